@@ -1,0 +1,57 @@
+"""Time as something one is handed: the system's clock, or one that a test moves by hand."""
+
+from __future__ import annotations
+
+import time
+from typing import Protocol
+
+CYCLE_TIME = 0.001  # [s] RCI manual 3.3: the control period is 1 ms.
+
+
+class Clock(Protocol):
+    """A monotonic clock one can wait on."""
+
+    def now(self) -> float:
+        """Returns the time, [s], from an arbitrary origin."""
+        ...
+
+    def sleep_until(self, deadline: float) -> None:
+        """Returns once `now()` has reached `deadline`; at once when it has passed already."""
+        ...
+
+
+class SystemClock:
+    """The monotonic clock of this machine."""
+
+    def now(self) -> float:
+        """Returns the monotonic time, [s]."""
+        return time.monotonic()
+
+    def sleep_until(self, deadline: float) -> None:
+        """Sleeps until `deadline`, [s]."""
+        remaining = deadline - time.monotonic()
+        if remaining > 0.0:
+            time.sleep(remaining)
+
+
+class ManualClock:
+    """A clock that moves only when told to, or when somebody sleeps on it.
+
+    Args:
+        start: First reading, [s].
+    """
+
+    def __init__(self, start: float = 0.0) -> None:
+        self._now = start
+
+    def now(self) -> float:
+        """Returns the time it was last moved to, [s]."""
+        return self._now
+
+    def advance(self, duration: float) -> None:
+        """Moves forward by `duration`, [s]."""
+        self._now += duration
+
+    def sleep_until(self, deadline: float) -> None:
+        """Moves to `deadline`, [s], unless it has passed."""
+        self._now = max(self._now, deadline)

@@ -1,0 +1,171 @@
+"""What can go wrong, as one family of exceptions built from facts.
+
+    RcilabError
+      ModelError                 an unknown robot, a description that is no arm
+      KinematicsError
+        UnreachableError         no joint angles give this pose
+        SingularError            the answer is not defined at this place
+      PlanningError
+      ConformanceError           .violations: the motion breaks a condition
+        CertificateError         .changed: judged, but not this motion, or not any more
+      ProtocolError
+        DecodeError              .offset: these bytes are no message
+        VersionMismatchError     .found, .expected
+      ConnectionLostError
+      CommandRejectedError       .command, .status: the controller said no
+      ControlError               .faults, .record: the controller stopped the motion
+      DeadlineError              also a TimeoutError
+      UsageError                 also a RuntimeError: wrong call order
+        InvalidValueError        also a ValueError: .name, .value
+
+Facts stay on the exception as attributes; nobody has to search a message for meaning.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+
+class RcilabError(Exception):
+    """The root of everything this package raises on purpose."""
+
+
+class ModelError(RcilabError):
+    """An unknown robot, or a description that is no arm."""
+
+
+class KinematicsError(RcilabError):
+    """A geometric question without an answer."""
+
+
+class UnreachableError(KinematicsError):
+    """No joint angles give this pose.
+
+    Attributes:
+        distance: How far the wrist centre is from the reachable shell, [m]; 0 when reach is not the reason.
+        joint: Number of the joint (from 1) whose limit is in the way, or None.
+        excess: How far that joint would have to pass its limit, [rad].
+    """
+
+    def __init__(
+        self, message: str, *, distance: float = 0.0, joint: int | None = None, excess: float = 0.0
+    ) -> None:
+        super().__init__(message)
+        self.distance = distance
+        self.joint = joint
+        self.excess = excess
+
+
+class SingularError(KinematicsError):
+    """The answer is not defined here: an axis is lost or an angle has no reference."""
+
+
+class PlanningError(RcilabError):
+    """No motion could be made from this request."""
+
+
+class ConformanceError(RcilabError):
+    """A motion breaks at least one necessary condition.
+
+    Attributes:
+        violations: The violated conditions, worst first.
+    """
+
+    def __init__(self, message: str, violations: Sequence[object] = ()) -> None:
+        super().__init__(message)
+        self.violations = tuple(violations)
+
+
+class CertificateError(ConformanceError):
+    """The motion was never judged, or something it was judged with has changed since.
+
+    Attributes:
+        changed: What differs: any of motion, model, limits, tool, load, safety box, start state.
+    """
+
+    def __init__(self, message: str, changed: Iterable[str] = ()) -> None:
+        super().__init__(message)
+        self.changed = tuple(changed)
+
+
+class ProtocolError(RcilabError):
+    """The other side does not speak as agreed."""
+
+
+class DecodeError(ProtocolError):
+    """These bytes are no message.
+
+    Attributes:
+        offset: Where the first wrong byte stands.
+    """
+
+    def __init__(self, message: str, offset: int = 0) -> None:
+        super().__init__(f"{message} (at byte {offset})")
+        self.offset = offset
+
+
+class VersionMismatchError(ProtocolError):
+    """Two sides of an interface were built from different versions of it."""
+
+    def __init__(self, what: str, found: object, expected: object) -> None:
+        super().__init__(
+            f"{what}: found version {found}, need {expected}; restart both sides from one rcilab"
+        )
+        self.found = found
+        self.expected = expected
+
+
+class ConnectionLostError(RcilabError):
+    """The robot, the controller or a process of ours is not there, or is there no longer."""
+
+
+class CommandRejectedError(RcilabError):
+    """The controller answered a command with a refusal.
+
+    Attributes:
+        command: Name of the command.
+        status: The status that came back.
+    """
+
+    def __init__(self, command: str, status: object, advice: str = "") -> None:
+        name = getattr(status, "name", str(status)).lower().replace("_", " ")
+        super().__init__(f"{command} was refused: {name}" + (f"; {advice}" if advice else ""))
+        self.command = command
+        self.status = status
+
+
+class ControlError(RcilabError):
+    """The controller reported faults and stopped the motion.
+
+    Attributes:
+        faults: The faults that were set, in wire order.
+        record: The last cycles before the stop, as recorded, or None.
+    """
+
+    def __init__(self, message: str, faults: Sequence[object] = (), record: object = None) -> None:
+        super().__init__(message)
+        self.faults = tuple(faults)
+        self.record = record
+
+
+class DeadlineError(RcilabError, TimeoutError):
+    """Something did not happen in time."""
+
+
+class UsageError(RcilabError, RuntimeError):
+    """A call in the wrong order or the wrong way."""
+
+
+class InvalidValueError(UsageError, ValueError):
+    """A value that cannot be used: wrong shape, not finite, out of range.
+
+    Attributes:
+        name: What the value is called.
+        value: The value as it came in.
+    """
+
+    def __init__(self, name: str, value: object, requirement: str) -> None:
+        text = repr(value)
+        super().__init__(f"{name}: {text if len(text) < 120 else text[:117] + '...'} {requirement}")
+        self.name = name
+        self.value = value

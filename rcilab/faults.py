@@ -1,0 +1,95 @@
+"""The twenty faults of the RCI, each with one name everywhere.
+
+A fault is a bit on the wire, a member here, a row in a report, a label in a plot and a lesson. Numbers, names,
+causes and remedies: RCI manual V1.3.1, section 4.6.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from enum import IntEnum
+
+
+class Fault(IntEnum):
+    """One error bit of the robot state; the value is the bit's place on the wire."""
+
+    ACTUAL_JOINT_POSITION_LIMITS_VIOLATION = 0
+    ACTUAL_CARTESIAN_POSITION_LIMITS_VIOLATION = 1
+    ACTUAL_CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION = 2
+    ACTUAL_JOINT_VELOCITY_LIMITS_VIOLATION = 3
+    ACTUAL_CARTESIAN_VELOCITY_LIMITS_VIOLATION = 4
+    ACTUAL_JOINT_ACCELERATION_LIMITS_VIOLATION = 5
+    ACTUAL_CARTESIAN_ACCELERATION_LIMITS_VIOLATION = 6
+    COMMAND_JOINT_POSITION_LIMITS_VIOLATION = 7
+    COMMAND_CARTESIAN_POSITION_LIMITS_VIOLATION = 8
+    COMMAND_CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION = 9
+    COMMAND_JOINT_VELOCITY_LIMITS_VIOLATION = 10
+    COMMAND_CARTESIAN_VELOCITY_LIMITS_VIOLATION = 11
+    COMMAND_JOINT_ACCELERATION_LIMITS_VIOLATION = 12
+    COMMAND_CARTESIAN_ACCELERATION_LIMITS_VIOLATION = 13
+    COMMAND_JOINT_ACCELERATION_DISCONTINUITY = 14
+    COLLISION = 15
+    CARTESIAN_POSITION_MOTION_GENERATOR_INVALID_FRAME = 16
+    COMMAND_TORQUE_DISCONTINUITY = 17
+    COMMAND_TORQUE_RANGE_VIOLATION = 18
+    INSTABILITY_DETECTION = 19
+
+    @property
+    def manual_name(self) -> str:
+        """The name as the manual prints it, such as `kCollision`."""
+        return "k" + "".join(word.capitalize() for word in self.name.split("_"))
+
+    @property
+    def cause(self) -> str:
+        """What the robot saw, in a few words (manual 4.6, second column)."""
+        return _CAUSES[self]
+
+    @property
+    def remedy(self) -> str:
+        """What to do about it, in one sentence (manual 4.6, third column)."""
+        return _REMEDIES.get(self, _SMOOTHNESS)
+
+
+FAULT_COUNT = len(Fault)
+
+
+def faults_from_bits(bits: Iterable[int]) -> tuple[Fault, ...]:
+    """Returns the faults whose error byte is set, in wire order."""
+    return tuple(Fault(place) for place, bit in enumerate(bits) if bit)
+
+
+_CAUSES = {
+    Fault.ACTUAL_JOINT_POSITION_LIMITS_VIOLATION: "a measured joint angle left its range",
+    Fault.ACTUAL_CARTESIAN_POSITION_LIMITS_VIOLATION: "the measured tool pose left the safety box",
+    Fault.ACTUAL_CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION: "the measured arm angle left its range",
+    Fault.ACTUAL_JOINT_VELOCITY_LIMITS_VIOLATION: "a measured joint velocity was too high",
+    Fault.ACTUAL_CARTESIAN_VELOCITY_LIMITS_VIOLATION: "the measured tool velocity was too high",
+    Fault.ACTUAL_JOINT_ACCELERATION_LIMITS_VIOLATION: "a measured joint acceleration was too high",
+    Fault.ACTUAL_CARTESIAN_ACCELERATION_LIMITS_VIOLATION: "the measured tool acceleration was too high",
+    Fault.COMMAND_JOINT_POSITION_LIMITS_VIOLATION: "a commanded joint angle is outside its range",
+    Fault.COMMAND_CARTESIAN_POSITION_LIMITS_VIOLATION: "the commanded tool pose is outside the safety box",
+    Fault.COMMAND_CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION: "the commanded arm angle is out of range",
+    Fault.COMMAND_JOINT_VELOCITY_LIMITS_VIOLATION: "a commanded joint velocity is too high",
+    Fault.COMMAND_CARTESIAN_VELOCITY_LIMITS_VIOLATION: "the commanded tool velocity is too high",
+    Fault.COMMAND_JOINT_ACCELERATION_LIMITS_VIOLATION: "a commanded joint acceleration is too high",
+    Fault.COMMAND_CARTESIAN_ACCELERATION_LIMITS_VIOLATION: "the commanded tool acceleration is too high",
+    Fault.COMMAND_JOINT_ACCELERATION_DISCONTINUITY: "a commanded joint acceleration jumps (jerk too high)",
+    Fault.COLLISION: "an external torque passed its collision threshold",
+    Fault.CARTESIAN_POSITION_MOTION_GENERATOR_INVALID_FRAME: "the arm is at a singularity or the pose is no pose",
+    Fault.COMMAND_TORQUE_DISCONTINUITY: "a commanded torque jumps (torque rate too high)",
+    Fault.COMMAND_TORQUE_RANGE_VIOLATION: "a commanded torque is too high",
+    Fault.INSTABILITY_DETECTION: "too many commands in a row were lost",
+}
+
+_SMOOTHNESS = (
+    "check that the planned motion is continuous up to its acceleration and inside the limits of section 4.4; "
+    "lower the speed or filter it where it is not"
+)
+
+_REMEDIES = {
+    Fault.COLLISION: "look for contact; if it fires without contact, raise the collision thresholds "
+    "(an emergency stop can also raise this bit)",
+    Fault.CARTESIAN_POSITION_MOTION_GENERATOR_INVALID_FRAME: "keep Cartesian motions away from singular poses",
+    Fault.INSTABILITY_DETECTION: "look at the network and the real-time set-up, or raise the packet-loss "
+    "threshold (usually 10 to 20); an emergency stop can also raise this bit",
+}

@@ -1,0 +1,26 @@
+"""The arms this package knows, one data file each."""
+
+from __future__ import annotations
+
+from importlib import import_module
+
+from rcilab.errors import ModelError
+from rcilab.robots.description import DhRow, Link, RobotDescription
+
+__all__ = ["ROBOT_NAMES", "DhRow", "Link", "RobotDescription", "describe_robot"]
+
+_MODULES = {"xMatePro3": "xmate_pro3", "xMatePro7": "xmate_pro7", "xMate3": "xmate3", "xMate7": "xmate7"}
+
+ROBOT_NAMES = tuple(_MODULES)
+
+
+def describe_robot(name: str) -> RobotDescription:
+    """Returns the description of a robot by name, in any case.
+
+    Raises:
+        ModelError: No robot has this name; the message lists those that exist.
+    """
+    for known, module in _MODULES.items():
+        if known.lower() == str(name).lower():
+            return import_module(f"rcilab.robots.{module}").DESCRIPTION
+    raise ModelError(f"unknown robot {name!r}; known robots: {', '.join(ROBOT_NAMES)}")

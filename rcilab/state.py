@@ -1,0 +1,107 @@
+"""The state an RCI robot reports every millisecond, and the vocabulary of its modes.
+
+Names follow RCI manual V1.3.1, section 3.2.2; a frame in a name reads `T_base_tool`, the pose of the tool in the
+base. Vectors have one element a joint of the arm; the wire's unused seventh element of a 6-axis arm is gone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+from rcilab.arrays import Array, JointVector, Matrix
+from rcilab.faults import Fault
+
+
+class ControllerMode(IntEnum):
+    """How the controller follows commands (manual 3.1.1)."""
+
+    JOINT_POSITION = 0
+    CARTESIAN_POSITION = 1
+    JOINT_IMPEDANCE = 2
+    CARTESIAN_IMPEDANCE = 3
+    TORQUE = 4
+    OTHER = 5
+
+
+class MotionGeneratorMode(IntEnum):
+    """What the commands of a motion are, as the state numbers it (a StartMove request numbers it otherwise)."""
+
+    IDLE = 0
+    JOINT_POSITION = 1
+    JOINT_VELOCITY = 2
+    CARTESIAN_POSITION = 3
+    CARTESIAN_VELOCITY = 4
+
+
+class RobotMode(IntEnum):
+    """What the robot as a whole is doing."""
+
+    OTHER = 0
+    IDLE = 1
+    MOVE = 2
+    GUIDING = 3
+    REFLEX = 4
+    USER_STOPPED = 5
+    AUTOMATIC_ERROR_RECOVERY = 6
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class RobotState:
+    """Everything the robot reports in one cycle. Measured values plain, commanded ones end in `_c`."""
+
+    message_id: int
+    """Number of the controller cycle; the command that answers this state carries it back."""
+    q: JointVector
+    """Joint angles, [rad]."""
+    q_c: JointVector
+    """Commanded joint angles, [rad]."""
+    dq: JointVector
+    """Joint velocities, [rad/s] (manual: dq_m)."""
+    dq_c: JointVector
+    """Commanded joint velocities, [rad/s]."""
+    ddq_c: JointVector
+    """Commanded joint accelerations, [rad/s^2]."""
+    T_base_tool: Matrix
+    """Pose of the tool in base, (4, 4), [m] (manual: toolTobase_pos_m)."""
+    T_base_tool_c: Matrix
+    """Commanded pose of the tool in base, (4, 4), [m]."""
+    tool_velocity_c: Array
+    """Commanded twist of the tool in base axes, linear first, (6,), [m/s, rad/s]."""
+    tool_acceleration_c: Array
+    """Commanded acceleration of the tool in base axes, linear first, (6,), [m/s^2, rad/s^2]."""
+    psi: float
+    """Arm angle, [rad]."""
+    psi_c: float
+    """Commanded arm angle, [rad]."""
+    dpsi_c: float
+    """Commanded arm-angle velocity, [rad/s]."""
+    ddpsi_c: float
+    """Commanded arm-angle acceleration, [rad/s^2]."""
+    tau: JointVector
+    """Joint torques, [N m]."""
+    tau_filtered: JointVector
+    """Filtered joint torques, [N m]."""
+    tau_c: JointVector
+    """Commanded joint torques, [N m]."""
+    dtau_c: JointVector
+    """Rate of the commanded joint torques, [N m/s] (manual: tau_vel_c)."""
+    tau_ext_in_base: Array
+    """External force and moment in the base frame, (6,), [N, N m]."""
+    tau_ext_in_stiff: Array
+    """External force and moment in the force-control frame, (6,), [N, N m]."""
+    theta: JointVector
+    """Motor positions, [rad]."""
+    dtheta: JointVector
+    """Motor velocities, [rad/s]."""
+    motor_tau: JointVector
+    """Motor torques, [N m]."""
+    motor_tau_filtered: JointVector
+    """Filtered motor torques, [N m]."""
+    faults: tuple[Fault, ...]
+    """The error bits that are set, in wire order."""
+    success_rate: float
+    """Share of the last commands that arrived in time, 0 to 1."""
+    motion_generator_mode: MotionGeneratorMode
+    controller_mode: ControllerMode
+    robot_mode: RobotMode
