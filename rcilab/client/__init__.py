@@ -1,1 +1,23 @@
-"""..."""
+"""Our end of the wire: connect to a controller, read its states, run motions and callbacks at 1 kHz."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rcilab.client.run import Run as Run
+    from rcilab.client.session import RobotSession as RobotSession
+    from rcilab.client.session import connect as connect
+
+_HOME = {"connect": "session", "RobotSession": "session", "Run": "run"}
+
+__all__ = ["RobotSession", "Run", "connect"]
+
+
+def __getattr__(name: str) -> object:
+    """Imports a public name when it is first asked for: the control process must not pay for what it does not use."""
+    from importlib import import_module
+
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)

@@ -1,1 +1,24 @@
-"""..."""
+"""The control process and its supervisor: shared memory, requests, start, watch, stop, restart."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rcilab.supervisor.simulate import simulate as simulate
+    from rcilab.supervisor.status import SupervisorStatus as SupervisorStatus
+    from rcilab.supervisor.supervisor import Supervisor as Supervisor
+    from rcilab.supervisor.supervisor import Ticket as Ticket
+
+_HOME = {"Supervisor": "supervisor", "Ticket": "supervisor", "SupervisorStatus": "status", "simulate": "simulate"}
+
+__all__ = ["Supervisor", "SupervisorStatus", "Ticket", "simulate"]
+
+
+def __getattr__(name: str) -> object:
+    """Imports a public name when it is first asked for: the control process must not pay for its parent's imports."""
+    from importlib import import_module
+
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)

@@ -1,0 +1,118 @@
+"""The flight recorder: one fixed-size row for every cycle, in memory that was allocated beforehand."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+RECORD_TIME = 60.0  # [s] of cycles that a recorder keeps unless told otherwise; a choice.
+
+
+def cycle_dtype(n: int) -> np.dtype[np.void]:
+    """Returns the layout of one recorded cycle of an arm with n joints.
+
+    ======================  ==================================================================================
+    message_id              number of the controller cycle
+    t                       time since the first command of the motion, in controller cycles, [s]; NaN outside
+    received_ns, sent_ns    monotonic stamps of the state's arrival and of the answer (0: not answered), [ns]
+    lateness                how late the cycle was handled, against the robot's own 1 ms grid, [s]
+    success_rate            share of commands that arrived in time, as the controller reports it, 0 to 1
+    q, q_c, dq              measured and commanded joint angles [rad], measured velocities [rad/s], shape (n,)
+    command                 joint angles sent in answer, [rad], shape (n,); NaN when nothing was sent
+    faults                  the error bits as one number, bit k = `Fault(k)`
+    lost                    controller cycles between the previous row and this one that never reached us
+    robot_mode, controller_mode, motion_generator_mode    as on the wire
+    ======================  ==================================================================================
+    """
+    vector = ("<f8", (n,))
+    return np.dtype(
+        [
+            ("message_id", "<u8"),
+            ("t", "<f8"),
+            ("received_ns", "<i8"),
+            ("sent_ns", "<i8"),
+            ("lateness", "<f8"),
+            ("success_rate", "<f8"),
+            ("q", *vector),
+            ("q_c", *vector),
+            ("dq", *vector),
+            ("command", *vector),
+            ("faults", "<u4"),
+            ("lost", "<u4"),
+            ("robot_mode", "u1"),
+            ("controller_mode", "u1"),
+            ("motion_generator_mode", "u1"),
+            ("reserved", "u1", (5,)),
+        ]
+    )
+
+
+class Recorder:
+    """A ring of cycles. Owned by the thread that runs the loop; others read copies.
+
+    Args:
+        n: Number of joints.
+        capacity: Number of rows; when it is full the oldest row is overwritten.
+        buffer: Writable memory to use, such as a piece of a shared block; None allocates it.
+    """
+
+    def __init__(
+        self, n: int, capacity: int = round(RECORD_TIME / 1e-3), buffer: memoryview | bytearray | None = None
+    ) -> None:
+        dtype = cycle_dtype(n)
+        self.n = n
+        self.capacity = capacity
+        self.count = 0
+        """Rows written since the beginning; the newest is number `count - 1`."""
+        self._size = dtype.itemsize
+        memory = bytearray(capacity * self._size) if buffer is None else buffer
+        self._memory = memory
+        self._rows: NDArray[np.void] = np.frombuffer(memory, dtype=dtype, count=capacity)
+        self._pack = struct.Struct(f"<Qdqqdd{4 * n}dIIBBB5x").pack_into
+
+    def write(
+        self,
+        message_id: int,
+        t: float,
+        received_ns: int,
+        sent_ns: int,
+        lateness: float,
+        success_rate: float,
+        q: Sequence[float],
+        q_c: Sequence[float],
+        dq: Sequence[float],
+        command: Sequence[float],
+        faults: int,
+        lost: int,
+        modes: Sequence[int],
+    ) -> None:
+        """Writes one row; see `cycle_dtype` for the meaning. `modes`: robot, controller, motion generator."""
+        self._pack(
+            self._memory,
+            self.count % self.capacity * self._size,
+            message_id, t, received_ns, sent_ns, lateness, success_rate,
+            *q, *q_c, *dq, *command,
+            faults, lost, *modes,
+        )  # fmt: skip
+        self.count += 1
+
+    @property
+    def truncated(self) -> bool:
+        """Whether the oldest rows have been overwritten."""
+        return self.count > self.capacity
+
+    def rows(self, start: int = 0) -> NDArray[np.void]:
+        """Returns a copy of the rows that are still there, oldest first.
+
+        Args:
+            start: Number of the first row wanted; older ones are left out.
+        """
+        first = max(start, self.count - self.capacity, 0)
+        return self._rows[np.arange(first, self.count) % self.capacity]
+
+    def last(self, count: int) -> NDArray[np.void]:
+        """Returns a copy of the newest `count` rows (fewer when there are fewer), oldest first."""
+        return self.rows(self.count - count)

@@ -1,0 +1,137 @@
+"""What the supervisor tells the rest of the program: one frozen snapshot of arm, processes and timing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rcilab.arrays import JointVector
+from rcilab.client.recorder import cycle_dtype
+from rcilab.faults import Fault
+from rcilab.state import ControllerMode, RobotMode
+
+__all__ = ["MESSAGES", "PHASES", "Incident", "Lateness", "Phase", "SupervisorStatus", "cycle_dtype"]
+
+Phase: TypeAlias = Literal["starting", "connecting", "idle", "moving", "stopping", "fault", "lost", "crashed", "closed"]
+
+PHASES: tuple[Phase, ...] = (
+    "starting",  # our processes are being started
+    "connecting",  # the control process is trying to reach the controller
+    "idle",  # states arrive; the arm stands still and takes requests
+    "moving",  # a motion is being streamed
+    "stopping",  # a motion is being brought to rest before its end
+    "fault",  # the controller has error bits set; recover() leads out
+    "lost",  # no states arrive, or the controller closed the connection; reconnect() tries again
+    "crashed",  # a process of ours has died; it is started again, or restart() does it
+    "closed",  # close() was called, or start() never was
+)
+
+MESSAGES: dict[str, str] = {
+    "closed": "The supervisor is closed.",
+    "starting": "Starting the control process.",
+    "starting.controller": "Starting the virtual controller.",
+    "connecting": "Connecting to {address}.",
+    "idle": "Ready.",
+    "idle.unpowered": "Ready; motor power is off.",
+    "idle.arrived": "The motion is finished.",
+    "idle.stopped": "The motion was stopped on request; the arm stands still.",
+    "idle.operator": "The motion was stopped: nobody was at the controls for {seconds:g} s.",
+    "idle.failed": "The last request failed: {error}",
+    "moving": "The arm is moving.",
+    "stopping": "The arm is being brought to rest.",
+    "stopping.operator": "Nobody is at the controls: the arm is being brought to rest.",
+    "fault": "The controller stopped the arm: {faults}. Recover leads out.",
+    "lost.unreachable": "{error}",
+    "lost.silent": "{address} has stopped sending states; reconnect tries again.",
+    "crashed.controller": "The virtual controller has died ({how}); {next}.",
+    "crashed.worker": "The control process has died ({how}); {next}.",
+    "crashed.frozen": "The control process has not answered for {seconds:.1f} s; {next}.",
+}
+"""Every message by its code, for translation; names in braces are filled in."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Incident:
+    """Something that went wrong and stays worth saying after the phase has moved on."""
+
+    number: int
+    """Counts up by one for every incident since the start; compare it to notice a new one."""
+    code: str
+    """Key of `MESSAGES`."""
+    message: str
+    """One English sentence."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Lateness:
+    """How late cycles were handled against the robot's own 1 ms grid, since the connection was made, [us].
+
+    Percentiles come from a logarithmic histogram and are right to about 4 %; the maximum is exact.
+    """
+
+    p50: float = 0.0
+    p99: float = 0.0
+    p999: float = 0.0
+    max: float = 0.0
+    cycles: int = 0
+    """Cycles counted."""
+    edges: NDArray[np.float64] = field(default_factory=lambda: np.zeros(1))
+    """Edges of the histogram's bins, shape (B + 1,), [us]."""
+    histogram: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    """Cycles a bin, shape (B,)."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class SupervisorStatus:
+    """One look at everything. Cheap: meant to be taken at the display's rate."""
+
+    phase: Phase = "closed"
+    """What is going on, see `PHASES`."""
+    code: str = "closed"
+    """Stable id of the message, a key of `MESSAGES`."""
+    message: str = MESSAGES["closed"]
+    """One English sentence for the status line."""
+    incident: Incident | None = None
+    """The latest thing that went wrong, also after it was repaired; None when nothing did."""
+    target: str = "virtual"
+    """"virtual", or the address it was started with."""
+    address: str | None = None
+    """Where the controller really is, such as rci://127.0.0.2:40123; None while it has none."""
+    q: JointVector | None = None
+    """Measured joint angles, shape (n,), [rad]; None as long as no state has arrived."""
+    q_c: JointVector | None = None
+    """Commanded joint angles, shape (n,), [rad]; plan the next motion from here."""
+    dq: JointVector | None = None
+    """Measured joint velocities, shape (n,), [rad/s]."""
+    robot_mode: RobotMode | None = None
+    controller_mode: ControllerMode | None = None
+    faults: tuple[Fault, ...] = ()
+    """Error bits that are set."""
+    powered: bool | None = None
+    """Motor power; None while unknown."""
+    success_rate: float = 0.0
+    """Share of commands that arrived in time, as the controller reports it, 0 to 1."""
+    rate_hz: float = 0.0
+    """States received over the last second, [1/s]."""
+    message_id: int = 0
+    """Number of the newest controller cycle."""
+    scheduling: Literal["SCHED_FIFO", "normal"] = "normal"
+    """How the control process is scheduled."""
+    memory_locked: bool = False
+    """Whether the control process's memory is kept from being paged out."""
+    late_cycles: int = 0
+    """Cycles handled more than 1 ms late since the connection was made."""
+    lost_cycles: int = 0
+    """Controller cycles of which no state reached us, since the connection was made."""
+    lateness: Lateness = field(default_factory=Lateness)
+    motion_time: float | None = None
+    """Time since the first command of the running (or last) motion, [s]; None before the first one."""
+    motion_duration: float | None = None
+    """How long that motion is planned to take, [s]."""
+    controller_pid: int | None = None
+    """Process id of the virtual controller; None when it is not ours or not running."""
+    worker_pid: int | None = None
+    """Process id of the control process."""
