@@ -1,0 +1,92 @@
+from __future__ import annotations
+
+import argparse
+import os
+import socket
+from pathlib import Path
+
+import pytest
+
+from rcilab.cli import doctor
+
+
+@pytest.mark.parametrize("kind", [socket.SOCK_STREAM, socket.SOCK_DGRAM])
+def test_a_taken_port_is_noted_with_the_way_round_it(kind: socket.SocketKind) -> None:
+    with socket.socket(socket.AF_INET, kind) as taken:
+        taken.bind(("127.0.0.1", 0))
+        finding = doctor.check_port("127.0.0.1", taken.getsockname()[1])
+    assert finding.verdict == "note"
+    assert ("TCP" if kind == socket.SOCK_STREAM else "UDP") in finding.value
+    assert "--port 0" in finding.advice
+
+
+def test_a_port_that_was_let_go_is_free() -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as taken:
+        taken.bind(("127.0.0.1", 0))
+        port = taken.getsockname()[1]
+    assert doctor.check_port("127.0.0.1", port).verdict == "ok"
+
+
+def test_an_address_that_is_not_ours_is_bad_and_says_how_to_get_it() -> None:
+    finding = doctor.check_address("192.0.2.1")  # Reserved for documentation: no machine has it.
+    assert finding.verdict == "bad"
+    assert "ip addr add" in finding.advice
+
+
+def test_an_old_python_is_bad() -> None:
+    finding = doctor.check_python((3, 10, 9))
+    assert finding.verdict == "bad"
+    assert finding.value == "3.10.9"
+    assert "3.11" in finding.advice
+
+
+def test_a_new_python_is_good() -> None:
+    assert doctor.check_python((3, 13, 0)).verdict == "ok"
+
+
+@pytest.mark.parametrize(
+    ("bounds", "verdict"), [("", "ok"), (">=1,<99", "ok"), (">=99", "bad"), ("<1", "bad"), (">=1.0.0.0", "ok")]
+)
+def test_a_package_is_judged_by_its_bounds(bounds: str, verdict: str) -> None:
+    assert doctor.check_package("numpy", bounds).verdict == verdict
+
+
+def test_a_missing_package_is_bad_unless_it_is_optional() -> None:
+    assert doctor.check_package("no-such-package-at-all", ">=1").verdict == "bad"
+    assert doctor.check_package("no-such-package-at-all", ">=1", optional=True).verdict == "note"
+
+
+def test_every_runtime_package_of_ours_is_looked_at() -> None:
+    names = [finding.name for finding in doctor.check_packages("rcilab")]
+    assert {"numpy", "pin", "ruckig", "mujoco", "viser", "yourdfpy", "meshcat", "jupyterlab"} <= set(names)
+    assert "pytest" not in names
+
+
+def test_one_core_is_noted() -> None:
+    assert doctor.check_cores(1).verdict == "note"
+    assert doctor.check_cores(2).verdict == "ok"
+
+
+@pytest.mark.parametrize(("flag", "verdict"), [("1\n", "ok"), ("0\n", "note"), (None, "note")])
+def test_a_kernel_is_real_time_by_its_own_word(tmp_path: Path, flag: str | None, verdict: str) -> None:
+    file = tmp_path / "realtime"
+    if flag is not None:
+        file.write_text(flag, encoding="ascii")
+    assert doctor.check_kernel(file).verdict == verdict
+
+
+def test_no_browser_is_noted() -> None:
+    assert doctor.check_browser(("no-such-browser-at-all",)).verdict == "note"
+
+
+def test_asking_for_real_time_leaves_this_process_as_it_was() -> None:
+    before = os.sched_getscheduler(0)
+    assert doctor.check_fifo().verdict in ("ok", "note")
+    assert os.sched_getscheduler(0) == before
+
+
+def test_the_exit_code_says_whether_something_is_bad(capsys: pytest.CaptureFixture[str]) -> None:
+    code = doctor.run(argparse.Namespace())
+    printed = capsys.readouterr().out
+    assert code == (1 if any(line.startswith("bad") for line in printed.splitlines()) else 0)
+    assert len(printed.splitlines()) >= 15
