@@ -1,1 +1,69 @@
+"""A lab for ROKAE xMate arms: see every limit before anything moves, then run it at 1 kHz.
 
+The names below are the ones a notebook needs; each is loaded when it is first used.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rcilab.client.run import Run as Run
+    from rcilab.client.session import RobotSession as RobotSession
+    from rcilab.client.session import connect as connect
+    from rcilab.command import CartesianPosition as CartesianPosition
+    from rcilab.command import JointPosition as JointPosition
+    from rcilab.command import JointTorque as JointTorque
+    from rcilab.conformance.check import check as check
+    from rcilab.conformance.report import Report as Report
+    from rcilab.dynamics.payload import Payload as Payload
+    from rcilab.errors import RcilabError as RcilabError
+    from rcilab.faults import Fault as Fault
+    from rcilab.model import RobotModel as RobotModel
+    from rcilab.model import load_model as load_model
+    from rcilab.motion.joint import plan_joint as plan_joint
+    from rcilab.motion.motion import Motion as Motion
+    from rcilab.notebook.plot import plot as plot
+    from rcilab.notebook.preview import preview as preview
+    from rcilab.spatial import Pose as Pose
+    from rcilab.supervisor.simulate import simulate as simulate
+
+__version__ = "0.1.0"
+
+_HOMES = {
+    "CartesianPosition": "rcilab.command",
+    "Fault": "rcilab.faults",
+    "JointPosition": "rcilab.command",
+    "JointTorque": "rcilab.command",
+    "Motion": "rcilab.motion.motion",
+    "Payload": "rcilab.dynamics.payload",
+    "Pose": "rcilab.spatial",
+    "RcilabError": "rcilab.errors",
+    "Report": "rcilab.conformance.report",
+    "RobotModel": "rcilab.model",
+    "RobotSession": "rcilab.client.session",
+    "Run": "rcilab.client.run",
+    "check": "rcilab.conformance.check",
+    "connect": "rcilab.client.session",
+    "load_model": "rcilab.model",
+    "plan_joint": "rcilab.motion.joint",
+    "plot": "rcilab.notebook.plot",
+    "preview": "rcilab.notebook.preview",
+    "simulate": "rcilab.supervisor.simulate",
+}
+
+__all__ = sorted(_HOMES)  # pyright: ignore[reportUnsupportedDunderAll]
+
+
+def __getattr__(name: str) -> object:
+    """Loads a public name on first use."""
+    if name not in _HOMES:
+        raise AttributeError(f"module 'rcilab' has no name {name!r}; it has: {', '.join(__all__)}")
+    value = getattr(import_module(_HOMES[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return __all__

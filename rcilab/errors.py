@@ -47,9 +47,7 @@ class UnreachableError(KinematicsError):
         excess: How far that joint would have to pass its limit, [rad].
     """
 
-    def __init__(
-        self, message: str, *, distance: float = 0.0, joint: int | None = None, excess: float = 0.0
-    ) -> None:
+    def __init__(self, message: str, *, distance: float = 0.0, joint: int | None = None, excess: float = 0.0) -> None:
         super().__init__(message)
         self.distance = distance
         self.joint = joint
@@ -108,9 +106,7 @@ class VersionMismatchError(ProtocolError):
     """Two sides of an interface were built from different versions of it."""
 
     def __init__(self, what: str, found: object, expected: object) -> None:
-        super().__init__(
-            f"{what}: found version {found}, need {expected}; restart both sides from one rcilab"
-        )
+        super().__init__(f"{what}: found version {found}, need {expected}; restart both sides from one rcilab")
         self.found = found
         self.expected = expected
 

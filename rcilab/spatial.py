@@ -77,7 +77,8 @@ class Pose:
         if np.linalg.det(rotation) < 0.0:
             raise InvalidValueError("pose", rotation.tolist(), "is a reflection, not a rotation")
         x, y, z = m[:3, 3].tolist()
-        return cls.from_parts(tuple(rotation.ravel().tolist()), (x, y, z))
+        a, b, c, d, e, f, g, h, i = rotation.ravel().tolist()
+        return cls.from_parts((a, b, c, d, e, f, g, h, i), (x, y, z))
 
     @classmethod
     def from_row_major(cls, numbers: Sequence[float]) -> Pose:
@@ -172,19 +173,15 @@ class Pose:
 
     def is_close(self, other: Pose, tolerance: float = 1e-9) -> bool:
         """Returns whether no element of the two transforms differs by more than `tolerance`."""
-        return all(
-            abs(x - y) <= tolerance for x, y in zip(self._r + self._p, other._r + other._p, strict=True)
-        )
+        return all(abs(x - y) <= tolerance for x, y in zip(self._r + self._p, other._r + other._p, strict=True))
 
     def __repr__(self) -> str:
         x, y, z = self._p
         roll, pitch, yaw = (math.degrees(angle) for angle in rpy_from_rotation(self._r))
-        return (
-            f"Pose(x={x:.4f}, y={y:.4f}, z={z:.4f} m; roll={roll:.2f}, pitch={pitch:.2f}, yaw={yaw:.2f} deg)"
-        )
+        return f"Pose(x={x:.4f}, y={y:.4f}, z={z:.4f} m; roll={roll:.2f}, pitch={pitch:.2f}, yaw={yaw:.2f} deg)"
 
 
-IDENTITY = Pose()
+IDENTITY = Pose.from_parts((1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
 
 
 def rotation_from_wxyz(wxyz: Sequence[float]) -> Rotation9:

@@ -1,1 +1,46 @@
-"""..."""
+"""The command line: `rcilab [COMMAND]`, the workbench when no command is named."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+
+from rcilab.errors import RcilabError
+
+COMMANDS = ("workbench", "controller", "run", "check", "urdf", "mjcf", "lab", "doctor", "bench")
+"""Each is a module here with `add_parser(subparsers)` and `run(args) -> int`."""
+
+_USAGE = 2  # Exit status of a request that cannot be served, as argparse uses it.
+_INTERRUPTED = 130  # Exit status after Ctrl-C, as shells use it.
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Runs one command and returns its exit status; an error of ours is one line on stderr."""
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    if not arguments or (arguments[0].startswith("-") and arguments[0] not in ("-h", "--help", "--version")):
+        arguments.insert(0, "workbench")
+    try:
+        args = _build_parser().parse_args(arguments)
+        return int(args.run(args) or 0)
+    except RcilabError as error:
+        print(f"rcilab: {error}", file=sys.stderr)
+        return _USAGE
+    except KeyboardInterrupt:
+        return _INTERRUPTED
+
+
+def _build_parser() -> argparse.ArgumentParser:
+    from rcilab import __version__
+
+    parser = argparse.ArgumentParser(
+        prog="rcilab",
+        description="A lab for ROKAE xMate arms. Without a command it opens the workbench in the browser.",
+    )
+    parser.add_argument("--version", action="version", version=f"rcilab {__version__}")
+    subparsers = parser.add_subparsers(metavar="COMMAND", required=True)
+    for command in COMMANDS:
+        module = import_module(f"rcilab.cli.{command}")
+        module.add_parser(subparsers)
+    return parser

@@ -1,1 +1,1 @@
-"""..."""
+"""Forces: what torques a motion takes."""

@@ -1,0 +1,41 @@
+"""A load at the flange."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from rcilab.arrays import Matrix, Vector3, as_vector, frozen
+from rcilab.errors import InvalidValueError
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Payload:
+    """A rigid body fixed to the flange.
+
+    Raises:
+        InvalidValueError: The mass is negative, the inertia is no symmetric 3 x 3 tensor, or something is not finite.
+    """
+
+    mass: float = 0.0
+    """[kg]."""
+    center_of_mass: Vector3 = field(default_factory=lambda: np.zeros(3))
+    """In the flange frame, shape (3,), [m]."""
+    inertia: Matrix = field(default_factory=lambda: np.zeros((3, 3)))
+    """About the centre of mass, flange axes, shape (3, 3), [kg m^2]."""
+
+    def __post_init__(self) -> None:
+        """Checks the values and makes them read-only."""
+        mass = float(as_vector([self.mass], 1, "load mass", "kg")[0])
+        if mass < 0.0:
+            raise InvalidValueError("load mass", mass, "must not be negative, [kg]")
+        inertia = as_vector(np.ravel(self.inertia), 9, "load inertia", "kg m^2").reshape(3, 3)
+        if np.abs(inertia - inertia.T).max() > 1e-9 * max(1.0, float(np.abs(inertia).max())):
+            raise InvalidValueError("load inertia", inertia.tolist(), "must be symmetric")
+        object.__setattr__(self, "mass", mass)
+        object.__setattr__(self, "center_of_mass", as_vector(self.center_of_mass, 3, "load centre of mass", "m"))
+        object.__setattr__(self, "inertia", frozen(inertia))
+
+
+NO_LOAD = Payload()

@@ -1,0 +1,68 @@
+"""The arm angle psi of a 7-axis arm: where the elbow is on its circle around the shoulder-wrist line.
+
+With S the shoulder, E the elbow, W the wrist centre and u = unit(W - S), psi is the right-hand angle about u from the
+component of base +z perpendicular to u to the component of (E - S) perpendicular to u. At psi = 0 the elbow is in the
+vertical plane on the upper side; at +-pi on the lower side. The vendor's controller counts it in the same way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import atan2, cos, hypot, sin, sqrt
+from typing import TypeAlias
+
+from rcilab.errors import SingularError
+
+Vec: TypeAlias = tuple[float, float, float]
+
+_VERTICAL = 1e-9  # sin of the angle between SW and the vertical below which psi has no reference direction.
+_STRETCHED = 1e-12  # Elbow distance from SW, relative to the arm's length, below which psi has no elbow to measure.
+
+
+def arm_angle(upper: float, fore: float, q: Sequence[float]) -> float:
+    """Returns the arm angle of a joint configuration, [rad] in (-pi, pi].
+
+    Args:
+        upper: d3, shoulder to elbow, [m].
+        fore: d5, elbow to wrist, [m].
+        q: Joint angles of a 7-axis arm as plain floats, [rad]; only the first four matter.
+
+    Raises:
+        SingularError: The shoulder-wrist line is vertical, or the arm is stretched.
+    """
+    c1, s1, c2, s2 = cos(q[0]), sin(q[0]), cos(q[1]), sin(q[1])
+    c3, s3, c4, s4 = cos(q[2]), sin(q[2]), cos(q[3]), sin(q[3])
+    # Elbow from shoulder, and wrist from elbow first in the frame of link 2, then in base.
+    ex, ey, ez = upper * c1 * s2, upper * s1 * s2, upper * c2
+    fx, fy, fz = fore * c3 * s4, fore * s3 * s4, fore * c4
+    wx = ex + c1 * (c2 * fx + s2 * fz) - s1 * fy
+    wy = ey + s1 * (c2 * fx + s2 * fz) + c1 * fy
+    wz = ez - s2 * fx + c2 * fz
+    length = sqrt(wx * wx + wy * wy + wz * wz)
+    if length == 0.0:
+        raise SingularError("arm angle: the wrist is on the shoulder, so there is no shoulder-wrist line")
+    u = (wx / length, wy / length, wz / length)
+    reference, across = reference_frame(u)
+    along, side = _dot((ex, ey, ez), reference), _dot((ex, ey, ez), across)
+    if hypot(along, side) < _STRETCHED * (upper + fore):
+        raise SingularError("arm angle: the arm is stretched (q4 = 0), the elbow is on the shoulder-wrist line")
+    return atan2(side, along)
+
+
+def reference_frame(u: Vec) -> tuple[Vec, Vec]:
+    """Returns the directions of psi = 0 and psi = +90 degrees, perpendicular to the unit vector u.
+
+    Raises:
+        SingularError: u is vertical; then no side of the line is the upper one.
+    """
+    horizontal = hypot(u[0], u[1])
+    if horizontal < _VERTICAL:
+        raise SingularError(
+            "arm angle: shoulder and wrist are above each other, so no direction around that line is the upper one"
+        )
+    cx, cy = u[0] / horizontal, u[1] / horizontal
+    return (-u[2] * cx, -u[2] * cy, horizontal), (cy, -cx, 0.0)
+
+
+def _dot(a: Vec, b: Vec) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

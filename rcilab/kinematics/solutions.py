@@ -1,0 +1,107 @@
+"""What the inverse answers with: every analytic branch, and which of them the arm can stand in."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import degrees, tau
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rcilab.arrays import JointVector, as_vector, frozen
+from rcilab.errors import UnreachableError
+from rcilab.limits import JointLimits
+
+
+@dataclass(frozen=True, slots=True)
+class Branch:
+    """One analytic solution, inside the joint limits or not."""
+
+    q: tuple[float, ...]
+    """Joint angles, [rad]."""
+    joint: int | None
+    """Number (from 1) of the joint that is furthest beyond its limit; None inside all limits."""
+    excess: float
+    """How far that joint is beyond its limit, [rad]; 0 inside all limits."""
+
+    @property
+    def ok(self) -> bool:
+        """Whether every joint is inside its limits."""
+        return self.joint is None
+
+
+class Solutions(Sequence[JointVector]):
+    """The joint configurations that put the tool at a pose, those inside the joint limits.
+
+    Iterating gives arrays of shape (n,), [rad]. `all` also holds the branches that a limit forbids.
+    """
+
+    __slots__ = ("_feasible", "_lower", "_upper", "all", "psi")
+
+    def __init__(
+        self, branches: Sequence[tuple[float, ...]], lower: list[float], upper: list[float], psi: float | None
+    ) -> None:
+        self.all = tuple(_judge(q, lower, upper) for q in branches)
+        self.psi = psi
+        self._lower, self._upper = lower, upper
+        self._feasible = frozen([branch.q for branch in self.all if branch.joint is None]).reshape(-1, len(lower))
+
+    def __len__(self) -> int:
+        return len(self._feasible)
+
+    def __getitem__(self, index):  # type: ignore[no-untyped-def]  # Sequence's overloads add nothing here.
+        return self._feasible[index]
+
+    def __iter__(self) -> Iterator[JointVector]:
+        return iter(self._feasible)
+
+    def nearest(self, q: ArrayLike) -> JointVector:
+        """Returns the solution closest to q, [rad], shape (n,).
+
+        A joint whose range is longer than a full turn may be moved by full turns to come closer.
+
+        Raises:
+            UnreachableError: No branch is inside the joint limits.
+        """
+        if not len(self._feasible):
+            raise self.refusal()
+        here = as_vector(q, len(self._lower), "q", "rad")
+        turns = np.round((here - self._feasible) / tau) * tau
+        turned = self._feasible + turns
+        inside = (turned > self._lower) & (turned < self._upper)
+        candidates = np.where(inside, turned, self._feasible)
+        return frozen(candidates[np.argmin(((candidates - here) ** 2).sum(axis=1))])
+
+    def refusal(self) -> UnreachableError:
+        """Returns the error that says which joint limit is in the way, for the branch that comes closest."""
+        best = min(self.all, key=lambda branch: branch.excess)
+        joint = best.joint or 1
+        angle, lower, upper = best.q[joint - 1], self._lower[joint - 1], self._upper[joint - 1]
+        return UnreachableError(
+            f"joint {joint} would have to be at {degrees(angle):.1f} deg, {degrees(best.excess):.1f} deg beyond its "
+            f"limit ({degrees(lower):.0f} to {degrees(upper):.0f} deg), in the best of {len(self.all)} branches; "
+            "move the target" + ("" if self.psi is None else " or change the arm angle"),
+            joint=joint,
+            excess=best.excess,
+        )
+
+    def __repr__(self) -> str:
+        rows = "\n".join("  " + " ".join(f"{degrees(angle):8.2f}" for angle in q) for q in self._feasible)
+        psi = "" if self.psi is None else f" at arm angle {degrees(self.psi):.2f} deg"
+        return f"{len(self)} of {len(self.all)} branches inside the limits{psi}, [deg]:\n{rows}"
+
+
+def joint_limit_lists(limits: JointLimits) -> tuple[list[float], list[float]]:
+    """Returns lower and upper joint limits as plain floats, [rad]."""
+    return limits.lower.tolist(), limits.upper.tolist()
+
+
+def _judge(q: tuple[float, ...], lower: list[float], upper: list[float]) -> Branch:
+    joint, worst = None, 0.0
+    for number, (angle, low, high) in enumerate(zip(q, lower, upper, strict=True), start=1):
+        if not low < angle < high:
+            excess = max(low - angle, angle - high)
+            if joint is None or excess > worst:
+                joint, worst = number, excess
+    return Branch(q, joint, worst)

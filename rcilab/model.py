@@ -1,0 +1,254 @@
+"""RobotModel: one arm with its tool and its load, as a read-only face of geometry, kinematics and dynamics."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rcilab.arrays import Array, JointVector, Matrix, as_path, as_vector
+from rcilab.dynamics.payload import NO_LOAD, Payload
+from rcilab.errors import InvalidValueError, KinematicsError, SingularError
+from rcilab.kinematics import arm_angle as arm_angles
+from rcilab.kinematics import forward as forward_kinematics
+from rcilab.kinematics.inverse import build_geometry, inverse_seven, inverse_six
+from rcilab.kinematics.jacobian import jacobian
+from rcilab.kinematics.singularity import Dexterity, dexterity
+from rcilab.kinematics.solutions import Solutions, joint_limit_lists
+from rcilab.limits import Limits
+from rcilab.robots import RobotDescription, describe_robot
+from rcilab.spatial import IDENTITY, Pose
+
+if TYPE_CHECKING:
+    from rcilab.dynamics.rigid_body import RigidBody, TorqueTerms
+
+__all__ = ["RobotModel", "load_model"]
+
+_PSI_SEARCH = tuple(math.radians(sign * step) for step in range(10, 181, 10) for sign in (1, -1))
+"""Offsets tried, nearest first, when no arm angle was asked for and the natural one has no solution."""
+
+
+def load_model(name: str, *, tool: Pose | None = None, load: Payload | None = None) -> RobotModel:
+    """Returns the model of a robot by name, in any case: xMatePro3, xMatePro7, xMate3 or xMate7.
+
+    Args:
+        name: Name of the robot.
+        tool: Pose of the tool in the flange frame (RCI setCoor); the flange itself when absent.
+        load: What is fixed to the flange (RCI setLoad); nothing when absent.
+
+    Raises:
+        ModelError: No robot has this name; the message lists those that exist.
+    """
+    return RobotModel(describe_robot(name), tool or IDENTITY, load or NO_LOAD)
+
+
+class RobotModel:
+    """An arm with a tool and a load. Immutable: `with_tool` and `with_load` return another one.
+
+    All joint vectors have shape (n,) and are in [rad]; all poses are of the tool in the base frame.
+    """
+
+    def __init__(self, description: RobotDescription, tool: Pose = IDENTITY, load: Payload = NO_LOAD) -> None:
+        self.description = description
+        self.T_flange_tool = tool
+        self.load = load
+        self.n = description.n
+        self._chain = forward_kinematics.build_chain(description.dh)
+        self._has_tool = not tool.is_close(IDENTITY, 0.0)
+        self._T_tool_flange = tool.inverse()
+
+    @property
+    def name(self) -> str:
+        """Name as the manual spells it."""
+        return self.description.name
+
+    @property
+    def limits(self) -> Limits:
+        """Every bound, each with its source."""
+        return self.description.limits
+
+    @property
+    def home(self) -> JointVector:
+        """A comfortable pose away from limits and singularities, shape (n,), [rad]."""
+        return self.description.home
+
+    def with_tool(self, tool: Pose) -> RobotModel:
+        """Returns this arm with another tool, given by its pose in the flange frame."""
+        return RobotModel(self.description, tool, self.load)
+
+    def with_load(self, load: Payload) -> RobotModel:
+        """Returns this arm with another load."""
+        return RobotModel(self.description, self.T_flange_tool, load)
+
+    def forward(self, q: ArrayLike) -> Pose:
+        """Returns the pose of the tool in base.
+
+        Args:
+            q: Joint angles, shape (n,), [rad]; limits are not looked at.
+
+        Raises:
+            InvalidValueError: q is not n finite numbers.
+        """
+        T = forward_kinematics.forward(self._chain, self._floats(q))
+        return T @ self.T_flange_tool if self._has_tool else T
+
+    def forward_path(self, q: ArrayLike) -> Array:
+        """Returns the poses of the tool in base along a path, shape (N, 4, 4), for q of shape (N, n)."""
+        T = forward_kinematics.forward_path(self._chain, as_path(q, self.n, "q", "rad"))
+        return T @ self.T_flange_tool.matrix if self._has_tool else T
+
+    def joint_frames(self, q: ArrayLike) -> tuple[Pose, ...]:
+        """Returns the Denavit-Hartenberg frames after joint 1, 2, ..., n in base; the last one is the flange."""
+        return forward_kinematics.joint_frames(self._chain, self._floats(q))
+
+    def jacobian(self, q: ArrayLike) -> Matrix:
+        """Returns the Jacobian at the tool, shape (6, n), linear rows first, base axes, [m/rad] and [rad/rad]."""
+        return jacobian(self._chain, self._floats(q), self.T_flange_tool)
+
+    def inverse(self, T: Pose | ArrayLike, psi: float | None = None, near: ArrayLike | None = None) -> Solutions:
+        """Returns every analytic solution inside the joint limits.
+
+        Args:
+            T: Pose of the tool in base: a `Pose` or a homogeneous matrix, shape (4, 4).
+            psi: Arm angle of a 7-axis arm, [rad]. When absent: that of `near`, or 0; and if nothing is inside the
+                limits there, the closest arm angle (in steps of 10 degrees) that has a solution.
+            near: Joint angles, [rad], that decide what a singular pose leaves open.
+
+        Raises:
+            UnreachableError: The pose is out of reach, or every branch breaks a joint limit; the message says by how
+                much, and `.distance`, `.joint` and `.excess` hold the numbers.
+            InvalidValueError: T, psi or near is not usable, or psi was given for a 6-axis arm.
+        """
+        pose = T if isinstance(T, Pose) else Pose.from_matrix(T)
+        r, p = pose.parts
+        if not math.isfinite(sum(r) + sum(p)):
+            raise InvalidValueError("pose", repr(pose), "must be finite in every element")
+        guess = None if near is None else self._floats(near)
+        if psi is not None and not math.isfinite(psi):
+            raise InvalidValueError("psi", psi, "must be finite, [rad]")
+        flange = pose @ self._T_tool_flange if self._has_tool else pose
+        if self.n == 7:
+            return self._inverse_seven(flange, psi, guess)
+        if psi is not None:
+            raise InvalidValueError("psi", psi, f"has no meaning for {self.name}: a 6-axis arm has no arm angle")
+        solutions = Solutions(inverse_six(self._geometry, flange, guess), *self._bounds, None)
+        if not len(solutions):
+            raise solutions.refusal()
+        return solutions
+
+    def arm_angle(self, q: ArrayLike) -> float:
+        """Returns the arm angle psi of a 7-axis arm, [rad] in (-pi, pi].
+
+        Raises:
+            SingularError: The shoulder-wrist line is vertical or the arm is stretched; psi has no meaning there.
+            KinematicsError: The arm has 6 axes.
+        """
+        if self.n != 7:
+            raise KinematicsError(f"{self.name} has 6 axes: only a 7-axis arm has an arm angle")
+        return arm_angles.arm_angle(self._geometry.upper, self._geometry.fore, self._floats(q))
+
+    def dexterity(self, q: ArrayLike) -> Dexterity:
+        """Returns how well the tool can be moved here: manipulability, smallest singular value, condition."""
+        return dexterity(self.jacobian(q))
+
+    def manipulability(self, q: ArrayLike) -> float:
+        """Returns sqrt(det(J J^T)) at the tool; 0 at a singularity."""
+        return self.dexterity(q).manipulability
+
+    def torque(self, q: ArrayLike, dq: ArrayLike | None = None, ddq: ArrayLike | None = None) -> TorqueTerms:
+        """Returns the joint torques of the rigid arm with its load, and their terms, each of shape (n,), [N m].
+
+        Args:
+            q: Joint angles, shape (n,), [rad].
+            dq: Joint velocities, shape (n,), [rad/s]; at rest when absent.
+            ddq: Joint accelerations, shape (n,), [rad/s^2]; none when absent.
+        """
+        zeros = np.zeros(self.n)
+        return self.rigid_body.torque(
+            as_vector(q, self.n, "q", "rad"),
+            zeros if dq is None else as_vector(dq, self.n, "dq", "rad/s"),
+            zeros if ddq is None else as_vector(ddq, self.n, "ddq", "rad/s^2"),
+        )
+
+    @cached_property
+    def rigid_body(self) -> RigidBody:
+        """The rigid-body model behind `torque`."""
+        from rcilab.dynamics.rigid_body import RigidBody
+
+        return RigidBody(self.description, self.load)
+
+    @cached_property
+    def fingerprint(self) -> Mapping[str, str]:
+        """Hashes of what a judgement depends on: model, limits, tool and load, each a SHA-256 in hex."""
+        d = self.description
+        joint, cartesian = d.limits.joint, d.limits.cartesian
+        geometry = [(row.a, row.alpha, row.d, row.theta_offset) for row in d.dh]
+        masses = [(link.mass, *link.center_of_mass, *link.inertia.flat, link.origin_height) for link in d.links]
+        bounds = [getattr(joint, name).tolist() for name in joint.__slots__]
+        paths = [getattr(cartesian, name) for name in cartesian.__slots__]
+        load = (self.load.mass, *self.load.center_of_mass, *self.load.inertia.flat)
+        return MappingProxyType(
+            {
+                "model": _digest(d.name, geometry, [tuple(map(float, row)) for row in masses]),
+                "limits": _digest(bounds, paths),
+                "tool": _digest(self.T_flange_tool.as_row_major()),
+                "load": _digest(tuple(map(float, load))),
+            }
+        )
+
+    def __repr__(self) -> str:
+        tool = f", tool={self.T_flange_tool!r}" if self._has_tool else ""
+        load = f", load={self.load.mass:g} kg" if self.load.mass else ""
+        return f"RobotModel({self.name}, {self.n} axes{tool}{load})"
+
+    @cached_property
+    def _geometry(self):  # type: ignore[no-untyped-def]  # ArmGeometry; cached_property hides it from no one.
+        return build_geometry(self.description)
+
+    @cached_property
+    def _bounds(self) -> tuple[list[float], list[float]]:
+        return joint_limit_lists(self.limits.joint)
+
+    def _inverse_seven(self, flange: Pose, psi: float | None, near: Sequence[float] | None) -> Solutions:
+        start = self._natural_psi(near) if psi is None else psi
+        solutions = Solutions(inverse_seven(self._geometry, flange, start, near), *self._bounds, start)
+        if len(solutions):
+            return solutions
+        best = solutions
+        for offset in _PSI_SEARCH if psi is None else ():
+            angle = math.remainder(start + offset, math.tau)
+            solutions = Solutions(inverse_seven(self._geometry, flange, angle, near), *self._bounds, angle)
+            if len(solutions):
+                return solutions
+            best = min(best, solutions, key=_least_excess)
+        raise best.refusal()
+
+    def _natural_psi(self, near: Sequence[float] | None) -> float:
+        if near is None:
+            return 0.0
+        try:
+            return arm_angles.arm_angle(self._geometry.upper, self._geometry.fore, near)
+        except SingularError:
+            return 0.0
+
+    def _floats(self, q: ArrayLike) -> list[float]:
+        """Returns q as n finite plain floats; the cheap way for what is an array already."""
+        if isinstance(q, np.ndarray) and q.dtype == np.float64 and q.shape == (self.n,):
+            values = q.tolist()
+            if math.isfinite(sum(values)):
+                return values
+        return as_vector(q, self.n, "q", "rad").tolist()
+
+
+def _least_excess(solutions: Solutions) -> float:
+    return min(branch.excess for branch in solutions.all)
+
+
+def _digest(*parts: object) -> str:
+    return hashlib.sha256(repr(parts).encode()).hexdigest()

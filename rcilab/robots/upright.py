@@ -1,0 +1,64 @@
+"""The arm standing up: link frames that are parallel to the base at zero pose.
+
+Denavit-Hartenberg frames are for computing. For drawing, URDF, MJCF and rigid-body dynamics each link gets the frame
+its mass data are given in: parallel to the base when all joint angles are zero, origin on the base z axis.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rcilab.arrays import Vector3, frozen
+from rcilab.errors import ModelError
+from rcilab.robots.description import RobotDescription
+
+_TOLERANCE = 1e-12  # [m] and axis components: the tables put axes and origins on the base z axis exactly.
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class UprightJoint:
+    """One revolute joint between two upright link frames."""
+
+    origin: Vector3
+    """Origin of the link's frame in the previous link's frame (the base's for joint 1), shape (3,), [m]."""
+    axis: Vector3
+    """Unit axis of the joint, the same in both frames, shape (3,)."""
+
+
+def upright_joints(description: RobotDescription) -> tuple[UprightJoint, ...]:
+    """Returns the joints between upright link frames, base to flange; the last frame is the flange.
+
+    Raises:
+        ModelError: The arm does not stand upright at zero, as with the manual's 6-axis table taken literally.
+    """
+    T = np.eye(4)
+    joints: list[UprightJoint] = []
+    below = 0.0
+    for number, (row, link) in enumerate(zip(description.dh, description.links, strict=True), start=1):
+        axis, foot = T[:3, 2].copy(), T[:3, 3].copy()
+        on_axis = foot + axis * (axis @ (np.array([0.0, 0.0, link.origin_height]) - foot))
+        if np.abs(on_axis - [0.0, 0.0, link.origin_height]).max() > _TOLERANCE:
+            raise ModelError(
+                f"{description.name}: joint {number} does not pass through the base axis at {link.origin_height} m "
+                "at zero pose; the theta offsets must make the arm stand upright"
+            )
+        joints.append(UprightJoint(frozen([0.0, 0.0, link.origin_height - below]), frozen(np.round(axis, 12) + 0.0)))
+        below = link.origin_height
+        T = T @ _dh_matrix(row.a, row.alpha, row.d, row.theta_offset)
+    if np.abs(T - [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, below], [0, 0, 0, 1]]).max() > _TOLERANCE:
+        raise ModelError(f"{description.name}: the flange is not upright above the base at zero pose")
+    return tuple(joints)
+
+
+def _dh_matrix(a: float, alpha: float, d: float, theta: float) -> np.ndarray:
+    ct, st, ca, sa = np.cos(theta), np.sin(theta), np.cos(alpha), np.sin(alpha)
+    return np.array(
+        [
+            [ct, -st * ca, st * sa, a * ct],
+            [st, ct * ca, -ct * sa, a * st],
+            [0.0, sa, ca, d],
+            [0.0, 0.0, 0.0, 1.0],
+        ]
+    )
