@@ -1,1 +1,1 @@
-"""..."""
+"""Bytes and values of robot protocols; no sockets, no clocks."""

@@ -1,1 +1,88 @@
-"""..."""
+"""The wire protocol of the ROKAE Control Interface: bytes to values and back, no sockets, no clocks."""
+
+from rcilab.protocols.rci.command_packet import (
+    COMMAND,
+    COMMAND_SIZE,
+    CommandPacket,
+    build_command,
+    decode_command,
+    encode_command,
+)
+from rcilab.protocols.rci.frame import (
+    HEADER,
+    MAX_FRAME_SIZE,
+    FrameReader,
+    Header,
+    decode_header,
+    decode_request,
+    decode_response,
+    encode_request,
+    encode_response,
+)
+from rcilab.protocols.rci.requests import (
+    REQUESTS,
+    AutomaticErrorRecovery,
+    Connect,
+    EnableVirtualGuide,
+    GetDIState,
+    GetMotorState,
+    GetSafetyStopState,
+    LoadRobotModel,
+    RebootRobot,
+    Request,
+    SetCartesianImpedance,
+    SetCartesianLimit,
+    SetCartImpDesiredTau,
+    SetCollisionBehavior,
+    SetCoor,
+    SetDO,
+    SetFcCoor,
+    SetFilters,
+    SetJointImpedance,
+    SetJointLimit,
+    SetLoad,
+    SetMotorPower,
+    SetTorqueFilterCutOffFrequency,
+    StartDrag,
+    StartMove,
+    StopDrag,
+    StopMove,
+)
+from rcilab.protocols.rci.responses import (
+    STATUS_TYPES,
+    DigitalInputResponse,
+    ModelResponse,
+    MotorStateResponse,
+    Response,
+    SafetyStopResponse,
+    StatusResponse,
+)
+from rcilab.protocols.rci.state_packet import STATE, STATE_SIZE, decode_state, encode_state
+from rcilab.protocols.rci.statuses import (
+    CommandCode,
+    DragSpace,
+    DragType,
+    ForceFrame,
+    GuideStatus,
+    RecoveryStatus,
+    SafetyStop,
+    SettingStatus,
+    StartMotionMode,
+    StartStatus,
+    Status,
+    StopStatus,
+)
+
+__all__ = [
+    "COMMAND", "COMMAND_SIZE", "HEADER", "MAX_FRAME_SIZE", "REQUESTS", "STATE", "STATE_SIZE", "STATUS_TYPES",
+    "AutomaticErrorRecovery", "CommandCode", "CommandPacket", "Connect", "DigitalInputResponse", "DragSpace",
+    "DragType", "EnableVirtualGuide", "ForceFrame", "FrameReader", "GetDIState", "GetMotorState",
+    "GetSafetyStopState", "GuideStatus", "Header", "LoadRobotModel", "ModelResponse", "MotorStateResponse",
+    "RebootRobot", "RecoveryStatus", "Request", "Response", "SafetyStop", "SafetyStopResponse",
+    "SetCartImpDesiredTau", "SetCartesianImpedance", "SetCartesianLimit", "SetCollisionBehavior", "SetCoor", "SetDO",
+    "SetFcCoor", "SetFilters", "SetJointImpedance", "SetJointLimit", "SetLoad", "SetMotorPower",
+    "SetTorqueFilterCutOffFrequency", "SettingStatus", "StartDrag", "StartMotionMode", "StartMove", "StartStatus",
+    "Status", "StatusResponse", "StopDrag", "StopMove", "StopStatus", "build_command", "decode_command",
+    "decode_header", "decode_request", "decode_response", "decode_state", "encode_command", "encode_request",
+    "encode_response", "encode_state",
+]  # fmt: skip
