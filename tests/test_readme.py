@@ -1,0 +1,39 @@
+"""The README keeps its promises: its Python runs, its commands and files exist."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def test_the_ten_lines_run_as_printed() -> None:
+    (code,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+    result = subprocess.run(
+        [sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, timeout=60, cwd=ROOT
+    )
+    assert result.returncode == 0, result.stderr
+    assert re.fullmatch(r"arrived after \d\.\d{3} s; largest error \d\.\de-\d+ rad\n", result.stdout)
+
+
+def test_both_set_up_commands_stand_on_a_line_of_their_own() -> None:
+    lines = README.splitlines()
+    assert "python3 -m venv .venv && .venv/bin/pip install -e . && .venv/bin/rcilab" in lines
+    assert "python3 -m venv .venv && .venv/bin/pip install -e '.[test]' && .venv/bin/pytest" in lines
+
+
+def test_every_link_leads_to_a_file() -> None:
+    targets = re.findall(r"\]\(([^)#:]+)\)", README)
+    assert len(targets) >= 5
+    assert [target for target in targets if not (ROOT / target).exists()] == []
+
+
+def test_every_command_it_names_exists() -> None:
+    listing = subprocess.run([sys.executable, "-m", "rcilab", "--help"], capture_output=True, text=True, check=True)
+    named = {words for words in re.findall(r"rcilab (\w+)", README) if words.islower()}
+    assert named >= {"lab", "controller", "urdf", "mjcf", "doctor", "bench"}
+    assert [name for name in sorted(named) if not re.search(rf"\b{name}\b", listing.stdout)] == []
