@@ -1,1 +1,20 @@
-"""..."""
+"""Motions: values that planners return and everybody else reads."""
+
+from __future__ import annotations
+
+from rcilab.motion.differences import derivatives_from_differences, differences_from_derivatives
+from rcilab.motion.margin import LIMIT_MARGIN
+from rcilab.motion.motion import Law, Motion, MotionSample
+from rcilab.motion.piecewise import PiecewisePolynomial
+from rcilab.motion.stop import plan_stop
+
+__all__ = [
+    "LIMIT_MARGIN",
+    "Law",
+    "Motion",
+    "MotionSample",
+    "PiecewisePolynomial",
+    "derivatives_from_differences",
+    "differences_from_derivatives",
+    "plan_stop",
+]

@@ -1,0 +1,173 @@
+"""The only file that knows ruckig: time-optimal, jerk-limited profiles as exact piecewise polynomials.
+
+`intermediate_positions` is never set: a non-empty list would send the problem to a cloud service. Position bounds are
+not given to ruckig either (its free edition does not enforce them); `plan_joint` looks at the curve instead.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from rcilab.arrays import Array, JointVector
+from rcilab.errors import PlanningError
+from rcilab.motion.piecewise import PiecewisePolynomial
+
+_SAME_BREAK = 1e-11  # [s] Breaks of two joints closer than this are one; at 1e4 rad/s^3 that is 1e-7 rad/s^2.
+
+_NO_MISS = 1e-13  # [rad] Rounding of the angles themselves.
+
+
+def plan_profile(
+    start: JointVector,
+    goal: JointVector,
+    velocity: JointVector,
+    acceleration: JointVector,
+    jerk: JointVector,
+    start_velocity: JointVector,
+    start_acceleration: JointVector,
+) -> PiecewisePolynomial:
+    """Returns the fastest curve from a moving start to rest at the goal with all joints arriving together.
+
+    In phase (a straight line in joint space) where that is possible, which it is from rest.
+
+    Args:
+        start: Joint angles at t = 0, shape (n,), [rad].
+        goal: Joint angles at the end, shape (n,), [rad].
+        velocity: Bounds, shape (n,), [rad/s].
+        acceleration: Bounds, shape (n,), [rad/s^2].
+        jerk: Bounds, shape (n,), [rad/s^3].
+        start_velocity: Joint velocities at t = 0, shape (n,), [rad/s].
+        start_acceleration: Joint accelerations at t = 0, shape (n,), [rad/s^2].
+
+    Raises:
+        PlanningError: ruckig found no curve; the message says why.
+    """
+    import ruckig
+
+    problem = ruckig.InputParameter(len(start))
+    problem.synchronization = ruckig.Synchronization.Phase
+    problem.current_position = start.tolist()
+    problem.current_velocity = start_velocity.tolist()
+    problem.current_acceleration = start_acceleration.tolist()
+    problem.target_position = goal.tolist()
+    problem.max_velocity = velocity.tolist()
+    problem.max_acceleration = acceleration.tolist()
+    problem.max_jerk = jerk.tolist()
+    return _arriving_at(goal, _solve(problem))
+
+
+def plan_standstill(
+    q: JointVector, dq: JointVector, ddq: JointVector, acceleration: JointVector, jerk: JointVector
+) -> PiecewisePolynomial:
+    """Returns the curve on which every joint for itself comes to rest as fast as its bounds allow.
+
+    Args:
+        q: Joint angles, shape (n,), [rad].
+        dq: Joint velocities, shape (n,), [rad/s]; any finite value.
+        ddq: Joint accelerations, shape (n,), [rad/s^2]; outside the bounds they are first led back inside.
+        acceleration: Bounds, shape (n,), [rad/s^2].
+        jerk: Bounds, shape (n,), [rad/s^3].
+
+    Raises:
+        PlanningError: ruckig found no curve; the message says why.
+    """
+    import ruckig
+
+    problem = ruckig.InputParameter(len(q))
+    problem.control_interface = ruckig.ControlInterface.Velocity
+    problem.synchronization = ruckig.Synchronization.No
+    problem.current_position = q.tolist()
+    problem.current_velocity = dq.tolist()
+    problem.current_acceleration = ddq.tolist()
+    problem.max_acceleration = acceleration.tolist()
+    problem.max_jerk = jerk.tolist()
+    return _solve(problem)
+
+
+@lru_cache(maxsize=16)
+def _reasons() -> dict[Any, str]:
+    from ruckig import Result
+
+    return {
+        Result.Error: "the planner failed without a reason",
+        Result.ErrorInvalidInput: "the request is not valid",
+        Result.ErrorPositionalLimits: "a joint would pass its position limits",
+        Result.ErrorExecutionTimeCalculation: "no profile reaches this goal from this start state",
+        Result.ErrorSynchronizationCalculation: "the joints cannot be brought into step",
+    }
+
+
+def _solve(problem: Any) -> PiecewisePolynomial:
+    import ruckig
+
+    trajectory = ruckig.Trajectory(problem.degrees_of_freedom)
+    try:
+        result = ruckig.Ruckig(problem.degrees_of_freedom).calculate(problem, trajectory)
+    except ruckig.RuckigError as error:
+        reason = str(error).replace("[ruckig]", "").strip()
+        raise PlanningError(f"no motion: {reason}; choose another start, goal or speed") from error
+    if result not in (ruckig.Result.Working, ruckig.Result.Finished):
+        reason = _reasons().get(result, f"the planner answered {result!r}")
+        raise PlanningError(f"no motion: {reason}; choose another start, goal or speed")
+    return _polynomial(trajectory.profiles[0], float(trajectory.duration))
+
+
+def _polynomial(profiles: list[Any], duration: float) -> PiecewisePolynomial:
+    """Returns the curve of a trajectory: for each joint up to two brake steps, seven steps, then rest."""
+    dt = np.array([[*p.brake.t, *p.t] for p in profiles])
+    steps = np.array(
+        [
+            [
+                [*p.brake.p, *p.p],
+                [*p.brake.v, *p.v[:7], 0.0],
+                [*p.brake.a, *p.a[:7], 0.0],
+                [*p.brake.j, *p.j, 0.0],
+            ]
+            for p in profiles
+        ]
+    )
+    joints, count = steps.shape[0], steps.shape[2]
+    starts = np.zeros((joints, count))
+    np.cumsum(np.maximum(dt, 0.0), axis=1, out=starts[:, 1:])
+    breaks = _union(starts, duration)
+    middle = (breaks[:-1] + breaks[1:]) / 2.0
+    step = (starts[:, np.newaxis, :] <= middle[:, np.newaxis]).sum(axis=2) - 1
+    row = np.arange(joints)[:, np.newaxis]
+    tau = breaks[:-1] - starts[row, step]
+    p, v, a, j = (steps[row, power, step] for power in range(4))
+    coefficients = np.empty((len(middle), joints, 4))
+    coefficients[:, :, 0] = (p + tau * (v + tau * (a / 2.0 + tau * (j / 6.0)))).T
+    coefficients[:, :, 1] = (v + tau * (a + tau * (j / 2.0))).T
+    coefficients[:, :, 2] = ((a + tau * j) / 2.0).T
+    coefficients[:, :, 3] = (j / 6.0).T
+    return PiecewisePolynomial(breaks, coefficients)
+
+
+def _arriving_at(goal: JointVector, curve: PiecewisePolynomial) -> PiecewisePolynomial:
+    """Returns the curve led to `goal` exactly.
+
+    ruckig accepts profiles that miss by up to 1e-8 rad. A jump of that size in the last cycle would be a jerk of some
+    10 rad/s^3, so the miss is spread over the whole motion as a cubic that starts and ends at rest.
+    """
+    miss = goal - curve.at_end()[0]
+    if np.abs(miss).max() < _NO_MISS:
+        return curve
+    total = curve.duration
+    u = curve.breaks[:-1, np.newaxis] / total
+    coefficients = curve.coefficients.copy()
+    coefficients[:, :, 0] += miss * u**2 * (3.0 - 2.0 * u)
+    coefficients[:, :, 1] += miss * 6.0 * u * (1.0 - u) / total
+    coefficients[:, :, 2] += miss * (3.0 - 6.0 * u) / total**2
+    coefficients[:, :, 3] += miss * -2.0 / total**3
+    return PiecewisePolynomial(curve.breaks, coefficients)
+
+
+def _union(starts: Array, duration: float) -> Array:
+    inner = np.sort(starts, axis=None)
+    inner = inner[(inner > _SAME_BREAK) & (inner < duration - _SAME_BREAK)]
+    if inner.size:
+        inner = inner[np.concatenate(([True], np.diff(inner) > _SAME_BREAK))]
+    return np.concatenate(([0.0], inner, [duration]))

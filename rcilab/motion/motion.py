@@ -1,0 +1,233 @@
+"""A motion as a value: planners return it, the checker judges it, views draw it, the control process streams it."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from dataclasses import dataclass, field
+from os import PathLike
+from typing import BinaryIO, Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rcilab.arrays import Array, JointPath, JointVector, as_vector, frozen
+from rcilab.clock import CYCLE_TIME
+from rcilab.errors import InvalidValueError
+from rcilab.motion.piecewise import DERIVATIVES, PiecewisePolynomial
+
+Law: TypeAlias = Literal["jerk_limited", "s_profile", "stop", "samples"]
+"""How a motion runs along its path: ruckig's time-optimal law, the manual's S profile (3.5), the fastest stop, or rows
+that somebody else made."""
+
+LAWS: tuple[Law, ...] = ("jerk_limited", "s_profile", "stop", "samples")
+
+_ROUNDING = 1e-9
+"""A duration that passes a cycle by less than this part of a cycle is that cycle, not the next one."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MotionSample:
+    """A motion at one instant, each array of shape (n,) and read-only."""
+
+    q: JointVector
+    """Joint angles, [rad]."""
+    dq: JointVector
+    """Joint velocities, [rad/s]."""
+    ddq: JointVector
+    """Joint accelerations, [rad/s^2]."""
+    jerk: JointVector
+    """Joint jerks, [rad/s^3]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Motion:
+    """Joint angles as a function of time, exact at every instant, with rows on the controller's 1 ms grid.
+
+    Rows: `.times`, `.q`, `.dq`, `.ddq`, `.jerk`, computed at the first look and kept. Row 0 is the start; the last row
+    is the goal at rest, at the first cycle that is not before the exact `.duration`. Derivatives are the true ones of
+    the curve; what the controller judges are backward differences of `.q`, and `rcilab.check` computes those.
+    """
+
+    polynomial: PiecewisePolynomial
+    """The curve."""
+    goal: JointVector
+    """Where it ends and holds, shape (n,), [rad]."""
+    law: Law
+    speed: float = 1.0
+    """The speed it was planned with, as a part of the limits, in (0, 1]."""
+    _cache: dict[str, Array] = field(init=False, repr=False, default_factory=dict[str, Array])
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "goal", as_vector(self.goal, self.polynomial.n, "goal", "rad"))
+        if self.law not in LAWS:
+            raise InvalidValueError("law", self.law, f"is unknown; known: {', '.join(LAWS)}")
+        if not 0.0 < self.speed <= 1.0:
+            raise InvalidValueError("speed", self.speed, "must be in (0, 1]")
+
+    @classmethod
+    def from_samples(cls, q: ArrayLike) -> Motion:
+        """Returns a motion through given rows, one a cycle: a recording, or a path from elsewhere, to be judged.
+
+        Between the rows it runs as cubic pieces with the slopes of central differences, at the ends of one-sided ones.
+
+        Args:
+            q: Joint angles, shape (N, n), N >= 1, [rad].
+
+        Raises:
+            InvalidValueError: Not a finite table of at least one row.
+        """
+        rows = np.array(q, dtype=np.float64, ndmin=2)
+        if rows.ndim != 2 or rows.size == 0 or not np.isfinite(rows).all():
+            raise InvalidValueError("q", f"array of shape {rows.shape}", "must be a finite table of shape (N, n) [rad]")
+        if len(rows) == 1:
+            return standing(rows[0], law="samples")
+        h = CYCLE_TIME
+        slopes = np.gradient(rows, h, axis=0)
+        rise = np.diff(rows, axis=0) / h
+        pieces = np.empty((len(rows) - 1, rows.shape[1], 4))
+        pieces[:, :, 0] = rows[:-1]
+        pieces[:, :, 1] = slopes[:-1]
+        pieces[:, :, 2] = (3.0 * rise - 2.0 * slopes[:-1] - slopes[1:]) / h
+        pieces[:, :, 3] = (slopes[:-1] + slopes[1:] - 2.0 * rise) / h**2
+        return cls(polynomial=PiecewisePolynomial(_grid(len(rows)), pieces), goal=rows[-1], law="samples")
+
+    @property
+    def duration(self) -> float:
+        """Exact duration, [s]; not rounded to cycles."""
+        return self.polynomial.duration
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return self.polynomial.n
+
+    @property
+    def start(self) -> JointVector:
+        """Joint angles at t = 0, shape (n,), [rad]."""
+        return self.polynomial.coefficients[0, :, 0]
+
+    @property
+    def times(self) -> Array:
+        """Times of the rows, whole cycles, shape (N,), [s]."""
+        return self._kept("times")
+
+    @property
+    def q(self) -> JointPath:
+        """Joint angles, shape (N, n), [rad]."""
+        return self._kept("q")
+
+    @property
+    def dq(self) -> JointPath:
+        """Joint velocities, shape (N, n), [rad/s]."""
+        return self._kept("dq")
+
+    @property
+    def ddq(self) -> JointPath:
+        """Joint accelerations, shape (N, n), [rad/s^2]."""
+        return self._kept("ddq")
+
+    @property
+    def jerk(self) -> JointPath:
+        """Joint jerks, shape (N, n), [rad/s^3]; where it jumps, the later value counts."""
+        return self._kept("jerk")
+
+    @property
+    def fingerprint(self) -> str:
+        """SHA-256 over everything that defines this motion, hexadecimal."""
+        digest = hashlib.sha256(f"rcilab motion {self.law} {self.speed!r}".encode())
+        for array in (self.polynomial.breaks, self.polynomial.coefficients, self.goal):
+            digest.update(repr(array.shape).encode())
+            digest.update(np.ascontiguousarray(array).tobytes())
+        return digest.hexdigest()
+
+    def __len__(self) -> int:
+        """Number of rows: one a cycle, start and goal included."""
+        return math.ceil(self.duration / CYCLE_TIME - _ROUNDING) + 1
+
+    def at(self, t: float) -> MotionSample:
+        """Returns the motion at any time: before the start it is the start, from the end on the goal at rest.
+
+        Args:
+            t: Time since the start, [s].
+        """
+        if math.isnan(t):
+            raise InvalidValueError("t", t, "is not a time [s]")
+        if t >= self.duration:
+            rest = frozen(np.zeros(self.n))
+            return MotionSample(self.goal, rest, rest, rest)
+        return _sample(self.polynomial.at(t))
+
+    def end(self) -> MotionSample:
+        """Returns how the curve arrives: the limits from the left at the end. A good motion arrives at rest."""
+        return _sample(self.polynomial.at_end())
+
+    def save(self, file: str | PathLike[str] | BinaryIO) -> None:
+        """Writes the motion to a file (.npz) that `Motion.load` reads back to the last bit."""
+        from rcilab.motion.storage import save_motion
+
+        save_motion(self, file)
+
+    @classmethod
+    def load(cls, file: str | PathLike[str] | BinaryIO) -> Motion:
+        """Returns the motion in a file.
+
+        Raises:
+            InvalidValueError: There is no such file, or it holds no sound motion.
+            VersionMismatchError: It was written by another version of this format.
+        """
+        from rcilab.motion.storage import load_motion
+
+        return load_motion(file)
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return _rebuild, (self.polynomial, self.goal, self.law, self.speed)
+
+    def __repr__(self) -> str:
+        return f"<Motion {self.law}, {self.n} joints, {self.duration:.3f} s, speed {self.speed:g}>"
+
+    def _repr_html_(self) -> str:
+        degrees = (
+            f"<tr><th>{name}</th>" + "".join(f"<td>{angle:.1f}</td>" for angle in np.degrees(q)) + "</tr>"
+            for name, q in (("start", self.start), ("goal", self.goal))
+        )
+        title = f"Motion, {self.law}: {self.duration:.3f} s at speed {self.speed:g} (angles in °)"
+        return f"<table><caption>{title}</caption>{''.join(degrees)}</table>"
+
+    def _kept(self, name: str) -> Array:
+        # Two threads may both compute it; they get equal arrays and one of them stays.
+        if name not in self._cache:
+            self._cache[name] = self._compute(name)
+        return self._cache[name]
+
+    def _compute(self, name: str) -> Array:
+        if name == "times":
+            array = _grid(len(self))
+        else:
+            derivative = ("q", "dq", "ddq", "jerk").index(name)
+            array = self.polynomial.sample(self.times, derivative)
+            array[-1] = 0.0 if derivative else self.goal
+        array.flags.writeable = False
+        return array
+
+
+def standing(q: ArrayLike, *, law: Law = "jerk_limited", speed: float = 1.0) -> Motion:
+    """Returns the motion of zero length that stands at `q`, shape (n,), [rad]."""
+    angles = np.asarray(q, dtype=np.float64)
+    still = PiecewisePolynomial(np.zeros(2), angles.reshape(1, -1, 1))
+    return Motion(polynomial=still, goal=angles, law=law, speed=speed)
+
+
+def _grid(count: int) -> Array:
+    return np.arange(count, dtype=np.float64) * CYCLE_TIME
+
+
+def _sample(arrays: tuple[JointVector, JointVector, JointVector, JointVector]) -> MotionSample:
+    assert len(arrays) == DERIVATIVES
+    for array in arrays:
+        array.flags.writeable = False
+    return MotionSample(*arrays)
+
+
+def _rebuild(polynomial: PiecewisePolynomial, goal: JointVector, law: Law, speed: float) -> Motion:
+    return Motion(polynomial=polynomial, goal=goal, law=law, speed=speed)
