@@ -1,0 +1,198 @@
+"""An arm in a scene. One class for the live arm, the plan, a candidate of the inverse: they differ in style only.
+
+Node names, on which browser tests and the page rely, for an arm of name NAME:
+
+    /NAME                              the base frame; /NAME/base_shell, /NAME/base_cap, ... its meshes
+    /NAME/joint1                       frame of link 1 (`robots/upright.py`); /NAME/joint1/shell, ... its meshes
+    /NAME/joint1/joint2/.../jointN     each link below the one that carries it
+    .../jointN/flange                  the flange;  .../jointN/flange/tool  the tool
+
+Only the orientation of the joint frames changes when the arm moves: one quaternion a joint.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+from numpy.typing import ArrayLike
+
+from rcilab.arrays import as_vector
+from rcilab.errors import UsageError
+from rcilab.robots.description import RobotDescription
+from rcilab.robots.shapes import ROLE_COLORS, ColorRole, LinkShape, build_shapes
+from rcilab.robots.upright import upright_joints
+from rcilab.spatial import Pose
+from rcilab.views.scene import Color, Scene
+
+ArmStyle = Literal["live", "commanded", "plan", "candidate", "refused"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Look:
+    tint: Color | None
+    """Colour of the housings; None keeps the arm's own colours."""
+    opacity: float
+
+
+_LOOKS: dict[ArmStyle, _Look] = {
+    "live": _Look(tint=None, opacity=1.0),
+    "commanded": _Look(tint=(255, 196, 64), opacity=0.22),
+    "plan": _Look(tint=(70, 140, 255), opacity=0.35),
+    "candidate": _Look(tint=(90, 200, 150), opacity=0.30),
+    "refused": _Look(tint=(230, 80, 70), opacity=0.30),
+}
+_TINTED_ROLE_SHADE: dict[ColorRole, float] = {"shell": 1.0, "cap": 0.75, "dark": 0.45}
+
+
+class DrawableModel(Protocol):
+    """What a view needs of a `RobotModel`."""
+
+    @property
+    def description(self) -> RobotDescription:
+        """The arm's data."""
+        ...
+
+    @property
+    def T_flange_tool(self) -> Pose:
+        """Pose of the tool in the flange."""
+        ...
+
+
+class ArmView:
+    """An arm drawn in a scene; owned by the thread that draws.
+
+    Args:
+        scene: Where to draw.
+        name: Name of the arm's root node, without slashes.
+        model: The arm.
+        style: How it looks; `opacity` and `color` override parts of it.
+        opacity: From 0 to 1.
+        color: Colour of the housings, RGB 0-255; caps and flange become darker shades of it.
+        quality: "fine" or "coarse" meshes; default coarse for translucent arms.
+        axes_length: Length of the axes drawn at the tool, [m]; 0 draws none.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        name: str,
+        model: DrawableModel,
+        style: ArmStyle = "live",
+        *,
+        opacity: float | None = None,
+        color: Color | None = None,
+        quality: Literal["fine", "coarse"] | None = None,
+        axes_length: float = 0.0,
+    ) -> None:
+        look = _LOOKS[style]
+        self._scene = scene
+        self._root = "/" + name.strip("/")
+        self._tint = look.tint if color is None else color
+        self._opacity = look.opacity if opacity is None else opacity
+        self._meshes: list[tuple[str, ColorRole]] = []
+        self._frames: list[str] = []
+        joints = upright_joints(model.description)
+        self._axes = tuple(tuple(joint.axis.tolist()) for joint in joints)
+        self._shown = [0.0] * len(joints)
+        self._removed = False
+        shape = build_shapes(model.description, quality or ("fine" if self._opacity >= 1.0 else "coarse"))
+        with scene.batch():
+            scene.add_frame(self._root)
+            self._add_link(self._root + "/base_", shape.base)
+            path = self._root
+            for number, (joint, link) in enumerate(zip(joints, shape.links, strict=True), start=1):
+                path += f"/joint{number}"
+                scene.add_frame(path, position=joint.origin.tolist())
+                self._frames.append(path)
+                self._add_link(path + "/", link)
+            scene.add_frame(path + "/flange")
+            self.tool_node = path + "/flange/tool"
+            tool = model.T_flange_tool
+            scene.add_frame(
+                self.tool_node, wxyz=tool.wxyz.tolist(), position=tool.position.tolist(), axes_length=axes_length
+            )
+
+    @property
+    def root(self) -> str:
+        """Name of the arm's base node."""
+        return self._root
+
+    @property
+    def joint_nodes(self) -> tuple[str, ...]:
+        """Names of the joint frames, base to flange."""
+        return tuple(self._frames)
+
+    def show(self, q: ArrayLike | Sequence[float]) -> None:
+        """Puts the arm into a pose.
+
+        Args:
+            q: Joint angles, shape (n,), [rad].
+
+        Raises:
+            InvalidValueError: Not n finite numbers; the arm stays as it was.
+        """
+        angles = as_vector(q, len(self._axes), "q", "rad").tolist()
+        changed = [i for i, angle in enumerate(angles) if angle != self._shown[i]]
+        if not changed:
+            return
+        self._require_present()
+        with self._scene.batch():
+            for i in changed:
+                half = 0.5 * angles[i]
+                s = math.sin(half)
+                x, y, z = self._axes[i]
+                self._scene.set_transform(self._frames[i], wxyz=(math.cos(half), s * x, s * y, s * z))
+                self._shown[i] = angles[i]
+
+    def show_tool(self, T_flange_tool: Pose) -> None:
+        """Moves the tool frame on the flange."""
+        self._require_present()
+        self._scene.set_transform(
+            self.tool_node, wxyz=T_flange_tool.wxyz.tolist(), position=T_flange_tool.position.tolist()
+        )
+
+    def set_visible(self, visible: bool) -> None:
+        """Shows or hides the whole arm."""
+        self._require_present()
+        self._scene.set_visible(self._root, visible)
+
+    def set_look(self, *, color: Color | None = None, opacity: float | None = None) -> None:
+        """Changes tint or opacity; what is None stays."""
+        self._require_present()
+        self._tint = self._tint if color is None else color
+        self._opacity = self._opacity if opacity is None else opacity
+        with self._scene.batch():
+            for name, role in self._meshes:
+                self._scene.set_style(name, color=self._color(role), opacity=self._opacity)
+
+    def remove(self) -> None:
+        """Takes the arm out of the scene; calling it again does nothing."""
+        if not self._removed:
+            self._removed = True
+            self._scene.remove(self._root)
+
+    def _add_link(self, prefix: str, shape: LinkShape) -> None:
+        for part in shape.parts:
+            name = prefix + part.role
+            self._scene.add_mesh(
+                name,
+                part.mesh.vertices,
+                part.mesh.faces,
+                color=self._color(part.role),
+                opacity=self._opacity,
+            )
+            self._meshes.append((name, part.role))
+
+    def _color(self, role: ColorRole) -> Color:
+        if self._tint is None:
+            return ROLE_COLORS[role]
+        shade = _TINTED_ROLE_SHADE[role]
+        red, green, blue = self._tint
+        return round(red * shade), round(green * shade), round(blue * shade)
+
+    def _require_present(self) -> None:
+        if self._removed:
+            raise UsageError(f"the arm {self._root} was removed from the scene; make a new ArmView")

@@ -1,0 +1,119 @@
+"""The scene of the page: a viser server's scene tree."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rcilab.views.scene import NO_TURN, ORIGIN, Color, line_points, unknown_node
+
+if TYPE_CHECKING:
+    import viser
+
+
+class ViserScene:
+    """Draws into a viser server (or into one client's private scene).
+
+    Meshes go through `add_mesh_simple`: coloured trimesh nodes come out nearly black without an environment map.
+
+    Args:
+        server: A `viser.ViserServer` or `viser.ClientHandle`.
+        shadows: Whether meshes cast and receive shadows; False is lighter on software rendering.
+    """
+
+    def __init__(self, server: viser.ViserServer | viser.ClientHandle, *, shadows: bool = True) -> None:
+        self._server = server
+        self._shadows = shadows
+        self._handles: dict[str, Any] = {}
+
+    def add_frame(
+        self,
+        name: str,
+        *,
+        wxyz: Sequence[float] = NO_TURN,
+        position: Sequence[float] = ORIGIN,
+        axes_length: float = 0.0,
+        visible: bool = True,
+    ) -> None:
+        """Adds a coordinate frame; see `Scene`."""
+        self._handles[name] = self._server.scene.add_frame(
+            name,
+            show_axes=axes_length > 0.0,
+            axes_length=axes_length,
+            axes_radius=0.025 * axes_length,
+            origin_radius=0.05 * axes_length,
+            wxyz=np.asarray(wxyz),
+            position=np.asarray(position),
+            visible=visible,
+        )
+
+    def add_mesh(self, name: str, vertices: ArrayLike, faces: ArrayLike, *, color: Color, opacity: float = 1.0) -> None:
+        """Adds a triangle mesh; see `Scene`. A translucent mesh casts no shadow."""
+        self._handles[name] = self._server.scene.add_mesh_simple(
+            name,
+            np.asarray(vertices, dtype=np.float32),
+            np.asarray(faces, dtype=np.uint32),
+            color=color,
+            opacity=_viser_opacity(opacity),
+            cast_shadow=self._shadows and opacity >= 1.0,
+            receive_shadow=self._shadows and opacity >= 1.0,
+        )
+
+    def add_polyline(self, name: str, points: ArrayLike, *, color: ArrayLike, thickness: float = 0.004) -> None:
+        """Adds a line through points; see `Scene`."""
+        path, shades = line_points(points, color)
+        self._handles[name] = self._server.scene.add_line_segments(
+            name,
+            np.stack([path[:-1], path[1:]], axis=1).astype(np.float32),
+            np.stack([shades[:-1], shades[1:]], axis=1),
+            thickness=thickness,
+        )
+
+    def set_transform(
+        self, name: str, *, wxyz: Sequence[float] | None = None, position: Sequence[float] | None = None
+    ) -> None:
+        """Moves a node; see `Scene`."""
+        handle = self._handle(name)
+        if wxyz is not None:
+            handle.wxyz = wxyz
+        if position is not None:
+            handle.position = position
+
+    def set_visible(self, name: str, visible: bool) -> None:
+        """Shows or hides a node; see `Scene`."""
+        self._handle(name).visible = visible
+
+    def set_style(self, name: str, *, color: Color | None = None, opacity: float | None = None) -> None:
+        """Changes a mesh's look; see `Scene`."""
+        handle = self._handle(name)
+        if color is not None:
+            handle.color = color
+        if opacity is not None:
+            handle.opacity = _viser_opacity(opacity)
+
+    def remove(self, name: str) -> None:
+        """Removes a node and everything below it; see `Scene`."""
+        self._handle(name).remove()
+        below = name.rstrip("/") + "/"
+        self._handles = {k: v for k, v in self._handles.items() if k != name and not k.startswith(below)}
+
+    @contextmanager
+    def batch(self) -> Iterator[None]:
+        """Sends the changes together. viser counts these globally: a thread inside stalls every other one's."""
+        with self._server.atomic():
+            yield
+
+    def _handle(self, name: str) -> Any:
+        try:
+            return self._handles[name]
+        except KeyError:
+            raise unknown_node(name) from None
+
+
+def _viser_opacity(opacity: float) -> float | None:
+    """Returns viser's spelling: None is solid, which also keeps the mesh out of the transparent pass."""
+    return None if opacity >= 1.0 else max(0.0, float(opacity))
