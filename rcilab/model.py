@@ -19,6 +19,7 @@ from rcilab.kinematics import arm_angle as arm_angles
 from rcilab.kinematics import forward as forward_kinematics
 from rcilab.kinematics.inverse import build_geometry, inverse_seven, inverse_six
 from rcilab.kinematics.jacobian import jacobian
+from rcilab.kinematics.reach import Reach, closest_reachable
 from rcilab.kinematics.singularity import Dexterity, dexterity
 from rcilab.kinematics.solutions import Solutions, joint_limit_lists
 from rcilab.limits import Limits
@@ -141,6 +142,21 @@ class RobotModel:
         if not len(solutions):
             raise solutions.refusal()
         return solutions
+
+    def closest(self, T: Pose, near: ArrayLike, psi: float | None = None) -> Reach:
+        """Returns joint angles for a target, or for the closest pose to it that the arm can take.
+
+        Args:
+            T: Wanted pose of the tool in base.
+            near: Present joint angles, shape (n,), [rad]: where to start from, and which branch to stay on.
+            psi: Arm angle of a 7-axis arm, [rad]; that of `near` when absent.
+        """
+        q = as_vector(near, self.n, "near", "rad")
+
+        def solve(pose: Pose) -> Solutions:
+            return self.inverse(pose, psi, q)
+
+        return closest_reachable(solve, self._geometry, self.T_flange_tool, self.forward(q), q, T)
 
     def arm_angle(self, q: ArrayLike) -> float:
         """Returns the arm angle psi of a 7-axis arm, [rad] in (-pi, pi].

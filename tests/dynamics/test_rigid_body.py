@@ -1,0 +1,65 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rcilab.dynamics.payload import Payload
+from rcilab.errors import InvalidValueError
+from rcilab.model import load_model
+from rcilab.robots import ROBOT_NAMES
+
+
+def random_state(model, seed=11):
+    rng = np.random.default_rng(seed)
+    return rng.uniform(-2, 2, model.n), rng.uniform(-1, 1, model.n), rng.uniform(-3, 3, model.n)
+
+
+@pytest.mark.parametrize("name", ROBOT_NAMES)
+def test_full_torque_is_the_sum_of_its_terms(name):
+    model = load_model(name)
+    q, dq, ddq = random_state(model)
+    terms = model.torque(q, dq, ddq)
+    np.testing.assert_allclose(terms.full, terms.inertial + terms.coriolis + terms.gravity, atol=1e-12)
+    np.testing.assert_allclose(terms.inertial, model.rigid_body.mass_matrix(q) @ ddq, atol=1e-11)
+    np.testing.assert_allclose(model.torque(q).full, terms.gravity, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ROBOT_NAMES)
+def test_gravity_torque_is_the_slope_of_the_potential_energy(name):
+    model = load_model(name, load=Payload(mass=2.0, center_of_mass=(0.01, 0.02, 0.05)))
+    q, _, _ = random_state(model)
+    step = 1e-6  # [rad]
+    slope = [
+        (potential_energy(model, q + s) - potential_energy(model, q - s)) / (2 * step) for s in np.eye(model.n) * step
+    ]
+    np.testing.assert_allclose(model.torque(q).gravity, slope, atol=1e-6)
+
+
+def potential_energy(model, q):
+    """Energy from our own forward kinematics: a link turns as the Denavit-Hartenberg frame after its joint does."""
+    zero, now = model.joint_frames(np.zeros(model.n)), model.joint_frames(q)
+    energy = 0.0
+    for frame_zero, frame, link in zip(zero, now, model.description.links, strict=True):
+        center_at_zero = link.center_of_mass + [0, 0, link.origin_height]
+        local = frame_zero.rotation.T @ (center_at_zero - frame_zero.position)
+        energy += 9.81 * link.mass * (frame.position + frame.rotation @ local)[2]
+    load = model.load
+    return energy + 9.81 * load.mass * (now[-1].position + now[-1].rotation @ load.center_of_mass)[2]
+
+
+@pytest.mark.parametrize("name", ROBOT_NAMES)
+def test_every_link_has_a_possible_inertia(name):
+    for link in load_model(name).description.links:
+        moments = np.linalg.eigvalsh(link.inertia)
+        assert moments[0] > 0
+        assert moments[0] + moments[1] >= moments[2] * (1 - 1e-9)
+        assert link.source
+
+
+def test_a_load_that_is_none_is_refused():
+    with pytest.raises(InvalidValueError, match="load mass: -1"):
+        Payload(mass=-1.0)
+    with pytest.raises(InvalidValueError, match="symmetric"):
+        Payload(mass=1.0, inertia=[[1, 2, 0], [0, 1, 0], [0, 0, 1]])
+    with pytest.raises(InvalidValueError, match="finite"):
+        Payload(mass=1.0, center_of_mass=(0, 0, float("nan")))

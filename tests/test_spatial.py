@@ -1,0 +1,48 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rcilab.errors import InvalidValueError
+from rcilab.spatial import IDENTITY, Pose
+
+angles = st.floats(-3.1, 3.1)
+lengths = st.floats(-2.0, 2.0)
+poses = st.builds(
+    lambda x, y, z, a, b, c: Pose.from_rpy((x, y, z), (a, b, c)), lengths, lengths, lengths, angles, angles, angles
+)
+
+
+@given(poses, poses)
+def test_composition_is_the_matrix_product(a, b):
+    np.testing.assert_allclose((a @ b).matrix, a.matrix @ b.matrix, atol=1e-12)
+
+
+@given(poses)
+def test_a_pose_and_its_inverse_cancel(pose):
+    assert (pose @ pose.inverse()).is_close(IDENTITY, 1e-12)
+
+
+@given(poses)
+def test_every_spelling_gives_the_pose_back(pose):
+    assert Pose(pose.position, pose.wxyz).is_close(pose, 1e-12)
+    assert Pose.from_matrix(pose.matrix).is_close(pose, 1e-12)
+    assert Pose.from_row_major(pose.as_row_major()).is_close(pose, 1e-12)
+    assert Pose.from_rpy(pose.position, pose.rpy).is_close(pose, 1e-7)  # Gimbal lock costs half the digits.
+
+
+@pytest.mark.parametrize("wxyz", [(0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1), (0, 0.6, 0.8, 0)])
+def test_half_turns_survive_the_quaternion(wxyz):
+    np.testing.assert_allclose(np.abs(Pose(wxyz=wxyz).wxyz), np.abs(wxyz), atol=1e-12)
+
+
+def test_what_is_no_pose_is_refused_in_words():
+    mirror, scaled, shifted, unknown = (np.eye(4) for _ in range(4))
+    mirror[0, 0], scaled[0, 0], shifted[3, 0], unknown[0, 3] = -1.0, 1.1, 1.0, np.nan
+    for matrix, word in ((mirror, "reflection"), (scaled, "orthonormal"), (shifted, "last row"), (unknown, "finite")):
+        with pytest.raises(InvalidValueError, match=word):
+            Pose.from_matrix(matrix)
+    with pytest.raises(InvalidValueError, match="norm is zero"):
+        Pose(wxyz=(0, 0, 0, 0))
