@@ -102,15 +102,11 @@ def pro_heights(d1: float, d3: float, d5: float, d7: float) -> tuple[float, ...]
     return 0.0, d1, joint_3, elbow, joint_5, wrist, wrist + d7
 
 
-def tabled_link(
-    mass: float, center: Sequence[float], tensor: Sequence[float], height: float, source: str
-) -> Link:
+def tabled_link(mass: float, center: Sequence[float], tensor: Sequence[float], height: float, source: str) -> Link:
     """Returns a link whose tensor is (Ixx, Iyy, Izz) or (Ixx, Iyy, Izz, Iyz), [kg m^2]."""
     ixx, iyy, izz, iyz = (*tensor, 0.0)[:4]
     inertia = frozen([[ixx, 0.0, 0.0], [0.0, iyy, iyz], [0.0, iyz, izz]])
-    return Link(
-        mass=mass, center_of_mass=frozen(center), inertia=inertia, origin_height=height, source=source
-    )
+    return Link(mass=mass, center_of_mass=frozen(center), inertia=inertia, origin_height=height, source=source)
 
 
 def solid_link(mass: float, center: Sequence[float], radius: float, length: float, height: float) -> Link:
@@ -125,6 +121,4 @@ def solid_link(mass: float, center: Sequence[float], radius: float, length: floa
         f"mass and centre: {ROS2}; tensor: computed, solid cylinder of radius {radius} m and length "
         f"{length:.3f} m, because the published one is impossible for a link of that radius"
     )
-    return Link(
-        mass=mass, center_of_mass=frozen(center), inertia=inertia, origin_height=height, source=source
-    )
+    return Link(mass=mass, center_of_mass=frozen(center), inertia=inertia, origin_height=height, source=source)
