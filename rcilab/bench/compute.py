@@ -1,0 +1,100 @@
+"""What planning and judging cost: the calls a person waits for at every drag of the target."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+
+from rcilab.arrays import Array
+from rcilab.bench.measure import Measurement, summarise, time_calls
+from rcilab.conformance.check import check
+from rcilab.errors import UnreachableError
+from rcilab.model import RobotModel, load_model
+from rcilab.motion.joint import plan_joint
+from rcilab.motion.motion import Motion
+
+_ROBOT = "xMatePro7"
+_SEED = 20
+
+
+def bench_forward() -> Measurement:
+    """Forward kinematics of a 7-axis arm at random poses, and of whole paths in the note."""
+    model = load_model(_ROBOT)
+    times = time_calls(model.forward, list(_random_q(model, 5000)))
+    growth = _growth(model.forward_path, {n: _random_q(model, n) for n in (10, 100, 1000, 10_000)})
+    return summarise("forward", times, "us", 10.0, f"{_ROBOT}, 5000 random poses; forward_path of N rows: {growth}")
+
+
+def bench_inverse() -> Measurement:
+    """Every branch of the inverse at one arm angle."""
+    model = load_model(_ROBOT)
+    cases = [(model.forward(q), model.arm_angle(q)) for q in _random_q(model, 2000)]
+    branches: list[int] = []
+
+    def solve(case: Any) -> None:
+        try:
+            branches.append(len(model.inverse(case[0], psi=case[1])))
+        except UnreachableError:  # Cannot happen: each pose was made from joint angles inside the limits.
+            branches.append(0)
+
+    times = time_calls(solve, cases)
+    note = (
+        f"{_ROBOT}, 2000 reachable poses, all 8 branches computed, {np.mean(branches):.1f} inside the limits on average"
+    )
+    if not all(branches):
+        note += f"; {branches.count(0)} POSES WITHOUT A SOLUTION"
+    return summarise("inverse", times, "us", 60.0, note)
+
+
+def bench_plan_joint() -> Measurement:
+    """A jerk-limited motion between two random poses, planned but not yet sampled."""
+    model = load_model(_ROBOT)
+    ends = _random_q(model, 400).reshape(200, 2, model.n)
+    times = time_calls(lambda pair: plan_joint(model, pair[0], pair[1]), list(ends))
+    sampled = time_calls(lambda pair: plan_joint(model, pair[0], pair[1]).q, list(ends[:50]))
+    note = f"{_ROBOT}, 200 random pairs; with every 1 ms sample of q: {1e3 * np.median(sampled):.2f} ms"
+    return summarise("plan_joint", times, "ms", 1.0, note)
+
+
+def bench_check() -> Measurement:
+    """The judgement of a 7-joint motion of 10 s; each time of a fresh one, so that nothing is cached."""
+    model = load_model(_ROBOT)
+    motions = [_motion_of(model, 10.0) for _ in range(30)]
+    times = time_calls(lambda motion: check(motion, model), motions, warm_up=0)
+    costs = []
+    for duration in (1.0, 3.0, 10.0, 30.0):
+        motion = _motion_of(model, duration)
+        costs.append(
+            f"{motion.duration:.0f} s {1e3 * time_calls(lambda m: check(m, model), [motion], warm_up=0)[0]:.1f} ms"
+        )
+    note = f"{_ROBOT}, {len(motions[0].times)} samples; by length: {', '.join(costs)}"
+    return summarise("check", times, "ms", 10.0, note)
+
+
+def _random_q(model: RobotModel, count: int) -> Array:
+    """Returns joint angles spread over the joint ranges, shape (count, n), [rad], the same on every machine."""
+    limits = model.limits.joint
+    return np.random.default_rng(_SEED).uniform(0.98 * limits.lower, 0.98 * limits.upper, (count, model.n))
+
+
+def _motion_of(model: RobotModel, duration: float) -> Motion:
+    """Returns a fresh motion of about this duration, [s]: the speed is chosen so that it takes that long."""
+    start, goal = -0.9 * model.limits.joint.upper, 0.9 * model.limits.joint.upper
+    fastest = plan_joint(model, start, goal, speed=1.0).duration
+    if duration <= fastest:
+        goal = start + (goal - start) * duration / fastest
+        return plan_joint(model, start, goal, speed=1.0)
+    return plan_joint(model, start, goal, speed=fastest / duration)
+
+
+def _growth(call: Any, cases: dict[int, Any]) -> str:
+    """Returns how the cost of a call grows with the size of its argument, in words."""
+    costs = []
+    for size, argument in cases.items():
+        start = time.perf_counter()
+        for _ in range(3):
+            call(argument)
+        costs.append(f"N={size} {1e6 * (time.perf_counter() - start) / 3:.0f} us")
+    return ", ".join(costs)

@@ -1,0 +1,63 @@
+"""A measurement: a named number beside its target."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+Unit = Literal["us", "ms", "s"]
+UNIT_SECONDS: dict[Unit, float] = {"us": 1e-6, "ms": 1e-3, "s": 1.0}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Measurement:
+    """What one bench found."""
+
+    name: str
+    median: float
+    p99: float
+    unit: Unit
+    target: float | None
+    """What we promise, in `unit`; None when nothing is promised."""
+    ok: bool | None
+    """Whether the promise is kept; None when nothing is promised."""
+    note: str = ""
+
+    def as_json(self) -> dict[str, Any]:
+        """Returns the entry that `rcilab bench --json` prints."""
+        return asdict(self)
+
+
+def summarise(name: str, seconds: ArrayLike, unit: Unit, target: float | None, note: str = "") -> Measurement:
+    """Returns the median and 99th percentile of measured times; the promise is about the median.
+
+    Args:
+        name: Name of the bench.
+        seconds: Measured times, [s].
+        unit: Unit to report in.
+        target: Largest median, in `unit`.
+        note: What else the reader should know.
+    """
+    values = np.asarray(seconds, dtype=np.float64) / UNIT_SECONDS[unit]
+    median, p99 = float(np.median(values)), float(np.percentile(values, 99))
+    return Measurement(
+        name=name, median=median, p99=p99, unit=unit, target=target, ok=None if target is None else median <= target,
+        note=note,
+    )  # fmt: skip
+
+
+def time_calls(call: Callable[[Any], object], arguments: Sequence[object], *, warm_up: int = 5) -> list[float]:
+    """Returns the time of each call, [s], one a given argument, after a few that do not count."""
+    for argument in arguments[:warm_up]:
+        call(argument)
+    times: list[float] = []
+    for argument in arguments:
+        start = time.perf_counter_ns()
+        call(argument)
+        times.append((time.perf_counter_ns() - start) * 1e-9)
+    return times

@@ -1,0 +1,50 @@
+"""JupyterLab on the lessons, on this machine only."""
+
+from __future__ import annotations
+
+import os
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+from rcilab.errors import UsageError
+
+
+def lab_command(
+    directory: Path, *, port: int | None = None, browser: bool = True, allow_root: bool = False
+) -> list[str]:
+    """Returns the command that opens JupyterLab on a directory, listening on loopback only.
+
+    Args:
+        directory: Where the notebooks are.
+        port: TCP port; None takes Jupyter's own choice, 8888 or the next free one.
+        browser: Whether to open a browser too.
+        allow_root: Whether root may run it, as in a container; Jupyter refuses otherwise.
+
+    Raises:
+        UsageError: JupyterLab is not installed, or there is no such directory.
+    """
+    if find_spec("jupyterlab") is None:
+        raise UsageError("JupyterLab is not installed: pip install -e '.[lab]' adds it")
+    if not directory.is_dir():
+        raise UsageError(f"there is no directory {directory}: name one that holds notebooks")
+    command = [sys.executable, "-m", "jupyterlab", str(directory), "--ServerApp.ip=127.0.0.1"]
+    if port is not None:
+        command += [f"--ServerApp.port={port}", "--ServerApp.port_retries=0"]
+    if not browser:
+        command.append("--no-browser")
+    if allow_root:
+        command.append("--allow-root")
+    return command
+
+
+def find_notebooks() -> Path:
+    """Returns the lessons of this checkout, or the current directory where rcilab was installed without them."""
+    lessons = Path(__file__).resolve().parents[2] / "notebooks"
+    return lessons if lessons.is_dir() else Path.cwd()
+
+
+def open_lab(command: list[str]) -> int:
+    """Becomes JupyterLab: this process is replaced, so that Ctrl-C reaches it and nothing is left behind."""
+    sys.stdout.flush()
+    os.execv(command[0], command)

@@ -1,0 +1,211 @@
+"""A motion as curves: angle, velocity, acceleration and jerk against their limits, the plan beside what happened."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rcilab.arrays import Array, as_vector
+from rcilab.clock import CYCLE_TIME
+from rcilab.conformance.check import check
+from rcilab.conformance.conditions import CYCLE_CONDITIONS, Condition
+from rcilab.errors import InvalidValueError
+from rcilab.limits import JointLimits
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from rcilab.client.run import Run
+    from rcilab.conformance.report import Violation
+    from rcilab.model import RobotModel
+    from rcilab.motion.motion import Motion
+
+# Okabe and Ito's palette, told apart with every kind of colour vision, without its yellow (too pale on white).
+JOINT_COLORS = ("#0072B2", "#E69F00", "#009E73", "#D55E00", "#56B4E9", "#CC79A7", "#000000")
+VIOLATION_COLOR = "#B00020"
+BEYOND_LIMIT_COLOR = "#808080"
+
+_RESOLUTION = 110  # [dots an inch] Sharp in a notebook, small in a file.
+_HEADROOM = 1.12
+"""How much of the limit a panel shows: all of it and a little of what lies beyond."""
+
+
+_SYMBOLS = ("q", "dq", "ddq", "jerk")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Panel:
+    """One row of the figure: what one condition judges, joint by joint."""
+
+    condition: Condition
+    values: Array
+    """As the controller will see it, shape (N, n)."""
+    lower: Array
+    upper: Array
+    actual: Array | None
+    """What happened, shape (M, n); None where nothing was measured."""
+
+
+def plot(motion: Motion, model: RobotModel, run: Run | None = None, *, joints: Sequence[int] | None = None) -> Figure:
+    """Draws angle, velocity, acceleration and jerk of a motion against the arm's limits.
+
+    Velocity, acceleration and jerk are backward differences at 1 ms, because those are what the controller judges.
+    Grey lies beyond a limit; where joints have different limits the grey gets darker at each. What `check` finds is
+    hatched in red over the time it lasts, and the title counts it. With a run, what the robot did is drawn solid over
+    the dashed plan, and a fifth panel shows the difference. Needs no display: the figure shows itself in a notebook
+    and takes `savefig` anywhere.
+
+    Args:
+        motion: What to draw.
+        model: The arm it is for; its limits are drawn.
+        run: What came of it on a robot, as `execute` returned it.
+        joints: Numbers of the joints to draw, from 1; None draws all.
+
+    Raises:
+        InvalidValueError: A joint number is none of this arm's.
+    """
+    chosen = _joint_indices(joints, model.n)
+    report = check(motion, model)
+    panels = _panels(motion, model.limits.joint, run)
+    figure = _new_figure(len(panels) + (run is not None))
+    axes: list[Axes] = list(figure.axes)
+    for panel, ax in zip(panels, axes, strict=False):
+        _draw_panel(ax, panel, motion.times, run, chosen)
+        _shade_violations(ax, panel, motion.times, report.violations)
+    if run is not None:
+        _draw_error(axes[-1], run, chosen)
+    axes[0].secondary_yaxis("right", functions=(np.degrees, np.radians)).set_ylabel("[deg]")
+    axes[0].legend(
+        loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=len(chosen) + 1, frameon=False, fontsize="small"
+    )
+    axes[-1].set_xlabel("time [s]")
+    axes[-1].set_xlim(0.0, max(motion.duration, float(run.t[-1]) if run is not None and len(run.t) else 0.0))
+    figure.suptitle(_title(model, motion, report.violations), fontsize="medium")
+    return figure
+
+
+def _new_figure(rows: int) -> Figure:
+    """Returns an empty figure that belongs to no window and shows itself in a notebook."""
+    from matplotlib.figure import Figure
+
+    class NotebookFigure(Figure):
+        """A figure that IPython can show although pyplot, and with it a back end, was never loaded."""
+
+        def _repr_png_(self) -> bytes:
+            picture = io.BytesIO()
+            self.savefig(picture, format="png")
+            return picture.getvalue()
+
+    figure = NotebookFigure(figsize=(9.0, 0.6 + 1.75 * rows), dpi=_RESOLUTION, layout="constrained")
+    figure.subplots(rows, 1, sharex=True)
+    return figure
+
+
+def _panels(motion: Motion, limits: JointLimits, run: Run | None) -> list[_Panel]:
+    measured = (run.q, run.dq) if run is not None else ()
+    return [
+        _Panel(
+            condition,
+            backward_differences(motion.q, condition.order),
+            *condition.bounds(limits),
+            measured[condition.order] if condition.order < len(measured) else None,
+        )
+        for condition in CYCLE_CONDITIONS
+    ]
+
+
+def backward_differences(q: Array, order: int) -> Array:
+    """Returns the backward differences at 1 ms of commanded angles, shape (N, n): what the controller judges.
+
+    Args:
+        q: Joint angles, one row a cycle, shape (N, n), [rad]; the arm is at rest in the first row.
+        order: 0 returns the angles themselves, 1 velocity [rad/s], 2 acceleration, 3 jerk.
+    """
+    before = np.repeat(q[:1], order, axis=0)
+    return np.diff(np.concatenate((before, q)), n=order, axis=0) / CYCLE_TIME**order
+
+
+def _draw_panel(ax: Axes, panel: _Panel, times: Array, run: Run | None, joints: Sequence[int]) -> None:
+    planned: dict[str, Any] = {"linestyle": (0, (4, 2)), "linewidth": 1.0} if run is not None else {"linewidth": 1.3}
+    for joint in joints:
+        color = JOINT_COLORS[joint % len(JOINT_COLORS)]
+        ax.plot(times, panel.values[:, joint], color=color, label=f"joint {joint + 1}", **planned)
+        if panel.actual is not None and run is not None:
+            ax.plot(run.t, panel.actual[:, joint], color=color, linewidth=1.3)
+    ax.set_ylabel(f"{_SYMBOLS[panel.condition.order]} [{panel.condition.unit.replace('^2', '²').replace('^3', '³')}]")
+    ax.margins(x=0.0)
+    ax.grid(visible=True, color="#E0E0E0", linewidth=0.6)
+    _draw_limits(ax, panel.lower[list(joints)], panel.upper[list(joints)], everything=panel.condition.order > 0)
+
+
+def _draw_limits(ax: Axes, lower: Array, upper: Array, *, everything: bool) -> None:
+    """Greys what lies beyond each limit.
+
+    Args:
+        ax: Where to.
+        lower: Lower bounds of the joints drawn.
+        upper: Upper bounds of the joints drawn.
+        everything: Widen the panel until all limits are in it; angles are drawn as large as they are instead, because
+            a wrist that may turn by 360 degrees would flatten every other curve.
+    """
+    low, high = ax.get_ylim()
+    if everything:
+        low, high = min(low, _HEADROOM * float(lower.min())), max(high, _HEADROOM * float(upper.max()))
+    beyond: dict[str, Any] = {"color": BEYOND_LIMIT_COLOR, "alpha": 0.16, "linewidth": 0.0, "zorder": 0.5}
+    edge: dict[str, Any] = {"color": BEYOND_LIMIT_COLOR, "linewidth": 0.8, "linestyle": (0, (1, 1.5)), "zorder": 0.6}
+    for bound in np.unique(upper[upper < high]):
+        ax.axhspan(bound, high, **beyond)
+        ax.axhline(bound, **edge)
+    for bound in np.unique(lower[lower > low]):
+        ax.axhspan(low, bound, **beyond)
+        ax.axhline(bound, **edge)
+    ax.set_ylim(low, high)
+
+
+def _shade_violations(ax: Axes, panel: _Panel, times: Array, violations: Sequence[Violation]) -> None:
+    """Hatches the time over which a joint is beyond its bound, and marks the worst sample."""
+    for violation in violations:
+        if violation.condition is not panel.condition:
+            continue
+        joint = violation.joint - 1
+        values = panel.values[:, joint]
+        for start, end in _spans((values >= panel.upper[joint]) | (values <= panel.lower[joint])):
+            ax.axvspan(
+                times[max(start - 1, 0)], times[min(end, len(times) - 1)],
+                facecolor=VIOLATION_COLOR, edgecolor=VIOLATION_COLOR, alpha=0.22, hatch="////", linewidth=0.0,
+            )  # fmt: skip
+        ax.plot([violation.time], [violation.value], "x", color=VIOLATION_COLOR, markersize=7, markeredgewidth=2)
+
+
+def _draw_error(ax: Axes, run: Run, joints: Sequence[int]) -> None:
+    for joint in joints:
+        ax.plot(run.t, 1e3 * run.error[:, joint], color=JOINT_COLORS[joint % len(JOINT_COLORS)], linewidth=1.0)
+    ax.set_ylabel("actual - plan [mrad]")
+    ax.margins(x=0.0)
+    ax.grid(visible=True, color="#E0E0E0", linewidth=0.6)
+
+
+def _spans(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Returns the runs of True in a mask as (first, one past last)."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], mask.astype(np.int8), [0]))))
+    return [(int(start), int(end)) for start, end in edges.reshape(-1, 2)]
+
+
+def _title(model: RobotModel, motion: Motion, violations: Sequence[Violation]) -> str:
+    verdict = f"{len(violations)} condition(s) violated, worst: {violations[0]}" if violations else "inside all limits"
+    return f"{model.name}, {motion.duration:.3f} s: {verdict}"
+
+
+def _joint_indices(joints: Sequence[int] | None, n: int) -> list[int]:
+    if joints is None:
+        return list(range(n))
+    numbers = as_vector(joints, len(joints), "joints").tolist()
+    if not numbers or any(number not in range(1, n + 1) for number in numbers):
+        raise InvalidValueError("joints", list(joints), f"must be numbers from 1 to {n}")
+    return [int(number) - 1 for number in numbers]

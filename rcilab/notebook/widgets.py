@@ -1,0 +1,140 @@
+"""Sliders that pose an arm: degrees for the hand, radians for the code."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import ipywidgets
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rcilab.arrays import JointVector, as_vector, frozen
+from rcilab.errors import InvalidValueError, KinematicsError
+
+if TYPE_CHECKING:
+    from rcilab.model import RobotModel
+
+_STEP_DEG = 0.5
+_POSITION_FORMAT = "x {:.1f}, y {:.1f}, z {:.1f} mm; roll {:.1f}, pitch {:.1f}, yaw {:.1f}°"
+
+
+class JointSliders:
+    """One slider a joint, its limits at its ends, and the pose of the tool below; shows itself in a notebook.
+
+    Args:
+        model: The arm.
+        q: Where to begin, shape (n,), [rad]; the arm's home when absent.
+        show: Called with the joint angles, shape (n,), [rad], at the start and at every change: `preview.show`, say.
+        continuous: Whether a slider reports while it is dragged, or once when it is let go. Take False where `show`
+            is slow; ipywidgets drops what comes too fast, so dragging is safe either way.
+
+    Raises:
+        InvalidValueError: q is not n angles inside the limits.
+    """
+
+    def __init__(
+        self,
+        model: RobotModel,
+        q: ArrayLike | None = None,
+        *,
+        show: Callable[[JointVector], object] | None = None,
+        continuous: bool = True,
+    ) -> None:
+        self._model = model
+        self._show = show
+        self._setting = False
+        limits = model.limits.joint
+        self.sliders = [
+            _joint_slider(i + 1, math.degrees(limits.lower[i]), math.degrees(limits.upper[i]), continuous)
+            for i in range(model.n)
+        ]
+        self.home = ipywidgets.Button(description="Home", tooltip="A comfortable pose away from limits")
+        self.zero = ipywidgets.Button(description="Zero", tooltip="Every joint at 0°: the arm stands upright")
+        self.pose = ipywidgets.HTML()
+        self._q = self._checked(model.home if q is None else q)
+        for slider in self.sliders:
+            slider.observe(self._on_slider, names="value")
+        self.home.on_click(lambda _: self._set(model.home))
+        self.zero.on_click(lambda _: self._set(np.zeros(model.n)))
+        rows = [_with_limits(slider) for slider in self.sliders]
+        self.widget = ipywidgets.VBox([*rows, ipywidgets.HBox([self.home, self.zero]), self.pose])
+        self._set(self._q)
+
+    @property
+    def q(self) -> JointVector:
+        """Joint angles, shape (n,), read-only, [rad]. Can be set; the sliders follow."""
+        return self._q
+
+    @q.setter
+    def q(self, q: ArrayLike) -> None:
+        self._set(self._checked(q))
+
+    def _repr_mimebundle_(self, **options: Any) -> Any:
+        return self.widget._repr_mimebundle_(**options)
+
+    def _set(self, q: JointVector) -> None:
+        """Takes angles as they are; the sliders show them rounded, and their own news is not listened to."""
+        self._q = frozen(q)
+        self._setting = True
+        try:
+            for slider, angle in zip(self.sliders, np.degrees(self._q).tolist(), strict=True):
+                slider.value = angle
+        finally:
+            self._setting = False
+        self._report()
+
+    def _on_slider(self, change: Any) -> None:
+        if self._setting:
+            return
+        limits = self._model.limits.joint
+        q = self._q.copy()
+        joint = self.sliders.index(change["owner"])
+        q[joint] = np.clip(math.radians(change["new"]), limits.lower[joint], limits.upper[joint])
+        self._q = frozen(q)
+        self._report()
+
+    def _report(self) -> None:
+        T_base_tool = self._model.forward(self._q)
+        text = _POSITION_FORMAT.format(*(1e3 * T_base_tool.position), *np.degrees(T_base_tool.rpy))
+        if self._model.n == 7:
+            try:
+                text += f"; arm angle {math.degrees(self._model.arm_angle(self._q)):.1f}°"
+            except KinematicsError:  # Stretched or straight above the base: there is no elbow to measure.
+                text += "; no arm angle here (singular)"
+        self.pose.value = f"<code>tool in base: {text}</code>"
+        if self._show is not None:
+            self._show(self._q)
+
+    def _checked(self, q: ArrayLike) -> JointVector:
+        angles = as_vector(q, self._model.n, "q", "rad")
+        limits = self._model.limits.joint
+        for joint, (angle, low, high) in enumerate(zip(angles, limits.lower, limits.upper, strict=True), start=1):
+            if not low <= angle <= high:
+                raise InvalidValueError(
+                    f"q of joint {joint}", float(angle), f"must be from {low:.4f} to {high:.4f} rad"
+                )
+        return angles
+
+
+def _joint_slider(number: int, lower: float, upper: float, continuous: bool) -> Any:
+    return ipywidgets.FloatSlider(
+        description=f"joint {number}",
+        min=lower,
+        max=upper,
+        step=_STEP_DEG,
+        readout_format=".1f",
+        continuous_update=continuous,
+        layout=ipywidgets.Layout(width="26em"),
+    )
+
+
+def _with_limits(slider: Any) -> Any:
+    """Returns the slider between its limits, which is where a hand looks for them."""
+    label = ipywidgets.Layout(width="4em", display="flex", justify_content="center")
+    return ipywidgets.HBox([
+        ipywidgets.Label(f"{slider.min:.0f}°", layout=label),
+        slider,
+        ipywidgets.Label(f"{slider.max:.0f}°", layout=label),
+    ])  # fmt: skip

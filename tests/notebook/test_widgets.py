@@ -1,0 +1,79 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import rcilab
+from rcilab.errors import InvalidValueError
+from rcilab.notebook.widgets import JointSliders
+
+PRO7 = rcilab.load_model("xMatePro7")
+
+
+@pytest.mark.parametrize("name", ["xMatePro3", "xMatePro7", "xMate3", "xMate7"])
+def test_every_joint_has_a_slider_with_its_limits_at_the_ends(name: str) -> None:
+    model = rcilab.load_model(name)
+    sliders = JointSliders(model).sliders
+    np.testing.assert_allclose([math.radians(s.min) for s in sliders], model.limits.joint.lower, rtol=1e-12)
+    np.testing.assert_allclose([math.radians(s.max) for s in sliders], model.limits.joint.upper, rtol=1e-12)
+
+
+def test_moving_one_slider_poses_the_arm_in_radians() -> None:
+    shown: list[np.ndarray] = []
+    sliders = JointSliders(PRO7, show=shown.append)
+    sliders.sliders[3].value = -45.0
+    expected = PRO7.home.copy()
+    expected[3] = math.radians(-45.0)
+    np.testing.assert_array_equal(shown[-1], expected)
+    np.testing.assert_array_equal(sliders.q, expected)
+
+
+def test_the_arm_is_shown_where_it_begins_and_home_and_zero_lead_back() -> None:
+    shown: list[np.ndarray] = []
+    start = np.full(7, 0.3)
+    sliders = JointSliders(PRO7, start, show=shown.append)
+    np.testing.assert_array_equal(shown[0], start)
+    sliders.zero.click()
+    np.testing.assert_array_equal(shown[-1], np.zeros(7))
+    sliders.home.click()
+    np.testing.assert_array_equal(shown[-1], PRO7.home)
+
+
+def test_setting_all_joints_shows_them_once_and_exactly() -> None:
+    shown: list[np.ndarray] = []
+    sliders = JointSliders(PRO7, show=shown.append)
+    before = len(shown)
+    q = np.linspace(-0.9, 0.9, 7) / 3.0
+    sliders.q = q
+    assert len(shown) == before + 1
+    np.testing.assert_array_equal(shown[-1], q)
+    np.testing.assert_allclose([slider.value for slider in sliders.sliders], np.degrees(q), atol=1e-12)
+
+
+def test_a_slider_at_its_end_stays_inside_the_limit() -> None:
+    sliders = JointSliders(PRO7)
+    for slider in sliders.sliders:
+        slider.value = slider.max
+    assert (sliders.q <= PRO7.limits.joint.upper).all()
+
+
+def test_the_pose_is_told_in_millimetres_and_degrees() -> None:
+    sliders = JointSliders(PRO7, np.zeros(7))
+    assert "z 1529.5 mm" in sliders.pose.value  # The sum of the lengths in the manual's table 4.5.
+    assert "no arm angle here" in sliders.pose.value
+    sliders.home.click()
+    assert "arm angle 0.0°" in sliders.pose.value.replace("-0.0°", "0.0°")
+
+
+def test_angles_beyond_a_limit_are_refused_by_joint_and_bound() -> None:
+    q = PRO7.home.copy()
+    q[1] = 2.2
+    with pytest.raises(InvalidValueError, match=r"joint 2: 2\.2 must be from -2\.0944 to 2\.0944 rad"):
+        JointSliders(PRO7, q)
+
+
+def test_sliders_can_wait_until_they_are_let_go() -> None:
+    assert all(s.continuous_update for s in JointSliders(PRO7).sliders)
+    assert not any(s.continuous_update for s in JointSliders(PRO7, continuous=False).sliders)
