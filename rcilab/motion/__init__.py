@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from rcilab.motion.differences import derivatives_from_differences, differences_from_derivatives
+from rcilab.motion.joint import plan_joint
 from rcilab.motion.margin import LIMIT_MARGIN
 from rcilab.motion.motion import Law, Motion, MotionSample
 from rcilab.motion.piecewise import PiecewisePolynomial
@@ -16,5 +17,6 @@ __all__ = [
     "PiecewisePolynomial",
     "derivatives_from_differences",
     "differences_from_derivatives",
+    "plan_joint",
     "plan_stop",
 ]

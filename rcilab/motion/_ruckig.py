@@ -7,17 +7,25 @@ not given to ruckig either (its free edition does not enforce them); `plan_joint
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from rcilab.arrays import Array, JointVector
+from rcilab.arrays import JointVector
 from rcilab.errors import PlanningError
-from rcilab.motion.piecewise import PiecewisePolynomial
+from rcilab.motion.piecewise import PiecewisePolynomial, join_pieces
 
-_SAME_BREAK = 1e-11  # [s] Breaks of two joints closer than this are one; at 1e4 rad/s^3 that is 1e-7 rad/s^2.
-
+_FACTORIALS = (1.0, 1.0, 2.0, 6.0)
 _NO_MISS = 1e-13  # [rad] Rounding of the angles themselves.
+
+
+class Extremes(NamedTuple):
+    """Where a joint turns: smallest and largest angle [rad], each with its time [s]."""
+
+    lowest: float
+    lowest_time: float
+    highest: float
+    highest_time: float
 
 
 def plan_profile(
@@ -28,10 +36,11 @@ def plan_profile(
     jerk: JointVector,
     start_velocity: JointVector,
     start_acceleration: JointVector,
-) -> PiecewisePolynomial:
+) -> tuple[PiecewisePolynomial, list[Extremes]]:
     """Returns the fastest curve from a moving start to rest at the goal with all joints arriving together.
 
-    In phase (a straight line in joint space) where that is possible, which it is from rest.
+    In phase (a straight line in joint space) where that is possible, which it is from rest. With it come the extreme
+    angles of every joint.
 
     Args:
         start: Joint angles at t = 0, shape (n,), [rad].
@@ -56,7 +65,9 @@ def plan_profile(
     problem.max_velocity = velocity.tolist()
     problem.max_acceleration = acceleration.tolist()
     problem.max_jerk = jerk.tolist()
-    return _arriving_at(goal, _solve(problem))
+    trajectory = _solve(problem)
+    extremes = [Extremes(e.min, e.t_min, e.max, e.t_max) for e in trajectory.position_extrema]
+    return _arriving_at(goal, _polynomial(trajectory)), extremes
 
 
 def plan_standstill(
@@ -84,7 +95,7 @@ def plan_standstill(
     problem.current_acceleration = ddq.tolist()
     problem.max_acceleration = acceleration.tolist()
     problem.max_jerk = jerk.tolist()
-    return _solve(problem)
+    return _polynomial(_solve(problem))
 
 
 @lru_cache(maxsize=16)
@@ -100,7 +111,7 @@ def _reasons() -> dict[Any, str]:
     }
 
 
-def _solve(problem: Any) -> PiecewisePolynomial:
+def _solve(problem: Any) -> Any:
     import ruckig
 
     trajectory = ruckig.Trajectory(problem.degrees_of_freedom)
@@ -112,38 +123,21 @@ def _solve(problem: Any) -> PiecewisePolynomial:
     if result not in (ruckig.Result.Working, ruckig.Result.Finished):
         reason = _reasons().get(result, f"the planner answered {result!r}")
         raise PlanningError(f"no motion: {reason}; choose another start, goal or speed")
-    return _polynomial(trajectory.profiles[0], float(trajectory.duration))
+    return trajectory
 
 
-def _polynomial(profiles: list[Any], duration: float) -> PiecewisePolynomial:
+def _polynomial(trajectory: Any) -> PiecewisePolynomial:
     """Returns the curve of a trajectory: for each joint up to two brake steps, seven steps, then rest."""
+    profiles: list[Any] = trajectory.profiles[0]
     dt = np.array([[*p.brake.t, *p.t] for p in profiles])
-    steps = np.array(
-        [
-            [
-                [*p.brake.p, *p.p],
-                [*p.brake.v, *p.v[:7], 0.0],
-                [*p.brake.a, *p.a[:7], 0.0],
-                [*p.brake.j, *p.j, 0.0],
-            ]
-            for p in profiles
-        ]
-    )
-    joints, count = steps.shape[0], steps.shape[2]
-    starts = np.zeros((joints, count))
+    steps = [
+        [[*p.brake.p, *p.p], [*p.brake.v, *p.v[:7], 0.0], [*p.brake.a, *p.a[:7], 0.0], [*p.brake.j, *p.j, 0.0]]
+        for p in profiles
+    ]
+    coefficients = np.array(steps).transpose(0, 2, 1) / _FACTORIALS
+    starts = np.zeros(coefficients.shape[:2])
     np.cumsum(np.maximum(dt, 0.0), axis=1, out=starts[:, 1:])
-    breaks = _union(starts, duration)
-    middle = (breaks[:-1] + breaks[1:]) / 2.0
-    step = (starts[:, np.newaxis, :] <= middle[:, np.newaxis]).sum(axis=2) - 1
-    row = np.arange(joints)[:, np.newaxis]
-    tau = breaks[:-1] - starts[row, step]
-    p, v, a, j = (steps[row, power, step] for power in range(4))
-    coefficients = np.empty((len(middle), joints, 4))
-    coefficients[:, :, 0] = (p + tau * (v + tau * (a / 2.0 + tau * (j / 6.0)))).T
-    coefficients[:, :, 1] = (v + tau * (a + tau * (j / 2.0))).T
-    coefficients[:, :, 2] = ((a + tau * j) / 2.0).T
-    coefficients[:, :, 3] = (j / 6.0).T
-    return PiecewisePolynomial(breaks, coefficients)
+    return join_pieces(starts, coefficients, float(trajectory.duration))
 
 
 def _arriving_at(goal: JointVector, curve: PiecewisePolynomial) -> PiecewisePolynomial:
@@ -163,11 +157,3 @@ def _arriving_at(goal: JointVector, curve: PiecewisePolynomial) -> PiecewisePoly
     coefficients[:, :, 2] += miss * (3.0 - 6.0 * u) / total**2
     coefficients[:, :, 3] += miss * -2.0 / total**3
     return PiecewisePolynomial(curve.breaks, coefficients)
-
-
-def _union(starts: Array, duration: float) -> Array:
-    inner = np.sort(starts, axis=None)
-    inner = inner[(inner > _SAME_BREAK) & (inner < duration - _SAME_BREAK)]
-    if inner.size:
-        inner = inner[np.concatenate(([True], np.diff(inner) > _SAME_BREAK))]
-    return np.concatenate(([0.0], inner, [duration]))

@@ -14,6 +14,8 @@ from rcilab.errors import InvalidValueError
 DERIVATIVES = 4
 """Position, velocity, acceleration and jerk."""
 
+_SAME_BREAK = 1e-11  # [s] Breaks of two joints closer than this are one; at 1e4 rad/s^3 that is 1e-7 rad/s^2.
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PiecewisePolynomial:
@@ -105,6 +107,37 @@ class PiecewisePolynomial:
                 value += coefficient[piece]
             results.append(value)
         return results[0], results[1], results[2], results[3]
+
+
+def join_pieces(starts: Array, coefficients: Array, duration: float) -> PiecewisePolynomial:
+    """Returns the curve of joints that each have their own pieces, on the union of all breaks.
+
+    Args:
+        starts: When each piece of each joint begins, shape (n, m), not decreasing along a joint, first 0, [s]. The last
+            piece of a joint goes on to the end; a piece of no length is skipped.
+        coefficients: Shape (n, m, k), ascending powers of the time since the piece began, [rad, rad/s, ...].
+        duration: Where the curve ends, [s].
+    """
+    breaks = _union(starts, duration)
+    middle = (breaks[:-1] + breaks[1:]) / 2.0
+    piece = (starts[:, np.newaxis, :] <= middle[:, np.newaxis]).sum(axis=2) - 1
+    joint = np.arange(len(starts))[:, np.newaxis]
+    tau = breaks[:-1] - starts[joint, piece]
+    shifted = np.moveaxis(coefficients[joint, piece], 2, 0).copy()
+    # Taylor shift by repeated synthetic division: the same polynomial in powers of the time since the new break.
+    powers = len(shifted)
+    for lowest in range(powers - 1):
+        for power in range(powers - 2, lowest - 1, -1):
+            shifted[power] += tau * shifted[power + 1]
+    return PiecewisePolynomial(breaks, shifted.transpose(2, 1, 0))
+
+
+def _union(starts: Array, duration: float) -> Array:
+    inner = np.sort(starts, axis=None)
+    inner = inner[(inner > _SAME_BREAK) & (inner < duration - _SAME_BREAK)]
+    if inner.size:
+        inner = inner[np.concatenate(([True], np.diff(inner) > _SAME_BREAK))]
+    return np.concatenate(([0.0], inner, [duration]))
 
 
 def _derivative_tables(coefficients: Array) -> tuple[tuple[Array, ...], ...]:

@@ -1,0 +1,172 @@
+"""Motions in joint space: time-optimal and jerk-limited, or by the manual's S profile."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import degrees
+from typing import Literal, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rcilab.arrays import JointVector, as_vector
+from rcilab.errors import InvalidValueError, PlanningError
+from rcilab.limits import JointLimits, Limits
+from rcilab.motion import _ruckig
+from rcilab.motion.margin import LIMIT_MARGIN
+from rcilab.motion.motion import Motion, standing
+from rcilab.motion.piecewise import join_pieces
+from rcilab.motion.s_curve import STANDSTILL_DISTANCE, plan_s_curve, synchronize
+
+JointLaw = Literal["jerk_limited", "s_profile"]
+
+S_PROFILE_VELOCITY = {7: (1.0, 1.0, 1.0, 1.0, 1.25, 1.25, 1.25), 6: (1.0, 1.0, 1.0, 1.25, 1.25, 1.25)}
+"""Speeds of the vendor's joint generator at speed 1, by number of joints, [rad/s]; six joints: without joint 3."""
+S_PROFILE_ACCELERATION = 2.5
+"""Acceleration of the vendor's joint generator at speed 1, every joint, [rad/s^2]."""
+
+
+class Arm(Protocol):
+    """What planning needs to know of a robot; a RobotModel and a RobotDescription both know it."""
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        ...
+
+    @property
+    def limits(self) -> Limits:
+        """Bounds of the arm."""
+        ...
+
+
+def plan_joint(
+    model: Arm,
+    start: ArrayLike,
+    goal: ArrayLike,
+    *,
+    speed: float = 0.5,
+    law: JointLaw = "jerk_limited",
+    start_velocity: ArrayLike | None = None,
+    start_acceleration: ArrayLike | None = None,
+) -> Motion:
+    """Returns a motion to rest at `goal` on which all joints start and arrive together.
+
+    Args:
+        model: The arm.
+        start: Joint angles at the start, shape (n,), [rad]. Plan from the commanded angles (`state.q_c`).
+        goal: Joint angles at the end, shape (n,), [rad]; strictly inside the limits, as the robot demands.
+        speed: Part of the velocity and acceleration limits to use, in (0, 1]; the jerk limit is used in full.
+        law: "jerk_limited": the fastest motion inside the limits, with `LIMIT_MARGIN` to spare; from rest a straight
+            line in joint space. "s_profile": exactly the motion of the vendor's joint generator (manual 3.5). That one
+            has speeds of its own and does not know the robot's limits: `rcilab.check` judges it. A joint that is to
+            move less than 1e-6 rad stays, so the motion may end that far from `goal`.
+        start_velocity: Joint velocities at the start, shape (n,), [rad/s]; None is rest. Derivatives of the running
+            motion, not the backward differences that a robot reports (`derivatives_from_differences`).
+        start_acceleration: Joint accelerations at the start, shape (n,), [rad/s^2]; None is zero.
+
+    Raises:
+        InvalidValueError: Wrong shape, not finite, an unknown law, or a speed outside (0, 1].
+        PlanningError: A joint is, or cannot help getting, outside its limits.
+    """
+    n, limits = model.n, model.limits.joint
+    start, goal = as_vector(start, n, "start", "rad"), as_vector(goal, n, "goal", "rad")
+    dq = as_vector(np.zeros(n) if start_velocity is None else start_velocity, n, "start_velocity", "rad/s")
+    ddq = as_vector(np.zeros(n) if start_acceleration is None else start_acceleration, n, "start_acceleration")
+    if not 0.0 < speed <= 1.0:
+        raise InvalidValueError("speed", speed, "must be in (0, 1]: the part of the limits to use")
+    if law not in _PLANNERS:
+        raise InvalidValueError("law", law, f"is unknown; known: {', '.join(_PLANNERS)}")
+    _require_inside("start", start, limits)
+    _require_inside("goal", goal, limits)
+    return _PLANNERS[law](limits, start, goal, float(speed), dq, ddq)
+
+
+def _plan_jerk_limited(
+    limits: JointLimits, start: JointVector, goal: JointVector, speed: float, dq: JointVector, ddq: JointVector
+) -> Motion:
+    at_rest = not dq.any() and not ddq.any()
+    if at_rest and np.array_equal(start, goal):
+        return standing(goal, speed=speed)
+    if not at_rest:
+        _require_possible(limits, dq, ddq)
+    part = LIMIT_MARGIN * speed
+    curve, extremes = _ruckig.plan_profile(
+        start, goal, part * limits.velocity, part * limits.acceleration, LIMIT_MARGIN * limits.jerk, dq, ddq
+    )
+    for joint, (turn, low, high) in enumerate(zip(extremes, limits.lower, limits.upper, strict=True), start=1):
+        if not low < turn.lowest:
+            raise _overshoot(joint, turn.lowest, turn.lowest_time, low)
+        if not turn.highest < high:
+            raise _overshoot(joint, turn.highest, turn.highest_time, high)
+    return Motion(polynomial=curve, goal=goal, law="jerk_limited", speed=speed)
+
+
+def _plan_s_profile(
+    limits: JointLimits, start: JointVector, goal: JointVector, speed: float, dq: JointVector, ddq: JointVector
+) -> Motion:
+    n = len(start)
+    if dq.any() or ddq.any():
+        raise PlanningError("the S profile starts at rest; use law='jerk_limited' to plan from a moving start")
+    if n not in S_PROFILE_VELOCITY:
+        raise PlanningError(f"the S profile is defined for arms of 6 or 7 joints, not {n}; use law='jerk_limited'")
+    acceleration = S_PROFILE_ACCELERATION * speed
+    curves = synchronize(
+        [
+            plan_s_curve(float(distance), velocity * speed, acceleration)
+            for distance, velocity in zip(goal - start, S_PROFILE_VELOCITY[n], strict=True)
+        ]
+    )
+    end = np.where(np.abs(goal - start) > STANDSTILL_DISTANCE, goal, start)
+    duration = max(curve.duration for curve in curves)
+    if duration == 0.0:
+        return standing(end, law="s_profile", speed=speed)
+    pieces = [curve.pieces() for curve in curves]
+    coefficients = np.array([table for _, table in pieces])
+    coefficients[:, :, 0] += start[:, np.newaxis]
+    curve = join_pieces(np.array([starts for starts, _ in pieces]), coefficients, duration)
+    return Motion(polynomial=curve, goal=end, law="s_profile", speed=speed)
+
+
+_Planner = Callable[[JointLimits, JointVector, JointVector, float, JointVector, JointVector], Motion]
+
+_PLANNERS: dict[str, _Planner] = {"jerk_limited": _plan_jerk_limited, "s_profile": _plan_s_profile}
+
+
+def _angle(value: float) -> str:
+    return f"{degrees(value):.2f}° ({value:.4f} rad)"
+
+
+def _require_inside(name: str, q: JointVector, limits: JointLimits) -> None:
+    outside = np.flatnonzero(~((limits.lower < q) & (q < limits.upper)))
+    if outside.size:
+        i = int(outside[0])
+        low, high = float(limits.lower[i]), float(limits.upper[i])
+        raise PlanningError(
+            f"joint {i + 1}: {name} {_angle(float(q[i]))} is not strictly between {_angle(low)} and {_angle(high)}; "
+            f"choose an angle between them"
+        )
+
+
+def _require_possible(limits: JointLimits, dq: JointVector, ddq: JointVector) -> None:
+    """Refuses a start state that is outside the limits, or that no jerk inside the limits keeps inside."""
+    for name, value, bound, unit in (
+        ("start velocity", dq, limits.velocity, "rad/s"),
+        ("start acceleration", ddq, limits.acceleration, "rad/s^2"),
+        # Until the acceleration is gone, at full jerk, the velocity still changes by ddq^2 / (2 jerk).
+        ("velocity shortly after the start", dq + ddq * np.abs(ddq) / (2.0 * limits.jerk), limits.velocity, "rad/s"),
+    ):
+        beyond = np.flatnonzero(np.abs(value) > bound)
+        if beyond.size:
+            i = int(beyond[0])
+            raise PlanningError(
+                f"joint {i + 1}: {name} {value[i]:.4g} {unit} exceeds {bound[i]:.4g} {unit}; "
+                f"slow down first (plan_stop answers from any state)"
+            )
+
+
+def _overshoot(joint: int, angle: float, time: float, bound: float) -> PlanningError:
+    return PlanningError(
+        f"joint {joint}: would reach {_angle(angle)} at t = {time:.3f} s, past its limit {_angle(float(bound))}, "
+        f"because it starts too fast towards it; start slower, or stop first and plan from rest"
+    )
