@@ -13,7 +13,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 
 LAYERS = [  # From the bottom. A part imports from lines below its own, and from itself; the base may import the base.
-    {"errors", "arrays", "clock", "faults", "limits", "command", "state", "spatial"},
+    {"errors", "arrays", "clock", "faults", "limits", "command", "state", "spatial", "realtime"},
     {"protocols", "robots"},
     {"kinematics", "dynamics"},
     {"model"},
