@@ -30,6 +30,17 @@ class Mesh:
         return Mesh(self.vertices + np.asarray(offset, dtype=np.float64), self.faces)
 
 
+def shrink(mesh: Mesh, depth: float) -> Mesh:
+    """Returns the mesh with every vertex moved inward along its normal by `depth`, [m]."""
+    corners = mesh.vertices[mesh.faces]
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals = np.stack(
+        [np.bincount(mesh.faces.ravel(), np.repeat(x, 3), minlength=len(mesh.vertices)) for x in across.T], axis=1
+    )
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+    return Mesh(mesh.vertices - depth * normals, mesh.faces)
+
+
 def merge_meshes(meshes: Sequence[Mesh]) -> Mesh:
     """Returns one mesh that holds all of the given ones."""
     starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes[:-1])])

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -20,22 +21,25 @@ import numpy as np
 from rcilab.arrays import Array, Vector3, frozen
 from rcilab.robots.description import RobotDescription
 from rcilab.robots.mesh import Mesh, merge_meshes, mirror_y, revolve
-from rcilab.robots.surface import box, cut, cylinder, join, mesh_surface, rod
+from rcilab.robots.surface import box, cut, cylinder, join, mesh_surface, rod, vase
 from rcilab.robots.upright import upright_joints
 
 ColorRole = Literal["shell", "cap", "dark"]
 
 ROLE_COLORS: dict[ColorRole, tuple[int, int, int]] = {
     "shell": (238, 240, 242),
-    "cap": (134, 142, 150),
-    "dark": (44, 48, 54),
+    "cap": (166, 172, 178),
+    "dark": (70, 75, 82),
 }
 """What the roles look like on a live arm, RGB 0-255."""
 
-_GAP = 0.0015  # [m] half the gap between two housings
-_COLLAR = 0.013  # [m] width of the machined ring on each side of a gap
-_SEAM = 0.0004  # [m] how much a collar stands proud of the cast housing
+_GAP = 0.0012  # [m] half the gap between two housings
+_COLLAR = 0.014  # [m] width of the machined ring on each side of a gap
+_SEAM = 0.0006  # [m] how much a collar stands proud of the cast housing
 _SWEEP = 0.006  # [m] free space around a joint cylinder for the neighbour's housing
+
+
+_STRENGTH = 1.15  # how much thicker the 7 kg arms are
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -96,8 +100,8 @@ class _Fineness:
 
 
 _FINENESS = {
-    "fine": _Fineness(cell=0.0080, segments=56),
-    "coarse": _Fineness(cell=0.0125, segments=32),
+    "fine": _Fineness(cell=0.0085, segments=56),
+    "coarse": _Fineness(cell=0.0125, segments=36),
 }
 
 
@@ -110,10 +114,12 @@ def build_shapes(description: RobotDescription, quality: Literal["fine", "coarse
         quality: "fine" for the screen, "coarse" for files and for ghosts.
     """
     fine = _FINENESS[quality]
+    if description.rated_payload >= 5.0:  # as many triangles on a larger arm
+        fine = _Fineness(cell=_STRENGTH * fine.cell, segments=fine.segments)
     joints = _design_joints(description)
     flange = description.links[-1].origin_height
     pedestal = _pedestal(joints[0], fine)
-    housings = [_housing(low, high, fine) for low, high in zip(joints[:-1], joints[1:], strict=True)]
+    housings = [_housing(low, high, fine) for low, high in pairwise(joints)]
     bodies = [*housings, _wrist_plate(joints[-1], flange, fine)]
     links = tuple(_in_frame(body, link.origin_height) for body, link in zip(bodies, description.links, strict=True))
     return ArmShape(base=pedestal, links=links)
@@ -129,8 +135,8 @@ def _in_frame(shape: LinkShape, height: float) -> LinkShape:
 
 
 def _design_joints(description: RobotDescription) -> list[_Joint]:
-    """Returns where the housings meet. Radii shrink from base to flange; the 7 kg arms are a sixth stronger."""
-    strength = 1.0 if description.rated_payload < 5.0 else 1.15
+    """Returns where the housings meet. Radii shrink from base to flange; the 7 kg arms are thicker."""
+    strength = 1.0 if description.rated_payload < 5.0 else _STRENGTH
     heights = [link.origin_height for link in description.links]
     axes = ["y" if abs(joint.axis[1]) > 0.5 else "z" for joint in upright_joints(description)]
     radii = np.interp(np.linspace(0.0, 1.0, len(axes)), [0.0, 0.5, 1.0], [0.064, 0.056, 0.045]) * strength
@@ -157,14 +163,14 @@ def _housing(low: _Joint, high: _Joint, fine: _Fineness) -> LinkShape:
     """Returns the link between two joints; at a y joint it lies at +y of its own joint and at -y of the next one."""
     ends = [(low, +1.0, +1.0), (high, -1.0, -1.0)]  # joint, side in y, direction in z into the housing
 
+    stations = [end.height + up * (_COLLAR + 0.01 if end.axis == "z" else 1.4 * end.radius) for end, _, up in ends]
+    radii = [end.radius - _SEAM if end.axis == "z" else 0.90 * end.radius for end, _, _ in ends]
+    tips = [end.height + up * (0.002 if end.axis == "z" else 1.0 * end.radius) for end, _, up in ends]
+
     def body(p: Array) -> Array:
-        tops = [end.height + up * (0.0 if end.axis == "z" else 1.30 * end.radius) for end, _, up in ends]
-        waist = [end.radius * (1.0 if end.axis == "z" else 0.90) - _SEAM for end, _, _ in ends]
-        d = rod(p, (0.0, 0.0, tops[0]), (0.0, 0.0, tops[1]), waist[0], waist[1])
+        d = vase(p, tips, stations, radii)
         for end, side, up in ends:
             if end.axis == "z":
-                near, far = sorted((end.height - up * 0.02, end.height + up * (_COLLAR + 0.008)))
-                d = join(d, cylinder(p, 2, near, far, end.radius - _SEAM, 0.004, (0.0, 0.0)), 0.006)
                 continue
             r, w = end.radius, _width(end)
             near, far = sorted((side * _GAP, side * w))
@@ -173,13 +179,11 @@ def _housing(low: _Joint, high: _Joint, fine: _Fineness) -> LinkShape:
                 p, (0.0, side * 0.36 * w, end.height), (0.0, 0.0, end.height + up * 1.75 * r), 0.78 * r, 0.88 * r
             )
             d = join(join(d, neck, 0.030), hub, 0.028)
-        for end, side, up in ends:
-            if end.axis == "z":
-                d = np.maximum(d, up * (end.height + up * 0.004 - p[:, 2]))
-                continue
-            near, far = sorted((-side * 0.3, side * _GAP))
-            room = cylinder(p, 1, near, far, end.radius + _SWEEP, 0.0, (0.0, end.height))
-            d = cut(d, room, 0.006)
+        for end, side, _ in ends:
+            if end.axis == "y":
+                near, far = sorted((-side * 0.3, side * _GAP))
+                room = cylinder(p, 1, near, far, end.radius + _SWEEP, 0.0, (0.0, end.height))
+                d = np.maximum(cut(d, room, 0.014), side * p[:, 1] - _width(end))
         return d
 
     reach = 1.5 * max(low.radius, high.radius) + 0.02
@@ -187,11 +191,31 @@ def _housing(low: _Joint, high: _Joint, fine: _Fineness) -> LinkShape:
     top = high.height + (1.3 * high.radius if high.axis == "y" else 0.03)
     half = 1.25 * max(low.radius, high.radius)
     parts = [Part(mesh_surface(body, (-half, -reach, bottom), (half, reach, top), fine.cell), "shell")]
-    capsules: list[Capsule] = []
     for end, side, up in ends:
         parts += _trim(end, side, up, fine)
     parts += _gap_ring(high, fine)
-    return LinkShape(_by_role(parts), tuple(capsules))
+    return LinkShape(_by_role(parts), tuple(_housing_capsules(ends)))
+
+
+def _housing_capsules(ends: list[tuple[_Joint, float, float]]) -> list[Capsule]:
+    """Returns one capsule through the middle and one along each y joint; they stand proud of the caps by a little."""
+    middle = [
+        (0.0, 0.0, end.height + up * 0.35 * end.radius)
+        if end.axis == "z"
+        else (0.0, side * 0.2 * end.radius, end.height + up * end.radius)
+        for end, side, up in ends
+    ]
+    capsules = [_capsule(middle[0], middle[1], 1.03 * max(end.radius for end, _, _ in ends))]
+    for end, side, _ in ends:
+        if end.axis == "y":
+            near, far = side * 0.3 * end.radius, side * (_width(end) - 0.7 * end.radius)
+            capsules.append(_capsule((0.0, near, end.height), (0.0, far, end.height), 1.02 * end.radius))
+    return capsules
+
+
+def _capsule(start: tuple[float, float, float], end: tuple[float, float, float], radius: float) -> Capsule:
+    """Returns a capsule in whole micrometres: nobody needs more, and files stay readable."""
+    return Capsule(frozen(np.round(start, 6)), frozen(np.round(end, 6)), round(radius, 6))
 
 
 def _trim(end: _Joint, side: float, up: float, fine: _Fineness) -> list[Part]:
@@ -228,7 +252,8 @@ def _gap_ring(joint: _Joint, fine: _Fineness) -> list[Part]:
 
 
 def _by_role(parts: list[Part]) -> tuple[Part, ...]:
-    """Joins the meshes of one colour."""
+    """Joins the meshes of one colour, trim before castings: drawn translucent, what lies below then stays hidden."""
+    parts = parts[::-1]
     roles = list(dict.fromkeys(part.role for part in parts))
     return tuple(Part(merge_meshes([p.mesh for p in parts if p.role == role]), role) for role in roles)
 
@@ -238,12 +263,11 @@ def _pedestal(joint: _Joint, fine: _Fineness) -> LinkShape:
     r, top = joint.radius, joint.height
 
     def body(p: Array) -> Array:
-        column = rod(p, (0.0, 0.0, 0.0), (0.0, 0.0, top), r * 1.17, r - _SEAM)
-        column = join(column, cylinder(p, 2, top - _COLLAR - 0.01, top + 0.03, r - _SEAM, 0.004, (0.0, 0.0)), 0.006)
+        column = vase(p, (-0.03, top - 0.002), (0.02, top - _COLLAR - 0.01), (r * 1.16, r - _SEAM))
         foot = cylinder(p, 2, -0.03, 0.030, r * 1.36, 0.014, (0.0, 0.0))
         back = box(p, (-0.95 * r, 0.0, 0.062), (0.75 * r, 0.66 * r, 0.042), 0.014)
         d = join(join(column, foot, 0.035), back, 0.022)
-        return np.maximum(np.maximum(d, p[:, 2] - (top - 0.004)), 0.008 - p[:, 2])
+        return np.maximum(d, -p[:, 2])
 
     half = 1.6 * r
     shell = mesh_surface(body, (-1.9 * r, -half, -0.015), (half, half, top + 0.02), fine.cell)
@@ -256,7 +280,8 @@ def _pedestal(joint: _Joint, fine: _Fineness) -> LinkShape:
         parts.append(
             Part(Mesh(mesh.vertices * (-1.0, 1.0, 1.0), mesh.faces[:, ::-1]).moved((-1.70 * r, y, 0.062)), "dark")
         )
-    return LinkShape(_by_role(parts), ())
+    solid = _capsule((0.0, 0.0, 1.15 * r), (0.0, 0.0, top - 0.35 * r), 1.15 * r)
+    return LinkShape(_by_role(parts), (solid,))
 
 
 def _wrist_plate(joint: _Joint, flange: float, fine: _Fineness) -> LinkShape:
@@ -265,8 +290,8 @@ def _wrist_plate(joint: _Joint, flange: float, fine: _Fineness) -> LinkShape:
     face = flange - 0.016
 
     def body(p: Array) -> Array:
-        drum = cylinder(p, 2, low - 0.03, face, r - _SEAM, 0.006, (0.0, 0.0))
-        pad = rod(p, (0.0, 0.70 * r, low + 0.026), (0.0, 0.70 * r, face - 0.016), 0.46 * r, 0.42 * r)
+        drum = cylinder(p, 2, low - 0.03, face - 0.003, r - _SEAM, 0.002, (0.0, 0.0))
+        pad = rod(p, (0.0, 0.70 * r, low + 0.036), (0.0, 0.70 * r, face - 0.016), 0.46 * r, 0.42 * r)
         return np.maximum(join(drum, pad, 0.016), low + 0.004 - p[:, 2])
 
     half = 1.35 * r
@@ -274,20 +299,24 @@ def _wrist_plate(joint: _Joint, flange: float, fine: _Fineness) -> LinkShape:
     outer = 0.0315 if r < 0.05 else 0.040  # [m] ISO 9409-1-50 and -63
     circle, bolt = (0.025, 0.0032) if r < 0.05 else (0.0315, 0.0036)
     plate = [
-        (outer + 0.006, face - 0.003),
-        (outer + 0.006, face + 0.004),
-        (outer, face + 0.006),
+        (outer + 0.004, face - 0.003),
+        (outer + 0.004, face + 0.003),
+        (outer, face + 0.005),
         (outer, flange - 0.001),
         (outer - 0.001, flange),
         (0.0125, flange),
         (0.0125, flange - 0.005),
         (0.0, flange - 0.005),
     ]
-    parts = [Part(shell, "shell"), Part(revolve(plate, segments=fine.segments), "dark")]
-    parts += _trim(joint, 1.0, 1.0, fine)
+    bend = np.linspace(0.0, np.pi / 2.0, 6)
+    shoulder = [(r - 0.0012, face - 0.0178), (r, face - 0.017)]
+    shoulder += [(r - 0.005 + 0.005 * np.cos(t), face - 0.005 + 0.005 * np.sin(t)) for t in bend] + [(outer, face)]
+    parts = [Part(shell, "shell"), Part(revolve(shoulder, segments=fine.segments), "shell")]
+    parts += [Part(revolve(plate, segments=fine.segments), "dark"), *_trim(joint, 1.0, 1.0, fine)]
     for angle in np.arange(6) * (np.pi / 3.0) + np.pi / 6.0:
         head = [(bolt, flange - 0.001), (bolt, flange + 0.0002), (0.0, flange + 0.0002)]
         parts.append(
             Part(revolve(head, center=(circle * np.cos(angle), circle * np.sin(angle), 0.0), segments=12), "cap")
         )
-    return LinkShape(_by_role(parts), ())
+    solid = _capsule((0.0, 0.0, low + 0.4 * r), (0.0, 0.0, flange - 0.9 * r), 1.05 * r)
+    return LinkShape(_by_role(parts), (solid,))

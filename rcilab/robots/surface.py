@@ -1,7 +1,7 @@
 """Smooth bodies from signed distances: primitives that melt into each other, and the mesh of their surface.
 
 A body is a function from points, shape (N, 3), [m], to signed distances, shape (N,), [m]: negative inside. Minimum
-joins bodies, maximum cuts them; the smooth versions round the seam, which is what makes housings look cast in one piece.
+joins bodies, maximum cuts them; the smooth versions round the seam, so that a housing looks cast in one piece.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from rcilab.robots.mesh import Mesh
 
 Body: TypeAlias = Callable[[Array], Array]
 
-_PROJECTIONS = 4
-_RELAXATIONS = 3
+_PROJECTIONS = 2
+_RELAXATIONS = 2
 _STEP = 1e-5  # [m] for differences of distances; bodies are smooth on a scale of millimetres
 
 
@@ -59,6 +59,21 @@ def rod(p: Array, start: Sequence[float], end: Sequence[float], r0: float, r1: f
     return np.linalg.norm(p - a - t[:, None] * along, axis=1) - (r0 + t * (r1 - r0))
 
 
+def vase(p: Array, ends: Sequence[float], stations: Sequence[float], radii: Sequence[float]) -> Array:
+    """Returns distances (a little short, on the slope) to an upright body of revolution about the z axis.
+
+    Args:
+        p: Points, shape (N, 3), [m].
+        ends: Heights of its flat bottom and top, [m].
+        stations: Heights between which the radius changes from the first to the second, smoothly, [m].
+        radii: Radius below the first and above the second station, [m].
+    """
+    t = np.clip((p[:, 2] - stations[0]) / (stations[1] - stations[0]), 0.0, 1.0)
+    radius = radii[0] + (radii[1] - radii[0]) * t * t * (3.0 - 2.0 * t)
+    radial = np.hypot(p[:, 0], p[:, 1]) - radius
+    return np.maximum(radial, np.maximum(ends[0] - p[:, 2], p[:, 2] - ends[1]))
+
+
 def box(p: Array, center: Sequence[float], half: Sequence[float], edge: float) -> Array:
     """Returns distances to a box with rounded edges, half lengths and edge radius in [m]."""
     d = np.abs(p - np.asarray(center)) - (np.asarray(half) - edge)
@@ -79,10 +94,9 @@ def mesh_surface(body: Body, low: Sequence[float], high: Sequence[float], cell: 
     axes = [start[i] + cell * np.arange(counts[i]) for i in range(3)]
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     inside = (body(grid) < 0.0).reshape(counts)
-    corners = sum(
-        inside[i : counts[0] - 1 + i, j : counts[1] - 1 + j, k : counts[2] - 1 + k].astype(np.int8)
-        for i in (0, 1) for j in (0, 1) for k in (0, 1)
-    )  # fmt: skip
+    corners = np.zeros(counts - 1, dtype=np.int8)
+    for i, j, k in np.ndindex(2, 2, 2):
+        corners += inside[i : counts[0] - 1 + i, j : counts[1] - 1 + j, k : counts[2] - 1 + k]
     crossed = (corners > 0) & (corners < 8)
     number = np.full(crossed.shape, -1, dtype=np.int64)
     number[crossed] = np.arange(int(crossed.sum()))
@@ -91,7 +105,7 @@ def mesh_surface(body: Body, low: Sequence[float], high: Sequence[float], cell: 
     vertices = _project(body, vertices, _PROJECTIONS)
     for _ in range(_RELAXATIONS):
         vertices = _project(body, _average_neighbours(vertices, quads), 1)
-    vertices = _project(body, vertices, 2)
+    vertices = _project(body, vertices, 1)
     return Mesh(vertices, _split_quads(vertices, quads))
 
 

@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike
 from rcilab.arrays import as_vector
 from rcilab.errors import UsageError
 from rcilab.robots.description import RobotDescription
+from rcilab.robots.mesh import shrink
 from rcilab.robots.shapes import ROLE_COLORS, ColorRole, LinkShape, build_shapes
 from rcilab.robots.upright import upright_joints
 from rcilab.spatial import Pose
@@ -35,14 +36,16 @@ class _Look:
     tint: Color | None
     """Colour of the housings; None keeps the arm's own colours."""
     opacity: float
+    inset: float
+    """How much thinner it is drawn, [m]: where two arms coincide one hides in the other instead of flickering."""
 
 
 _LOOKS: dict[ArmStyle, _Look] = {
-    "live": _Look(tint=None, opacity=1.0),
-    "commanded": _Look(tint=(255, 196, 64), opacity=0.22),
-    "plan": _Look(tint=(70, 140, 255), opacity=0.35),
-    "candidate": _Look(tint=(90, 200, 150), opacity=0.30),
-    "refused": _Look(tint=(230, 80, 70), opacity=0.30),
+    "live": _Look(tint=None, opacity=1.0, inset=0.0),
+    "commanded": _Look(tint=(255, 190, 60), opacity=0.35, inset=0.0012),
+    "plan": _Look(tint=(70, 140, 255), opacity=0.35, inset=0.0020),
+    "candidate": _Look(tint=(70, 190, 130), opacity=0.35, inset=0.0028),
+    "refused": _Look(tint=(230, 80, 70), opacity=0.35, inset=0.0036),
 }
 _TINTED_ROLE_SHADE: dict[ColorRole, float] = {"shell": 1.0, "cap": 0.75, "dark": 0.45}
 
@@ -73,6 +76,7 @@ class ArmView:
         color: Colour of the housings, RGB 0-255; caps and flange become darker shades of it.
         quality: "fine" or "coarse" meshes; default coarse for translucent arms.
         axes_length: Length of the axes drawn at the tool, [m]; 0 draws none.
+        base: Whether the base is drawn; default only for a solid arm, since ghosts stand in the live arm's base.
     """
 
     def __init__(
@@ -86,12 +90,14 @@ class ArmView:
         color: Color | None = None,
         quality: Literal["fine", "coarse"] | None = None,
         axes_length: float = 0.0,
+        base: bool | None = None,
     ) -> None:
         look = _LOOKS[style]
         self._scene = scene
         self._root = "/" + name.strip("/")
         self._tint = look.tint if color is None else color
         self._opacity = look.opacity if opacity is None else opacity
+        self._inset = look.inset
         self._meshes: list[tuple[str, ColorRole]] = []
         self._frames: list[str] = []
         joints = upright_joints(model.description)
@@ -101,7 +107,8 @@ class ArmView:
         shape = build_shapes(model.description, quality or ("fine" if self._opacity >= 1.0 else "coarse"))
         with scene.batch():
             scene.add_frame(self._root)
-            self._add_link(self._root + "/base_", shape.base)
+            if self._opacity >= 1.0 if base is None else base:
+                self._add_link(self._root + "/base_", shape.base)
             path = self._root
             for number, (joint, link) in enumerate(zip(joints, shape.links, strict=True), start=1):
                 path += f"/joint{number}"
@@ -177,10 +184,11 @@ class ArmView:
     def _add_link(self, prefix: str, shape: LinkShape) -> None:
         for part in shape.parts:
             name = prefix + part.role
+            mesh = shrink(part.mesh, self._inset) if self._inset else part.mesh
             self._scene.add_mesh(
                 name,
-                part.mesh.vertices,
-                part.mesh.faces,
+                mesh.vertices,
+                mesh.faces,
                 color=self._color(part.role),
                 opacity=self._opacity,
             )
