@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import math
 import struct
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rcilab.clock import CYCLE_TIME
+from rcilab.faults import Fault
+from rcilab.state import RobotState
+
 RECORD_TIME = 60.0  # [s] of cycles that a recorder keeps unless told otherwise; a choice.
+_CYCLE_NS = round(CYCLE_TIME * 1e9)
+_CREEP = 100  # [ns] a cycle, 100 ppm: more than two computers' clocks drift apart.
 
 
 def cycle_dtype(n: int) -> np.dtype[np.void]:
@@ -60,7 +67,7 @@ class Recorder:
     """
 
     def __init__(
-        self, n: int, capacity: int = round(RECORD_TIME / 1e-3), buffer: memoryview | bytearray | None = None
+        self, n: int, capacity: int = round(RECORD_TIME / CYCLE_TIME), buffer: memoryview | bytearray | None = None
     ) -> None:
         dtype = cycle_dtype(n)
         self.n = n
@@ -116,3 +123,80 @@ class Recorder:
     def last(self, count: int) -> NDArray[np.void]:
         """Returns a copy of the newest `count` rows (fewer when there are fewer), oldest first."""
         return self.rows(self.count - count)
+
+
+class CycleLog:
+    """Writes states and answers as rows of a recorder, and judges how late each was. Owned by the loop's thread.
+
+    Lateness is counted from the robot's own 1 ms grid: the earliest moment at which a state of that number could have
+    been here, judging by all states so far. The grid may creep by `_CREEP` a cycle to follow a clock that runs slower.
+
+    Args:
+        recorder: Where rows go.
+    """
+
+    def __init__(self, recorder: Recorder) -> None:
+        self.recorder = recorder
+        self.lateness = 0.0
+        """Of the newest row, [s]."""
+        self.lost_total = 0
+        """Controller cycles whose state never arrived."""
+        self._last_id: int | None = None
+        self._grid_ns = 0
+        self._nothing = (math.nan,) * recorder.n
+
+    def restart(self) -> None:
+        """Forgets the grid and the last number: another connection begins."""
+        self._last_id = None
+        self.lost_total = 0
+
+    def write(
+        self,
+        state: RobotState,
+        received_ns: int,
+        t: float = math.nan,
+        sent_ns: int = 0,
+        command: Sequence[float] | None = None,
+    ) -> None:
+        """Records one state and, where there was one, the answer to it.
+
+        Args:
+            state: The state.
+            received_ns: When it arrived, monotonic, [ns].
+            t: Motion time, [s].
+            sent_ns: When it was answered, monotonic, [ns]; 0 when it was not.
+            command: Joint angles sent in answer, n numbers, [rad].
+        """
+        number = state.message_id
+        origin = received_ns - number * _CYCLE_NS
+        lost = 0
+        if self._last_id is None or number < self._last_id:
+            self._grid_ns = origin
+        elif number > self._last_id:
+            lost = number - self._last_id - 1
+            self.lost_total += lost
+            self._grid_ns = min(origin, self._grid_ns + _CREEP * (lost + 1))
+        self._last_id = number
+        self.lateness = ((sent_ns or received_ns) - number * _CYCLE_NS - self._grid_ns) * 1e-9
+        self.recorder.write(
+            number,
+            t,
+            received_ns,
+            sent_ns,
+            self.lateness,
+            state.success_rate,
+            state.q.tolist(),
+            state.q_c.tolist(),
+            state.dq.tolist(),
+            self._nothing if command is None else command,
+            _bits(state.faults) if state.faults else 0,
+            lost,
+            (state.robot_mode, state.controller_mode, state.motion_generator_mode),
+        )
+
+
+def _bits(faults: tuple[Fault, ...]) -> int:
+    bits = 0
+    for fault in faults:
+        bits |= 1 << fault
+    return bits

@@ -1,0 +1,364 @@
+"""The 1 kHz loop: the robot's state is the clock, every state gets one answer, every surprise takes one way out."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from rcilab.client.brake import Brake, CartesianBrake, JointBrake, TorqueBrake
+from rcilab.client.commands import RciCommands
+from rcilab.client.fault_report import describe_faults
+from rcilab.client.link import Link
+from rcilab.client.recorder import CycleLog
+from rcilab.clock import CYCLE_TIME
+from rcilab.command import CartesianPosition, Command, JointPosition, JointTorque
+from rcilab.errors import (
+    CommandRejectedError,
+    ConnectionLostError,
+    ControlError,
+    DeadlineError,
+    InvalidValueError,
+)
+from rcilab.limits import Limits
+from rcilab.protocols.rci import StartMotionMode, build_command
+from rcilab.state import ControllerMode, RobotState
+
+SILENCE = 0.1  # [s] without a state while moving means that the connection is lost; a choice.
+MODE_TIMEOUT = 3.0  # [s] for the controller to show the requested modes; virtual ones take 0.2 to 1.05 s.
+STOP_TIMEOUT = 1.0  # [s] for the answer to StopMove when something has gone wrong already.
+SETTLE_CYCLES = 200  # Cycles that the last command is repeated at most until the controller has played it.
+REST_TIMEOUT = 1.0  # [s] for the controller's own stop after a fault; the slowest joint needs 0.3 s from full speed.
+RECORD_CYCLES = 50  # Cycles that a ControlError carries, as many as the vendor's client writes.
+START_TOLERANCE = 1e-6  # [rad] or [m] A first command this far off makes a jerk of 1000 rad/s^3, below every limit.
+ARRIVED = 1e-12  # [rad] The commanded angles come back over the wire bit by bit; this is for a sign of zero.
+
+Callback: TypeAlias = Callable[[RobotState, float], Command]
+"""`(state, t) -> command`; t counts controller cycles since the first call, [s]."""
+Watch: TypeAlias = Callable[[float], str | None]
+"""Asked in every cycle, with t; anything but None brings the motion to rest and is the reason."""
+
+_MOTION_MODES = {
+    ControllerMode.JOINT_POSITION: StartMotionMode.JOINT,
+    ControllerMode.JOINT_IMPEDANCE: StartMotionMode.JOINT,
+    ControllerMode.CARTESIAN_POSITION: StartMotionMode.CARTESIAN,
+    ControllerMode.CARTESIAN_IMPEDANCE: StartMotionMode.CARTESIAN,
+    ControllerMode.TORQUE: StartMotionMode.IDLE,
+}
+_COMMANDS = {
+    StartMotionMode.JOINT: JointPosition,
+    StartMotionMode.CARTESIAN: CartesianPosition,
+    StartMotionMode.IDLE: JointTorque,
+}
+
+
+class ControlLoop:
+    """One motion from StartMove to StopMove. Owned by the thread that calls `run`.
+
+    Args:
+        link: The connection.
+        commands: The commands on it.
+        limits: Bounds of the arm, for coming to rest.
+        mode: How the controller shall follow.
+        log: Where every cycle is written.
+        watch: Asked in every cycle whether to stop.
+        silence: Time without a state that counts as a lost connection, [s].
+    """
+
+    def __init__(
+        self,
+        link: Link,
+        commands: RciCommands,
+        limits: Limits,
+        mode: ControllerMode,
+        log: CycleLog,
+        *,
+        watch: Watch = lambda t: None,
+        silence: float = SILENCE,
+    ) -> None:
+        if mode not in _MOTION_MODES:
+            raise InvalidValueError("mode", mode, f"is no mode to move in; there are {[m.name for m in _MOTION_MODES]}")
+        self._link = link
+        self._commands = commands
+        self._limits = limits
+        self._mode = mode
+        self._motion_mode = _MOTION_MODES[mode]
+        self._kind = _COMMANDS[self._motion_mode]
+        self._log = log
+        self._watch = watch
+        self._silence = silence
+        self._first_id = 0
+        self._answered_id = -1
+        self._t = math.nan
+        self._command: Command | None = None
+        self._brake: Brake = {
+            StartMotionMode.JOINT: lambda: JointBrake(limits.joint),
+            StartMotionMode.CARTESIAN: lambda: CartesianBrake(limits),
+            StartMotionMode.IDLE: lambda: TorqueBrake(limits.joint),
+        }[self._motion_mode]()
+
+    def run(self, callback: Callback) -> str | None:
+        """Runs a motion to its end.
+
+        Args:
+            callback: Gives the command for each state; the one with `finished=True` is the last.
+
+        Returns:
+            None when the motion ran to its end, or what `watch` said when it was brought to rest before.
+
+        Raises:
+            ControlError: The controller set error bits or ended the motion by itself.
+            ConnectionLostError: States stopped coming, or the TCP connection broke.
+            CommandRejectedError: The controller refused to begin.
+            DeadlineError: It agreed to begin and then did not.
+            InvalidValueError: The callback returned no usable command; the motion was brought to rest.
+            Exception: Whatever the callback raised, after the motion was brought to rest.
+        """
+        self._commands.start_move(self._mode, self._motion_mode)
+        try:
+            state = self._await_modes()
+            reason = self._stream(state, callback) if isinstance(state, RobotState) else state
+        except BaseException as error:
+            self._end(error)
+            raise
+        self._end(None, brake=reason is not None)
+        return reason
+
+    def _await_modes(self) -> RobotState | str:
+        """Returns the newest state that shows the requested modes, or what `watch` said when it wants an end first."""
+        deadline = time.monotonic() + MODE_TIMEOUT
+        shown = self._motion_mode.shown_as
+        while time.monotonic() < deadline:
+            states = self._link.poll(self._silence)
+            if not states:
+                raise self._lost()
+            for state in states[:-1]:
+                self._log.write(state, self._link.received_ns)
+            state = states[-1]
+            if state.faults:
+                raise self._fault(state)
+            if state.controller_mode == self._mode and state.motion_generator_mode == shown:
+                self._first_id = state.message_id
+                self._brake.begin(state)
+                return state
+            self._log.write(state, self._link.received_ns)
+            reason = self._watch(0.0)
+            if reason is not None:
+                return reason
+        raise DeadlineError(
+            f"{self._link.name} accepted StartMove and then did not show {self._mode.name} within {MODE_TIMEOUT:g} s; "
+            "try again, and look at the teach pendant if it goes on"
+        )
+
+    def _stream(self, state: RobotState, callback: Callback) -> str | None:
+        while True:
+            t = (state.message_id - self._first_id) * CYCLE_TIME
+            reason = self._watch(t)
+            if reason is not None:
+                self._log.write(state, self._link.received_ns, t)
+                return reason
+            command = self._checked(callback(state, t), state)
+            self._answer(state, command)
+            if command.finished:
+                self._hold(state, command)
+                return None
+            state = self._next()
+
+    def _next(self) -> RobotState:
+        """Returns the newest state that has not been answered yet."""
+        deadline = time.monotonic() + self._silence
+        while True:
+            states = self._link.poll(deadline - time.monotonic())
+            for state in states[:-1]:
+                if state.message_id > self._answered_id and not state.faults:
+                    self._log.write(state, self._link.received_ns, self._time(state))
+            if states:
+                state = states[-1]
+                if state.faults:
+                    raise self._fault(state)
+                # A lock-step controller repeats a state whose answer it has not seen yet: it was answered, wait on.
+                if state.message_id > self._answered_id:
+                    if state.motion_generator_mode != self._motion_mode.shown_as:
+                        raise self._ended_by_controller(state)
+                    return state
+            if time.monotonic() >= deadline:
+                raise self._lost()
+
+    def _answer(self, state: RobotState, command: Command) -> None:
+        # The end is announced by StopMove alone: a set `finished` byte has never been seen from the vendor's client.
+        self._link.send(build_command(state.message_id, command, state)._replace(finished=False))
+        sent_ns = time.monotonic_ns()
+        self._answered_id = state.message_id
+        self._command = command
+        self._t = self._time(state)
+        self._brake.remember(command, state.message_id - self._first_id)
+        joints = command.q.tolist() if isinstance(command, JointPosition) else None
+        self._log.write(state, self._link.received_ns, self._t, sent_ns, joints)
+
+    def _hold(self, state: RobotState, command: Command) -> None:
+        """Repeats the last command until the controller has played it: StopMove may overtake a queued one."""
+        for _ in range(SETTLE_CYCLES):
+            state = self._next()
+            self._answer(state, command)
+            if _has_arrived(state, command):
+                return
+
+    def _end(self, error: BaseException | None, *, brake: bool = True) -> None:
+        """The one stop path: every end of a motion comes through here, the planned one too.
+
+        Brings the commands to rest within the limits where anything can still be commanded, then ends the motion over
+        TCP. After `ControlError` and `ConnectionLostError` nothing can be: the controller stops by itself.
+        """
+        surprise = error
+        if brake and self._command is not None and not isinstance(error, ControlError | ConnectionLostError):
+            try:
+                self._come_to_rest()
+            except BaseException as worse:
+                surprise = worse
+        self._stop_move(surprise)
+        if isinstance(surprise, ControlError):
+            self._watch_standstill()
+        if surprise is not None and surprise is not error:
+            raise surprise from error
+
+    def _come_to_rest(self) -> None:
+        last = self._command
+        state: RobotState | None = None
+        for command in self._brake.commands():
+            state = self._next()
+            self._answer(state, command)
+            last = command
+        if state is not None and last is not None:
+            self._hold(state, last)
+
+    def _stop_move(self, error: BaseException | None) -> None:
+        if error is None:
+            self._commands.stop_move()
+            return
+        try:
+            self._commands.stop_move(STOP_TIMEOUT)
+        except (CommandRejectedError, ConnectionLostError, DeadlineError) as refusal:
+            error.add_note(f"StopMove did not go well either: {refusal}")
+
+    def _watch_standstill(self) -> None:
+        """Records the controller's own stop, so that the record shows it and the next motion starts from rest."""
+        deadline = time.monotonic() + REST_TIMEOUT
+        before: RobotState | None = None
+        while time.monotonic() < deadline:
+            states = self._link.poll(self._silence)
+            for state in states:
+                self._log.write(state, self._link.received_ns, self._time(state))
+            if not states or (before is not None and _stands(before, states[-1])):
+                return
+            before = states[-1]
+
+    def _checked(self, command: Any, state: RobotState) -> Command:
+        """Returns the callback's command once its kind, shape, finiteness and, at first, its place are found good."""
+        if not isinstance(command, self._kind):
+            raise InvalidValueError(
+                "command", command, f"must be a {self._kind.__name__} in mode {self._mode.name}; what the callback "
+                "returns is sent as it is"
+            )  # fmt: skip
+        values, shape, unit = _content(command, self._link.n)
+        numbers = np.asarray(values)
+        if numbers.dtype != np.float64 or numbers.shape != shape:
+            try:
+                numbers = np.array(values, dtype=np.float64)
+            except (TypeError, ValueError) as error:
+                raise InvalidValueError("command", values, f"is not {shape} numbers [{unit}]") from error
+            if numbers.shape != shape:
+                raise InvalidValueError("command", values, f"has shape {numbers.shape}, needs {shape} [{unit}]")
+            command = _with_content(command, numbers)
+        psi = command.psi if isinstance(command, CartesianPosition) else None
+        if not np.isfinite(numbers).all() or (psi is not None and not math.isfinite(psi)):
+            raise InvalidValueError("command", values, f"must be finite in every element [{unit}]")
+        if self._command is None:
+            _require_first(command, state)
+        return command
+
+    def _time(self, state: RobotState) -> float:
+        return (state.message_id - self._first_id) * CYCLE_TIME
+
+    def _fault(self, state: RobotState) -> ControlError:
+        t = self._time(state) if self._command is not None else math.nan
+        self._log.write(state, self._link.received_ns, t)
+        record = self._log.recorder.last(RECORD_CYCLES)
+        return ControlError(describe_faults(state.faults, record, t, self._limits.joint), state.faults, record)
+
+    def _ended_by_controller(self, state: RobotState) -> ControlError:
+        self._log.write(state, self._link.received_ns, self._time(state))
+        record = self._log.recorder.last(RECORD_CYCLES)
+        mode = state.robot_mode.name.lower().replace("_", " ")
+        return ControlError(
+            f"the controller ended the motion by itself at t = {self._time(state):.3f} s without naming a fault "
+            f"(robot mode: {mode}); look at the teach pendant and the emergency stop",
+            (),
+            record,
+        )
+
+    def _lost(self) -> ConnectionLostError:
+        when = "before the first command" if math.isnan(self._t) else f"after t = {self._t:.3f} s"
+        return ConnectionLostError(
+            f"{self._link.name}: no state for {self._silence:g} s, {when}; look whether the controller runs and the "
+            "cable is in, then connect again. The controller stops an arm that gets no commands by itself"
+        )
+
+
+def _content(command: Command, n: int) -> tuple[Any, tuple[int, ...], str]:
+    if isinstance(command, JointPosition):
+        return command.q, (n,), "rad"
+    if isinstance(command, CartesianPosition):
+        return command.T_base_tool, (4, 4), "m"
+    return command.tau, (n,), "N m"
+
+
+def _with_content(command: Command, numbers: Any) -> Command:
+    if isinstance(command, JointPosition):
+        return JointPosition(numbers, command.finished)
+    if isinstance(command, CartesianPosition):
+        return CartesianPosition(numbers, command.psi, command.finished)
+    return JointTorque(numbers, command.finished)
+
+
+def _require_first(command: Command, state: RobotState) -> None:
+    """Refuses a first command that is not the commanded state: the arm would jump."""
+    if isinstance(command, JointPosition):
+        off = np.abs(command.q - state.q_c)
+        joint = int(off.argmax())
+        if off[joint] > START_TOLERANCE:
+            raise InvalidValueError(
+                "first command",
+                np.degrees(command.q).round(3).tolist(),
+                f"deg must be where the arm is: joint {joint + 1} is commanded to "
+                f"{math.degrees(command.q[joint]):.4f} deg and stands at {math.degrees(state.q_c[joint]):.4f} deg, "
+                f"{math.degrees(off[joint]):.4f} deg apart (tolerance {math.degrees(START_TOLERANCE):.1g} deg); "
+                "begin with state.q_c",
+            )
+    elif isinstance(command, CartesianPosition):
+        off = float(np.abs(command.T_base_tool - state.T_base_tool_c).max())
+        if off > START_TOLERANCE:
+            raise InvalidValueError(
+                "first command",
+                command.T_base_tool[:3, 3].tolist(),
+                f"must be the pose the arm is at: an element differs by {off:.3g} (tolerance {START_TOLERANCE:g}); "
+                "begin with state.T_base_tool_c",
+            )
+
+
+def _has_arrived(state: RobotState, command: Command) -> bool:
+    if isinstance(command, JointPosition):
+        return bool(np.abs(state.q_c - command.q).max() <= ARRIVED)
+    if isinstance(command, CartesianPosition):
+        return bool(np.abs(state.T_base_tool_c - command.T_base_tool).max() <= 1e-9)
+    return True
+
+
+def _stands(before: RobotState, after: RobotState) -> bool:
+    return (
+        after.message_id > before.message_id
+        and bool(np.array_equal(before.q_c, after.q_c))
+        and float(np.abs(after.dq).max()) < 1e-3
+    )

@@ -1,0 +1,106 @@
+"""The link to a controller in values instead of bytes: requests and their answers, states, commands."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+from rcilab.client.transport import Transport
+from rcilab.errors import DeadlineError, DecodeError
+from rcilab.protocols.rci import (
+    CommandPacket,
+    Request,
+    decode_header,
+    decode_response,
+    decode_state,
+    encode_command,
+    encode_request,
+)
+from rcilab.state import RobotState
+
+_LOOK = 0.05  # [s] Longest wait before the deadline of a request is looked at again.
+
+
+class Link:
+    """One connection. Owned by one thread.
+
+    Args:
+        transport: The wire.
+        n: Number of joints of the arm at the other end.
+        name: What to call the other end in errors, such as its address.
+        timeout: How long the answer to a request may take, [s].
+    """
+
+    def __init__(self, transport: Transport, n: int, name: str, timeout: float) -> None:
+        self.n = n
+        self.name = name
+        self.timeout = timeout
+        self.latest: RobotState | None = None
+        """The newest state received so far."""
+        self.received_ns = 0
+        """When that was, monotonic, [ns]."""
+        self.undecodable = 0
+        """Datagrams of the right size that were no state."""
+        self.on_states: Callable[[list[RobotState]], None] = _ignore
+        """Gets the states that come in while the answer to a request is awaited."""
+        self._transport = transport
+        self._command_id = 0
+
+    def poll(self, timeout: float) -> list[RobotState]:
+        """Returns every state that has arrived, oldest first; waits up to `timeout`, [s], for the first one."""
+        if not self._transport.wait(timeout):
+            return []
+        return self._take_states()
+
+    def send(self, packet: CommandPacket) -> None:
+        """Sends one command."""
+        self._transport.send_command(encode_command(packet))
+
+    def request(self, request: Request, timeout: float | None = None) -> Any:
+        """Sends a request and returns the answer to it; answers to older requests are dropped.
+
+        Raises:
+            DeadlineError: No answer within the timeout.
+            ConnectionLostError: The connection broke.
+            DecodeError: The answer is none.
+        """
+        self._command_id = self._command_id % 0xFFFFFFFF + 1
+        limit = self.timeout if timeout is None else timeout
+        deadline = time.monotonic() + limit
+        self._transport.send_request(encode_request(request, self._command_id))
+        while True:
+            frame = self._transport.receive_frame()
+            if frame is not None:
+                if decode_header(frame).command_id == self._command_id:
+                    return decode_response(request.code, frame)[1]
+                continue
+            remaining = deadline - time.monotonic()
+            if remaining <= 0.0:
+                raise DeadlineError(
+                    f"{self.name} did not answer {type(request).__name__} within {limit:g} s; "
+                    "look whether the controller is busy or hangs, and connect again if it goes on"
+                )
+            if self._transport.wait(min(remaining, _LOOK), frames=True):
+                self.on_states(self._take_states())
+
+    def close(self) -> None:
+        """Ends the connection. May be called twice."""
+        self._transport.close()
+
+    def _take_states(self) -> list[RobotState]:
+        states: list[RobotState] = []
+        datagrams = self._transport.receive_states()
+        self.received_ns = time.monotonic_ns()
+        for datagram in datagrams:
+            try:
+                states.append(decode_state(datagram, self.n))
+            except DecodeError:
+                self.undecodable += 1
+        if states:
+            self.latest = states[-1]
+        return states
+
+
+def _ignore(states: list[RobotState]) -> None:
+    """States nobody asked for."""

@@ -1,0 +1,208 @@
+"""What became of a motion: every cycle as arrays, plan against actual, and how punctual both sides were."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rcilab.arrays import Array, JointPath
+from rcilab.clock import CYCLE_TIME
+from rcilab.faults import FAULT_COUNT, Fault
+
+if TYPE_CHECKING:
+    from rcilab.motion import Motion
+
+_LONGEST_DELAY = 64  # [cycles] between a command and the state that shows it; more is no play-out buffer any more.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Timing:
+    """How punctual a run was. Periods are those of the states' arrival; lateness is against the robot's 1 ms grid."""
+
+    cycles: int
+    """States answered."""
+    lost: int
+    """Controller cycles that were not answered in their turn: their state never came, or a newer one was there."""
+    period_median: float
+    """[s]."""
+    period_max: float
+    """[s]."""
+    response_median: float
+    """From a state's arrival to the answer, [s]."""
+    response_max: float
+    """[s]."""
+    lateness_median: float
+    """[s]."""
+    lateness_p99: float
+    """[s]."""
+    lateness_max: float
+    """[s]."""
+    late: int
+    """Cycles answered more than 1 ms late."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Run:
+    """A motion as it happened. Arrays have one row a recorded controller cycle and are read-only."""
+
+    plan: Motion | None
+    """What was meant to happen; None for a callback."""
+    cycles: NDArray[np.void]
+    """Every recorded cycle in full, see `cycle_dtype`."""
+    stopped: str | None = None
+    """Why the motion was brought to rest before its end; None when it ran to its end."""
+    truncated: bool = False
+    """Whether the beginning is missing because the run was longer than the recorder."""
+    realtime: bool = True
+    """False in lock-step, where a millisecond lasts as long as it takes and timing means nothing."""
+
+    @property
+    def t(self) -> Array:
+        """Time since the first command, in controller cycles, shape (N,), [s]."""
+        return self.cycles["t"]
+
+    @property
+    def q(self) -> JointPath:
+        """Measured joint angles, shape (N, n), [rad]."""
+        return self.cycles["q"]
+
+    @property
+    def q_c(self) -> JointPath:
+        """Commanded joint angles as the controller reports them, shape (N, n), [rad]."""
+        return self.cycles["q_c"]
+
+    @property
+    def dq(self) -> JointPath:
+        """Measured joint velocities, shape (N, n), [rad/s]."""
+        return self.cycles["dq"]
+
+    @property
+    def command(self) -> JointPath:
+        """Joint angles sent in answer, shape (N, n), [rad]; NaN where a cycle was not answered with joint angles."""
+        return self.cycles["command"]
+
+    @property
+    def success_rate(self) -> Array:
+        """Share of commands that arrived in time, as the controller reports it, shape (N,)."""
+        return self.cycles["success_rate"]
+
+    @property
+    def faults(self) -> tuple[Fault, ...]:
+        """Every fault that was seen, in wire order."""
+        bits = int(np.bitwise_or.reduce(self.cycles["faults"])) if len(self.cycles) else 0
+        return tuple(Fault(place) for place in range(FAULT_COUNT) if bits >> place & 1)
+
+    @property
+    def duration(self) -> float:
+        """Time from the first command to the last recorded cycle, [s]."""
+        return float(self.t[-1]) if len(self.t) else 0.0
+
+    @property
+    def delay(self) -> int:
+        """Cycles between a command and the state that reports it as commanded; found by comparison, usually 1."""
+        best, least = 1, math.inf
+        for delay in range(1, min(_LONGEST_DELAY, len(self.cycles) - 1) + 1):
+            difference = np.abs(self.q_c[delay:] - self.command[:-delay])
+            if np.isfinite(difference).any():
+                size = float(np.nanmax(difference))
+                if size < least:
+                    best, least = delay, size
+                if size == 0.0:
+                    break
+        return best
+
+    @property
+    def error(self) -> JointPath:
+        """Measured minus planned joint angles, shape (N, n), [rad], with the play-out delay taken out.
+
+        Without a plan, measured minus commanded.
+        """
+        delay = self.delay
+        if self.plan is None:
+            wanted = np.full_like(self.q, np.nan)
+            if len(wanted) > delay:
+                wanted[delay:] = self.command[:-delay]
+                wanted[:delay] = self.command[0]
+            return self.q - wanted
+        rows = np.clip(np.rint(self.t / CYCLE_TIME).astype(np.intp) - delay, 0, len(self.plan.q) - 1)
+        return self.q - self.plan.q[rows]
+
+    @property
+    def timing(self) -> Timing:
+        """How punctual both sides were."""
+        sent = self.cycles[self.cycles["sent_ns"] != 0]
+        if len(sent) < 2:
+            return Timing(
+                cycles=len(sent), lost=0, period_median=0.0, period_max=0.0, response_median=0.0, response_max=0.0,
+                lateness_median=0.0, lateness_p99=0.0, lateness_max=0.0, late=0,
+            )  # fmt: skip
+        steps = np.diff(sent["message_id"].astype(np.int64))
+        period = np.diff(sent["received_ns"]) * 1e-9
+        response = (sent["sent_ns"] - sent["received_ns"]) * 1e-9
+        lateness = sent["lateness"]
+        return Timing(
+            cycles=len(sent),
+            lost=int((steps - 1).sum()),
+            period_median=float(np.median(period)),
+            period_max=float(period.max()),
+            response_median=float(np.median(response)),
+            response_max=float(response.max()),
+            lateness_median=float(np.median(lateness)),
+            lateness_p99=float(np.quantile(lateness, 0.99)),
+            lateness_max=float(lateness.max()),
+            late=int((lateness > CYCLE_TIME).sum()),
+        )
+
+    def __repr__(self) -> str:
+        facts = [f"{self.duration:.3f} s", f"{len(self.cycles)} cycles"]
+        if len(self.cycles):
+            facts.append(f"largest error {_degrees(self.error):.3g} deg")
+            facts.append(f"success rate {float(self.success_rate[-1]):.3f}")
+        if self.stopped:
+            facts.append(f"stopped: {self.stopped}")
+        if self.faults:
+            facts.append("faults: " + ", ".join(fault.name for fault in self.faults))
+        return f"<Run {', '.join(facts)}>"
+
+    def _repr_html_(self) -> str:
+        timing = self.timing
+        rows = [
+            ("duration", f"{self.duration:.3f} s, {len(self.cycles)} cycles"),
+            ("ended", self.stopped or ("with a fault" if self.faults else "at its goal")),
+            ("faults", ", ".join(fault.name for fault in self.faults) or "none"),
+            ("largest error", f"{_degrees(self.error):.3g} deg"),
+            ("success rate", f"{float(self.success_rate[-1]):.3f}" if len(self.cycles) else "-"),
+            ("lost cycles", f"{timing.lost}"),
+        ]
+        if self.realtime:
+            rows.append(
+                ("lateness", f"median {timing.lateness_median * 1e6:.0f} µs, p99 {timing.lateness_p99 * 1e6:.0f} µs, "
+                             f"max {timing.lateness_max * 1e6:.0f} µs")
+            )  # fmt: skip
+        else:
+            rows.append(("timing", "lock-step: simulated milliseconds wait for each other"))
+        cells = "".join(f"<tr><th style='text-align:left'>{name}</th><td>{value}</td></tr>" for name, value in rows)
+        return f"<table><caption>Run</caption>{cells}</table>"
+
+
+def build_run(
+    cycles: NDArray[np.void],
+    *,
+    plan: Motion | None,
+    stopped: str | None = None,
+    truncated: bool = False,
+    realtime: bool = True,
+) -> Run:
+    """Returns the run in a recording: the rows from the first command on."""
+    rows = cycles[np.isfinite(cycles["t"])]
+    rows.flags.writeable = False
+    return Run(plan=plan, cycles=rows, stopped=stopped, truncated=truncated, realtime=realtime)
+
+
+def _degrees(error: JointPath) -> float:
+    finite = np.abs(error[np.isfinite(error)])
+    return math.degrees(float(finite.max())) if finite.size else 0.0

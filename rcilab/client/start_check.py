@@ -1,0 +1,33 @@
+"""Is the arm where a motion begins? Asked before anything is sent."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from rcilab.arrays import JointVector
+from rcilab.conformance.conditions import START_POSITION_TOLERANCE
+
+
+def describe_start_mismatch(start: JointVector, q_c: JointVector) -> str | None:
+    """Returns what is wrong with starting a motion here, in a sentence, or None when it begins where the arm is.
+
+    Args:
+        start: Where the motion begins, shape (n,), [rad].
+        q_c: Commanded joint angles of the arm, [rad].
+    """
+    if len(start) != len(q_c):
+        return f"the motion is for {len(start)} joints and the arm has {len(q_c)}; plan it for the right model"
+    off = np.abs(np.asarray(start) - q_c)
+    if float(off.max()) <= START_POSITION_TOLERANCE:
+        return None
+    joint = int(off.argmax())
+    others = int((off > START_POSITION_TOLERANCE).sum()) - 1
+    more = f" (and {others} more joint{'s' if others > 1 else ''})" if others else ""
+    return (
+        f"the motion starts elsewhere than the arm is: joint {joint + 1} would start at "
+        f"{math.degrees(start[joint]):.4f} deg and stands at {math.degrees(q_c[joint]):.4f} deg, "
+        f"{math.degrees(off[joint]):.2g} deg apart{more} (tolerance {math.degrees(START_POSITION_TOLERANCE):.0e} deg); "
+        "plan the motion from robot.state.q_c"
+    )
