@@ -1,0 +1,36 @@
+"""`rcilab check FILE --model NAME`: the report on a motion in a file."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+from typing import Any
+
+
+def add_parser(subparsers: Any) -> None:
+    """Adds the command to the `rcilab` parser."""
+    parser: ArgumentParser = subparsers.add_parser(
+        "check",
+        help="judge a saved motion by the robot's conditions",
+        description="Prints the report on a motion saved with Motion.save. Exit code: 0 it conforms, 1 it does not, "
+        "2 the file or the model name is no good.",
+    )
+    parser.add_argument("file", type=Path, metavar="FILE", help="motion file (.npz)")
+    parser.add_argument("--model", required=True, metavar="NAME", help="arm, such as xMatePro7 (any case)")
+    parser.set_defaults(run=run)
+
+
+def run(args: Namespace) -> int:
+    """Prints the report and returns 0 if the motion conforms, else 1.
+
+    Raises:
+        RcilabError: Bad input; the caller prints it and exits with 2.
+    """
+    from rcilab.conformance import check
+    from rcilab.model import load_model
+    from rcilab.motion import Motion
+
+    model = load_model(args.model)
+    report = check(Motion.load(args.file), model)
+    print(report)
+    return 0 if report.ok else 1

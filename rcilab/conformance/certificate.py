@@ -1,0 +1,119 @@
+"""The proof that a motion was judged: for this motion, this arm, this start, and no other."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import degrees
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rcilab.conformance.conditions import START_POSITION_TOLERANCE
+from rcilab.conformance.start import StartState, as_start
+from rcilab.errors import CertificateError
+from rcilab.motion.motion import Motion
+
+if TYPE_CHECKING:
+    from rcilab.model import RobotModel
+
+NO_SAFETY_BOX = "none"
+"""The part of a certificate that says that the motion was judged without a safety box."""
+
+MODEL_PARTS = ("model", "limits", "tool", "load")
+
+
+@dataclass(frozen=True, slots=True)
+class Certificate:
+    """What a conforming motion was judged with, by fingerprint. A plain value: it may travel between processes."""
+
+    entries: tuple[tuple[str, str], ...]
+    """Name and fingerprint of each part."""
+    start_q: tuple[float, ...]
+    """Commanded joint angles it was judged from, [rad]."""
+
+    @property
+    def parts(self) -> Mapping[str, str]:
+        """Fingerprints by name: motion, model, limits, tool, load, safety box, start state."""
+        return MappingProxyType(dict(self.entries))
+
+    @property
+    def digest(self) -> str:
+        """One SHA-256 over all parts, hexadecimal."""
+        return hashlib.sha256(repr(self.entries).encode()).hexdigest()
+
+    def verify(self, motion: Motion, model: RobotModel, start_q: ArrayLike | StartState) -> None:
+        """Makes sure that this certificate is for this motion on this arm from this start.
+
+        Args:
+            motion: The motion that is about to run.
+            model: The arm as it is now, with its tool and load.
+            start_q: Commanded joint angles now (`state.q_c`), shape (n,), [rad]; or a StartState for a moving arm.
+
+        Raises:
+            CertificateError: Something is not what was judged; `.changed` and the message name it.
+        """
+        start = as_start(start_q, len(self.start_q)) if motion.n == len(self.start_q) else None
+        now = dict(issue_certificate(motion, model, start).entries) if start is not None else {"motion": ""}
+        changed = [name for name, fingerprint in self.entries if now.get(name, fingerprint) != fingerprint]
+        if start is not None and "start state" in changed and self._same_start(start):
+            changed.remove("start state")
+        if changed:
+            raise CertificateError(self._reason(changed, start), changed)
+
+    def _same_start(self, start: StartState) -> bool:
+        near = np.abs(start.q - np.array(self.start_q)).max() <= START_POSITION_TOLERANCE
+        still = StartState(np.array(self.start_q), start.dq, start.ddq)
+        return bool(near) and self.parts["start state"] == _start_fingerprint(still)
+
+    def _reason(self, changed: list[str], start: StartState | None) -> str:
+        if changed == ["start state"] and start is not None:
+            off = start.q - np.array(self.start_q)
+            i = int(np.abs(off).argmax())
+            if abs(off[i]) > START_POSITION_TOLERANCE:
+                return (
+                    f"the motion was judged from another start: joint {i + 1} is commanded to "
+                    f"{degrees(start.q[i]):.4f}° now, the motion starts from {degrees(self.start_q[i]):.4f}°; "
+                    f"plan it again from where the arm is (state.q_c)"
+                )
+            return "the motion was judged from another start: the arm moves differently now; plan it again"
+        what = " and ".join(filter(None, (", ".join(changed[:-1]), changed[-1])))
+        verb = "has" if len(changed) == 1 else "have"
+        return f"the certificate is stale: {what} {verb} changed since the motion was judged; check it again"
+
+
+def issue_certificate(motion: Motion, model: RobotModel, start: StartState) -> Certificate:
+    """Returns the certificate of a motion; only a report that is ok may hand it out."""
+    prints = model.fingerprint
+    parts = {
+        "motion": motion.fingerprint,
+        **{name: prints[name] for name in MODEL_PARTS},
+        "safety box": NO_SAFETY_BOX,
+        "start state": _start_fingerprint(start),
+    }
+    return Certificate(tuple(parts.items()), tuple(start.q.tolist()))
+
+
+def verify_certificate(
+    certificate: Certificate | None, motion: Motion, model: RobotModel, start_q: ArrayLike | StartState
+) -> None:
+    """Makes sure that there is a certificate and that it is for this; the gate in front of every hand-off.
+
+    Raises:
+        CertificateError: There is none, or it is stale.
+    """
+    if certificate is None:
+        raise CertificateError(
+            "the motion has no certificate: run rcilab.check(motion, model) and hand over report.certificate, "
+            "which exists when the report is ok",
+            ("certificate",),
+        )
+    certificate.verify(motion, model, start_q)
+
+
+def _start_fingerprint(start: StartState) -> str:
+    state = np.stack([start.q, start.dq, start.ddq]) + 0.0  # Makes -0.0 and 0.0 the same bytes.
+    return hashlib.sha256(state.tobytes()).hexdigest()

@@ -1,0 +1,194 @@
+"""What a check found: one row a condition, one sentence a violation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from rcilab.conformance.certificate import Certificate
+from rcilab.conformance.conditions import Condition, Necessity
+from rcilab.conformance.wording import amount, with_degrees
+from rcilab.errors import ConformanceError
+from rcilab.faults import Fault
+
+_LISTED = 8  # Violations printed in full; a thousand sentences help nobody.
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class ConditionResult:
+    """One condition, and how near the motion comes to its bound."""
+
+    condition: Condition
+    value: float
+    """The worst value, in the condition's unit."""
+    bound: float
+    """The bound on that side."""
+    ratio: float
+    """How much of the way from the middle of the allowed range to the bound is used; 1 is the bound."""
+    joint: int
+    """Joint with the worst value, from 1."""
+    time: float
+    """When, [s] since the start of the motion."""
+    broken: int
+    """Number of samples that break the condition, over all joints."""
+
+    @property
+    def ok(self) -> bool:
+        """Whether the condition holds throughout."""
+        return self.broken == 0
+
+    @property
+    def id(self) -> str:
+        """The condition's name, such as "joint.velocity"."""
+        return self.condition.id
+
+    @property
+    def source(self) -> str:
+        """Where condition and bound come from."""
+        return self.condition.source
+
+    @property
+    def necessity(self) -> Necessity:
+        """Necessary or recommended."""
+        return self.condition.necessity
+
+    @property
+    def fault(self) -> Fault | None:
+        """What the controller raises when it is broken; None for a recommended condition."""
+        return self.condition.fault
+
+    @property
+    def unit(self) -> str:
+        """Unit of value and bound."""
+        return self.condition.unit
+
+    @property
+    def verdict(self) -> str:
+        """One word: ok, advice (a recommended condition is broken) or violated."""
+        if self.ok:
+            return "ok"
+        return "violated" if self.necessity == "necessary" else "advice"
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Violation:
+    """Consecutive samples of one joint that break one condition."""
+
+    condition: Condition
+    joint: int
+    """From 1."""
+    time: float
+    """The first of the samples, [s] since the start of the motion."""
+    count: int
+    """How many samples in a row, at 1 ms each."""
+    value: float
+    """The worst of them, in the condition's unit."""
+    worst_time: float
+    """When it is worst, [s]."""
+    bound: float
+    """The bound it passes."""
+    ratio: float
+    """As in ConditionResult; 1 is the bound."""
+    advice: str
+    """What to do about it."""
+
+    @property
+    def fault(self) -> Fault | None:
+        """What the controller raises; None for a recommended condition."""
+        return self.condition.fault
+
+    def __str__(self) -> str:
+        value, bound = amount(self.value, self.bound)
+        row = self.condition
+        if row.necessity == "recommended":
+            what = f"{row.quantity} is {value} {row.unit}, not 0"
+            return f"joint {self.joint}: {what} ({row.necessity} condition); {self.advice}"
+        if row.order == 0:
+            what = f"{row.quantity} {with_degrees(self.value, value)} passes {with_degrees(self.bound, bound)}"
+        else:
+            what = f"{row.quantity} {value} {row.unit} exceeds {bound.lstrip('-')} {row.unit}"
+        lasting = f" and for {self.count} ms" if self.count > 1 else ""
+        return (
+            f"joint {self.joint}: {what} at t = {self.time:.3f} s{lasting} ({row.necessity} condition); {self.advice}"
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Report:
+    """The verdict on one motion."""
+
+    title: str
+    """Which motion on which arm, in words."""
+    rows: tuple[ConditionResult, ...]
+    """One a condition, in the manual's order."""
+    violations: tuple[Violation, ...]
+    """Necessary conditions that are broken, worst first: the robot would stop."""
+    warnings: tuple[Violation, ...]
+    """Recommended conditions that are broken, worst first."""
+    issue: Callable[[], Certificate] = field(repr=False)
+    """Makes the certificate when somebody asks for it."""
+
+    @property
+    def ok(self) -> bool:
+        """Whether every necessary condition holds."""
+        return not self.violations
+
+    @property
+    def worst(self) -> ConditionResult:
+        """The necessary condition nearest to, or farthest past, its bound."""
+        return max((row for row in self.rows if row.necessity == "necessary"), key=lambda row: (not row.ok, row.ratio))
+
+    @property
+    def certificate(self) -> Certificate | None:
+        """The proof for a hand-off; a report that is not ok has none."""
+        return self.issue() if self.ok else None
+
+    def require(self) -> Report:
+        """Returns this report if it is ok.
+
+        Raises:
+            ConformanceError: A necessary condition is broken; `.violations` has them all.
+        """
+        if self.ok:
+            return self
+        more = len(self.violations) - 1
+        rest = f" (and {more} more)" if more else ""
+        raise ConformanceError(f"{self.violations[0]}{rest}", self.violations)
+
+    def __str__(self) -> str:
+        lines = [self.title, self._verdict()]
+        for row in self.rows:
+            value, bound = amount(row.value, row.bound)
+            place = f"joint {row.joint}, t = {row.time:.3f} s"
+            share = f"{100.0 * row.ratio:.1f} %" if row.necessity == "necessary" else ""
+            lines.append(
+                f"  {row.verdict:8}  {row.id:18}  {value:>9} of {bound:>7} {row.unit:8} {share:>8}  {place}  "
+                f"[{row.source}]"
+            )
+        found = (*self.violations, *self.warnings)
+        lines += [f"- {violation}" for violation in found[:_LISTED]]
+        if len(found) > _LISTED:
+            lines.append(f"- ... and {len(found) - _LISTED} more")
+        return "\n".join(lines)
+
+    def __repr__(self) -> str:
+        return f"<Report {self._verdict()}>"
+
+    def _repr_html_(self) -> str:
+        from rcilab.conformance.html import report_html
+
+        return report_html(self)
+
+    def _verdict(self) -> str:
+        worst = self.worst
+        if self.ok:
+            near = f"{worst.condition.quantity} of joint {worst.joint}, {100.0 * worst.ratio:.1f} % of its bound"
+            advice = f"; {_plural(len(self.warnings), 'recommendation')} not met" if self.warnings else ""
+            return f"conforms{advice}; nearest: {near}"
+        broken = [row for row in self.rows if not row.ok and row.necessity == "necessary"]
+        names = ", ".join(row.fault.manual_name for row in broken if row.fault is not None)
+        return f"does not conform: {_plural(len(self.violations), 'violation')}; the robot would stop with {names}"
+
+
+def _plural(count: int, noun: str) -> str:
+    return f"{count} {noun}" + ("" if count == 1 else "s")
