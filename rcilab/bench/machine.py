@@ -4,45 +4,39 @@ from __future__ import annotations
 
 import os
 import platform
-import threading
+import subprocess
+import sys
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 PACKAGES = ("rcilab", "numpy", "pin", "ruckig", "mujoco", "viser")
 
-_PRIORITY = 50
+_PRIORITY = 50  # Any will do for the question: the permission is for all or for none.
 
 
 def describe_machine() -> dict[str, Any]:
-    """Returns cpu, cores, memory, versions and whether a loop of ours may run under SCHED_FIFO."""
+    """Returns cpu, cores, load, versions, and whether SCHED_FIFO and locked memory are in force for our loops."""
+    fifo, locked = ask_realtime()
     return {
         "name": "machine",
         "cpu": _cpu_name(),
         "cores": len(os.sched_getaffinity(0)),
         "load": round(os.getloadavg()[0], 2),
         "kernel": f"{platform.system()} {platform.release()}",
-        "sched_fifo": may_run_fifo(),
+        "sched_fifo": fifo,
+        "memory_locked": locked,
         "python": platform.python_version(),
         "versions": {name: metadata.version(name) for name in PACKAGES},
     }
 
 
-def may_run_fifo() -> bool:
-    """Returns whether this process may schedule a thread first-in first-out, tried in a thread that then ends."""
-    answers: list[bool] = []
-
-    def ask() -> None:
-        try:
-            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(_PRIORITY))
-            answers.append(True)
-        except OSError:
-            answers.append(False)
-
-    thread = threading.Thread(target=ask)
-    thread.start()
-    thread.join()
-    return answers[0]
+def ask_realtime() -> tuple[bool, bool]:
+    """Returns whether a control process gets SCHED_FIFO and locked memory, tried in a process that then ends."""
+    code = f"from rcilab.realtime import enter_realtime as e; s = e({_PRIORITY}); print(s.policy, s.memory_locked)"
+    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    policy, locked = answer.stdout.split()
+    return policy == "SCHED_FIFO", locked == "True"
 
 
 def _cpu_name() -> str:

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import argparse
-import ctypes
 import os
 import re
 import shutil
 import socket
 import sys
-import threading
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 from typing import Literal
+
+from rcilab.bench.machine import ask_realtime
 
 OLDEST_PYTHON = (3, 11)
 CONTROLLER_ADDRESS = "127.0.0.2"  # Where `rcilab controller` listens unless told otherwise.
@@ -22,8 +22,6 @@ FEWEST_CORES = 2
 """One for the 1 kHz loops, one for the page and the browser."""
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "firefox", "microsoft-edge")
 
-_PRIORITY = 50
-_MCL_CURRENT = 1
 _REAL_TIME_LIMITS = (
     "add '@realtime - rtprio 80' and '@realtime - memlock unlimited' to /etc/security/limits.conf, join that group"
 )
@@ -47,7 +45,8 @@ class Finding:
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Adds `rcilab doctor`."""
-    subparsers.add_parser("doctor", help="say what this machine lacks for planning, simulating and streaming")
+    parser = subparsers.add_parser("doctor", help="say what this machine lacks for planning, simulating and streaming")
+    parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -64,8 +63,7 @@ def examine() -> list[Finding]:
     return [
         check_python(sys.version_info[:3]),
         *check_packages("rcilab"),
-        check_fifo(),
-        check_memory_lock(),
+        *check_realtime(*ask_realtime()),
         check_address(CONTROLLER_ADDRESS),
         check_port(CONTROLLER_ADDRESS, CONTROLLER_PORT),
         check_cores(len(os.sched_getaffinity(0))),
@@ -110,38 +108,15 @@ def check_package(name: str, bounds: str, *, optional: bool = False) -> Finding:
     return Finding(name, "ok", version)
 
 
-def check_fifo() -> Finding:
-    """May a loop of ours run ahead of everything else on a core?"""
-    answers: list[OSError | None] = []
-
-    def ask() -> None:  # A thread has a policy of its own, and takes it to its grave.
-        try:
-            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(_PRIORITY))
-        except OSError as error:
-            answers.append(error)
-        else:
-            answers.append(None)
-
-    thread = threading.Thread(target=ask)
-    thread.start()
-    thread.join()
-    if answers[0] is None:
-        return Finding("SCHED_FIFO", "ok", f"permitted at priority {_PRIORITY}")
-    return Finding(
-        "SCHED_FIFO", "note", "not permitted, so cycles can be late on a busy machine", f"{_REAL_TIME_LIMITS}"
-    )
-
-
-def check_memory_lock() -> Finding:
-    """May a loop of ours keep its memory from being paged out?"""
-    libc = ctypes.CDLL(None, use_errno=True)
-    if libc.mlockall(_MCL_CURRENT) == 0:
-        libc.munlockall()
-        return Finding("memory locking", "ok", "permitted")
-    reason = os.strerror(ctypes.get_errno())
-    return Finding(
-        "memory locking", "note", f"not permitted ({reason}), so a page fault can delay a cycle", _REAL_TIME_LIMITS
-    )
+def check_realtime(fifo: bool, locked: bool) -> list[Finding]:
+    """Does a loop of ours run ahead of everything else on a core, and is its memory never paged out?"""
+    refused = "not permitted, so cycles can be late on a busy machine"
+    return [
+        Finding("SCHED_FIFO", "ok", "permitted") if fifo else Finding("SCHED_FIFO", "note", refused, _REAL_TIME_LIMITS),
+        Finding("locked memory", "ok", "permitted")
+        if locked
+        else Finding("locked memory", "note", refused, _REAL_TIME_LIMITS),
+    ]
 
 
 def check_address(address: str) -> Finding:

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rcilab.arrays import Array, as_vector
 from rcilab.clock import CYCLE_TIME
-from rcilab.conformance.check import check
+from rcilab.conformance.check import HOLD_SAMPLES, check
 from rcilab.conformance.conditions import CYCLE_CONDITIONS, Condition
 from rcilab.errors import InvalidValueError
 from rcilab.limits import JointLimits
@@ -76,8 +75,8 @@ def plot(motion: Motion, model: RobotModel, run: Run | None = None, *, joints: S
     figure = _new_figure(len(panels) + (run is not None))
     axes: list[Axes] = list(figure.axes)
     for panel, ax in zip(panels, axes, strict=False):
-        _draw_panel(ax, panel, motion.times, run, chosen)
-        _shade_violations(ax, panel, motion.times, report.violations)
+        _draw_panel(ax, panel, run, chosen)
+        _shade_violations(ax, panel, report.violations, chosen)
     if run is not None:
         _draw_error(axes[-1], run, chosen)
     axes[0].secondary_yaxis("right", functions=(np.degrees, np.radians)).set_ylabel("[deg]")
@@ -85,7 +84,7 @@ def plot(motion: Motion, model: RobotModel, run: Run | None = None, *, joints: S
         loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=len(chosen) + 1, frameon=False, fontsize="small"
     )
     axes[-1].set_xlabel("time [s]")
-    axes[-1].set_xlim(0.0, max(motion.duration, float(run.t[-1]) if run is not None and len(run.t) else 0.0))
+    axes[-1].set_xlim(0.0, max(motion.duration, run.duration if run is not None else 0.0) + HOLD_SAMPLES * CYCLE_TIME)
     figure.suptitle(_title(model, motion, report.violations), fontsize="medium")
     return figure
 
@@ -112,7 +111,7 @@ def _panels(motion: Motion, limits: JointLimits, run: Run | None) -> list[_Panel
     return [
         _Panel(
             condition,
-            backward_differences(motion.q, condition.order),
+            _backward_differences(motion.q, condition.order),
             *condition.bounds(limits),
             measured[condition.order] if condition.order < len(measured) else None,
         )
@@ -120,18 +119,22 @@ def _panels(motion: Motion, limits: JointLimits, run: Run | None) -> list[_Panel
     ]
 
 
-def backward_differences(q: Array, order: int) -> Array:
-    """Returns the backward differences at 1 ms of commanded angles, shape (N, n): what the controller judges.
+def _backward_differences(q: Array, order: int) -> Array:
+    """Returns backward differences at 1 ms of commanded angles, with the cycles in which the controller holds the goal.
 
     Args:
         q: Joint angles, one row a cycle, shape (N, n), [rad]; the arm is at rest in the first row.
         order: 0 returns the angles themselves, 1 velocity [rad/s], 2 acceleration, 3 jerk.
+
+    Returns:
+        Shape (N + HOLD_SAMPLES, n).
     """
-    before = np.repeat(q[:1], order, axis=0)
-    return np.diff(np.concatenate((before, q)), n=order, axis=0) / CYCLE_TIME**order
+    path = np.concatenate((np.repeat(q[:1], order, axis=0), q, np.repeat(q[-1:], HOLD_SAMPLES, axis=0)))
+    return np.diff(path, n=order, axis=0) / CYCLE_TIME**order
 
 
-def _draw_panel(ax: Axes, panel: _Panel, times: Array, run: Run | None, joints: Sequence[int]) -> None:
+def _draw_panel(ax: Axes, panel: _Panel, run: Run | None, joints: Sequence[int]) -> None:
+    times = CYCLE_TIME * np.arange(len(panel.values))
     planned: dict[str, Any] = {"linestyle": (0, (4, 2)), "linewidth": 1.0} if run is not None else {"linewidth": 1.3}
     for joint in joints:
         color = JOINT_COLORS[joint % len(JOINT_COLORS)]
@@ -168,19 +171,24 @@ def _draw_limits(ax: Axes, lower: Array, upper: Array, *, everything: bool) -> N
     ax.set_ylim(low, high)
 
 
-def _shade_violations(ax: Axes, panel: _Panel, times: Array, violations: Sequence[Violation]) -> None:
-    """Hatches the time over which a joint is beyond its bound, and marks the worst sample."""
-    for violation in violations:
-        if violation.condition is not panel.condition:
-            continue
-        joint = violation.joint - 1
-        values = panel.values[:, joint]
-        for start, end in _spans((values >= panel.upper[joint]) | (values <= panel.lower[joint])):
-            ax.axvspan(
-                times[max(start - 1, 0)], times[min(end, len(times) - 1)],
-                facecolor=VIOLATION_COLOR, edgecolor=VIOLATION_COLOR, alpha=0.22, hatch="////", linewidth=0.0,
-            )  # fmt: skip
-        ax.plot([violation.time], [violation.value], "x", color=VIOLATION_COLOR, markersize=7, markeredgewidth=2)
+def _shade_violations(ax: Axes, panel: _Panel, violations: Sequence[Violation], joints: Sequence[int]) -> None:
+    """Hatches the time over which some joint is beyond its bound, and marks the worst sample of each violation."""
+    broken = [v for v in violations if v.condition is panel.condition and v.joint - 1 in joints]
+    for begin, end in _union((v.time - CYCLE_TIME, v.time + (v.count - 1) * CYCLE_TIME) for v in broken):
+        ax.axvspan(begin, end, facecolor=VIOLATION_COLOR, edgecolor=VIOLATION_COLOR, alpha=0.2, hatch="///", zorder=0.7)
+    worst: dict[str, Any] = {"color": VIOLATION_COLOR, "markersize": 5, "markeredgewidth": 1.5, "linestyle": "none"}
+    ax.plot([v.worst_time for v in broken], [v.value for v in broken], "x", **worst)
+
+
+def _union(spans: Iterable[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Returns spans of time that cover the same and do not overlap; a difference speaks of the cycle before it."""
+    merged: list[tuple[float, float]] = []
+    for begin, end in sorted(spans):
+        if merged and begin <= merged[-1][1]:
+            merged[-1] = (merged[-1][0], max(end, merged[-1][1]))
+        else:
+            merged.append((begin, end))
+    return merged
 
 
 def _draw_error(ax: Axes, run: Run, joints: Sequence[int]) -> None:
@@ -191,14 +199,8 @@ def _draw_error(ax: Axes, run: Run, joints: Sequence[int]) -> None:
     ax.grid(visible=True, color="#E0E0E0", linewidth=0.6)
 
 
-def _spans(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Returns the runs of True in a mask as (first, one past last)."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], mask.astype(np.int8), [0]))))
-    return [(int(start), int(end)) for start, end in edges.reshape(-1, 2)]
-
-
 def _title(model: RobotModel, motion: Motion, violations: Sequence[Violation]) -> str:
-    verdict = f"{len(violations)} condition(s) violated, worst: {violations[0]}" if violations else "inside all limits"
+    verdict = f"{len(violations)} × beyond a limit, hatched" if violations else "inside all limits"
     return f"{model.name}, {motion.duration:.3f} s: {verdict}"
 
 

@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import argparse
-import os
 import socket
 from pathlib import Path
 
@@ -79,10 +78,11 @@ def test_no_browser_is_noted() -> None:
     assert doctor.check_browser(("no-such-browser-at-all",)).verdict == "note"
 
 
-def test_asking_for_real_time_leaves_this_process_as_it_was() -> None:
-    before = os.sched_getscheduler(0)
-    assert doctor.check_fifo().verdict in ("ok", "note")
-    assert os.sched_getscheduler(0) == before
+@pytest.mark.parametrize("granted", [True, False])
+def test_real_time_is_good_to_have_and_its_lack_is_noted_with_the_remedy(granted: bool) -> None:
+    for finding in doctor.check_realtime(granted, granted):
+        assert finding.verdict == ("ok" if granted else "note")
+        assert ("limits.conf" in finding.advice) is not granted
 
 
 def test_the_exit_code_says_whether_something_is_bad(capsys: pytest.CaptureFixture[str]) -> None:

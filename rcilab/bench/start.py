@@ -1,0 +1,82 @@
+"""What a person waits for at the very beginning: the import, and `rcilab` until its page is served."""
+
+from __future__ import annotations
+
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+import urllib.error
+import urllib.request
+from typing import IO
+
+import numpy as np
+
+from rcilab.bench.measure import Measurement, summarise
+from rcilab.errors import ConnectionLostError, DeadlineError
+
+_RUNS = 5
+_PATIENCE = 60.0  # [s]
+_POLL = 0.01  # [s]
+
+
+def bench_import() -> Measurement:
+    """`import rcilab` in a fresh interpreter; the interpreter's own start is taken off."""
+    bare = [_time_python("pass") for _ in range(_RUNS)]
+    full = [_time_python("import rcilab") for _ in range(_RUNS)]
+    model = [_time_python("import rcilab; rcilab.load_model('xMatePro7')") for _ in range(_RUNS)]
+    start = float(np.median(bare))
+    loaded = 1e3 * (float(np.median(model)) - start)
+    note = f"fresh interpreter, its own {1e3 * start:.0f} ms taken off; with load_model {loaded:.0f} ms"
+    return summarise("import", [time - start for time in full], "ms", None, note)
+
+
+def bench_start() -> Measurement:
+    """`rcilab` from the command to its page served whole, with everything behind it started."""
+    times, sizes = zip(*(_time_page() for _ in range(_RUNS)), strict=True)
+    note = f"`rcilab --no-browser`, {_RUNS} fresh processes, until GET / gives 200; page of {sizes[0] / 1e3:.0f} kB"
+    return summarise("start", times, "s", 3.0, note)
+
+
+def free_port() -> int:
+    """Returns a TCP port on 127.0.0.1 that was free a moment ago."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def _time_python(code: str) -> float:
+    start = time.perf_counter()
+    subprocess.run([sys.executable, "-c", code], check=True)
+    return time.perf_counter() - start
+
+
+def _time_page() -> tuple[float, int]:
+    """Returns how long the page took, [s], and how large it is, [bytes]."""
+    port = free_port()
+    with tempfile.TemporaryFile("w+", encoding="utf-8") as said:
+        start = time.perf_counter()
+        process = subprocess.Popen(
+            [sys.executable, "-m", "rcilab.cli", "--no-browser", "--port", str(port)], stdout=said, stderr=said
+        )
+        try:
+            page = _wait_for_page(f"http://127.0.0.1:{port}/", process, said)
+            return time.perf_counter() - start, len(page)
+        finally:
+            process.terminate()
+            process.wait(_PATIENCE)
+
+
+def _wait_for_page(url: str, process: subprocess.Popen[bytes], said: IO[str]) -> bytes:
+    deadline = time.monotonic() + _PATIENCE
+    while time.monotonic() < deadline:
+        try:
+            with urllib.request.urlopen(url, timeout=_PATIENCE) as answer:
+                return answer.read()
+        except urllib.error.URLError:
+            time.sleep(_POLL)
+        if process.poll() is not None:
+            said.seek(0)
+            raise ConnectionLostError(f"rcilab ended with exit code {process.returncode}: {said.read().strip()}")
+    raise DeadlineError(f"rcilab served no page at {url} within {_PATIENCE:g} s")

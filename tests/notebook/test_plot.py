@@ -1,0 +1,101 @@
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
+
+import rcilab
+from rcilab.errors import InvalidValueError
+from rcilab.notebook.plot import JOINT_COLORS, VIOLATION_COLOR, plot
+
+PRO7 = rcilab.load_model("xMatePro7")
+MOTION = rcilab.plan_joint(PRO7, PRO7.home, PRO7.home + np.array([0.5, -0.4, 0.3, -0.6, 0.7, -0.8, 1.0]))
+TOO_FAST = rcilab.Motion.from_samples(MOTION.q[::2])
+
+
+def hatched(ax: Axes) -> list[tuple[float, float]]:
+    """Spans of time that are marked as violated."""
+    spans = [patch for patch in ax.patches if to_hex(patch.get_facecolor()).upper() == VIOLATION_COLOR]
+    boxes = [span.get_extents().transformed(ax.transData.inverted()) for span in spans]
+    return [(box.x0, box.x1) for box in boxes]
+
+
+def main_axes(figure: Figure) -> list[Axes]:
+    return list(figure.axes)
+
+
+def test_four_panels_show_the_signals_in_si_units() -> None:
+    labels = [ax.get_ylabel() for ax in main_axes(plot(MOTION, PRO7))]
+    assert labels == ["q [rad]", "dq [rad/s]", "ddq [rad/s²]", "jerk [rad/s³]"]
+
+
+def test_every_joint_is_drawn_with_every_sample_and_a_colour_of_its_own() -> None:
+    lines = [line for line in main_axes(plot(MOTION, PRO7))[0].lines if len(line.get_xdata()) > 10]
+    assert len({line.get_color() for line in lines}) == len(lines) == 7 <= len(JOINT_COLORS)
+    for joint, line in enumerate(lines):
+        np.testing.assert_array_equal(np.asarray(line.get_ydata())[: len(MOTION.q)], MOTION.q[:, joint])
+
+
+def test_a_conforming_motion_has_nothing_hatched_and_says_so() -> None:
+    figure = plot(MOTION, PRO7)
+    assert [hatched(ax) for ax in main_axes(figure)] == [[], [], [], []]
+    assert "inside all limits" in figure.get_suptitle()
+
+
+def test_what_check_finds_is_hatched_from_its_first_to_its_last_sample() -> None:
+    violations = rcilab.check(TOO_FAST, PRO7).violations
+    spans = {f"joint.{name}": hatched(ax) for name, ax in zip(
+        ("position", "velocity", "acceleration", "jerk"), main_axes(plot(TOO_FAST, PRO7)), strict=True
+    )}  # fmt: skip
+    assert {name for name, found in spans.items() if found} == {v.condition.id for v in violations}
+    for violation in violations:
+        first, last = violation.time, violation.time + (violation.count - 1) * 1e-3
+        found = spans[violation.condition.id]
+        assert any(begin <= first + 1e-9 and last <= end + 1e-9 for begin, end in found)
+    covered = sum(end - begin for begin, end in spans["joint.acceleration"])
+    assert covered < TOO_FAST.duration / 2.0  # Only where it is broken: in the middle of this motion all is well.
+
+
+def test_each_distinct_limit_in_sight_has_its_line() -> None:
+    velocity = main_axes(plot(MOTION, PRO7))[1]
+    levels = {line.get_ydata()[0] for line in velocity.lines if len(line.get_xdata()) == 2}
+    assert levels == {2.175, 2.61, -2.175, -2.61}
+
+
+def test_chosen_joints_alone_are_drawn() -> None:
+    ax = main_axes(plot(MOTION, PRO7, joints=[4]))[1]
+    assert [line.get_label() for line in ax.lines if len(line.get_xdata()) > 10] == ["joint 4"]
+
+
+@pytest.mark.parametrize("joints", [[0], [8], [], [1.5]])
+def test_a_joint_that_the_arm_does_not_have_is_refused(joints: list[int]) -> None:
+    with pytest.raises(InvalidValueError, match="must be numbers from 1 to 7"):
+        plot(MOTION, PRO7, joints=joints)
+
+
+def test_a_run_adds_what_the_robot_did_and_the_difference() -> None:
+    with rcilab.simulate(PRO7) as robot:
+        robot.power_on()
+        motion = rcilab.plan_joint(PRO7, robot.state.q_c, robot.state.q_c + 0.02)
+        run = robot.execute(motion, rcilab.check(motion, PRO7).certificate)
+    axes = main_axes(plot(motion, PRO7, run))
+    assert axes[-1].get_ylabel() == "actual - plan [mrad]"
+    actual = [line for line in axes[0].lines if line.get_linestyle() == "-"]
+    np.testing.assert_array_equal(actual[2].get_ydata(), run.q[:, 2])
+    np.testing.assert_allclose(axes[-1].lines[2].get_ydata(), 1e3 * run.error[:, 2])
+
+
+def test_a_figure_shows_itself_without_pyplot_or_a_display() -> None:
+    code = """
+import sys, rcilab
+model = rcilab.load_model("xMate3")
+figure = rcilab.plot(rcilab.plan_joint(model, model.home, model.home + 0.2), model)
+assert figure._repr_png_()[:8] == b"\\x89PNG\\r\\n\\x1a\\n"
+assert "matplotlib.pyplot" not in sys.modules
+"""
+    subprocess.run([sys.executable, "-W", "error", "-c", code], check=True, env={"PATH": "", "HOME": "/nonexistent"})
