@@ -49,9 +49,12 @@ class Link:
 
     def poll(self, timeout: float) -> list[RobotState]:
         """Returns every state that has arrived, oldest first; waits up to `timeout`, [s], for the first one."""
-        if not self._transport.wait(timeout):
-            return []
-        return self._take_states()
+        deadline = time.monotonic() + timeout
+        while self._transport.wait(deadline - time.monotonic()):
+            states = self._take_states()  # Empty when what came was no state of this robot.
+            if states:
+                return states
+        return []
 
     def send(self, packet: CommandPacket) -> None:
         """Sends one command."""
