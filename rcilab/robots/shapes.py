@@ -101,7 +101,7 @@ class _Fineness:
 
 _FINENESS = {
     "fine": _Fineness(cell=0.0085, segments=56),
-    "coarse": _Fineness(cell=0.0125, segments=36),
+    "coarse": _Fineness(cell=0.0180, segments=26),
 }
 
 
@@ -138,7 +138,7 @@ def _design_joints(description: RobotDescription) -> list[_Joint]:
     """Returns where the housings meet. Radii shrink from base to flange; the 7 kg arms are thicker."""
     strength = 1.0 if description.rated_payload < 5.0 else _STRENGTH
     heights = [link.origin_height for link in description.links]
-    axes = ["y" if abs(joint.axis[1]) > 0.5 else "z" for joint in upright_joints(description)]
+    axes: list[Literal["y", "z"]] = ["y" if abs(joint.axis[1]) > 0.5 else "z" for joint in upright_joints(description)]
     radii = np.interp(np.linspace(0.0, 1.0, len(axes)), [0.0, 0.5, 1.0], [0.064, 0.056, 0.045]) * strength
     joints: list[_Joint] = []
     for i, (axis, radius) in enumerate(zip(axes, radii.tolist(), strict=True)):
@@ -254,7 +254,7 @@ def _gap_ring(joint: _Joint, fine: _Fineness) -> list[Part]:
 def _by_role(parts: list[Part]) -> tuple[Part, ...]:
     """Joins the meshes of one colour, trim before castings: drawn translucent, what lies below then stays hidden."""
     parts = parts[::-1]
-    roles = list(dict.fromkeys(part.role for part in parts))
+    roles: dict[ColorRole, None] = dict.fromkeys(part.role for part in parts)
     return tuple(Part(merge_meshes([p.mesh for p in parts if p.role == role]), role) for role in roles)
 
 

@@ -1,0 +1,30 @@
+"""`rcilab mjcf NAME`: an arm as MJCF, for MuJoCo."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Adds the command."""
+    parser = subparsers.add_parser("mjcf", help="print an arm as MJCF for MuJoCo, or write it with its meshes")
+    parser.add_argument("name", metavar="NAME", help="xMatePro3, xMatePro7, xMate3 or xMate7, in any case")
+    parser.add_argument("--output", metavar="DIR", type=Path, help="write DIR/NAME.xml and DIR/meshes/NAME/*.stl")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Prints the MJCF (capsules only, no file needed), or writes it and its meshes into a directory."""
+    from rcilab.robots import describe_robot
+    from rcilab.robots.files import write_model
+    from rcilab.robots.mjcf import build_mjcf
+
+    description = describe_robot(args.name)
+    if args.output is None:
+        sys.stdout.write(build_mjcf(description))
+        return 0
+    text = build_mjcf(description, meshes=True)
+    print(write_model(args.output, f"{description.name}.xml", text, description))
+    return 0

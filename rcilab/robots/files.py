@@ -1,0 +1,29 @@
+"""Robot descriptions on disk: the description file and, below it, the meshes it names."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rcilab.errors import ModelError
+from rcilab.robots.description import RobotDescription
+from rcilab.robots.urdf import build_meshes
+
+
+def write_model(directory: Path, file_name: str, text: str, description: RobotDescription) -> Path:
+    """Writes a URDF or MJCF and its meshes (`meshes/NAME/*.stl`), and returns the path of the description file.
+
+    Raises:
+        ModelError: The directory cannot be written; the message says why.
+    """
+    try:
+        meshes = directory / "meshes" / description.name
+        meshes.mkdir(parents=True, exist_ok=True)
+        for name, content in build_meshes(description).items():
+            (meshes / name).write_bytes(content)
+        path = directory / file_name
+        path.write_text(text, encoding="utf-8", newline="\n")
+    except OSError as error:
+        raise ModelError(
+            f"cannot write {file_name} into {directory}: {error.strerror}; name another --output"
+        ) from error
+    return path
