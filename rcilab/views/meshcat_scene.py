@@ -1,0 +1,149 @@
+"""The scene of a notebook: meshcat, inline in a cell or in a browser tab."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rcilab.spatial import Pose
+from rcilab.views.meshcat_server import MeshcatServer, import_meshcat
+from rcilab.views.scene import NO_TURN, ORIGIN, Color, line_points, unknown_node
+
+
+@dataclass(slots=True)
+class _Node:
+    wxyz: Sequence[float] = NO_TURN
+    position: Sequence[float] = ORIGIN
+    geometry: Any = None
+    """A mesh's geometry, kept for changes of its material."""
+    color: Color = (0, 0, 0)
+    opacity: float = 1.0
+
+
+class MeshcatScene:
+    """Draws into a meshcat page that only this machine can open.
+
+    Args:
+        server: The server to draw into; default a new one, which `close()` then stops.
+    """
+
+    def __init__(self, server: MeshcatServer | None = None) -> None:
+        self._server = server or MeshcatServer()
+        self._owns_server = server is None
+        self._nodes: dict[str, _Node] = {}
+        self.visualizer = import_meshcat().Visualizer(window=self._server)
+        """meshcat's own handle; what it offers beyond `Scene` is there: animations, properties."""
+        self.visualizer["/Background"].set_property("top_color", [0.78, 0.82, 0.86])
+        self.visualizer["/Background"].set_property("bottom_color", [0.98, 0.985, 0.99])
+
+    @property
+    def url(self) -> str:
+        """Address of the page."""
+        return self._server.web_url
+
+    def add_frame(
+        self,
+        name: str,
+        *,
+        wxyz: Sequence[float] = NO_TURN,
+        position: Sequence[float] = ORIGIN,
+        axes_length: float = 0.0,
+        visible: bool = True,
+    ) -> None:
+        """Adds a coordinate frame; see `Scene`."""
+        g = import_meshcat().geometry
+
+        self._nodes[name] = _Node(wxyz, position)
+        if axes_length > 0.0:
+            self._at(name).set_object(g.triad(axes_length))
+        self._send_transform(name)
+        if not visible:
+            self.set_visible(name, False)
+
+    def add_mesh(self, name: str, vertices: ArrayLike, faces: ArrayLike, *, color: Color, opacity: float = 1.0) -> None:
+        """Adds a triangle mesh; see `Scene`."""
+        g = import_meshcat().geometry
+
+        geometry = g.TriangularMeshGeometry(np.asarray(vertices, dtype=np.float32), np.asarray(faces, dtype=np.uint32))
+        self._nodes[name] = _Node(geometry=geometry, color=color, opacity=opacity)
+        self._send_mesh(name)
+
+    def add_polyline(self, name: str, points: ArrayLike, *, color: ArrayLike, thickness: float = 0.004) -> None:
+        """Adds a line through points; see `Scene`. WebGL draws it one pixel wide, whatever the thickness."""
+        g = import_meshcat().geometry
+
+        path, shades = line_points(points, color)
+        geometry = g.PointsGeometry(path.T.astype(np.float32), (shades.T / 255.0).astype(np.float32))
+        self._nodes[name] = _Node()
+        self._at(name).set_object(g.Line(geometry, g.LineBasicMaterial(vertexColors=True)))
+
+    def set_transform(
+        self, name: str, *, wxyz: Sequence[float] | None = None, position: Sequence[float] | None = None
+    ) -> None:
+        """Moves a node; see `Scene`."""
+        node = self._node(name)
+        node.wxyz = node.wxyz if wxyz is None else wxyz
+        node.position = node.position if position is None else position
+        self._send_transform(name)
+
+    def set_visible(self, name: str, visible: bool) -> None:
+        """Shows or hides a node; see `Scene`."""
+        self._node(name)
+        self._at(name).set_property("visible", visible)
+
+    def set_style(self, name: str, *, color: Color | None = None, opacity: float | None = None) -> None:
+        """Changes a mesh's look by sending it again; see `Scene`."""
+        node = self._node(name)
+        node.color = node.color if color is None else color
+        node.opacity = node.opacity if opacity is None else opacity
+        self._send_mesh(name)
+
+    def remove(self, name: str) -> None:
+        """Removes a node and everything below it; see `Scene`."""
+        self._node(name)
+        self._at(name).delete()
+        below = name.rstrip("/") + "/"
+        self._nodes = {k: v for k, v in self._nodes.items() if k != name and not k.startswith(below)}
+
+    @contextmanager
+    def batch(self) -> Iterator[None]:
+        """Changes are sent at once: meshcat has no batches, and its page draws at its own rate."""
+        yield
+
+    def as_html(self) -> str:
+        """Returns the scene as one page that needs neither server nor network."""
+        return self._server.get_scene()
+
+    def close(self) -> None:
+        """Stops the server if this scene started it."""
+        if self._owns_server:
+            self._server.close()
+
+    def _at(self, name: str) -> Any:
+        return self.visualizer[name.strip("/")]
+
+    def _node(self, name: str) -> _Node:
+        try:
+            return self._nodes[name]
+        except KeyError:
+            raise unknown_node(name) from None
+
+    def _send_transform(self, name: str) -> None:
+        node = self._nodes[name]
+        self._at(name).set_transform(Pose(node.position, node.wxyz).matrix)
+
+    def _send_mesh(self, name: str) -> None:
+        g = import_meshcat().geometry
+
+        node = self._nodes[name]
+        red, green, blue = node.color
+        solid = node.opacity >= 1.0
+        material = g.MeshLambertMaterial(
+            color=(red << 16) | (green << 8) | blue, opacity=node.opacity, transparent=not solid
+        )
+        self._at(name).set_object(node.geometry, material)

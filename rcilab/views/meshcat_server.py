@@ -1,0 +1,149 @@
+"""A meshcat server that only this machine can reach.
+
+meshcat's own server prints a 127.0.0.1 address and listens on every interface, and no option changes that. This one
+runs meshcat's scene tree and page in a thread of ours, with the web port bound to 127.0.0.1 and without the ZeroMQ
+detour: drawing commands are handed over in memory. Tornado refuses websockets of foreign origin by itself (403).
+"""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+import warnings
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future
+from typing import Any
+
+from rcilab.errors import ConnectionLostError, DeadlineError
+
+_HOST = "127.0.0.1"
+_PATIENCE = 10.0  # [s] for the thread to answer; it does so in milliseconds
+
+
+def import_meshcat() -> Any:
+    """Returns the module; meshcat 0.3.2 imports a module that pyzmq has declared old, which is none of our business."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)
+        import meshcat.geometry
+        import meshcat.servers.zmqserver
+    return meshcat
+
+
+class MeshcatServer:
+    """Serves one scene to browsers on this machine until closed. Usable as the window of a `meshcat.Visualizer`."""
+
+    def __init__(self) -> None:
+        import_meshcat()
+        self._ready: Future[str] = Future()
+        self._loop = asyncio.new_event_loop()
+        self._bridge: Any = None
+        self._thread = threading.Thread(target=self._serve, name="meshcat", daemon=True)
+        self._thread.start()
+        self.web_url = self._ready.result(_PATIENCE)
+        """Address of the page."""
+
+    def send(self, command: Any) -> None:
+        """Takes a drawing command (meshcat's own objects) and passes it on to every open page."""
+        import umsgpack
+
+        content: Mapping[str, Any] = command.lower()
+        frames = [str(content["type"]).encode(), str(content["path"]).encode(), umsgpack.packb(content)]
+        self._post(lambda: self._bridge.handle_zmq(frames))
+
+    def get_scene(self) -> str:
+        """Returns the whole scene as one HTML page that needs no server."""
+        return self._ask(self._bridge.scene_html)
+
+    def close(self) -> None:
+        """Stops serving; open pages keep what they show. Calling it again does nothing."""
+        if self._thread.is_alive():
+            self._loop.call_soon_threadsafe(self._loop.stop)
+            self._thread.join(_PATIENCE)
+
+    def _serve(self) -> None:
+        asyncio.set_event_loop(self._loop)
+        try:
+            self._bridge = _build_bridge()
+            http, port = _listen(self._bridge.app)
+            self._ready.set_result(f"http://{_HOST}:{port}/static/")
+        except Exception as error:  # Whatever went wrong belongs to the caller that waits for the address.
+            self._ready.set_exception(error)
+            return
+        self._loop.run_forever()
+        http.stop()
+        self._loop.run_until_complete(http.close_all_connections())
+        self._loop.run_until_complete(self._loop.shutdown_default_executor())
+        self._loop.close()
+
+    def _post(self, work: Callable[[], None]) -> None:
+        """Runs something in the server's thread, in order, without waiting for it."""
+        try:
+            self._loop.call_soon_threadsafe(work)
+        except RuntimeError as error:
+            raise ConnectionLostError("this meshcat server was closed; make a new MeshcatScene") from error
+
+    def _ask(self, question: Callable[[], str]) -> str:
+        answer: Future[str] = Future()
+        self._post(lambda: answer.set_result(question()))
+        try:
+            return answer.result(_PATIENCE)
+        except TimeoutError as error:
+            raise DeadlineError(f"the meshcat server did not answer within {_PATIENCE:g} s") from error
+
+
+def _listen(app: Any) -> tuple[Any, int]:
+    """Returns the HTTP server and its port, any free one, on the loopback interface alone."""
+    from tornado.httpserver import HTTPServer
+    from tornado.netutil import bind_sockets
+
+    sockets = bind_sockets(0, _HOST)
+    http = HTTPServer(app)
+    http.add_sockets(sockets)
+    return http, int(sockets[0].getsockname()[1])
+
+
+def _build_bridge() -> Any:
+    """Returns meshcat's bridge, which keeps the scene tree, with its ZeroMQ socket replaced by a variable."""
+    import tornado.web
+    from meshcat.servers import zmqserver
+
+    class Page(zmqserver.WebSocketHandler):
+        """One open page; meshcat's own handler prints to stderr at each."""
+
+        def open(self, *args: str, **kwargs: str) -> None:
+            self.bridge.websocket_pool.add(self)
+            self.bridge.send_scene(self)
+
+        def on_close(self) -> None:
+            self.bridge.websocket_pool.discard(self)
+
+        def on_message(self, message: str | bytes) -> None:
+            pass  # Pages answer only to picture requests, which this server never makes.
+
+    class Bridge(zmqserver.ZMQWebSocketBridge):
+        def __init__(self) -> None:
+            self.websocket_pool = set()
+            self.tree = zmqserver.SceneTree()
+            self.zmq_socket = _Reply()
+            self.app = self.make_app()
+
+        def make_app(self) -> tornado.web.Application:
+            static = {"path": zmqserver.VIEWER_ROOT, "default_filename": zmqserver.VIEWER_HTML}
+            routes = [(r"/static/(.*)", zmqserver.StaticFileHandlerNoCache, static), (r"/", Page, {"bridge": self})]
+            return tornado.web.Application(routes, log_function=lambda handler: None)
+
+        def scene_html(self) -> str:
+            self.handle_zmq([b"get_scene"])
+            return self.zmq_socket.last.decode("utf-8")
+
+    return Bridge()
+
+
+class _Reply:
+    """Where the bridge puts its answer in place of a ZeroMQ socket."""
+
+    def __init__(self) -> None:
+        self.last = b""
+
+    def send(self, answer: bytes) -> None:
+        self.last = answer

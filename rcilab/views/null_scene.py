@@ -1,0 +1,121 @@
+"""A scene without a screen: it keeps what was drawn, for headless runs, counting and tests."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rcilab.arrays import Array, as_vector, frozen
+from rcilab.spatial import IDENTITY, Pose
+from rcilab.views.scene import NO_TURN, ORIGIN, Color, line_points, unknown_node
+
+
+@dataclass(slots=True)
+class DrawnNode:
+    """One node as it stands now; owned by its scene."""
+
+    kind: Literal["frame", "mesh", "polyline"]
+    wxyz: Sequence[float] = NO_TURN
+    position: Sequence[float] = ORIGIN
+    visible: bool = True
+    color: Color = (0, 0, 0)
+    opacity: float = 1.0
+    points: Array | None = None
+    """Vertices of a mesh or points of a line, shape (N, 3), [m]."""
+    triangles: int = 0
+
+
+class NullScene:
+    """Draws nothing and knows everything: nodes by name, and how often each was moved."""
+
+    def __init__(self) -> None:
+        self.nodes: dict[str, DrawnNode] = {}
+        self.moves = 0
+        """Number of `set_transform` calls so far."""
+        self.batches = 0
+        """Number of batches so far."""
+
+    def add_frame(
+        self,
+        name: str,
+        *,
+        wxyz: Sequence[float] = NO_TURN,
+        position: Sequence[float] = ORIGIN,
+        axes_length: float = 0.0,
+        visible: bool = True,
+    ) -> None:
+        """Keeps a coordinate frame; see `Scene`."""
+        self.nodes[name] = DrawnNode("frame", tuple(wxyz), tuple(position), visible)
+
+    def add_mesh(self, name: str, vertices: ArrayLike, faces: ArrayLike, *, color: Color, opacity: float = 1.0) -> None:
+        """Keeps a mesh; see `Scene`."""
+        count = len(np.asarray(faces))
+        self.nodes[name] = DrawnNode("mesh", color=color, opacity=opacity, points=frozen(vertices), triangles=count)
+
+    def add_polyline(self, name: str, points: ArrayLike, *, color: ArrayLike, thickness: float = 0.004) -> None:
+        """Keeps a line; see `Scene`."""
+        path, shades = line_points(points, color)
+        red, green, blue = (int(value) for value in shades[0])
+        self.nodes[name] = DrawnNode("polyline", color=(red, green, blue), points=frozen(path))
+
+    def set_transform(
+        self, name: str, *, wxyz: Sequence[float] | None = None, position: Sequence[float] | None = None
+    ) -> None:
+        """Moves a node; see `Scene`."""
+        node = self._node(name)
+        self.moves += 1
+        if wxyz is not None:
+            node.wxyz = as_vector(wxyz, 4, "wxyz").tolist()
+        if position is not None:
+            node.position = as_vector(position, 3, "position", "m").tolist()
+
+    def set_visible(self, name: str, visible: bool) -> None:
+        """Shows or hides a node; see `Scene`."""
+        self._node(name).visible = visible
+
+    def set_style(self, name: str, *, color: Color | None = None, opacity: float | None = None) -> None:
+        """Changes a mesh's look; see `Scene`."""
+        node = self._node(name)
+        node.color = node.color if color is None else color
+        node.opacity = node.opacity if opacity is None else opacity
+
+    def remove(self, name: str) -> None:
+        """Forgets a node and everything below it; see `Scene`."""
+        self._node(name)
+        below = name.rstrip("/") + "/"
+        self.nodes = {k: v for k, v in self.nodes.items() if k != name and not k.startswith(below)}
+
+    @contextmanager
+    def batch(self) -> Iterator[None]:
+        """Counts the batches; see `Scene`."""
+        self.batches += 1
+        yield
+
+    def world_pose(self, name: str) -> Pose:
+        """Returns where a node stands in the world: the product of all transforms above it."""
+        self._node(name)
+        T_world_node = IDENTITY
+        parts = name.strip("/").split("/")
+        for depth in range(1, len(parts) + 1):
+            node = self.nodes.get("/" + "/".join(parts[:depth]))
+            if node is not None:
+                T_world_node = T_world_node @ Pose(node.position, node.wxyz)
+        return T_world_node
+
+    def is_shown(self, name: str) -> bool:
+        """Returns whether a node and everything above it is visible."""
+        self._node(name)
+        parts = name.strip("/").split("/")
+        above = ("/" + "/".join(parts[:depth]) for depth in range(1, len(parts) + 1))
+        return all(self.nodes[path].visible for path in above if path in self.nodes)
+
+    def _node(self, name: str) -> DrawnNode:
+        try:
+            return self.nodes[name]
+        except KeyError:
+            raise unknown_node(name) from None
