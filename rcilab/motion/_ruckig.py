@@ -1,13 +1,14 @@
 """The only file that knows ruckig: time-optimal, jerk-limited profiles as exact piecewise polynomials.
 
 `intermediate_positions` is never set: a non-empty list would send the problem to a cloud service. Position bounds are
-not given to ruckig either (its free edition does not enforce them); `plan_joint` looks at the curve instead.
+not given to ruckig either (its free edition does not enforce them), and its `position_extrema` overlooks what happens
+while a joint brakes back inside its bounds (seen with 0.19.4); `plan_joint` looks at the curve instead.
 """
 
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -19,15 +20,6 @@ _FACTORIALS = (1.0, 1.0, 2.0, 6.0)
 _NO_MISS = 1e-13  # [rad] Rounding of the angles themselves.
 
 
-class Extremes(NamedTuple):
-    """Where a joint turns: smallest and largest angle [rad], each with its time [s]."""
-
-    lowest: float
-    lowest_time: float
-    highest: float
-    highest_time: float
-
-
 def plan_profile(
     start: JointVector,
     goal: JointVector,
@@ -36,11 +28,10 @@ def plan_profile(
     jerk: JointVector,
     start_velocity: JointVector,
     start_acceleration: JointVector,
-) -> tuple[PiecewisePolynomial, list[Extremes]]:
+) -> PiecewisePolynomial:
     """Returns the fastest curve from a moving start to rest at the goal with all joints arriving together.
 
-    In phase (a straight line in joint space) where that is possible, which it is from rest. With it come the extreme
-    angles of every joint.
+    In phase (a straight line in joint space) where that is possible, which it is from rest.
 
     Args:
         start: Joint angles at t = 0, shape (n,), [rad].
@@ -65,9 +56,7 @@ def plan_profile(
     problem.max_velocity = velocity.tolist()
     problem.max_acceleration = acceleration.tolist()
     problem.max_jerk = jerk.tolist()
-    trajectory = _solve(problem)
-    extremes = [Extremes(e.min, e.t_min, e.max, e.t_max) for e in trajectory.position_extrema]
-    return _arriving_at(goal, _polynomial(trajectory)), extremes
+    return _arriving_at(goal, _polynomial(_solve(problem)))
 
 
 def plan_standstill(

@@ -15,7 +15,7 @@ from rcilab.limits import JointLimits, Limits
 from rcilab.motion import _ruckig
 from rcilab.motion.margin import LIMIT_MARGIN
 from rcilab.motion.motion import Motion, standing
-from rcilab.motion.piecewise import join_pieces
+from rcilab.motion.piecewise import PiecewisePolynomial, join_pieces
 from rcilab.motion.s_curve import STANDSTILL_DISTANCE, plan_s_curve, synchronize
 
 JointLaw = Literal["jerk_limited", "s_profile"]
@@ -91,14 +91,11 @@ def _plan_jerk_limited(
     if not at_rest:
         _require_possible(limits, dq, ddq)
     part = LIMIT_MARGIN * speed
-    curve, extremes = _ruckig.plan_profile(
+    curve = _ruckig.plan_profile(
         start, goal, part * limits.velocity, part * limits.acceleration, LIMIT_MARGIN * limits.jerk, dq, ddq
     )
-    for joint, (turn, low, high) in enumerate(zip(extremes, limits.lower, limits.upper, strict=True), start=1):
-        if not low < turn.lowest:
-            raise _overshoot(joint, turn.lowest, turn.lowest_time, low)
-        if not turn.highest < high:
-            raise _overshoot(joint, turn.highest, turn.highest_time, high)
+    if not at_rest:  # From rest every joint runs straight from start to goal, and both are inside.
+        _require_room(curve, limits)
     return Motion(polynomial=curve, goal=goal, law="jerk_limited", speed=speed)
 
 
@@ -165,8 +162,17 @@ def _require_possible(limits: JointLimits, dq: JointVector, ddq: JointVector) ->
             )
 
 
-def _overshoot(joint: int, angle: float, time: float, bound: float) -> PlanningError:
-    return PlanningError(
-        f"joint {joint}: would reach {_angle(angle)} at t = {time:.3f} s, past its limit {_angle(float(bound))}, "
-        f"because it starts too fast towards it; start slower, or stop first and plan from rest"
-    )
+def _require_room(curve: PiecewisePolynomial, limits: JointLimits) -> None:
+    """Refuses a curve that turns outside the position limits."""
+    (lowest, lowest_times), (highest, highest_times) = curve.extremes()
+    for angles, times, bounds, outside in (
+        (lowest, lowest_times, limits.lower, lowest <= limits.lower),
+        (highest, highest_times, limits.upper, highest >= limits.upper),
+    ):
+        if outside.any():
+            i = int(outside.argmax())
+            raise PlanningError(
+                f"joint {i + 1}: would reach {_angle(float(angles[i]))} at t = {times[i]:.3f} s, past its limit "
+                f"{_angle(float(bounds[i]))}, because it starts too fast towards it; "
+                f"start slower, or stop first and plan from rest"
+            )

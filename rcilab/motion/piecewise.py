@@ -94,6 +94,33 @@ class PiecewisePolynomial:
         piece = bisect_right(self._starts, t) - 1
         return self._at_piece(piece, t - self._starts[piece])
 
+    def extremes(self) -> tuple[tuple[JointVector, JointVector], tuple[JointVector, JointVector]]:
+        """Returns how far each joint goes: the smallest angles with their times, and the largest with theirs.
+
+        Exact for pieces up to cubics: a joint turns at a break or where its velocity, a parabola, is zero.
+
+        Returns:
+            ((lowest, times), (highest, times)), each of shape (n,), [rad] and [s].
+        """
+        assert self.coefficients.shape[2] <= 4
+        q, dq = self._tables[0], self._tables[1]
+        c, b, a = (dq[p] if p < len(dq) else np.zeros_like(q[0]) for p in range(3))
+        length = np.broadcast_to(np.diff(self.breaks)[:, np.newaxis], c.shape)
+        root = np.sqrt(np.maximum(b * b - 4.0 * a * c, 0.0))
+        sum_ = -0.5 * (b + np.copysign(root, b))  # Numerical Recipes 5.6.4: no difference of close numbers.
+        with np.errstate(divide="ignore", invalid="ignore"):
+            turns = [np.nan_to_num(sum_ / a), np.nan_to_num(c / sum_)]
+        # What is no turn, or lies outside the piece, is replaced by an end of the piece: a point of the curve too.
+        tau = np.stack([np.zeros_like(c), length, *(np.clip(turn, 0.0, length) for turn in turns)])
+        angles = q[-1]
+        for coefficient in reversed(q[:-1]):
+            angles = angles * tau + coefficient
+        angles = np.broadcast_to(angles, tau.shape).reshape(-1, self.n)
+        times = (tau + self.breaks[:-1, np.newaxis]).reshape(-1, self.n)
+        joint = np.arange(self.n)
+        low, high = angles.argmin(axis=0), angles.argmax(axis=0)
+        return (angles[low, joint], times[low, joint]), (angles[high, joint], times[high, joint])
+
     def at_end(self) -> tuple[JointVector, JointVector, JointVector, JointVector]:
         """Returns the limits from the left at the end of the last piece: does it arrive at rest?"""
         return self._at_piece(-1, float(self.breaks[-1]) - self._starts[-1])

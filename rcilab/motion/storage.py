@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import zipfile
+from io import BytesIO
 from os import PathLike, fspath
+from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
@@ -71,14 +72,21 @@ def load_motion(file: str | PathLike[str] | BinaryIO) -> Motion:
 
 
 def _read(file: str | PathLike[str] | BinaryIO, name: str) -> dict[str, np.ndarray]:
+    if isinstance(file, str | PathLike):
+        try:
+            content = Path(file).read_bytes()
+        except FileNotFoundError as error:
+            raise InvalidValueError("motion file", name, "does not exist") from error
+        except OSError as error:
+            raise InvalidValueError("motion file", name, f"cannot be read: {error.strerror}") from error
+    else:
+        content = file.read()
     try:
-        with np.load(file, allow_pickle=False) as archive:
-            if not isinstance(archive, np.lib.npyio.NpzFile):
-                raise InvalidValueError("motion file", name, "is a single array, not a motion (.npz)")
+        archive = np.load(BytesIO(content), allow_pickle=False)
+        if isinstance(archive, np.ndarray):
+            return {"a single array": archive}
+        with archive:
             return {key: archive[key] for key in archive.files}
-    except InvalidValueError:
-        raise
-    except FileNotFoundError as error:
-        raise InvalidValueError("motion file", name, "does not exist") from error
-    except (OSError, ValueError, TypeError, EOFError, KeyError, zipfile.BadZipFile) as error:
+    # Foreign bytes make numpy, zipfile and zlib raise a dozen kinds of errors, NotImplementedError among them.
+    except Exception as error:
         raise InvalidValueError("motion file", name, f"cannot be read as a motion: {error}") from error

@@ -1,0 +1,144 @@
+import pickle
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rcilab.clock import CYCLE_TIME
+from rcilab.errors import InvalidValueError
+from rcilab.model import load_model
+from rcilab.motion import Motion, PiecewisePolynomial, plan_joint
+from rcilab.motion.motion import standing
+
+MODEL = load_model("xMatePro7")
+GOAL = np.array([0.4, 0.3, -0.2, 0.9, 0.1, 0.5, -1.0])
+
+
+def ramp(duration: float) -> Motion:
+    return Motion(polynomial=PiecewisePolynomial([0.0, duration], [[[0.0, 1.0]]]), goal=[duration], law="samples")
+
+
+def test_rows_are_whole_cycles_from_the_start_to_the_goal_at_rest():
+    motion = plan_joint(MODEL, MODEL.home, GOAL)
+    assert np.array_equal(motion.q[0], MODEL.home)
+    assert np.array_equal(motion.q[-1], GOAL)
+    assert not motion.dq[-1].any()
+    assert not motion.ddq[-1].any()
+    assert not motion.jerk[-1].any()
+    assert np.array_equal(motion.times, np.arange(len(motion)) * CYCLE_TIME)
+    assert motion.times[-2] < motion.duration <= motion.times[-1]
+
+
+@given(st.floats(min_value=1e-6, max_value=0.5))
+def test_the_last_row_is_the_first_cycle_that_is_not_before_the_end(duration):
+    motion = ramp(duration)
+    assert len(motion) == len(motion.q) == len(motion.times)
+    assert motion.times[-1] >= duration - 1e-9 * CYCLE_TIME
+    assert motion.times[-1] - duration < CYCLE_TIME
+    assert motion.duration == duration
+
+
+@pytest.mark.parametrize("cycles", [1, 3, 7, 49, 303, 1000, 4999])
+def test_a_duration_of_whole_cycles_gets_no_row_too_many(cycles):
+    assert len(ramp(cycles * CYCLE_TIME)) == cycles + 1
+    assert len(ramp(cycles / 1000)) == cycles + 1
+
+
+def test_at_agrees_with_the_rows_to_the_last_bit():
+    motion = plan_joint(MODEL, MODEL.home, GOAL, speed=0.8)
+    for row, t in enumerate(motion.times):
+        sample = motion.at(float(t))
+        assert np.array_equal(sample.q, motion.q[row])
+        assert np.array_equal(sample.dq, motion.dq[row])
+        assert np.array_equal(sample.ddq, motion.ddq[row])
+        assert np.array_equal(sample.jerk, motion.jerk[row])
+
+
+def test_outside_its_time_a_motion_stands_at_start_and_goal():
+    motion = plan_joint(MODEL, MODEL.home, GOAL)
+    assert np.array_equal(motion.at(-1.0).q, MODEL.home)
+    for t in (motion.duration, motion.duration + 9.0, np.inf):
+        assert np.array_equal(motion.at(t).q, GOAL)
+        assert not motion.at(t).dq.any()
+    with pytest.raises(InvalidValueError, match="not a time"):
+        motion.at(float("nan"))
+
+
+def test_a_motion_of_no_length_is_one_row():
+    motion = plan_joint(MODEL, GOAL, GOAL)
+    assert motion.duration == 0.0
+    assert motion.q.shape == motion.dq.shape == (1, 7)
+    assert np.array_equal(motion.q[0], GOAL)
+    assert np.array_equal(motion.at(0.0).q, GOAL)
+    assert not motion.end().dq.any()
+
+
+def test_rows_are_computed_once_and_cannot_be_changed():
+    motion = plan_joint(MODEL, MODEL.home, GOAL)
+    assert motion.q is motion.q
+    for array in (motion.q, motion.dq, motion.ddq, motion.jerk, motion.times, motion.goal, motion.at(0.1).q):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 1.0
+
+
+def test_samples_of_a_curve_come_back_as_its_rows():
+    q = np.random.default_rng(0).normal(size=(40, 6))
+    motion = Motion.from_samples(q)
+    assert np.array_equal(motion.q, q)
+    assert motion.n == 6
+    assert motion.duration == 39 * CYCLE_TIME
+    assert len(Motion.from_samples(q[:1])) == 1
+
+
+def test_samples_of_a_smooth_curve_give_nearly_its_velocity():
+    planned = plan_joint(MODEL, MODEL.home, GOAL)
+    again = Motion.from_samples(planned.q)
+    # A cubic through rows 1 ms apart is off by less than the jerk's effect over one cycle.
+    assert np.abs(again.dq - planned.dq).max() < MODEL.limits.joint.jerk.max() * CYCLE_TIME**2
+
+
+@pytest.mark.parametrize("rows", [np.zeros((0, 7)), np.full((3, 7), np.nan), np.zeros((2, 2, 2))])
+def test_rows_that_are_no_path_are_refused(rows):
+    with pytest.raises(InvalidValueError, match="finite table"):
+        Motion.from_samples(rows)
+
+
+def test_the_fingerprint_changes_with_anything_that_defines_the_motion():
+    motion = plan_joint(MODEL, MODEL.home, GOAL)
+    nudged = GOAL.copy()
+    nudged[3] = np.nextafter(nudged[3], 2.0)
+    others = [
+        plan_joint(MODEL, MODEL.home, GOAL, speed=0.51),
+        plan_joint(MODEL, MODEL.home, nudged),
+        plan_joint(MODEL, MODEL.home, GOAL, law="s_profile"),
+        Motion(polynomial=motion.polynomial, goal=nudged, law=motion.law, speed=motion.speed),
+        Motion(polynomial=motion.polynomial, goal=motion.goal, law="samples", speed=motion.speed),
+    ]
+    assert plan_joint(MODEL, MODEL.home, GOAL).fingerprint == motion.fingerprint
+    assert len({motion.fingerprint, *(other.fingerprint for other in others)}) == len(others) + 1
+
+
+def test_a_pickled_motion_is_the_same_motion():
+    motion = plan_joint(MODEL, MODEL.home, GOAL)
+    again = pickle.loads(pickle.dumps(motion))
+    assert again.fingerprint == motion.fingerprint
+    assert np.array_equal(again.q, motion.q)
+
+
+def test_speed_law_and_goal_are_checked_when_a_motion_is_built():
+    curve = standing(GOAL).polynomial
+    with pytest.raises(InvalidValueError, match="speed"):
+        Motion(polynomial=curve, goal=GOAL, law="samples", speed=0.0)
+    with pytest.raises(InvalidValueError, match="known: jerk_limited"):
+        Motion(polynomial=curve, goal=GOAL, law="teleport")  # type: ignore[arg-type]
+    with pytest.raises(InvalidValueError, match="goal"):
+        Motion(polynomial=curve, goal=GOAL[:6], law="samples")
+
+
+def test_its_texts_are_short_and_name_duration_and_law():
+    motion = plan_joint(MODEL, MODEL.home, GOAL)
+    assert f"{motion.duration:.3f} s" in repr(motion)
+    assert len(repr(motion)) < 80
+    assert "jerk_limited" in motion._repr_html_()
+    assert len(motion._repr_html_()) < 800

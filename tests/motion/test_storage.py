@@ -1,0 +1,119 @@
+import io
+
+import numpy as np
+import pytest
+
+from rcilab.errors import InvalidValueError, RcilabError, VersionMismatchError
+from rcilab.model import load_model
+from rcilab.motion import Motion, plan_joint
+from rcilab.motion.storage import KIND, VERSION
+
+MODEL = load_model("xMate3")
+MOTION = plan_joint(MODEL, MODEL.home, MODEL.home + 0.3, speed=0.7)
+
+
+def fields(**changes: object) -> dict[str, object]:
+    good = {
+        "kind": KIND,
+        "version": VERSION,
+        "law": "jerk_limited",
+        "speed": 0.7,
+        "breaks": MOTION.polynomial.breaks,
+        "coefficients": MOTION.polynomial.coefficients,
+        "goal": MOTION.goal,
+    }
+    return {name: value for name, value in (good | changes).items() if value is not None}
+
+
+@pytest.mark.parametrize("law", ["jerk_limited", "s_profile"])
+def test_load_after_save_is_the_same_motion_to_the_last_bit(tmp_path, law):
+    motion = plan_joint(MODEL, MODEL.home, MODEL.home + 0.3, law=law)
+    motion.save(tmp_path / "a.motion")  # No ending is added to the name.
+    again = Motion.load(str(tmp_path / "a.motion"))
+    assert again.fingerprint == motion.fingerprint
+    assert np.array_equal(again.q, motion.q)
+    assert again.law == law
+
+
+def test_a_motion_goes_through_a_stream():
+    stream = io.BytesIO()
+    MOTION.save(stream)
+    stream.seek(0)
+    assert Motion.load(stream).fingerprint == MOTION.fingerprint
+
+
+@pytest.mark.parametrize(
+    ("changes", "word"),
+    [
+        ({"kind": "holiday photos"}, "holds no motion"),
+        ({"kind": None}, "holds no motion"),
+        ({"goal": None}, "incomplete"),
+        ({"speed": 3.0}, "speed"),
+        ({"law": "teleport"}, "law"),
+        ({"goal": np.full(6, np.nan)}, "finite"),
+        ({"goal": np.zeros(7)}, "goal"),
+        ({"breaks": np.array([0.0, np.nan])}, "damaged|shapes"),
+        ({"coefficients": np.zeros(3)}, "shapes"),
+        ({"coefficients": np.array([["a"]])}, "damaged"),
+        ({"speed": np.array([1.0, 2.0])}, "damaged"),
+    ],
+)
+def test_a_file_that_holds_no_sound_motion_is_refused_in_words(tmp_path, changes, word):
+    np.savez(tmp_path / "x.npz", **fields(**changes))
+    with pytest.raises(InvalidValueError, match=word):
+        Motion.load(tmp_path / "x.npz")
+
+
+@pytest.mark.parametrize("version", [VERSION + 1, 0, None, [1, 2]])
+def test_another_version_is_named(tmp_path, version):
+    np.savez(tmp_path / "x.npz", **fields(version=version))
+    with pytest.raises(VersionMismatchError, match=f"need {VERSION}"):
+        Motion.load(tmp_path / "x.npz")
+
+
+@pytest.mark.parametrize("content", [b"", b"hello", b"PK\x03\x04 broken", b"\x93NUMPY\x01\x00"])
+def test_bytes_that_are_no_archive_are_refused(tmp_path, content):
+    (tmp_path / "x.npz").write_bytes(content)
+    with pytest.raises(InvalidValueError, match=r"x\.npz.*cannot be read"):
+        Motion.load(tmp_path / "x.npz")
+
+
+def test_a_cut_file_is_refused_wherever_it_is_cut(tmp_path):
+    MOTION.save(tmp_path / "x.npz")
+    whole = (tmp_path / "x.npz").read_bytes()
+    for length in range(0, len(whole), len(whole) // 40):
+        (tmp_path / "x.npz").write_bytes(whole[:length])
+        with pytest.raises(RcilabError):
+            Motion.load(tmp_path / "x.npz")
+
+
+def test_one_flipped_byte_never_gives_another_motion_silently(tmp_path):
+    MOTION.save(tmp_path / "x.npz")
+    whole = bytearray((tmp_path / "x.npz").read_bytes())
+    rng = np.random.default_rng(7)
+    for place in rng.integers(0, len(whole), 150):
+        damaged = bytearray(whole)
+        damaged[place] ^= 0x10
+        (tmp_path / "x.npz").write_bytes(damaged)
+        try:
+            assert Motion.load(tmp_path / "x.npz").fingerprint == MOTION.fingerprint
+        except RcilabError:
+            pass
+
+
+def test_a_single_array_and_pickles_are_refused(tmp_path):
+    np.save(tmp_path / "x.npy", np.zeros(3))
+    with pytest.raises(InvalidValueError, match="single array"):
+        Motion.load(tmp_path / "x.npy")
+    np.savez(tmp_path / "y.npz", kind=np.array([{}], dtype=object))
+    with pytest.raises(InvalidValueError, match="cannot be read"):
+        Motion.load(tmp_path / "y.npz")
+
+
+def test_missing_and_unwritable_files_are_named(tmp_path):
+    with pytest.raises(InvalidValueError, match=r"nothing\.npz.*does not exist"):
+        Motion.load(tmp_path / "nothing.npz")
+    with pytest.raises(InvalidValueError, match="cannot be written"):
+        MOTION.save(tmp_path / "no" / "such" / "folder.npz")
+    with pytest.raises(InvalidValueError, match="cannot be read"):
+        Motion.load(tmp_path)
