@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Sequence
 from typing import Any, Protocol
 
 import numpy as np
 
 from rcilab.arrays import Array, JointVector
 from rcilab.clock import CYCLE_TIME
-from rcilab.command import CartesianPosition, JointPosition, JointTorque
+from rcilab.command import CartesianPosition, Command, JointPosition, JointTorque
 from rcilab.limits import JointLimits, Limits
 from rcilab.motion import plan_stop
 from rcilab.state import RobotState
@@ -29,8 +29,8 @@ class Brake(Protocol):
         """Takes note of a command that was sent in answer to a controller cycle."""
         ...
 
-    def commands(self) -> Iterator[Any]:
-        """Yields the commands that lead to rest within the limits, one a controller cycle; the last one holds."""
+    def plan(self) -> Sequence[Command]:
+        """Returns the commands that lead to rest within the limits, one a cycle after the last; at least one."""
         ...
 
 
@@ -85,10 +85,9 @@ class JointBrake:
         """Takes note of a command."""
         self._stream.remember(command.q, cycle)
 
-    def commands(self) -> Iterator[JointPosition]:
-        """Yields the angles that lead to rest."""
-        for row in self._stream.rows():
-            yield JointPosition(row)
+    def plan(self) -> Sequence[Command]:
+        """Returns the angles that lead to rest."""
+        return [JointPosition(row) for row in self._stream.rows()]
 
 
 class CartesianBrake:
@@ -126,8 +125,8 @@ class CartesianBrake:
         if cycle > self._poses[-1][0]:
             self._poses = [*self._poses[-2:], (cycle, command)]
 
-    def commands(self) -> Iterator[CartesianPosition]:
-        """Yields the poses that lead to rest."""
+    def plan(self) -> Sequence[Command]:
+        """Returns the poses that lead to rest."""
         last = self._poses[-1][1]
         R = last.T_base_tool[:3, :3]
         past: list[tuple[int, Array]] = []
@@ -136,11 +135,13 @@ class CartesianBrake:
             psi = 0.0 if pose.psi is None or last.psi is None else pose.psi - last.psi
             past.append((cycle, np.concatenate((pose.T_base_tool[:3, 3], turn, [psi]))))
         self._stream.begin(*past)
+        way: list[Command] = []
         for row in self._stream.rows():
             T = np.eye(4)
             T[:3, :3] = _rotation(row[3:6]) @ R
             T[:3, 3] = row[:3]
-            yield CartesianPosition(T, None if last.psi is None else last.psi + float(row[6]))
+            way.append(CartesianPosition(T, None if last.psi is None else last.psi + float(row[6])))
+        return way
 
 
 class TorqueBrake:
@@ -162,12 +163,13 @@ class TorqueBrake:
         """Takes note of a command."""
         self._tau = command.tau
 
-    def commands(self) -> Iterator[JointTorque]:
-        """Yields the torques that lead to zero."""
-        tau = self._tau
-        while tau.any():
-            tau = np.sign(tau) * np.maximum(np.abs(tau) - self._step, 0.0)
-            yield JointTorque(tau)
+    def plan(self) -> Sequence[Command]:
+        """Returns the torques that lead to zero."""
+        way = [JointTorque(self._tau)]
+        while way[-1].tau.any():
+            tau = way[-1].tau
+            way.append(JointTorque(np.sign(tau) * np.maximum(np.abs(tau) - self._step, 0.0)))
+        return way
 
 
 def _rotation_vector(R: Array) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections import deque
 from collections.abc import Callable
 from typing import Any, TypeAlias
 
@@ -28,6 +29,7 @@ from rcilab.protocols.rci import StartMotionMode, build_command
 from rcilab.state import ControllerMode, RobotState
 
 SILENCE = 0.1  # [s] without a state while moving means that the connection is lost; a choice.
+CATCH_UP = 20  # Cycles: as many lost commands as a controller bridges at most (manual 4.6: 10 to 20).
 MODE_TIMEOUT = 3.0  # [s] for the controller to show the requested modes; virtual ones take 0.2 to 1.05 s.
 STOP_TIMEOUT = 1.0  # [s] for the answer to StopMove when something has gone wrong already.
 SETTLE_CYCLES = 200  # Cycles that the last command is repeated at most until the controller has played it.
@@ -94,6 +96,7 @@ class ControlLoop:
         self._answered_id = -1
         self._t = math.nan
         self._command: Command | None = None
+        self._pending: deque[RobotState] = deque()
         self._brake: Brake = {
             StartMotionMode.JOINT: lambda: JointBrake(limits.joint),
             StartMotionMode.CARTESIAN: lambda: CartesianBrake(limits),
@@ -163,20 +166,20 @@ class ControlLoop:
             command = self._checked(callback(state, t), state)
             self._answer(state, command)
             if command.finished:
-                self._hold(state, command)
+                self._hold(command)
                 return None
             state = self._next()
 
     def _next(self) -> RobotState:
-        """Returns the newest state that has not been answered yet."""
+        """Returns the next state that has not been answered yet, oldest first.
+
+        After a hiccup of ours several wait. Each gets its answer in turn, because the controller's play-out buffer
+        still has use for those that are only a little late; what is older than `CATCH_UP` cycles is let go.
+        """
         deadline = time.monotonic() + self._silence
         while True:
-            states = self._link.poll(deadline - time.monotonic())
-            for state in states[:-1]:
-                if state.message_id > self._answered_id and not state.faults:
-                    self._log.write(state, self._link.received_ns, self._time(state))
-            if states:
-                state = states[-1]
+            while self._pending:
+                state = self._pending.popleft()
                 if state.faults:
                     raise self._fault(state)
                 # A lock-step controller repeats a state whose answer it has not seen yet: it was answered, wait on.
@@ -184,8 +187,15 @@ class ControlLoop:
                     if state.motion_generator_mode != self._motion_mode.shown_as:
                         raise self._ended_by_controller(state)
                     return state
-            if time.monotonic() >= deadline:
+            states = self._link.poll(deadline - time.monotonic())
+            if not states and time.monotonic() >= deadline:
                 raise self._lost()
+            for state in states[:-CATCH_UP]:
+                if state.message_id > self._answered_id:
+                    self._log.write(state, self._link.received_ns, self._time(state))
+            # A fault anywhere in the burst ends the motion: nothing before it is worth an answer any more.
+            faulty = [state for state in states if state.faults]
+            self._pending.extend(faulty[:1] or states[-CATCH_UP:])
 
     def _answer(self, state: RobotState, command: Command) -> None:
         # The end is announced by StopMove alone: a set `finished` byte has never been seen from the vendor's client.
@@ -198,7 +208,7 @@ class ControlLoop:
         joints = command.q.tolist() if isinstance(command, JointPosition) else None
         self._log.write(state, self._link.received_ns, self._t, sent_ns, joints)
 
-    def _hold(self, state: RobotState, command: Command) -> None:
+    def _hold(self, command: Command) -> None:
         """Repeats the last command until the controller has played it: StopMove may overtake a queued one."""
         for _ in range(SETTLE_CYCLES):
             state = self._next()
@@ -225,14 +235,14 @@ class ControlLoop:
             raise surprise from error
 
     def _come_to_rest(self) -> None:
-        last = self._command
-        state: RobotState | None = None
-        for command in self._brake.commands():
+        way = self._brake.plan()
+        last_id = self._answered_id
+        step = 0
+        while step < len(way):
             state = self._next()
-            self._answer(state, command)
-            last = command
-        if state is not None and last is not None:
-            self._hold(state, last)
+            step = min(state.message_id - last_id, len(way))
+            self._answer(state, way[step - 1])
+        self._hold(way[-1])
 
     def _stop_move(self, error: BaseException | None) -> None:
         if error is None:

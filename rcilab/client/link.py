@@ -43,7 +43,7 @@ class Link:
         self.undecodable = 0
         """Datagrams of the right size that were no state."""
         self.on_states: Callable[[list[RobotState]], None] = _ignore
-        """Gets the states that come in while the answer to a request is awaited."""
+        """Called at least every 0.05 s while the answer to a request is awaited, with the states that came in."""
         self._transport = transport
         self._command_id = 0
 
@@ -84,8 +84,8 @@ class Link:
                     f"{self.name} did not answer {type(request).__name__} within {limit:g} s; "
                     "look whether the controller is busy or hangs, and connect again if it goes on"
                 )
-            if self._transport.wait(min(remaining, _LOOK), frames=True):
-                self.on_states(self._take_states())
+            is_ready = self._transport.wait(min(remaining, _LOOK), frames=True)
+            self.on_states(self._take_states() if is_ready else [])
 
     def close(self) -> None:
         """Ends the connection. May be called twice."""

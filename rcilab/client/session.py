@@ -8,6 +8,7 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import TYPE_CHECKING, Literal, TypeAlias, get_args
 
+from rcilab.arrays import JointPath
 from rcilab.client.address import RobotAddress, parse_address
 from rcilab.client.commands import RciCommands
 from rcilab.client.control_loop import SILENCE, Callback, ControlLoop
@@ -173,7 +174,7 @@ class RobotSession(RciCommands):
             check(motion, self.model, start=state.q_c).require()
         else:
             certificate.verify(motion, self.model, state.q_c)
-        return self._run(follow(motion, progress), "joint_position", motion)
+        return self._run(follow(motion.q, _reporter(motion, progress)), "joint_position", motion)
 
     def control(self, callback: Callback, mode: Mode = "joint_position") -> Run:
         """Runs a callback in every controller cycle until it returns a command with `finished=True`.
@@ -271,15 +272,31 @@ class RobotSession(RciCommands):
             raise UsageError("this session is closed; connect again")
 
 
-def follow(motion: Motion, progress: Progress | None = None) -> Callback:
-    """Returns the callback that streams a motion: row k of it in controller cycle k."""
-    rows = motion.q
+def follow(rows: JointPath, on_cycle: Callable[[int], None] | None = None) -> Callback:
+    """Returns the callback that streams prepared joint angles: row k in controller cycle k.
+
+    Args:
+        rows: Joint angles, shape (N, n), [rad].
+        on_cycle: Told the number of every cycle.
+    """
     last = len(rows) - 1
 
     def callback(state: RobotState, t: float) -> JointPosition:
         cycle = min(round(t / CYCLE_TIME), last)
-        if progress is not None and (cycle % _PROGRESS_CYCLES == 0 or cycle == last):
-            progress(min(t, motion.duration), motion.duration)
+        if on_cycle is not None:
+            on_cycle(cycle)
         return JointPosition(rows[cycle], finished=cycle == last)
 
     return callback
+
+
+def _reporter(motion: Motion, progress: Progress | None) -> Callable[[int], None] | None:
+    if progress is None:
+        return None
+    last = len(motion.q) - 1
+
+    def report(cycle: int) -> None:
+        if cycle % _PROGRESS_CYCLES == 0 or cycle == last:
+            progress(min(cycle * CYCLE_TIME, motion.duration), motion.duration)
+
+    return report
