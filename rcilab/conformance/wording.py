@@ -7,8 +7,6 @@ from math import ceil, degrees, floor, isfinite
 from rcilab.conformance.conditions import Condition
 from rcilab.motion.motion import Motion
 
-_GLITCH = 4  # Samples; one displaced sample shows in at most four third differences.
-
 
 def amount(value: float, bound: float) -> tuple[str, str]:
     """Returns value and bound with as few digits as show that they differ."""
@@ -49,7 +47,8 @@ def advise(condition: Condition, motion: Motion, *, row: int, count: int, ratio:
         return "the motion starts moving: plan it from rest, or check it with the start state it was planned for"
     if row >= len(motion):
         return "the motion stops with a jerk at its end: let it end at rest"
-    if not isfinite(ratio) or (condition.order >= 2 and count <= _GLITCH and motion.law == "samples"):
+    # One displaced sample shows in two first differences, three second and four third ones.
+    if not isfinite(ratio) or (count <= condition.order + 1 and motion.law == "samples"):
         return "the samples around this time jump: smooth them"
     if motion.law in ("jerk_limited", "s_profile"):
         lower = floor(100.0 * motion.speed / ratio) / 100.0

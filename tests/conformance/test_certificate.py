@@ -1,0 +1,74 @@
+import pickle
+
+import numpy as np
+import pytest
+
+from rcilab.conformance import StartState, check, verify_certificate
+from rcilab.dynamics.payload import Payload
+from rcilab.errors import CertificateError
+from rcilab.model import load_model
+from rcilab.motion import Motion, plan_joint
+from rcilab.spatial import Pose
+
+MODEL = load_model("xMatePro7")
+START = MODEL.home
+MOTION = plan_joint(MODEL, START, -START)
+CERTIFICATE = check(MOTION, MODEL).certificate
+assert CERTIFICATE is not None
+
+
+def changed(motion=MOTION, model=MODEL, start=START) -> set[str]:
+    with pytest.raises(CertificateError) as caught:
+        CERTIFICATE.verify(motion, model, start)
+    assert all(name in str(caught.value) for name in caught.value.changed if name != "start state")
+    return set(caught.value.changed)
+
+
+def test_a_fresh_certificate_holds_for_what_was_judged():
+    CERTIFICATE.verify(MOTION, MODEL, START)
+    CERTIFICATE.verify(plan_joint(MODEL, START, -START), load_model("XMATEPRO7"), START.tolist())
+    assert set(CERTIFICATE.parts) == {"motion", "model", "limits", "tool", "load", "safety box", "start state"}
+
+
+def test_it_names_what_changed():
+    assert changed(motion=plan_joint(MODEL, START, -START, speed=0.51)) == {"motion"}
+    assert changed(model=MODEL.with_tool(Pose((0.0, 0.0, 0.1)))) == {"tool"}
+    assert changed(model=MODEL.with_load(Payload(mass=1.0, center_of_mass=(0.0, 0.0, 0.05)))) == {"load"}
+    assert changed(model=load_model("xMatePro3")) == {"model"}
+    assert changed(start=START + 1e-6) == {"start state"}
+    assert changed(model=MODEL.with_tool(Pose((0.0, 0.0, 0.1))), start=START + 1.0) == {"tool", "start state"}
+
+
+def test_a_nano_radian_off_is_the_same_start_and_a_micro_radian_is_not():
+    CERTIFICATE.verify(MOTION, MODEL, START + 0.9e-9)
+    with pytest.raises(CertificateError, match=r"joint 1 is commanded to .*plan it again from where the arm is"):
+        CERTIFICATE.verify(MOTION, MODEL, START + np.array([1e-6, 0, 0, 0, 0, 0, 0]))
+
+
+def test_an_arm_that_moves_is_another_start():
+    assert changed(start=StartState(START, np.full(7, 0.1), np.zeros(7))) == {"start state"}
+    CERTIFICATE.verify(MOTION, MODEL, StartState(START, np.full(7, -0.0), np.zeros(7)))
+
+
+def test_a_motion_for_another_number_of_joints_is_another_motion():
+    six = load_model("xMate7")
+    assert "motion" in changed(plan_joint(six, six.home, -six.home), six, six.home)
+
+
+def test_a_report_that_is_not_ok_has_no_certificate():
+    report = check(Motion.from_samples(MOTION.q[:500]), MODEL)
+    assert not report.ok
+    assert report.certificate is None
+
+
+def test_a_missing_certificate_is_refused_with_the_way_to_one():
+    with pytest.raises(CertificateError, match=r"run rcilab\.check"):
+        verify_certificate(None, MOTION, MODEL, START)
+    verify_certificate(CERTIFICATE, MOTION, MODEL, START)
+
+
+def test_it_travels_between_processes():
+    again = pickle.loads(pickle.dumps(CERTIFICATE))
+    again.verify(pickle.loads(pickle.dumps(MOTION)), MODEL, START)
+    assert again == CERTIFICATE
+    assert again.digest == CERTIFICATE.digest

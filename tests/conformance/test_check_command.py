@@ -1,0 +1,46 @@
+import argparse
+
+import numpy as np
+import pytest
+
+from rcilab.cli import check as command
+from rcilab.errors import InvalidValueError, ModelError
+from rcilab.model import load_model
+from rcilab.motion import Motion, plan_joint
+
+MODEL = load_model("xMate3")
+MOTION = plan_joint(MODEL, MODEL.home, MODEL.home + 0.4)
+
+
+def run(*arguments: object) -> int:
+    parser = argparse.ArgumentParser()
+    command.add_parser(parser.add_subparsers())
+    args = parser.parse_args(["check", *map(str, arguments)])
+    return args.run(args)
+
+
+def test_a_good_motion_prints_its_report_and_gives_0(tmp_path, capsys):
+    MOTION.save(tmp_path / "a.npz")
+    assert run(tmp_path / "a.npz", "--model", "xmate3") == 0
+    assert "conforms; nearest" in capsys.readouterr().out
+
+
+def test_a_bad_motion_prints_what_is_wrong_and_gives_1(tmp_path, capsys):
+    q = MOTION.q.copy()
+    q[300, 2] += 0.1
+    Motion.from_samples(q).save(tmp_path / "a.npz")
+    assert run(tmp_path / "a.npz", "--model", "xMate3") == 1
+    assert "- joint 3: commanded jerk" in capsys.readouterr().out
+
+
+def test_bad_input_is_an_error_of_ours_which_the_command_line_turns_into_2(tmp_path):
+    MOTION.save(tmp_path / "a.npz")
+    with pytest.raises(ModelError, match="known robots"):
+        run(tmp_path / "a.npz", "--model", "xMate9")
+    with pytest.raises(InvalidValueError, match="does not exist"):
+        run(tmp_path / "b.npz", "--model", "xMate3")
+    with pytest.raises(InvalidValueError, match="for 6 joints, xMatePro7 has 7"):
+        run(tmp_path / "a.npz", "--model", "xMatePro7")
+    np.savez(tmp_path / "c.npz", photo=np.zeros(3))
+    with pytest.raises(InvalidValueError, match="holds no motion"):
+        run(tmp_path / "c.npz", "--model", "xMate3")

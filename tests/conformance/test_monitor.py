@@ -1,0 +1,129 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rcilab.conformance import CYCLE_CONDITIONS, JointMonitor, StartState, check
+from rcilab.conformance.check import HOLD_SAMPLES
+from rcilab.errors import InvalidValueError
+from rcilab.faults import Fault
+from rcilab.model import load_model
+from rcilab.motion import Motion, plan_joint
+
+MODELS = [load_model("xMatePro7"), load_model("xMate3")]
+
+
+def faults_by_cycle(motion: Motion, model, start: StartState | None = None) -> list[tuple[Fault, ...]]:
+    """Plays a motion into a monitor as the controller would, hold included; one entry a row of the check."""
+    monitor = JointMonitor(model.limits.joint)
+    rows = [*motion.q.tolist(), *[motion.q[-1].tolist()] * HOLD_SAMPLES]
+    if start is None:
+        monitor.reset(rows[0])
+        return [monitor.step(row) for row in rows]
+    monitor.reset(start.q.tolist(), start.dq.tolist(), start.ddq.tolist())
+    if start.moving:
+        return [monitor.step(row) for row in rows[1:]]
+    return [monitor.step(row) for row in rows]
+
+
+@st.composite
+def spoiled_motions(draw):
+    """A short planned motion with up to four samples, steps or ramps put on top, of any size that matters."""
+    model = draw(st.sampled_from(MODELS))
+    rng = np.random.default_rng(draw(st.integers(0, 2**32)))
+    limits = model.limits.joint
+    start = 0.95 * rng.uniform(limits.lower, limits.upper)
+    goal = start + rng.uniform(0.01, 0.2) * (0.95 * rng.uniform(limits.lower, limits.upper) - start)
+    q = plan_joint(model, start, goal, speed=rng.uniform(0.2, 1.0)).q.copy()
+    for _ in range(draw(st.integers(0, 4))):
+        row, joint = int(rng.integers(0, len(q))), int(rng.integers(0, model.n))
+        size = draw(st.sampled_from([1.0, -1.0])) * 10.0 ** draw(st.floats(-10.0, 0.5))
+        kind = draw(st.sampled_from(["sample", "step", "ramp"]))
+        if kind == "sample":
+            q[row, joint] += size
+        else:
+            q[row:, joint] += size if kind == "step" else size * np.arange(len(q) - row) / 10.0
+    return model, Motion.from_samples(q)
+
+
+@settings(max_examples=150)
+@given(spoiled_motions())
+def test_monitor_and_check_give_the_same_verdict_in_every_cycle(case):
+    model, motion = case
+    played = faults_by_cycle(motion, model)
+    report = check(motion, model)
+    for condition in CYCLE_CONDITIONS:
+        expected = np.zeros(len(played), dtype=bool)
+        for violation in report.violations:
+            if violation.condition is condition:
+                first = round(violation.time / 0.001)
+                expected[first : first + violation.count] = True
+        assert [condition.fault in faults for faults in played] == expected.tolist()
+    assert report.ok == (not any(played))
+
+
+@settings(max_examples=40)
+@given(spoiled_motions(), st.integers(0, 2**32))
+def test_they_agree_also_from_a_moving_start(case, seed):
+    model, motion = case
+    rng = np.random.default_rng(seed)
+    start = StartState(motion.start, rng.uniform(-0.3, 0.3, model.n), rng.uniform(-5.0, 5.0, model.n))
+    report = check(motion, model, start=start)
+    later = [v for v in report.violations if v.time + (v.count - 1) * 0.001 > 0.0]
+    assert any(faults_by_cycle(motion, model, start)) == bool(later)
+
+
+def test_faults_come_in_wire_order_and_once_each():
+    monitor = JointMonitor(MODELS[0].limits.joint)
+    assert monitor.step([9.0] * 7) == (
+        Fault.COMMAND_JOINT_POSITION_LIMITS_VIOLATION,
+        Fault.COMMAND_JOINT_VELOCITY_LIMITS_VIOLATION,
+        Fault.COMMAND_JOINT_ACCELERATION_LIMITS_VIOLATION,
+        Fault.COMMAND_JOINT_ACCELERATION_DISCONTINUITY,
+    )
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), -float("inf")])
+def test_what_is_not_a_number_breaks_conditions(value):
+    monitor = JointMonitor(MODELS[0].limits.joint)
+    assert Fault.COMMAND_JOINT_POSITION_LIMITS_VIOLATION in monitor.step([0.0, value, 0.0, 0.0, 0.0, 0.0, 0.0])
+
+
+def test_a_standing_arm_raises_nothing_and_a_six_axis_arm_ignores_the_seventh():
+    model = MODELS[1]
+    monitor = JointMonitor(model.limits.joint)
+    monitor.reset(model.home.tolist())
+    assert monitor.step([*model.home.tolist(), float("nan")]) == ()
+    assert monitor.q == model.home.tolist()
+    assert monitor.dq == monitor.ddq == monitor.jerk == [0.0] * 6
+
+
+def test_its_signals_are_the_backward_differences():
+    monitor = JointMonitor(MODELS[0].limits.joint)
+    for angle in (1e-6, 3e-6, 7e-6):
+        monitor.step([angle] * 7)
+    # Differences: 4e-6; second: 2e-6; third: 1e-6 (from 0, 1, 3, 7 micro-radians).
+    assert monitor.dq == pytest.approx([4e-3] * 7)
+    assert monitor.ddq == pytest.approx([2.0] * 7)
+    assert monitor.jerk == pytest.approx([1000.0] * 7)
+
+
+def test_what_was_broken_is_named_with_joint_value_and_bound():
+    monitor = JointMonitor(MODELS[0].limits.joint)
+    monitor.step([0.0, 0.0, 0.0, -2e-5, 0.0, 0.0, 0.0])
+    found = {condition.id: (joint, bound) for condition, joint, _, bound in monitor.broken()}
+    assert found == {"joint.acceleration": (4, -10.0), "joint.jerk": (4, -5000.0)}
+
+
+def test_reset_forgets_the_past():
+    monitor = JointMonitor(MODELS[0].limits.joint)
+    monitor.step([9.0] * 7)
+    monitor.reset([0.5] * 7)
+    assert monitor.step([0.5] * 7) == ()
+    monitor.reset([0.5] * 7, dq=[0.1] * 7)
+    assert monitor.step([0.5 + 1e-4] * 7) == ()
+
+
+def test_a_reset_to_the_wrong_number_of_joints_is_refused():
+    with pytest.raises(InvalidValueError, match="needs 7 numbers"):
+        JointMonitor(MODELS[0].limits.joint).reset([0.0] * 6)

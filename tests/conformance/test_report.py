@@ -1,0 +1,97 @@
+import math
+import re
+
+import numpy as np
+import pytest
+
+from rcilab.conformance import check
+from rcilab.conformance.html import COLORS
+from rcilab.conformance.wording import amount
+from rcilab.model import load_model
+from rcilab.motion import Motion, plan_joint
+
+MODEL = load_model("xMatePro7")
+GOOD = plan_joint(MODEL, MODEL.home, -MODEL.home, speed=0.6)
+
+
+def spoiled() -> Motion:
+    q = GOOD.q.copy()
+    q[412, 3] += 0.01
+    return Motion.from_samples(q)
+
+
+def test_a_violation_reads_as_one_sentence_with_everything_in_it():
+    violation = next(v for v in check(spoiled(), MODEL).violations if v.condition.id == "joint.velocity")
+    assert re.fullmatch(
+        r"joint 4: commanded velocity -?[\d.]+ rad/s exceeds 2\.175 rad/s at t = 0\.412 s and for 2 ms "
+        r"\(necessary condition\); the samples around this time jump: smooth them",
+        str(violation),
+    )
+
+
+def test_an_angle_is_told_in_both_units():
+    q = np.repeat(MODEL.home[np.newaxis], 10, axis=0)
+    q[:, 1] = 2.2
+    sentence = str(check(Motion.from_samples(q), MODEL).violations[0])
+    assert sentence.startswith("joint 2: commanded position 2.2 rad (126.05°) passes 2.094 rad (120.00°) at t = 0.000")
+
+
+def test_the_worst_violation_comes_first_and_the_worst_row_agrees():
+    report = check(spoiled(), MODEL)
+    ratios = [violation.ratio for violation in report.violations]
+    assert ratios == sorted(ratios, reverse=True)
+    assert report.worst.condition is report.violations[0].condition
+    assert report.worst.value == report.violations[0].value
+    assert report.worst.joint == 4
+
+
+def test_rows_name_joint_time_value_bound_and_source():
+    motion = plan_joint(MODEL, MODEL.home, -MODEL.home, speed=1.0)
+    row = next(row for row in check(motion, MODEL).rows if row.id == "joint.velocity")
+    assert row.ok
+    assert row.ratio == pytest.approx(abs(row.value) / abs(row.bound))
+    assert row.source == "RCI manual V1.3.1, 4.1 and 4.4"
+    step = motion.q[round(row.time * 1000)] - motion.q[round(row.time * 1000) - 1]
+    assert row.value == pytest.approx(step[row.joint - 1] / 0.001, rel=1e-9)
+
+
+def test_the_text_says_the_verdict_and_lists_every_condition():
+    good, bad = check(GOOD, MODEL), check(spoiled(), MODEL)
+    assert "conforms; nearest: " in str(good)
+    assert "does not conform" in str(bad)
+    assert "kCommandJointAccelerationDiscontinuity" in str(bad)
+    assert all(row.id in str(good) for row in good.rows)
+    assert repr(good).startswith("<Report conforms")
+
+
+def test_a_thousand_violations_do_not_make_a_thousand_lines():
+    rows = MODEL.home + 0.01 * np.random.default_rng(0).normal(size=(300, 7))
+    report = check(Motion.from_samples(rows), MODEL)
+    assert len(report.violations) > 100
+    assert len(str(report).splitlines()) < 30
+    assert len(report._repr_html_()) < 20000
+    assert "more" in str(report)
+
+
+def test_the_table_is_green_amber_or_red():
+    amber = check(GOOD, MODEL, start=MODEL.home + 2e-9)
+    assert amber.ok
+    assert amber.warnings
+    for report, color in ((check(GOOD, MODEL), "ok"), (amber, "advice"), (check(spoiled(), MODEL), "violated")):
+        html = report._repr_html_()
+        assert html.startswith(f'<div><b style="color:{COLORS[color]}"')
+        assert html.count("<tr>") == len(report.rows) + 1
+    assert COLORS["violated"] not in amber._repr_html_()
+
+
+@pytest.mark.parametrize(
+    ("value", "bound", "texts"),
+    [
+        (2.31, 2.175, ("2.31", "2.175")),
+        (2.17500001, 2.175, ("2.17500001", "2.175")),
+        (10.0, 10.0, ("10", "10")),
+        (math.nextafter(1.0, 2.0), 1.0, ("1.0000000000000002", "1.0")),
+    ],
+)
+def test_value_and_bound_never_look_alike_when_they_differ(value, bound, texts):
+    assert amount(value, bound) == texts
