@@ -15,6 +15,9 @@ from rcilab.views.meshcat_server import MeshcatServer, import_meshcat
 from rcilab.views.scene import NO_TURN, ORIGIN, Color, line_points, unknown_node
 
 
+_CAMERA = [1.25, 0.75, 1.15]  # [m] axes of three.js: x, up, -y; the page's camera always looks at the origin
+
+
 @dataclass(slots=True)
 class _Node:
     wxyz: Sequence[float] = NO_TURN
@@ -40,6 +43,7 @@ class MeshcatScene:
         """meshcat's own handle; what it offers beyond `Scene` is there: animations, properties."""
         self.visualizer["/Background"].set_property("top_color", [0.78, 0.82, 0.86])
         self.visualizer["/Background"].set_property("bottom_color", [0.98, 0.985, 0.99])
+        self.visualizer["/Cameras/default/rotated/<object>"].set_property("position", _CAMERA)
 
     @property
     def url(self) -> str:
