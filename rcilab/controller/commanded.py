@@ -1,0 +1,100 @@
+"""The commanded motion of the arm: where it is told to be, how that changes, and the one way to bring it to rest."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from rcilab.clock import CYCLE_TIME
+from rcilab.limits import JointLimits
+from rcilab.motion.differences import derivatives_from_differences
+from rcilab.motion.stop import plan_stop
+
+
+class CommandedMotion:
+    """Commanded joint angles and their backward differences over one cycle. Owned by the controller's cycle.
+
+    Attributes:
+        q: Commanded joint angles, n plain floats, [rad].
+        dq: Their first backward difference, [rad/s].
+        ddq: Their second, [rad/s^2].
+        is_at_rest: Whether nothing has moved for two cycles, so that both differences are exactly zero.
+        version: Rises with every change.
+
+    Args:
+        limits: Bounds of the joints, for coming to rest.
+        q: Where the arm stands, n numbers, [rad].
+    """
+
+    def __init__(self, limits: JointLimits, q: Sequence[float]) -> None:
+        self._limits = limits
+        self._acceleration: list[float] = limits.acceleration.tolist()
+        self._jerk: list[float] = limits.jerk.tolist()
+        self.version = 0
+        self.place(q)
+
+    def place(self, q: Sequence[float]) -> None:
+        """Puts the commanded angles somewhere, at rest: while the brakes or a person's hand decide where the arm is."""
+        self.q = list(q)
+        self.dq = [0.0] * len(self.q)
+        self.ddq = [0.0] * len(self.q)
+        self.is_at_rest = True
+        self._stop: Iterator[list[float]] | None = None
+        self.version += 1
+
+    def move(self, q: Sequence[float]) -> None:
+        """Takes the commanded angles of this cycle."""
+        self._stop = None
+        self._advance(list(q))
+
+    def come_to_rest(self) -> None:
+        """Takes one cycle of the fastest stop inside the limits; planned at the first call, repeated calls play it.
+
+        When standing still at once is itself inside the limits, as at the end of any decent motion, it stands still.
+        """
+        if self._stop is None:
+            self._stop = self._plan()
+        self._advance(next(self._stop, self.q))
+
+    def predict(self, steps: int, target: Sequence[float] | None = None, target_steps: int = 1) -> list[float]:
+        """Returns where the arm will be in a number of cycles when nothing new is commanded, [rad].
+
+        Without a target the acceleration goes on as it is. With one, the jerk is what leads there.
+
+        Args:
+            steps: Cycles from now.
+            target: Commanded angles that are known for a later cycle, [rad].
+            target_steps: How many cycles from now that is.
+        """
+        h = CYCLE_TIME
+        even = [
+            q + steps * h * dq + steps * (steps + 1) / 2.0 * h * h * ddq
+            for q, dq, ddq in zip(self.q, self.dq, self.ddq, strict=True)
+        ]
+        if target is None:
+            return even
+        # Newton's form of the cubic through the last three angles and the target, at cycles -2, -1, 0, target_steps.
+        share = steps * (steps + 1) * (steps + 2) / (target_steps * (target_steps + 1) * (target_steps + 2))
+        there = self.predict(target_steps)
+        return [x + share * (goal - far) for x, goal, far in zip(even, target, there, strict=True)]
+
+    def _advance(self, q: list[float]) -> None:
+        h = CYCLE_TIME
+        dq = [(new - old) / h for new, old in zip(q, self.q, strict=True)]
+        self.ddq = [(new - old) / h for new, old in zip(dq, self.dq, strict=True)]
+        self.q, self.dq = q, dq
+        self.is_at_rest = not any(dq) and not any(self.ddq)
+        self.version += 1
+
+    def _plan(self) -> Iterator[list[float]]:
+        if self._may_stand_still():
+            return iter(())
+        dq, ddq = derivatives_from_differences(self.dq, self.ddq)
+        return iter(plan_stop(self._limits, self.q, dq, ddq).q[1:].tolist())
+
+    def _may_stand_still(self) -> bool:
+        h = CYCLE_TIME
+        bounds = zip(self.dq, self.ddq, self._acceleration, self._jerk, strict=True)
+        return all(
+            abs(dq / h) < acceleration and abs(dq / h + ddq) / h < jerk and abs(dq / h) / h < jerk
+            for dq, ddq, acceleration, jerk in bounds
+        )

@@ -1,0 +1,163 @@
+"""The play-out buffer: commands arrive as the network likes, one is played per controller cycle.
+
+    waiting --first command, then `prefill` cycles--> playing --empty queue--> losing cycles --next command--> playing
+
+* The first command starts a countdown of `prefill` cycles; as many commands are then in stock and absorb the jitter of
+  client and network. A burst (the vendor's client may answer 90 old states at once after StartMove) simply fills the
+  queue; its old message ids do not matter.
+* Where ids advance one by one, they are cycle numbers. An empty queue is a lost cycle, and the command for it, when
+  it comes after all, is dropped: the arm has passed that place already.
+* A repeated id is the next command: the vendor's client answers the last state again when none came in time.
+* A short gap in the ids is either a lost command, or a lost state whose cycle the client never saw; only the command
+  itself can tell, so the caller is asked whether it continues the motion by one step or by the whole gap.
+* A long gap, or ids that start again far behind, mean another numbering: the command is simply the next one.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from typing import NamedTuple
+
+from rcilab.protocols.rci import CommandPacket
+
+CAPACITY = 256  # Commands. Two and a half of the vendor client's worst bursts (about 92).
+WINDOW = 1000  # Cycles that the success rate looks back over, 1 s; a choice.
+LONGEST_GAP = 20  # Ids. The largest loss that the controller bridges at all (manual 4.6: 10 to 20).
+
+
+class Playback(NamedTuple):
+    """What one cycle gets from the buffer."""
+
+    packet: CommandPacket | None
+    """The command to play; with `steps` > 1 the next one known, that many cycles ahead; None when there is none."""
+    steps: int
+    """Cycles from now to when `packet` is due, 1 for now."""
+    is_lost: bool
+    """The motion runs and this cycle has no command."""
+
+
+_WAITING = Playback(None, 1, False)
+_EMPTY = Playback(None, 1, True)
+
+
+class Playout:
+    """The queue between network and cycle. Owned by the controller's loop.
+
+    Attributes:
+        lost: Lost cycles of this motion.
+        lost_in_row: Lost cycles since the last command.
+        late: Commands dropped because their cycle had passed.
+        dropped: Commands dropped, oldest first, because the queue was full.
+
+    Args:
+        prefill: Cycles between the first command's arrival and its play-out.
+        capacity: Longest queue; the oldest command gives way to the newest.
+    """
+
+    def __init__(self, prefill: int, capacity: int = CAPACITY) -> None:
+        self._prefill = prefill
+        self._queue: deque[CommandPacket] = deque()
+        self._capacity = capacity
+        self.begin()
+
+    def begin(self) -> None:
+        """Forgets everything, ready for the first command of a motion."""
+        self._queue.clear()
+        self._countdown = self._prefill
+        self._outcomes: deque[bool] = deque(maxlen=WINDOW)
+        self._played_in_window = 0
+        self._last_id = 0
+        self._extrapolated_through: int | None = None
+        self._surplus = 0
+        self.is_playing = False
+        self.is_finished = False
+        self.lost = self.lost_in_row = self.late = self.dropped = 0
+
+    def clear(self) -> None:
+        """Drops what is queued; what was counted stays."""
+        self._queue.clear()
+
+    def __len__(self) -> int:
+        return len(self._queue)
+
+    @property
+    def success_rate(self) -> float:
+        """Share of the last cycles that had their command, 0 to 1; 1 before the first one."""
+        return self._played_in_window / len(self._outcomes) if self._outcomes else 1.0
+
+    def push(self, packet: CommandPacket) -> None:
+        """Takes a command from the network."""
+        if len(self._queue) >= self._capacity:
+            self._queue.popleft()
+            self.dropped += 1
+        self._queue.append(packet)
+
+    def take(self, is_next: Callable[[CommandPacket, int], bool]) -> Playback:
+        """Returns what this cycle plays.
+
+        Args:
+            is_next: Asked about a command whose id is a few cycles ahead: does it continue the motion by one step
+                (true) or by that many (false)?
+        """
+        if self.is_finished:
+            return _WAITING
+        if not self.is_playing:
+            if not self._queue:
+                return _WAITING
+            if self._countdown > 0:
+                self._countdown -= 1
+                return _WAITING
+            self.is_playing = True
+            self._last_id = self._queue[0].message_id - 1
+        self._drop_late()
+        if not self._queue:
+            return self._lose(_EMPTY)
+        packet = self._queue[0]
+        ahead = packet.message_id - self._last_id
+        if ahead == 0:
+            self._surplus += 1
+        elif 1 < ahead <= LONGEST_GAP:
+            explained = min(self._surplus, ahead - 1)
+            self._surplus -= explained
+            ahead -= explained
+            if ahead > 1 and not is_next(packet, ahead):
+                self._surplus += explained
+                return self._lose(Playback(packet, ahead, True))
+        elif ahead != 1:
+            self._surplus = 0
+        return self._play(packet)
+
+    def _play(self, packet: CommandPacket) -> Playback:
+        self._queue.popleft()
+        self._last_id = packet.message_id
+        self._extrapolated_through = None
+        self.lost_in_row = 0
+        self.is_finished = packet.finished
+        self._count(True)
+        return Playback(packet, 1, False)
+
+    def _lose(self, playback: Playback) -> Playback:
+        self._last_id += 1
+        self._extrapolated_through = self._last_id
+        self.lost += 1
+        self.lost_in_row += 1
+        self._count(False)
+        return playback
+
+    def _drop_late(self) -> None:
+        queue, last = self._queue, self._last_id
+        while queue:
+            behind = last - queue[0].message_id
+            is_late = 0 <= behind <= LONGEST_GAP and (behind > 0 or self._extrapolated_through == last)
+            if not is_late:
+                return
+            queue.popleft()
+            self.late += 1
+
+    def _count(self, played: bool) -> None:
+        outcomes = self._outcomes
+        if len(outcomes) == WINDOW:
+            self._played_in_window -= outcomes[0]
+        outcomes.append(played)
+        self._played_in_window += played

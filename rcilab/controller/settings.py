@@ -1,0 +1,187 @@
+"""Everything a client can set over TCP, judged again on our side.
+
+The vendor's client checks some values before it sends them and lets NaN through nearly every check, so here every
+value is judged: finite, inside its range, a proper pose where one is due. What fails is answered with "invalid
+argument" and changes nothing. On 6-axis arms the seventh elements are not even looked at.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import chain, repeat
+from math import isfinite
+
+import numpy as np
+
+from rcilab.dynamics.payload import NO_LOAD, Payload
+from rcilab.errors import InvalidValueError
+from rcilab.protocols import rci
+from rcilab.robots import RobotDescription
+from rcilab.spatial import IDENTITY, Pose
+
+SIGNAL_COUNT = 6  # Digital inputs, and outputs: DI0_0 to DI0_3, DI1_0, DI1_1 (manual 3.1.13 and 3.1.14).
+MAX_FREQUENCY = 1000.0  # [Hz] Largest cut-off frequency; there it means "no filter" (wire notes, section 4).
+_LIMIT_TOLERANCE = 1e-9  # [rad] For soft limits that were converted from degrees elsewhere.
+
+Floats = tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SafetyBox:
+    """The box that the tool shall stay in."""
+
+    size: Floats
+    """Edges along x, y and z of its frame, [m]."""
+    T_base_box: Pose
+    """Its centre and directions."""
+    active: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Settings:
+    """All values that commands set; vectors have n plain floats."""
+
+    joint_lower: Floats
+    """Soft limits, [rad]."""
+    joint_upper: Floats
+    """[rad]."""
+    collision_thresholds: Floats
+    """[N m]."""
+    joint_stiffness: Floats
+    """[N m/rad]."""
+    cartesian_stiffness: Floats
+    """Three translations [N/m], three rotations [N m/rad]."""
+    desired_wrench: Floats = (0.0,) * 6
+    """What Cartesian impedance presses with, [N, N m]."""
+    T_flange_tool: Pose = IDENTITY
+    load: Payload = NO_LOAD
+    joint_filter: float = 100.0
+    """Cut-off frequency, [Hz]; 100 as the vendor's client starts with."""
+    cartesian_filter: float = 100.0
+    """[Hz]."""
+    torque_filter: float = 100.0
+    """[Hz]."""
+    torque_report_filter: float = 100.0
+    """Cut-off frequency of the filtered torques in the state, [Hz]."""
+    safety_box: SafetyBox | None = None
+    T_flange_force: Pose = IDENTITY
+    """Force-control frame."""
+    force_frame: rci.ForceFrame = rci.ForceFrame.WORLD
+    virtual_guide: bool = False
+    outputs: tuple[bool, ...] = (False,) * SIGNAL_COUNT
+    inputs: tuple[bool, ...] = (False,) * SIGNAL_COUNT
+    """Levels of the digital inputs; nothing is wired to a virtual controller, they are set from outside."""
+
+
+def default_settings(arm: RobotDescription) -> Settings:
+    """Returns the settings a controller wakes up with: the widest limits, the highest thresholds and stiffness."""
+    joint, cartesian = arm.limits.joint, arm.limits.cartesian
+    return Settings(
+        joint_lower=tuple(joint.lower.tolist()),
+        joint_upper=tuple(joint.upper.tolist()),
+        collision_thresholds=tuple(joint.collision_threshold.tolist()),
+        joint_stiffness=tuple(joint.stiffness.tolist()),
+        cartesian_stiffness=(cartesian.translation_stiffness,) * 3 + (cartesian.rotation_stiffness,) * 3,
+    )
+
+
+def apply_request(settings: Settings, request: rci.Request, arm: RobotDescription) -> Settings | None:
+    """Returns the settings with a request's values in them, or None when the request has an invalid argument.
+
+    Args:
+        settings: The settings so far.
+        request: A setter; anything else leaves them as they are.
+        arm: Whose ranges count.
+    """
+    changes = _judge(request, arm, settings)
+    return None if changes is None else replace(settings, **changes)
+
+
+def _judge(request: rci.Request, arm: RobotDescription, settings: Settings) -> dict[str, object] | None:
+    """Returns the fields to change, or None when a value is invalid."""
+    n, joint, cartesian = arm.n, arm.limits.joint, arm.limits.cartesian
+    match request:
+        case rci.SetCollisionBehavior(thresholds=values):
+            return _ranged("collision_thresholds", values[:n], joint.collision_threshold.tolist())
+        case rci.SetJointImpedance(stiffness=values):
+            return _ranged("joint_stiffness", values[:n], joint.stiffness.tolist())
+        case rci.SetCartesianImpedance(stiffness=values):
+            largest = [cartesian.translation_stiffness] * 3 + [cartesian.rotation_stiffness] * 3
+            return _ranged("cartesian_stiffness", values, largest)
+        case rci.SetCartImpDesiredTau(wrench=values):
+            largest = [cartesian.force] * 3 + [cartesian.moment] * 3
+            return _ranged("desired_wrench", values, largest, symmetric=True)
+        case rci.SetTorqueFilterCutOffFrequency(frequency=value):
+            return {"torque_report_filter": value} if 0.0 <= value <= MAX_FREQUENCY else None
+        case rci.SetFilters():
+            frequencies = (request.joint_frequency, request.cartesian_frequency, request.torque_frequency)
+            if not all(0.0 <= value <= MAX_FREQUENCY for value in frequencies):
+                return None
+            return dict(zip(("joint_filter", "cartesian_filter", "torque_filter"), frequencies, strict=True))
+        case rci.SetJointLimit():
+            return _soft_limits(request, arm)
+        case rci.SetCartesianLimit():
+            pose = _pose(request.frame)
+            if pose is None or not all(isfinite(edge) and edge > 0.0 for edge in request.size):
+                return None
+            return {"safety_box": SafetyBox(size=request.size, T_base_box=pose, active=request.active)}
+        case rci.SetCoor(T_flange_tool=numbers):
+            pose = _pose(numbers)
+            return None if pose is None else {"T_flange_tool": pose}
+        case rci.SetFcCoor(frame=numbers, type=kind):
+            pose = _pose(numbers)
+            if pose is None or kind not in tuple(rci.ForceFrame):
+                return None
+            return {"T_flange_force": pose, "force_frame": rci.ForceFrame(kind)}
+        case rci.SetLoad():
+            return _load(request, arm)
+        case rci.EnableVirtualGuide(enable=enable):
+            return {"virtual_guide": enable}
+        case rci.SetDO(signal=signal, level=level):
+            if signal >= SIGNAL_COUNT:
+                return None
+            outputs = settings.outputs
+            return {"outputs": (*outputs[:signal], level, *outputs[signal + 1 :])}
+        case _:
+            return {}
+
+
+def _ranged(
+    name: str, values: Floats, largest: Sequence[float], *, symmetric: bool = False
+) -> dict[str, object] | None:
+    lowest = (-bound for bound in largest) if symmetric else repeat(0.0)
+    if all(low <= value <= high for value, low, high in zip(values, lowest, largest, strict=False)):
+        return {name: values}
+    return None  # Also for NaN, which is in no range.
+
+
+def _soft_limits(request: rci.SetJointLimit, arm: RobotDescription) -> dict[str, object] | None:
+    upper, lower = request.upper[: arm.n], request.lower[: arm.n]
+    bounds = zip(lower, upper, arm.limits.joint.lower.tolist(), arm.limits.joint.upper.tolist(), strict=True)
+    for low, high, lowest, highest in bounds:
+        if not lowest - _LIMIT_TOLERANCE <= low < high <= highest + _LIMIT_TOLERANCE:
+            return None
+    return {"joint_lower": lower, "joint_upper": upper}
+
+
+def _load(request: rci.SetLoad, arm: RobotDescription) -> dict[str, object] | None:
+    numbers = chain(request.center_of_mass, request.inertia)
+    if not 0.0 <= request.mass <= arm.rated_payload or not all(map(isfinite, numbers)):
+        return None
+    try:
+        load = Payload(
+            mass=request.mass,
+            center_of_mass=np.array(request.center_of_mass),
+            inertia=np.array(request.inertia).reshape(3, 3),
+        )
+    except InvalidValueError:
+        return None
+    return {"load": load}
+
+
+def _pose(numbers: Floats) -> Pose | None:
+    try:
+        return Pose.from_row_major(numbers)
+    except InvalidValueError:
+        return None

@@ -1,0 +1,259 @@
+"""What the robot is doing, and what each event does to that: one table, pure.
+
+    OFF <-> IDLE -> STARTING -> MOVING -> STOPPING -> IDLE
+    IDLE <-> GUIDING            any of them -> REFLEX -> RECOVERING -> IDLE
+                                any of them <-> USER_STOPPED
+
+In every phase but MOVING and GUIDING the arm is brought to rest if it still moves, and then stays; that is the one
+stop path, and no event needs to ask for it. A reply that waits for `AT_REST` is sent when the arm stands still.
+`print(state_machine.as_text())` shows the table.
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import Final, NamedTuple, TypeAlias
+
+from rcilab.protocols.rci import (
+    CommandCode,
+    GuideStatus,
+    RecoveryStatus,
+    SettingStatus,
+    StartStatus,
+    Status,
+    StopStatus,
+)
+from rcilab.state import RobotMode
+
+
+class Phase(Enum):
+    """What the robot is doing; the value is the robot mode that its state reports meanwhile."""
+
+    OFF = (RobotMode.OTHER, 0)
+    """Motors off, brakes closed."""
+    IDLE = (RobotMode.IDLE, 0)
+    """Motors on, the arm stands still under power."""
+    STARTING = (RobotMode.IDLE, 1)
+    """StartMove was answered; the requested modes are not shown yet."""
+    MOVING = (RobotMode.MOVE, 0)
+    """Commands are followed."""
+    STOPPING = (RobotMode.MOVE, 1)
+    """The motion was ended; what is queued is played, then the arm comes to rest."""
+    GUIDING = (RobotMode.GUIDING, 0)
+    """A person moves the arm by hand."""
+    REFLEX = (RobotMode.REFLEX, 0)
+    """A fault stopped the arm; brakes closed once it rests."""
+    USER_STOPPED = (RobotMode.USER_STOPPED, 0)
+    """An emergency stop is pressed."""
+    RECOVERING = (RobotMode.AUTOMATIC_ERROR_RECOVERY, 0)
+    """Faults are being cleared."""
+
+    @property
+    def robot_mode(self) -> RobotMode:
+        """What the state reports in this phase."""
+        return self.value[0]
+
+
+class Event(Enum):
+    """What happens inside the controller, beside the client's commands."""
+
+    MODES_SHOWN = "the delay after StartMove is over"
+    FAULT = "a condition was broken"
+    AT_REST = "the arm has come to rest"
+    RECOVERED = "the recovery has taken its time and the arm rests"
+    CLIENT_LOST = "the client's connection ended"
+    SAFETY_STOP = "an emergency stop was pressed"
+    SAFETY_RELEASE = "the emergency stop was released"
+
+
+class Action(Enum):
+    """What a transition asks of the cycle."""
+
+    APPLY = "take the request's values into the settings"
+    BEGIN = "arm the play-out and count down to the modes"
+    SHOW_MODES = "show the requested modes and listen for commands"
+    HIDE_MODES = "show idle modes"
+    DRAIN = "play what is queued, then come to rest"
+    DISCARD = "forget commands that were not played and come to rest"
+    SET_FAULTS = "set the error bits"
+    CLEAR_FAULTS = "clear the error bits"
+    REBOOT = "forget all settings and end the connection"
+
+
+class When(Enum):
+    """When a reply is sent."""
+
+    NOW = "now"
+    AT_REST = "once the arm rests"
+    """And, in RECOVERING and STOPPING, once that phase is over."""
+
+
+Trigger: TypeAlias = CommandCode | Event
+
+
+class Transition(NamedTuple):
+    """What one event does in one phase."""
+
+    phase: Phase
+    """The phase afterwards."""
+    actions: tuple[Action, ...] = ()
+    """In this order."""
+    status: Status | None = None
+    """The answer to a command; None for events, and for commands that are answered with content."""
+    when: When = When.NOW
+
+
+C, P, E, A = CommandCode, Phase, Event, Action
+
+QUERIES: Final = (C.GET_MOTOR_STATE, C.LOAD_ROBOT_MODEL, C.GET_DI_STATE, C.GET_SAFETY_STOP_STATE)
+"""Answered with content, always."""
+
+ANYTIME: Final = (C.CONNECT, C.SET_DO, C.SET_CART_IMP_DESIRED_TAU)
+"""Setters that may be used while the arm moves: they change nothing under its feet."""
+
+GROUNDED: Final = (
+    C.SET_CARTESIAN_LIMIT,
+    C.SET_JOINT_LIMIT,
+    C.SET_COLLISION_BEHAVIOR,
+    C.SET_JOINT_IMPEDANCE,
+    C.SET_CARTESIAN_IMPEDANCE,
+    C.SET_COOR,
+    C.SET_LOAD,
+    C.SET_FILTERS,
+    C.SET_TORQUE_FILTER_CUT_OFF_FREQUENCY,
+    C.SET_FC_COOR,
+    C.ENABLE_VIRTUAL_GUIDE,
+)
+"""Setters for an arm at rest and in good health. The manual gives no list: a choice, on the safe side."""
+
+_BUSY = (P.STARTING, P.MOVING, P.STOPPING, P.GUIDING, P.RECOVERING)
+_START_REFUSED = dict.fromkeys((P.OFF, *_BUSY), StartStatus.NOT_POSSIBLE) | {
+    P.REFLEX: StartStatus.REFLEX,
+    P.USER_STOPPED: StartStatus.USER_STOP,
+}
+
+
+def _refusal(command: CommandCode) -> Status:
+    return GuideStatus.FAILED if command == C.ENABLE_VIRTUAL_GUIDE else SettingStatus.NOT_POSSIBLE
+
+
+def _success(command: CommandCode) -> Status:
+    return GuideStatus.SUCCESS if command == C.ENABLE_VIRTUAL_GUIDE else SettingStatus.SUCCESS
+
+
+def _setters(phase: Phase) -> dict[Trigger, Transition]:
+    rows: dict[Trigger, Transition] = {command: Transition(phase) for command in QUERIES}
+    for command in ANYTIME:
+        rows[command] = Transition(phase, (A.APPLY,), _success(command))
+    for command in GROUNDED:
+        if phase in (P.OFF, P.IDLE):
+            rows[command] = Transition(phase, (A.APPLY,), _success(command))
+        else:
+            rows[command] = Transition(phase, (), _refusal(command))
+    return rows
+
+
+def _motion(phase: Phase) -> dict[Trigger, Transition]:
+    stopped = StopStatus.SUCCESS  # Always: the vendor's client dies of any other answer.
+    rows: dict[Trigger, Transition] = {}
+    if phase is P.IDLE:
+        rows[C.START_MOVE] = Transition(P.STARTING, (A.BEGIN,), StartStatus.SUCCESS)
+    else:
+        rows[C.START_MOVE] = Transition(phase, (), _START_REFUSED[phase])
+    if phase is P.STARTING:
+        rows[C.STOP_MOVE] = Transition(P.IDLE, (A.HIDE_MODES, A.DISCARD), stopped, When.AT_REST)
+    elif phase is P.MOVING:
+        rows[C.STOP_MOVE] = Transition(P.STOPPING, (A.HIDE_MODES, A.DRAIN), stopped, When.AT_REST)
+    else:
+        rows[C.STOP_MOVE] = Transition(phase, (), stopped, When.AT_REST)
+    if phase is P.IDLE:
+        rows[C.START_DRAG] = Transition(P.GUIDING, (), SettingStatus.SUCCESS)
+    else:
+        rows[C.START_DRAG] = Transition(phase, (), SettingStatus.NOT_POSSIBLE)
+    after = P.IDLE if phase is P.GUIDING else phase
+    rows[C.STOP_DRAG] = Transition(after, (), SettingStatus.SUCCESS, When.AT_REST)
+    return rows
+
+
+def _power(phase: Phase) -> dict[Trigger, Transition]:
+    """SetMotorPower is two commands in one: this is the row for "on"; `POWER_OFF` holds the one for "off"."""
+    rows: dict[Trigger, Transition] = {}
+    if phase is P.OFF:
+        rows[C.SET_MOTOR_POWER] = Transition(P.IDLE, (), SettingStatus.SUCCESS)
+    elif phase is P.USER_STOPPED:
+        rows[C.SET_MOTOR_POWER] = Transition(phase, (), SettingStatus.NOT_POSSIBLE)
+    else:
+        rows[C.SET_MOTOR_POWER] = Transition(phase, (), SettingStatus.SUCCESS)
+    if phase in (P.OFF, P.IDLE, P.REFLEX, P.USER_STOPPED):
+        after = phase if phase is P.USER_STOPPED else P.OFF
+        actions = (A.HIDE_MODES, A.DISCARD, A.CLEAR_FAULTS, A.REBOOT)
+        rows[C.REBOOT_ROBOT] = Transition(after, actions, SettingStatus.SUCCESS, When.AT_REST)
+    else:
+        rows[C.REBOOT_ROBOT] = Transition(phase, (), SettingStatus.NOT_POSSIBLE)
+    return rows
+
+
+def _recovery(phase: Phase) -> dict[Trigger, Transition]:
+    command = C.AUTOMATIC_ERROR_RECOVERY
+    if phase is P.REFLEX:
+        return {command: Transition(P.RECOVERING, (), RecoveryStatus.SUCCESS, When.AT_REST)}
+    if phase in (P.OFF, P.IDLE):  # Nothing to recover from.
+        return {command: Transition(phase, (), RecoveryStatus.SUCCESS)}
+    status = RecoveryStatus.USER_STOP if phase is P.USER_STOPPED else RecoveryStatus.NOT_POSSIBLE
+    return {command: Transition(phase, (), status)}
+
+
+def _events(phase: Phase) -> dict[Trigger, Transition]:
+    rows: dict[Trigger, Transition] = {event: Transition(phase) for event in Event}
+    if phase is P.STARTING:
+        rows[E.MODES_SHOWN] = Transition(P.MOVING, (A.SHOW_MODES,))
+    if phase is P.STOPPING:
+        rows[E.AT_REST] = Transition(P.IDLE, (A.DISCARD,))
+    if phase is P.RECOVERING:
+        rows[E.RECOVERED] = Transition(P.IDLE, (A.CLEAR_FAULTS,))
+    if phase is P.USER_STOPPED:
+        rows[E.SAFETY_RELEASE] = Transition(P.OFF, (A.CLEAR_FAULTS,))
+        rows[E.FAULT] = Transition(phase, (A.SET_FAULTS,))
+    elif phase is not P.OFF:
+        rows[E.FAULT] = Transition(P.REFLEX, (A.SET_FAULTS, A.HIDE_MODES, A.DISCARD))
+    tells = (A.SET_FAULTS,) if phase in (P.MOVING, P.STOPPING) else ()  # A bit is the only thing that stops a client.
+    rows[E.SAFETY_STOP] = Transition(P.USER_STOPPED, (*tells, A.HIDE_MODES, A.DISCARD))
+    if phase in (P.STARTING, P.GUIDING):
+        rows[E.CLIENT_LOST] = Transition(P.IDLE, (A.HIDE_MODES, A.DISCARD))
+    elif phase in (P.MOVING, P.STOPPING):
+        rows[E.CLIENT_LOST] = Transition(P.STOPPING, (A.HIDE_MODES, A.DISCARD))
+    return rows
+
+
+def _row(phase: Phase) -> dict[Trigger, Transition]:
+    return _setters(phase) | _motion(phase) | _power(phase) | _recovery(phase) | _events(phase)
+
+
+TABLE: Final = {(phase, trigger): cell for phase in Phase for trigger, cell in _row(phase).items()}
+"""Every phase with every command and every event."""
+
+POWER_OFF: Final = {
+    phase: Transition(
+        phase if phase is P.USER_STOPPED else P.OFF,
+        () if phase in (P.OFF, P.USER_STOPPED) else (A.HIDE_MODES, A.DISCARD, A.CLEAR_FAULTS),
+        SettingStatus.SUCCESS,
+        When.AT_REST,
+    )
+    for phase in Phase
+}
+"""SetMotorPower(0): obeyed in every phase; a moving arm is brought to rest first, then the brakes close."""
+
+
+def transition(phase: Phase, trigger: Trigger) -> Transition:
+    """Returns what a command or an event does in a phase."""
+    return TABLE[phase, trigger]
+
+
+def as_text() -> str:
+    """Returns the table as text, one line a pair."""
+    lines: list[str] = []
+    for (phase, trigger), cell in TABLE.items():
+        actions = ", ".join(action.name for action in cell.actions)
+        status = "" if cell.status is None else f"{cell.status.name} {cell.when.value}"
+        lines.append(f"{phase.name:13}{trigger.name:37}-> {cell.phase.name:13}{status:32}{actions}".rstrip())
+    return "\n".join(lines)

@@ -1,0 +1,165 @@
+from __future__ import annotations
+
+import pytest
+
+from rcilab.controller.playout import CAPACITY, Playback, Playout
+from rcilab.protocols.rci import CommandPacket
+
+
+def command(message_id: int, *, finished: bool = False) -> CommandPacket:
+    return CommandPacket(message_id, finished=finished)
+
+
+def by_whole_gap(packet: CommandPacket, steps: int) -> bool:
+    return False
+
+
+def by_one_step(packet: CommandPacket, steps: int) -> bool:
+    return True
+
+
+def take_ids(playout: Playout, cycles: int) -> list[int | str]:
+    """The id played in each cycle, "wait" or "lost"."""
+    found: list[int | str] = []
+    for _ in range(cycles):
+        playback = playout.take(by_whole_gap)
+        if playback.is_lost:
+            found.append("lost")
+        elif playback.packet is None:
+            found.append("wait")
+        else:
+            found.append(playback.packet.message_id)
+    return found
+
+
+def test_one_command_is_played_a_cycle_in_order() -> None:
+    playout = Playout(prefill=0)
+    for k in (7, 8, 9):
+        playout.push(command(k))
+    assert take_ids(playout, 3) == [7, 8, 9]
+    assert playout.success_rate == 1.0
+
+
+def test_nothing_is_lost_before_the_first_command() -> None:
+    playout = Playout(prefill=0)
+    assert take_ids(playout, 5) == ["wait"] * 5
+    assert (playout.lost, playout.success_rate) == (0, 1.0)
+
+
+def test_the_prefill_delays_the_first_command_and_then_absorbs_a_pause() -> None:
+    playout = Playout(prefill=3)
+    played = []
+    for k in range(10):
+        if k not in (5, 6, 7):  # The client sleeps for three cycles and then answers all it missed.
+            for late in range(5, 8) if k == 8 else ():
+                playout.push(command(late))
+            playout.push(command(k))
+        played += take_ids(playout, 1)
+    assert played == ["wait"] * 3 + [0, 1, 2, 3, 4, 5, 6]
+    assert playout.lost == 0
+
+
+def test_a_prefill_does_not_wait_for_commands_that_never_come() -> None:
+    playout = Playout(prefill=4)
+    playout.push(command(1))
+    assert take_ids(playout, 6) == ["wait"] * 4 + [1, "lost"]
+
+
+def test_a_burst_with_old_ids_is_played_one_a_cycle_and_its_jump_to_live_ids_is_no_loss() -> None:
+    playout = Playout(prefill=4)
+    for k in range(100, 191):
+        playout.push(command(k))
+    played = []
+    for k in range(95):
+        playout.push(command(1099 + k))
+        played += take_ids(playout, 1)
+    assert played == ["wait"] * 4 + list(range(100, 191))
+    assert take_ids(playout, 2) == [1099, 1100]
+    assert playout.lost == 0
+
+
+def test_commands_for_cycles_that_were_lost_are_dropped_when_they_come_late() -> None:
+    playout = Playout(prefill=0)
+    playout.push(command(10))
+    assert take_ids(playout, 4) == [10, "lost", "lost", "lost"]
+    for k in range(11, 16):
+        playout.push(command(k))
+    assert take_ids(playout, 2) == [14, 15]
+    assert (playout.late, playout.lost, playout.lost_in_row) == (3, 3, 0)
+    assert playout.success_rate == 3 / 6
+
+
+def test_a_repeated_id_is_the_next_command() -> None:
+    playout = Playout(prefill=0)
+    for k in (5, 5, 5, 6):
+        playout.push(command(k))
+    assert take_ids(playout, 4) == [5, 5, 5, 6]
+    assert playout.late == 0
+
+
+def test_a_repeated_id_explains_the_gap_that_follows() -> None:
+    playout = Playout(prefill=0)
+    for k in (5, 5, 7):  # The state 6 never reached the client, which answered 5 again instead.
+        playout.push(command(k))
+    assert take_ids(playout, 3) == [5, 5, 7]
+
+
+def test_a_lost_command_leaves_a_gap_that_can_be_bridged_to_the_next_one() -> None:
+    playout = Playout(prefill=0)
+    for k in (5, 8):
+        playout.push(command(k))
+    playout.take(by_whole_gap)
+    assert playout.take(by_whole_gap) == Playback(command(8), 3, True)
+    assert playout.take(by_whole_gap) == Playback(command(8), 2, True)
+    assert playout.take(by_whole_gap) == Playback(command(8), 1, False)
+    assert playout.lost == 2
+
+
+def test_a_gap_of_ids_without_a_gap_of_the_motion_is_no_loss() -> None:
+    playout = Playout(prefill=0)
+    for k in (5, 8, 9):
+        playout.push(command(k))
+    ids = [packet.message_id for _ in range(3) if (packet := playout.take(by_one_step).packet) is not None]
+    assert ids == [5, 8, 9]
+    assert playout.lost == 0
+
+
+def test_a_reordered_command_is_dropped() -> None:
+    playout = Playout(prefill=0)
+    for k in (5, 6, 8, 7, 9):
+        playout.push(command(k))
+    assert take_ids(playout, 5) == [5, 6, "lost", 8, 9]
+    assert playout.late == 1
+
+
+def test_ids_that_begin_again_are_another_numbering() -> None:
+    playout = Playout(prefill=0)
+    for k in (5000, 5001, 3, 4):
+        playout.push(command(k))
+    assert take_ids(playout, 4) == [5000, 5001, 3, 4]
+
+
+def test_the_newest_commands_win_when_the_queue_is_full() -> None:
+    playout = Playout(prefill=0)
+    for k in range(CAPACITY + 10):
+        playout.push(command(k))
+    assert (len(playout), playout.dropped) == (CAPACITY, 10)
+    assert take_ids(playout, 1) == [10]
+
+
+def test_nothing_is_lost_after_the_last_command() -> None:
+    playout = Playout(prefill=0)
+    playout.push(command(1, finished=True))
+    assert take_ids(playout, 4) == [1, "wait", "wait", "wait"]
+
+
+@pytest.mark.parametrize("lost", [1, 100, 400])
+def test_the_success_rate_forgets_what_is_older_than_its_window(lost: int) -> None:
+    playout = Playout(prefill=0)
+    playout.push(command(0))
+    take_ids(playout, 1 + lost)
+    assert playout.success_rate == 1 / (1 + lost)
+    for k in range(1001):
+        playout.push(command(10_000 + k))
+        take_ids(playout, 1)
+    assert playout.success_rate == 1.0
