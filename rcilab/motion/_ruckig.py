@@ -3,14 +3,17 @@
 `intermediate_positions` is never set: a non-empty list would send the problem to a cloud service. Position bounds are
 not given to ruckig either (its free edition does not enforce them), and its `position_extrema` overlooks what happens
 while a joint brakes back inside its bounds (seen with 0.19.4); `plan_joint` looks at the curve instead.
+
+Imported with this module and not at the first call (3 ms), because the first call may be a stop inside a cycle.
 """
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
+import ruckig
+from ruckig import Result
 
 from rcilab.arrays import JointVector
 from rcilab.errors import PlanningError
@@ -45,8 +48,6 @@ def plan_profile(
     Raises:
         PlanningError: ruckig found no curve; the message says why.
     """
-    import ruckig
-
     problem = ruckig.InputParameter(len(start))
     problem.synchronization = ruckig.Synchronization.Phase
     problem.current_position = start.tolist()
@@ -74,8 +75,6 @@ def plan_standstill(
     Raises:
         PlanningError: ruckig found no curve; the message says why.
     """
-    import ruckig
-
     problem = ruckig.InputParameter(len(q))
     problem.control_interface = ruckig.ControlInterface.Velocity
     problem.synchronization = ruckig.Synchronization.No
@@ -87,30 +86,24 @@ def plan_standstill(
     return _polynomial(_solve(problem))
 
 
-@lru_cache(maxsize=16)
-def _reasons() -> dict[Any, str]:
-    from ruckig import Result
-
-    return {
-        Result.Error: "the planner failed without a reason",
-        Result.ErrorInvalidInput: "the request is not valid",
-        Result.ErrorPositionalLimits: "a joint would pass its position limits",
-        Result.ErrorExecutionTimeCalculation: "no profile reaches this goal from this start state",
-        Result.ErrorSynchronizationCalculation: "the joints cannot be brought into step",
-    }
+_REASONS: dict[Any, str] = {
+    Result.Error: "the planner failed without a reason",
+    Result.ErrorInvalidInput: "the request is not valid",
+    Result.ErrorPositionalLimits: "a joint would pass its position limits",
+    Result.ErrorExecutionTimeCalculation: "no profile reaches this goal from this start state",
+    Result.ErrorSynchronizationCalculation: "the joints cannot be brought into step",
+}
 
 
 def _solve(problem: Any) -> Any:
-    import ruckig
-
     trajectory = ruckig.Trajectory(problem.degrees_of_freedom)
     try:
         result = ruckig.Ruckig(problem.degrees_of_freedom).calculate(problem, trajectory)
     except ruckig.RuckigError as error:
         reason = str(error).replace("[ruckig]", "").strip()
         raise PlanningError(f"no motion: {reason}; choose another start, goal or speed") from error
-    if result not in (ruckig.Result.Working, ruckig.Result.Finished):
-        reason = _reasons().get(result, f"the planner answered {result!r}")
+    if result not in (Result.Working, Result.Finished):
+        reason = _REASONS.get(result, f"the planner answered {result!r}")
         raise PlanningError(f"no motion: {reason}; choose another start, goal or speed")
     return trajectory
 

@@ -174,5 +174,5 @@ def _require_room(curve: PiecewisePolynomial, limits: JointLimits) -> None:
             raise PlanningError(
                 f"joint {i + 1}: would reach {_angle(float(angles[i]))} at t = {times[i]:.3f} s, past its limit "
                 f"{_angle(float(bounds[i]))}, because it starts too fast towards it; "
-                f"start slower, or stop first and plan from rest"
+                f"plan with a higher speed (it brakes harder), or stop first and plan from rest"
             )

@@ -170,5 +170,5 @@ def test_every_result_of_ruckig_has_a_reason_in_words():
     from ruckig import Result
 
     failures = {result for result in Result if int(result) < 0}
-    assert failures == set(_ruckig._reasons())
-    assert all("Error" not in reason for reason in _ruckig._reasons().values())
+    assert failures == set(_ruckig._REASONS)
+    assert all("Error" not in reason for reason in _ruckig._REASONS.values())
