@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -133,10 +133,12 @@ class CycleLog:
 
     Args:
         recorder: Where rows go.
+        on_row: Called after every row; must be quick.
     """
 
-    def __init__(self, recorder: Recorder) -> None:
+    def __init__(self, recorder: Recorder, on_row: Callable[[CycleLog], None] | None = None) -> None:
         self.recorder = recorder
+        self._on_row = on_row
         self.lateness = 0.0
         """Of the newest row, [s]."""
         self.lost_total = 0
@@ -193,6 +195,8 @@ class CycleLog:
             lost,
             (state.robot_mode, state.controller_mode, state.motion_generator_mode),
         )
+        if self._on_row is not None:
+            self._on_row(self)
 
 
 def _bits(faults: tuple[Fault, ...]) -> int:

@@ -37,6 +37,7 @@ Progress: TypeAlias = Callable[[float, float], None]
 """`(t, duration)`, both [s]; called about 20 times a second from inside the loop, so it must be quick."""
 
 RECOVERY_TIMEOUT = 3.0  # [s] for the error bits to go after the controller has agreed to clear them; a choice.
+_FRESH = 0.1  # [s] Longest wait for one state while faults are expected to go.
 _PROGRESS_CYCLES = 50
 _SPARE_CYCLES = 2000  # Room in the recorder for what comes before and after the motion itself.
 
@@ -55,6 +56,19 @@ def connect(address: str, model: RobotModel | None = None, timeout: float = 3.0)
         ModelError: No model was given, and the controller's arm is not among the known ones.
         InvalidValueError: The address is none.
     """
+    return open_session(address, model, timeout)
+
+
+def open_session(
+    address: str,
+    model: RobotModel | None,
+    timeout: float,
+    *,
+    realtime: bool = True,
+    silence: float = SILENCE,
+    on_close: Callable[[], None] = lambda: None,
+) -> RobotSession:
+    """Returns a session as `connect` does, with what only a simulation sets; see `RobotSession`."""
     place = parse_address(address)
     transport = SocketTransport(place, STATE_SIZE, timeout)
     try:
@@ -65,7 +79,7 @@ def connect(address: str, model: RobotModel | None = None, timeout: float = 3.0)
             model = load_model(identify_robot(RciCommands(link).load_robot_model().dh))
             link.n = model.n
         await_first_state(link, place, transport.local_address, timeout)
-        return RobotSession(link, model)
+        return RobotSession(link, model, realtime=realtime, silence=silence, on_close=on_close)
     except BaseException:
         transport.close()
         raise
@@ -210,16 +224,7 @@ class RobotSession(RciCommands):
             DeadlineError: It agreed, and the faults stayed.
         """
         self._require_open()
-        self.automatic_error_recovery()
-        deadline = time.monotonic() + RECOVERY_TIMEOUT
-        while (faults := self.receive_state().faults) and time.monotonic() < deadline:
-            pass
-        if faults:
-            names = ", ".join(fault.name for fault in faults)
-            raise DeadlineError(
-                f"{self._link.name}: {names} did not clear within {RECOVERY_TIMEOUT:g} s; remove the cause first "
-                f"({faults[0].remedy})"
-            )
+        recover(self, self._link)
 
     def close(self) -> None:
         """Ends the connection. May be called twice. A motion must be over: it ends with the call that runs it."""
@@ -270,6 +275,25 @@ class RobotSession(RciCommands):
     def _require_open(self) -> None:
         if self._closed:
             raise UsageError("this session is closed; connect again")
+
+
+def recover(commands: RciCommands, link: Link) -> None:
+    """Clears the controller's faults and returns once no state shows them any more; see `RobotSession.recover`."""
+    commands.automatic_error_recovery()
+    deadline = time.monotonic() + RECOVERY_TIMEOUT
+    faults = link.latest.faults if link.latest is not None else ()
+    while time.monotonic() < deadline:
+        states = link.poll(_FRESH)
+        link.on_states(states)
+        if states:
+            faults = states[-1].faults
+            if not faults:
+                return
+    names = ", ".join(fault.name for fault in faults)
+    raise DeadlineError(
+        f"{link.name}: {names or 'the faults'} did not clear within {RECOVERY_TIMEOUT:g} s; remove the cause first"
+        + (f": {faults[0].remedy}" if faults else "")
+    )
 
 
 def follow(rows: JointPath, on_cycle: Callable[[int], None] | None = None) -> Callback:

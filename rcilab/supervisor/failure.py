@@ -1,0 +1,32 @@
+"""An error on its way from the control process to whoever asked: its kind, its sentence, its facts."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rcilab import errors
+from rcilab.errors import ControlError, RcilabError
+from rcilab.faults import Fault
+
+
+def pack_failure(error: Exception) -> dict[str, Any]:
+    """Returns an error as a letter."""
+    failure: dict[str, Any] = {"kind": type(error).__name__, "message": str(error)}
+    if not isinstance(error, RcilabError):
+        failure["message"] = f"the control process failed with {type(error).__name__}: {error}; this is a defect"
+    if isinstance(error, ControlError):
+        failure["faults"] = [int(fault) for fault in error.faults if isinstance(fault, Fault)]
+    return failure
+
+
+def unpack_failure(failure: dict[str, Any]) -> RcilabError:
+    """Returns the error in a letter, of the same class where it is one of ours."""
+    kind = getattr(errors, str(failure.get("kind")), RcilabError)
+    if not (isinstance(kind, type) and issubclass(kind, RcilabError)):
+        kind = RcilabError
+    error: RcilabError = kind.__new__(kind)  # Its constructor would build a sentence from facts; here is the sentence.
+    error.args = (str(failure.get("message")),)
+    if isinstance(error, ControlError):
+        error.faults = tuple(Fault(number) for number in failure.get("faults", ()))
+        error.record = None
+    return error

@@ -1,0 +1,172 @@
+"""Starting a virtual controller of our own in a process of its own."""
+
+from __future__ import annotations
+
+import os
+import re
+import select
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from typing import IO
+
+from rcilab.errors import ConnectionLostError
+
+START_TIMEOUT = 20.0  # [s] A cold Python with its numerical libraries takes about 1 s; a busy machine several.
+_END_TIMEOUT = 3.0  # [s] Between asking a process to end and ending it.
+_LISTENING = re.compile(r"^listening (rci://\S+)( |$)")
+_TAIL = 2000  # Characters of what a process said last that go into an error.
+
+
+class Child:
+    """A process of ours with what it says kept for error messages.
+
+    Args:
+        arguments: What to run, after the interpreter.
+        name: What to call it in errors.
+        descriptors: Open files it inherits.
+    """
+
+    def __init__(self, arguments: Sequence[str], name: str, descriptors: Sequence[int] = ()) -> None:
+        self.name = name
+        self._stderr: IO[str] = tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace")
+        try:
+            # A session of its own: Ctrl-C in the terminal is for the parent, which brings the arm to rest first.
+            self._process = subprocess.Popen(
+                [sys.executable, *arguments],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=self._stderr,
+                pass_fds=tuple(descriptors),
+                start_new_session=True,
+            )
+        except OSError as error:
+            self._stderr.close()
+            raise ConnectionLostError(f"{name} could not be started: {error}") from error
+
+    @property
+    def pid(self) -> int:
+        """Process id."""
+        return self._process.pid
+
+    @property
+    def is_alive(self) -> bool:
+        """Whether it still runs."""
+        return self._process.poll() is None
+
+    @property
+    def how_it_ended(self) -> str:
+        """In words, such as "signal 9 (SIGKILL)"."""
+        code = self._process.poll()
+        if code is None:
+            return "it is running"
+        if code < 0:
+            return f"signal {-code} ({signal.Signals(-code).name})"
+        return f"exit code {code}"
+
+    @property
+    def last_words(self) -> str:
+        """The end of what it wrote to stderr."""
+        self._stderr.seek(0)
+        return self._stderr.read()[-_TAIL:].strip()
+
+    def end(self, timeout: float = _END_TIMEOUT) -> None:
+        """Asks it to end (SIGTERM), and ends it (SIGKILL) when it has not after `timeout`, [s]. May be called twice."""
+        if self.is_alive:
+            self._process.terminate()
+            try:
+                self._process.wait(timeout)
+            except subprocess.TimeoutExpired:
+                self.kill()
+        if self._process.stdout is not None:
+            self._process.stdout.close()
+        self._stderr.close()
+
+    def kill(self) -> None:
+        """Ends it at once and waits until it is gone."""
+        self._process.kill()
+        self._process.wait()
+
+    def wait(self, timeout: float) -> bool:
+        """Returns whether it has ended within `timeout`, [s]."""
+        try:
+            self._process.wait(timeout)
+        except subprocess.TimeoutExpired:
+            return False
+        return True
+
+    def read_output(self) -> str:
+        """Returns what has come on stdout since the last call; does not wait."""
+        stream = self._process.stdout
+        assert stream is not None
+        if not select.select([stream], [], [], 0.0)[0]:
+            return ""
+        return os.read(stream.fileno(), 4096).decode(errors="replace")
+
+
+class VirtualController(Child):
+    """A private `rcilab controller` on loopback and free ports; it ends with this process, whatever happens to it.
+
+    Args:
+        model_name: Name of the arm.
+        plant: "ideal" or "mujoco".
+        lockstep: Whether a simulated millisecond waits for its command.
+    """
+
+    def __init__(self, model_name: str, plant: str = "ideal", lockstep: bool = False) -> None:
+        arguments = ["-m", "rcilab.cli", "controller", "--model", model_name, "--plant", plant, "--port", "0"]
+        super().__init__(
+            [*arguments, *(["--lockstep"] if lockstep else []), "--exit-with-parent"], "the virtual controller"
+        )
+        self._said = ""
+        self._started = time.monotonic()
+        self._address: str | None = None
+
+    @property
+    def address(self) -> str | None:
+        """Where it listens, or None as long as it does not.
+
+        Raises:
+            ConnectionLostError: It has ended, or has not been ready for too long; the message carries what it said.
+        """
+        if self._address is None:
+            is_alive = self.is_alive
+            self._said += self.read_output()
+            for line in self._said.splitlines(keepends=True):
+                found = _LISTENING.match(line)
+                if found and line.endswith("\n"):
+                    self._address = found[1]
+                    return self._address
+            if not is_alive:
+                words = self.last_words or "it said nothing"
+                raise ConnectionLostError(f"{self.name} did not start ({self.how_it_ended}): {words}")
+            if time.monotonic() - self._started > START_TIMEOUT:
+                raise ConnectionLostError(
+                    f"{self.name} was not ready after {START_TIMEOUT:g} s: {self.last_words or 'it said nothing'}; "
+                    "try again when the machine is less busy"
+                )
+        return self._address
+
+
+def start_controller(model_name: str, plant: str = "ideal", lockstep: bool = False) -> VirtualController:
+    """Returns a private virtual controller that is ready for a client.
+
+    Args:
+        model_name: Name of the arm.
+        plant: "ideal" or "mujoco".
+        lockstep: Whether a simulated millisecond waits for its command.
+
+    Raises:
+        ConnectionLostError: It did not start; the message carries what it said.
+    """
+    controller = VirtualController(model_name, plant, lockstep)
+    try:
+        while controller.address is None:
+            time.sleep(0.01)
+    except BaseException:
+        controller.end()
+        raise
+    return controller

@@ -1,0 +1,69 @@
+"""What the control process shows of itself, kept cheap enough for every cycle."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from typing import Any
+
+from rcilab.client.recorder import CycleLog, Recorder
+from rcilab.clock import CYCLE_TIME
+from rcilab.supervisor.lateness import LatenessHistogram
+from rcilab.supervisor.layout import RING_CYCLES, ControlBlock, Word
+from rcilab.supervisor.snapshot import Snapshot, write_snapshot
+
+_SNAPSHOT_CYCLES = 20  # Rows between two snapshots: 50 a second.
+_RATE_TIME = 1.0  # [s] over which states are counted.
+
+
+class Publisher:
+    """Owns the control process's side of the shared block. One thread.
+
+    Args:
+        block: The shared block.
+    """
+
+    def __init__(self, block: ControlBlock) -> None:
+        self._block = block
+        self._words = block.words
+        self.recorder = Recorder(block.n, RING_CYCLES, block.cycles)
+        self.recorder.count = self._words[Word.CYCLES]  # A successor goes on where its predecessor died.
+        self.snapshot = Snapshot()
+        self._histogram = LatenessHistogram(block.histogram)
+        self._rate_since = time.monotonic_ns()
+        self._rate_from = self.recorder.count
+        self._motion_cycle = 0
+        self.update()
+
+    def restart(self) -> None:
+        """Forgets the timing: another connection begins."""
+        self._histogram.clear()
+        self._words[Word.LOST] = 0
+
+    def beat(self) -> None:
+        """Gives a sign of life, and counts states a second."""
+        now = time.monotonic_ns()
+        self._words[Word.WORKER_BEAT] = now
+        elapsed = (now - self._rate_since) * 1e-9
+        if elapsed >= _RATE_TIME:
+            self.update(rate_hz=(self.recorder.count - self._rate_from) / elapsed)
+            self._rate_since, self._rate_from = now, self.recorder.count
+
+    def update(self, **changes: Any) -> None:
+        """Writes the snapshot with some fields changed."""
+        self.snapshot = replace(self.snapshot, **changes)
+        write_snapshot(self._block.snapshot, self._words, self.snapshot)
+
+    def on_row(self, log: CycleLog) -> None:
+        """Announces a row that was written to the ring."""
+        count = self.recorder.count
+        self._words[Word.CYCLES] = count
+        self._words[Word.LOST] = log.lost_total
+        self._histogram.add(log.lateness)
+        self.beat()
+        if count % _SNAPSHOT_CYCLES == 0 and self.snapshot.phase in ("moving", "stopping"):
+            self.update(motion_time=self._motion_cycle * CYCLE_TIME)
+
+    def on_cycle(self, cycle: int) -> None:
+        """Takes note of how far the motion is."""
+        self._motion_cycle = cycle

@@ -1,0 +1,62 @@
+"""What the control process is told at its start, through JSON and back."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rcilab.limits import ArmAngleLimits, CartesianLimits, JointLimits, Limits
+from rcilab.spatial import IDENTITY, Pose
+
+if TYPE_CHECKING:
+    from rcilab.model import RobotModel
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WorkerSettings:
+    """The arm as far as the control process needs it: no kinematics, no dynamics."""
+
+    n: int
+    limits: Limits
+    tool: Pose | None
+    """Pose in the flange frame, to be sent to the controller; None to send none."""
+    load: tuple[float, list[float], list[list[float]]] | None
+    """Mass [kg], centre [m] and inertia [kg m^2], to be sent to the controller; None to send none."""
+
+
+def build_settings(model: RobotModel, *, is_virtual: bool) -> dict[str, Any]:
+    """Returns what to write into the block.
+
+    Args:
+        model: The arm.
+        is_virtual: Whether the controller is ours: then it is told of tool and load. A real one has its own settings.
+    """
+    limits = model.limits
+    has_tool = is_virtual and not model.T_flange_tool.is_close(IDENTITY, 0.0)
+    has_load = is_virtual and model.load.mass > 0.0
+    load = model.load
+    return {
+        "n": model.n,
+        "joint": {name: getattr(limits.joint, name).tolist() for name in JointLimits.__slots__},
+        "cartesian": asdict(limits.cartesian),
+        "arm_angle": asdict(limits.arm_angle) if limits.arm_angle else None,
+        "tool": model.T_flange_tool.as_row_major() if has_tool else None,
+        "load": [load.mass, load.center_of_mass.tolist(), load.inertia.tolist()] if has_load else None,
+    }
+
+
+def parse_settings(settings: dict[str, Any]) -> WorkerSettings:
+    """Returns what `build_settings` wrote."""
+    arm_angle, tool, load = settings["arm_angle"], settings["tool"], settings["load"]
+    return WorkerSettings(
+        n=settings["n"],
+        limits=Limits(
+            joint=JointLimits(**{name: np.array(values) for name, values in settings["joint"].items()}),
+            cartesian=CartesianLimits(**settings["cartesian"]),
+            arm_angle=ArmAngleLimits(**arm_angle) if arm_angle else None,
+        ),
+        tool=None if tool is None else Pose.from_row_major(tool),
+        load=None if load is None else (load[0], load[1], load[2]),
+    )

@@ -1,0 +1,53 @@
+"""`simulate`: the same session as `connect`, with a private virtual controller at the other end."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rcilab.client.control_loop import SILENCE
+from rcilab.client.session import RobotSession, open_session
+from rcilab.spatial import IDENTITY
+from rcilab.supervisor.launch import start_controller
+
+if TYPE_CHECKING:
+    from rcilab.model import RobotModel
+
+ANSWER_TIMEOUT = 10.0  # [s] The other end is on this machine: if it is slow, the machine is busy.
+SILENCE_IN_LOCKSTEP = 5.0  # [s] A busy machine may pause a controller that has no deadlines to keep for long.
+
+
+def simulate(model: RobotModel, *, plant: str = "ideal", lockstep: bool = True) -> RobotSession:
+    """Returns a session with a simulated arm; closing the session ends the simulation.
+
+    Args:
+        model: The arm, with its tool and load; the virtual controller is told of both.
+        plant: "ideal" (the arm is where it is told to be) or "mujoco".
+        lockstep: True: each simulated millisecond waits for its command, so that a run comes out the same to the last
+            bit on any machine. False: the controller runs free at 1 kHz, as a real one does.
+
+    Raises:
+        ConnectionLostError: The virtual controller did not start; the message carries what it said.
+    """
+    controller = start_controller(model.name, plant, lockstep)
+    try:
+        assert controller.address is not None  # start_controller waits for it.
+        session = open_session(
+            controller.address,
+            model,
+            ANSWER_TIMEOUT,
+            realtime=not lockstep,
+            silence=SILENCE_IN_LOCKSTEP if lockstep else SILENCE,
+            on_close=controller.end,
+        )
+    except BaseException:
+        controller.end()
+        raise
+    try:
+        if not model.T_flange_tool.is_close(IDENTITY, 0.0):
+            session.set_coor(model.T_flange_tool)
+        if model.load.mass > 0.0:
+            session.set_load(model.load.mass, model.load.center_of_mass, model.load.inertia)
+    except BaseException:
+        session.close()
+        raise
+    return session

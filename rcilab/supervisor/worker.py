@@ -1,0 +1,272 @@
+"""The main of the control process: one thread, one connection, one loop.
+
+It reads states, writes every cycle into the shared ring, takes requests from the mailbox and streams motions. It
+imports nothing that draws. Started by the supervisor as `python -m rcilab.supervisor.worker --block FD`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import gc
+import os
+import sys
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from rcilab.client.address import parse_address
+from rcilab.client.commands import RciCommands
+from rcilab.client.control_loop import ControlLoop
+from rcilab.client.link import Link
+from rcilab.client.punctual import PRIORITY
+from rcilab.client.recorder import CycleLog
+from rcilab.client.session import await_first_state, follow, recover
+from rcilab.client.start_check import describe_start_mismatch
+from rcilab.client.transport import SocketTransport
+from rcilab.errors import ConnectionLostError, ControlError, RcilabError, UsageError
+from rcilab.motion import plan_stop
+from rcilab.protocols.rci import STATE_SIZE
+from rcilab.realtime import enter_realtime
+from rcilab.state import ControllerMode, RobotState
+from rcilab.supervisor.failure import pack_failure
+from rcilab.supervisor.layout import ControlBlock, Word
+from rcilab.supervisor.mailbox import Mailbox
+from rcilab.supervisor.publisher import Publisher
+from rcilab.supervisor.settings import parse_settings
+from rcilab.supervisor.status import MESSAGES, Phase
+
+OPERATOR_TIMEOUT = 2.0  # [s] Nobody at the controls for that long ends a motion (workbench: operator lease).
+SILENCE = 0.3  # [s] without a state while idle before the connection counts as lost; a choice below half a second.
+_LOOK = 0.02  # [s] Longest wait in the idle loop.
+
+
+class Worker:
+    """The control process's state. Everything here belongs to its one thread.
+
+    Args:
+        block: The shared block.
+    """
+
+    def __init__(self, block: ControlBlock) -> None:
+        self._block = block
+        self._words = block.words
+        self._settings = parse_settings(block.settings)
+        self._inbox = Mailbox(block.requests, block.words, Word.REQUESTS_POSTED, Word.REQUESTS_TAKEN)
+        self._outbox = Mailbox(block.replies, block.words, Word.REPLIES_POSTED, Word.REPLIES_TAKEN)
+        self._publisher = Publisher(block)
+        self._log = CycleLog(self._publisher.recorder, self._publisher.on_row)
+        self._stops_seen = self._words[Word.STOPS_ASKED]
+        self._parent = os.getppid()
+        self._link: Link | None = None
+        self._address = ""
+        self._is_ending = False
+
+    def run(self) -> int:
+        """Lives until asked to end or until the supervisor is gone; returns the exit code."""
+        plan_stop(
+            self._settings.limits.joint,
+            np.zeros(self._settings.n),
+            np.full(self._settings.n, 0.1),
+            np.zeros(self._settings.n),
+        )  # The first one loads the planner; the next one must be quick.
+        granted = enter_realtime(PRIORITY)
+        self._publisher.update(is_fifo=granted.policy == "SCHED_FIFO", memory_locked=granted.memory_locked)
+        if granted.warning:
+            print(granted.warning, file=sys.stderr, flush=True)
+        try:
+            while not self._is_ending and os.getppid() == self._parent:
+                self._publisher.beat()
+                self._listen()
+                self._serve()
+        finally:
+            self._disconnect()
+        return 0
+
+    def _listen(self) -> None:
+        """Takes in what the robot says while nothing moves."""
+        if self._link is None:
+            time.sleep(_LOOK)
+            return
+        states = self._link.poll(_LOOK)
+        self._record(states)
+        if states:
+            self._show_state(states[-1])
+        elif time.monotonic_ns() - self._link.received_ns > SILENCE * 1e9:
+            self._say("lost", "lost.silent", address=self._address)
+
+    def _record(self, states: list[RobotState]) -> None:
+        self._publisher.beat()
+        for state in states:
+            assert self._link is not None
+            self._log.write(state, self._link.received_ns)
+
+    def _show_state(self, state: RobotState) -> None:
+        """Keeps the phase in step with what the robot reports while nothing moves."""
+        phase = self._publisher.snapshot.phase
+        if state.faults:
+            if phase != "fault":
+                self._say("fault", "fault", faults=", ".join(fault.name for fault in state.faults))
+        elif phase in ("fault", "lost"):
+            self._say_ready()
+
+    def _serve(self) -> None:
+        while (request := self._inbox.take()) is not None:
+            handler: Callable[[dict[str, Any]], None] = getattr(self, f"_do_{request['kind']}")
+            try:
+                handler(request)
+            except RcilabError as error:
+                self._fail(request, error)
+            except Exception as error:
+                self._fail(request, error)
+                raise
+            else:
+                self._outbox.post({"id": request["id"]})
+        self._stops_seen = self._words[Word.STOPS_ASKED]
+
+    def _fail(self, request: dict[str, Any], error: Exception) -> None:
+        if isinstance(error, ConnectionLostError):
+            self._disconnect()
+            self._say("lost", "lost.unreachable", error=str(error))
+        elif isinstance(error, ControlError) and error.faults:
+            self._say("fault", "fault", faults=", ".join(fault.name for fault in error.faults))  # type: ignore[attr-defined]
+        elif self._link is not None:
+            self._say("idle", "idle.failed", error=str(error))
+        self._outbox.post({"id": request["id"], "failure": pack_failure(error)})
+
+    def _do_connect(self, request: dict[str, Any]) -> None:
+        self._disconnect()
+        self._address = request["address"]
+        self._say("connecting", "connecting", address=self._address)
+        place = parse_address(self._address)
+        transport = SocketTransport(place, STATE_SIZE, request["timeout"])
+        try:
+            link = Link(transport, self._settings.n, str(place), request["timeout"])
+            await_first_state(link, place, transport.local_address, request["timeout"])
+        except BaseException:
+            transport.close()
+            raise
+        self._link = link
+        link.on_states = self._record
+        self._log.restart()
+        self._publisher.restart()
+        self._commands = RciCommands(link, self._settings.limits)
+        if self._settings.tool is not None:
+            self._commands.set_coor(self._settings.tool)
+        if self._settings.load is not None:
+            self._commands.set_load(*self._settings.load)
+        self._learn_power()
+        self._say_ready()
+
+    def _do_power(self, request: dict[str, Any]) -> None:
+        self._require_link()
+        self._commands.set_motor_power(request["on"])
+        self._learn_power()
+        self._say_ready()
+
+    def _do_recover(self, request: dict[str, Any]) -> None:
+        recover(self._commands, self._require_link())
+        self._learn_power()
+        self._say_ready()
+
+    def _do_end(self, request: dict[str, Any]) -> None:
+        self._is_ending = True
+
+    def _do_execute(self, request: dict[str, Any]) -> None:
+        link = self._require_link()
+        rows = self._block.motion[: request["rows"]].copy()
+        self._record(link.poll(_LOOK))
+        if link.latest is not None:
+            mismatch = describe_start_mismatch(rows[0], link.latest.q_c)
+            if mismatch is not None:
+                raise UsageError(mismatch)
+        self._publisher.update(motion_time=0.0, motion_duration=request["duration"])
+        self._say("moving", "moving")
+        loop = ControlLoop(
+            link, self._commands, self._settings.limits, ControllerMode.JOINT_POSITION, self._log, watch=self._watch
+        )
+        try:
+            reason = loop.run(follow(rows, self._publisher.on_cycle))
+        finally:
+            gc.collect()
+        if reason is None:
+            self._say("idle", "idle.arrived")
+        elif reason == "idle.operator":
+            self._say("idle", reason, seconds=OPERATOR_TIMEOUT)
+        else:
+            self._say("idle", "idle.stopped")
+        if reason is not None:
+            raise UsageError(self._publisher.snapshot.message)
+
+    def _watch(self, t: float) -> str | None:
+        """Looked at in every cycle of a motion: does anybody or anything want it to end?"""
+        reason = None
+        if self._words[Word.STOPS_ASKED] != self._stops_seen:
+            reason = "idle.stopped"
+        elif self._is_operator_gone():
+            reason = "idle.operator"
+        elif os.getppid() != self._parent:
+            reason, self._is_ending = "idle.stopped", True
+        elif self._inbox.waiting:
+            reason = self._answer_while_moving()
+        if reason is not None:
+            self._say("stopping", "stopping.operator" if reason == "idle.operator" else "stopping")
+        return reason
+
+    def _answer_while_moving(self) -> str | None:
+        request = self._inbox.take()
+        if request is None:
+            return None
+        if request["kind"] == "end":
+            self._is_ending = True
+            return "idle.stopped"
+        error = UsageError("the arm is moving; stop it first, or wait until it has arrived")
+        self._outbox.post({"id": request["id"], "failure": pack_failure(error)})
+        return None
+
+    def _is_operator_gone(self) -> bool:
+        beat = self._words[Word.OPERATOR_BEAT]
+        if beat == 0:
+            return False
+        # A supervisor that hangs cannot tell whether anybody is there: that counts as nobody.
+        oldest = min(beat, self._words[Word.SUPERVISOR_BEAT])
+        return time.monotonic_ns() - oldest > OPERATOR_TIMEOUT * 1e9
+
+    def _learn_power(self) -> None:
+        self._publisher.update(powered=self._commands.get_motor_state())
+
+    def _say_ready(self) -> None:
+        if self._link is not None and self._link.latest is not None and self._link.latest.faults:
+            names = ", ".join(fault.name for fault in self._link.latest.faults)
+            self._say("fault", "fault", faults=names)
+        elif self._publisher.snapshot.powered:
+            self._say("idle", "idle")
+        else:
+            self._say("idle", "idle.unpowered")
+
+    def _say(self, phase: Phase, code: str, **facts: Any) -> None:
+        if self._publisher.snapshot.code != code or facts:
+            self._publisher.update(phase=phase, code=code, message=MESSAGES[code].format(**facts))
+
+    def _require_link(self) -> Link:
+        if self._link is None:
+            raise UsageError("no controller is connected; reconnect first")
+        return self._link
+
+    def _disconnect(self) -> None:
+        if self._link is not None:
+            self._link.close()
+            self._link = None
+            self._publisher.update(powered=None)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Runs the control process on the block it was handed."""
+    parser = argparse.ArgumentParser(prog="rcilab.supervisor.worker", description=__doc__)
+    parser.add_argument("--block", type=int, required=True, metavar="FD", help="open descriptor of the shared block")
+    return Worker(ControlBlock(parser.parse_args(argv).block)).run()
+
+
+if __name__ == "__main__":
+    sys.exit(main())
