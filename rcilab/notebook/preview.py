@@ -1,0 +1,185 @@
+"""A motion, or a pose, as a small 3D scene inside the notebook."""
+
+from __future__ import annotations
+
+import html
+import math
+import os
+import warnings
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rcilab.arrays import Array, as_vector
+from rcilab.errors import UsageError
+from rcilab.motion.motion import Motion
+from rcilab.robots.upright import upright_joints
+from rcilab.views.arm_view import ArmView
+
+if TYPE_CHECKING:
+    from rcilab.model import RobotModel
+
+HEIGHT = 420  # [px]
+_RATE = 30  # [1/s] Keyframes; the viewer turns smoothly between them.
+_HOLD = 1.0  # [s] The arm rests at the goal before the motion starts again.
+_REPETITIONS = 1000  # For as long as anybody looks.
+_MIDDLE = (0.2, 0.0, 0.5)  # [m] What the camera turns about.
+_CAMERA_POSITION = (0.7, -1.0, 0.35)  # [m] seen from there
+_FAR_AWAY = ("JUPYTERHUB_SERVICE_PREFIX", "BINDER_SERVICE_HOST", "COLAB_RELEASE_TAG")
+"""Set where the kernel's loopback is not the browser's."""
+
+
+class Preview:
+    """An arm in a meshcat viewer; shows itself in a notebook. Nothing in it can move a robot.
+
+    Live, it is served on loopback by the kernel, and `show` moves it while you look. Static, it is part of the
+    notebook (about 1.5 MB), needs no kernel, and keeps the pose or the motion that it was made with.
+
+    Args:
+        what: A motion to play over and over, its goal as a ghost; or joint angles, shape (n,), [rad], to stand at.
+        model: The arm.
+        live: Whether to serve it.
+        height: Height in the notebook, [px].
+
+    Raises:
+        InvalidValueError: The pose is not n finite numbers, or the motion is for another number of joints.
+    """
+
+    def __init__(self, what: Motion | ArrayLike, model: RobotModel, *, live: bool = True, height: int = HEIGHT) -> None:
+        pose = as_vector(what.start if isinstance(what, Motion) else what, model.n, "q", "rad")
+        with warnings.catch_warnings():  # meshcat 0.3 loads pyzmq's old event loop, which says that it is old.
+            warnings.simplefilter("ignore", DeprecationWarning)
+            from rcilab.views.meshcat_scene import MeshcatScene
+
+            self._scene = MeshcatScene()
+        self._model = model
+        self._height = height
+        self._live = live
+        self._arm = ArmView(self._scene, "arm", model, quality="fine" if live else "coarse")
+        self._arm.show(pose)
+        self._moving = False
+        if isinstance(what, Motion):
+            ArmView(self._scene, "goal", model, "plan").show(what.goal)
+            self._animate(what)
+        self._markup = ""
+        _aim_camera(self._scene.visualizer)
+        if not live:
+            self._markup = self._scene.as_html()
+            self._scene.close()
+
+    @property
+    def url(self) -> str | None:
+        """Address of the viewer, to open it in a window of its own; None when it is not live."""
+        return self._scene.url if self._live else None
+
+    def show(self, q: ArrayLike) -> None:
+        """Puts the arm into a pose, shape (n,), [rad]; an animation ends.
+
+        Raises:
+            UsageError: The preview is static, or was closed.
+        """
+        if not self._live:
+            raise UsageError("a static preview keeps its pose; make a new one, or use preview(..., live=True)")
+        if self._moving:
+            self._animate(None)
+        self._arm.show(q)
+
+    def html(self) -> str:
+        """Returns the scene, animation included, as one HTML page that needs neither kernel nor network."""
+        return self._scene.as_html() if self._live else self._markup
+
+    def save(self, file: str | os.PathLike[str]) -> None:
+        """Writes `html()` to a file."""
+        Path(file).write_text(self.html(), encoding="utf-8")
+
+    def close(self) -> None:
+        """Stops serving and keeps what was shown as a static scene; calling it again does nothing."""
+        if self._live:
+            self._markup = self._scene.as_html()
+            self._scene.close()
+            self._live = False
+
+    def __enter__(self) -> Preview:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        return f"<Preview of {self._model.name}, {self.url or 'static'}>"
+
+    def _repr_html_(self) -> str:
+        style = f"width: 100%; height: {self._height}px; border: none"
+        if self.url is None:
+            return f'<iframe srcdoc="{html.escape(self.html())}" style="{style}"></iframe>'
+        return (
+            f'<iframe src="{self.url}" style="{style}"></iframe>'
+            f'<p><small><a href="{self.url}" target="_blank">{self.url}</a>; nothing to see? Where the kernel is on '
+            "another machine, use <code>preview(..., live=False)</code>.</small></p>"
+        )
+
+    def _animate(self, motion: Motion | None) -> None:
+        """Hands the viewer a track of orientations for each joint; None takes them away."""
+        from meshcat.animation import Animation, AnimationClip, AnimationTrack
+
+        visualizer = self._scene.visualizer
+        clips = {}
+        if motion is not None:
+            times, q = _keyframes(motion)
+            frames = (times * _RATE).tolist()
+            for joint, node in zip(upright_joints(self._model.description), self._arm.joint_nodes, strict=True):
+                angles = q[:, len(clips)]
+                track = AnimationTrack("quaternion", "quaternion", frames, _xyzw(joint.axis, angles))
+                path = visualizer[node.strip("/")].path
+                clips[path] = AnimationClip({"quaternion": track}, fps=_RATE)
+        visualizer.set_animation(Animation(clips), play=True, repetitions=_REPETITIONS)
+        self._moving = motion is not None
+
+
+def preview(
+    motion: Motion | ArrayLike, model: RobotModel, *, live: bool | None = None, height: int = HEIGHT
+) -> Preview:
+    """Returns a 3D scene that plays a motion, or shows a pose, inside the notebook.
+
+    Args:
+        motion: What to play; or joint angles, shape (n,), [rad], to show the arm standing there.
+        model: The arm.
+        live: Served by the kernel (True) or part of the notebook (False); None serves it, unless the kernel runs on a
+            hub, whose loopback the browser cannot reach.
+        height: Height in the notebook, [px].
+
+    Raises:
+        InvalidValueError: The pose is not n finite numbers.
+    """
+    if live is None:
+        live = not any(name in os.environ for name in _FAR_AWAY)
+    return Preview(motion, model, live=live, height=height)
+
+
+def _aim_camera(visualizer: Any) -> None:
+    """Looks at the middle of the arm. meshcat 0.3's camera always turns about the origin, so the arm goes there."""
+    T_viewer_base = np.eye(4)
+    T_viewer_base[:3, 3] = -np.array(_MIDDLE)
+    visualizer.set_transform(T_viewer_base)
+    visualizer["/Axes"].set_transform(T_viewer_base)
+    visualizer["/Grid"].set_property("visible", False)  # Lines out to 20 m, far larger than any arm.
+    x, y, z = _CAMERA_POSITION
+    visualizer["/Cameras/default/rotated/<object>"].set_property("position", [x, z, -y])  # Its y axis points up.
+
+
+def _keyframes(motion: Motion) -> tuple[Array, Array]:
+    """Returns times, shape (K,), [s], and joint angles there, shape (K, n), the hold at the goal included."""
+    count = math.ceil(motion.duration * _RATE) + 1
+    times = np.append(np.linspace(0.0, motion.duration, count), motion.duration + _HOLD)
+    return times, np.array([motion.at(t).q for t in times])
+
+
+def _xyzw(axis: Array, angles: Array) -> list[list[float]]:
+    """Returns turns about an axis as quaternions in the viewer's order."""
+    half = 0.5 * angles[:, np.newaxis]
+    return np.hstack((np.sin(half) * axis, np.cos(half))).tolist()
