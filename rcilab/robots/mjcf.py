@@ -122,8 +122,8 @@ def _joint_body(description: RobotDescription, number: int) -> list[str]:
         f'{pad}<body name="link{number}" pos="{vector_text(joint.origin)}">',
         f'{pad}  <joint name="joint{number}" axis="{vector_text(joint.axis)}"'
         f' range="{number_text(limits.lower[i])} {number_text(limits.upper[i])}"'
-        f' armature="{number_text(round(ARMATURE_PER_TORQUE * torque, 6))}"'
-        f' damping="{number_text(round(DAMPING_PER_TORQUE * torque, 6))}"/>',
+        f' armature="{number_text(ARMATURE_PER_TORQUE * torque)}"'
+        f' damping="{number_text(DAMPING_PER_TORQUE * torque)}"/>',
     ]
 
 
