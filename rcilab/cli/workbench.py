@@ -1,0 +1,65 @@
+"""`rcilab [workbench]`: opens the page."""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import threading
+from typing import Any
+
+
+def add_parser(subparsers: Any) -> None:
+    """Adds the command and its options."""
+    parser = subparsers.add_parser("workbench", help="open the page: pose an arm, plan, check, run")
+    add_options(parser)
+    parser.set_defaults(run=run)
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Adds the options, for `rcilab workbench` and for a bare `rcilab`."""
+    parser.add_argument("--model", default="xMatePro7", help="robot to show first (default: %(default)s)")
+    parser.add_argument("--host", default="127.0.0.1", help="address to listen on; others than loopback need --token")
+    parser.add_argument("--port", type=_port, default=None, help="port of the page (default: 8080; 0: any free one)")
+    parser.add_argument("--token", default=None, help="secret that every page must bring")
+    parser.add_argument("--no-browser", action="store_true", help="do not open a browser")
+    parser.add_argument("--robot", default="virtual", metavar="rci://HOST:PORT", help="controller to connect to")
+    parser.add_argument("--language", choices=("en", "zh"), default="en", help="language of the page")
+    parser.add_argument("--quality", choices=("full", "light"), default="full", help="light: for software rendering")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Serves the page until Ctrl-C or a termination signal."""
+    from rcilab.workbench.app import Workbench, WorkbenchConfig
+    from rcilab.workbench.security import DEFAULT_PORT
+
+    config = WorkbenchConfig(
+        model=args.model,
+        target=args.robot,
+        host=args.host,
+        port=DEFAULT_PORT if args.port is None else args.port,
+        token=args.token,
+        language=args.language,
+        quality=args.quality,
+    )
+    ending = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: ending.set())
+    with Workbench(config) as bench:
+        print(f"rcilab workbench: {bench.url}  (Ctrl-C ends it)", flush=True)
+        if not args.no_browser:
+            import webbrowser
+
+            webbrowser.open(bench.url)
+        while not ending.wait(0.5):
+            pass
+    return 0
+
+
+def _port(text: str) -> int:
+    try:
+        port = int(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is no port number; give one from 0 to 65535") from None
+    if not 0 <= port <= 65535:
+        raise argparse.ArgumentTypeError(f"{port} is no port number; give one from 0 to 65535")
+    return port

@@ -1,0 +1,175 @@
+"""Curves for a screen: few points, no spike lost, limits and violations as areas. No plotting library in here."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from rcilab.arrays import Array
+from rcilab.clock import CYCLE_TIME
+
+if TYPE_CHECKING:
+    from rcilab.limits import JointLimits
+    from rcilab.motion import Motion
+
+Quantity = Literal["q", "dq", "ddq", "jerk"]
+QUANTITIES: tuple[Quantity, ...] = ("q", "dq", "ddq", "jerk")
+
+
+_ROUND_ENDS = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 15.0, 20.0, 25.0, 30.0, 40.0, 50.0, 60.0)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Curves:
+    """Signals of the same kind over time."""
+
+    t: Array
+    """[s], increasing, shape (N,)."""
+    values: Array
+    """One column a signal, shape (N, k)."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Frame:
+    """What one plot shows: everything on one time axis, shape (M,) each."""
+
+    t: Array
+    """Two instants a bucket, [s]."""
+    plan: tuple[Array, ...]
+    actual: tuple[Array, ...]
+    """Empty when nothing was recorded."""
+    upper: float
+    lower: float
+    """The limit, in the unit of the curves."""
+    above: Array
+    """The highest planned curve where it is above the limit, the limit elsewhere."""
+    below: Array
+    bound: float
+    """The plot reaches from -bound to bound."""
+    end: float
+    """Where the time axis ends, [s]: a round number, so that the axis stands still while a plan is dragged."""
+
+
+def decimate(curves: Curves, edges: Array) -> Array:
+    """Returns the smallest and the largest value of every signal in every bucket, in the order they occur.
+
+    No extreme value is lost: whatever a full plot would have shown as a spike is still there.
+
+    Args:
+        curves: What to thin out.
+        edges: Times between the buckets, increasing, shape (B + 1,), [s].
+
+    Returns:
+        Two rows a bucket, shape (2 B, k). A bucket without samples repeats the value before it; before the first
+        sample and from one bucket after the last on there is NaN.
+    """
+    buckets, signals = len(edges) - 1, curves.values.shape[1]
+    thin = np.full((2 * buckets, signals), np.nan)
+    starts = np.searchsorted(curves.t, edges[:-1], side="left")
+    ends = np.append(starts[1:], np.searchsorted(curves.t, edges[-1], side="right"))
+    last = int(np.searchsorted(edges, curves.t[-1], side="right")) - 1 if len(curves.t) else -1
+    for bucket in range(min(buckets, last + 1)):
+        a, b = starts[bucket], ends[bucket]
+        if a == b:
+            if a > 0:
+                thin[2 * bucket : 2 * bucket + 2] = curves.values[a - 1]
+            continue
+        part = curves.values[a:b]
+        low, high = part.argmin(axis=0), part.argmax(axis=0)
+        smallest, largest = part.min(axis=0), part.max(axis=0)
+        thin[2 * bucket] = np.where(low <= high, smallest, largest)
+        thin[2 * bucket + 1] = np.where(low <= high, largest, smallest)
+    return thin
+
+
+def plan_curves(motion: Motion, quantity: Quantity) -> Curves:
+    """Returns a planned signal, one column a joint."""
+    return Curves(t=motion.times, values=getattr(motion, quantity))
+
+
+def recorded_curves(t: Array, q: Array, q_c: Array, dq: Array, quantity: Quantity) -> Curves:
+    """Returns a recorded signal: measured q and dq; ddq and jerk of the commands, as the controller computes them.
+
+    Args:
+        t: Time since the first command, [s], shape (N,).
+        q: Measured joint angles, [rad], shape (N, n).
+        q_c: Commanded joint angles, [rad], shape (N, n).
+        dq: Measured joint velocities, [rad/s], shape (N, n).
+        quantity: Which signal.
+    """
+    if quantity in ("q", "dq"):
+        return Curves(t=t, values=q if quantity == "q" else dq)
+    order = 2 if quantity == "ddq" else 3
+    values = np.zeros_like(q_c)
+    if len(q_c) > order:
+        # A lost cycle makes a gap: differences across it would be no derivative, so they are left at zero.
+        steps = np.rint(np.diff(t) / CYCLE_TIME)
+        whole = np.ones(len(t) - order, dtype=bool)
+        for shift in range(order):
+            whole &= steps[shift : len(steps) - order + 1 + shift] == 1.0
+        values[order:][whole] = np.diff(q_c, n=order, axis=0)[whole] / CYCLE_TIME**order
+    return Curves(t=t, values=values)
+
+
+def bounds_of(limits: JointLimits, quantity: Quantity) -> tuple[Array, Array]:
+    """Returns lower and upper limit of a signal, each of shape (n,)."""
+    if quantity == "q":
+        return limits.lower, limits.upper
+    upper = {"dq": limits.velocity, "ddq": limits.acceleration, "jerk": limits.jerk}[quantity]
+    return -upper, upper
+
+
+def build_frame(
+    plan: Curves | None, actual: Curves | None, limits: JointLimits, quantity: Quantity, joint: int, buckets: int = 240
+) -> Frame:
+    """Returns what a plot of one quantity shows.
+
+    Args:
+        plan: Planned curves of all joints, or None.
+        actual: Recorded curves of all joints, or None.
+        limits: The arm's limits.
+        quantity: Which signal.
+        joint: The joint to show in its own unit, [deg] and its derivatives, from 1; 0 shows all, each in percent of
+            its limit (of its range, with 0 in the middle, for q).
+        buckets: Number of buckets the time is cut into.
+    """
+    low, high = bounds_of(limits, quantity)
+    ends = [0.0] + [float(curves.t[-1]) for curves in (plan, actual) if curves is not None and len(curves.t)]
+    last = max(ends) or 1.0
+    end = next((end for end in _ROUND_ENDS if end >= last - 1e-9), last)
+    edges = np.linspace(0.0, last, buckets + 1)
+    t = np.repeat(edges[:-1], 2)
+    t[1::2] = 0.5 * (edges[:-1] + edges[1:])
+    t[-1] = last
+    t = np.append(t, max(end, last))  # One more point, so that the limits run on to the end of the axis.
+
+    def thin(curves: Curves | None) -> tuple[Array, ...]:
+        if curves is None or not len(curves.t):
+            return ()
+        if joint:
+            shown = Curves(t=curves.t, values=np.degrees(curves.values[:, joint - 1 : joint]))
+        else:
+            shown = Curves(t=curves.t, values=100.0 * (2.0 * curves.values - low - high) / (high - low))
+        return tuple(np.append(column, np.nan) for column in decimate(shown, edges).T)
+
+    lower, upper = (-100.0, 100.0)
+    if joint:
+        lower, upper = float(np.degrees(low[joint - 1])), float(np.degrees(high[joint - 1]))
+    planned, recorded = thin(plan), thin(actual)
+    curves = np.array(planned) if planned else np.zeros((1, len(t)))
+    above = np.maximum(np.nan_to_num(curves, nan=upper).max(axis=0), upper)
+    below = np.minimum(np.nan_to_num(curves, nan=lower).min(axis=0), lower)
+    peak = max(abs(upper), abs(lower), float(above.max()), -float(below.min()))
+    return Frame(
+        t=t,
+        end=float(t[-1]),
+        plan=planned,
+        actual=recorded,
+        upper=upper,
+        lower=lower,
+        above=above,
+        below=below,
+        bound=1.12 * peak,
+    )

@@ -1,0 +1,144 @@
+"""The workbench as a whole: opens the page first, then everything that takes time, and closes it all again."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass
+from types import TracebackType
+from typing import TYPE_CHECKING
+
+from rcilab.model import load_model
+from rcilab.workbench import requests, security
+from rcilab.workbench.conductor import Conductor
+from rcilab.workbench.goal_actions import initial_goal
+from rcilab.workbench.live import LiveChannel
+from rcilab.workbench.page import decorate
+from rcilab.workbench.session import Session
+from rcilab.workbench.store import Store, UiState
+from rcilab.workbench.text import message
+
+if TYPE_CHECKING:
+    import viser
+
+_BRAND = (11, 111, 194)
+
+
+@dataclass(frozen=True, kw_only=True)
+class WorkbenchConfig:
+    """How a workbench is started."""
+
+    model: str = "xMatePro7"
+    target: str = "virtual"
+    """"virtual" for a virtual controller of its own, or the address of a controller, rci://HOST:PORT."""
+    host: str = "127.0.0.1"
+    """Address to listen on; anything but loopback needs a token."""
+    port: int = security.DEFAULT_PORT
+    """0 takes any free port."""
+    token: str | None = None
+    language: str = "en"
+    quality: str = "full"
+
+
+class Workbench:
+    """The page and what is behind it. `with Workbench(config) as bench: print(bench.url)`.
+
+    Args:
+        config: How to start.
+
+    Raises:
+        ModelError: No robot has this name.
+        UsageError: The port is in use, or the address needs a token.
+    """
+
+    def __init__(self, config: WorkbenchConfig) -> None:
+        security.check_host(config.host, config.token)
+        if config.target != "virtual":
+            from rcilab.client.address import parse_address
+
+            parse_address(config.target)
+        model = load_model(config.model)
+        self._config = config
+        self._bound = security.bind(config.host, config.port)
+        self.port: int = self._bound.getsockname()[1]
+        """Port the page is served on."""
+        goal = initial_goal(model, model.home)
+        state = UiState(model=model, target=config.target, goal=goal, language=config.language, quality=config.quality)
+        self.store = Store(state)
+        self.session = Session(lambda error: self.store.say("bad", message("notice.plain", text=str(error))))
+        self.conductor = Conductor(self.store, self.session)
+        self.server: viser.ViserServer
+        self._stopped = threading.Event()
+        self._opened = False
+
+    @property
+    def url(self) -> str:
+        """What to open in a browser."""
+        host = {"0.0.0.0": "127.0.0.1", "::": "[::1]"}.get(self._config.host, self._config.host)
+        secret = f"?token={self._config.token}" if self._config.token else ""
+        return f"http://{host}:{self.port}/{secret}"
+
+    def start(self) -> None:
+        """Serves the page, then connects to the robot in the background."""
+        from rcilab.workbench.presenter import Presenter
+
+        ask = self.conductor.ask
+        live = LiveChannel(
+            on_stop=self.session.stop,
+            on_seek=lambda place: ask(requests.Seek(place=place)),
+            on_size=lambda height: ask(requests.SetView(name="height", value=height)),
+        )
+        gate = security.Gate(host=self._config.host, port=self.port, token=self._config.token)
+        self.server = security.open_server(self._bound, gate, decorate=decorate, live=live.serve)
+        self._opened = True
+        self.server.gui.configure_theme(
+            brand_color=_BRAND, show_logo=False, show_share_button=False, control_width="medium"
+        )
+        self._follow_pages()
+        self.presenter = Presenter(self.server, self.store, self.session, live, ask)
+        self.presenter.start()
+        self.conductor.start()
+        self.conductor.robot.open(self._config.model, self._config.target)
+        threading.Thread(target=self._beat, name="operator", daemon=True).start()
+
+    def close(self) -> None:
+        """Brings a motion to rest, ends the processes, closes the page. May be called twice."""
+        if self._stopped.is_set():
+            return
+        self._stopped.set()
+        if not self._opened:
+            self._bound.close()
+            return
+        self.conductor.close()
+        self.session.close()
+        self.presenter.close()
+        self.server.stop()
+
+    def _follow_pages(self) -> None:
+        ask = self.conductor.ask
+
+        @self.server.on_client_connect
+        async def _(client: viser.ClientHandle) -> None:
+            ask(requests.PageCame(page=client.client_id))
+
+        @self.server.on_client_disconnect
+        async def _(client: viser.ClientHandle) -> None:
+            ask(requests.PageWent(page=client.client_id))
+
+    def _beat(self) -> None:
+        """Tells the control process, all the time, whether somebody is there to press Stop."""
+        while not self._stopped.wait(0.25):
+            if self.server.get_clients():
+                self.session.heartbeat()
+
+    def __enter__(self) -> Workbench:
+        try:
+            self.start()
+        except BaseException:
+            self.close()
+            raise
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()

@@ -1,0 +1,127 @@
+// The bar of the workbench. It speaks to Python over its own websocket, so that Stop works whatever viser shows.
+(() => {
+  "use strict";
+  let live = null, said = {}, bar, chips, stop, toast, notice = null, hideTimer = 0;
+
+  const send = (message) => {
+    if (live && live.readyState === WebSocket.OPEN) { live.send(JSON.stringify(message)); return true; }
+    return false;
+  };
+
+  const pressStop = () => {
+    stop.classList.add("rl-pressed");
+    if (!send({ kind: "stop" })) show({ tone: "bad", text: said.lost || "Not connected: Stop was not sent." });
+  };
+
+  const show = (message) => {
+    toast.textContent = message.text;
+    toast.className = "rl-shown rl-" + message.tone;
+    clearTimeout(hideTimer);
+    hideTimer = setTimeout(() => { toast.className = ""; }, 7000);
+  };
+
+  const build = () => {
+    bar = document.createElement("div");
+    bar.id = "rl-bar";
+    bar.innerHTML = '<div id="rl-brand"><svg viewBox="0 0 24 24" fill="none" stroke="#5ab0ff" stroke-width="2.6" ' +
+      'stroke-linecap="round" stroke-linejoin="round"><path d="M6 21V14L10 6L18 9"/><circle cx="6" cy="14" r="1.6" ' +
+      'fill="#fff" stroke="#fff"/><circle cx="10" cy="6" r="1.6" fill="#fff" stroke="#fff"/><path d="M2.5 21.5H10"/></svg>' +
+      '<span>rcilab</span></div><div id="rl-chips" role="status" aria-live="off"></div>';
+    stop = document.createElement("button");
+    stop.id = "rl-stop";
+    stop.type = "button";
+    stop.addEventListener("click", pressStop);
+    bar.appendChild(stop);
+    chips = bar.querySelector("#rl-chips");
+    toast = document.createElement("div");
+    toast.id = "rl-toast";
+    toast.setAttribute("role", "alert");
+    document.body.append(bar, toast);
+    label();
+    connect();
+    requestAnimationFrame(follow);
+  };
+
+  const label = () => {
+    stop.textContent = said.stop || "Stop";
+    const key = document.createElement("kbd");
+    key.textContent = "Esc";
+    key.setAttribute("aria-hidden", "true");
+    stop.appendChild(key);
+    stop.title = said.stopHint || "";
+    stop.setAttribute("aria-label", said.stop || "Stop");
+  };
+
+  const draw = (list) => {
+    while (chips.children.length > list.length) chips.lastChild.remove();
+    list.forEach((chip, i) => {
+      let box = chips.children[i];
+      if (!box) {
+        box = document.createElement("div");
+        box.append(document.createElement("small"), document.createElement("b"));
+        chips.appendChild(box);
+      }
+      const look = "rl-chip" + (chip.tone ? " rl-" + chip.tone : "") + (chip.wide ? " rl-wide" : "");
+      if (box.className !== look) box.className = look;
+      box.dataset.id = chip.id;
+      box.title = chip.hint || chip.label + ": " + chip.value;
+      if (box.firstChild.textContent !== chip.label) box.firstChild.textContent = chip.label;
+      if (box.lastChild.textContent !== chip.value) box.lastChild.textContent = chip.value;
+    });
+  };
+
+  const hear = (event) => {
+    const news = JSON.parse(event.data);
+    Object.assign(said, news);
+    if ("stop" in news || "stopHint" in news) label();
+    if (news.chips) draw(news.chips);
+    if (news.notice && news.notice.serial !== notice) {
+      if (notice !== null || news.notice.fresh) show(news.notice);
+      notice = news.notice.serial;
+    }
+    if (news.language) document.documentElement.lang = news.language;
+  };
+
+  const connect = () => {
+    const scheme = location.protocol === "https:" ? "wss://" : "ws://";
+    live = new WebSocket(scheme + location.host + "/rcilab/live");
+    live.onopen = () => { bar.classList.remove("rl-lost"); size(); };
+    live.onmessage = hear;
+    live.onclose = () => {
+      bar.classList.add("rl-lost");
+      draw([{ id: "lost", label: "rcilab", value: said.lost || "The workbench is not running.", tone: "bad", wide: true }]);
+      setTimeout(connect, 1000);
+    };
+  };
+
+  const size = () => send({ kind: "size", height: window.innerHeight });
+  window.addEventListener("resize", size);
+
+  // The time cursor: one line in every plot whose x axis is the motion's time; a click there moves it.
+  const follow = () => {
+    const cursor = said.cursor;
+    document.querySelectorAll(".u-over").forEach((over) => {
+      let line = over.querySelector(".rl-cursor");
+      if (!line) {
+        line = document.createElement("div");
+        line.className = "rl-cursor";
+        over.appendChild(line);
+        over.addEventListener("click", (event) => {
+          const box = over.getBoundingClientRect();
+          if (box.width > 0) send({ kind: "seek", place: (event.clientX - box.left) / box.width });
+        });
+      }
+      const place = cursor ? (cursor.place * 100).toFixed(2) + "%" : "";
+      if (line.style.left !== place) line.style.left = place;
+      line.style.display = cursor ? "" : "none";
+    });
+    setTimeout(() => requestAnimationFrame(follow), 50);
+  };
+
+  // Capture phase: before viser and before any text field. A convenience, not a safety function.
+  window.addEventListener("keydown", (event) => {
+    if (event.key === "Escape" && !event.repeat) pressStop();
+  }, true);
+
+  if (document.body) build(); else document.addEventListener("DOMContentLoaded", build);
+})();

@@ -1,0 +1,129 @@
+"""The one thread that acts: takes requests from the mailbox, validates them, and exchanges the state."""
+
+from __future__ import annotations
+
+import sys
+import threading
+import time
+import traceback
+from collections.abc import Callable
+from typing import Any
+
+from rcilab.errors import RcilabError
+from rcilab.workbench import requests
+from rcilab.workbench.goal_actions import GoalActions
+from rcilab.workbench.mailbox import Mailbox
+from rcilab.workbench.robot_actions import RobotActions
+from rcilab.workbench.session import Session
+from rcilab.workbench.store import Store
+from rcilab.workbench.text import message
+from rcilab.workbench.view_actions import ViewActions
+
+_TICK = 0.03  # [s] A choice: about the display's rate; also how often the robot is looked at.
+
+
+class Conductor:
+    """Owns the state and the session; everything else only reads snapshots.
+
+    Args:
+        store: The state.
+        session: The robot side.
+    """
+
+    def __init__(self, store: Store, session: Session) -> None:
+        self._store, self._session = store, session
+        self._goal = GoalActions(store, session)
+        self.robot = RobotActions(store, session)
+        self._view = ViewActions(store)
+        self._mailbox: Mailbox[requests.Request] = Mailbox()
+        self._thread: threading.Thread | None = None
+        self._ending = threading.Event()
+        self.errors: list[BaseException] = []
+        """Failures of our own code, for tests; each was also printed and said on the page."""
+        self._actions: dict[type, Callable[[Any], None]] = {
+            requests.MoveJoint: self._goal.move_joint,
+            requests.PoseGoal: self._goal.pose_goal,
+            requests.MoveTarget: self._goal.move_target,
+            requests.TypeField: self._goal.type_field,
+            requests.SetArmAngle: self._goal.set_arm_angle,
+            requests.ChooseBranch: self._goal.choose_branch,
+            requests.Plan: self._goal.plan,
+            requests.SetSpeed: self._goal.set_speed,
+            requests.SetLaw: self._goal.set_law,
+            requests.Drive: self.robot.drive,
+            requests.ChooseRobot: self.robot.choose_robot,
+            requests.Seek: self._view.seek,
+            requests.Play: self._view.play,
+            requests.SetView: self._view.set_view,
+            requests.TakeControls: self._view.take_controls,
+            requests.PageCame: self._view.page_came,
+            requests.PageWent: self._view.page_went,
+        }
+
+    def ask(self, request: requests.Request) -> None:
+        """Takes a request and returns at once; callable from any thread."""
+        self._mailbox.put(request, _coalescing_key(request))
+
+    def start(self) -> None:
+        """Starts the thread."""
+        self._thread = threading.Thread(target=self._run, name="conductor", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Ends the thread."""
+        self._ending.set()
+        if self._thread is not None:
+            self._thread.join(10.0)
+
+    def act(self, request: requests.Request) -> None:
+        """Carries out one request; what goes wrong becomes a sentence on the page."""
+        lease = self._store.state.lease
+        if not isinstance(request, requests.Harmless) and not lease.allows(request.page) and not _is_stop(request):
+            self._store.say("warn", message("notice.watching", page=lease.number(lease.holder)))
+            return
+        self._guard(lambda: self._actions[type(request)](request))
+
+    def tick(self, elapsed: float) -> None:
+        """Does what time asks for: the preview plays on, the robot is looked at."""
+        self._view.advance(elapsed)
+        event = self.robot.watch()
+        if event == "placed":
+            self._goal.plan()
+        elif event == "rested":
+            self._goal.catch_up()
+
+    def _run(self) -> None:
+        last = time.monotonic()
+        while not self._ending.is_set():
+            request = self._mailbox.take(max(0.0, last + _TICK - time.monotonic()))
+            if request is not None:
+                self.act(request)
+            now = time.monotonic()
+            if now - last >= _TICK:
+                elapsed, last = now - last, now
+                self._guard(lambda elapsed=elapsed: self.tick(elapsed))
+
+    def _guard(self, action: Callable[[], None]) -> None:
+        try:
+            action()
+        except RcilabError as error:
+            self._store.say("bad", message("notice.plain", text=str(error)))
+        except Exception as error:  # A bug of ours must neither end the thread nor stay unseen.
+            self.errors.append(error)
+            traceback.print_exc(file=sys.stderr)
+            self._store.say("bad", message("notice.bug", error=f"{type(error).__name__}: {error}"))
+
+
+def _coalescing_key(request: requests.Request) -> str | None:
+    """Returns what a newer request replaces an older one by: drags and sliders, nothing that is pressed once."""
+    if isinstance(request, requests.MoveTarget) and not request.ended:
+        return f"target.{request.page}"
+    if isinstance(request, requests.MoveJoint):
+        return f"joint.{request.joint}.{request.page}"
+    if isinstance(request, requests.Seek | requests.SetSpeed | requests.SetArmAngle):
+        return f"{type(request).__name__}.{request.page}"
+    return None
+
+
+def _is_stop(request: requests.Request) -> bool:
+    return isinstance(request, requests.Drive) and request.what == "stop"

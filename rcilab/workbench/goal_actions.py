@@ -1,0 +1,193 @@
+"""What happens when somebody poses the goal: solve, plan, judge. Owned by the conductor's thread."""
+
+from __future__ import annotations
+
+import math
+from types import MappingProxyType
+
+import numpy as np
+
+from rcilab.arrays import JointVector, frozen
+from rcilab.errors import KinematicsError
+from rcilab.spatial import Pose
+from rcilab.workbench import requests
+from rcilab.workbench.parse import parse_number
+from rcilab.workbench.planning import LAWS, Plan, make_plan
+from rcilab.workbench.reach import judge_joints, judge_pose
+from rcilab.workbench.readiness import is_moving
+from rcilab.workbench.session import Session
+from rcilab.workbench.store import Goal, Store
+from rcilab.workbench.text import Message
+
+POSE_FIELDS = ("x", "y", "z", "roll", "pitch", "yaw")
+FURTHEST = 3.0  # [m] A choice: no arm of ours reaches half as far, and the gizmo should stay in sight.
+SLOWEST = 0.01
+
+
+class GoalActions:
+    """Poses, targets, typed numbers, speed; each ends in a fresh plan."""
+
+    def __init__(self, store: Store, session: Session) -> None:
+        self._store, self._session = store, session
+        self._stale = False  # The goal has changed while the arm was moving.
+
+    def move_joint(self, request: requests.MoveJoint) -> None:
+        """Poses one joint of the candidate arm."""
+        model = self._store.state.model
+        if not (0 <= request.joint < model.n and math.isfinite(request.angle)):
+            return
+        q = np.array(self._store.state.goal.q)
+        limits = model.limits.joint
+        q[request.joint] = min(max(request.angle, limits.lower[request.joint]), limits.upper[request.joint])
+        self._pose(frozen(q))
+
+    def pose_goal(self, request: requests.PoseGoal) -> None:
+        """Poses the candidate arm by name."""
+        state = self._store.state
+        if request.name == "undo":
+            goal = self._store.undo()
+            if goal is not None:
+                self._store.update(goal=goal)
+                self.plan()
+            return
+        self._store.remember()
+        here = self._session.status().q_c
+        named = {
+            "zero": np.zeros(state.model.n),
+            "home": state.model.home,
+            "here": state.goal.q if here is None else here,
+        }
+        self._pose(frozen(named[request.name]))
+        self._clear_problems("")
+
+    def move_target(self, request: requests.MoveTarget) -> None:
+        """Follows the gizmo."""
+        numbers = (*request.position, *request.wxyz)
+        if len(numbers) != 7 or not all(math.isfinite(number) for number in numbers):
+            return
+        if math.hypot(*request.wxyz) < 1e-6:
+            return
+        position = [min(max(number, -FURTHEST), FURTHEST) for number in request.position]
+        if request.ended:
+            self._clear_problems("pose.")
+        self._aim(Pose(position, request.wxyz))
+
+    def set_arm_angle(self, request: requests.SetArmAngle) -> None:
+        """Turns the elbow about the shoulder-wrist line while the tool stays."""
+        if math.isfinite(request.psi) and self._store.state.model.n == 7:
+            self._aim(self._store.state.goal.target, math.remainder(request.psi, math.tau))
+
+    def choose_branch(self, request: requests.ChooseBranch) -> None:
+        """Takes another analytic solution of the same pose."""
+        goal = self._store.state.goal
+        solutions = goal.reach.solutions
+        if solutions is None or not 0 <= request.index < len(solutions):
+            return
+        self._store.remember()
+        self._aim(goal.target, None, near=solutions[request.index])
+
+    def type_field(self, request: requests.TypeField) -> None:
+        """Takes a typed number, or says beside the field what is wrong with it."""
+        state = self._store.state
+        kind, _, name = request.field.partition(".")
+        if kind == "joint" and name.isdigit() and int(name) < state.model.n:
+            low, high = np.degrees(state.model.limits.joint.lower), np.degrees(state.model.limits.joint.upper)
+            number = int(name)
+            parsed = parse_number(request.text, round(float(low[number]), 6), round(float(high[number]), 6), "deg")
+            value = parsed.value
+            act = None if value is None else lambda: self.move_joint(
+                requests.MoveJoint(joint=number, angle=math.radians(value))
+            )  # fmt: skip
+        elif kind == "pose" and name in POSE_FIELDS:
+            index = POSE_FIELDS.index(name)
+            bound, unit = (FURTHEST * 1000.0, "mm") if index < 3 else (360.0, "deg")
+            parsed = parse_number(request.text, -bound, bound, unit)
+            value = parsed.value
+            act = None if value is None else lambda: self._aim(_with_number(state.goal.target, index, value))
+        elif kind == "psi" and state.model.n == 7:
+            parsed = parse_number(request.text, -180.0, 180.0, "deg")
+            value = parsed.value
+            act = None if value is None else lambda: self.set_arm_angle(requests.SetArmAngle(psi=math.radians(value)))
+        else:
+            return
+        if act is None:
+            assert parsed.problem is not None
+            self._store.update(problems=MappingProxyType({**state.problems, request.field: parsed.problem}))
+            return
+        self._store.remember()
+        self._clear_problems(request.field)
+        act()
+        self._store.update(typed=self._store.state.typed + 1)
+
+    def set_speed(self, request: requests.SetSpeed) -> None:
+        """Plans faster or slower."""
+        if math.isfinite(request.speed):
+            self._store.update(speed=min(max(request.speed, SLOWEST), 1.0))
+            self.plan()
+
+    def set_law(self, request: requests.SetLaw) -> None:
+        """Plans with another law."""
+        if request.law in LAWS:
+            self._store.update(law=request.law)
+            self.plan()
+
+    def plan(self, request: requests.Plan | None = None) -> None:
+        """Plans from where the arm stands to the goal, unless it is moving: then when it has come to rest."""
+        del request
+        state, status = self._store.state, self._session.status()
+        if is_moving(status):
+            self._stale = True
+            return
+        self._stale = False
+        start = state.goal.q if status.q_c is None else status.q_c
+        made = make_plan(state.model, frozen(start), state.goal.q, state.speed, state.law)
+        if isinstance(made, Plan):
+            self._store.update(plan=made, no_plan=None, recording=None, place=0.0, playing=False)
+        else:
+            self._store.update(plan=None, no_plan=made, recording=None, place=0.0, playing=False)
+
+    def catch_up(self) -> None:
+        """Plans what was put off while the arm was moving."""
+        if self._stale:
+            self.plan()
+
+    def _pose(self, q: JointVector) -> None:
+        model = self._store.state.model
+        goal = Goal(q=q, target=model.forward(q), reach=judge_joints(model, q), psi=self._arm_angle(q))
+        self._store.update(goal=goal)
+        self.plan()
+
+    def _aim(self, target: Pose, psi: float | None = None, near: JointVector | None = None) -> None:
+        state = self._store.state
+        reach = judge_pose(state.model, target, state.goal.q if near is None else near, psi)
+        self._store.update(goal=Goal(q=reach.q, target=target, reach=reach, psi=self._arm_angle(reach.q)))
+        self.plan()
+
+    def _arm_angle(self, q: JointVector) -> float | None:
+        try:
+            return self._store.state.model.arm_angle(q)
+        except KinematicsError:
+            return None
+
+    def _clear_problems(self, prefix: str) -> None:
+        kept: dict[str, Message] = {k: v for k, v in self._store.state.problems.items() if not k.startswith(prefix)}
+        self._store.update(problems=MappingProxyType(kept))
+
+
+def initial_goal(model, q: JointVector) -> Goal:  # type: ignore[no-untyped-def]
+    """Returns the goal that stands where the arm stands."""
+    try:
+        psi = model.arm_angle(q)
+    except KinematicsError:
+        psi = None
+    return Goal(q=q, target=model.forward(q), reach=judge_joints(model, q), psi=psi)
+
+
+def _with_number(pose: Pose, index: int, value: float) -> Pose:
+    """Returns a pose with one of x, y, z [mm] and roll, pitch, yaw [deg] replaced."""
+    position, rpy = pose.position, pose.rpy
+    if index < 3:
+        position[index] = value / 1000.0
+    else:
+        rpy[index - 3] = math.radians(value)
+    return Pose.from_rpy(position, rpy)

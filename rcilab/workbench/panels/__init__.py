@@ -1,0 +1,21 @@
+"""One class a panel: `build(gui)` once, `show(state, status)` at the display's rate. No panel knows another."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Protocol
+
+if TYPE_CHECKING:
+    from rcilab.supervisor import SupervisorStatus
+    from rcilab.workbench.store import UiState
+
+
+class Panel(Protocol):
+    """What the presenter needs of a panel."""
+
+    def build(self, gui: Any, state: UiState) -> None:
+        """Adds the panel's controls to the container that is open in `gui`."""
+        ...
+
+    def show(self, state: UiState, status: SupervisorStatus) -> None:
+        """Brings the controls up to date."""
+        ...

@@ -1,0 +1,71 @@
+"""The bar's status line: what is always on screen, whichever tab is open."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from rcilab.workbench.readiness import is_moving
+from rcilab.workbench.text import Text
+
+if TYPE_CHECKING:
+    from rcilab.supervisor import SupervisorStatus
+    from rcilab.workbench.store import UiState
+
+_TONES = {"idle": "good", "moving": "good", "starting": "warn", "connecting": "warn", "stopping": "warn"}
+
+
+def status_values(state: UiState, status: SupervisorStatus, text: Text, cursor_end: float) -> dict[str, Any]:
+    """Returns what the page's bar shows, ready for `LiveChannel.publish`."""
+    values: dict[str, Any] = {
+        "language": state.language,
+        "stop": text("stop.label"),
+        "stopHint": text("stop.note"),
+        "lost": text("bar.lost"),
+        "chips": _chips(state, status, text),
+        "cursor": _cursor(state, status, cursor_end),
+    }
+    if state.notice is not None:
+        notice = state.notice
+        values["notice"] = {"serial": notice.serial, "tone": notice.tone, "text": text.say(notice.text)}
+    return values
+
+
+def _chips(state: UiState, status: SupervisorStatus, text: Text) -> list[dict[str, Any]]:
+    phase = text(f"phase.{status.phase}")
+    doing = text.say(state.busy) if state.busy is not None else phase
+    if status.phase == "idle" and status.powered is False:
+        doing = text("phase.unpowered")
+    mode = "—" if status.robot_mode is None else text(f"robot_mode.{status.robot_mode.name}")
+    faults = text("bar.none") if not status.faults else ", ".join(fault.manual_name for fault in status.faults)
+    connected = status.rate_hz > 0.0
+    lease = state.lease
+    return [
+        _chip(text, "model", state.model.name),
+        _chip(text, "where", text("where.virtual") if state.target == "virtual" else state.target),
+        _chip(text, "phase", doing, _TONES.get(status.phase, "bad"), hint=status.message),
+        _chip(text, "mode", mode),
+        _chip(text, "rate", f"{status.rate_hz:.0f} Hz" if connected else "—"),
+        _chip(text, "success", f"{100.0 * status.success_rate:.0f} %" if connected else "—"),
+        _chip(text, "controls", text("bar.holder", holder=lease.number(lease.holder), pages=len(lease.pages))),
+        _chip(text, "faults", faults, "bad" if status.faults else "", wide=True),
+    ]
+
+
+def _chip(text: Text, name: str, value: str, tone: str = "", *, wide: bool = False, hint: str = "") -> dict[str, Any]:
+    chip: dict[str, Any] = {"id": name, "label": text(f"bar.{name}"), "value": value}
+    if tone:
+        chip["tone"] = tone
+    if wide:
+        chip["wide"] = True
+    if hint:
+        chip["hint"] = hint
+    return chip
+
+
+def _cursor(state: UiState, status: SupervisorStatus, end: float) -> dict[str, float] | None:
+    if state.plan is None or end <= 0.0:
+        return None
+    t = state.place * state.plan.motion.duration
+    if is_moving(status) and status.motion_time is not None:
+        t = status.motion_time
+    return {"place": round(min(max(t / end, 0.0), 1.0), 4)}

@@ -1,0 +1,125 @@
+"""Target: the tool pose in numbers, the branches that reach it, the arm angle, and how to go there."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rcilab.workbench import requests
+from rcilab.workbench.goal_actions import POSE_FIELDS
+from rcilab.workbench.panels.jog import problems_html, reach_html
+from rcilab.workbench.planning import LAWS
+from rcilab.workbench.reach import margin
+from rcilab.workbench.text import Text
+from rcilab.workbench.widgets import Ask, Html, Linked, NumberField, esc, on_press, shown
+
+if TYPE_CHECKING:
+    from rcilab.supervisor import SupervisorStatus
+    from rcilab.workbench.store import UiState
+
+
+class TargetPanel:
+    """Pose in mm and degrees, branch list, arm angle, speed, law, "plan there"."""
+
+    def __init__(self, text: Text, ask: Ask) -> None:
+        self._text, self._ask = text, ask
+
+    def build(self, gui: Any, state: UiState) -> None:
+        """Adds the controls."""
+        text, ask = self._text, self._ask
+        gui.add_html(f'<p class="rl-note">{esc(text("target.note"))}</p>')
+        self._fields: list[NumberField] = []
+        with gui.add_folder(text("target.pose")):
+            gui.add_html('<i class="rl-pairs"></i>')
+            for index in (0, 3, 1, 4, 2, 5):
+                name = POSE_FIELDS[index]
+                box = gui.add_text(text(f"target.{name}"), "", hint=text("target.type_hint"))
+                self._fields.append(NumberField(box, ask, f"pose.{name}"))
+        self._problems = Html(gui)
+        self._reach = Html(gui)
+        self._psi: Linked | None = None
+        self._psi_field: NumberField | None = None
+        if state.model.n == 7:
+            with gui.add_folder(text("target.psi_title")):
+                gui.add_html('<i class="rl-rows"></i>')
+                slider = gui.add_slider("ψ", -180.0, 180.0, 1.0, 0.0, hint=text("target.psi_hint"))
+                self._psi = Linked(slider, ask, lambda v, p: requests.SetArmAngle(page=p, psi=math.radians(v)))
+                self._psi_field = NumberField(gui.add_text("", ""), ask, "psi")
+        with gui.add_folder(text("target.branches")):
+            self._branches = Html(gui)
+            self._choice = gui.add_button_group(
+                " ", [str(number) for number in range(1, 9)], hint=text("target.branch_hint")
+            )
+
+            @self._choice.on_click
+            async def _(event: Any) -> None:
+                ask(requests.ChooseBranch(page=event.client_id, index=int(event.target.value) - 1))
+
+        with gui.add_folder(text("target.motion")):
+            speed = gui.add_slider(text("target.speed"), 1, 100, 1, 50, hint=text("target.speed_hint"))
+            self._speed = Linked(speed, ask, lambda v, p: requests.SetSpeed(page=p, speed=v / 100.0))
+            laws = {text(f"law.{law}"): law for law in LAWS}
+            self._laws = {law: label for label, law in laws.items()}
+            law = gui.add_dropdown(text("target.law"), tuple(laws), hint=text("target.law_hint"))
+            self._law = Linked(law, ask, lambda v, p: requests.SetLaw(page=p, law=laws.get(v, "")))
+            self._plan = gui.add_button(text("target.plan"), icon="route", hint=text("target.plan_hint"))
+            on_press(self._plan, ask, lambda page: requests.Plan(page=page))
+            self._planned = Html(gui)
+
+    def show(self, state: UiState, status: SupervisorStatus) -> None:
+        """Follows the goal."""
+        goal = state.goal
+        values = (*(goal.target.position * 1000.0), *np.degrees(goal.target.rpy))
+        numbers: dict[str, float] = dict(zip(POSE_FIELDS, values, strict=True))
+        labels = []
+        for field in self._fields:
+            name = field.field.partition(".")[2]
+            field.show(shown(numbers[name]), state.problems.get(field.field), state.typed)
+            labels.append((field.field, self._text(f"target.{name}")))
+        if self._psi is not None and self._psi_field is not None and goal.psi is not None:
+            degrees = math.degrees(goal.psi)
+            self._psi.show(float(round(degrees)))
+            self._psi_field.show(shown(degrees), state.problems.get("psi"), state.typed)
+            labels.append(("psi", "ψ"))
+        self._problems.show(problems_html(state, self._text, labels))
+        self._reach.show(reach_html(state, self._text))
+        self._branches.show(self._branch_table(state, status))
+        solutions = goal.reach.solutions
+        self._choice.visible = solutions is not None and len(solutions) > 0
+        if solutions is not None and len(solutions):
+            self._choice.options = tuple(str(number) for number in range(1, len(solutions) + 1))
+        self._speed.show(round(state.speed * 100.0))
+        self._law.show(self._laws[state.law])
+        self._planned.show(planned_html(state, self._text))
+
+    def _branch_table(self, state: UiState, status: SupervisorStatus) -> str:
+        solutions, text = state.goal.reach.solutions, self._text
+        if solutions is None or not len(solutions):
+            return f'<p class="rl-note">{esc(text("target.no_branches"))}</p>'
+        here = state.goal.q if status.q_c is None else status.q_c
+        rows = []
+        for number, q in enumerate(solutions, start=1):
+            least = margin(state.model, q)
+            chosen = float(np.abs(np.angle(np.exp(1j * (q - state.goal.q)))).max()) < 1e-6
+            mark = ' class="rl-chosen"' if chosen else ""
+            away = math.degrees(float(np.abs(q - here).max()))
+            cells = (f"{number}", f"{math.degrees(least.angle):.1f}°", f"J{least.joint}", f"{away:.1f}°")
+            rows.append(f"<tr{mark}>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>")
+        heads = "".join(
+            f"<th>{esc(text(f'target.head.{name}'))}</th>" for name in ("number", "margin", "worst", "away")
+        )
+        return f'<table class="rl-table"><tr>{heads}</tr>{"".join(rows)}</table>'
+
+
+def planned_html(state: UiState, text: Text) -> str:
+    """Returns one line about the plan: how long it takes and whether it passed, or why there is none."""
+    if state.plan is None:
+        return f'<p class="rl-note">{esc(text.say(state.no_plan)) if state.no_plan else ""}</p>'
+    report = state.plan.report
+    tone, word = ("good", "check.passed") if report.ok else ("bad", "check.failed")
+    duration = f"{state.plan.motion.duration:.3f}"
+    return (
+        f'<p class="rl-verdict rl-{tone}"><b>{esc(text(word))}</b> {esc(text("target.planned", duration=duration))}</p>'
+    )

@@ -1,0 +1,61 @@
+"""From a goal to a judged motion: what every change of the goal runs, many times a second during a drag."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from rcilab.arrays import Array, JointVector
+from rcilab.errors import RcilabError
+from rcilab.model import RobotModel
+from rcilab.workbench.text import Message, message
+
+if TYPE_CHECKING:
+    from rcilab.conformance import Report
+    from rcilab.motion import Motion
+
+PlannableLaw = Literal["jerk_limited", "s_profile"]
+LAWS: tuple[PlannableLaw, ...] = ("jerk_limited", "s_profile")
+
+SMALLEST_MOTION = 1e-4  # [rad] A choice: a goal closer than this to the arm is where the arm is.
+_RIBBON_POINTS = 120
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Plan:
+    """A motion, its judgement, and what views draw of it."""
+
+    motion: Motion
+    report: Report
+    path: Array = field(repr=False)
+    """Positions of the tool, shape (N, 3), [m]."""
+    effort: Array = field(repr=False)
+    """How much of its velocity limit the busiest joint uses at each of these positions, 0 to 1, shape (N,)."""
+
+    @property
+    def starts_at(self) -> JointVector:
+        """Joint angles it must be executed from, [rad]."""
+        return self.motion.start
+
+
+def make_plan(
+    model: RobotModel, start: JointVector, goal: JointVector, speed: float, law: PlannableLaw
+) -> Plan | Message:
+    """Returns a judged motion from start to goal, or why there is none."""
+    from rcilab.conformance import check
+    from rcilab.motion import plan_joint
+
+    if float(np.abs(goal - start).max()) < SMALLEST_MOTION:
+        return message("plan.here")
+    try:
+        motion = plan_joint(model, start, goal, speed=speed, law=law)
+        report = check(motion, model, start=start)
+    except RcilabError as error:
+        return message("plan.failed", error=str(error))
+    times = np.linspace(0.0, motion.duration, _RIBBON_POINTS)
+    rows = np.minimum((times / 1e-3).astype(int), len(motion.times) - 1)
+    path = model.forward_path(motion.q[rows])[:, :3, 3]
+    effort = np.abs(motion.dq[rows] / model.limits.joint.velocity).max(axis=1)
+    return Plan(motion=motion, report=report, path=path, effort=effort)

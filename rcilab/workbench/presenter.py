@@ -1,0 +1,123 @@
+"""Thirty times a second: takes snapshots of state and robot and lets stage, panels and bar show what has changed."""
+
+from __future__ import annotations
+
+import sys
+import threading
+import time
+import traceback
+from typing import TYPE_CHECKING, Any
+
+from rcilab.workbench.live import LiveChannel
+from rcilab.workbench.panels import Panel
+from rcilab.workbench.panels.check import CheckPanel
+from rcilab.workbench.panels.jog import JogPanel
+from rcilab.workbench.panels.run import RunPanel
+from rcilab.workbench.panels.settings import SettingsPanel
+from rcilab.workbench.panels.status import status_values
+from rcilab.workbench.panels.target import TargetPanel
+from rcilab.workbench.panels.timeline import TimelinePanel
+from rcilab.workbench.session import Session
+from rcilab.workbench.stage import Stage
+from rcilab.workbench.store import Store
+from rcilab.workbench.text import Text
+from rcilab.workbench.widgets import Ask
+
+if TYPE_CHECKING:
+    import viser
+
+    from rcilab.workbench.store import UiState
+
+_PERIOD = 1.0 / 30.0  # [s] A choice: the display's rate is enough, and it leaves the processor to the robot.
+_MAIN_WIDTH, _TIMELINE_WIDTH = 352, 380  # [px]
+_TABS = (
+    ("tab.jog", "adjustments-horizontal", JogPanel),
+    ("tab.target", "current-location", TargetPanel),
+    ("tab.check", "clipboard-check", CheckPanel),
+    ("tab.run", "player-play", RunPanel),
+    ("tab.settings", "settings", SettingsPanel),
+)
+
+
+class Presenter:
+    """Owns every handle of the page. It reads snapshots and knows no sockets.
+
+    Args:
+        server: The page.
+        store: Where the state is.
+        session: Where the robot is.
+        live: The bar.
+        ask: Takes requests.
+    """
+
+    def __init__(self, server: viser.ViserServer, store: Store, session: Session, live: LiveChannel, ask: Ask) -> None:
+        self._server, self._store, self._session, self._live, self._ask = server, store, session, live, ask
+        self._stage = Stage(server, ask)
+        self._text = Text(store.state.language)
+        self._panels: list[Panel] = []
+        self._containers: list[Any] = []
+        self._built: tuple[str, str] | None = None
+        self._ending = threading.Event()
+        self._thread: threading.Thread | None = None
+        self.errors: list[BaseException] = []
+        """Failures of our own code, for tests; each was also printed."""
+
+    def start(self) -> None:
+        """Draws once, then goes on in a thread of its own."""
+        self.show()
+        self._thread = threading.Thread(target=self._run, name="presenter", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Ends the thread."""
+        self._ending.set()
+        if self._thread is not None:
+            self._thread.join(5.0)
+
+    def show(self) -> None:
+        """Shows one snapshot."""
+        state, status = self._store.state, self._session.status()
+        if (state.language, state.model.name) != self._built:
+            self._build(state)
+        for panel in self._panels:
+            panel.show(state, status)
+        self._stage.show(state, status, self._text)
+        self._live.publish(**status_values(state, status, self._text, self._timeline.end))
+
+    def _build(self, state: UiState) -> None:
+        """Makes the panels anew: another language has other words, another arm other joints."""
+        gui = self._server.gui
+        for container in self._containers:
+            container.remove()
+        self._text = Text(state.language)
+        self._built = (state.language, state.model.name)
+        gui.set_panel_label(self._text("panel.main"))
+        tabs = gui.add_tab_group()
+        self._panels = []
+        for label, icon, kind in _TABS:
+            panel = kind(self._text, self._ask)
+            with tabs.add_tab(self._text(label), icon):
+                panel.build(gui, state)
+            self._panels.append(panel)
+        self._timeline = TimelinePanel(self._text, self._ask)
+        window = gui.add_panel()
+        with window.add_tab(self._text("panel.timeline"), "timeline"):
+            self._timeline.build(gui, state)
+        self._panels.append(self._timeline)
+        window.dock_left()
+        window.set_width(_TIMELINE_WIDTH)
+        if not self._containers:
+            gui.main_panel.dock_right()
+            gui.main_panel.set_width(_MAIN_WIDTH)
+        self._containers = [tabs, window]
+
+    def _run(self) -> None:
+        deadline = time.monotonic()
+        while not self._ending.is_set():
+            deadline = max(deadline + _PERIOD, time.monotonic() + 0.3 * _PERIOD)  # A slow page must not starve others.
+            try:
+                self.show()
+            except Exception as error:  # A panel that fails must not freeze the others for good.
+                self.errors.append(error)
+                traceback.print_exc(file=sys.stderr)
+            self._ending.wait(max(0.0, deadline - time.monotonic()))

@@ -1,0 +1,48 @@
+"""Whether the planned motion may be executed now, and if not, why: one answer for the button and for the act."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rcilab.workbench.store import UiState
+from rcilab.workbench.text import Message, message
+
+if TYPE_CHECKING:
+    from rcilab.supervisor import SupervisorStatus
+
+_SAME_PLACE = 1e-9  # [rad] What the checker allows between the arm and the start of a motion.
+
+_NOT_IDLE = {
+    "starting": "ready.starting",
+    "connecting": "ready.starting",
+    "moving": "ready.moving",
+    "stopping": "ready.moving",
+    "fault": "ready.fault",
+    "lost": "ready.lost",
+    "crashed": "ready.crashed",
+    "closed": "ready.starting",
+}
+
+
+def obstacle(state: UiState, status: SupervisorStatus) -> Message | None:
+    """Returns what stands in the way of Execute, or None when it may be pressed."""
+    if state.busy is not None:
+        return message("ready.busy")
+    if status.phase in _NOT_IDLE:
+        return message(_NOT_IDLE[status.phase])
+    if not status.powered:
+        return message("ready.power")
+    if state.plan is None:
+        return message("ready.no_plan")
+    if not state.plan.report.ok:
+        return message("ready.violations", count=len(state.plan.report.violations))
+    if status.q_c is None or float(np.abs(status.q_c - state.plan.starts_at).max()) > _SAME_PLACE:
+        return message("ready.elsewhere")
+    return None
+
+
+def is_moving(status: SupervisorStatus) -> bool:
+    """Returns whether the arm is being moved by us."""
+    return status.phase in ("moving", "stopping")

@@ -1,0 +1,155 @@
+"""What happens when somebody drives the robot. Owned by the conductor's thread; it never waits for the robot."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rcilab.errors import CertificateError, RcilabError
+from rcilab.model import load_model
+from rcilab.workbench import requests
+from rcilab.workbench.goal_actions import initial_goal
+from rcilab.workbench.readiness import is_moving, obstacle
+from rcilab.workbench.session import Session
+from rcilab.workbench.store import Recording, Store
+from rcilab.workbench.text import message
+
+if TYPE_CHECKING:
+    from rcilab.supervisor import SupervisorStatus, Ticket
+
+_LONGEST_RECORDING = 600_000  # Rows: ten minutes of cycles.
+
+
+class RobotActions:
+    """Execute, stop, power, recover, connect; and the recording of what came of it."""
+
+    def __init__(self, store: Store, session: Session) -> None:
+        self._store, self._session = store, session
+        self._tickets: list[tuple[str, Ticket]] = []
+        self._rows: list[np.ndarray] = []
+        self._recording = False
+        self._placed = False  # The goal stands where the arm was first seen.
+        self._powered = False  # The virtual arm's motors have been switched on once.
+        self._incident = 0
+        self._phase = ""
+
+    def drive(self, request: requests.Drive) -> None:
+        """Passes one button of the Run tab on to the supervisor."""
+        if request.what == "execute":
+            self._execute()
+            return
+        if request.what == "stop":
+            self._session.stop()
+            return
+        supervisor = self._session.supervisor()
+        act = {
+            "recover": supervisor.recover,
+            "power_on": supervisor.power_on,
+            "power_off": supervisor.power_off,
+            "reconnect": supervisor.reconnect,
+        }[request.what]
+        self._tickets.append((request.what, act()))
+
+    def choose_robot(self, request: requests.ChooseRobot) -> None:
+        """Takes another arm or another destination; refused while the arm moves."""
+        state = self._store.state
+        if is_moving(self._session.status()):
+            self._store.say("warn", message("notice.moving"))
+            return
+        model = state.model if request.model is None else load_model(request.model)
+        target = state.target if request.target is None else request.target.strip()
+        if target != "virtual":
+            from rcilab.client.address import parse_address
+
+            parse_address(target)
+        if model.name == state.model.name and target == state.target and request.target is None:
+            return
+        self.open(model.name, target)
+
+    def open(self, name: str, target: str) -> None:
+        """Connects to a destination with an arm, starting from a clean table."""
+        state = self._store.state
+        model = state.model if state.model.name == name else load_model(name)
+        self._placed = self._powered = False
+        self._rows, self._recording, self._tickets, self._incident, self._phase = [], False, [], 0, ""
+        changes: dict[str, object] = {"target": target, "plan": None, "no_plan": None, "recording": None}
+        if model is not state.model:
+            self._store.forget()
+            changes |= {"model": model, "goal": initial_goal(model, model.home), "plot_joint": 0, "problems": {}}
+        self._store.update(place=0.0, playing=False, **changes)
+        self._session.open(model, target)
+
+    def watch(self) -> str | None:
+        """Looks at the supervisor: finished tickets, new incidents, recorded cycles, the arm's first pose.
+
+        Returns:
+            "rested" when the arm has just come to rest, "placed" when it was seen for the first time, else None.
+        """
+        status = self._session.status()
+        self._collect_tickets()
+        if status.incident is not None and status.incident.number > self._incident:
+            self._incident = status.incident.number
+            self._store.say("bad", message("notice.plain", text=status.incident.message))
+        before, self._phase = self._phase, status.phase
+        self._record(status)
+        if not self._placed and status.q_c is not None:
+            self._placed = True
+            self._store.update(goal=initial_goal(self._store.state.model, status.q_c))
+            return "placed"
+        if not self._powered and status.phase == "idle" and self._store.state.target == "virtual":
+            self._powered = True
+            if not status.powered:
+                self.drive(requests.Drive(what="power_on"))
+        return "rested" if before in ("moving", "stopping") and not is_moving(status) else None
+
+    def _execute(self) -> None:
+        state = self._store.state
+        reason = obstacle(state, self._session.status())
+        if reason is not None:
+            self._store.say("warn", reason)
+            return
+        certificate = None if state.plan is None else state.plan.report.certificate
+        if state.plan is None or certificate is None:
+            return
+        supervisor = self._session.supervisor()
+        supervisor.drain()
+        try:
+            ticket = supervisor.execute(state.plan.motion, certificate)
+        except CertificateError as error:
+            self._store.say("warn", message("notice.stale", error=str(error)))
+            return
+        self._rows, self._recording = [], True
+        self._tickets.append(("execute", ticket))
+        self._store.update(recording=None, playing=False)
+
+    def _collect_tickets(self) -> None:
+        waiting = []
+        for what, ticket in self._tickets:
+            if not ticket.done:
+                waiting.append((what, ticket))
+            elif ticket.error is not None:
+                self._store.say(
+                    "bad", message("notice.refused", what=message(f"drive.{what}"), error=str(ticket.error))
+                )
+            elif what == "execute":
+                self._store.say("good", message("notice.arrived"))
+        self._tickets = waiting
+
+    def _record(self, status: SupervisorStatus) -> None:
+        try:
+            rows = self._session.supervisor().drain()
+        except RcilabError:
+            return
+        if not self._recording:
+            return
+        rows = rows[np.isfinite(rows["t"])]
+        if len(rows):
+            self._rows.append(rows)
+            together = np.concatenate(self._rows)[-_LONGEST_RECORDING:]
+            self._rows = [together]
+            self._store.update(
+                recording=Recording(t=together["t"], q=together["q"], q_c=together["q_c"], dq=together["dq"])
+            )
+        if not is_moving(status) and not any(what == "execute" for what, _ in self._tickets):
+            self._recording = False

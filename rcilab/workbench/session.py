@@ -1,0 +1,106 @@
+"""The robot side of the page: one supervisor at a time, exchanged without anybody waiting for it."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from rcilab.errors import RcilabError, UsageError
+
+if TYPE_CHECKING:
+    from rcilab.model import RobotModel
+    from rcilab.supervisor import Supervisor, SupervisorStatus
+
+
+class Session:
+    """Starts, exchanges and closes the supervisor in a thread of its own.
+
+    Args:
+        on_failure: Called with the error when a supervisor could not be started; from a foreign thread.
+    """
+
+    def __init__(self, on_failure: Callable[[RcilabError], None]) -> None:
+        self._on_failure = on_failure
+        self._lock = threading.Lock()
+        self._current: Supervisor | None = None
+        self._ready: Supervisor | None = None  # Only what start() has built; requests go here.
+        self._generation = 0
+        self._worker: threading.Thread | None = None
+
+    def open(self, model: RobotModel, target: str) -> None:
+        """Closes what is open and starts a supervisor for this arm and destination; returns at once."""
+        with self._lock:
+            self._generation += 1
+            generation, previous = self._generation, self._worker
+            self._ready = None
+            self._worker = threading.Thread(
+                target=self._exchange, args=(generation, previous, model, target), name="session", daemon=True
+            )
+            self._worker.start()
+
+    def close(self) -> None:
+        """Ends the supervisor and waits for its processes to go."""
+        with self._lock:
+            self._generation += 1
+            worker, self._ready = self._worker, None
+        if worker is not None:
+            worker.join(20.0)
+        with self._lock:
+            current, self._current = self._current, None
+        if current is not None:
+            current.close()
+
+    def status(self) -> SupervisorStatus:
+        """Returns the supervisor's snapshot; "starting" while there is none."""
+        current = self._current
+        if current is not None:
+            return current.status()
+        from rcilab.supervisor import SupervisorStatus
+
+        return SupervisorStatus(phase="starting", code="starting", message="Starting the control process.")
+
+    def supervisor(self) -> Supervisor:
+        """Returns the supervisor to ask something of.
+
+        Raises:
+            UsageError: It is not there yet.
+        """
+        ready = self._ready
+        if ready is None:
+            raise UsageError("the control process is still starting; try again in a moment")
+        return ready
+
+    def stop(self) -> None:
+        """Stops a motion. Callable from any thread, never waits: the fast lane of Stop and Esc."""
+        current = self._current
+        if current is not None:
+            current.stop()
+
+    def heartbeat(self) -> None:
+        """Tells the control process that somebody is at the page; call it several times a second while it is so."""
+        ready = self._ready
+        if ready is not None:
+            ready.set_operator_present(True)
+
+    def _exchange(self, generation: int, previous: threading.Thread | None, model: RobotModel, target: str) -> None:
+        if previous is not None:
+            previous.join()
+        old, self._current = self._current, None
+        if old is not None:
+            old.close()
+        with self._lock:
+            if generation != self._generation:
+                return
+        try:
+            from rcilab.supervisor import Supervisor
+
+            supervisor = Supervisor(model, target)
+            self._current = supervisor
+            supervisor.start()
+        except RcilabError as error:
+            self._on_failure(error)
+            return
+        with self._lock:
+            if generation == self._generation:
+                self._ready = supervisor

@@ -1,0 +1,129 @@
+"""What the page shows, as one frozen value, and the one place where it is exchanged."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from rcilab.arrays import JointVector
+from rcilab.model import RobotModel
+from rcilab.spatial import Pose
+from rcilab.workbench.lease import Lease
+from rcilab.workbench.planning import Plan, PlannableLaw
+from rcilab.workbench.reach import Reach, Tone
+from rcilab.workbench.text import Message
+
+_UNDO_DEPTH = 100
+
+
+@dataclass(frozen=True, slots=True)
+class Notice:
+    """Something to say once, over the scene."""
+
+    serial: int
+    tone: Tone
+    text: Message
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Goal:
+    """Where the operator wants the arm to go."""
+
+    q: JointVector
+    """Joint angles of the candidate arm, shape (n,), [rad]."""
+    target: Pose
+    """Where the gizmo stands: what was asked for, reachable or not."""
+    reach: Reach
+    psi: float | None = None
+    """Arm angle of `q`, [rad]; None where it has none."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Recording:
+    """The last executed motion as the controller reported it."""
+
+    t: np.ndarray
+    """[s], shape (N,)."""
+    q: np.ndarray
+    """Measured, [rad], shape (N, n)."""
+    q_c: np.ndarray
+    """Commanded, [rad], shape (N, n)."""
+    dq: np.ndarray
+    """Measured, [rad/s], shape (N, n)."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class UiState:
+    """Everything the operator has set and everything that was computed from it."""
+
+    model: RobotModel
+    target: str = "virtual"
+    """"virtual" or an address, rci://HOST:PORT."""
+    goal: Goal
+    plan: Plan | None = None
+    no_plan: Message | None = None
+    """Why there is no plan."""
+    recording: Recording | None = None
+    speed: float = 0.5
+    law: PlannableLaw = "jerk_limited"
+    busy: Message | None = None
+    """What is being done that takes longer than a moment."""
+    place: float = 0.0
+    """Where in the plan the preview stands, 0 to 1."""
+    playing: bool = False
+    rate: float = 1.0
+    plot_joint: int = 0
+    """Joint shown in the plots, from 1; 0 shows all."""
+    language: str = "en"
+    quality: str = "full"
+    height: float = 800.0
+    """Height of the newest page's window, [px]: the plots fill it."""
+    lease: Lease = field(default_factory=Lease)
+    notice: Notice | None = None
+    problems: Mapping[str, Message] = field(default_factory=lambda: MappingProxyType({}))
+    """What is wrong with typed numbers, by field."""
+    typed: int = 0
+    """Counts accepted typed values, so that fields are rewritten in their own spelling."""
+
+
+class Store:
+    """Holds the state. One thread (the conductor's) writes, any thread may read a snapshot."""
+
+    def __init__(self, state: UiState) -> None:
+        self._lock = threading.Lock()
+        self._state = state
+        self._past: list[Goal] = []
+
+    @property
+    def state(self) -> UiState:
+        """The newest snapshot."""
+        return self._state
+
+    def update(self, **changes: Any) -> UiState:
+        """Exchanges the state for one with these fields changed, and returns it."""
+        with self._lock:
+            self._state = replace(self._state, **changes)
+            return self._state
+
+    def say(self, tone: Tone, text: Message) -> None:
+        """Shows a notice on every page."""
+        with self._lock:
+            serial = self._state.notice.serial + 1 if self._state.notice else 1
+            self._state = replace(self._state, notice=Notice(serial, tone, text))
+
+    def remember(self) -> None:
+        """Keeps the goal of this moment, to come back to with `undo`."""
+        self._past = [*self._past[-_UNDO_DEPTH:], self._state.goal]
+
+    def undo(self) -> Goal | None:
+        """Returns the goal that was remembered last, or None."""
+        return self._past.pop() if self._past else None
+
+    def forget(self) -> None:
+        """Drops what could be undone: it belongs to another arm."""
+        self._past = []

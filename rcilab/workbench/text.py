@@ -1,0 +1,64 @@
+"""Words of the page: one catalogue a language, found by key, filled with values."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+from importlib.resources import files
+from types import MappingProxyType
+
+from rcilab.errors import InvalidValueError
+
+LANGUAGES: Mapping[str, str] = MappingProxyType({"en": "English", "zh": "中文"})
+
+
+@dataclass(frozen=True)
+class Message:
+    """Something to say, before it is known in which language."""
+
+    code: str
+    """Key in the catalogues."""
+    values: Mapping[str, object] = field(default_factory=dict)
+    """What the sentence is filled with."""
+
+
+def message(code: str, **values: object) -> Message:
+    """Returns a message by its key and the values that fill it."""
+    return Message(code, MappingProxyType(values))
+
+
+class Text:
+    """The catalogue of one language, called with a key.
+
+    Raises:
+        InvalidValueError: There is no catalogue for this language.
+    """
+
+    def __init__(self, language: str) -> None:
+        if language not in LANGUAGES:
+            raise InvalidValueError("language", language, f"is unknown; known: {', '.join(LANGUAGES)}")
+        self.language = language
+        self._entries = load_catalogue(language)
+
+    def __call__(self, code: str, **values: object) -> str:
+        """Returns the words for a key; the key itself when the catalogue lacks it (a test keeps it complete)."""
+        entry = self._entries.get(code)
+        return code if entry is None else entry.format(**values) if values else entry
+
+    def has(self, code: str) -> bool:
+        """Returns whether the catalogue knows a key."""
+        return code in self._entries
+
+    def say(self, said: Message) -> str:
+        """Returns a message in this language; messages among its values are translated first."""
+        values = {k: self.say(v) if isinstance(v, Message) else v for k, v in said.values.items()}
+        return self(said.code, **values)
+
+
+@lru_cache
+def load_catalogue(language: str) -> Mapping[str, str]:
+    """Returns all entries of one language."""
+    path = files("rcilab.workbench") / "catalogues" / f"{language}.json"
+    return MappingProxyType(json.loads(path.read_text(encoding="utf-8")))

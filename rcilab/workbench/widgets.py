@@ -1,0 +1,122 @@
+"""What panels are made of: controls that ask, and show the state without fighting the hand that moves them."""
+
+from __future__ import annotations
+
+import html
+import time
+from collections.abc import Callable
+from typing import Any, TypeAlias
+
+from rcilab.workbench.requests import Request, TypeField
+from rcilab.workbench.text import Message
+
+Ask: TypeAlias = Callable[[Request], None]
+
+_HAND_AWAY = 0.6  # [s] A choice: a control touched less long ago is not written to.
+_TYPING_PAUSE = 0.7  # [s] A choice: a typed number counts when no key came for so long.
+
+
+def on_press(button: Any, ask: Ask, make: Callable[[int | None], Request]) -> None:
+    """Asks for something when a button is pressed.
+
+    Callbacks are async on purpose: viser then runs them on its event loop, in the order of the events. They only put
+    a value into a queue.
+    """
+
+    @button.on_click
+    async def _(event: Any) -> None:
+        ask(make(event.client_id))
+
+
+class Linked:
+    """A slider, dropdown or checkbox that asks when a person moves it and follows the state otherwise.
+
+    Args:
+        handle: The viser control.
+        ask: Takes requests.
+        make: Builds the request from the control's value and the page's client id.
+    """
+
+    def __init__(self, handle: Any, ask: Ask, make: Callable[[Any, int | None], Request | None]) -> None:
+        self.handle = handle
+        self._touched = float("-inf")
+
+        @handle.on_update
+        async def _(event: Any) -> None:
+            if event.client_id is None:  # We set it ourselves.
+                return
+            self._touched = time.monotonic()
+            request = make(event.target.value, event.client_id)
+            if request is not None:
+                ask(request)
+
+    def show(self, value: Any) -> None:
+        """Writes the state's value, unless a person is moving the control."""
+        if self.handle.value != value and time.monotonic() - self._touched > _HAND_AWAY:
+            self.handle.value = value
+
+
+class NumberField:
+    """A text box for a number: a proposal while it is typed, asked for once the typing has paused.
+
+    Args:
+        handle: From `gui.add_text`.
+        ask: Takes requests.
+        field: Name of the field in `TypeField`.
+    """
+
+    def __init__(self, handle: Any, ask: Ask, field: str) -> None:
+        self._handle, self._ask, self.field = handle, ask, field
+        self._typed: tuple[float, str, int | None] | None = None
+        self._counted = 0
+
+        @handle.on_update
+        async def _(event: Any) -> None:
+            if event.client_id is not None:
+                self._typed = (time.monotonic(), event.target.value, event.client_id)
+
+    def show(self, text: str, problem: Message | None, counted: int) -> None:
+        """Commits what was typed, or writes the state's number; called at the display's rate.
+
+        Args:
+            text: The state's number as it is to be shown.
+            problem: What is wrong with the typed number; it is then left as it is.
+            counted: `UiState.typed`.
+        """
+        typed = self._typed
+        if typed is not None:
+            if time.monotonic() - typed[0] < _TYPING_PAUSE:
+                return
+            self._typed = None
+            self._counted = counted
+            self._ask(TypeField(page=typed[2], field=self.field, text=typed[1]))
+            self._waiting = time.monotonic()
+            return
+        if problem is not None or time.monotonic() - getattr(self, "_waiting", 0.0) < 0.2:
+            return  # The answer to what was just typed is still on its way, or it was no.
+        if self._handle.value != text:
+            self._handle.value = text
+
+
+class Html:
+    """A piece of HTML that is sent only when it changes."""
+
+    def __init__(self, gui: Any) -> None:
+        self._handle = gui.add_html("")
+        self._shown = ""
+
+    def show(self, content: str) -> None:
+        """Shows this HTML."""
+        if content != self._shown:
+            self._shown = content
+            self._handle.content = content
+
+
+def esc(text: object) -> str:
+    """Returns text that HTML shows as it is."""
+    return html.escape(str(text))
+
+
+def shown(number: float) -> str:
+    """Returns a number for a field: two decimals, and never "-0.00"."""
+    return f"{round(float(number), 2) + 0.0:.2f}"
