@@ -1,0 +1,255 @@
+"""The running controller: the cycle at 1 kHz or in lock-step, and its sockets. One thread; everything happens in it.
+
+Free-running, a cycle is due every millisecond on a fixed grid. A cycle that this process itself missed is left out
+and counted: the simulated time slips, rather than the client being blamed for commands it had no state to answer.
+In lock-step a motion's next cycle is due when its command has come, however long or short that takes.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections import deque
+from collections.abc import Callable
+
+from rcilab.clock import CYCLE_TIME, SystemClock
+from rcilab.controller.config import ControllerConfig
+from rcilab.controller.cycle import ControlCycle, Reply
+from rcilab.controller.endpoint import (
+    Arrival,
+    ClientJoined,
+    ClientLeft,
+    ClientRefused,
+    DatagramArrived,
+    Endpoint,
+    FrameArrived,
+)
+from rcilab.controller.plant import IdealPlant, Plant
+from rcilab.controller.state_machine import Event, Phase, When
+from rcilab.errors import DecodeError
+from rcilab.model import RobotModel, load_model
+from rcilab.protocols.rci import (
+    COMMAND_SIZE,
+    Connect,
+    Request,
+    decode_command,
+    decode_request,
+    encode_response,
+    encode_state,
+)
+from rcilab.realtime import enter_realtime, leave_realtime
+
+PRIORITY = 80  # Under SCHED_FIFO; above the client's process, whose clock this is.
+RESEND_TIME = 0.02  # [s] In lock-step a state is sent again after this time until the first command has come.
+PATIENCE = 1.0  # [s] In lock-step, for the next command; then its cycle is lost, and each following one at 1 kHz.
+GRACE = 2.0  # [s] For the arm to come to rest when the controller shall end.
+_LOOK = 0.1  # [s] Between looks at whether the parent process still lives.
+
+
+class ControllerServer:
+    """A virtual controller on its sockets. `run` in one thread; `request_stop` from anywhere, signal handlers too.
+
+    Attributes:
+        cycle: The controller itself; owned by the thread that runs.
+        missed: Cycles that this process was too late for and left out.
+        misfits: Datagrams that had not the size of a command.
+
+    Args:
+        config: How it is set up.
+        plant: What moves; None: what the configuration says.
+        log: Takes one line about everything unusual.
+
+    Raises:
+        ModelError: The configuration names no known arm.
+        UsageError: An address or port cannot be used.
+    """
+
+    def __init__(
+        self,
+        config: ControllerConfig,
+        *,
+        plant: Plant | None = None,
+        log: Callable[[str], None] | None = None,
+    ) -> None:
+        self.config = config
+        model = load_model(config.model)
+        self._plant = plant if plant is not None else build_plant(config.plant, model)
+        self.cycle = ControlCycle(
+            model,
+            self._plant,
+            mode_delay=config.mode_delay_cycles,
+            prefill=config.prefill_cycles,
+            lost_limit=config.lost_limit,
+        )
+        self.missed = 0
+        self.misfits = 0
+        self._log = log if log is not None else _to_stderr
+        self._clock = SystemClock()
+        self._requests: deque[bytes] = deque()
+        self._pending: tuple[Request, int, Reply] | None = None
+        self._is_ending = False
+        self._next_look = 0.0
+        self._endpoint = Endpoint(config)
+
+    @property
+    def url(self) -> str:
+        """Where clients connect to."""
+        host, port, udp_port = self._endpoint.host, self._endpoint.port, self._endpoint.udp_port
+        return f"rci://{host}:{port}" + ("" if udp_port == port else f"?udp_port={udp_port}")
+
+    @property
+    def description(self) -> str:
+        """The line that says the controller is ready."""
+        return f"listening {self.url} model={self.cycle.model.name} plant={self._plant.kind}"
+
+    def run(self) -> None:
+        """Runs until `request_stop`, then brings the arm to rest and closes every socket."""
+        use_realtime = self.config.realtime and not self.config.lockstep
+        if use_realtime:
+            warning = enter_realtime(PRIORITY).warning
+            if warning is not None:
+                self._log(warning)
+        try:
+            self._loop()
+        finally:
+            if use_realtime:
+                leave_realtime()
+            self._endpoint.close()
+
+    def request_stop(self) -> None:
+        """Asks for the end: one controlled stop if the arm moves, then `run` returns."""
+        self._is_ending = True
+
+    def close(self) -> None:
+        """Closes the sockets of a server that does not run."""
+        self._endpoint.close()
+
+    def _loop(self) -> None:
+        deadline = self._clock.now()
+        last_moment: float | None = None
+        while True:
+            if self._is_ending and last_moment is None:
+                last_moment = self._clock.now() + GRACE
+                self.cycle.happen(Event.CLIENT_LOST)
+            if last_moment is not None and (not self.cycle.is_moving or self._clock.now() > last_moment):
+                return
+            if self.config.lockstep and self.cycle.wants_commands:
+                self._await_command()
+                deadline = self._clock.now()
+            else:
+                deadline = self._next_deadline(deadline)
+                self._await(deadline)
+            self._step()
+
+    def _next_deadline(self, deadline: float) -> float:
+        deadline += CYCLE_TIME
+        late = self._clock.now() - deadline
+        if late >= CYCLE_TIME:
+            skipped = int(late / CYCLE_TIME)
+            self.missed += skipped
+            deadline += skipped * CYCLE_TIME
+        return deadline
+
+    def _await(self, deadline: float) -> None:
+        """Serves the sockets until the deadline, and at least once."""
+        while True:
+            remaining = deadline - self._clock.now()
+            self._take(self._endpoint.poll(remaining))
+            if remaining <= 0.0:
+                return
+
+    def _await_command(self) -> None:
+        """Serves the sockets until a command is there, the motion is over or patience is."""
+        cycle = self.cycle
+        is_first = not cycle.playout.is_playing
+        patience = CYCLE_TIME if cycle.playout.lost_in_row else PATIENCE
+        deadline = self._clock.now() + patience
+        while True:
+            self._take(self._endpoint.poll(0.0 if len(cycle.playout) else RESEND_TIME if is_first else patience))
+            if len(cycle.playout) or not cycle.wants_commands or self._is_ending:
+                return
+            if is_first:
+                self._send_state()
+            elif self._clock.now() >= deadline:
+                return
+
+    def _step(self) -> None:
+        self.cycle.step()
+        self._send_state()
+        if self._pending is not None and self.cycle.is_settled:
+            request, command_id, reply = self._pending
+            self._pending = None
+            self._answer(request, command_id, reply)
+            self._serve()
+        if self.config.parent_pid is not None and self._clock.now() >= self._next_look:
+            self._next_look = self._clock.now() + _LOOK
+            if os.getppid() != self.config.parent_pid:
+                self.request_stop()
+
+    def _send_state(self) -> None:
+        self._endpoint.send_state(encode_state(self.cycle.state))
+
+    def _take(self, arrivals: list[Arrival]) -> None:
+        for arrival in arrivals:
+            match arrival:
+                case DatagramArrived(datagram):
+                    if len(datagram) == COMMAND_SIZE:
+                        self.cycle.receive(decode_command(datagram, self.cycle.model.n))
+                    else:
+                        self.misfits += 1
+                case FrameArrived(frame):
+                    self._requests.append(frame)
+                    self._serve()
+                case ClientJoined():
+                    self._send_state()  # Before anything else: the vendor's client waits for it a few milliseconds.
+                case ClientLeft(reason):
+                    self._lose_client(reason)
+                case ClientRefused(address, holder):
+                    self._log(f"refused a second client from {address}: {holder} is connected; one at a time")
+
+    def _serve(self) -> None:
+        """Handles requests in order, up to one whose answer has to wait."""
+        while self._requests and self._pending is None:
+            frame = self._requests.popleft()
+            try:
+                command_id, request = decode_request(frame)
+            except DecodeError as error:
+                self._requests.clear()
+                self._endpoint.drop_client(f"sent bytes that are no RCI: {error}")
+                return
+            reply = self.cycle.handle(request)
+            if isinstance(request, Connect):
+                self._endpoint.redirect_states(request.udp_port)
+            # Idle modes are to be seen before StopMove is answered, so even an arm at rest answers after a cycle.
+            if reply.when is When.AT_REST:
+                self._pending = (request, command_id, reply)
+            else:
+                self._answer(request, command_id, reply)
+
+    def _answer(self, request: Request, command_id: int, reply: Reply) -> None:
+        self._endpoint.send_frame(encode_response(request.code, command_id, reply.response))
+        if reply.ends_connection:
+            self._endpoint.drop_client("asked for a reboot")
+
+    def _lose_client(self, reason: str) -> None:
+        was_moving = self.cycle.phase in (Phase.MOVING, Phase.STOPPING, Phase.GUIDING)
+        self._requests.clear()
+        self._pending = None
+        self.cycle.happen(Event.CLIENT_LOST)
+        if was_moving:
+            self._log(f"the client {reason} in mid-motion: the arm comes to rest")
+        elif reason != "closed the connection":
+            self._log(f"the client {reason}")
+
+
+def build_plant(kind: str, model: RobotModel) -> Plant:
+    """Returns the arm that a controller moves."""
+    if kind == "mujoco":
+        from rcilab.controller.mujoco_plant import MuJoCoPlant
+
+        return MuJoCoPlant(model)
+    return IdealPlant(model)
+
+
+def _to_stderr(line: str) -> None:
+    print(f"rcilab controller: {line}", file=sys.stderr, flush=True)
