@@ -142,7 +142,7 @@ def _recommended(
         formula=formula,
         necessity="recommended",
         unit=("rad", "rad/s", "rad/s^2")[order],
-        source=f"{MANUAL}, 4.1, at the {stage}; tolerance: a choice",
+        source=f"{MANUAL}, 4.1 (tolerance: ours)",
         fault=None,
         stage=stage,
         order=order,

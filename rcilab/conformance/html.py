@@ -5,8 +5,6 @@ from __future__ import annotations
 from html import escape
 from typing import TYPE_CHECKING
 
-from rcilab.conformance.wording import amount
-
 if TYPE_CHECKING:
     from rcilab.conformance.report import ConditionResult, Report
 
@@ -14,7 +12,7 @@ COLORS = {"ok": "#1a7f37", "advice": "#b26a00", "violated": "#c62828"}
 """Green, amber, red, each readable on white and on dark grey."""
 
 _LISTED = 8
-_CELL = 'style="text-align:left;padding:2px 10px"'
+_CELL = 'style="text-align:left;white-space:nowrap;padding:2px 10px"'
 _HEADINGS = ("", "condition", "worst", "bound", "used", "joint", "t [s]", "source")
 
 
@@ -37,8 +35,8 @@ def report_html(report: Report) -> str:
 
 
 def _row(row: ConditionResult) -> str:
-    value, bound = amount(row.value, row.bound)
-    used = f"{100.0 * row.ratio:.1f} %" if row.necessity == "necessary" else ""
+    value, bound, used = row.texts
+    unit = escape(row.unit).replace("^2", "²").replace("^3", "³")
     name = f'<span title="{escape(row.condition.formula)}">{escape(row.condition.quantity)}</span>'
     if row.necessity == "recommended":
         name += " <i>(recommended)</i>"
@@ -46,8 +44,8 @@ def _row(row: ConditionResult) -> str:
     cells = (
         mark,
         name,
-        f"{value} {escape(row.unit)}",
-        f"{bound} {escape(row.unit)}",
+        f"{value} {unit}",
+        f"{bound} {unit}",
         used,
         str(row.joint),
         f"{row.time:.3f}",

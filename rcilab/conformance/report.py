@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from rcilab.conformance.certificate import Certificate
 from rcilab.conformance.conditions import Condition, Necessity
-from rcilab.conformance.wording import amount, with_degrees
+from rcilab.conformance.wording import amount, share, with_degrees
 from rcilab.errors import ConformanceError
 from rcilab.faults import Fault
 
@@ -61,6 +61,13 @@ class ConditionResult:
     def unit(self) -> str:
         """Unit of value and bound."""
         return self.condition.unit
+
+    @property
+    def texts(self) -> tuple[str, str, str]:
+        """Worst value, bound and used part as text; what is to be zero, and is, reads 0."""
+        if self.necessity == "necessary":
+            return *amount(self.value, self.bound), share(self.ratio)
+        return "0" if self.ok else f"{self.value:.4g}", f"0 ± {abs(self.bound):g}", ""
 
     @property
     def verdict(self) -> str:
@@ -158,13 +165,10 @@ class Report:
     def __str__(self) -> str:
         lines = [self.title, self._verdict()]
         for row in self.rows:
-            value, bound = amount(row.value, row.bound)
+            value, bound, used = row.texts
             place = f"joint {row.joint}, t = {row.time:.3f} s"
-            share = f"{100.0 * row.ratio:.1f} %" if row.necessity == "necessary" else ""
-            lines.append(
-                f"  {row.verdict:8}  {row.id:18}  {value:>9} of {bound:>7} {row.unit:8} {share:>8}  {place}  "
-                f"[{row.source}]"
-            )
+            size = f"{value:>9} of {bound:>10} {row.unit:7} {used:>7}"
+            lines.append(f"  {row.verdict:8}  {row.id:18}  {size}  {place}  [{row.source}]")
         found = (*self.violations, *self.warnings)
         lines += [f"- {violation}" for violation in found[:_LISTED]]
         if len(found) > _LISTED:
@@ -182,7 +186,7 @@ class Report:
     def _verdict(self) -> str:
         worst = self.worst
         if self.ok:
-            near = f"{worst.condition.quantity} of joint {worst.joint}, {100.0 * worst.ratio:.1f} % of its bound"
+            near = f"{worst.condition.quantity} of joint {worst.joint}, {share(worst.ratio)} of its bound"
             advice = f"; {_plural(len(self.warnings), 'recommendation')} not met" if self.warnings else ""
             return f"conforms{advice}; nearest: {near}"
         broken = [row for row in self.rows if not row.ok and row.necessity == "necessary"]

@@ -17,6 +17,11 @@ def amount(value: float, bound: float) -> tuple[str, str]:
     return repr(value), repr(bound)
 
 
+def share(ratio: float) -> str:
+    """Returns how much of a bound is used: in percent, or as a factor far beyond it."""
+    return f"{100.0 * ratio:.1f} %" if ratio < 10.0 else f"{ratio:.0f} x"
+
+
 def with_degrees(angle: float, text: str) -> str:
     """Returns an angle in both units; `text` is its number in [rad]."""
     return f"{text} rad ({degrees(angle):.2f}°)"
