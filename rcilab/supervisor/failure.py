@@ -11,7 +11,8 @@ from rcilab.faults import Fault
 
 def pack_failure(error: Exception) -> dict[str, Any]:
     """Returns an error as a letter."""
-    failure: dict[str, Any] = {"kind": type(error).__name__, "message": str(error)}
+    kind = next((kind.__name__ for kind in type(error).__mro__ if hasattr(errors, kind.__name__)), "RcilabError")
+    failure: dict[str, Any] = {"kind": kind, "message": str(error)}
     if not isinstance(error, RcilabError):
         failure["message"] = f"the control process failed with {type(error).__name__}: {error}; this is a defect"
     if isinstance(error, ControlError):

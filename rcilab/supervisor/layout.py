@@ -41,6 +41,7 @@ VERSION = 1  # Count up with every change of this file, of the snapshot or of `c
 RING_CYCLES = 32768  # 33 s of cycles: how long a reader may sleep.
 MOTION_TIME = 300.0  # [s] Longest motion that can be handed over.
 MOTION_ROWS = round(MOTION_TIME / CYCLE_TIME) + 1
+OPERATOR_TIMEOUT = 2.0  # [s] Nobody at the controls for that long ends a motion (workbench: operator lease).
 MAIL_SLOTS = 16
 MAIL_SIZE = 4096  # [bytes] of one letter.
 

@@ -31,15 +31,18 @@ from rcilab.protocols.rci import STATE_SIZE
 from rcilab.realtime import enter_realtime
 from rcilab.state import ControllerMode, RobotState
 from rcilab.supervisor.failure import pack_failure
-from rcilab.supervisor.layout import ControlBlock, Word
+from rcilab.supervisor.layout import OPERATOR_TIMEOUT, ControlBlock, Word
 from rcilab.supervisor.mailbox import Mailbox
 from rcilab.supervisor.publisher import Publisher
 from rcilab.supervisor.settings import parse_settings
 from rcilab.supervisor.status import MESSAGES, Phase
 
-OPERATOR_TIMEOUT = 2.0  # [s] Nobody at the controls for that long ends a motion (workbench: operator lease).
 SILENCE = 0.3  # [s] without a state while idle before the connection counts as lost; a choice below half a second.
 _LOOK = 0.02  # [s] Longest wait in the idle loop.
+
+
+class StoppedError(ControlError):
+    """A motion was brought to rest before its end, because somebody wanted it so."""
 
 
 class Worker:
@@ -62,6 +65,7 @@ class Worker:
         self._link: Link | None = None
         self._address = ""
         self._is_ending = False
+        self._deferred: list[dict[str, Any]] = []
 
     def run(self) -> int:
         """Lives until asked to end or until the supervisor is gone; returns the exit code."""
@@ -107,12 +111,12 @@ class Worker:
         phase = self._publisher.snapshot.phase
         if state.faults:
             if phase != "fault":
-                self._say("fault", "fault", faults=", ".join(fault.name for fault in state.faults))
+                self._say("fault", "fault", faults=_names(state.faults))
         elif phase in ("fault", "lost"):
             self._say_ready()
 
     def _serve(self) -> None:
-        while (request := self._inbox.take()) is not None:
+        while (request := self._deferred.pop(0) if self._deferred else self._inbox.take()) is not None:
             handler: Callable[[dict[str, Any]], None] = getattr(self, f"_do_{request['kind']}")
             try:
                 handler(request)
@@ -123,14 +127,15 @@ class Worker:
                 raise
             else:
                 self._outbox.post({"id": request["id"]})
-        self._stops_seen = self._words[Word.STOPS_ASKED]
 
     def _fail(self, request: dict[str, Any], error: Exception) -> None:
-        if isinstance(error, ConnectionLostError):
+        if isinstance(error, StoppedError):
+            pass  # Said already.
+        elif isinstance(error, ConnectionLostError):
             self._disconnect()
             self._say("lost", "lost.unreachable", error=str(error))
         elif isinstance(error, ControlError) and error.faults:
-            self._say("fault", "fault", faults=", ".join(fault.name for fault in error.faults))  # type: ignore[attr-defined]
+            self._say("fault", "fault", faults=_names(error.faults))
         elif self._link is not None:
             self._say("idle", "idle.failed", error=str(error))
         self._outbox.post({"id": request["id"], "failure": pack_failure(error)})
@@ -170,6 +175,10 @@ class Worker:
         self._learn_power()
         self._say_ready()
 
+    def _do_stop(self, request: dict[str, Any]) -> None:
+        # Served in its turn, so what it was meant for stands still by now; see `_watch`.
+        self._stops_seen = request["number"]
+
     def _do_end(self, request: dict[str, Any]) -> None:
         self._is_ending = True
 
@@ -197,7 +206,7 @@ class Worker:
         else:
             self._say("idle", "idle.stopped")
         if reason is not None:
-            raise UsageError(self._publisher.snapshot.message)
+            raise StoppedError(self._publisher.snapshot.message)
 
     def _watch(self, t: float) -> str | None:
         """Looked at in every cycle of a motion: does anybody or anything want it to end?"""
@@ -218,8 +227,8 @@ class Worker:
         request = self._inbox.take()
         if request is None:
             return None
-        if request["kind"] == "end":
-            self._is_ending = True
+        if request["kind"] in ("stop", "end"):
+            self._deferred.append(request)
             return "idle.stopped"
         error = UsageError("the arm is moving; stop it first, or wait until it has arrived")
         self._outbox.post({"id": request["id"], "failure": pack_failure(error)})
@@ -238,8 +247,7 @@ class Worker:
 
     def _say_ready(self) -> None:
         if self._link is not None and self._link.latest is not None and self._link.latest.faults:
-            names = ", ".join(fault.name for fault in self._link.latest.faults)
-            self._say("fault", "fault", faults=names)
+            self._say("fault", "fault", faults=_names(self._link.latest.faults))
         elif self._publisher.snapshot.powered:
             self._say("idle", "idle")
         else:
@@ -259,6 +267,10 @@ class Worker:
             self._link.close()
             self._link = None
             self._publisher.update(powered=None)
+
+
+def _names(faults: Sequence[object]) -> str:
+    return ", ".join(getattr(fault, "name", str(fault)) for fault in faults)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
