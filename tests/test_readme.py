@@ -33,7 +33,7 @@ def test_every_link_leads_to_a_file() -> None:
 
 
 def test_every_command_it_names_exists() -> None:
-    listing = subprocess.run([sys.executable, "-m", "rcilab", "--help"], capture_output=True, text=True, check=True)
+    listing = subprocess.run([sys.executable, "-m", "rcilab.cli", "--help"], capture_output=True, text=True, check=True)
     named = {words for words in re.findall(r"rcilab (\w+)", README) if words.islower()}
     assert named >= {"lab", "controller", "urdf", "mjcf", "doctor", "bench"}
     assert [name for name in sorted(named) if not re.search(rf"\b{name}\b", listing.stdout)] == []

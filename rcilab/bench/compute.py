@@ -61,11 +61,11 @@ def bench_plan_joint() -> Measurement:
 def bench_check() -> Measurement:
     """The judgement of a 7-joint motion of 10 s; each time of a fresh one, so that nothing is cached."""
     model = load_model(_ROBOT)
-    motions = [_motion_of(model, 10.0) for _ in range(30)]
+    motions = [motion_of(model, 10.0) for _ in range(30)]
     times = time_calls(lambda motion: check(motion, model), motions, warm_up=0)
     costs = []
     for duration in (1.0, 3.0, 10.0, 30.0):
-        motion = _motion_of(model, duration)
+        motion = motion_of(model, duration)
         costs.append(
             f"{motion.duration:.0f} s {1e3 * time_calls(lambda m: check(m, model), [motion], warm_up=0)[0]:.1f} ms"
         )
@@ -73,20 +73,26 @@ def bench_check() -> Measurement:
     return summarise("check", times, "ms", 10.0, note)
 
 
+def motion_of(model: RobotModel, duration: float, start: Array | None = None) -> Motion:
+    """Returns a fresh motion of about this duration, [s], towards the far end of every joint's range.
+
+    Args:
+        model: The arm.
+        duration: How long it is to take, [s].
+        start: Where it starts, shape (n,), [rad]; the near end of every joint's range when absent.
+    """
+    near = -0.9 * model.limits.joint.upper if start is None else start
+    far = 0.9 * model.limits.joint.upper
+    fastest = plan_joint(model, near, far, speed=1.0).duration
+    if duration <= fastest:
+        return plan_joint(model, near, near + (far - near) * duration / fastest, speed=1.0)
+    return plan_joint(model, near, far, speed=fastest / duration)
+
+
 def _random_q(model: RobotModel, count: int) -> Array:
     """Returns joint angles spread over the joint ranges, shape (count, n), [rad], the same on every machine."""
     limits = model.limits.joint
     return np.random.default_rng(_SEED).uniform(0.98 * limits.lower, 0.98 * limits.upper, (count, model.n))
-
-
-def _motion_of(model: RobotModel, duration: float) -> Motion:
-    """Returns a fresh motion of about this duration, [s]: the speed is chosen so that it takes that long."""
-    start, goal = -0.9 * model.limits.joint.upper, 0.9 * model.limits.joint.upper
-    fastest = plan_joint(model, start, goal, speed=1.0).duration
-    if duration <= fastest:
-        goal = start + (goal - start) * duration / fastest
-        return plan_joint(model, start, goal, speed=1.0)
-    return plan_joint(model, start, goal, speed=fastest / duration)
 
 
 def _growth(call: Any, cases: dict[int, Any]) -> str:

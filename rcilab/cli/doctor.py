@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import os
 import re
-import shutil
 import socket
 import sys
 from dataclasses import dataclass
@@ -13,6 +12,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Literal
 
+from rcilab.bench.browser import BROWSERS, find_browser
 from rcilab.bench.machine import ask_realtime
 
 OLDEST_PYTHON = (3, 11)
@@ -20,7 +20,6 @@ CONTROLLER_ADDRESS = "127.0.0.2"  # Where `rcilab controller` listens unless tol
 CONTROLLER_PORT = 1337
 FEWEST_CORES = 2
 """One for the 1 kHz loops, one for the page and the browser."""
-BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "firefox", "microsoft-edge")
 
 _REAL_TIME_LIMITS = (
     "add '@realtime - rtprio 80' and '@realtime - memlock unlimited' to /etc/security/limits.conf, join that group"
@@ -169,10 +168,9 @@ def check_kernel(flag: Path) -> Finding:
 
 def check_browser(names: tuple[str, ...]) -> Finding:
     """Is there a browser to open the page in?"""
-    for name in names:
-        path = shutil.which(name)
-        if path:
-            return Finding("browser", "ok", path)
+    path = find_browser(names)
+    if path is not None:
+        return Finding("browser", "ok", path)
     return Finding("browser", "note", "none found", "install one (Debian: apt-get install chromium)")
 
 

@@ -26,7 +26,7 @@ def test_a_missing_directory_is_refused_by_name(tmp_path: Path) -> None:
 def test_jupyterlab_starts_on_loopback_and_serves_the_directory(tmp_path: Path) -> None:
     (tmp_path / "notes").mkdir()
     runtime = tmp_path / "runtime"
-    command = [sys.executable, "-c", "from rcilab.cli import main; raise SystemExit(main())", "lab"]
+    command = [sys.executable, "-m", "rcilab.cli", "lab"]
     command += [str(tmp_path / "notes"), "--no-browser", *(["--allow-root"] if os.geteuid() == 0 else [])]
     environment = {
         **os.environ,

@@ -1,0 +1,99 @@
+"""`rcilab bench`: how fast this machine is, beside what we promise."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import textwrap
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from rcilab.errors import UsageError
+
+if TYPE_CHECKING:
+    from rcilab.bench.measure import Measurement
+
+BENCHES = ("forward", "inverse", "plan_joint", "check", "drag", "import", "start", "control_loop")
+"""In the order they run; the slow ones last."""
+
+_STREAMING = 30.0  # [s]
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Adds `rcilab bench`."""
+    parser = subparsers.add_parser("bench", help="measure this machine beside what we promise")
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"one or more of: {', '.join(BENCHES)} (default: all)")
+    parser.add_argument("--json", action="store_true", help="print one JSON list instead of a table")
+    parser.add_argument(
+        "--seconds", type=float, default=_STREAMING, help="how long control_loop streams, [s] (default: %(default)s)"
+    )
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Measures and prints, the machine first; returns 1 when a promise is not kept, else 0.
+
+    Raises:
+        UsageError: A bench is unknown, or the time is no time.
+    """
+    names = _chosen(args.names)
+    if not 0.5 <= args.seconds <= 600.0:
+        raise UsageError(f"--seconds {args.seconds:g} is not from 0.5 to 600 s")
+    from rcilab.bench.machine import describe_machine
+
+    machine = describe_machine()
+    if not args.json:
+        _print_machine(machine)
+    found: list[Measurement] = []
+    for name in names:
+        if not args.json and sys.stderr.isatty():
+            print(f"{name} ...", end="\r", file=sys.stderr, flush=True)
+        found.append(_bench(name, args.seconds)())
+        if not args.json:
+            print(_row(found[-1]), flush=True)
+    if args.json:
+        print(json.dumps([machine, *(measurement.as_json() for measurement in found)], indent=1))
+    return 1 if any(measurement.ok is False for measurement in found) else 0
+
+
+def _chosen(names: list[str]) -> list[str]:
+    unknown = [name for name in names if name not in BENCHES]
+    if unknown:
+        raise UsageError(f"unknown bench {unknown[0]!r}; known: {', '.join(BENCHES)}")
+    return [name for name in BENCHES if name in names or not names]
+
+
+def _bench(name: str, seconds: float) -> Callable[[], Measurement]:
+    """Returns a bench by name; what it needs is loaded now, so that it is not part of what the next one measures."""
+    if name in ("import", "start"):
+        from rcilab.bench import start
+
+        return {"import": start.bench_import, "start": start.bench_start}[name]
+    if name in ("drag", "control_loop"):
+        from rcilab.bench import page
+
+        return page.bench_drag if name == "drag" else lambda: page.bench_control_loop(seconds)
+    from rcilab.bench import compute
+
+    return {
+        "forward": compute.bench_forward,
+        "inverse": compute.bench_inverse,
+        "plan_joint": compute.bench_plan_joint,
+        "check": compute.bench_check,
+    }[name]
+
+
+def _print_machine(machine: dict[str, Any]) -> None:
+    versions = ", ".join(f"{name} {version}" for name, version in machine["versions"].items())
+    fifo = "in force" if machine["sched_fifo"] else "NOT permitted"
+    print(f"{machine['cpu']}, {machine['cores']} cores, load {machine['load']}; {machine['kernel']}; SCHED_FIFO {fifo}")
+    print(f"Python {machine['python']}, {versions}")
+    print(f"\n{'':4} {'bench':14} {'median':>10} {'p99':>10} {'target':>10}")
+
+
+def _row(found: Measurement) -> str:
+    verdict = {True: "ok", False: "SLOW", None: "-"}[found.ok]
+    target = "-" if found.target is None else f"{found.target:g}"
+    numbers = f"{verdict:4} {found.name:14} {found.median:10.3g} {found.p99:10.3g} {target:>10} {found.unit}"
+    return numbers + "\n" + textwrap.fill(found.note, 110, initial_indent=" " * 7, subsequent_indent=" " * 7)
