@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from rcilab.supervisor.simulate import simulate as simulate
+    from rcilab.supervisor.simulation import simulate as simulate
     from rcilab.supervisor.status import SupervisorStatus as SupervisorStatus
     from rcilab.supervisor.supervisor import Supervisor as Supervisor
     from rcilab.supervisor.supervisor import Ticket as Ticket
 
-_HOME = {"Supervisor": "supervisor", "Ticket": "supervisor", "SupervisorStatus": "status", "simulate": "simulate"}
+_HOME = {"Supervisor": "supervisor", "Ticket": "supervisor", "SupervisorStatus": "status", "simulate": "simulation"}
 
 __all__ = ["Supervisor", "SupervisorStatus", "Ticket", "simulate"]
 
