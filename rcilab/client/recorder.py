@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import struct
+from collections import deque
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -15,7 +16,7 @@ from rcilab.state import RobotState
 
 RECORD_TIME = 60.0  # [s] of cycles that a recorder keeps unless told otherwise; a choice.
 _CYCLE_NS = round(CYCLE_TIME * 1e9)
-_CREEP = 100  # [ns] a cycle, 100 ppm: more than two computers' clocks drift apart.
+_GRID_CYCLES = 8  # A controller that slips counts as late for so many cycles, a hiccup of ours for as many at most.
 
 
 def cycle_dtype(n: int) -> np.dtype[np.void]:
@@ -128,8 +129,8 @@ class Recorder:
 class CycleLog:
     """Writes states and answers as rows of a recorder, and judges how late each was. Owned by the loop's thread.
 
-    Lateness is counted from the robot's own 1 ms grid: the earliest moment at which a state of that number could have
-    been here, judging by all states so far. The grid may creep by `_CREEP` a cycle to follow a clock that runs slower.
+    Lateness is counted from the robot's own 1 ms grid, as the most punctual of the last `_GRID_CYCLES` states shows it.
+    So short a memory follows another computer's clock, and a controller that left a cycle out.
 
     Args:
         recorder: Where rows go.
@@ -144,7 +145,7 @@ class CycleLog:
         self.lost_total = 0
         """Controller cycles whose state never arrived."""
         self._last_id: int | None = None
-        self._grid_ns = 0
+        self._origins: deque[int] = deque(maxlen=_GRID_CYCLES)
         self._nothing = (math.nan,) * recorder.n
 
     def restart(self) -> None:
@@ -170,16 +171,15 @@ class CycleLog:
             command: Joint angles sent in answer, n numbers, [rad].
         """
         number = state.message_id
-        origin = received_ns - number * _CYCLE_NS
         lost = 0
         if self._last_id is None or number < self._last_id:
-            self._grid_ns = origin
+            self._origins.clear()
         elif number > self._last_id:
             lost = number - self._last_id - 1
             self.lost_total += lost
-            self._grid_ns = min(origin, self._grid_ns + _CREEP * (lost + 1))
         self._last_id = number
-        self.lateness = ((sent_ns or received_ns) - number * _CYCLE_NS - self._grid_ns) * 1e-9
+        self._origins.append(received_ns - number * _CYCLE_NS)
+        self.lateness = ((sent_ns or received_ns) - number * _CYCLE_NS - min(self._origins)) * 1e-9
         self.recorder.write(
             number,
             t,

@@ -1,18 +1,20 @@
-"""The control process and its supervisor: shared memory, requests, start, watch, stop, restart."""
+"""The control process and its supervisor: shared memory, requests, start, watch, stop, restart.
+
+`simulate` lives in the module of the same name and is for that reason not a name of this package: `rcilab.simulate`.
+"""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from rcilab.supervisor.simulation import simulate as simulate
     from rcilab.supervisor.status import SupervisorStatus as SupervisorStatus
     from rcilab.supervisor.supervisor import Supervisor as Supervisor
-    from rcilab.supervisor.supervisor import Ticket as Ticket
+    from rcilab.supervisor.ticket import Ticket as Ticket
 
-_HOME = {"Supervisor": "supervisor", "Ticket": "supervisor", "SupervisorStatus": "status", "simulate": "simulation"}
+_HOME = {"Supervisor": "supervisor", "Ticket": "ticket", "SupervisorStatus": "status"}
 
-__all__ = ["Supervisor", "SupervisorStatus", "Ticket", "simulate"]
+__all__ = ["Supervisor", "SupervisorStatus", "Ticket"]
 
 
 def __getattr__(name: str) -> object:
