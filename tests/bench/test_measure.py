@@ -1,0 +1,42 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rcilab.bench.compute import motion_of
+from rcilab.bench.measure import summarise, time_calls
+from rcilab.conformance.check import check
+from rcilab.model import load_model
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("us", 1e6), ("ms", 1e3), ("s", 1.0)])
+def test_times_are_reported_in_the_unit_that_is_named(unit: str, factor: float) -> None:
+    found = summarise("x", [0.001, 0.002, 0.003], unit, None)  # type: ignore[arg-type]
+    assert found.median == pytest.approx(0.002 * factor)
+    assert found.ok is None
+
+
+@pytest.mark.parametrize(("target", "ok"), [(2.0, True), (1.9, False)])
+def test_the_promise_is_about_the_median(target: float, ok: bool) -> None:
+    assert summarise("x", [0.001, 0.002, 0.9], "ms", target).ok is ok
+
+
+def test_the_99th_percentile_is_not_the_largest() -> None:
+    times = np.arange(1, 1001) / 1e6
+    assert summarise("x", times, "us", None).p99 == pytest.approx(990.0, abs=0.1)
+
+
+def test_every_argument_is_timed_once_after_the_warm_up() -> None:
+    called: list[object] = []
+    times = time_calls(called.append, [1, 2, 3], warm_up=2)
+    assert called == [1, 2, 1, 2, 3]
+    assert len(times) == 3
+    assert min(times) > 0.0
+
+
+@pytest.mark.parametrize("duration", [0.8, 3.0, 10.0, 30.0])
+def test_a_motion_to_stream_takes_as_long_as_asked_and_conforms(duration: float) -> None:
+    model = load_model("xMatePro7")
+    motion = motion_of(model, duration, model.home)
+    assert motion.duration == pytest.approx(duration, rel=0.25)
+    assert check(motion, model).ok

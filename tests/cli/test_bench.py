@@ -1,0 +1,57 @@
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from rcilab.cli import main
+from rcilab.cli.bench import BENCHES
+
+KEYS = {"name", "median", "p99", "unit", "target", "ok", "note"}
+
+
+def test_an_unknown_bench_is_refused_with_the_known_ones(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["bench", "forward", "speed_of_light"]) == 2
+    said = capsys.readouterr().err
+    assert "unknown bench 'speed_of_light'" in said
+    assert all(name in said for name in BENCHES)
+
+
+@pytest.mark.parametrize("seconds", ["0", "-3", "nan", "1e9"])
+def test_a_streaming_time_that_is_none_is_refused(seconds: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["bench", "control_loop", "--seconds", seconds]) == 2
+    assert "0.5 to 600 s" in capsys.readouterr().err
+
+
+def test_json_is_one_list_with_the_machine_first(capsys: pytest.CaptureFixture[str]) -> None:
+    code = main(["bench", "inverse", "forward", "--json"])
+    machine, *found = json.loads(capsys.readouterr().out)
+    assert machine["name"] == "machine"
+    assert {"cpu", "cores", "kernel", "python", "sched_fifo", "versions"} <= machine.keys()
+    assert [bench["name"] for bench in found] == ["forward", "inverse"]
+    for bench in found:
+        assert bench.keys() == KEYS
+        assert 0.0 < bench["median"] <= bench["p99"]
+        assert bench["ok"] is (bench["median"] <= bench["target"])
+    assert "WITHOUT A SOLUTION" not in found[1]["note"]
+    assert code == (0 if all(bench["ok"] for bench in found) else 1)
+
+
+def test_the_table_names_machine_median_and_target(capsys: pytest.CaptureFixture[str]) -> None:
+    main(["bench", "forward"])
+    printed = capsys.readouterr().out
+    assert "cores" in printed.splitlines()[0]
+    assert "SCHED_FIFO" in printed.splitlines()[0]
+    (row,) = [line for line in printed.splitlines() if "forward  " in line]
+    assert row.split()[-1] == "us"
+    assert row.split()[-2] == "10"
+
+
+@pytest.mark.realtime
+def test_the_loop_streams_and_reports_every_figure(capsys: pytest.CaptureFixture[str]) -> None:
+    """Only that it runs and reports: how late this machine is on this day is no verdict on the code."""
+    main(["bench", "control_loop", "--seconds", "2", "--json"])
+    _, found = json.loads(capsys.readouterr().out)
+    assert found["name"] == "control_loop"
+    for figure in ("p50", "p99", "p99.9", "max", "late by more than 1 ms", "lost", "success rate"):
+        assert figure in found["note"]
