@@ -86,7 +86,7 @@ class Presenter:
 
     def _build(self, state: UiState) -> None:
         """Makes the panels anew: another language has other words, another arm other joints."""
-        gui = self._server.gui
+        gui: Any = self._server.gui  # Icons are plain strings here, which viser's types do not allow.
         for container in self._containers:
             container.remove()
         self._text = Text(state.language)

@@ -97,7 +97,10 @@ def _why_not(refusal: UnreachableError) -> Message:
 
 
 def _nearest_reachable(model: RobotModel, target: Pose, near: JointVector, psi: float | None) -> Solutions | None:
-    """Returns the branches at the better of two poses: the target pulled towards the shoulder, and the last step on the way from `near`."""
+    """Returns the branches at the better of two poses.
+
+    One is the target pulled towards the shoulder, the other the last reachable one on the way from `near`.
+    """
     shoulder = np.array([0.0, 0.0, model.description.dh[0].d])
     wanted, start = target.position, model.forward(near)
     tries = []

@@ -153,11 +153,10 @@ def _guarded_serve(
     import io
     from contextlib import redirect_stdout
 
-    from viser.infra import _infra
+    import websockets.asyncio.server as serving
     from websockets.datastructures import Headers
     from websockets.http11 import Response
 
-    serving = _infra.websockets.asyncio.server
     original = serving.serve
 
     def refuse(reason: str) -> Response:

@@ -101,7 +101,7 @@ class Stage:
             "/target", scale=_GIZMO_SCALE, line_width=3.0, depth_test=False, wxyz=pose.wxyz, position=pose.position
         )
         self._mark: Any = scene.add_icosphere(
-            "/mark", radius=0.05, color=TONE_COLORS["good"], opacity=0.55, cast_shadow=False, receive_shadow=False,
+            "/mark", radius=0.075, color=TONE_COLORS["good"], opacity=0.4, cast_shadow=False, receive_shadow=False,
             position=pose.position,
         )  # fmt: skip
         self._label: Any = scene.add_label(

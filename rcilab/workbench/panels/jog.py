@@ -14,7 +14,8 @@ if TYPE_CHECKING:
     from rcilab.supervisor import SupervisorStatus
     from rcilab.workbench.store import UiState
 
-_NAMES: tuple[Literal["zero", "home", "here", "undo"], ...] = ("zero", "home", "here", "undo")
+_Name = Literal["zero", "home", "here", "undo"]
+_NAMES: tuple[_Name, ...] = ("zero", "home", "here", "undo")
 
 
 class JogPanel:
@@ -28,7 +29,7 @@ class JogPanel:
         text, limits = self._text, state.model.limits.joint
         gui.add_html(f'<p class="rl-note">{esc(text("jog.note"))}</p>')
         self._buttons = gui.add_button_group(text("jog.poses"), [text(f"jog.{name}") for name in _NAMES])
-        names = {text(f"jog.{name}"): name for name in _NAMES}
+        names: dict[str, _Name] = {text(f"jog.{name}"): name for name in _NAMES}
 
         @self._buttons.on_click
         async def _(event: Any) -> None:

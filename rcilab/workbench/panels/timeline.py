@@ -87,10 +87,11 @@ class TimelinePanel:
             self._readout.show(f'<p class="rl-note">{esc(text("timeline.nothing"))}</p>')
         else:
             duration = state.plan.motion.duration
-            kinds = text("timeline.plan_only" if state.recording is None else "timeline.kinds")
-            self._readout.show(
-                f'<p class="rl-clock"><b>{state.place * duration:.3f}</b> / {duration:.3f} s<span>{esc(kinds)}</span></p>'
+            t, kinds = (
+                state.place * duration,
+                text("timeline.plan_only" if state.recording is None else "timeline.kinds"),
             )
+            self._readout.show(f'<p class="rl-clock"><b>{t:.3f}</b> / {duration:.3f} s<span>{esc(kinds)}</span></p>')
         for plot in self._plots.values():
             plot.height = _plot_height(state)
         wanted = (state.plan, state.recording, state.plot_joint, state.model)
@@ -108,7 +109,7 @@ class TimelinePanel:
             actual = recorded_curves(recording.t, recording.q, recording.q_c, recording.dq, quantity)
         frame = build_frame(plan, actual, state.model.limits.joint, quantity, joint)
         self.end = frame.end
-        unit = _UNITS[quantity] if joint else "%"
+        unit = _UNITS[quantity] if joint else self._text("plot.percent")
         title = self._text(f"plot.{quantity}") + (f" · J{joint}" if joint else "") + f" [{unit}]"
         self._titles[quantity].show(f'<div class="rl-plot-title">{esc(title)}</div>')
         plot = self._plots[quantity]
