@@ -100,15 +100,15 @@ class Plant(Protocol):
 class IdealPlant:
     """The arm that is exactly where it was told to be; its torques are those of the rigid-body model.
 
-    Impedance is exact tracking too: without outside forces a spring has nothing to yield to. What commands torques or
-    needs a hand to push it (TORQUE, GUIDED) is beyond it.
+    Nothing outside can touch it. So impedance is exact tracking too (a spring without a load is not stretched), and
+    guided by a hand that does not exist it stays where it is. What commands torques (TORQUE) is beyond it.
 
     Args:
         model: The arm with its tool and load.
     """
 
     kind = "ideal"
-    drives = frozenset({Drive.BRAKED, Drive.POSITION, Drive.IMPEDANCE})
+    drives = frozenset({Drive.BRAKED, Drive.POSITION, Drive.IMPEDANCE, Drive.GUIDED})
 
     def __init__(self, model: RobotModel) -> None:
         self._model = model
@@ -128,9 +128,9 @@ class IdealPlant:
         return self._measure(frozen(q), self._zeros, self._zeros)
 
     def step(self, setpoint: Setpoint) -> Measurement:
-        """Moves the arm to the setpoint; braked, it stays where it is."""
+        """Moves the arm to the setpoint; braked or guided, it stays where it is."""
         last = self._measurement
-        if setpoint.drive is Drive.BRAKED:
+        if setpoint.drive in (Drive.BRAKED, Drive.GUIDED):
             return last if self._rests else self.reset(last.q)
         stays = not any(setpoint.dq) and not any(setpoint.ddq) and last.q.tolist() == list(setpoint.q)
         if stays and self._rests:

@@ -1,0 +1,80 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rcilab.controller.commanded import CommandedMotion
+from rcilab.model import load_model
+
+LIMITS = load_model("xMatePro7").limits.joint
+UNIT = st.lists(st.floats(-1.0, 1.0), min_size=7, max_size=7).map(np.array)
+
+
+def moving(velocity: np.ndarray, acceleration: np.ndarray) -> tuple[CommandedMotion, list[np.ndarray]]:
+    """A commanded motion that has had constant acceleration long enough for its differences to be true."""
+    commanded = CommandedMotion(LIMITS, [0.0] * 7)
+    t = np.arange(-5, 1)[:, None] * 1e-3
+    rows = velocity * t + acceleration * t * t / 2.0
+    commanded.place(rows[0].tolist())
+    for row in rows[1:]:
+        commanded.move(row.tolist())
+    return commanded, list(rows[2:])
+
+
+@given(UNIT, UNIT)
+def test_from_any_state_inside_the_limits_it_comes_to_rest_inside_acceleration_and_jerk(velocity, acceleration) -> None:
+    # Not at full acceleration: where rounding decides, the manual's strict bounds leave nothing over.
+    commanded, rows = moving(velocity * LIMITS.velocity, 0.95 * acceleration * LIMITS.acceleration)
+    for _ in range(3000):
+        commanded.come_to_rest()
+        rows.append(np.array(commanded.q))
+        if commanded.is_at_rest:
+            break
+    assert commanded.is_at_rest
+    ddq = np.diff(rows, 2, axis=0) * 1e6
+    jerk = np.diff(rows, 3, axis=0) * 1e9
+    assert (np.abs(ddq) < LIMITS.acceleration).all()
+    assert (np.abs(jerk) < LIMITS.jerk).all()
+
+
+def test_the_end_of_a_decent_motion_is_rest_on_the_spot() -> None:
+    commanded = CommandedMotion(LIMITS, [0.0] * 7)
+    commanded.move([1e-6] * 7)
+    goal = commanded.q
+    for _ in range(3):
+        commanded.come_to_rest()
+        assert commanded.q == goal
+    assert commanded.is_at_rest
+
+
+def test_resting_it_stays_at_rest() -> None:
+    commanded = CommandedMotion(LIMITS, [0.5] * 7)
+    for _ in range(3):
+        commanded.come_to_rest()
+    assert commanded.is_at_rest
+    assert commanded.q == [0.5] * 7
+
+
+def test_without_a_target_the_acceleration_goes_on() -> None:
+    velocity, acceleration = np.full(7, 0.3), np.full(7, 2.0)
+    commanded, _ = moving(velocity, acceleration)
+    for steps in (1, 2, 7):
+        t = steps * 1e-3
+        expected = velocity * t + acceleration * t * t / 2.0
+        assert np.allclose(commanded.predict(steps), expected, rtol=0, atol=1e-15)
+
+
+@pytest.mark.parametrize("gap", [2, 3, 10])
+def test_a_bridge_follows_a_constant_jerk_exactly(gap: int) -> None:
+    def cubic(k: int) -> np.ndarray:
+        t = k * 1e-3
+        return np.full(7, 0.2 * t + 1.5 * t * t - 700.0 * t**3)
+
+    commanded = CommandedMotion(LIMITS, cubic(-3).tolist())
+    for k in (-2, -1, 0):
+        commanded.move(cubic(k).tolist())
+    for steps in range(1, gap):
+        found = commanded.predict(steps, cubic(gap).tolist(), gap)
+        assert np.allclose(found, cubic(steps), rtol=0, atol=1e-15)

@@ -1,0 +1,110 @@
+"""Every phase with every command and every event: the whole table, spelled out a second time and compared."""
+
+from __future__ import annotations
+
+import pytest
+
+from rcilab.controller.state_machine import (
+    ANYTIME,
+    GROUNDED,
+    POWER_OFF,
+    QUERIES,
+    TABLE,
+    Action,
+    Event,
+    Phase,
+    When,
+    as_text,
+    transition,
+)
+from rcilab.protocols.rci import CommandCode, StopStatus
+from rcilab.state import RobotMode
+
+# Rows: what happens. Columns: where. A cell: the phase afterwards ("=" is the same), and the status that is answered.
+PHASES = "OFF IDLE STARTING MOVING STOPPING GUIDING REFLEX USER_STOPPED RECOVERING".split()
+MATRIX = """
+START_MOVE   =,3 STARTING,0 =,3 =,3 =,3 =,3 =,6 =,7 =,3
+STOP_MOVE    =,0 =,0 IDLE,0 STOPPING,0 =,0 =,0 =,0 =,0 =,0
+START_DRAG   =,1 GUIDING,0 =,1 =,1 =,1 =,1 =,1 =,1 =,1
+STOP_DRAG    =,0 =,0 =,0 =,0 =,0 IDLE,0 =,0 =,0 =,0
+SET_MOTOR_POWER IDLE,0 =,0 =,0 =,0 =,0 =,0 =,0 =,1 =,0
+AUTOMATIC_ERROR_RECOVERY =,0 =,0 =,1 =,1 =,1 =,1 RECOVERING,0 =,4 =,1
+REBOOT_ROBOT =,0 OFF,0 =,1 =,1 =,1 =,1 OFF,0 =,0 =,1
+GROUNDED     =,0 =,0 =,1 =,1 =,1 =,1 =,1 =,1 =,1
+ANYTIME      =,0 =,0 =,0 =,0 =,0 =,0 =,0 =,0 =,0
+QUERIES      =,- =,- =,- =,- =,- =,- =,- =,- =,-
+MODES_SHOWN  = = MOVING = = = = = =
+FAULT        = REFLEX REFLEX REFLEX REFLEX REFLEX REFLEX = REFLEX
+AT_REST      = = = = IDLE = = = =
+RECOVERED    = = = = = = = = IDLE
+CLIENT_LOST  = = IDLE STOPPING STOPPING IDLE = = =
+SAFETY_STOP  USER_STOPPED USER_STOPPED USER_STOPPED USER_STOPPED USER_STOPPED USER_STOPPED USER_STOPPED = USER_STOPPED
+SAFETY_RELEASE = = = = = = = OFF =
+"""
+GROUPS = {"GROUNDED": GROUNDED, "ANYTIME": ANYTIME, "QUERIES": QUERIES}
+
+
+def expected() -> dict[tuple[Phase, CommandCode | Event], tuple[Phase, str]]:
+    cells: dict[tuple[Phase, CommandCode | Event], tuple[Phase, str]] = {}
+    for line in MATRIX.strip().splitlines():
+        name, *entries = line.split()
+        events = [Event[name]] if name in Event.__members__ else GROUPS.get(name) or [CommandCode[name]]
+        for phase_name, entry in zip(PHASES, entries, strict=True):
+            after, _, status = entry.partition(",")
+            phase = Phase[phase_name]
+            for event in events:
+                cells[phase, event] = (phase if after == "=" else Phase[after], status.strip("-"))
+    return cells
+
+
+EXPECTED = expected()
+
+
+def test_the_table_holds_every_pair() -> None:
+    assert set(TABLE) == {(phase, trigger) for phase in Phase for trigger in (*CommandCode, *Event)} == set(EXPECTED)
+    assert [phase.name for phase in Phase] == PHASES
+    assert len(as_text().splitlines()) == 9 * (25 + 7)
+
+
+@pytest.mark.parametrize("pair", list(EXPECTED), ids=lambda pair: f"{pair[0].name}-{pair[1].name}")
+def test_each_pair_leads_where_it_should_and_answers_what_it_should(pair) -> None:
+    cell = transition(*pair)
+    status = "" if cell.status is None else str(int(cell.status))
+    assert (cell.phase, status) == EXPECTED[pair]
+
+
+@pytest.mark.parametrize("phase", Phase)
+def test_stop_move_succeeds_everywhere_and_only_at_rest(phase: Phase) -> None:
+    cell = transition(phase, CommandCode.STOP_MOVE)
+    assert (cell.status, cell.when) == (StopStatus.SUCCESS, When.AT_REST)
+
+
+@pytest.mark.parametrize("phase", Phase)
+def test_power_off_is_obeyed_everywhere(phase: Phase) -> None:
+    cell = POWER_OFF[phase]
+    assert cell.status == 0
+    assert cell.phase is (phase if phase is Phase.USER_STOPPED else Phase.OFF)
+
+
+def test_whatever_leaves_a_motion_hides_its_modes_and_forgets_or_drains_its_commands() -> None:
+    for (phase, _), cell in TABLE.items():
+        if phase in (Phase.STARTING, Phase.MOVING) and cell.phase not in (Phase.STARTING, Phase.MOVING):
+            assert Action.HIDE_MODES in cell.actions
+            assert {Action.DISCARD, Action.DRAIN} & {*cell.actions}
+
+
+def test_only_the_delay_after_start_move_leads_into_a_motion() -> None:
+    into = {(phase, trigger) for (phase, trigger), cell in TABLE.items() if cell.phase is Phase.MOVING != phase}
+    assert into == {(Phase.STARTING, Event.MODES_SHOWN)}
+
+
+def test_faults_are_cleared_only_by_recovery_release_power_off_and_reboot() -> None:
+    clearing = {trigger for (_, trigger), cell in TABLE.items() if Action.CLEAR_FAULTS in cell.actions}
+    assert clearing == {Event.RECOVERED, Event.SAFETY_RELEASE, CommandCode.REBOOT_ROBOT}
+
+
+def test_each_phase_reports_a_robot_mode() -> None:
+    modes = {phase.name: phase.robot_mode for phase in Phase}
+    assert modes["MOVING"] is modes["STOPPING"] is RobotMode.MOVE
+    assert modes["STARTING"] is modes["IDLE"] is RobotMode.IDLE
+    assert set(modes.values()) == set(RobotMode)
