@@ -161,9 +161,13 @@ class ControlLoop:
             t = (state.message_id - self._first_id) * CYCLE_TIME
             reason = self._watch(t)
             if reason is not None:
-                self._log.write(state, self._link.received_ns, t)
+                self._pending.appendleft(state)  # Still without an answer: the way to rest begins with it.
                 return reason
-            command = self._checked(callback(state, t), state)
+            try:
+                command = self._checked(callback(state, t), state)
+            except BaseException:
+                self._pending.appendleft(state)
+                raise
             self._answer(state, command)
             if command.finished:
                 self._hold(command)

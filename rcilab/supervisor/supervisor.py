@@ -361,7 +361,7 @@ class Supervisor:
             failure = reply.get("failure")
             if ticket is not None:
                 ticket.settle(unpack_failure(failure) if failure else None)
-            if failure and failure["kind"] in ("ConnectionLostError", "ControlError"):
+            if self._crash is None and failure and failure["kind"] in ("ConnectionLostError", "ControlError"):
                 shown = read_snapshot(self._require_block().snapshot, self._require_block().words)
                 if shown.phase in ("lost", "fault"):
                     self._note(shown.code, failure["message"])

@@ -41,14 +41,13 @@ class Script:
 
 
 class Peer:
-    def __init__(self, script: Script | None = None, states_to: tuple[str, int] | None = None) -> None:
+    def __init__(self, script: Script | None = None) -> None:
         self.script = script or Script()
         self._tcp = socket.create_server((HOST, 0))
         self.port: int = self._tcp.getsockname()[1]
         self._udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._udp.bind((HOST, self.port))
         self._udp.setblocking(False)
-        self._states_to = states_to
         self.requests: list[rci.Request] = []
         self.commands: list[rci.CommandPacket] = []
         self.q_c: list[np.ndarray] = []
@@ -93,7 +92,7 @@ class Peer:
             if not select.select([self._tcp], [], [], 0.02)[0]:
                 continue
             connection, client = self._tcp.accept()
-            to = self._states_to or (client[0], self.port)
+            to = (client[0], self.port)
             with connection:
                 connection.setblocking(False)
                 self._attend(connection, to)
