@@ -281,7 +281,8 @@ def _pedestal(joint: _Joint, fine: _Fineness) -> LinkShape:
             Part(Mesh(mesh.vertices * (-1.0, 1.0, 1.0), mesh.faces[:, ::-1]).moved((-1.70 * r, y, 0.062)), "dark")
         )
     solid = _capsule((0.0, 0.0, 1.15 * r), (0.0, 0.0, top - 0.35 * r), 1.15 * r)
-    return LinkShape(_by_role(parts), (solid,))
+    box_solid = _capsule((-1.15 * r, 0.0, 0.062), (0.0, 0.0, 0.062), 0.062)
+    return LinkShape(_by_role(parts), (solid, box_solid))
 
 
 def _wrist_plate(joint: _Joint, flange: float, fine: _Fineness) -> LinkShape:
