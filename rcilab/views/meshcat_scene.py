@@ -14,7 +14,6 @@ from rcilab.spatial import Pose
 from rcilab.views.meshcat_server import MeshcatServer, import_meshcat
 from rcilab.views.scene import NO_TURN, ORIGIN, Color, line_points, unknown_node
 
-
 _CAMERA = [1.25, 0.75, 1.15]  # [m] axes of three.js: x, up, -y; the page's camera always looks at the origin
 
 
