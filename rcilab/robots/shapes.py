@@ -292,7 +292,7 @@ def _wrist_plate(joint: _Joint, flange: float, fine: _Fineness) -> LinkShape:
 
     def body(p: Array) -> Array:
         drum = cylinder(p, 2, low - 0.03, face - 0.003, r - _SEAM, 0.002, (0.0, 0.0))
-        pad = rod(p, (0.0, 0.70 * r, low + 0.036), (0.0, 0.70 * r, face - 0.016), 0.46 * r, 0.42 * r)
+        pad = rod(p, (0.0, 0.70 * r, low + 0.036), (0.0, 0.70 * r, face - 0.42 * r - 0.004), 0.46 * r, 0.42 * r)
         return np.maximum(join(drum, pad, 0.016), low + 0.004 - p[:, 2])
 
     half = 1.35 * r
