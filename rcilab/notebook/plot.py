@@ -15,6 +15,7 @@ from rcilab.conformance.check import HOLD_SAMPLES, check
 from rcilab.conformance.conditions import CYCLE_CONDITIONS, Condition
 from rcilab.errors import InvalidValueError
 from rcilab.limits import JointLimits
+from rcilab.views.plots import QUANTITIES, recorded_curves
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -35,9 +36,6 @@ _HEADROOM = 1.12
 """How much of the limit a panel shows: all of it and a little of what lies beyond."""
 
 
-_SYMBOLS = ("q", "dq", "ddq", "jerk")
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class _Panel:
     """One row of the figure: what one condition judges, joint by joint."""
@@ -48,7 +46,7 @@ class _Panel:
     lower: Array
     upper: Array
     actual: Array | None
-    """What happened, shape (M, n); None where nothing was measured."""
+    """What happened, shape (M, n): measured angles and velocities, differences of the commanded angles; or None."""
 
 
 def plot(motion: Motion, model: RobotModel, run: Run | None = None, *, joints: Sequence[int] | None = None) -> Figure:
@@ -56,9 +54,9 @@ def plot(motion: Motion, model: RobotModel, run: Run | None = None, *, joints: S
 
     Velocity, acceleration and jerk are backward differences at 1 ms, because those are what the controller judges.
     Grey lies beyond a limit; where joints have different limits the grey gets darker at each. What `check` finds is
-    hatched in red over the time it lasts, and the title counts it. With a run, what the robot did is drawn solid over
-    the dashed plan, and a fifth panel shows the difference. Needs no display: the figure shows itself in a notebook
-    and takes `savefig` anywhere.
+    hatched in red over the time it lasts, and the title counts it. With a run, what the robot did is drawn as a broad
+    line under the dashed plan (acceleration and jerk: of its commanded angles), and a fifth panel shows the
+    difference. Needs no display: the figure shows itself in a notebook and takes `savefig` anywhere.
 
     Args:
         motion: What to draw.
@@ -107,13 +105,12 @@ def _new_figure(rows: int) -> Figure:
 
 
 def _panels(motion: Motion, limits: JointLimits, run: Run | None) -> list[_Panel]:
-    measured = (run.q, run.dq) if run is not None else ()
     return [
         _Panel(
             condition,
             _backward_differences(motion.q, condition.order),
             *condition.bounds(limits),
-            measured[condition.order] if condition.order < len(measured) else None,
+            None if run is None else recorded_curves(run.t, run.q, run.q_c, run.dq, QUANTITIES[condition.order]).values,
         )
         for condition in CYCLE_CONDITIONS
     ]
@@ -135,13 +132,14 @@ def _backward_differences(q: Array, order: int) -> Array:
 
 def _draw_panel(ax: Axes, panel: _Panel, run: Run | None, joints: Sequence[int]) -> None:
     times = CYCLE_TIME * np.arange(len(panel.values))
-    planned: dict[str, Any] = {"linestyle": (0, (4, 2)), "linewidth": 1.0} if run is not None else {"linewidth": 1.3}
+    planned: dict[str, Any] = {"linewidth": 1.3}
+    if run is not None and panel.actual is not None:
+        planned = {"linestyle": (0, (4, 2)), "linewidth": 1.0, "zorder": 3.0}
+        for joint in joints:
+            ax.plot(run.t, panel.actual[:, joint], color=_color(joint), linewidth=3.0, alpha=0.45)
     for joint in joints:
-        color = JOINT_COLORS[joint % len(JOINT_COLORS)]
-        ax.plot(times, panel.values[:, joint], color=color, label=f"joint {joint + 1}", **planned)
-        if panel.actual is not None and run is not None:
-            ax.plot(run.t, panel.actual[:, joint], color=color, linewidth=1.3)
-    ax.set_ylabel(f"{_SYMBOLS[panel.condition.order]} [{panel.condition.unit.replace('^2', '²').replace('^3', '³')}]")
+        ax.plot(times, panel.values[:, joint], color=_color(joint), label=f"joint {joint + 1}", **planned)
+    ax.set_ylabel(f"{QUANTITIES[panel.condition.order]} [{panel.condition.unit.replace('^2', '²').replace('^3', '³')}]")
     ax.margins(x=0.0)
     ax.grid(visible=True, color="#E0E0E0", linewidth=0.6)
     _draw_limits(ax, panel.lower[list(joints)], panel.upper[list(joints)], everything=panel.condition.order > 0)
@@ -192,11 +190,16 @@ def _union(spans: Iterable[tuple[float, float]]) -> list[tuple[float, float]]:
 
 
 def _draw_error(ax: Axes, run: Run, joints: Sequence[int]) -> None:
+    error = 1e3 * run.error
     for joint in joints:
-        ax.plot(run.t, 1e3 * run.error[:, joint], color=JOINT_COLORS[joint % len(JOINT_COLORS)], linewidth=1.0)
+        ax.plot(run.t, error[:, joint], color=_color(joint), linewidth=1.0)
     ax.set_ylabel("actual - plan [mrad]")
     ax.margins(x=0.0)
     ax.grid(visible=True, color="#E0E0E0", linewidth=0.6)
+
+
+def _color(joint: int) -> str:
+    return JOINT_COLORS[joint % len(JOINT_COLORS)]
 
 
 def _title(model: RobotModel, motion: Motion, violations: Sequence[Violation]) -> str:

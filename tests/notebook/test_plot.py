@@ -85,8 +85,9 @@ def test_a_run_adds_what_the_robot_did_and_the_difference() -> None:
         run = robot.execute(motion, rcilab.check(motion, PRO7).certificate)
     axes = main_axes(plot(motion, PRO7, run))
     assert axes[-1].get_ylabel() == "actual - plan [mrad]"
-    actual = [line for line in axes[0].lines if line.get_linestyle() == "-"]
-    np.testing.assert_array_equal(actual[2].get_ydata(), run.q[:, 2])
+    for ax, measured in zip(axes, (run.q, run.dq), strict=False):
+        actual = [line for line in ax.lines if line.get_alpha() == 0.45]
+        np.testing.assert_array_equal(actual[2].get_ydata(), measured[:, 2])
     np.testing.assert_allclose(axes[-1].lines[2].get_ydata(), 1e3 * run.error[:, 2])
 
 
