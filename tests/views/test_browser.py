@@ -59,13 +59,13 @@ def test_the_page_shows_the_arm_where_our_kinematics_put_it(browser: Any) -> Non
         model = load_model("xMatePro7")
         arm = ArmView(ViserScene(server, shadows=False), "live", model)
         arm.show(model.home)
-        page = browser.new_page(viewport={"width": 800, "height": 600})
+        page = browser.new_page(viewport={"width": 480, "height": 360})
         page.goto(f"http://127.0.0.1:{server.get_port()}/?fixedDpr=0.5")
         page.wait_for_function(
             "name => window.__viserMutable && __viserMutable.nodeRefFromName[name]"
             " && __viserTestpoints.rendererInfo.render.frame > 3",
             arg=arm.tool_node,
-            timeout=60_000,
+            timeout=120_000,
         )
         for q in (model.home, np.linspace(-1.0, 1.2, 7)):
             arm.show(q)
@@ -73,7 +73,7 @@ def test_the_page_shows_the_arm_where_our_kinematics_put_it(browser: Any) -> Non
             page.wait_for_function(
                 f"([name, z]) => Math.abs(({WORLD_POSE})(name)[14] - z) < 1e-5",
                 arg=[arm.tool_node, float(expected[2, 3])],
-                timeout=20_000,
+                timeout=60_000,
             )
             shown = np.array(page.evaluate(WORLD_POSE, arm.tool_node)).reshape(4, 4).T
             assert np.abs(shown - expected).max() < 1e-5
