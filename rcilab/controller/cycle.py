@@ -54,6 +54,7 @@ class ControlCycle:
     Attributes:
         phase: What the robot is doing.
         faults: The error bits that are set, in wire order.
+        reason: Why the last fault was raised, in words and numbers.
         state: The last reported state.
         playout: The queue of commands, with its counts.
         ignored: Commands that came while none was wanted.
@@ -87,6 +88,7 @@ class ControlCycle:
         self.safety_stop = rci.SafetyStop.NONE
         self.phase = Phase.OFF
         self.faults: tuple[Fault, ...] = ()
+        self.reason = ""
         self.ignored = 0
         self._measured = plant.reset(model.home)
         self._commanded = CommandedMotion(model.limits.joint, self._measured.q.tolist())
@@ -175,6 +177,7 @@ class ControlCycle:
         """Presses an emergency stop, or releases it with NONE. Pressed in mid-motion it also sets an error bit."""
         if kind is not self.safety_stop:
             self.safety_stop = kind
+            self.reason = "an emergency stop was pressed"
             event = Event.SAFETY_RELEASE if kind is rci.SafetyStop.NONE else Event.SAFETY_STOP
             self.happen(event, Fault.INSTABILITY_DETECTION)
 
@@ -230,15 +233,24 @@ class ControlCycle:
         return self._commanded.predict(1, q, steps) if is_lost else q
 
     def _judge(self, q: list[float], playback: Playback) -> tuple[Fault, ...]:
+        lost = self.playout.lost_in_row
         if playback.is_lost:
             self._blurred_until = self._message_id + _BLURRED
-            if self._lost_limit is not None and self.playout.lost_in_row >= self._lost_limit:
+            if self._lost_limit is not None and lost >= self._lost_limit:
+                self.reason = f"{lost} commands in a row were lost"
                 return (Fault.INSTABILITY_DETECTION,)
         if not math.isfinite(sum(q)):  # Not a number is in no range; the derivatives say nothing then.
+            self.reason = f"commanded positions {q} rad are not all finite numbers"
             return (Fault.COMMAND_JOINT_POSITION_LIMITS_VIOLATION,)
         faults = self._monitor.step(q)
-        if faults and self._message_id <= self._blurred_until:
-            return (Fault.INSTABILITY_DETECTION,)  # It was the lost commands that broke the motion.
+        if faults:
+            self.reason = "; ".join(
+                f"joint {joint}: {row.quantity} {value:.6g} {row.unit} passes {bound:.6g} {row.unit}"
+                for row, joint, value, bound in self._monitor.broken()
+            )
+            if self._message_id <= self._blurred_until:
+                self.reason = f"lost commands broke the motion ({self.playout.lost} lost so far): {self.reason}"
+                return (Fault.INSTABILITY_DETECTION,)
         return faults
 
     def _is_next(self, packet: rci.CommandPacket, steps: int) -> bool:
@@ -268,8 +280,14 @@ class ControlCycle:
         return Drive.BRAKED if is_braked and self._commanded.is_at_rest else Drive.POSITION
 
     def _collides(self) -> bool:
-        forces = zip(self._measured.tau_ext.tolist(), self.settings.collision_thresholds, strict=True)
-        return any(abs(torque) > threshold for torque, threshold in forces)
+        pairs = zip(self._measured.tau_ext.tolist(), self.settings.collision_thresholds, strict=True)
+        for joint, (torque, threshold) in enumerate(pairs, start=1):
+            if abs(torque) > threshold:
+                self.reason = (
+                    f"joint {joint}: external torque {torque:.3g} N m is above its threshold {threshold:g} N m"
+                )
+                return True
+        return False
 
     def _report(self) -> RobotState:
         controller_mode, motion_mode = self._shown

@@ -174,8 +174,11 @@ class ControllerServer:
                 return
 
     def _step(self) -> None:
-        self.cycle.step()
+        faults = self.cycle.faults
+        state = self.cycle.step()
         self._send_state()
+        if state.faults and state.faults != faults:
+            self._log(f"{', '.join(fault.name for fault in state.faults)}: {self.cycle.reason}; the arm comes to rest")
         if self._pending is not None and self.cycle.is_settled:
             request, command_id, reply = self._pending
             self._pending = None

@@ -393,6 +393,9 @@ def test_a_command_that_jumps_is_a_fault_in_the_state_that_answers_it(lockstep: 
         assert Fault.COMMAND_JOINT_ACCELERATION_DISCONTINUITY in answer.faults
         assert answer.controller_mode is ControllerMode.OTHER
         assert answer.motion_generator_mode is MotionGeneratorMode.IDLE
+        assert "joint 1: commanded velocity 10 rad/s passes 2.175 rad/s" in lockstep.wait_for_line(
+            "the arm comes to rest"
+        )
 
 
 def test_in_lock_step_two_runs_are_the_same_to_the_last_bit() -> None:
