@@ -100,7 +100,7 @@ class _Fineness:
 
 
 _FINENESS = {
-    "fine": _Fineness(cell=0.0085, segments=56),
+    "fine": _Fineness(cell=0.0095, segments=52),
     "coarse": _Fineness(cell=0.0180, segments=26),
 }
 
