@@ -18,7 +18,7 @@ from rcilab.errors import ConnectionLostError
 START_TIMEOUT = 20.0  # [s] A cold Python with its numerical libraries takes about 1 s; a busy machine several.
 _END_TIMEOUT = 3.0  # [s] Between asking a process to end and ending it.
 _LISTENING = re.compile(r"^listening (rci://\S+)( |$)")
-_TAIL = 2000  # Characters of what a process said last that go into an error.
+_TAIL = 2000  # [bytes] of what a process said last that go into an error.
 
 
 class Child:
@@ -32,7 +32,7 @@ class Child:
 
     def __init__(self, arguments: Sequence[str], name: str, descriptors: Sequence[int] = ()) -> None:
         self.name = name
-        self._stderr: IO[str] = tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace")
+        self._stderr: IO[bytes] = tempfile.TemporaryFile()
         try:
             # A session of its own: Ctrl-C in the terminal is for the parent, which brings the arm to rest first.
             self._process = subprocess.Popen(
@@ -70,8 +70,12 @@ class Child:
     @property
     def last_words(self) -> str:
         """The end of what it wrote to stderr."""
-        self._stderr.seek(0)
-        return self._stderr.read()[-_TAIL:].strip()
+        if self._stderr.closed:
+            return ""
+        # Not by seeking: the process shares the file's position with us and would write over what it said before.
+        descriptor = self._stderr.fileno()
+        start = max(0, os.fstat(descriptor).st_size - _TAIL)
+        return os.pread(descriptor, _TAIL, start).decode(errors="replace").strip()
 
     def end(self, timeout: float = _END_TIMEOUT) -> None:
         """Asks it to end (SIGTERM), and ends it (SIGKILL) when it has not after `timeout`, [s]. May be called twice."""
@@ -114,12 +118,16 @@ class VirtualController(Child):
         model_name: Name of the arm.
         plant: "ideal" or "mujoco".
         lockstep: Whether a simulated millisecond waits for its command.
+        options: Further options of `rcilab controller`.
     """
 
-    def __init__(self, model_name: str, plant: str = "ideal", lockstep: bool = False) -> None:
+    def __init__(
+        self, model_name: str, plant: str = "ideal", lockstep: bool = False, options: Sequence[str] = ()
+    ) -> None:
         arguments = ["-m", "rcilab.cli", "controller", "--model", model_name, "--plant", plant, "--port", "0"]
         super().__init__(
-            [*arguments, *(["--lockstep"] if lockstep else []), "--exit-with-parent"], "the virtual controller"
+            [*arguments, *(["--lockstep"] if lockstep else []), *options, "--exit-with-parent"],
+            "the virtual controller",
         )
         self._said = ""
         self._started = time.monotonic()
@@ -151,18 +159,21 @@ class VirtualController(Child):
         return self._address
 
 
-def start_controller(model_name: str, plant: str = "ideal", lockstep: bool = False) -> VirtualController:
+def start_controller(
+    model_name: str, plant: str = "ideal", lockstep: bool = False, options: Sequence[str] = ()
+) -> VirtualController:
     """Returns a private virtual controller that is ready for a client.
 
     Args:
         model_name: Name of the arm.
         plant: "ideal" or "mujoco".
         lockstep: Whether a simulated millisecond waits for its command.
+        options: Further options of `rcilab controller`.
 
     Raises:
         ConnectionLostError: It did not start; the message carries what it said.
     """
-    controller = VirtualController(model_name, plant, lockstep)
+    controller = VirtualController(model_name, plant, lockstep, options)
     try:
         while controller.address is None:
             time.sleep(0.01)

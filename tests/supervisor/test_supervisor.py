@@ -1,0 +1,194 @@
+"""The supervisor with its control process and the real virtual controller, free-running."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+
+from rcilab.conformance import check
+from rcilab.errors import CertificateError, ConnectionLostError, ControlError, InvalidValueError, UsageError
+from rcilab.model import load_model
+from rcilab.motion import plan_joint
+from rcilab.state import RobotMode
+from rcilab.supervisor import Supervisor
+
+MODEL = load_model("xMatePro7")
+GOAL = np.array([0.3, 0.4, 0.2, 1.2, 0.1, 0.8, 0.5])
+SOON = 20.0  # [s] Generous: the machine may be busy.
+
+
+def wait_for(condition, timeout=SOON):
+    deadline = time.monotonic() + timeout
+    while not (found := condition()):
+        assert time.monotonic() < deadline, "it did not happen"
+        time.sleep(0.005)
+    return found
+
+
+def wait_for_phase(supervisor, *phases):
+    return wait_for(lambda: status if (status := supervisor.status()).phase in phases else None)
+
+
+def begin(supervisor, goal=GOAL, speed=0.1):
+    motion = plan_joint(MODEL, supervisor.status().q_c, goal, speed=speed)
+    ticket = supervisor.execute(motion, check(motion, MODEL).certificate)
+    return motion, ticket
+
+
+def go_home(supervisor):
+    if supervisor.status().faults:
+        supervisor.recover().wait(SOON)
+    supervisor.power_on().wait(SOON)
+    begin(supervisor, MODEL.home, speed=1.0)[1].wait(SOON)
+
+
+@pytest.fixture(scope="module")
+def shared():
+    with Supervisor(MODEL) as supervisor:
+        yield supervisor
+
+
+@pytest.fixture
+def supervisor(shared):
+    go_home(shared)
+    shared.drain()
+    return shared
+
+
+def test_a_motion_arrives_and_every_cycle_of_it_is_in_the_drain(supervisor):
+    assert supervisor.status().phase == "idle"
+    motion, ticket = begin(supervisor, speed=0.7)
+    ticket.wait(SOON)
+    status = supervisor.status()
+    assert (status.phase, status.code) == ("idle", "idle.arrived")
+    assert np.abs(status.q - GOAL).max() <= 1e-12
+    assert status.motion_duration == motion.duration
+    rows = supervisor.drain()
+    moving = rows[np.isfinite(rows["t"])]
+    # Controller cycles that this machine lost are left out of the rows and counted in `lost`, never repeated.
+    steps = np.diff(moving["message_id"].astype(int))
+    assert (steps >= 1).all()
+    assert steps.sum() == moving["lost"][1:].sum() + len(moving) - 1
+    assert moving["t"][0] == 0.0
+    sent = moving[moving["sent_ns"] > 0]
+    index = np.minimum(np.rint(sent["t"] * 1000).astype(int), len(motion.q) - 1)
+    assert np.array_equal(sent["command"], motion.q[index])
+
+
+def test_status_says_what_runs_and_how_punctual_it_is(supervisor):
+    status = wait_for(lambda: s if (s := supervisor.status()).rate_hz > 0 else None)
+    assert status.controller_pid
+    assert status.worker_pid
+    assert status.scheduling in ("SCHED_FIFO", "normal")
+    assert status.address.startswith("rci://127.0.0.2:")
+    assert status.powered is True
+    assert status.robot_mode is RobotMode.IDLE
+    assert status.lateness.p50 <= status.lateness.p99 <= status.lateness.p999 <= status.lateness.max
+    assert status.lateness.histogram.sum() == status.lateness.cycles > 0
+
+
+def test_stop_ends_in_one_controlled_stop_and_the_next_motion_can_begin(supervisor):
+    _, ticket = begin(supervisor)
+    wait_for(lambda: (supervisor.status().motion_time or 0.0) > 0.3 and supervisor.status().phase == "moving")
+    supervisor.stop().wait(SOON)
+    with pytest.raises(ControlError, match="stopped on request"):
+        ticket.wait(SOON)
+    status = supervisor.status()
+    assert (status.phase, status.code, status.faults) == ("idle", "idle.stopped", ())
+    assert np.abs(status.q_c - GOAL).max() > 0.01
+    assert_in_limits(supervisor.drain())
+    go_home(supervisor)
+    assert np.array_equal(supervisor.status().q_c, MODEL.home)
+
+
+def test_a_stop_without_a_motion_is_done_and_stops_nothing_later(supervisor):
+    supervisor.stop().wait(SOON)
+    begin(supervisor, speed=1.0)[1].wait(SOON)
+    assert np.abs(supervisor.status().q - GOAL).max() <= 1e-12
+
+
+def test_requests_in_mid_motion_are_refused_and_disturb_nothing(supervisor):
+    _, ticket = begin(supervisor, speed=0.5)
+    wait_for_phase(supervisor, "moving")
+    with pytest.raises(UsageError, match="the arm is moving"):
+        supervisor.power_off().wait(SOON)
+    motion = plan_joint(MODEL, supervisor.status().q_c, GOAL)
+    with pytest.raises(UsageError, match="the arm is moving"):
+        supervisor.execute(motion, check(motion, MODEL).certificate)
+    ticket.wait(SOON)
+    assert np.abs(supervisor.status().q - GOAL).max() <= 1e-12
+
+
+def test_a_missing_or_stale_certificate_is_refused_at_once(supervisor):
+    q = supervisor.status().q_c
+    motion, other = plan_joint(MODEL, q, GOAL), plan_joint(MODEL, q, GOAL, speed=0.2)
+    with pytest.raises(CertificateError, match="has not been checked"):
+        supervisor.execute(motion, None)
+    with pytest.raises(CertificateError) as caught:
+        supervisor.execute(motion, check(other, MODEL).certificate)
+    assert "motion" in caught.value.changed
+    away = plan_joint(MODEL, GOAL, MODEL.home)
+    with pytest.raises(CertificateError, match=r"stands at .* plan the motion from robot\.state\.q_c") as caught:
+        supervisor.execute(away, check(away, MODEL).certificate)
+    assert caught.value.changed == ("start state",)
+
+
+def test_nobody_at_the_controls_ends_a_motion_after_two_seconds():
+    with Supervisor(MODEL) as supervisor:
+        supervisor.power_on().wait(SOON)
+        supervisor.set_operator_present(True)
+        _, ticket = begin(supervisor, speed=0.03)
+        with pytest.raises(ControlError, match="nobody was at the controls"):
+            ticket.wait(SOON)
+        status = supervisor.status()
+        assert (status.phase, status.code, status.faults) == ("idle", "idle.operator", ())
+        assert status.motion_time > 1.0
+        with pytest.raises(UsageError, match="nobody is at the controls"):
+            begin(supervisor)
+        supervisor.set_operator_present(True)
+        begin(supervisor, MODEL.home, speed=1.0)
+    assert supervisor.status().phase == "closed"
+    supervisor.close()
+
+
+def test_an_unreachable_robot_is_a_phase_with_a_reason_and_not_an_error():
+    with Supervisor(MODEL, "rci://127.0.0.2:9") as supervisor:
+        status = supervisor.status()
+        assert (status.phase, status.code) == ("lost", "lost.unreachable")
+        assert "no robot at rci://127.0.0.2:9" in status.message
+        with pytest.raises(UsageError, match="nothing can move now"):
+            begin_nowhere(supervisor)
+        with pytest.raises(UsageError, match="no controller is connected"):
+            supervisor.power_on().wait(SOON)
+        with pytest.raises(ConnectionLostError, match="no robot at"):
+            supervisor.reconnect().wait(SOON)
+
+
+def test_wrong_use_is_named():
+    with pytest.raises(InvalidValueError, match="needs rci://"):
+        Supervisor(MODEL, "tcp://127.0.0.2")
+    supervisor = Supervisor(MODEL)
+    assert supervisor.status().phase == "closed"
+    for call in (supervisor.power_on, supervisor.stop, supervisor.drain, supervisor.restart):
+        with pytest.raises(UsageError, match=r"start\(\) it first"):
+            call()
+    with pytest.raises(ConnectionLostError, match=r"did not start.*ideal, mujoco"):
+        Supervisor(MODEL, plant="rubber").start()
+
+
+def begin_nowhere(supervisor):
+    motion = plan_joint(MODEL, MODEL.home, GOAL)
+    return supervisor.execute(motion, check(motion, MODEL).certificate)
+
+
+def assert_in_limits(rows):
+    """What was commanded keeps velocity, acceleration and jerk limits wherever cycles follow each other."""
+    sent = rows[(rows["sent_ns"] > 0) & np.isfinite(rows["command"]).all(axis=1)]
+    whole = np.diff(sent["message_id"].astype(int)) == 1
+    limits = MODEL.limits.joint
+    for order, bound in ((1, limits.velocity), (2, limits.acceleration), (3, limits.jerk)):
+        differences = np.abs(np.diff(sent["command"], order, axis=0)) / 1e-3**order
+        runs = np.array([whole[k : k + order].all() for k in range(len(differences))])
+        assert (differences[runs] < bound).all()
