@@ -29,9 +29,8 @@ def bench_drag() -> Measurement:
     poses: list[float] = []
     plans: list[float] = []
     with Workbench(WorkbenchConfig(port=0)) as bench:
-        _wait(
-            "the arm to be seen", lambda: bench.session.status().phase == "idle" and bench.store.state.plan is not None
-        )
+        _wait("the control process", lambda: bench.session.status().phase == "idle")
+        _wait("the goal to stand where the arm is", lambda: bench.store.state.no_plan is not None)
         centre = bench.store.state.goal.target
         for step in range(_DRAGS):
             angle = math.tau * step / 50

@@ -7,6 +7,7 @@ import json
 import sys
 import textwrap
 from collections.abc import Callable
+from contextlib import redirect_stdout
 from typing import TYPE_CHECKING, Any
 
 from rcilab.errors import UsageError
@@ -49,7 +50,8 @@ def run(args: argparse.Namespace) -> int:
     for name in names:
         if not args.json and sys.stderr.isatty():
             print(f"{name} ...", end="\r", file=sys.stderr, flush=True)
-        found.append(_bench(name, args.seconds)())
+        with redirect_stdout(sys.stderr):  # What libraries have to say is no part of the list.
+            found.append(_bench(name, args.seconds)())
         if not args.json:
             print(_row(found[-1]), flush=True)
     if args.json:
