@@ -139,6 +139,6 @@ class IdealPlant:
         return self._measure(frozen(setpoint.q), frozen(setpoint.dq), frozen(setpoint.ddq))
 
     def _measure(self, q: JointVector, dq: JointVector, ddq: JointVector) -> Measurement:
-        tau = self._model.torque(q, dq, ddq).full
+        tau = self._model.rigid_body.full_torque(q, dq, ddq)
         self._measurement = Measurement(q, dq, frozen(tau), self._zeros, self._no_wrench)
         return self._measurement

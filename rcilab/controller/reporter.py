@@ -97,7 +97,7 @@ class StateReporter:
         dpsi_c = 0.0 if last is None else math.remainder(psi_c - self._psi_c, math.tau) / h
         ddpsi_c = 0.0 if last is None else (dpsi_c - self._dpsi_c) / h
         follows = is_exact and np.array_equal(measured.dq, dq_c)
-        tau_c = measured.tau if follows else model.torque(q_c, dq_c, ddq_c).full
+        tau_c = measured.tau if follows else model.rigid_body.full_torque(q_c, dq_c, ddq_c)
         dtau_c = self._zeros if last is None else (tau_c - last.tau_c) / h
         tau_filtered = measured.tau if last is None else self._low_pass(last.tau_filtered, measured.tau)
         self._psi, self._psi_c, self._dpsi_c = psi, psi_c, dpsi_c
