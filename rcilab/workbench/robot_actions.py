@@ -77,8 +77,8 @@ class RobotActions:
         if model is not state.model:
             self._store.forget()
             changes |= {"model": model, "goal": initial_goal(model, model.home), "plot_joint": 0, "problems": {}}
+        self._session.open(model, target)  # First: from here on no state of the old arm is shown on the new one.
         self._store.update(place=0.0, playing=False, **changes)
-        self._session.open(model, target)
 
     def watch(self) -> str | None:
         """Looks at the supervisor: finished tickets, new incidents, recorded cycles, the arm's first pose.

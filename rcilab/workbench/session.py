@@ -24,6 +24,7 @@ class Session:
         self._on_failure = on_failure
         self._lock = threading.Lock()
         self._current: Supervisor | None = None
+        self._shown: Supervisor | None = None  # Whose states belong to the model of now.
         self._ready: Supervisor | None = None  # Only what start() has built; requests go here.
         self._generation = 0
         self._worker: threading.Thread | None = None
@@ -33,7 +34,7 @@ class Session:
         with self._lock:
             self._generation += 1
             generation, previous = self._generation, self._worker
-            self._ready = None
+            self._ready = self._shown = None
             self._worker = threading.Thread(
                 target=self._exchange, args=(generation, previous, model, target), name="session", daemon=True
             )
@@ -53,9 +54,9 @@ class Session:
 
     def status(self) -> SupervisorStatus:
         """Returns the supervisor's snapshot; "starting" while there is none."""
-        current = self._current
-        if current is not None:
-            return current.status()
+        shown = self._shown
+        if shown is not None:
+            return shown.status()
         from rcilab.supervisor import SupervisorStatus
 
         return SupervisorStatus(phase="starting", code="starting", message="Starting the control process.")
@@ -96,7 +97,7 @@ class Session:
             from rcilab.supervisor import Supervisor
 
             supervisor = Supervisor(model, target)
-            self._current = supervisor
+            self._current = self._shown = supervisor
             supervisor.start()
         except RcilabError as error:
             self._on_failure(error)

@@ -30,6 +30,7 @@
     stop = document.createElement("button");
     stop.id = "rl-stop";
     stop.type = "button";
+    stop.addEventListener("pointerdown", pressStop);  // Not only on release: a stop should not wait for the finger.
     stop.addEventListener("click", pressStop);
     bar.appendChild(stop);
     chips = bar.querySelector("#rl-chips");

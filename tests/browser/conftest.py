@@ -1,0 +1,96 @@
+"""One Chromium for all browser tests, one workbench with a virtual controller, a fresh page for each test."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from browser.page import BenchPage, close_toasts
+
+FLAGS = (
+    "--no-sandbox --no-first-run --use-gl=angle --use-angle=swiftshader --enable-unsafe-swiftshader "
+    "--disable-background-networking --disable-component-update --disable-sync --disable-default-apps "
+    "--disable-background-timer-throttling --disable-renderer-backgrounding "
+    "--disable-backgrounding-occluded-windows --force-color-profile=srgb"
+).split()
+VIEW = {"width": 960, "height": 620}
+
+
+def find_chromium() -> str | None:
+    for name in ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable"):
+        path = shutil.which(name)
+        if path is not None:
+            return path
+    return None
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    here = Path(__file__).parent
+    for item in items:
+        if here in item.path.parents:
+            item.add_marker(pytest.mark.browser)
+
+
+@pytest.fixture(scope="session")
+def chromium() -> Iterator[object]:
+    path = find_chromium()
+    if path is None:
+        reason = "no Chromium found: install it (Debian: apt install chromium) to run the browser tests"
+        if os.environ.get("CI") == "true":
+            pytest.fail(reason)
+        pytest.skip(reason)
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=path, args=FLAGS)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture(scope="session")
+def bench() -> Iterator[object]:
+    from rcilab.workbench.app import Workbench, WorkbenchConfig
+
+    with Workbench(WorkbenchConfig(port=0, quality="light")) as workbench:
+        yield workbench
+        assert workbench.conductor.errors == []
+        assert workbench.presenter.errors == []
+
+
+@pytest.fixture(scope="session")
+def opened(chromium, bench) -> Iterator[BenchPage]:
+    """One page for all: opening it costs several seconds of software rendering."""
+    context = chromium.new_context(viewport=VIEW)
+    context.set_default_timeout(20_000)
+    outside: list[str] = []
+
+    def guard(route) -> None:
+        if "://127.0.0.1" in route.request.url or route.request.url.startswith(("data:", "blob:")):
+            route.continue_()
+        else:
+            outside.append(route.request.url)
+            route.abort()
+
+    context.route("**/*", guard)
+    tab = context.new_page()
+    page = BenchPage(tab, bench)
+    tab.on("pageerror", lambda error: page.problems.append(str(error)))
+    tab.goto(f"{bench.url}?fixedDpr=0.4")
+    page.wait_until_drawn()
+    close_toasts(tab)
+    yield page
+    context.close()
+    assert outside == [], f"the page asked for something beyond this machine: {outside}"
+
+
+@pytest.fixture
+def page(opened) -> Iterator[BenchPage]:
+    opened.start_afresh()
+    yield opened
+    assert opened.problems == [], f"the page's own script failed: {opened.problems}"
+    assert opened.bench.conductor.errors == []
+    assert opened.bench.presenter.errors == []

@@ -1,0 +1,150 @@
+"""The page as a person meets it, and the few looks behind it that a test needs (viser's unofficial test hooks)."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from rcilab.workbench import requests
+
+_PROJECT = """([name, offset]) => {
+  const m = __viserMutable, node = m.nodeRefFromName[name];
+  node.updateWorldMatrix(true, false);
+  const v = m.camera.position.clone().set(...offset).applyMatrix4(node.matrixWorld).project(m.camera);
+  const r = m.canvas.getBoundingClientRect();
+  return [r.left + (v.x + 1) / 2 * r.width, r.top + (1 - v.y) / 2 * r.height];
+}"""
+_RELATIVE = """([root, node]) => {
+  const n = __viserMutable.nodeRefFromName, a = n[root], b = n[node];
+  if (!a || !b) return null;
+  a.updateWorldMatrix(true, false); b.updateWorldMatrix(true, false);
+  return a.matrixWorld.clone().invert().multiply(b.matrixWorld).transpose().elements;
+}"""
+_DRAWN = """() => window.__viserMutable && __viserMutable.nodeRefFromName
+  && __viserMutable.nodeRefFromName['/live'] && __viserMutable.nodeRefFromName['/target']
+  && __viserTestpoints.rendererInfo.render.frame > 3"""
+
+
+def close_toasts(tab) -> None:
+    """Closes viser's notice about software rendering, which covers the top left of the scene."""
+    for button in tab.locator(".mantine-Notification-closeButton").all():
+        button.click()
+
+
+def wait_for(condition: Callable[[], bool], what: str, timeout: float = 15.0, tab=None) -> None:
+    """Polls until something holds; the message says what never came."""
+    end = time.monotonic() + timeout
+    while not condition():
+        if time.monotonic() > end:
+            raise AssertionError(f"within {timeout} s this did not happen: {what() if callable(what) else what}")
+        if tab is None:
+            time.sleep(0.05)
+        else:
+            tab.wait_for_timeout(50)  # Lets playwright handle the page's events.
+
+
+class BenchPage:
+    """One browser page on a workbench."""
+
+    def __init__(self, tab, bench) -> None:
+        self.tab, self.bench = tab, bench
+        self.problems: list[str] = []
+        """What the page's own script threw."""
+
+    @property
+    def state(self):
+        return self.bench.store.state
+
+    @property
+    def status(self):
+        return self.bench.session.status()
+
+    def wait(self, condition: Callable[[], bool], what: str, timeout: float = 15.0) -> None:
+        wait_for(condition, what, timeout, self.tab)
+
+    def wait_until_drawn(self) -> None:
+        self.tab.wait_for_function(_DRAWN, timeout=40_000)
+
+    def start_afresh(self) -> None:
+        """Puts robot and settings into the state a test starts from, past the page."""
+        ask = self.bench.conductor.ask
+        self.wait(lambda: self.status.phase == "idle" and bool(self.status.powered), "a powered, idle arm", 30.0)
+        ask(requests.SetView(name="language", value="en"))
+        ask(requests.SetSpeed(speed=0.5))
+        ask(requests.PoseGoal(name="here"))
+        self.wait(lambda: self.state.plan is None and self.state.language == "en", "a goal where the arm is")
+        self.wait(lambda: self.status.phase == "idle", "an idle arm")
+        self.wait(lambda: self.state.lease.holder is not None, "the controls in this page's hand")
+        self.open_tab("Jog")
+        self.wait(lambda: self.alerts() == [], "no complaint of an earlier test")
+
+    def open_tab(self, name: str) -> None:
+        self.tab.get_by_role("tab", name=name).click()
+
+    def button(self, name: str):
+        return self.tab.get_by_role("button", name=name, exact=True)
+
+    def rows(self):
+        """The sliders and typed numbers of the Jog tab."""
+        return self.tab.locator("div:has(> div > .rl-rows)").first
+
+    def slider(self, joint: int):
+        return self.rows().get_by_role("slider").nth(joint - 1)
+
+    def joint_field(self, joint: int):
+        return self.rows().locator(".mantine-TextInput-root input").nth(joint - 1)
+
+    def pose_field(self, name: str):
+        place = ("x", "roll", "y", "pitch", "z", "yaw").index(name)
+        return self.tab.locator("div:has(> div > .rl-pairs)").locator(".mantine-TextInput-root input").nth(place)
+
+    def alerts(self) -> list[str]:
+        return self.tab.locator(".rl-problem").all_inner_texts()
+
+    def chip(self, name: str) -> str:
+        return self.tab.locator(f"[data-id={name}] b").inner_text()
+
+    def toast(self) -> str:
+        return self.tab.locator("#rl-toast.rl-shown").inner_text() if self.tab.locator("#rl-toast.rl-shown").count() else ""
+
+    def tool_pose(self, arm: str) -> np.ndarray | None:
+        """Pose of an arm's tool in its base as the page's scene holds it, (4, 4)."""
+        n = self.state.model.n
+        node = f"/{arm}" + "".join(f"/joint{i}" for i in range(1, n + 1)) + "/flange/tool"
+        numbers = self.tab.evaluate(_RELATIVE, [f"/{arm}", node])
+        return None if numbers is None else np.array(numbers).reshape(4, 4)
+
+    def shows(self, arm: str, q: np.ndarray, tolerance: float = 1e-5) -> bool:
+        """Whether the page's scene has this arm in this pose, by our own forward kinematics."""
+        pose = self.tool_pose(arm)
+        return pose is not None and float(np.abs(pose - self.state.model.forward(q).matrix).max()) < tolerance
+
+    def project(self, node: str, offset: tuple[float, float, float]) -> tuple[float, float]:
+        x, y = self.tab.evaluate(_PROJECT, [node, list(offset)])
+        return x, y
+
+    def drag(self, start: tuple[float, float], end: tuple[float, float], steps: int = 8) -> None:
+        mouse = self.tab.mouse
+        mouse.move(*start)
+        self.tab.wait_for_timeout(300)  # The gizmo notices the mouse on its next drawn frame.
+        mouse.down()
+        for step in range(1, steps + 1):
+            share = step / steps
+            mouse.move(start[0] + (end[0] - start[0]) * share, start[1] + (end[1] - start[1]) * share)
+            self.tab.wait_for_timeout(60)
+        mouse.up()
+
+    def type_joint(self, joint: int, text: str) -> None:
+        self.joint_field(joint).fill(text)
+
+    def plan_to(self, joint: int, degrees: float) -> None:
+        """Poses one joint of the goal by typing, and waits for the plan."""
+        self.open_tab("Jog")
+        self.type_joint(joint, str(degrees))
+        wanted = np.radians(degrees)
+        self.wait(
+            lambda: self.state.plan is not None and abs(self.state.plan.motion.goal[joint - 1] - wanted) < 1e-9,
+            f"a plan to joint {joint} = {degrees} deg",
+        )

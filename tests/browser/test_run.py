@@ -1,0 +1,82 @@
+"""Plan, check, execute, stop: the robot really moves, and the page mirrors it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rcilab.workbench import requests
+
+
+def test_plan_check_execute_and_the_arm_arrives(page):
+    goal_deg = -40.0 if page.status.q_c[0] > 0 else 40.0
+    page.plan_to(1, goal_deg)
+    page.open_tab("Check")
+    verdict = page.tab.locator(".rl-verdict.rl-good:visible").first
+    page.wait(lambda: "Passed" in verdict.inner_text(), "a green report")
+    assert page.tab.locator(".rl-card:visible").count() >= 9
+    goal = np.array(page.state.goal.q)
+    page.open_tab("Run")
+    page.wait(lambda: page.button("Execute").is_enabled(), "Execute to be pressable")
+    page.button("Execute").click()
+    page.wait(lambda: page.status.phase == "moving", "the arm to move")
+    page.wait(lambda: page.status.phase == "idle" and np.abs(page.status.q - goal).max() < 1e-6, "the arm to arrive", 30)
+    page.wait(lambda: page.shows("live", goal), "the live arm of the page at the goal")
+    page.wait(lambda: page.state.recording is not None and page.state.recording.t[-1] > 0.9 * page.state.plan.motion.duration, "a recording")
+    assert not page.button("Execute").is_enabled(), "a certificate that was used up must not be pressable again"
+    page.wait(lambda: "no longer stands where this plan starts" in page.tab.locator(".rl-why").inner_text(), "the reason")
+
+
+def stop_in_mid_motion(page, press) -> None:
+    start = np.array(page.status.q_c)
+    page.bench.conductor.ask(requests.SetSpeed(speed=0.05))
+    page.plan_to(1, 60.0 if start[0] <= 0 else -60.0)
+    goal = np.array(page.state.goal.q)
+    page.open_tab("Run")
+    page.wait(lambda: page.button("Execute").is_enabled(), "Execute to be pressable")
+    page.button("Execute").click()
+    page.wait(lambda: page.status.phase == "moving" and abs(page.status.q[0] - start[0]) > 0.05, "the arm on its way")
+    press()
+    page.wait(lambda: page.status.phase == "idle", lambda: f"the arm to come to rest: {page.status}", 5.0)
+    q = np.array(page.status.q_c)
+    assert abs(q[0] - goal[0]) > 0.1, "the arm stopped short of the goal"
+    assert not page.status.faults, "a controlled stop raises no fault"
+    page.wait(lambda: page.shows("live", page.status.q), "the live arm where it stopped")
+    page.button("Plan from here").click()
+    page.wait(lambda: page.button("Execute").is_enabled(), "the way to go on")
+
+
+def test_stop_brings_the_arm_to_rest_short_of_the_goal(page):
+    stop_in_mid_motion(page, lambda: page.button("Stop").click())
+
+
+def test_escape_does_the_same_even_while_a_text_field_has_the_focus(page):
+    def press() -> None:
+        page.tab.get_by_role("textbox").last.focus()
+        page.tab.keyboard.press("Escape")
+
+    stop_in_mid_motion(page, press)
+
+
+def test_stop_is_in_sight_in_every_tab(page):
+    for name in ("Jog", "Target", "Check", "Run", "Settings"):
+        page.open_tab(name)
+        assert page.button("Stop").is_visible(), name
+
+
+def test_play_moves_only_the_translucent_arm(page):
+    page.plan_to(2, float(np.degrees(page.status.q_c[1])) - 25.0)
+    before = np.array(page.status.q_c)
+    page.button("Play").click()
+    page.wait(lambda: page.state.place > 0.3, "the preview to play")
+    page.wait(lambda: page.state.place == 1.0 and not page.state.playing, "the preview to end")
+    assert np.array_equal(page.status.q_c, before)
+
+
+def test_a_click_in_a_plot_moves_the_timeline(page):
+    page.plan_to(2, float(np.degrees(page.status.q_c[1])) - 25.0)
+    over = page.tab.locator(".u-over").nth(1)
+    box = over.bounding_box()
+    page.tab.mouse.click(box["x"] + box["width"] * 0.3, box["y"] + box["height"] / 2)
+    page.wait(lambda: page.state.place > 0.0, "the timeline to move")
+    t = page.state.place * page.state.plan.motion.duration
+    page.wait(lambda: page.shows("plan", page.state.plan.motion.at(t).q, 1e-4), "the plan's arm at that moment")

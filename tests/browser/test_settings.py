@@ -1,0 +1,85 @@
+"""Language, another arm, two pages, and a page of a foreign origin."""
+
+from __future__ import annotations
+
+import http.server
+import threading
+
+import numpy as np
+
+from browser.page import BenchPage, close_toasts
+
+
+def test_the_language_changes_everywhere_and_back(page):
+    page.open_tab("Settings")
+    choose(page, "Language", "中文")
+    page.tab.get_by_role("tab", name="关节").wait_for()
+    page.wait(lambda: page.tab.locator("#rl-stop").inner_text().startswith("停止"), "Stop in Chinese")
+    assert page.tab.locator("[data-id=model] small").inner_text() == "机器人"
+    page.tab.get_by_role("tab", name="设置").click()
+    choose(page, "语言", "English")
+    page.tab.get_by_role("tab", name="Settings").wait_for()
+
+
+def test_another_arm_stands_there_without_a_restart(page):
+    page.open_tab("Settings")
+    choose(page, "Robot", "xMate3")
+    page.wait(lambda: page.state.model.name == "xMate3", "the other model", 30)
+    page.wait(lambda: page.status.q is not None and len(page.status.q) == 6, "states of a 6-axis arm", 30)
+    page.wait(lambda: page.shows("live", page.status.q), "the other arm in the scene", 30)
+    page.wait(lambda: page.rows().get_by_role("slider").count() == 6, "six sliders")
+    page.open_tab("Settings")
+    choose(page, "Robot", "xMatePro7")
+    page.wait(lambda: page.status.q is not None and len(page.status.q) == 7, "the first arm again", 30)
+    page.wait(lambda: page.shows("live", page.status.q), "the first arm in the scene", 30)
+
+
+def test_the_second_page_watches_until_it_takes_the_controls(page, chromium):
+    context = chromium.new_context(viewport={"width": 960, "height": 620})
+    other = BenchPage(context.new_page(), page.bench)
+    other.tab.goto(f"{page.bench.url}?fixedDpr=0.4")
+    other.wait_until_drawn()
+    close_toasts(other.tab)
+    page.wait(lambda: len(page.state.lease.pages) == 2, "two pages")
+    before = np.array(page.state.goal.q)
+    other.type_joint(1, "33")
+    other.wait(lambda: "holds the controls" in other.toast(), "to be told that it only watches")
+    assert np.array_equal(page.state.goal.q, before)
+    other.open_tab("Settings")
+    other.button("Take the controls").click()
+    other.wait(lambda: page.chip("controls") == "page 2 of 2", "the first page to see who has the controls")
+    context.close()
+    page.wait(lambda: page.state.lease.pages == (page.state.lease.holder,), "the controls back with the first page")
+
+
+def test_a_page_of_a_foreign_origin_gets_no_websocket(page, chromium):
+    class Foreign(http.server.BaseHTTPRequestHandler):
+        def do_GET(self):
+            self.send_response(200)
+            self.end_headers()
+            self.wfile.write(b"<title>foreign</title>")
+
+        def log_message(self, *_):
+            pass
+
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), Foreign) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        context = chromium.new_context()
+        tab = context.new_page()
+        tab.goto(f"http://127.0.0.1:{server.server_port}/")
+        script = """([port, path, protocol]) => new Promise((done) => {
+          const s = protocol ? new WebSocket(`ws://127.0.0.1:${port}${path}`, [protocol]) : new WebSocket(`ws://127.0.0.1:${port}${path}`);
+          s.onopen = () => done('open'); s.onerror = () => done('refused'); })"""
+        answers = [
+            tab.evaluate(script, [page.bench.port, path, protocol])
+            for path, protocol in (("/", "viser-v1.1.1"), ("/rcilab/live", None))
+        ]
+        context.close()
+        server.shutdown()
+    assert answers == ["refused", "refused"]
+
+
+def choose(page: BenchPage, label: str, option: str) -> None:
+    row = page.tab.get_by_label(label, exact=True).or_(page.tab.get_by_role("textbox", name=label, exact=True)).first
+    row.click()
+    page.tab.get_by_role("option", name=option, exact=True).click()
