@@ -68,12 +68,12 @@ class StateReporter:
         robot_mode: RobotMode,
     ) -> RobotState:
         """Returns the state of this cycle."""
-        state = self._state
         is_same = measurement is self._measurement and commanded.version == self._version
-        if state is None or not is_same or not self._is_settled:
-            state = self._compute(commanded, measurement)
+        base = self._state if is_same and self._is_settled else None
+        if base is None:
+            base = self._compute(commanded, measurement)
         state = self._state = replace(
-            state,
+            base,
             message_id=message_id,
             faults=faults,
             success_rate=success_rate,
@@ -87,7 +87,7 @@ class StateReporter:
     def _compute(self, commanded: CommandedMotion, measured: Measurement) -> RobotState:
         model, last, h = self._model, self._state, CYCLE_TIME
         q_c, dq_c, ddq_c = frozen(commanded.q), frozen(commanded.dq), frozen(commanded.ddq)
-        is_exact = np.array_equal(measured.q, q_c)
+        is_exact = measured.q.tolist() == commanded.q
         pose_c = model.forward(q_c)
         pose = pose_c if is_exact else model.forward(measured.q)
         twist_c = self._zeros6 if commanded.is_at_rest else model.jacobian(q_c) @ dq_c
@@ -96,7 +96,7 @@ class StateReporter:
         psi = psi_c if is_exact else self._arm_angle(measured.q, self._psi)
         dpsi_c = 0.0 if last is None else math.remainder(psi_c - self._psi_c, math.tau) / h
         ddpsi_c = 0.0 if last is None else (dpsi_c - self._dpsi_c) / h
-        follows = is_exact and np.array_equal(measured.dq, dq_c)
+        follows = is_exact and measured.dq.tolist() == commanded.dq
         tau_c = measured.tau if follows else model.rigid_body.full_torque(q_c, dq_c, ddq_c)
         dtau_c = self._zeros if last is None else (tau_c - last.tau_c) / h
         tau_filtered = measured.tau if last is None else self._low_pass(last.tau_filtered, measured.tau)
