@@ -50,6 +50,11 @@ class ViserScene:
             position=np.asarray(position),
             visible=visible,
         )
+        # A page keeps the pose of a removed node of the same name, and viser sends none that equals the default: send
+        # it for certain, by setting another one first.
+        handle = self._handles[name]
+        handle.wxyz, handle.position = (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, -1.0)
+        handle.wxyz, handle.position = np.asarray(wxyz), np.asarray(position)
 
     def add_mesh(self, name: str, vertices: ArrayLike, faces: ArrayLike, *, color: Color, opacity: float = 1.0) -> None:
         """Adds a triangle mesh; see `Scene`. A translucent mesh casts no shadow."""
