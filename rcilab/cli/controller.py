@@ -25,6 +25,16 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     parser.add_argument("--plant", default="ideal", metavar="KIND", help="what moves: ideal or mujoco (%(default)s)")
     parser.add_argument("--lockstep", action="store_true", help="advance a motion only as its commands come")
+    parser.add_argument(
+        "--prefill", type=int, metavar="N", help="play commands N cycles late, which absorbs jitter (10; lock-step: 0)"
+    )
+    parser.add_argument(
+        "--lost-limit",
+        type=int,
+        default=20,
+        metavar="N",
+        help="lost commands in a row that stop a motion, 10 to 20; 0: none do (%(default)s)",
+    )
     parser.add_argument("--exit-with-parent", nargs="?", type=int, const=0, metavar="PID", help=argparse.SUPPRESS)
     parser.set_defaults(run=run)
 
@@ -44,6 +54,8 @@ def run(args: argparse.Namespace) -> int:
         client_port=client_port,
         plant=args.plant,
         lockstep=args.lockstep,
+        prefill=args.prefill,
+        lost_limit=args.lost_limit or None,  # 0 switches it off.
         # Without a number: whoever started us, as long as that one is still there to be asked for.
         parent_pid=os.getppid() if args.exit_with_parent == 0 else args.exit_with_parent,
     )

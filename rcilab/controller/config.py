@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, TypeAlias, get_args
 
+from rcilab.clock import CYCLE_TIME
+from rcilab.controller.cycle import PREFILL
 from rcilab.errors import InvalidValueError
 
 PlantKind: TypeAlias = Literal["ideal", "mujoco"]
@@ -46,7 +48,7 @@ class ControllerConfig:
     """From StartMove to the requested modes, [s]; None: 0.2, or 0.02 in lock-step. The vendor's client wants 0.1 at
     least, or it answers old states."""
     prefill: int | None = None
-    """Cycles by which commands are played late, to absorb jitter; None: 4, or 0 in lock-step."""
+    """Cycles by which commands are played late, to absorb jitter; None: 10, or 0 in lock-step."""
     lost_limit: int | None = MOST_LOST
     """Lost cycles in a row that are an instability, 10 to 20; None: any number is bridged."""
     realtime: bool = True
@@ -78,9 +80,9 @@ class ControllerConfig:
     def mode_delay_cycles(self) -> int:
         """Cycles from StartMove to the requested modes."""
         delay = self.mode_delay if self.mode_delay is not None else 0.02 if self.lockstep else 0.2
-        return round(delay * 1000.0)
+        return round(delay / CYCLE_TIME)
 
     @property
     def prefill_cycles(self) -> int:
         """Cycles by which commands are played late."""
-        return self.prefill if self.prefill is not None else 0 if self.lockstep else 4
+        return self.prefill if self.prefill is not None else 0 if self.lockstep else PREFILL

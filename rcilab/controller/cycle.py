@@ -27,7 +27,8 @@ from rcilab.protocols import rci
 from rcilab.state import ControllerMode, MotionGeneratorMode, RobotState
 
 MODE_DELAY = 200  # [cycles] After StartMove; by then the vendor client's buffer is full of idle states, which it skips.
-PREFILL = 4  # [cycles] Jitter of client and network that a motion survives unharmed, and its delay; a choice.
+PREFILL = 10  # [cycles] Pauses of client and network that a motion survives unharmed, and its delay. Both ends on one
+# busy machine, even under SCHED_FIFO, were measured to pause for 5 to 10 ms now and then.
 LOST_LIMIT = 20  # [cycles] Lost commands in a row that are an instability (manual 4.6: usually 10 to 20).
 RECOVERY_TIME = 50  # [cycles] How long an error recovery takes at least; a choice.
 DRAIN_LIMIT = 300  # [cycles] How long queued commands are played after StopMove; longer than any queue.
