@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import io
 import math
 import socket
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager, redirect_stdout
+from contextlib import contextmanager
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
@@ -48,6 +47,7 @@ class PreviewPage:
         self.port: int = bound.getsockname()[1]
         self._motion = motion
         self._server = _open_server(bound)
+        self._server.gui.configure_theme(show_logo=False, show_share_button=False)
         set_stage(self._server, quality="light")
         scene = ViserScene(self._server, shadows=False)
         ArmView(scene, "goal", model, "plan").show(motion.goal)
@@ -77,7 +77,7 @@ class PreviewPage:
         if not self._closed.is_set():
             self._closed.set()
             self._player.join()
-            with redirect_stdout(io.StringIO()):  # viser says that it stopped; whoever called us knows.
+            with _quiet():  # viser says that it stopped; whoever called us knows.
                 self._server.stop()
 
     def __enter__(self) -> PreviewPage:
@@ -166,7 +166,20 @@ def _guarded_serve(bound: socket.socket, origins: list[Any]) -> Iterator[None]:
 
     serving.serve = serve
     try:
-        with redirect_stdout(io.StringIO()):  # viser prints a box of addresses; ours is one line.
+        with _quiet():  # viser prints a box of addresses; ours is one line.
             yield
     finally:
         serving.serve = original
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keeps viser from printing: it goes through rich, which in a notebook does not go through stdout."""
+    import rich
+
+    console = rich.get_console()
+    before, console.quiet = console.quiet, True
+    try:
+        yield
+    finally:
+        console.quiet = before

@@ -97,10 +97,12 @@ class JointSliders:
 
     def _report(self) -> None:
         T_base_tool = self._model.forward(self._q)
-        text = _POSITION_FORMAT.format(*(1e3 * T_base_tool.position), *np.degrees(T_base_tool.rpy))
+        numbers = np.concatenate((1e3 * T_base_tool.position, np.degrees(T_base_tool.rpy)))
+        text = _POSITION_FORMAT.format(*(np.round(numbers, 1) + 0.0))  # Adding 0 turns -0.0 into 0.0.
         if self._model.n == 7:
             try:
-                text += f"; arm angle {math.degrees(self._model.arm_angle(self._q)):.1f}°"
+                psi = math.degrees(self._model.arm_angle(self._q))
+                text += f"; arm angle {round(psi, 1) + 0.0:.1f}°"
             except KinematicsError:  # Stretched or straight above the base: there is no elbow to measure.
                 text += "; no arm angle here (singular)"
         self.pose.value = f"<code>tool in base: {text}</code>"

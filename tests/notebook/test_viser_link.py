@@ -102,3 +102,9 @@ def test_in_a_notebook_it_is_a_link_and_a_frame(page: PreviewPage) -> None:
     markup = page._repr_html_()
     assert f'<a href="{page.url}"' in markup
     assert f'<iframe src="{page.url}"' in markup
+
+
+def test_viser_keeps_its_address_box_to_itself(capsys: pytest.CaptureFixture[str]) -> None:
+    serve_preview(MOTION, PRO7).close()
+    said = capsys.readouterr()
+    assert said.out == said.err == ""
