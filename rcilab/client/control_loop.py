@@ -11,6 +11,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from rcilab.client.brake import Brake, CartesianBrake, JointBrake, TorqueBrake
+from rcilab.client.checked_command import check_command, has_arrived, require_first
 from rcilab.client.commands import RciCommands
 from rcilab.client.fault_report import describe_faults
 from rcilab.client.link import Link
@@ -35,8 +36,6 @@ STOP_TIMEOUT = 1.0  # [s] for the answer to StopMove when something has gone wro
 SETTLE_CYCLES = 200  # Cycles that the last command is repeated at most until the controller has played it.
 REST_TIMEOUT = 1.0  # [s] for the controller's own stop after a fault; the slowest joint needs 0.3 s from full speed.
 RECORD_CYCLES = 50  # Cycles that a ControlError carries, as many as the vendor's client writes.
-START_TOLERANCE = 1e-6  # [rad] or [m] A first command this far off makes a jerk of 1000 rad/s^3, below every limit.
-ARRIVED = 1e-12  # [rad] The commanded angles come back over the wire bit by bit; this is for a sign of zero.
 
 Callback: TypeAlias = Callable[[RobotState, float], Command]
 """`(state, t) -> command`; t counts controller cycles since the first call, [s]."""
@@ -217,7 +216,7 @@ class ControlLoop:
         for _ in range(SETTLE_CYCLES):
             state = self._next()
             self._answer(state, command)
-            if _has_arrived(state, command):
+            if has_arrived(state, command):
                 return
 
     def _end(self, error: BaseException | None, *, brake: bool = True) -> None:
@@ -270,28 +269,11 @@ class ControlLoop:
             before = states[-1]
 
     def _checked(self, command: Any, state: RobotState) -> Command:
-        """Returns the callback's command once its kind, shape, finiteness and, at first, its place are found good."""
-        if not isinstance(command, self._kind):
-            raise InvalidValueError(
-                "command", command, f"must be a {self._kind.__name__} in mode {self._mode.name}; what the callback "
-                "returns is sent as it is"
-            )  # fmt: skip
-        values, shape, unit = _content(command, self._link.n)
-        numbers = np.asarray(values)
-        if numbers.dtype != np.float64 or numbers.shape != shape:
-            try:
-                numbers = np.array(values, dtype=np.float64)
-            except (TypeError, ValueError) as error:
-                raise InvalidValueError("command", values, f"is not {shape} numbers [{unit}]") from error
-            if numbers.shape != shape:
-                raise InvalidValueError("command", values, f"has shape {numbers.shape}, needs {shape} [{unit}]")
-            command = _with_content(command, numbers)
-        psi = command.psi if isinstance(command, CartesianPosition) else None
-        if not np.isfinite(numbers).all() or (psi is not None and not math.isfinite(psi)):
-            raise InvalidValueError("command", values, f"must be finite in every element [{unit}]")
+        """Returns the callback's command once it is found good; the first one must also be where the arm is."""
+        checked = check_command(command, self._kind, self._link.n)
         if self._command is None:
-            _require_first(command, state)
-        return command
+            require_first(checked, state)
+        return checked
 
     def _time(self, state: RobotState) -> float:
         return (state.message_id - self._first_id) * CYCLE_TIME
@@ -319,55 +301,6 @@ class ControlLoop:
             f"{self._link.name}: no state for {self._silence:g} s, {when}; look whether the controller runs and the "
             "cable is in, then connect again. The controller stops an arm that gets no commands by itself"
         )
-
-
-def _content(command: Command, n: int) -> tuple[Any, tuple[int, ...], str]:
-    if isinstance(command, JointPosition):
-        return command.q, (n,), "rad"
-    if isinstance(command, CartesianPosition):
-        return command.T_base_tool, (4, 4), "m"
-    return command.tau, (n,), "N m"
-
-
-def _with_content(command: Command, numbers: Any) -> Command:
-    if isinstance(command, JointPosition):
-        return JointPosition(numbers, command.finished)
-    if isinstance(command, CartesianPosition):
-        return CartesianPosition(numbers, command.psi, command.finished)
-    return JointTorque(numbers, command.finished)
-
-
-def _require_first(command: Command, state: RobotState) -> None:
-    """Refuses a first command that is not the commanded state: the arm would jump."""
-    if isinstance(command, JointPosition):
-        off = np.abs(command.q - state.q_c)
-        joint = int(off.argmax())
-        if off[joint] > START_TOLERANCE:
-            raise InvalidValueError(
-                "first command",
-                np.degrees(command.q).round(3).tolist(),
-                f"deg must be where the arm is: joint {joint + 1} is commanded to "
-                f"{math.degrees(command.q[joint]):.4f} deg and stands at {math.degrees(state.q_c[joint]):.4f} deg, "
-                f"{math.degrees(off[joint]):.4f} deg apart (tolerance {math.degrees(START_TOLERANCE):.1g} deg); "
-                "begin with state.q_c",
-            )
-    elif isinstance(command, CartesianPosition):
-        off = float(np.abs(command.T_base_tool - state.T_base_tool_c).max())
-        if off > START_TOLERANCE:
-            raise InvalidValueError(
-                "first command",
-                command.T_base_tool[:3, 3].tolist(),
-                f"must be the pose the arm is at: an element differs by {off:.3g} (tolerance {START_TOLERANCE:g}); "
-                "begin with state.T_base_tool_c",
-            )
-
-
-def _has_arrived(state: RobotState, command: Command) -> bool:
-    if isinstance(command, JointPosition):
-        return bool(np.abs(state.q_c - command.q).max() <= ARRIVED)
-    if isinstance(command, CartesianPosition):
-        return bool(np.abs(state.T_base_tool_c - command.T_base_tool).max() <= 1e-9)
-    return True
 
 
 def _stands(before: RobotState, after: RobotState) -> bool:

@@ -230,6 +230,7 @@ def test_a_first_command_elsewhere_names_the_joint_and_both_angles(make_robot):
     [
         (lambda q: JointPosition(np.full(7, np.nan)), "finite"),
         (lambda q: JointPosition(np.zeros(6)), r"needs \(7,\)"),
+        (lambda q: JointPosition([1.0, [2.0]]), "is not"),
         (lambda q: q, "must be a JointPosition"),
         (lambda q: CartesianPosition(np.eye(4)), "must be a JointPosition"),
     ],
@@ -254,6 +255,21 @@ def test_an_exception_in_the_callback_brings_the_arm_to_rest_and_comes_out_again
 
     with pytest.raises(LookupError, match="mine"):
         robot.control(callback)
+    assert_controlled_stop(peer)
+
+
+def test_a_callback_that_writes_into_one_array_again_and_again_still_stops_within_the_limits(make_robot):
+    peer, robot = make_robot()
+    good = wave(400, size=0.2)
+    q = np.zeros(7)
+
+    def callback(state, t):
+        q[:] = good(state, t).q
+        if t > 0.2:
+            robot.stop()
+        return JointPosition(q)
+
+    assert robot.control(callback).stopped
     assert_controlled_stop(peer)
 
 

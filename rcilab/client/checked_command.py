@@ -1,0 +1,89 @@
+"""What a callback returned, before it is sent: is it a command, and is it one the arm can follow from where it is?"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from rcilab.arrays import Array
+from rcilab.command import CartesianPosition, Command, JointPosition, JointTorque
+from rcilab.errors import InvalidValueError
+from rcilab.state import RobotState
+
+START_TOLERANCE = 1e-6  # [rad] or [m] A first command this far off makes a jerk of 1000 rad/s^3, below every limit.
+_ARRIVED = 1e-12  # [rad] The commanded angles come back over the wire bit by bit; this is for a sign of zero.
+_POSE_ARRIVED = 1e-9  # [m], or an element of a rotation: a controller may normalise what it was sent.
+
+
+def check_command(command: Any, kind: type[Command], n: int) -> Command:
+    """Returns a command of ours with a copy of its numbers, so that the caller may go on writing into his array.
+
+    Args:
+        command: What a callback returned.
+        kind: What the mode asks for.
+        n: Number of joints.
+
+    Raises:
+        InvalidValueError: It is of another kind, of the wrong shape, or not finite.
+    """
+    if not isinstance(command, kind):
+        raise InvalidValueError("command", command, f"must be a {kind.__name__} in this mode")
+    if isinstance(command, JointPosition):
+        return JointPosition(_numbers(command.q, (n,), "rad"), command.finished)
+    if isinstance(command, JointTorque):
+        return JointTorque(_numbers(command.tau, (n,), "N m"), command.finished)
+    if command.psi is not None and not math.isfinite(command.psi):
+        raise InvalidValueError("psi", command.psi, "must be finite [rad], or None")
+    return CartesianPosition(_numbers(command.T_base_tool, (4, 4), "m"), command.psi, command.finished)
+
+
+def require_first(command: Command, state: RobotState) -> None:
+    """Refuses a first command that is not the commanded state: the arm would jump.
+
+    Raises:
+        InvalidValueError: It is elsewhere; the message names the joint, both angles and the tolerance.
+    """
+    if isinstance(command, JointPosition):
+        off = np.abs(command.q - state.q_c)
+        joint = int(off.argmax())
+        if off[joint] > START_TOLERANCE:
+            raise InvalidValueError(
+                "first command",
+                np.degrees(command.q).round(3).tolist(),
+                f"deg must be where the arm is: joint {joint + 1} is commanded to "
+                f"{math.degrees(command.q[joint]):.4f} deg and stands at {math.degrees(state.q_c[joint]):.4f} deg, "
+                f"{math.degrees(off[joint]):.4f} deg apart (tolerance {math.degrees(START_TOLERANCE):.1g} deg); "
+                "begin with state.q_c",
+            )
+    elif isinstance(command, CartesianPosition):
+        off = float(np.abs(command.T_base_tool - state.T_base_tool_c).max())
+        if off > START_TOLERANCE:
+            raise InvalidValueError(
+                "first command",
+                command.T_base_tool[:3, 3].tolist(),
+                f"must be the pose the arm is at: an element differs by {off:.3g} (tolerance {START_TOLERANCE:g}); "
+                "begin with state.T_base_tool_c",
+            )
+
+
+def has_arrived(state: RobotState, command: Command) -> bool:
+    """Returns whether the controller reports a command as its commanded state."""
+    if isinstance(command, JointPosition):
+        return bool(np.abs(state.q_c - command.q).max() <= _ARRIVED)
+    if isinstance(command, CartesianPosition):
+        return bool(np.abs(state.T_base_tool_c - command.T_base_tool).max() <= _POSE_ARRIVED)
+    return True
+
+
+def _numbers(values: Any, shape: tuple[int, ...], unit: str) -> Array:
+    try:
+        numbers = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InvalidValueError("command", values, f"is not {shape} numbers [{unit}]") from error
+    if numbers.shape != shape:
+        raise InvalidValueError("command", values, f"has shape {numbers.shape}, needs {shape} [{unit}]")
+    if not np.isfinite(numbers).all():
+        raise InvalidValueError("command", values, f"must be finite in every element [{unit}]")
+    return numbers
