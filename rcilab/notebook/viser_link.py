@@ -54,7 +54,7 @@ class PreviewPage:
         self._arm = ArmView(scene, "arm", model)
         self._arm.show(motion.start)
         gui = self._server.gui
-        last = max(motion.duration, _TICK)
+        last = max(math.ceil(1e3 * motion.duration) / 1e3, _TICK)
         self._play = gui.add_checkbox("Play", True)
         self._slider = gui.add_slider("Time [s]", min=0.0, max=last, step=0.001, initial_value=0.0)
         self._speed = gui.add_dropdown("Speed", ("1", "0.5", "0.25", "0.1"))
