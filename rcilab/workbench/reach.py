@@ -118,20 +118,21 @@ def _last_reachable(
 ) -> tuple[Pose, Solutions] | None:
     """Returns the pose furthest on the straight way from a reachable origin to a target that is not."""
 
-    def attempt(share: float) -> tuple[Pose, Solutions] | None:
+    def attempt(share: float, held: float | None) -> tuple[Pose, Solutions] | None:
         pose = _between(origin, target, share)
         try:
-            return pose, model.inverse(pose, psi=psi, near=near)
+            return pose, model.inverse(pose, psi=held, near=near)
         except UnreachableError:
             return None
 
-    best = attempt(0.0)
+    best = attempt(0.0, psi)
     if best is None:
         return None
+    held = best[1].psi  # Searching for another arm angle at every step would cost more than a display's frame.
     low, high = 0.0, 1.0
     for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
-        found = attempt(middle)
+        found = attempt(middle, held)
         if found is None:
             high = middle
         else:

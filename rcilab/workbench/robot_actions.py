@@ -6,14 +6,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rcilab.errors import CertificateError, RcilabError
+from rcilab.errors import CertificateError, ControlError, RcilabError
+from rcilab.faults import Fault
 from rcilab.model import load_model
 from rcilab.workbench import requests
 from rcilab.workbench.goal_actions import initial_goal
 from rcilab.workbench.readiness import is_moving, obstacle
 from rcilab.workbench.session import Session
 from rcilab.workbench.store import Recording, Store
-from rcilab.workbench.text import message
+from rcilab.workbench.reach import Tone
+from rcilab.workbench.text import Message, message
 
 if TYPE_CHECKING:
     from rcilab.supervisor import SupervisorStatus, Ticket
@@ -90,7 +92,7 @@ class RobotActions:
         self._collect_tickets()
         if status.incident is not None and status.incident.number > self._incident:
             self._incident = status.incident.number
-            self._store.say("bad", message("notice.plain", text=status.incident.message))
+            self._store.say("bad", _tell_incident(status.incident.code, status.incident.message))
         before, self._phase = self._phase, status.phase
         self._record(status)
         if not self._placed and status.q_c is not None:
@@ -129,12 +131,19 @@ class RobotActions:
             if not ticket.done:
                 waiting.append((what, ticket))
             elif ticket.error is not None:
-                self._store.say(
-                    "bad", message("notice.refused", what=message(f"drive.{what}"), error=str(ticket.error))
-                )
+                self._store.say(*self._tell_failure(what, ticket.error))
             elif what == "execute":
                 self._store.say("good", message("notice.arrived"))
         self._tickets = waiting
+
+    def _tell_failure(self, what: str, error: RcilabError) -> tuple[Tone, Message]:
+        if isinstance(error, ControlError) and error.faults:
+            faults = ", ".join(fault.manual_name for fault in error.faults if isinstance(fault, Fault))
+            return "bad", message("notice.fault", faults=faults)
+        if isinstance(error, ControlError) and what == "execute":
+            left_alone = self._session.status().code == "idle.operator"
+            return "warn", message("notice.operator" if left_alone else "notice.stopped")
+        return "bad", message("notice.refused", what=message(f"drive.{what}"), error=str(error))
 
     def _record(self, status: SupervisorStatus) -> None:
         try:
@@ -153,3 +162,10 @@ class RobotActions:
             )
         if not is_moving(status) and not any(what == "execute" for what, _ in self._tickets):
             self._recording = False
+
+
+_TOLD = ("crashed.controller", "crashed.worker", "crashed.frozen", "lost.silent", "lost.unreachable")
+
+
+def _tell_incident(code: str, sentence: str) -> Message:
+    return message(f"incident.{code}", detail=sentence) if code in _TOLD else message("notice.plain", text=sentence)

@@ -1,0 +1,50 @@
+"""Typed numbers: a value or a sentence, whatever was typed."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rcilab.workbench.parse import parse_number
+from rcilab.workbench.text import Text
+
+
+@pytest.mark.parametrize(
+    ("typed", "value"),
+    [("-0.25", -0.25), (" 12 ", 12.0), ("-.5", -0.5), ("1,5", 1.5), ("−7", -7.0), ("45°", 45.0), ("45 deg", 45.0), ("1e1", 10.0)],
+)
+def test_numbers_are_read_as_people_write_them(typed, value):
+    parsed = parse_number(typed, -170.0, 170.0, "deg")
+    assert parsed.value == value
+    assert parsed.problem is None
+
+
+@pytest.mark.parametrize(
+    ("typed", "code"),
+    [("", "parse.empty"), ("abc", "parse.garbage"), ("1_000", "parse.garbage"), ("1,2,3", "parse.garbage"), ("nan", "parse.not_finite"),
+     ("inf", "parse.not_finite"), ("1e999", "parse.not_finite"), ("170.1", "parse.range"), ("-1e5", "parse.range")],
+)  # fmt: skip
+def test_everything_else_is_answered_with_a_sentence(typed, code):
+    parsed = parse_number(typed, -170.0, 170.0, "deg")
+    assert parsed.value is None
+    assert parsed.problem is not None
+    assert parsed.problem.code == code
+    for language in ("en", "zh"):
+        assert "{" not in Text(language).say(parsed.problem).replace(typed, "")
+
+
+@given(st.text(max_size=200))
+def test_any_text_gives_a_value_in_range_or_a_problem(typed):
+    parsed = parse_number(typed, -10.0, 10.0, "mm")
+    assert (parsed.value is None) != (parsed.problem is None)
+    if parsed.value is not None:
+        assert math.isfinite(parsed.value)
+        assert -10.0 <= parsed.value <= 10.0
+
+
+@given(st.floats(-170.0, 170.0))
+def test_what_python_prints_is_read_back_to_the_last_bit(number):
+    assert parse_number(repr(number), -170.0, 170.0, "deg").value == number

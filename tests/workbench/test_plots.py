@@ -1,0 +1,100 @@
+"""Curves for a screen: no spike is lost, violations are areas, axes stand still."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rcilab.model import load_model
+from rcilab.motion import Motion, plan_joint
+from rcilab.views.plots import QUANTITIES, Curves, bounds_of, build_frame, decimate, plan_curves, recorded_curves
+from rcilab.workbench.panels.timeline import plot_contents
+
+MODEL = load_model("xMatePro7")
+LIMITS = MODEL.limits.joint
+
+
+def some_motion() -> Motion:
+    return plan_joint(MODEL, MODEL.home, MODEL.home + 0.5, speed=0.5)
+
+
+@given(st.integers(1, 400), st.integers(1, 50), st.integers(0, 2**31))
+def test_decimation_keeps_the_extremes_of_every_bucket(count, buckets, seed):
+    rng = np.random.default_rng(seed)
+    t = np.sort(rng.uniform(0.0, 1.0, count))
+    values = rng.normal(size=(count, 3))
+    thin = decimate(Curves(t=t, values=values), np.linspace(0.0, 1.0, buckets + 1))
+    assert thin.shape == (2 * buckets, 3)
+    assert np.array_equal(np.nanmax(thin, axis=0), values.max(axis=0))
+    assert np.array_equal(np.nanmin(thin, axis=0), values.min(axis=0))
+
+
+def test_a_spike_of_one_sample_survives():
+    motion = some_motion()
+    q = np.array(motion.q)
+    q[431, 2] += 0.3
+    frame = build_frame(Curves(t=motion.times, values=q), None, LIMITS, "q", 3, buckets=60)
+    assert np.nanmax(frame.plan[0]) == pytest.approx(np.degrees(q[431, 2]), abs=1e-12)
+
+
+def test_a_violation_becomes_an_area_above_the_limit_and_nothing_else_does():
+    motion = some_motion()
+    dq = np.array(motion.dq)
+    calm = build_frame(Curves(t=motion.times, values=dq), None, LIMITS, "dq", 0)
+    assert (calm.above == calm.upper).all()
+    assert (calm.below == calm.lower).all()
+    dq[500, 1] = 1.5 * LIMITS.velocity[1]
+    spoiled = build_frame(Curves(t=motion.times, values=dq), None, LIMITS, "dq", 0)
+    assert spoiled.above.max() == pytest.approx(150.0)
+    assert spoiled.bound > 150.0
+    assert (spoiled.above > spoiled.upper).sum() <= 2
+
+
+@pytest.mark.parametrize("quantity", QUANTITIES)
+def test_in_percent_the_limits_are_100_whatever_the_joint(quantity):
+    low, high = bounds_of(LIMITS, quantity)
+    curves = Curves(t=np.array([0.0, 0.5, 1.0]), values=np.array([low, 0.5 * (low + high), high]))
+    frame = build_frame(curves, None, LIMITS, quantity, 0, buckets=3)
+    for column in frame.plan:
+        assert np.nanmin(column) == pytest.approx(-100.0)
+        assert np.nanmax(column) == pytest.approx(100.0)
+
+
+def test_recorded_derivatives_are_the_controllers_backward_differences():
+    motion = some_motion()
+    t, q = motion.times, motion.q
+    jerk = recorded_curves(t, q, q, motion.dq, "jerk").values
+    expected = np.zeros_like(q)
+    expected[3:] = np.diff(q, n=3, axis=0) / 1e-9
+    assert np.array_equal(jerk, expected)
+
+
+def test_a_lost_cycle_makes_no_false_spike():
+    motion = some_motion()
+    keep = np.ones(len(motion.times), dtype=bool)
+    keep[300] = False
+    t, q = motion.times[keep], motion.q[keep]
+    whole = np.abs(recorded_curves(motion.times, motion.q, motion.q, motion.dq, "ddq").values).max()
+    assert np.abs(recorded_curves(t, q, q, motion.dq[keep], "ddq").values).max() <= whole * (1 + 1e-9)
+
+
+def test_the_time_axis_ends_at_a_round_number_and_holds_the_longer_curve():
+    motion = some_motion()
+    longer = Curves(t=np.append(motion.times, motion.times[-1] + 1.0), values=np.vstack([motion.q, motion.q[-1:]]))
+    frame = build_frame(plan_curves(motion, "q"), longer, LIMITS, "q", 0)
+    assert frame.end >= longer.t[-1]
+    assert frame.end == frame.t[-1]
+    assert frame.end in (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0)
+
+
+@pytest.mark.parametrize("joint", [0, 4])
+def test_the_number_of_series_never_changes(joint):
+    motion = some_motion()
+    empty = plot_contents(build_frame(None, None, LIMITS, "q", joint), joint, 7)
+    full = plot_contents(
+        build_frame(plan_curves(motion, "q"), plan_curves(motion, "q"), LIMITS, "q", joint), joint, 7
+    )
+    assert len(empty[0]) == len(empty[1]) == len(full[0]) == len(full[1]) == 21
+    assert len({len(column) for column in full[0]}) == 1

@@ -1,0 +1,85 @@
+"""The catalogues are complete, agree with each other and with the code that uses them."""
+
+from __future__ import annotations
+
+import json
+import re
+import string
+from importlib.resources import files
+from pathlib import Path
+
+import pytest
+
+import rcilab.workbench
+from rcilab.conformance import CONDITIONS
+from rcilab.errors import InvalidValueError
+from rcilab.faults import Fault
+from rcilab.state import ControllerMode, RobotMode
+from rcilab.supervisor.status import PHASES
+from rcilab.workbench.planning import LAWS
+from rcilab.workbench.text import LANGUAGES, Text, load_catalogue, message
+from rcilab.workbench.view_actions import QUALITIES
+
+SOURCES = sorted(Path(rcilab.workbench.__file__).parent.rglob("*.py"))
+
+
+def fields(entry: str) -> set[str]:
+    return {name for _, name, _, _ in string.Formatter().parse(entry) if name}
+
+
+def test_every_language_has_the_same_keys_and_places_to_fill():
+    english = load_catalogue("en")
+    for language in LANGUAGES:
+        catalogue = load_catalogue(language)
+        assert set(catalogue) == set(english), language
+        for key, entry in catalogue.items():
+            assert entry.strip(), key
+            assert fields(entry) == fields(english[key]), f"{language}: {key}"
+
+
+def test_no_key_stands_twice_in_a_catalogue():
+    for language in LANGUAGES:
+        text = (files("rcilab.workbench") / "catalogues" / f"{language}.json").read_text(encoding="utf-8")
+        pairs = json.loads(text, object_pairs_hook=list)
+        assert len(pairs) == len(dict(pairs)), language
+
+
+def test_every_key_written_in_the_code_exists():
+    known = load_catalogue("en")
+    written = {
+        key
+        for path in SOURCES
+        for key in re.findall(r"""(?:\btext|_text|message)\(\s*["']([a-z_.]+)["']""", path.read_text())
+        if not key.endswith(".")
+    }
+    assert len(written) > 60
+    assert sorted(written - set(known)) == []
+
+
+def test_every_name_that_becomes_a_key_has_one():
+    known = set(load_catalogue("en"))
+    wanted = [f"condition.{row.id}" for row in CONDITIONS]
+    wanted += [f"fault.{fault.name}" for fault in Fault]
+    wanted += [f"phase.{phase}" for phase in PHASES]
+    wanted += [f"robot_mode.{mode.name}" for mode in RobotMode]
+    wanted += [f"controller_mode.{mode.name}" for mode in ControllerMode]
+    wanted += [f"law.{law}" for law in LAWS] + [f"quality.{quality}" for quality in QUALITIES]
+    wanted += [f"scheduling.{kind}" for kind in ("SCHED_FIFO", "normal")]
+    wanted += [f"reach.tone.{tone}" for tone in ("good", "warn", "bad")]
+    assert sorted(set(wanted) - known) == []
+
+
+def test_english_causes_are_the_manuals():
+    text = Text("en")
+    for fault in Fault:
+        assert text(f"fault.{fault.name}") == fault.cause
+
+
+def test_messages_inside_messages_are_translated_too():
+    said = Text("zh").say(message("notice.refused", what=message("drive.execute"), error="x"))
+    assert said == "执行未成功：x"
+
+
+def test_an_unknown_language_lists_the_known_ones():
+    with pytest.raises(InvalidValueError, match="en, zh"):
+        Text("fr")
