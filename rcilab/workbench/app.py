@@ -111,7 +111,7 @@ class Workbench:
         self.conductor.close()
         self.session.close()
         self.presenter.close()
-        self.server.stop()
+        security.close_server(self.server)
 
     def _follow_pages(self) -> None:
         ask = self.conductor.ask

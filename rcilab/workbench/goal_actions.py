@@ -90,7 +90,7 @@ class GoalActions:
         """Takes a typed number, or says beside the field what is wrong with it."""
         state = self._store.state
         kind, _, name = request.field.partition(".")
-        if kind == "joint" and name.isdigit() and int(name) < state.model.n:
+        if kind == "joint" and name in map(str, range(state.model.n)):
             low, high = np.degrees(state.model.limits.joint.lower), np.degrees(state.model.limits.joint.upper)
             number = int(name)
             parsed = parse_number(request.text, round(float(low[number]), 6), round(float(high[number]), 6), "deg")

@@ -11,10 +11,10 @@ from rcilab.faults import Fault
 from rcilab.model import load_model
 from rcilab.workbench import requests
 from rcilab.workbench.goal_actions import initial_goal
+from rcilab.workbench.reach import Tone
 from rcilab.workbench.readiness import is_moving, obstacle
 from rcilab.workbench.session import Session
 from rcilab.workbench.store import Recording, Store
-from rcilab.workbench.reach import Tone
 from rcilab.workbench.text import Message, message
 
 if TYPE_CHECKING:

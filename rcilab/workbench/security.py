@@ -10,10 +10,11 @@ from __future__ import annotations
 
 import errno
 import hmac
+import io
 import math
 import socket
 from collections.abc import Callable
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass
 from http import HTTPStatus
 from http.cookies import CookieError, SimpleCookie
@@ -145,14 +146,17 @@ def open_server(
     return server
 
 
+def close_server(server: viser.ViserServer) -> None:
+    """Stops viser without its parting words on our terminal."""
+    with redirect_stdout(io.StringIO()):
+        server.stop()
+
+
 @contextmanager
 def _guarded_serve(
     bound: socket.socket, gate: Gate, decorate: Callable[[bytes], bytes], live: Callable[[Any], Any]
 ) -> Iterator[None]:
     """Replaces the `serve` that viser's server thread is about to call."""
-    import io
-    from contextlib import redirect_stdout
-
     import websockets.asyncio.server as serving
     from websockets.datastructures import Headers
     from websockets.http11 import Response

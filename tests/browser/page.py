@@ -107,7 +107,11 @@ class BenchPage:
         return self.tab.locator(f"[data-id={name}] b").inner_text()
 
     def toast(self) -> str:
-        return self.tab.locator("#rl-toast.rl-shown").inner_text() if self.tab.locator("#rl-toast.rl-shown").count() else ""
+        return (
+            self.tab.locator("#rl-toast.rl-shown").inner_text()
+            if self.tab.locator("#rl-toast.rl-shown").count()
+            else ""
+        )
 
     def tool_pose(self, arm: str) -> np.ndarray | None:
         """Pose of an arm's tool in its base as the page's scene holds it, (4, 4)."""

@@ -66,7 +66,13 @@ def test_an_unreachable_target_says_why_and_the_arm_comes_as_near_as_it_can(page
 
 @pytest.mark.parametrize(
     ("typed", "answer"),
-    [("nan", "not a finite number"), ("1e999", "not a finite number"), ("abc", "is not a number"), ("999", "outside"), ("", "is empty")],
+    [
+        ("nan", "not a finite number"),
+        ("1e999", "not a finite number"),
+        ("abc", "is not a number"),
+        ("999", "outside"),
+        ("", "is empty"),
+    ],
 )
 def test_a_bad_joint_angle_is_answered_beside_the_field_and_nothing_is_lost(page, typed, answer):
     before = np.array(page.state.goal.q)
@@ -75,10 +81,14 @@ def test_a_bad_joint_angle_is_answered_beside_the_field_and_nothing_is_lost(page
     assert np.array_equal(page.state.goal.q, before)
     assert page.joint_field(2).input_value() == typed
     page.type_joint(2, "20")
-    page.wait(lambda: page.alerts() == [] and abs(np.degrees(page.state.goal.q[1]) - 20.0) < 1e-9, "20 deg, no complaint")
+    page.wait(
+        lambda: page.alerts() == [] and abs(np.degrees(page.state.goal.q[1]) - 20.0) < 1e-9, "20 deg, no complaint"
+    )
 
 
-@pytest.mark.parametrize(("field", "typed", "answer"), [("x", "∞", "is not a number"), ("yaw", "1000", "outside"), ("z", "-inf", "finite")])
+@pytest.mark.parametrize(
+    ("field", "typed", "answer"), [("x", "∞", "is not a number"), ("yaw", "1000", "outside"), ("z", "-inf", "finite")]
+)
 def test_a_bad_pose_number_is_answered_in_words(page, field, typed, answer):
     page.open_tab("Target")
     page.pose_field(field).fill(typed)

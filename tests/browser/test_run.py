@@ -19,11 +19,18 @@ def test_plan_check_execute_and_the_arm_arrives(page):
     page.wait(lambda: page.button("Execute").is_enabled(), "Execute to be pressable")
     page.button("Execute").click()
     page.wait(lambda: page.status.phase == "moving", "the arm to move")
-    page.wait(lambda: page.status.phase == "idle" and np.abs(page.status.q - goal).max() < 1e-6, "the arm to arrive", 30)
+    page.wait(
+        lambda: page.status.phase == "idle" and np.abs(page.status.q - goal).max() < 1e-6, "the arm to arrive", 30
+    )
     page.wait(lambda: page.shows("live", goal), "the live arm of the page at the goal")
-    page.wait(lambda: page.state.recording is not None and page.state.recording.t[-1] > 0.9 * page.state.plan.motion.duration, "a recording")
+    page.wait(
+        lambda: page.state.recording is not None and page.state.recording.t[-1] > 0.9 * page.state.plan.motion.duration,
+        "a recording",
+    )
     assert not page.button("Execute").is_enabled(), "a certificate that was used up must not be pressable again"
-    page.wait(lambda: "no longer stands where this plan starts" in page.tab.locator(".rl-why").inner_text(), "the reason")
+    page.wait(
+        lambda: "no longer stands where this plan starts" in page.tab.locator(".rl-why").inner_text(), "the reason"
+    )
 
 
 def stop_in_mid_motion(page, press) -> None:

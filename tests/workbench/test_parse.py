@@ -14,7 +14,16 @@ from rcilab.workbench.text import Text
 
 @pytest.mark.parametrize(
     ("typed", "value"),
-    [("-0.25", -0.25), (" 12 ", 12.0), ("-.5", -0.5), ("1,5", 1.5), ("−7", -7.0), ("45°", 45.0), ("45 deg", 45.0), ("1e1", 10.0)],
+    [
+        ("-0.25", -0.25),
+        (" 12 ", 12.0),
+        ("-.5", -0.5),
+        ("1,5", 1.5),
+        ("−7", -7.0),
+        ("45°", 45.0),
+        ("45 deg", 45.0),
+        ("1e1", 10.0),
+    ],
 )
 def test_numbers_are_read_as_people_write_them(typed, value):
     parsed = parse_number(typed, -170.0, 170.0, "deg")
@@ -24,9 +33,18 @@ def test_numbers_are_read_as_people_write_them(typed, value):
 
 @pytest.mark.parametrize(
     ("typed", "code"),
-    [("", "parse.empty"), ("abc", "parse.garbage"), ("1_000", "parse.garbage"), ("1,2,3", "parse.garbage"), ("nan", "parse.not_finite"),
-     ("inf", "parse.not_finite"), ("1e999", "parse.not_finite"), ("170.1", "parse.range"), ("-1e5", "parse.range")],
-)  # fmt: skip
+    [
+        ("", "parse.empty"),
+        ("abc", "parse.garbage"),
+        ("1_000", "parse.garbage"),
+        ("1,2,3", "parse.garbage"),
+        ("nan", "parse.not_finite"),
+        ("inf", "parse.not_finite"),
+        ("1e999", "parse.not_finite"),
+        ("170.1", "parse.range"),
+        ("-1e5", "parse.range"),
+    ],
+)
 def test_everything_else_is_answered_with_a_sentence(typed, code):
     parsed = parse_number(typed, -170.0, 170.0, "deg")
     assert parsed.value is None

@@ -93,8 +93,6 @@ def test_the_time_axis_ends_at_a_round_number_and_holds_the_longer_curve():
 def test_the_number_of_series_never_changes(joint):
     motion = some_motion()
     empty = plot_contents(build_frame(None, None, LIMITS, "q", joint), joint, 7)
-    full = plot_contents(
-        build_frame(plan_curves(motion, "q"), plan_curves(motion, "q"), LIMITS, "q", joint), joint, 7
-    )
+    full = plot_contents(build_frame(plan_curves(motion, "q"), plan_curves(motion, "q"), LIMITS, "q", joint), joint, 7)
     assert len(empty[0]) == len(empty[1]) == len(full[0]) == len(full[1]) == 21
     assert len({len(column) for column in full[0]}) == 1

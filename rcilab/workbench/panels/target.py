@@ -110,7 +110,9 @@ class TargetPanel:
         heads = "".join(
             f"<th>{esc(text(f'target.head.{name}'))}</th>" for name in ("number", "margin", "worst", "away")
         )
-        return f'<table class="rl-table"><tr>{heads}</tr>{"".join(rows)}</table>'
+        others = len(solutions.all) - len(solutions)
+        rest = f'<p class="rl-note">{esc(text("target.forbidden", count=others))}</p>' if others else ""
+        return f'<table class="rl-table"><tr>{heads}</tr>{"".join(rows)}</table>{rest}'
 
 
 def planned_html(state: UiState, text: Text) -> str:

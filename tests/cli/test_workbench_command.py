@@ -1,0 +1,110 @@
+"""`rcilab` as a person starts it: one line, one page, and Ctrl-C leaves nothing behind."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import time
+import urllib.request
+from pathlib import Path
+
+import pytest
+
+COMMAND = [sys.executable, "-m", "rcilab.cli"]
+
+
+def children(pid: int) -> list[int]:
+    found = []
+    for task in Path(f"/proc/{pid}/task").glob("*/children"):
+        found += [int(child) for child in task.read_text().split()]
+    return found + [grandchild for child in found for grandchild in children(child)]
+
+
+def is_gone(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
+    except OSError:
+        return True
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_it_prints_one_line_serves_the_page_and_ends_cleanly(number):
+    process = subprocess.Popen(
+        [*COMMAND, "--no-browser", "--port", "0", "--quality", "light"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        line = process.stdout.readline()
+        match = re.search(r"http://127\.0\.0\.1:\d+/", line)
+        assert match, line
+        with urllib.request.urlopen(match[0], timeout=20) as answer:
+            assert b"rl-stop" in answer.read()
+        end = time.monotonic() + 30.0
+        while len(children(process.pid)) < 2 and time.monotonic() < end:
+            time.sleep(0.05)
+        ours = children(process.pid)
+        assert len(ours) >= 2, "a controller and a control process"
+        process.send_signal(number)
+        rest, errors = process.communicate(timeout=30)
+    finally:
+        process.kill()
+        process.wait()
+    assert process.returncode == 0
+    assert errors == ""
+    end = time.monotonic() + 10.0
+    while not all(is_gone(pid) for pid in ours) and time.monotonic() < end:
+        time.sleep(0.05)
+    assert all(is_gone(pid) for pid in ours)
+    assert rest == ""
+
+
+@pytest.mark.parametrize(
+    ("arguments", "answer"),
+    [
+        (["--model", "kuka"], "known robots: xMatePro3"),
+        (["--host", "0.0.0.0"], "--token"),
+        (["--robot", "http://x"], "rci://"),
+        (["--port", "70000"], "0 to 65535"),
+        (["--port", "abc"], "0 to 65535"),
+    ],
+)
+def test_bad_arguments_get_one_sentence(arguments, answer):
+    done = subprocess.run(
+        [*COMMAND, "--no-browser", *arguments], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert done.returncode == 2
+    assert answer in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_a_busy_port_gets_one_sentence_that_says_what_to_change():
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        done = subprocess.run(
+            [*COMMAND, "--no-browser", "--port", str(port)], capture_output=True, text=True, timeout=60, check=False
+        )
+    assert done.returncode == 2
+    assert f"--port {port + 1}" in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+
+
+def test_the_app_script_is_the_same_command():
+    script = Path(__file__).parents[2] / "apps" / "workbench.py"
+    done = subprocess.run(
+        [sys.executable, str(script), "--model", "kuka"],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+        env=dict(os.environ),
+    )
+    assert done.returncode == 2
+    assert "known robots" in done.stderr

@@ -1,0 +1,203 @@
+"""The workbench without a browser, with the real controller behind it: requests in, state out."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+
+from rcilab.errors import InvalidValueError, ModelError, UsageError
+from rcilab.workbench import requests
+from rcilab.workbench.app import Workbench, WorkbenchConfig
+from rcilab.workbench.readiness import obstacle
+
+
+def wait(condition: Callable[[], bool], what: str, timeout: float = 30.0) -> None:
+    end = time.monotonic() + timeout
+    while not condition():
+        assert time.monotonic() < end, f"within {timeout} s this did not happen: {what}"
+        time.sleep(0.02)
+
+
+@pytest.fixture(scope="module")
+def bench() -> Iterator[Workbench]:
+    with Workbench(WorkbenchConfig(port=0, quality="light")) as opened:
+        wait(lambda: opened.session.status().phase == "idle" and bool(opened.session.status().powered), "an idle arm")
+        yield opened
+        assert opened.conductor.errors == []
+        assert opened.presenter.errors == []
+
+
+@pytest.fixture
+def ask(bench) -> Callable[[requests.Request], None]:
+    """Asks, and returns once it has been dealt with."""
+
+    def act(request: requests.Request) -> None:
+        height = bench.store.state.height + 1.0
+        bench.conductor.ask(request)
+        bench.conductor.ask(requests.SetView(name="height", value=height))
+        wait(lambda: bench.store.state.height == height, f"an answer to {request}")
+
+    act(requests.PoseGoal(name="here"))
+    act(requests.SetSpeed(speed=0.5))
+    return act
+
+
+def test_it_is_connected_to_a_virtual_controller_from_the_start(bench):
+    status = bench.session.status()
+    assert status.target == "virtual"
+    assert status.address is not None
+    assert np.allclose(bench.store.state.goal.q, status.q_c)
+
+
+def test_posing_a_joint_plans_and_judges_and_moves_nothing(bench, ask):
+    before = np.array(bench.session.status().q_c)
+    ask(requests.MoveJoint(joint=0, angle=before[0] + 0.3))
+    state = bench.store.state
+    assert state.plan is not None
+    assert state.plan.report.ok
+    assert state.plan.motion.goal[0] == pytest.approx(before[0] + 0.3)
+    assert np.array_equal(bench.session.status().q_c, before)
+    assert obstacle(state, bench.session.status()) is None
+
+
+@pytest.mark.parametrize("angle", [math.nan, math.inf, -math.inf])
+def test_an_angle_that_is_no_number_changes_nothing(bench, ask, angle):
+    before = bench.store.state.goal
+    ask(requests.MoveJoint(joint=0, angle=angle))
+    ask(requests.MoveJoint(joint=99, angle=0.0))
+    ask(requests.MoveTarget(position=(angle, 0.0, 0.0), wxyz=(1.0, 0.0, 0.0, 0.0)))
+    ask(requests.MoveTarget(position=(0.5, 0.0, 0.5), wxyz=(0.0, 0.0, 0.0, 0.0)))
+    ask(requests.SetArmAngle(psi=angle))
+    ask(requests.SetSpeed(speed=angle))
+    ask(requests.Seek(place=angle))
+    assert bench.store.state.goal is before
+
+
+def test_an_angle_beyond_its_limit_is_taken_at_the_limit(bench, ask):
+    ask(requests.MoveJoint(joint=1, angle=77.0))
+    assert bench.store.state.goal.q[1] == bench.store.state.model.limits.joint.upper[1]
+
+
+def test_a_typed_number_is_taken_and_a_bad_one_is_answered_beside_its_field(bench, ask):
+    ask(requests.TypeField(field="joint.0", text="-0.25"))
+    assert bench.store.state.goal.q[0] == pytest.approx(math.radians(-0.25))
+    ask(requests.TypeField(field="joint.0", text="nan"))
+    assert bench.store.state.problems["joint.0"].code == "parse.not_finite"
+    assert bench.store.state.goal.q[0] == pytest.approx(math.radians(-0.25))
+    ask(requests.TypeField(field="joint.0", text="3"))
+    assert "joint.0" not in bench.store.state.problems
+
+
+@pytest.mark.parametrize("field", ["", "joint.", "joint.7", "joint.-1", "pose.w", "nonsense", "joint.²"])
+def test_a_field_that_does_not_exist_is_ignored(bench, ask, field):
+    before = bench.store.state.goal
+    ask(requests.TypeField(field=field, text="5"))
+    assert bench.store.state.goal is before
+
+
+def test_undo_brings_the_goal_back(bench, ask):
+    ask(requests.TypeField(field="joint.2", text="10"))
+    ask(requests.TypeField(field="joint.2", text="20"))
+    ask(requests.PoseGoal(name="undo"))
+    assert math.degrees(bench.store.state.goal.q[2]) == pytest.approx(10.0)
+
+
+def test_another_branch_keeps_the_tool_where_it_is(bench, ask):
+    target = bench.store.state.model.forward(np.radians((100.0, 40.0, 95.0, 60.0, 80.0, 50.0, 20.0)))
+    ask(requests.MoveTarget(position=tuple(target.position), wxyz=tuple(target.wxyz)))
+    solutions = bench.store.state.goal.reach.solutions
+    assert solutions is not None
+    assert len(solutions) > 1
+    for index in range(len(solutions)):
+        ask(requests.MoveTarget(position=tuple(target.position), wxyz=tuple(target.wxyz)))
+        ask(requests.ChooseBranch(index=index))
+        goal = bench.store.state.goal
+        assert bench.store.state.model.forward(goal.q).is_close(target, 1e-6)
+
+
+def test_the_arm_angle_turns_the_elbow_and_keeps_the_tool(bench, ask):
+    target = bench.store.state.model.forward(bench.store.state.model.home)
+    ask(requests.MoveTarget(position=tuple(target.position), wxyz=tuple(target.wxyz)))
+    ask(requests.SetArmAngle(psi=0.4))
+    goal = bench.store.state.goal
+    assert goal.psi == pytest.approx(0.4)
+    assert bench.store.state.model.forward(goal.q).is_close(target, 1e-6)
+
+
+def test_a_watching_page_may_look_but_not_touch(bench, ask):
+    ask(requests.PageCame(page=1))
+    ask(requests.PageCame(page=2))
+    before = bench.store.state.goal
+    ask(requests.MoveJoint(page=2, joint=0, angle=0.1))
+    assert bench.store.state.goal is before
+    assert bench.store.state.notice.text.code == "notice.watching"
+    ask(requests.MoveJoint(page=1, joint=0, angle=0.1))
+    assert bench.store.state.goal.q[0] == pytest.approx(0.1)
+    ask(requests.TakeControls(page=2))
+    assert bench.store.state.lease.holder == 2
+    for page in (1, 2):
+        ask(requests.PageWent(page=page))
+    assert bench.store.state.lease.holder is None
+
+
+def test_execute_runs_the_plan_records_it_and_then_asks_for_a_new_one(bench, ask):
+    start = float(bench.session.status().q_c[0])
+    ask(requests.MoveJoint(joint=0, angle=start + (0.2 if start < 1.0 else -0.2)))
+    goal = np.array(bench.store.state.goal.q)
+    ask(requests.Drive(what="execute"))
+    wait(lambda: bench.store.state.notice.text.code == "notice.arrived", "the arrival")
+    assert np.abs(bench.session.status().q_c - goal).max() < 1e-9
+    recording = bench.store.state.recording
+    assert recording is not None
+    duration = bench.store.state.plan.motion.duration
+    wait(lambda: bench.store.state.recording.t[-1] >= duration - 0.005, "the whole recording")
+    assert obstacle(bench.store.state, bench.session.status()).code == "ready.elsewhere"
+    ask(requests.Drive(what="execute"))
+    assert bench.store.state.notice.text.code == "ready.elsewhere"
+
+
+def test_stop_ends_a_motion_and_says_so(bench, ask):
+    ask(requests.SetSpeed(speed=0.05))
+    start = float(bench.session.status().q_c[0])
+    ask(requests.MoveJoint(joint=0, angle=start + (0.8 if start < 0.0 else -0.8)))
+    ask(requests.Drive(what="execute"))
+    wait(lambda: bench.session.status().phase == "moving", "the arm to move")
+    ask(requests.ChooseRobot(model="xMate3"))
+    assert bench.store.state.notice.text.code == "notice.moving"
+    ask(requests.Drive(what="stop"))
+    wait(lambda: bench.store.state.notice.text.code == "notice.stopped", "the stop to be told")
+    assert bench.session.status().phase == "idle"
+    assert abs(float(bench.session.status().q_c[0]) - start) < 0.7
+
+
+def test_an_address_that_is_none_is_answered_and_nothing_is_lost(bench, ask):
+    before = bench.session.status().address
+    ask(requests.ChooseRobot(target="http://robot"))
+    assert bench.store.state.notice.tone == "bad"
+    assert "rci://" in str(bench.store.state.notice.text.values["text"])
+    assert bench.session.status().address == before
+
+
+def test_an_unknown_model_lists_the_known_ones():
+    with pytest.raises(ModelError, match="xMatePro3, xMatePro7, xMate3, xMate7"):
+        Workbench(WorkbenchConfig(model="kuka", port=0))
+
+
+def test_a_bad_robot_address_is_refused_before_anything_starts():
+    with pytest.raises(InvalidValueError, match="rci://"):
+        Workbench(WorkbenchConfig(target="http://robot", port=0))
+
+
+def test_an_open_address_needs_a_token():
+    with pytest.raises(UsageError, match="--token"):
+        Workbench(WorkbenchConfig(host="0.0.0.0", port=0))
+
+
+def test_a_workbench_that_never_started_closes():
+    bench = Workbench(WorkbenchConfig(port=0))
+    bench.close()
+    bench.close()

@@ -1,0 +1,239 @@
+"""Every door of the page: who gets in, who does not, and what they cannot do once inside."""
+
+from __future__ import annotations
+
+import http.client
+import json
+import socket
+import threading
+from collections.abc import Iterator
+
+import msgspec
+import pytest
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import connect
+
+from rcilab.errors import UsageError
+from rcilab.workbench import security
+from rcilab.workbench.live import LiveChannel
+from rcilab.workbench.page import decorate
+from rcilab.workbench.security import Gate, bind, check_host, is_finite, open_server
+
+LOCAL = Gate(host="127.0.0.1", port=8080)
+
+
+@pytest.mark.parametrize("origin", [None, "null", "http://evil.example", "http://127.0.0.1:8081", "file://127.0.0.1:8080",
+                                    "http://127.0.0.1:8080.evil.example", "http://evil.example:8080"])  # fmt: skip
+def test_a_foreign_or_missing_origin_gets_no_websocket(origin):
+    assert LOCAL.refuse_socket("127.0.0.1:8080", origin, None) is not None
+
+
+@pytest.mark.parametrize("name", ["127.0.0.1:8080", "localhost:8080"])
+def test_our_own_pages_get_in(name):
+    assert LOCAL.refuse_page(name, "/", None) is None
+    assert LOCAL.refuse_socket(name, f"http://{name}", None) is None
+
+
+def test_a_rebound_name_is_refused_even_when_host_and_origin_agree():
+    assert LOCAL.refuse_page("evil.example:8080", "/", None) is not None
+    assert LOCAL.refuse_socket("evil.example:8080", "http://evil.example:8080", None) is not None
+
+
+def test_a_token_is_asked_for_and_kept_in_a_cookie():
+    gate = Gate(host="0.0.0.0", port=80, token="s3cret")
+    assert gate.refuse_page("10.0.0.5:80", "/", None) is not None
+    assert gate.refuse_page("10.0.0.5:80", "/?token=wrong", None) is not None
+    assert gate.refuse_page("10.0.0.5:80", "/?token=s3cret", None) is None
+    assert gate.refuse_socket("10.0.0.5:80", "http://10.0.0.5:80", None) is not None
+    assert gate.refuse_socket("10.0.0.5:80", "http://10.0.0.5:80", "rcilab_token=s3cret") is None
+    assert gate.refuse_socket("10.0.0.5:80", "http://evil.example", "rcilab_token=s3cret") is not None
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "127.0.0.2", "localhost", "::1"])
+def test_loopback_needs_no_token(host):
+    check_host(host, None)
+
+
+@pytest.mark.parametrize("host", ["0.0.0.0", "192.168.0.5", "::"])
+def test_an_open_address_without_a_token_is_refused_in_one_sentence(host):
+    with pytest.raises(UsageError, match="--token") as caught:
+        check_host(host, None)
+    assert "\n" not in str(caught.value)
+    check_host(host, "s3cret")
+
+
+def test_a_busy_port_is_refused_and_says_what_to_change():
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        with pytest.raises(UsageError, match=rf"port {port} is in use.*--port {port + 1}"):
+            bind("127.0.0.1", port)
+
+
+def test_an_address_that_is_not_ours_is_refused():
+    with pytest.raises(UsageError, match="--host"):
+        bind("192.0.2.1", 0)
+
+
+@pytest.mark.parametrize(
+    ("value", "finite"),
+    [(1.0, True), (float("nan"), False), ([0.0, float("inf")], False), ("nan", True), ([[1], (2.0,)], True)],
+)
+def test_is_finite_looks_into_everything(value, finite):
+    assert is_finite(value) is finite
+
+
+class Door:
+    """A running server behind the gate."""
+
+    def __init__(self) -> None:
+        self.stops = threading.Event()
+        self.seeks: list[float] = []
+        self.live = LiveChannel(self.stops.set, self.seeks.append, lambda height: None)
+        bound = bind("127.0.0.1", 0)
+        self.port = bound.getsockname()[1]
+        self.server = open_server(
+            bound, Gate(host="127.0.0.1", port=self.port), decorate=decorate, live=self.live.serve
+        )
+
+    def connect(self, path: str = "/", origin: str | None = "", protocol: str | None = None):
+        headers = {} if origin is None else {"Origin": origin or f"http://127.0.0.1:{self.port}"}
+        return connect(
+            f"ws://127.0.0.1:{self.port}{path}",
+            additional_headers=headers,
+            subprotocols=None if protocol is None else [protocol],
+            compression=None,
+        )
+
+
+@pytest.fixture(scope="module")
+def door() -> Iterator[Door]:
+    opened = Door()
+    yield opened
+    opened.server.stop()
+
+
+PROTOCOL = f"viser-v{__import__('viser').__version__}"
+
+
+@pytest.mark.parametrize("origin", [None, "http://evil.example"])
+@pytest.mark.parametrize("path", ["/", "/rcilab/live"])
+def test_the_real_server_answers_403_to_strangers(door, origin, path):
+    with pytest.raises(InvalidStatus) as caught:
+        door.connect(path, origin, PROTOCOL)
+    assert caught.value.response.status_code == 403
+
+
+def test_the_real_server_lets_its_own_page_in(door):
+    with door.connect(protocol=PROTOCOL) as page:
+        assert page.recv(timeout=10)
+
+
+def test_it_listens_on_loopback_only(door):
+    with socket.socket() as other:
+        other.settimeout(1.0)
+        assert other.connect_ex(("127.0.0.9", door.port)) != 0
+
+
+def test_the_page_is_ours_and_cannot_be_framed_by_strangers(door):
+    status, headers, body = fetch(door.port, f"127.0.0.1:{door.port}")
+    assert status == 200
+    assert b"rl-stop" in body
+    assert b"<title>rcilab workbench</title>" in body
+    assert headers["Content-Security-Policy"].startswith("frame-ancestors 'self'")
+    assert fetch(door.port, "evil.example")[0] == 403
+
+
+def fetch(port: int, host: str) -> tuple[int, dict[str, str], bytes]:
+    link = http.client.HTTPConnection("127.0.0.1", port, timeout=10)
+    link.request("GET", "/", headers={"Host": host})
+    answer = link.getresponse()
+    body = answer.read()
+    link.close()
+    return answer.status, dict(answer.getheaders()), body
+
+
+def test_nobody_can_ask_for_the_share_tunnel(door):
+    from viser import _messages
+
+    handlers = door.server._websock_server._incoming_handlers
+    assert _messages.ShareUrlRequest not in handlers
+    assert _messages.ShareUrlDisconnect not in handlers
+
+
+def test_a_client_can_set_a_value_but_neither_nan_nor_anything_else(door):
+    gui = door.server.gui
+    slider = gui.add_slider("x", 0.0, 1.0, 0.1, 0.5)
+    button_like = gui.add_checkbox("marker", False)
+
+    @slider.on_update
+    async def _(_event):
+        pass
+
+    def update(uuid: str, **updates) -> bytes:
+        return msgspec.msgpack.encode({"type": "GuiUpdateMessage", "uuid": uuid, "updates": updates})
+
+    arrived = threading.Event()
+
+    @button_like.on_update
+    async def _(_event):
+        arrived.set()
+
+    with door.connect(protocol=PROTOCOL) as page:
+        page.send(update(slider._impl.uuid, value=float("nan")))
+        page.send(update(slider._impl.uuid, update_cb=[]))
+        page.send(update(slider._impl.uuid, value=0.7, update_cb=[]))
+        page.send(update(slider._impl.uuid, value=0.25))
+        wait_until(lambda: slider.value == 0.25)
+    assert len(slider._impl.update_cb) == 1
+    assert slider.value == 0.25
+
+
+def wait_until(condition, timeout: float = 10.0) -> None:
+    import time
+
+    end = time.monotonic() + timeout
+    while not condition():
+        assert time.monotonic() < end, "it did not happen in time"
+        time.sleep(0.01)
+
+
+def test_stop_and_seek_arrive_over_the_live_channel_and_garbage_does_not_hurt_it(door):
+    door.stops.clear()
+    with door.connect("/rcilab/live") as page:
+        assert isinstance(json.loads(page.recv(timeout=10)), dict)
+        for garbage in (
+            "",
+            "{",
+            "[]",
+            "1",
+            json.dumps({"kind": "seek", "place": "x"}),
+            '{"kind":"seek","place":NaN}',
+            "x" * 9000,
+            b"\xff\x00",
+        ):
+            page.send(garbage)
+        page.send(json.dumps({"kind": "seek", "place": 7.0}))
+        page.send(json.dumps({"kind": "seek", "place": 0.25}))
+        page.send(json.dumps({"kind": "stop"}))
+        assert door.stops.wait(10.0)
+    assert door.seeks == [1.0, 0.25]
+
+
+def test_published_values_reach_every_page_and_the_next_one_too(door):
+    with door.connect("/rcilab/live") as first:
+        first.recv(timeout=10)
+        door.live.publish(chips=[{"id": "a"}], language="en")
+        assert json.loads(first.recv(timeout=10)) == {"chips": [{"id": "a"}], "language": "en"}
+        door.live.publish(chips=[{"id": "a"}], language="zh")
+        assert json.loads(first.recv(timeout=10)) == {"language": "zh"}
+        with door.connect("/rcilab/live") as second:
+            assert json.loads(second.recv(timeout=10))["language"] == "zh"
+
+
+def test_viser_is_left_as_it_was(door):
+    import websockets.asyncio.server as serving
+
+    assert serving.serve.__module__ == "websockets.asyncio.server"
+    assert security.DEFAULT_PORT == 8080
