@@ -1,5 +1,8 @@
 """Joint torques of the rigid arm, by pinocchio's recursive Newton-Euler algorithm."""
 
+# pyright: reportAttributeAccessIssue=false
+# pinocchio's names are put into its module by compiled code when it is loaded, where pyright cannot see them.
+
 from __future__ import annotations
 
 from dataclasses import dataclass
