@@ -153,8 +153,10 @@ class RobotModel:
         """
         q = as_vector(near, self.n, "near", "rad")
 
-        def solve(pose: Pose) -> Solutions:
-            return self.inverse(pose, psi, q)
+        held = self._natural_psi(q.tolist()) if psi is None and self.n == 7 else psi
+
+        def solve(pose: Pose, may_search: bool) -> Solutions:
+            return self.inverse(pose, psi if may_search else held, q)
 
         return closest_reachable(solve, self._geometry, self.T_flange_tool, self.forward(q), q, T)
 

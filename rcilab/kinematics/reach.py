@@ -24,12 +24,19 @@ class Reach:
     """Joint angles, shape (n,), [rad]."""
     pose: Pose
     """Pose of the tool at q in base: the target itself, or the closest pose found."""
+    solutions: Solutions | None
+    """All branches at that pose; None when the arm is best left where it is."""
     refusal: UnreachableError | None
     """Why the target itself cannot be reached; None when it can."""
 
 
 def closest_reachable(
-    solve: Callable[[Pose], Solutions], arm: ArmGeometry, T_flange_tool: Pose, here: Pose, q: JointVector, target: Pose
+    solve: Callable[[Pose, bool], Solutions],
+    arm: ArmGeometry,
+    T_flange_tool: Pose,
+    here: Pose,
+    q: JointVector,
+    target: Pose,
 ) -> Reach:
     """Returns joint angles for a target, or for the closest pose to it that the arm can take.
 
@@ -37,7 +44,8 @@ def closest_reachable(
     limit forbids is approached along the straight way from the present pose, as far as there is a solution.
 
     Args:
-        solve: Inverse kinematics from a tool pose; raises UnreachableError.
+        solve: Inverse kinematics from a tool pose; raises UnreachableError. Its second argument tells whether it may
+            look for another arm angle than the present one: a search is too slow for every step of a search.
         arm: Lengths of the arm.
         T_flange_tool: Pose of the tool in the flange frame.
         here: Present pose of the tool in base, reached at q.
@@ -45,23 +53,37 @@ def closest_reachable(
         target: Wanted pose of the tool in base.
     """
     try:
-        return Reach(q=solve(target).nearest(q), pose=target, refusal=None)
+        found = solve(target, True)
+        return Reach(q=found.nearest(q), pose=target, solutions=found, refusal=None)
     except UnreachableError as error:
         refusal = error
     goal = _pull_in(arm, T_flange_tool, target)
-    best, best_q = here, q
-    low, high = 0.0, 1.0
-    share = 1.0
-    for _ in range(_HALVINGS):
-        pose = interpolate(here, goal, share)
+    if goal is not target:
         try:
-            best_q, best, low = solve(pose).nearest(best_q), pose, share
+            found = solve(goal, True)
+            return Reach(q=found.nearest(q), pose=goal, solutions=found, refusal=refusal)
         except UnreachableError:
-            high = share
-        if low == 1.0:
-            break
-        share = (low + high) / 2.0
-    return Reach(q=best_q, pose=best, refusal=refusal)
+            pass
+    return _approach(solve, here, q, goal, refusal)
+
+
+def _approach(
+    solve: Callable[[Pose, bool], Solutions], here: Pose, q: JointVector, goal: Pose, refusal: UnreachableError
+) -> Reach:
+    """Returns the last reachable pose found on the straight way from here to an unreachable goal, by bisection."""
+    best = Reach(q=q, pose=here, solutions=None, refusal=refusal)
+    low, high = 0.0, 1.0
+    for _ in range(_HALVINGS):
+        middle = (low + high) / 2.0
+        pose = interpolate(here, goal, middle)
+        try:
+            found = solve(pose, False)
+        except UnreachableError:
+            high = middle
+        else:
+            low = middle
+            best = Reach(q=found.nearest(best.q), pose=pose, solutions=found, refusal=refusal)
+    return best
 
 
 def interpolate(a: Pose, b: Pose, share: float) -> Pose:
