@@ -6,9 +6,11 @@ import math
 import time
 from collections.abc import Callable
 from contextlib import nullcontext
+from dataclasses import replace
 
 import numpy as np
 
+from rcilab.bench.bare_loop import measure_bare_loop, stolen_time
 from rcilab.bench.browser import find_chromium, open_page
 from rcilab.bench.compute import motion_of
 from rcilab.bench.measure import Measurement, summarise
@@ -73,6 +75,7 @@ def _stream(bench: Workbench, supervisor: Supervisor, seconds: float, browser: s
     motion = motion_of(model, seconds, before.q_c)
     certificate = check(motion, model, start=before.q_c).require().certificate
     assert certificate is not None  # A report that is ok has one.
+    stolen = stolen_time()
     ticket = supervisor.execute(motion, certificate)
     success, fewest_pages = 1.0, len(bench.server.get_clients())
     while not ticket.done:
@@ -82,7 +85,21 @@ def _stream(bench: Workbench, supervisor: Supervisor, seconds: float, browser: s
         fewest_pages = min(fewest_pages, len(bench.server.get_clients()))
         time.sleep(0.1)
     ticket.wait(0.0)
-    return _judge(before, supervisor.status(), motion.duration, success, fewest_pages, browser)
+    after, stolen = supervisor.status(), stolen_time() - stolen
+    found = _judge(before, after, motion.duration, success, fewest_pages, browser)
+    return replace(
+        found, note=f"{found.note}; the machine by itself: {_describe_machine_jitter(seconds / 3.0, stolen)}"
+    )
+
+
+def _describe_machine_jitter(seconds: float, stolen: float) -> str:
+    """Returns what an empty loop suffers beside the same page, in words."""
+    late = 1e6 * np.array(measure_bare_loop(seconds))
+    p999, largest, count = np.percentile(late, 99.9), late.max(), int((late > 1e3).sum())
+    return (
+        f"an empty loop for {seconds:.1f} s had p99.9 {p999:.0f}, max {largest:.0f} us, {count} later than 1 ms; "
+        f"the hypervisor kept {1e3 * stolen:.0f} ms from us while streaming"
+    )
 
 
 def _judge(
