@@ -19,8 +19,6 @@ Tone = Literal["good", "warn", "bad"]
 
 NEAR_LIMIT = math.radians(5.0)  # [rad] A choice: closer than this to a limit is worth saying.
 NEAR_SINGULAR = 0.03  # A choice: smallest singular value of the Jacobian below which the arm is as good as singular.
-_BISECTIONS = 14  # Halvings between a reachable pose and one that is not: 1 m becomes 0.06 mm.
-_SHORTEST_PULL = 0.2  # How far towards the shoulder a target is pulled at most, as a part of its distance.
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -63,14 +61,10 @@ def judge_pose(model: RobotModel, target: Pose, near: JointVector, psi: float | 
         near: Where the arm (or the last answer) is, shape (n,), [rad]; decides the branch.
         psi: Arm angle to hold, [rad]; None keeps that of `near`.
     """
-    try:
-        solutions = model.inverse(target, psi=psi, near=near)
-    except UnreachableError as refusal:
-        solutions = _nearest_reachable(model, target, near, psi)
-        q = near if solutions is None else solutions.nearest(near)
-        return Reach(tone="bad", reason=_why_not(refusal), q=q, solutions=solutions)
-    q = solutions.nearest(near)
-    return _judge_configuration(model, q, solutions)
+    found = model.closest(target, near, psi)
+    if found.refusal is not None:
+        return Reach(tone="bad", reason=_why_not(found.refusal), q=found.q, solutions=found.solutions)
+    return _judge_configuration(model, found.q, found.solutions)
 
 
 def judge_joints(model: RobotModel, q: JointVector) -> Reach:
@@ -94,57 +88,3 @@ def _why_not(refusal: UnreachableError) -> Message:
     if refusal.joint is not None:
         return message("reach.joint", joint=refusal.joint, excess=f"{math.degrees(refusal.excess):.1f}")
     return message("reach.no")
-
-
-def _nearest_reachable(model: RobotModel, target: Pose, near: JointVector, psi: float | None) -> Solutions | None:
-    """Returns the branches at the better of two poses.
-
-    One is the target pulled towards the shoulder, the other the last reachable one on the way from `near`.
-    """
-    shoulder = np.array([0.0, 0.0, model.description.dh[0].d])
-    wanted, start = target.position, model.forward(near)
-    tries = []
-    towards = shoulder + _SHORTEST_PULL * (wanted - shoulder)
-    for origin in (Pose(towards, target.wxyz), start):
-        found = _last_reachable(model, origin, target, near, psi)
-        if found is not None:
-            turned = 1.0 - abs(float(found[0].wxyz @ target.wxyz))
-            tries.append((float(np.linalg.norm(found[0].position - wanted)) + turned, len(tries), found))
-    return min(tries)[2][1] if tries else None
-
-
-def _last_reachable(
-    model: RobotModel, origin: Pose, target: Pose, near: JointVector, psi: float | None
-) -> tuple[Pose, Solutions] | None:
-    """Returns the pose furthest on the straight way from a reachable origin to a target that is not."""
-
-    def attempt(share: float, held: float | None) -> tuple[Pose, Solutions] | None:
-        pose = _between(origin, target, share)
-        try:
-            return pose, model.inverse(pose, psi=held, near=near)
-        except UnreachableError:
-            return None
-
-    best = attempt(0.0, psi)
-    if best is None:
-        return None
-    held = best[1].psi  # Searching for another arm angle at every step would cost more than a display's frame.
-    low, high = 0.0, 1.0
-    for _ in range(_BISECTIONS):
-        middle = 0.5 * (low + high)
-        found = attempt(middle, held)
-        if found is None:
-            high = middle
-        else:
-            low, best = middle, found
-    return best
-
-
-def _between(start: Pose, end: Pose, share: float) -> Pose:
-    """Returns the pose at a share of the way, positions and quaternions blended linearly (short ways only)."""
-    a, b = start.wxyz, end.wxyz
-    b = -b if float(a @ b) < 0.0 else b
-    wxyz = (1.0 - share) * a + share * b
-    if float(wxyz @ wxyz) < 1e-9:
-        wxyz = a
-    return Pose((1.0 - share) * start.position + share * end.position, wxyz)
