@@ -20,7 +20,7 @@ PlannableLaw = Literal["jerk_limited", "s_profile"]
 LAWS: tuple[PlannableLaw, ...] = ("jerk_limited", "s_profile")
 
 SMALLEST_MOTION = 1e-4  # [rad] A choice: a goal closer than this to the arm is where the arm is.
-_RIBBON_POINTS = 120
+PATH_POINTS = 120
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -54,7 +54,7 @@ def make_plan(
         report = check(motion, model, start=start)
     except RcilabError as error:
         return message("plan.failed", error=str(error))
-    times = np.linspace(0.0, motion.duration, _RIBBON_POINTS)
+    times = np.linspace(0.0, motion.duration, PATH_POINTS)
     rows = np.minimum((times / 1e-3).astype(int), len(motion.times) - 1)
     path = model.forward_path(motion.q[rows])[:, :3, 3]
     effort = np.abs(motion.dq[rows] / model.limits.joint.velocity).max(axis=1)

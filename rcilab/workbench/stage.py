@@ -10,6 +10,7 @@ import numpy as np
 from rcilab.views.arm_view import ArmView
 from rcilab.views.viser_scene import ViserScene
 from rcilab.workbench import requests
+from rcilab.workbench.planning import PATH_POINTS
 from rcilab.workbench.readiness import is_moving
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask
@@ -87,7 +88,6 @@ class Stage:
         )
         scene.add_frame("/base_axes", axes_length=0.22, axes_radius=0.004, origin_radius=0.006)
         drawing = ViserScene(server, shadows=full)
-        self._drawing = drawing
         self._live = ArmView(drawing, "live", state.model, "live", quality="fine" if full else "coarse")
         self._candidate = ArmView(drawing, "candidate", state.model, "candidate")
         self._ghost = ArmView(drawing, "plan", state.model, "plan")
@@ -97,6 +97,10 @@ class Stage:
 
     def _build_target(self, state: UiState) -> None:
         pose, scene = state.goal.target, self._server.scene
+        nowhere = np.zeros((PATH_POINTS - 1, 2, 3))
+        self._path: Any = scene.add_line_segments(
+            "/path", nowhere.astype(np.float32), nowhere.astype(np.uint8), thickness=0.008, visible=False
+        )
         self._gizmo: Any = scene.add_transform_controls(
             "/target", scale=_GIZMO_SCALE, line_width=3.0, depth_test=False, wxyz=pose.wxyz, position=pose.position
         )
@@ -139,7 +143,8 @@ class Stage:
             self._tone = goal.reach.tone
             self._mark.color = TONE_COLORS[self._tone]
             self._candidate.set_look(color=_CANDIDATE_COLORS[self._tone])
-        said = f"{text('reach.tone.' + goal.reach.tone)} {text.say(goal.reach.reason)}"
+        tone, reason = goal.reach.tone, text.say(goal.reach.reason)
+        said = text("reach.label") if tone == "good" else f"{text('reach.tone.' + tone)} {reason}"
         if said != self._said:
             self._said = said
             self._label.text = said
@@ -147,11 +152,12 @@ class Stage:
     def _show_plan(self, state: UiState, status: SupervisorStatus, live: np.ndarray) -> None:
         plan = state.plan
         if plan is not self._plan:
-            if self._plan is not None:
-                self._drawing.remove("/path")
             self._plan = plan
+            self._path.visible = plan is not None
             if plan is not None:
-                self._drawing.add_polyline("/path", plan.path, color=_effort_colors(plan.effort), thickness=0.006)
+                colors = _effort_colors(plan.effort).astype(np.uint8)
+                self._path.points = np.stack([plan.path[:-1], plan.path[1:]], axis=1).astype(np.float32)
+                self._path.colors = np.stack([colors[:-1], colors[1:]], axis=1)
         if plan is None or is_moving(status):
             self._see("plan", self._ghost, False)
             return

@@ -32,7 +32,7 @@ class RunPanel:
         """Adds the controls."""
         text, ask = self._text, self._ask
         self._planned = Html(gui)
-        self._execute = gui.add_button(text("run.execute"), color="green", icon="player-play", disabled=True)
+        self._execute = gui.add_button(text("run.execute"), color=(23, 128, 68), icon="player-play", disabled=True)
         on_press(self._execute, ask, lambda page: requests.Drive(page=page, what="execute"))
         self._reason = Html(gui)
         self._buttons: dict[str, Any] = {}

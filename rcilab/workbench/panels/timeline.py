@@ -158,7 +158,7 @@ def plot_contents(frame: Frame, joint: int, n: int) -> tuple[tuple[np.ndarray, .
             if joint and curves is frame.actual:
                 color = "#111827"
             data.append(curves[index] if index < len(curves) else nothing)
-            series.append({"stroke": color, "points": {"show": False}, **look})
+            series.append({"stroke": color, "points": {"show": False}, "pxAlign": 0, **look})
     return tuple(data), tuple(series), bands
 
 
