@@ -69,6 +69,9 @@ class Incident:
 class Lateness:
     """How late cycles were handled against the robot's own 1 ms grid, since the connection was made, [us].
 
+    Cycles without a motion count, too: the control process wakes for every single state then as well, so they show what
+    the machine is capable of before anything moves. What a motion met is in its rows: `drain()`, where `t` is finite.
+
     Percentiles come from a logarithmic histogram and are right to about 4 %; the maximum is exact.
     """
 
@@ -123,7 +126,7 @@ class SupervisorStatus:
     memory_locked: bool = False
     """Whether the control process's memory is kept from being paged out."""
     late_cycles: int = 0
-    """Cycles handled more than 1 ms late since the connection was made."""
+    """Cycles handled more than 1 ms late since the connection was made, with or without a motion; see `Lateness`."""
     lost_cycles: int = 0
     """Controller cycles of which no state reached us, since the connection was made."""
     lateness: Lateness = field(default_factory=Lateness)

@@ -174,6 +174,8 @@ def test_wrong_use_is_named():
     for call in (supervisor.power_on, supervisor.stop, supervisor.drain, supervisor.restart):
         with pytest.raises(UsageError, match=r"start\(\) it first"):
             call()
+    with pytest.raises(UsageError, match=r"nothing can move now: The supervisor is closed"):
+        begin_nowhere(supervisor)
     with pytest.raises(ConnectionLostError, match=r"did not start.*ideal, mujoco"):
         Supervisor(MODEL, plant="rubber").start()
 

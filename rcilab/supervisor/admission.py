@@ -1,0 +1,56 @@
+"""Whether a motion may begin: every reason to refuse one before the control process hears of it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rcilab.client.start_check import describe_start_mismatch
+from rcilab.errors import CertificateError, UsageError
+from rcilab.supervisor.layout import MOTION_ROWS, MOTION_TIME, OPERATOR_TIMEOUT
+from rcilab.supervisor.status import SupervisorStatus
+
+if TYPE_CHECKING:
+    from rcilab.conformance import Certificate
+    from rcilab.model import RobotModel
+    from rcilab.motion import Motion
+
+
+def require_admissible(
+    motion: Motion,
+    certificate: Certificate | None,
+    model: RobotModel,
+    status: SupervisorStatus,
+    *,
+    is_operator_overdue: bool,
+) -> None:
+    """Returns if the motion may begin now.
+
+    Args:
+        motion: The motion.
+        certificate: What `check` gave for it.
+        model: The arm.
+        status: Where the arm is and what it does.
+        is_operator_overdue: Whether somebody ought to be at the controls and is not.
+
+    Raises:
+        CertificateError: The certificate is missing, or does not fit the motion, the model, or where the arm is.
+        UsageError: The arm is moving, no controller is connected, nobody is at the controls, or the motion is too long.
+    """
+    if status.phase in ("moving", "stopping"):
+        raise UsageError("the arm is moving; stop it first, or wait until it has arrived")
+    if status.q_c is None or status.phase not in ("idle", "fault"):
+        raise UsageError(f"nothing can move now: {status.message}")
+    if certificate is None:
+        raise CertificateError("the motion has not been checked: check(motion, model) first", ["certificate"])
+    mismatch = describe_start_mismatch(motion.q[0], status.q_c)
+    if mismatch is not None:
+        raise CertificateError(mismatch, ["start state"])
+    certificate.verify(motion, model, status.q_c)
+    if is_operator_overdue:
+        raise UsageError(
+            f"nobody is at the controls: the page that holds them has not been heard of for {OPERATOR_TIMEOUT:g} s"
+        )
+    if len(motion.q) > MOTION_ROWS:
+        raise UsageError(
+            f"the motion takes {motion.duration:.1f} s, {MOTION_TIME:g} s at most can be handed over; split it"
+        )

@@ -1,0 +1,64 @@
+"""Reading the part of the status that is in the shared block: arm, motion and timing."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rcilab.faults import faults_from_bits
+from rcilab.state import ControllerMode, RobotMode
+from rcilab.supervisor.lateness import late_cycles, summarise
+from rcilab.supervisor.layout import ControlBlock, Word
+from rcilab.supervisor.ring import RingReader
+from rcilab.supervisor.snapshot import Snapshot, read_snapshot
+
+
+class StatusReader:
+    """Looks at what the control process shows of itself; changes nothing.
+
+    Args:
+        block: The shared block.
+    """
+
+    def __init__(self, block: ControlBlock) -> None:
+        self._block = block
+        self._ring = RingReader(block)
+
+    def read_snapshot(self) -> Snapshot:
+        """Returns what the control process last said about itself."""
+        return read_snapshot(self._block.snapshot, self._block.words)
+
+    def read_fields(self, shown: Snapshot) -> dict[str, Any]:
+        """Returns the fields of `SupervisorStatus` that the block knows; those of the arm only once states came.
+
+        Args:
+            shown: The snapshot to take motion and scheduling from.
+        """
+        return {
+            "powered": shown.powered,
+            "rate_hz": shown.rate_hz,
+            "scheduling": "SCHED_FIFO" if shown.is_fifo else "normal",
+            "memory_locked": shown.memory_locked,
+            "late_cycles": late_cycles(self._block.histogram),
+            "lost_cycles": self._block.words[Word.LOST],
+            "lateness": summarise(self._block.histogram),
+            "motion_time": shown.motion_time,
+            "motion_duration": shown.motion_duration,
+            **self._read_arm(),
+        }
+
+    def _read_arm(self) -> dict[str, Any]:
+        row = self._ring.newest()
+        if row is None:
+            return {}
+        last = row[0]
+        bits = int(last["faults"])
+        return {
+            "q": last["q"],
+            "q_c": last["q_c"],
+            "dq": last["dq"],
+            "robot_mode": RobotMode(last["robot_mode"]),
+            "controller_mode": ControllerMode(last["controller_mode"]),
+            "faults": faults_from_bits(bits >> place & 1 for place in range(32)) if bits else (),
+            "success_rate": float(last["success_rate"]),
+            "message_id": int(last["message_id"]),
+        }
