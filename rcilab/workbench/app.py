@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     import viser
 
 _BRAND = (11, 111, 194)
+_BEAT = 0.4  # [s] A choice: the control process stops a motion when it has heard of nobody for 2 s.
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,6 +85,7 @@ class Workbench:
         ask = self.conductor.ask
         live = LiveChannel(
             on_stop=self.session.stop,
+            on_here=self.session.heartbeat,
             on_seek=lambda place: ask(requests.Seek(place=place)),
             on_size=lambda height: ask(requests.SetView(name="height", value=height)),
         )
@@ -98,7 +100,7 @@ class Workbench:
         self.presenter.start()
         self.conductor.start()
         self.conductor.robot.open(self._config.model, self._config.target)
-        threading.Thread(target=self._beat, name="operator", daemon=True).start()
+        threading.Thread(target=self._beat, args=(live,), name="operator", daemon=True).start()
 
     def close(self) -> None:
         """Brings a motion to rest, ends the processes, closes the page. May be called twice."""
@@ -124,11 +126,10 @@ class Workbench:
         async def _(client: viser.ClientHandle) -> None:
             ask(requests.PageWent(page=client.client_id))
 
-    def _beat(self) -> None:
-        """Tells the control process, all the time, whether somebody is there to press Stop."""
-        while not self._stopped.wait(0.25):
-            if self.server.get_clients():
-                self.session.heartbeat()
+    def _beat(self, live: LiveChannel) -> None:
+        """Asks the pages, all the time, whether somebody is there to press Stop; each answer goes to the robot side."""
+        while not self._stopped.wait(_BEAT):
+            live.beat()
 
     def __enter__(self) -> Workbench:
         try:

@@ -20,13 +20,18 @@ class LiveChannel:
     Args:
         on_stop: Called when somebody presses Stop or Esc. It must return at once.
         on_seek: Called with the place in the motion that was clicked in a plot, 0 to 1.
+        on_here: Called when a page has answered a beat: somebody who could press Stop is connected.
         on_size: Called with the height of a page's window, [px], when it opens and when it changes.
     """
 
     def __init__(
-        self, on_stop: Callable[[], None], on_seek: Callable[[float], None], on_size: Callable[[float], None]
+        self,
+        on_stop: Callable[[], None],
+        on_here: Callable[[], None],
+        on_seek: Callable[[float], None],
+        on_size: Callable[[float], None],
     ) -> None:
-        self._on_stop, self._on_seek, self._on_size = on_stop, on_seek, on_size
+        self._on_stop, self._on_here, self._on_seek, self._on_size = on_stop, on_here, on_seek, on_size
         self._pages: set[Any] = set()  # Owned by the event loop.
         self._loop: asyncio.AbstractEventLoop | None = None
         self._latest: dict[str, Any] = {}
@@ -59,6 +64,8 @@ class LiveChannel:
             return
         if said.get("kind") == "stop":
             self._on_stop()
+        elif said.get("kind") == "here":
+            self._on_here()
         elif said.get("kind") == "seek":
             self._pass_on(said.get("place"), 0.0, 1.0, self._on_seek)
         elif said.get("kind") == "size":
@@ -77,6 +84,11 @@ class LiveChannel:
         self._latest = {**self._latest, **changed}
         if self._loop is not None and not self._loop.is_closed():
             self._loop.call_soon_threadsafe(self._send, json.dumps(changed))
+
+    def beat(self) -> None:
+        """Asks every page whether it is still there. A page answers even while its timers are throttled in the back."""
+        if self._loop is not None and not self._loop.is_closed():
+            self._loop.call_soon_threadsafe(self._send, '{"beat": 1}')
 
     def _send(self, message: str) -> None:
         from websockets.asyncio.server import broadcast

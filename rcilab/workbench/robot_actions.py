@@ -92,6 +92,8 @@ class RobotActions:
         self._collect_tickets()
         if status.incident is not None and status.incident.number > self._incident:
             self._incident = status.incident.number
+            if status.incident.code == "crashed.controller":
+                self._powered = False  # The one that is started in its place comes up without motor power.
             self._store.say("bad", _tell_incident(status.incident.code, status.incident.message))
         before, self._phase = self._phase, status.phase
         self._record(status)

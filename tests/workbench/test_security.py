@@ -90,7 +90,7 @@ class Door:
     def __init__(self) -> None:
         self.stops = threading.Event()
         self.seeks: list[float] = []
-        self.live = LiveChannel(self.stops.set, self.seeks.append, lambda height: None)
+        self.live = LiveChannel(self.stops.set, lambda: None, self.seeks.append, lambda height: None)
         bound = bind("127.0.0.1", 0)
         self.port = bound.getsockname()[1]
         self.server = open_server(

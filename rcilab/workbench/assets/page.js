@@ -73,6 +73,7 @@
 
   const hear = (event) => {
     const news = JSON.parse(event.data);
+    if (news.beat) { send({ kind: "here" }); return; }
     Object.assign(said, news);
     if ("stop" in news || "stopHint" in news) label();
     if (news.chips) draw(news.chips);

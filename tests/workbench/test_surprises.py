@@ -1,0 +1,110 @@
+"""Processes that die and pages that go away in mid-motion: the page says so, the robot rests, and work goes on."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+from websockets.sync.client import connect
+
+from rcilab.workbench import requests
+from rcilab.workbench.app import Workbench, WorkbenchConfig
+
+
+def wait(condition: Callable[[], bool], what: str, timeout: float = 30.0) -> None:
+    end = time.monotonic() + timeout
+    while not condition():
+        assert time.monotonic() < end, f"within {timeout} s this did not happen: {what}"
+        time.sleep(0.02)
+
+
+def is_ready(bench: Workbench) -> bool:
+    status = bench.session.status()
+    return status.phase == "idle" and bool(status.powered) and status.q_c is not None
+
+
+def set_out(bench: Workbench) -> float:
+    """Executes a slow motion of joint 1 and returns where it started, once it is under way."""
+    wait(lambda: is_ready(bench), "an idle arm")
+    start = float(bench.session.status().q_c[0])
+    bench.conductor.ask(requests.SetSpeed(speed=0.05))
+    goal = start + (0.8 if start < 0.0 else -0.8)
+    bench.conductor.ask(requests.MoveJoint(joint=0, angle=goal))
+    wait(lambda: bench.store.state.plan is not None and bench.store.state.plan.motion.goal[0] == goal, "a plan")
+    bench.conductor.ask(requests.Drive(what="execute"))
+    wait(lambda: bench.session.status().phase == "moving", "the arm to move")
+    wait(lambda: abs(float(bench.session.status().q[0]) - start) > 0.01, "the arm to get somewhere")
+    return start
+
+
+def move_on(bench: Workbench) -> None:
+    """Plans and executes a short motion to show that nothing is lost."""
+    wait(lambda: is_ready(bench), "an idle, powered arm")
+    bench.conductor.ask(requests.SetSpeed(speed=1.0))
+    angle = float(bench.session.status().q_c[1]) - 0.1
+    bench.conductor.ask(requests.MoveJoint(joint=1, angle=angle))
+    wait(lambda: bench.store.state.plan is not None and bench.store.state.plan.motion.goal[1] == angle, "a plan")
+    bench.conductor.ask(requests.Plan())
+    bench.conductor.ask(requests.Drive(what="execute"))
+    wait(lambda: abs(float(bench.session.status().q_c[1]) - angle) < 1e-9, "the arm to arrive")
+
+
+@pytest.fixture
+def bench() -> Iterator[Workbench]:
+    with Workbench(WorkbenchConfig(port=0, quality="light")) as opened:
+        yield opened
+        assert opened.conductor.errors == []
+        assert opened.presenter.errors == []
+
+
+@pytest.mark.parametrize(
+    ("who", "code"), [("controller_pid", "incident.crashed.controller"), ("worker_pid", "incident.crashed.worker")]
+)
+def test_a_killed_process_is_noticed_told_and_replaced(bench, who, code):
+    set_out(bench)
+    goal = np.array(bench.store.state.goal.q)
+    os.kill(getattr(bench.session.status(), who), signal.SIGKILL)
+    killed = time.monotonic()
+    wait(lambda: bench.session.status().phase != "moving", "the loss to be noticed")
+    assert time.monotonic() - killed < 2.0  # The machine may be busy; the supervisor's own tests hold it to 0.5 s.
+    wait(lambda: bench.store.state.notice is not None and bench.store.state.notice.text.code == code, "to be told")
+    assert np.array_equal(bench.store.state.goal.q, goal), "what the operator has set is not lost"
+    move_on(bench)
+
+
+def test_a_page_that_goes_away_in_mid_motion_means_one_controlled_stop(bench):
+    origin = {"Origin": f"http://127.0.0.1:{bench.port}"}
+    with connect(f"ws://127.0.0.1:{bench.port}/rcilab/live", additional_headers=origin, close_timeout=0.1) as page:
+        going = threading.Event()
+
+        def answer() -> None:
+            for message in page:
+                if "beat" in json.loads(message) and not going.is_set():
+                    page.send('{"kind": "here"}')
+
+        threading.Thread(target=answer, daemon=True).start()
+        time.sleep(1.0)  # Two beats: from now on somebody is expected to be there.
+        start = set_out(bench)
+        going.set()
+    wait(lambda: bench.session.status().phase == "idle", "the arm to rest", 6.0)
+    assert bench.session.status().code == "idle.operator"
+    assert abs(float(bench.session.status().q_c[0]) - start) < 0.7
+    assert not bench.session.status().faults
+    wait(lambda: bench.store.state.notice.text.code == "notice.operator", "to be told")
+
+
+def test_an_unreachable_robot_is_told_and_the_page_stays_usable(bench):
+    wait(lambda: is_ready(bench), "an idle arm")
+    bench.conductor.ask(requests.ChooseRobot(target="rci://127.0.0.9:9"))
+    wait(lambda: bench.session.status().phase == "lost", "no connection")
+    assert "127.0.0.9" in bench.session.status().message
+    bench.conductor.ask(requests.MoveJoint(joint=0, angle=0.3))
+    wait(lambda: bench.store.state.goal.q[0] == 0.3, "the candidate to be posed all the same")
+    bench.conductor.ask(requests.ChooseRobot(target="virtual"))
+    move_on(bench)
