@@ -1,4 +1,8 @@
-"""One Chromium for all browser tests, one workbench with a virtual controller, a fresh page for each test."""
+"""One Chromium for all browser tests, one workbench with a virtual controller, a fresh page for each test.
+
+All of it ends with this folder (scope "package", not "session"): Playwright leaves an event loop running in the test's
+thread, and the workbench two 1 kHz loops under SCHED_FIFO; neither is fair to the tests that come after.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +39,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(pytest.mark.browser)
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def chromium() -> Iterator[object]:
     path = find_chromium()
     if path is None:
@@ -51,7 +55,7 @@ def chromium() -> Iterator[object]:
         browser.close()
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def bench() -> Iterator[object]:
     from rcilab.workbench.app import Workbench, WorkbenchConfig
 
@@ -61,7 +65,7 @@ def bench() -> Iterator[object]:
         assert workbench.presenter.errors == []
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def opened(chromium, bench) -> Iterator[BenchPage]:
     """One page for all: opening it costs several seconds of software rendering."""
     context = chromium.new_context(viewport=VIEW)

@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import asyncio
 import math
 import socket
 import time
@@ -9,8 +8,8 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
-from websockets.asyncio.client import connect
 from websockets.exceptions import InvalidStatus
+from websockets.sync.client import connect
 
 import rcilab
 from rcilab.errors import UsageError
@@ -35,15 +34,11 @@ def wait_until(condition: Callable[[], bool], timeout: float = 5.0) -> bool:
 
 def handshake(page: PreviewPage, origin: str | None) -> int:
     """Status of a websocket's opening request."""
-
-    async def ask() -> int:
-        try:
-            async with connect(page.url.replace("http", "ws"), origin=origin, subprotocols=["viser-v1.1.1"]):  # type: ignore[arg-type]
-                return 101
-        except InvalidStatus as error:
-            return error.response.status_code
-
-    return asyncio.run(ask())
+    try:
+        with connect(page.url.replace("http", "ws"), origin=origin, subprotocols=["viser-v1.1.1"]):  # type: ignore[arg-type]
+            return 101
+    except InvalidStatus as error:
+        return error.response.status_code
 
 
 def test_the_page_is_served_on_loopback_only(page: PreviewPage) -> None:
