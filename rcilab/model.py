@@ -29,7 +29,7 @@ from rcilab.spatial import IDENTITY, Pose
 if TYPE_CHECKING:
     from rcilab.dynamics.rigid_body import RigidBody, TorqueTerms
 
-__all__ = ["RobotModel", "load_model"]
+__all__ = ["RobotModel", "load_model", "require_model"]
 
 _PSI_SEARCH = tuple(math.radians(sign * step) for step in range(10, 181, 10) for sign in (1, -1))
 """Offsets tried, nearest first, when no arm angle was asked for and the natural one has no solution."""
@@ -47,6 +47,19 @@ def load_model(name: str, *, tool: Pose | None = None, load: Payload | None = No
         ModelError: No robot has this name; the message lists those that exist.
     """
     return RobotModel(describe_robot(name), tool or IDENTITY, load or NO_LOAD)
+
+
+def require_model(model: object) -> RobotModel:
+    """Returns `model` if it is a robot model: for borders where its name is an easy slip.
+
+    Raises:
+        InvalidValueError: It is a name, or something else that is no model; the message says what to write.
+    """
+    if isinstance(model, RobotModel):
+        return model
+    if isinstance(model, str):
+        raise InvalidValueError("model", model, f"is a name; use load_model({model!r})")
+    raise InvalidValueError("model", model, "is no robot model; make one with load_model")
 
 
 class RobotModel:

@@ -4,7 +4,7 @@ import pytest
 
 import rcilab
 from rcilab.errors import InvalidValueError, ModelError
-from rcilab.model import load_model
+from rcilab.model import load_model, require_model
 from rcilab.robots import ROBOT_NAMES
 from rcilab.spatial import Pose
 
@@ -61,3 +61,12 @@ def test_every_public_name_can_be_loaded():
 def test_a_name_that_does_not_exist_lists_those_that_do():
     with pytest.raises(AttributeError, match="load_model"):
         _ = rcilab.load_robot
+
+
+def test_a_name_where_a_model_belongs_says_what_to_write():
+    model = load_model("xMatePro7")
+    assert require_model(model) is model
+    with pytest.raises(InvalidValueError, match=r"model: 'xMatePro7' is a name; use load_model\('xMatePro7'\)"):
+        require_model("xMatePro7")
+    with pytest.raises(InvalidValueError, match="model: None is no robot model"):
+        require_model(None)
