@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from rcilab.errors import RcilabError, UsageError
@@ -76,13 +77,17 @@ class Session:
         """Stops a motion. Callable from any thread, never waits: the fast lane of Stop and Esc."""
         current = self._current
         if current is not None:
-            current.stop()
+            with suppress(
+                RcilabError
+            ):  # It is closed or has no connection: nothing of ours moves, and status says why.
+                current.stop()
 
     def heartbeat(self) -> None:
         """Tells the control process that somebody is at the page; call it several times a second while it is so."""
         ready = self._ready
         if ready is not None:
-            ready.set_operator_present(True)
+            with suppress(RcilabError):  # Closed in the meantime.
+                ready.set_operator_present(True)
 
     def _exchange(self, generation: int, previous: threading.Thread | None, model: RobotModel, target: str) -> None:
         if previous is not None:
