@@ -22,6 +22,11 @@ def wait(condition: Callable[[], bool], what: str, timeout: float = 30.0) -> Non
         time.sleep(0.02)
 
 
+def told(bench: Workbench) -> str | None:
+    notice = bench.store.state.notice
+    return None if notice is None else notice.text.code
+
+
 @pytest.fixture(scope="module")
 def bench() -> Iterator[Workbench]:
     with Workbench(WorkbenchConfig(port=0, quality="light")) as opened:
@@ -134,7 +139,7 @@ def test_a_watching_page_may_look_but_not_touch(bench, ask):
     before = bench.store.state.goal
     ask(requests.MoveJoint(page=2, joint=0, angle=0.1))
     assert bench.store.state.goal is before
-    assert bench.store.state.notice.text.code == "notice.watching"
+    assert told(bench) == "notice.watching"
     ask(requests.MoveJoint(page=1, joint=0, angle=0.1))
     assert bench.store.state.goal.q[0] == pytest.approx(0.1)
     ask(requests.TakeControls(page=2))
@@ -149,7 +154,7 @@ def test_execute_runs_the_plan_records_it_and_then_asks_for_a_new_one(bench, ask
     ask(requests.MoveJoint(joint=0, angle=start + (0.2 if start < 1.0 else -0.2)))
     goal = np.array(bench.store.state.goal.q)
     ask(requests.Drive(what="execute"))
-    wait(lambda: bench.store.state.notice.text.code == "notice.arrived", "the arrival")
+    wait(lambda: told(bench) == "notice.arrived", "the arrival")
     assert np.abs(bench.session.status().q_c - goal).max() < 1e-9
     recording = bench.store.state.recording
     assert recording is not None
@@ -157,7 +162,7 @@ def test_execute_runs_the_plan_records_it_and_then_asks_for_a_new_one(bench, ask
     wait(lambda: bench.store.state.recording.t[-1] >= duration - 0.005, "the whole recording")
     assert obstacle(bench.store.state, bench.session.status()).code == "ready.elsewhere"
     ask(requests.Drive(what="execute"))
-    assert bench.store.state.notice.text.code == "ready.elsewhere"
+    assert told(bench) == "ready.elsewhere"
 
 
 def test_stop_ends_a_motion_and_says_so(bench, ask):
@@ -167,9 +172,9 @@ def test_stop_ends_a_motion_and_says_so(bench, ask):
     ask(requests.Drive(what="execute"))
     wait(lambda: bench.session.status().phase == "moving", "the arm to move")
     ask(requests.ChooseRobot(model="xMate3"))
-    assert bench.store.state.notice.text.code == "notice.moving"
+    assert told(bench) == "notice.moving"
     ask(requests.Drive(what="stop"))
-    wait(lambda: bench.store.state.notice.text.code == "notice.stopped", "the stop to be told")
+    wait(lambda: told(bench) == "notice.stopped", "the stop to be told")
     assert bench.session.status().phase == "idle"
     assert abs(float(bench.session.status().q_c[0]) - start) < 0.7
 

@@ -29,6 +29,11 @@ def is_ready(bench: Workbench) -> bool:
     return status.phase == "idle" and bool(status.powered) and status.q_c is not None
 
 
+def told(bench: Workbench) -> str | None:
+    notice = bench.store.state.notice
+    return None if notice is None else notice.text.code
+
+
 def set_out(bench: Workbench) -> float:
     """Executes a slow motion of joint 1 and returns where it started, once it is under way."""
     wait(lambda: is_ready(bench), "an idle arm")
@@ -73,7 +78,7 @@ def test_a_killed_process_is_noticed_told_and_replaced(bench, who, code):
     killed = time.monotonic()
     wait(lambda: bench.session.status().phase != "moving", "the loss to be noticed")
     assert time.monotonic() - killed < 2.0  # The machine may be busy; the supervisor's own tests hold it to 0.5 s.
-    wait(lambda: bench.store.state.notice is not None and bench.store.state.notice.text.code == code, "to be told")
+    wait(lambda: told(bench) == code, "to be told")
     assert np.array_equal(bench.store.state.goal.q, goal), "what the operator has set is not lost"
     move_on(bench)
 
@@ -96,7 +101,7 @@ def test_a_page_that_goes_away_in_mid_motion_means_one_controlled_stop(bench):
     assert bench.session.status().code == "idle.operator"
     assert abs(float(bench.session.status().q_c[0]) - start) < 0.7
     assert not bench.session.status().faults
-    wait(lambda: bench.store.state.notice.text.code == "notice.operator", "to be told")
+    wait(lambda: told(bench) == "notice.operator", "to be told")
 
 
 def test_an_unreachable_robot_is_told_and_the_page_stays_usable(bench):
