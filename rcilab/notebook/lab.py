@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import os
 import sys
-from importlib.util import find_spec
 from pathlib import Path
 
 from rcilab.errors import UsageError
+from rcilab.notebook.installed import require_installed
 
 
 def lab_command(
@@ -24,8 +24,7 @@ def lab_command(
     Raises:
         UsageError: JupyterLab is not installed, or there is no such directory.
     """
-    if find_spec("jupyterlab") is None:
-        raise UsageError("JupyterLab is not installed: pip install -e '.[lab]' adds it")
+    require_installed("jupyterlab", "the lab")
     if not directory.is_dir():
         raise UsageError(f"there is no directory {directory}: name one that holds notebooks")
     command = [sys.executable, "-m", "jupyterlab", str(directory), "--ServerApp.ip=127.0.0.1"]

@@ -15,6 +15,7 @@ from rcilab.conformance.check import HOLD_SAMPLES, check
 from rcilab.conformance.conditions import CYCLE_CONDITIONS, Condition
 from rcilab.errors import InvalidValueError
 from rcilab.limits import JointLimits
+from rcilab.notebook.installed import require_installed
 from rcilab.views.plots import QUANTITIES, recorded_curves
 
 if TYPE_CHECKING:
@@ -66,7 +67,9 @@ def plot(motion: Motion, model: RobotModel, run: Run | None = None, *, joints: S
 
     Raises:
         InvalidValueError: A joint number is none of this arm's.
+        UsageError: matplotlib is not installed.
     """
+    require_installed("matplotlib", "plot")
     chosen = _joint_indices(joints, model.n)
     report = check(motion, model)
     panels = _panels(motion, model.limits.joint, run)

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from rcilab.arrays import Array, as_vector
 from rcilab.errors import UsageError
 from rcilab.motion.motion import Motion
+from rcilab.notebook.installed import require_installed
 from rcilab.robots.upright import upright_joints
 from rcilab.views.arm_view import ArmView
 
@@ -46,9 +47,11 @@ class Preview:
 
     Raises:
         InvalidValueError: The pose is not n finite numbers, or the motion is for another number of joints.
+        UsageError: meshcat is not installed.
     """
 
     def __init__(self, what: Motion | ArrayLike, model: RobotModel, *, live: bool = True, height: int = HEIGHT) -> None:
+        require_installed("meshcat", "preview")
         pose = as_vector(what.start if isinstance(what, Motion) else what, model.n, "q", "rad")
         with warnings.catch_warnings():  # meshcat 0.3 loads pyzmq's old event loop, which says that it is old.
             warnings.simplefilter("ignore", DeprecationWarning)
