@@ -31,6 +31,42 @@ def frozen(value: ArrayLike) -> Array:
     return array
 
 
+class Words(str):
+    """Text that an error shows as it is, without quotes, where a value would stand."""
+
+    __slots__ = ()
+
+    __repr__ = str.__str__
+
+
+def described(value: object) -> object:
+    """Returns what an error should show of a value: a table's shape instead of its rows, anything else as it is."""
+    if getattr(value, "ndim", 0) > 1:
+        return Words(f"an array of shape {getattr(value, 'shape', '')}")
+    return value
+
+
+def as_number(value: object, name: str, unit: str = "") -> float:
+    """Returns a number as a plain float; NaN and infinities are numbers too.
+
+    Args:
+        value: Anything that is one number; text is not.
+        name: What to call it in an error.
+        unit: Unit to name in an error, such as "rad".
+
+    Raises:
+        InvalidValueError: It is not a number.
+    """
+    if isinstance(value, float):
+        return float(value)
+    if not isinstance(value, str | bytes) and getattr(value, "ndim", 0) == 0:
+        try:
+            return float(value)  # type: ignore[arg-type]  # Whatever has no float is refused below.
+        except (TypeError, ValueError, OverflowError):
+            pass
+    raise InvalidValueError(name, described(value), f"is not a number{_in(unit)}")
+
+
 def as_vector(value: ArrayLike, size: int, name: str, unit: str = "") -> Array:
     """Returns a checked, read-only copy of a vector.
 
@@ -55,8 +91,14 @@ def as_vector(value: ArrayLike, size: int, name: str, unit: str = "") -> Array:
     return array
 
 
-def as_path(value: ArrayLike, columns: int, name: str, unit: str = "") -> Array:
-    """Returns a checked, read-only copy of a table with one row a sample.
+def as_path(value: ArrayLike, columns: int | None, name: str, unit: str = "") -> Array:
+    """Returns a checked, read-only copy of a table with one row a sample and one column a joint.
+
+    Args:
+        value: Anything array-like.
+        columns: Number of columns it must have; None takes any but zero.
+        name: What to call it in an error.
+        unit: Unit to name in an error, such as "rad".
 
     Raises:
         InvalidValueError: It is not a finite table of at least one row and exactly `columns` columns.
@@ -64,12 +106,15 @@ def as_path(value: ArrayLike, columns: int, name: str, unit: str = "") -> Array:
     try:
         array = np.array(value, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise InvalidValueError(name, value, f"is not a table of numbers{_in(unit)}") from error
-    if array.ndim != 2 or array.shape[1] != columns or array.shape[0] < 1:
-        raise InvalidValueError(name, f"array of shape {array.shape}", f"needs shape (N, {columns})")
+        raise InvalidValueError(name, described(value), f"is not a table of numbers{_in(unit)}") from error
+    if array.ndim != 2 or 0 in array.shape or columns not in (None, array.shape[1]):
+        needed = f"needs shape (N, {'n' if columns is None else columns}){_in(unit)}"
+        shown = described(array) if array.ndim else value
+        raise InvalidValueError(name, shown, needed)
     if not np.isfinite(array).all():
         row, column = (int(i) for i in np.argwhere(~np.isfinite(array))[0])
-        raise InvalidValueError(f"{name}[{row}, {column}]", array[row, column], f"must be finite{_in(unit)}")
+        where = f"{name} at row {row} (from 0), joint {column + 1}"
+        raise InvalidValueError(where, float(array[row, column]), f"must be finite{_in(unit)}")
     array.flags.writeable = False
     return array
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.arrays import Array, JointVector, Matrix, as_path, as_vector
+from rcilab.arrays import Array, JointVector, Matrix, as_number, as_path, as_vector, described
 from rcilab.dynamics.payload import NO_LOAD, Payload
 from rcilab.errors import InvalidValueError, KinematicsError, SingularError
 from rcilab.kinematics import arm_angle as arm_angles
@@ -45,8 +45,9 @@ def load_model(name: str, *, tool: Pose | None = None, load: Payload | None = No
 
     Raises:
         ModelError: No robot has this name; the message lists those that exist.
+        InvalidValueError: The tool is no `Pose`, the load no `Payload`, or it is heavier than the arm is rated for.
     """
-    return RobotModel(describe_robot(name), tool or IDENTITY, load or NO_LOAD)
+    return RobotModel(describe_robot(name), IDENTITY if tool is None else tool, NO_LOAD if load is None else load)
 
 
 def require_model(model: object) -> RobotModel:
@@ -59,7 +60,7 @@ def require_model(model: object) -> RobotModel:
         return model
     if isinstance(model, str):
         raise InvalidValueError("model", model, f"is a name; use load_model({model!r})")
-    raise InvalidValueError("model", model, "is no robot model; make one with load_model")
+    raise InvalidValueError("model", described(model), "is no robot model; load_model makes one")
 
 
 class RobotModel:
@@ -69,6 +70,17 @@ class RobotModel:
     """
 
     def __init__(self, description: RobotDescription, tool: Pose = IDENTITY, load: Payload = NO_LOAD) -> None:
+        if not isinstance(tool, Pose):
+            raise InvalidValueError(
+                "tool", described(tool), "is no Pose; Pose.from_matrix makes one, Pose() is no tool"
+            )
+        if not isinstance(load, Payload):
+            raise InvalidValueError(
+                "load", described(load), "is no Payload; Payload(mass=...) makes one, Payload() is no load"
+            )
+        if load.mass > description.rated_payload:
+            bound = f"{description.rated_payload:g} kg for {description.name}"
+            raise InvalidValueError("load mass", load.mass, f"kg is above {bound}, the payload it is rated for")
         self.description = description
         self.T_flange_tool = tool
         self.load = load
@@ -93,11 +105,19 @@ class RobotModel:
         return self.description.home
 
     def with_tool(self, tool: Pose) -> RobotModel:
-        """Returns this arm with another tool, given by its pose in the flange frame."""
+        """Returns this arm with another tool, given by its pose in the flange frame.
+
+        Raises:
+            InvalidValueError: It is no `Pose`.
+        """
         return RobotModel(self.description, tool, self.load)
 
     def with_load(self, load: Payload) -> RobotModel:
-        """Returns this arm with another load."""
+        """Returns this arm with another load.
+
+        Raises:
+            InvalidValueError: It is no `Payload`, or heavier than the arm is rated for.
+        """
         return RobotModel(self.description, self.T_flange_tool, load)
 
     def forward(self, q: ArrayLike) -> Pose:
@@ -144,7 +164,7 @@ class RobotModel:
         if not math.isfinite(sum(r) + sum(p)):
             raise InvalidValueError("pose", repr(pose), "must be finite in every element")
         guess = None if near is None else self._floats(near)
-        if psi is not None and not math.isfinite(psi):
+        if psi is not None and not math.isfinite(psi := as_number(psi, "psi", "rad")):
             raise InvalidValueError("psi", psi, "must be finite, [rad]")
         flange = pose @ self._T_tool_flange if self._has_tool else pose
         if self.n == 7:
@@ -156,22 +176,25 @@ class RobotModel:
             raise solutions.refusal()
         return solutions
 
-    def closest(self, T: Pose, near: ArrayLike, psi: float | None = None) -> Reach:
+    def closest(self, T: Pose | ArrayLike, near: ArrayLike, psi: float | None = None) -> Reach:
         """Returns joint angles for a target, or for the closest pose to it that the arm can take.
 
         Args:
-            T: Wanted pose of the tool in base.
+            T: Wanted pose of the tool in base: a `Pose` or a homogeneous matrix, shape (4, 4).
             near: Present joint angles, shape (n,), [rad]: where to start from, and which branch to stay on.
             psi: Arm angle of a 7-axis arm, [rad]; that of `near` when absent.
+
+        Raises:
+            InvalidValueError: T, near or psi is not usable, or psi was given for a 6-axis arm.
         """
         q = as_vector(near, self.n, "near", "rad")
-
+        target = T if isinstance(T, Pose) else Pose.from_matrix(T)
         held = self._natural_psi(q.tolist()) if psi is None and self.n == 7 else psi
 
         def solve(pose: Pose, may_search: bool) -> Solutions:
             return self.inverse(pose, psi if may_search else held, q)
 
-        return closest_reachable(solve, self._geometry, self.T_flange_tool, self.forward(q), q, T)
+        return closest_reachable(solve, self._geometry, self.T_flange_tool, self.forward(q), q, target)
 
     def arm_angle(self, q: ArrayLike) -> float:
         """Returns the arm angle psi of a 7-axis arm, [rad] in (-pi, pi].

@@ -14,7 +14,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.arrays import Array, Matrix, Vector3, as_vector
+from rcilab.arrays import Array, Matrix, Vector3, as_vector, described
 from rcilab.errors import InvalidValueError
 
 Rotation9: TypeAlias = tuple[float, float, float, float, float, float, float, float, float]
@@ -64,11 +64,13 @@ class Pose:
         try:
             m = np.array(matrix, dtype=np.float64)
         except (TypeError, ValueError) as error:
-            raise InvalidValueError("pose", matrix, "is not a 4 x 4 matrix of numbers") from error
+            raise InvalidValueError("pose", described(matrix), "is not a 4 x 4 matrix of numbers") from error
         if m.shape != (4, 4):
-            raise InvalidValueError("pose", f"array of shape {m.shape}", "needs shape (4, 4)")
+            shown = described(m) if m.ndim else matrix
+            raise InvalidValueError("pose", shown, "needs shape (4, 4)")
         if not np.isfinite(m).all():
-            raise InvalidValueError("pose", matrix, "must be finite in every element")
+            row, column = (int(i) for i in np.argwhere(~np.isfinite(m))[0])
+            raise InvalidValueError(f"pose[{row}, {column}]", float(m[row, column]), "must be finite")
         if not np.array_equal(m[3], (0.0, 0.0, 0.0, 1.0)):
             raise InvalidValueError("pose", m[3].tolist(), "must have 0 0 0 1 as its last row")
         rotation = m[:3, :3]
@@ -149,9 +151,16 @@ class Pose:
         )
 
     def __matmul__(self, other: Pose) -> Pose:
-        """Returns `T_a_c` from `T_a_b @ T_b_c`."""
+        """Returns `T_a_c` from `T_a_b @ T_b_c`.
+
+        Raises:
+            InvalidValueError: The other factor is no pose.
+        """
         a, (px, py, pz) = self._r, self._p
-        b, (qx, qy, qz) = other._r, other._p
+        try:
+            b, (qx, qy, qz) = other._r, other._p
+        except AttributeError:
+            raise _no_pose(other) from None
         return Pose.from_parts(
             (
                 a[0] * b[0] + a[1] * b[3] + a[2] * b[6],
@@ -173,12 +182,20 @@ class Pose:
 
     def is_close(self, other: Pose, tolerance: float = 1e-9) -> bool:
         """Returns whether no element of the two transforms differs by more than `tolerance`."""
-        return all(abs(x - y) <= tolerance for x, y in zip(self._r + self._p, other._r + other._p, strict=True))
+        try:
+            numbers = other._r + other._p
+        except AttributeError:
+            raise _no_pose(other) from None
+        return all(abs(x - y) <= tolerance for x, y in zip(self._r + self._p, numbers, strict=True))
 
     def __repr__(self) -> str:
         x, y, z = self._p
         roll, pitch, yaw = (math.degrees(angle) for angle in rpy_from_rotation(self._r))
         return f"Pose(x={x:.4f}, y={y:.4f}, z={z:.4f} m; roll={roll:.2f}, pitch={pitch:.2f}, yaw={yaw:.2f} deg)"
+
+
+def _no_pose(value: object) -> InvalidValueError:
+    return InvalidValueError("pose", described(value), "is no Pose; Pose.from_matrix makes one of a 4 x 4 matrix")
 
 
 IDENTITY = Pose.from_parts((1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0))

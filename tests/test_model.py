@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 import rcilab
@@ -70,3 +71,40 @@ def test_a_name_where_a_model_belongs_says_what_to_write():
         require_model("xMatePro7")
     with pytest.raises(InvalidValueError, match="model: None is no robot model"):
         require_model(None)
+
+
+@pytest.mark.parametrize("value", [None, 3, "tool"])
+def test_what_is_no_tool_or_load_is_refused_in_words(value):
+    model = load_model("xMate3")
+    with pytest.raises(InvalidValueError, match=r"tool: .* is no Pose"):
+        model.with_tool(value)
+    with pytest.raises(InvalidValueError, match=r"load: .* is no Payload"):
+        model.with_load(value)
+
+
+def test_a_load_beyond_the_rated_payload_is_refused_with_value_bound_and_unit():
+    assert load_model("xMatePro7", load=rcilab.Payload(mass=7.0)).load.mass == 7.0
+    with pytest.raises(InvalidValueError, match=r"load mass: 100\.0 kg is above 7 kg for xMatePro7") as caught:
+        load_model("xMatePro7").with_load(rcilab.Payload(mass=100.0))
+    assert caught.value.value == 100.0
+    with pytest.raises(InvalidValueError, match=r"load mass: 3\.5 kg is above 3 kg for xMate3"):
+        load_model("xMate3", load=rcilab.Payload(mass=3.5))
+
+
+def test_an_arm_angle_or_target_of_the_wrong_type_is_refused_in_words():
+    model = load_model("xMatePro7")
+    target = model.forward(model.home)
+    with pytest.raises(InvalidValueError, match="psi: 'a' is not a number"):
+        model.inverse(target, psi="a")
+    with pytest.raises(InvalidValueError, match="psi: 'a' is not a number"):
+        model.closest(target, model.home, psi="a")
+    with pytest.raises(InvalidValueError, match="pose: None needs shape"):
+        model.closest(None, model.home)
+    assert model.closest(target.matrix, model.home).pose.is_close(target, 1e-9)
+
+
+def test_an_angle_that_is_not_finite_is_named_by_row_and_joint():
+    path = np.zeros((4, 7))
+    path[2, 4] = np.nan
+    with pytest.raises(InvalidValueError, match=r"q at row 2 \(from 0\), joint 5: nan must be finite \[rad\]"):
+        load_model("xMatePro7").forward_path(path)

@@ -46,3 +46,22 @@ def test_what_is_no_pose_is_refused_in_words():
             Pose.from_matrix(matrix)
     with pytest.raises(InvalidValueError, match="norm is zero"):
         Pose(wxyz=(0, 0, 0, 0))
+
+
+@pytest.mark.parametrize("other", [3, None, np.eye(4)], ids=["number", "nothing", "matrix"])
+def test_a_pose_times_what_is_no_pose_says_how_to_make_one(other):
+    with pytest.raises(InvalidValueError, match=r"is no Pose; Pose\.from_matrix"):
+        IDENTITY @ other
+    with pytest.raises(InvalidValueError, match="is no Pose"):
+        IDENTITY.is_close(other)
+
+
+def test_a_matrix_that_is_no_pose_is_shown_in_one_short_line():
+    with pytest.raises(InvalidValueError, match=r"^pose: None needs shape \(4, 4\)$"):
+        Pose.from_matrix(None)
+    with pytest.raises(InvalidValueError, match=r"^pose: an array of shape \(3, 3\) needs shape \(4, 4\)$"):
+        Pose.from_matrix(np.eye(3))
+    broken = np.eye(4)
+    broken[1, 3] = np.nan
+    with pytest.raises(InvalidValueError, match=r"^pose\[1, 3\]: nan must be finite$"):
+        Pose.from_matrix(broken)
