@@ -11,6 +11,7 @@ from __future__ import annotations
 import errno
 import hmac
 import io
+import logging
 import math
 import socket
 from collections.abc import Callable
@@ -207,7 +208,10 @@ def _guarded_serve(
             path = urlsplit(connection.request.path).path
             await (live(connection) if path == "/rcilab/live" else handler(connection))
 
-        return original(route, sock=bound, process_request=process, **options)
+        # A browser opens connections ahead of need and drops them unused; that is no error worth a traceback.
+        quiet = logging.getLogger("rcilab.page")
+        quiet.setLevel(logging.CRITICAL)
+        return original(route, sock=bound, process_request=process, **{**options, "logger": quiet})
 
     serving.serve = serve
     try:
