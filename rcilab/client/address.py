@@ -55,6 +55,12 @@ def parse_address(text: str) -> RobotAddress:
     if not isinstance(text, str) or not text.strip():
         raise InvalidValueError("address", text, f"is no address; write it like {_EXAMPLE}")
     text = text.strip()
+    if "[" in text or text.rpartition("://")[2].count(":") > 1:
+        raise InvalidValueError(
+            "address", text, f"looks like IPv6, which is not supported; write the robot's IPv4 address, like {_EXAMPLE}"
+        )
+    if not any(mark in text for mark in ":.") and text != "localhost":  # "foo", or a robot's name: a slip, no host.
+        raise InvalidValueError("address", text, f"is no address; write it like {_EXAMPLE}")
     parts = urlsplit(text if "://" in text else f"rci://{text}")
     if parts.scheme != "rci":
         raise InvalidValueError("address", text, f"begins with {parts.scheme}://, needs rci://, like {_EXAMPLE}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -59,11 +60,13 @@ class RciCommands:
 
     def set_motor_power(self, power: bool) -> None:
         """Switches the motors on or off."""
+        if not isinstance(power, bool | int):
+            raise InvalidValueError("power", power, "must be True or False")
         self._ask(rci.SetMotorPower(int(power)))
 
     def get_motor_state(self) -> bool:
         """Returns whether the motors are on."""
-        return bool(self._link.request(rci.GetMotorState()).power)
+        return bool(self._request(rci.GetMotorState()).power)
 
     def start_move(self, controller_mode: ControllerMode, motion_mode: rci.StartMotionMode) -> None:
         """Begins a motion; commands must follow at once. `execute` and `control` do all of it by themselves."""
@@ -88,7 +91,7 @@ class RciCommands:
         edges = as_vector(size, 3, "size", "m")
         if (edges <= 0.0).any():
             raise InvalidValueError("size", edges.tolist(), "needs three lengths above 0 [m]")
-        self._ask(rci.SetCartesianLimit(_floats(edges), center.as_row_major(), active))
+        self._ask(rci.SetCartesianLimit(_floats(edges), _pose("center", center).as_row_major(), active))
 
     def set_joint_limit(self, lower: ArrayLike, upper: ArrayLike) -> None:
         """Sets soft limits of the joint angles, each of shape (n,), [rad], inside the arm's own limits."""
@@ -126,7 +129,7 @@ class RciCommands:
 
     def set_coor(self, T_flange_tool: Pose) -> None:
         """Sets the tool by its pose in the flange frame."""
-        self._ask(rci.SetCoor(T_flange_tool.as_row_major()))
+        self._ask(rci.SetCoor(_pose("T_flange_tool", T_flange_tool).as_row_major()))
 
     def set_load(self, mass: float, center_of_mass: ArrayLike, inertia: ArrayLike) -> None:
         """Sets the load at the flange.
@@ -173,14 +176,14 @@ class RciCommands:
         Raises:
             CommandRejectedError: The controller has none.
         """
-        response: rci.ModelResponse = self._link.request(rci.LoadRobotModel())
+        response: rci.ModelResponse = self._request(rci.LoadRobotModel())
         if response.status != rci.GuideStatus.SUCCESS:
             raise CommandRejectedError("LoadRobotModel", response.status)
         return response
 
     def set_fc_coor(self, frame: Pose, type: rci.ForceFrame = rci.ForceFrame.TOOL) -> None:
         """Sets the force-control frame by its pose in the flange frame, and what its axes follow."""
-        self._ask(rci.SetFcCoor(frame.as_row_major(), type))
+        self._ask(rci.SetFcCoor(_pose("frame", frame).as_row_major(), type))
 
     def enable_virtual_guide(self, enable: bool) -> None:
         """Switches the virtual guide."""
@@ -192,7 +195,7 @@ class RciCommands:
 
     def get_di(self, signal: int) -> bool:
         """Returns the level of a digital input, 0 to 5."""
-        return bool(self._link.request(rci.GetDIState(_signal(signal))).level)
+        return bool(self._request(rci.GetDIState(_signal(signal))).level)
 
     def start_drag(self, space: rci.DragSpace, type: rci.DragType = rci.DragType.FREE) -> None:
         """Lets a person guide the arm by hand."""
@@ -204,16 +207,20 @@ class RciCommands:
 
     def get_safety_stop_state(self) -> rci.SafetyStop:
         """Returns which emergency stop is pressed."""
-        return self._link.request(rci.GetSafetyStopState()).state
+        return self._request(rci.GetSafetyStopState()).state
 
     def reboot_robot(self) -> None:
         """Restarts the controller; the connection ends with it."""
         self._ask(rci.RebootRobot())
 
     def _ask(self, request: rci.Request, also_good: IntEnum | None = None, timeout: float | None = None) -> None:
-        status = self._link.request(request, timeout).status
+        status = self._request(request, timeout).status
         if status != 0 and status != also_good:
             raise CommandRejectedError(type(request).__name__, status, _ADVICE.get((type(request), status), ""))
+
+    def _request(self, request: rci.Request, timeout: float | None = None) -> Any:
+        """Sends a request and returns the answer; every command comes through here."""
+        return self._link.request(request, timeout)
 
 
 def _require_range(name: str, values: Array, lower: ArrayLike, upper: ArrayLike, unit: str) -> None:
@@ -221,6 +228,12 @@ def _require_range(name: str, values: Array, lower: ArrayLike, upper: ArrayLike,
     for i, value in enumerate(values):
         if not low[i] <= value <= high[i]:
             raise InvalidValueError(f"{name}[{i + 1}]", float(value), f"is outside {low[i]:g} to {high[i]:g} [{unit}]")
+
+
+def _pose(name: str, value: object) -> Pose:
+    if not isinstance(value, Pose):
+        raise InvalidValueError(name, value, "must be a Pose")
+    return value
 
 
 def _signal(signal: int) -> int:

@@ -3,26 +3,31 @@
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from types import TracebackType
-from typing import TYPE_CHECKING, Literal, TypeAlias, get_args
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, get_args
 
-from rcilab.arrays import JointPath
-from rcilab.client.address import RobotAddress, parse_address
+from numpy.typing import ArrayLike
+
+from rcilab.client.address import parse_address
 from rcilab.client.commands import RciCommands
 from rcilab.client.control_loop import SILENCE, Callback, ControlLoop
-from rcilab.client.identify import identify_robot
+from rcilab.client.following import Progress, follow, report_progress
+from rcilab.client.identify import dh_lengths, identify_robot
 from rcilab.client.link import Link
+from rcilab.client.opening import await_first_state, require_arm_there, require_timeout
 from rcilab.client.punctual import punctual
 from rcilab.client.recorder import RECORD_TIME, CycleLog, Recorder
+from rcilab.client.recovery import recover
 from rcilab.client.run import Run, build_run
-from rcilab.client.start_check import describe_start_mismatch
+from rcilab.client.start_check import describe_start_mismatch, require_motion
 from rcilab.client.transport import SocketTransport
 from rcilab.clock import CYCLE_TIME
-from rcilab.command import JointPosition
-from rcilab.errors import ConnectionLostError, DeadlineError, InvalidValueError, UsageError
-from rcilab.protocols.rci import STATE_SIZE
+from rcilab.errors import ConnectionLostError, InvalidValueError, UsageError
+from rcilab.protocols.rci import STATE_SIZE, Request
+from rcilab.spatial import Pose
 from rcilab.state import ControllerMode, RobotState
 
 if TYPE_CHECKING:
@@ -33,12 +38,9 @@ if TYPE_CHECKING:
 Mode: TypeAlias = Literal["joint_position", "joint_impedance", "cartesian_position", "cartesian_impedance", "torque"]
 MODES: tuple[Mode, ...] = get_args(Mode)
 
-Progress: TypeAlias = Callable[[float, float], None]
-"""`(t, duration)`, both [s]; called about 20 times a second from inside the loop, so it must be quick."""
-
-RECOVERY_TIMEOUT = 3.0  # [s] for the error bits to go after the controller has agreed to clear them; a choice.
-_FRESH = 0.1  # [s] Longest wait for one state while faults are expected to go.
-_PROGRESS_CYCLES = 50
+_CLOSED = "the session was closed while a motion ran"
+_CLOSE_TIMEOUT = 10.0  # [s] for another thread to bring its motion to rest; the slowest joint needs 0.4 s.
+_LOOK = 0.02  # [s] Longest wait for another thread's request before it is looked at again what that thread does.
 _SPARE_CYCLES = 2000  # Room in the recorder for what comes before and after the motion itself.
 
 
@@ -48,13 +50,13 @@ def connect(address: str, model: RobotModel | None = None, timeout: float = 3.0)
     Args:
         address: `rci://HOST:PORT`; `?udp_port=N` when the robot takes commands at another UDP port,
             `?client_port=M` when it sends states to another port of ours.
-        model: The arm, with its tool and load; None asks the controller which arm it is.
+        model: The arm, with its tool and load; None takes the arm that the controller says it is.
         timeout: How long to wait for the connection, for the first state, and for every answer, [s].
 
     Raises:
         ConnectionLostError: Nobody answers there, or states do not arrive; the message says what to check.
-        ModelError: No model was given, and the controller's arm is not among the known ones.
-        InvalidValueError: The address is none.
+        ModelError: The model is another arm than the controller's, or none was given and that one is not known.
+        InvalidValueError: The address, the model or the timeout is none.
     """
     return open_session(address, model, timeout)
 
@@ -70,6 +72,11 @@ def open_session(
 ) -> RobotSession:
     """Returns a session as `connect` does, with what only a simulation sets; see `RobotSession`."""
     place = parse_address(address)
+    require_timeout(timeout)
+    if model is not None:
+        from rcilab.model import require_model
+
+        require_model(model)
     transport = SocketTransport(place, STATE_SIZE, timeout)
     try:
         link = Link(transport, 7 if model is None else model.n, str(place), timeout)
@@ -78,6 +85,8 @@ def open_session(
 
             model = load_model(identify_robot(RciCommands(link).load_robot_model().dh))
             link.n = model.n
+        else:
+            require_arm_there(RciCommands(link), model.name, dh_lengths(model.description.dh), str(place))
         await_first_state(link, place, transport.local_address, timeout)
         return RobotSession(link, model, realtime=realtime, silence=silence, on_close=on_close)
     except BaseException:
@@ -85,24 +94,11 @@ def open_session(
         raise
 
 
-def await_first_state(link: Link, place: RobotAddress, local: tuple[str, int], timeout: float) -> None:
-    """Returns once a state has arrived.
-
-    Raises:
-        ConnectionLostError: None has after `timeout`, [s].
-    """
-    if not link.poll(timeout):
-        raise ConnectionLostError(
-            f"{place} accepted the connection but sent no state to {local[0]}:{local[1]} within {timeout:g} s; check "
-            "that the teach pendant's RCI page names this computer's address and that no firewall drops UDP; if the "
-            "robot sends to another port of ours, add ?client_port=N to its address"
-        )
-
-
 class RobotSession(RciCommands):
     """A connected arm: its state, every RCI command, and motions at 1 kHz. Made by `connect` and `simulate`.
 
-    Use it from one thread; only `stop` may be called from others. A session stays usable after faults: `recover()`.
+    While a motion runs, only `stop`, `close` and `state` may be called, from any thread and from a callback; all else
+    is refused and does not disturb it. A session stays usable after faults: `recover()`.
 
     Args:
         link: The connection.
@@ -122,13 +118,21 @@ class RobotSession(RciCommands):
         on_close: Callable[[], None] = lambda: None,
     ) -> None:
         super().__init__(link, model.limits)
-        self.model = model
+        self._model = model
         self._realtime = realtime
         self._silence = silence
         self._on_close = on_close
         self._stop_reason: str | None = None
         self._moving = False
+        self._closing = False
         self._closed = False
+        self._busy = threading.RLock()  # Held by the thread that talks to the controller.
+        self._mover: int | None = None  # The thread that runs a motion.
+
+    @property
+    def model(self) -> RobotModel:
+        """The arm, with the tool and the load that the controller was told of last by this session."""
+        return self._model
 
     @property
     def address(self) -> str:
@@ -150,12 +154,13 @@ class RobotSession(RciCommands):
 
         Raises:
             ConnectionLostError: None came.
-            UsageError: The session is closed.
+            UsageError: The session is closed, or a motion runs: `state` is the newest then.
         """
-        self._require_open()
-        while self._link.poll(0.0):
-            pass
-        states = self._link.poll(timeout)
+        require_timeout(timeout)
+        with self._turn("receive_state"):
+            while self._link.poll(0.0):
+                pass
+            states = self._link.poll(timeout)
         if not states:
             raise ConnectionLostError(
                 f"{self._link.name}: no state within {timeout:g} s; look whether the controller runs and the cable is "
@@ -178,6 +183,11 @@ class RobotSession(RciCommands):
             ControlError: The controller stopped it; `.faults` and `.record` say why. `recover()` leads on.
             ConnectionLostError: The controller is gone.
         """
+        require_motion(motion, certificate)
+        with self._turn("execute"):
+            return self._execute(motion, certificate, progress)
+
+    def _execute(self, motion: Motion, certificate: Certificate | None, progress: Progress | None) -> Run:
         state = self.receive_state()
         mismatch = describe_start_mismatch(motion.q[0], state.q_c)
         if mismatch is not None:
@@ -188,7 +198,7 @@ class RobotSession(RciCommands):
             check(motion, self.model, start=state.q_c).require()
         else:
             certificate.verify(motion, self.model, state.q_c)
-        return self._run(follow(motion.q, _reporter(motion, progress)), "joint_position", motion)
+        return self._run(follow(motion.q, report_progress(motion, progress)), "joint_position", motion)
 
     def control(self, callback: Callback, mode: Mode = "joint_position") -> Run:
         """Runs a callback in every controller cycle until it returns a command with `finished=True`.
@@ -206,7 +216,31 @@ class RobotSession(RciCommands):
             InvalidValueError: A command was unusable; the arm was brought to rest.
             Exception: Whatever the callback raised; the arm was brought to rest.
         """
-        return self._run(callback, mode, None)
+        with self._turn("control"):
+            return self._run(callback, mode, None)
+
+    def set_coor(self, T_flange_tool: Pose) -> None:
+        """Sets the tool by its pose in the flange frame; `model` has it from then on."""
+        with self._turn("SetCoor"):
+            model = self._model.with_tool(T_flange_tool)
+            super().set_coor(T_flange_tool)
+            self._model = model
+
+    def set_load(self, mass: float, center_of_mass: ArrayLike, inertia: ArrayLike) -> None:
+        """Sets the load at the flange; `model` has it from then on.
+
+        Args:
+            mass: [kg], up to the arm's payload.
+            center_of_mass: In the flange frame, shape (3,), [m].
+            inertia: About the centre of mass, shape (3, 3), [kg m^2].
+        """
+        from rcilab.dynamics.payload import Payload
+
+        with self._turn("SetLoad"):
+            load = Payload(mass=mass, center_of_mass=center_of_mass, inertia=inertia)  # type: ignore[arg-type]
+            model = self._model.with_load(load)
+            super().set_load(load.mass, load.center_of_mass, load.inertia)
+            self._model = model
 
     def stop(self) -> None:
         """Brings a running motion to rest within the limits; `execute` or `control` then returns its run.
@@ -223,15 +257,23 @@ class RobotSession(RciCommands):
             CommandRejectedError: The controller refuses; the message says what it waits for.
             DeadlineError: It agreed, and the faults stayed.
         """
-        self._require_open()
-        recover(self, self._link)
+        with self._turn("recover"):
+            recover(self, self._link)
 
     def close(self) -> None:
-        """Ends the connection. May be called twice. A motion must be over: it ends with the call that runs it."""
-        if not self._closed:
-            self._closed = True
-            self._link.close()
-            self._on_close()
+        """Brings a running motion to rest within the limits and ends the connection. May be called twice.
+
+        The call that runs the motion returns its run. From inside a callback, the connection ends with the motion.
+        """
+        self._closing = True
+        if self._moving and self._mover == threading.get_ident():
+            return
+        is_mine = self._busy.acquire(timeout=_CLOSE_TIMEOUT)
+        try:
+            self._disconnect()
+        finally:
+            if is_mine:
+                self._busy.release()
 
     def __enter__(self) -> RobotSession:
         return self
@@ -245,82 +287,61 @@ class RobotSession(RciCommands):
         return f"<RobotSession {self.model.name} at {self._link.name}{', closed' if self._closed else ''}>"
 
     def _run(self, callback: Callback, mode: Mode, plan: Motion | None) -> Run:
-        self._require_open()
         if mode not in MODES:
             raise InvalidValueError("mode", mode, f"is unknown; known: {', '.join(MODES)}")
-        if self._moving:
-            raise UsageError("a motion is running already; let it end, or stop() it first")
         time_needed = RECORD_TIME if plan is None else plan.duration
         recorder = Recorder(self.n, math.ceil(time_needed / CYCLE_TIME) + _SPARE_CYCLES)
         self._stop_reason = None
         loop = ControlLoop(
             self._link,
-            self,
+            RciCommands(self._link),  # Not self: everybody else's commands are refused while a motion runs.
             self.model.limits,
             ControllerMode[mode.upper()],
             CycleLog(recorder),
-            watch=lambda t: self._stop_reason,
+            watch=lambda t: _CLOSED if self._closing else self._stop_reason,
             silence=self._silence,
         )
+        self._mover = threading.get_ident()
         self._moving = True
         try:
             with punctual(self._realtime):
                 reason = loop.run(callback)
         finally:
             self._moving = False
+            if self._closing:
+                self._disconnect()
         return build_run(
             recorder.rows(), plan=plan, stopped=reason, truncated=recorder.truncated, realtime=self._realtime
         )
 
-    def _require_open(self) -> None:
-        if self._closed:
+    def _request(self, request: Request, timeout: float | None = None) -> Any:
+        with self._turn(type(request).__name__):
+            return super()._request(request, timeout)
+
+    @contextmanager
+    def _turn(self, what: str) -> Iterator[None]:
+        """Has the connection for itself: waits for another thread's request, not for a motion.
+
+        Raises:
+            UsageError: A motion runs, or the session is closed.
+        """
+        self._require_free(what)
+        while not self._busy.acquire(timeout=_LOOK):
+            self._require_free(what)
+        try:
+            self._require_free(what)  # Also where the lock is ours: a callback has it too.
+            yield
+        finally:
+            self._busy.release()
+
+    def _require_free(self, what: str) -> None:
+        if self._closing:
             raise UsageError("this session is closed; connect again")
+        if self._moving:
+            raise UsageError(f"a motion is running already: no {what} meanwhile; let it end, or stop() it first")
 
-
-def recover(commands: RciCommands, link: Link) -> None:
-    """Clears the controller's faults and returns once no state shows them any more; see `RobotSession.recover`."""
-    commands.automatic_error_recovery()
-    deadline = time.monotonic() + RECOVERY_TIMEOUT
-    faults = link.latest.faults if link.latest is not None else ()
-    while time.monotonic() < deadline:
-        states = link.poll(_FRESH)
-        link.on_states(states)
-        if states:
-            faults = states[-1].faults
-            if not faults:
-                return
-    names = ", ".join(fault.name for fault in faults)
-    raise DeadlineError(
-        f"{link.name}: {names or 'the faults'} did not clear within {RECOVERY_TIMEOUT:g} s; remove the cause first"
-        + (f": {faults[0].remedy}" if faults else "")
-    )
-
-
-def follow(rows: JointPath, on_cycle: Callable[[int], None] | None = None) -> Callback:
-    """Returns the callback that streams prepared joint angles: row k in controller cycle k.
-
-    Args:
-        rows: Joint angles, shape (N, n), [rad].
-        on_cycle: Told the number of every cycle.
-    """
-    last = len(rows) - 1
-
-    def callback(state: RobotState, t: float) -> JointPosition:
-        cycle = min(round(t / CYCLE_TIME), last)
-        if on_cycle is not None:
-            on_cycle(cycle)
-        return JointPosition(rows[cycle], finished=cycle == last)
-
-    return callback
-
-
-def _reporter(motion: Motion, progress: Progress | None) -> Callable[[int], None] | None:
-    if progress is None:
-        return None
-    last = len(motion.q) - 1
-
-    def report(cycle: int) -> None:
-        if cycle % _PROGRESS_CYCLES == 0 or cycle == last:
-            progress(min(cycle * CYCLE_TIME, motion.duration), motion.duration)
-
-    return report
+    def _disconnect(self) -> None:
+        if not self._closed:
+            self._closed = True
+            self._link.close()
+            self._on_close()

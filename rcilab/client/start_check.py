@@ -1,4 +1,4 @@
-"""Is the arm where a motion begins? Asked before anything is sent."""
+"""Is it a motion, with its proof, that begins where the arm is? Asked before anything is sent."""
 
 from __future__ import annotations
 
@@ -8,6 +8,24 @@ import numpy as np
 
 from rcilab.arrays import JointVector
 from rcilab.conformance.conditions import START_POSITION_TOLERANCE
+from rcilab.errors import InvalidValueError
+
+
+def require_motion(motion: object, certificate: object) -> None:
+    """Makes sure that what is to run is a motion, and its proof a certificate or None.
+
+    Raises:
+        InvalidValueError: It is something else, such as a report; the message says what to pass.
+    """
+    from rcilab.conformance import Certificate, Report
+    from rcilab.motion import Motion
+
+    if not isinstance(motion, Motion):
+        raise InvalidValueError("motion", motion, "is no motion; make one with plan_joint or Motion.from_samples")
+    if isinstance(certificate, Report):
+        raise InvalidValueError("certificate", "report", "is not the proof: pass report.certificate, not the report")
+    if certificate is not None and not isinstance(certificate, Certificate):
+        raise InvalidValueError("certificate", certificate, "is none; pass check(motion, model).certificate")
 
 
 def describe_start_mismatch(start: JointVector, q_c: JointVector) -> str | None:
@@ -29,5 +47,6 @@ def describe_start_mismatch(start: JointVector, q_c: JointVector) -> str | None:
         f"the motion starts elsewhere than the arm is: joint {joint + 1} would start at "
         f"{math.degrees(start[joint]):.4f} deg and stands at {math.degrees(q_c[joint]):.4f} deg, "
         f"{math.degrees(off[joint]):.2g} deg apart{more} (tolerance {math.degrees(START_POSITION_TOLERANCE):.0e} deg); "
-        "plan the motion from robot.state.q_c"
+        "plan the motion from robot.state.q_c, or bring the arm to its start first: "
+        "robot.execute(plan_joint(robot.model, robot.state.q_c, motion.q[0]))"
     )

@@ -66,6 +66,7 @@ class SocketTransport:
         self._robot_host = route.robot_udp[0]
         self._command_address = route.robot_udp
         self._frames: list[bytes] = []
+        self._was_answered = False
         self._reader = FrameReader()
         self._udp = _bind_udp(address, route)
         try:
@@ -103,6 +104,7 @@ class SocketTransport:
                 raise self._lost(error) from error
             if not piece:
                 raise self._lost(None)
+            self._was_answered = True
             try:
                 self._frames += self._reader.feed(piece)
             except DecodeError as error:
@@ -147,6 +149,11 @@ class SocketTransport:
 
     def _lost(self, error: OSError | None) -> ConnectionLostError:
         reason = "it closed the connection" if error is None else (error.strerror or str(error))
+        if not self._was_answered:
+            return ConnectionLostError(
+                f"{self.address}: the controller ended the connection before its first answer ({reason}), probably "
+                "because another client is connected: it takes one at a time; close that one and connect again"
+            )
         return ConnectionLostError(
             f"{self.address}: the connection is lost ({reason}); look whether the controller runs, and connect again"
         )
@@ -190,6 +197,6 @@ def _connect_tcp(address: RobotAddress, route: Route, timeout: float) -> socket.
         raise ConnectionLostError(
             f"no robot at {address} ({reason}); check that it is switched on, that its IP address and port are those "
             "of the teach pendant's RCI page with RCI enabled there, and that the cable and no firewall is in between; "
-            "a virtual one is started with: rcilab controller"
+            "a virtual one is started with, for example: rcilab controller --model xMatePro7"
         ) from error
     return tcp

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rcilab.client.start_check import describe_start_mismatch
+from rcilab.client.start_check import describe_start_mismatch, require_motion
 from rcilab.errors import CertificateError, UsageError
 from rcilab.supervisor.layout import MOTION_ROWS, MOTION_TIME, OPERATOR_TIMEOUT
 from rcilab.supervisor.status import SupervisorStatus
@@ -33,9 +33,11 @@ def require_admissible(
         is_operator_overdue: Whether somebody ought to be at the controls and is not.
 
     Raises:
+        InvalidValueError: It is no motion, or the certificate is something else, such as a report.
         CertificateError: The certificate is missing, or does not fit the motion, the model, or where the arm is.
         UsageError: The arm is moving, no controller is connected, nobody is at the controls, or the motion is too long.
     """
+    require_motion(motion, certificate)
     if status.phase in ("moving", "stopping"):
         raise UsageError("the arm is moving; stop it first, or wait until it has arrived")
     if status.q_c is None or status.phase not in ("idle", "fault"):

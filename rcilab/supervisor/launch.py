@@ -13,12 +13,24 @@ import time
 from collections.abc import Sequence
 from typing import IO
 
-from rcilab.errors import ConnectionLostError
+from rcilab.errors import ConnectionLostError, InvalidValueError
 
 START_TIMEOUT = 20.0  # [s] A cold Python with its numerical libraries takes about 1 s; a busy machine several.
 _END_TIMEOUT = 3.0  # [s] Between asking a process to end and ending it.
 _LISTENING = re.compile(r"^listening (rci://\S+)( |$)")
 _TAIL = 2000  # [bytes] of what a process said last that go into an error.
+
+
+def require_plant(plant: object) -> None:
+    """Makes sure that a virtual controller knows this plant.
+
+    Raises:
+        InvalidValueError: It does not; the message lists those it knows.
+    """
+    from rcilab.controller.config import PLANT_KINDS
+
+    if plant not in PLANT_KINDS:
+        raise InvalidValueError("plant", plant, f"is unknown; known: {', '.join(PLANT_KINDS)}")
 
 
 class Child:

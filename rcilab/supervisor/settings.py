@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rcilab.client.identify import dh_lengths
 from rcilab.limits import ArmAngleLimits, CartesianLimits, JointLimits, Limits
 from rcilab.spatial import IDENTITY, Pose
 
@@ -18,6 +19,10 @@ if TYPE_CHECKING:
 class WorkerSettings:
     """The arm as far as the control process needs it: no kinematics, no dynamics."""
 
+    name: str
+    """Name of the arm, to compare with the controller's."""
+    lengths: list[list[float]]
+    """Its Denavit-Hartenberg a and d, one row a joint, [m]; also to compare."""
     n: int
     limits: Limits
     tool: Pose | None
@@ -38,6 +43,8 @@ def build_settings(model: RobotModel, *, is_virtual: bool) -> dict[str, Any]:
     has_load = is_virtual and model.load.mass > 0.0
     load = model.load
     return {
+        "name": model.name,
+        "lengths": [list(row) for row in dh_lengths(model.description.dh)],
         "n": model.n,
         "joint": {name: getattr(limits.joint, name).tolist() for name in JointLimits.__slots__},
         "cartesian": asdict(limits.cartesian),
@@ -51,6 +58,8 @@ def parse_settings(settings: dict[str, Any]) -> WorkerSettings:
     """Returns what `build_settings` wrote."""
     arm_angle, tool, load = settings["arm_angle"], settings["tool"], settings["load"]
     return WorkerSettings(
+        name=settings["name"],
+        lengths=settings["lengths"],
         n=settings["n"],
         limits=Limits(
             joint=JointLimits(**{name: np.array(values) for name, values in settings["joint"].items()}),

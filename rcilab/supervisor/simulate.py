@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from rcilab.client.control_loop import SILENCE
 from rcilab.client.session import RobotSession, open_session
 from rcilab.spatial import IDENTITY
-from rcilab.supervisor.launch import start_controller
+from rcilab.supervisor.launch import require_plant, start_controller
 
 if TYPE_CHECKING:
     from rcilab.model import RobotModel
@@ -26,8 +26,13 @@ def simulate(model: RobotModel, *, plant: str = "ideal", lockstep: bool = True) 
             bit on any machine. False: the controller runs free at 1 kHz, as a real one does.
 
     Raises:
+        InvalidValueError: The model is none, or the plant is unknown.
         ConnectionLostError: The virtual controller did not start; the message carries what it said.
     """
+    from rcilab.model import require_model
+
+    require_model(model)
+    require_plant(plant)
     controller = start_controller(model.name, plant, lockstep)
     try:
         assert controller.address is not None  # start_controller waits for it.

@@ -15,6 +15,7 @@ from rcilab.client.address import parse_address
 from rcilab.errors import ConnectionLostError, RcilabError, UsageError
 from rcilab.supervisor.admission import require_admissible
 from rcilab.supervisor.keeper import ANSWER_TIMEOUT, ProcessKeeper
+from rcilab.supervisor.launch import require_plant
 from rcilab.supervisor.layout import OPERATOR_TIMEOUT, ControlBlock, Word
 from rcilab.supervisor.ring import RingReader
 from rcilab.supervisor.settings import build_settings
@@ -51,7 +52,7 @@ class Supervisor:
         auto_restart: Whether a process of ours that died is started again by itself (at most 3 times a minute).
 
     Raises:
-        InvalidValueError: The target is no address.
+        InvalidValueError: The target is no address, the model no model, or the plant unknown.
     """
 
     def __init__(
@@ -63,7 +64,10 @@ class Supervisor:
         stop_without_operator: bool = True,
         auto_restart: bool = True,
     ) -> None:
-        self.model = model
+        from rcilab.model import require_model
+
+        self.model = require_model(model)
+        require_plant(plant)
         self._target = VIRTUAL if target == VIRTUAL else str(parse_address(target))
         self._plant = plant
         self._stop_without_operator = stop_without_operator
@@ -286,7 +290,7 @@ class Supervisor:
 
     def _collect_replies(self) -> None:
         for failure in self._desk.collect():
-            if self._crash is None and failure["kind"] in ("ConnectionLostError", "ControlError"):
+            if self._crash is None and failure["kind"] in ("ConnectionLostError", "ControlError", "ModelError"):
                 shown = self._reader.read_snapshot()
                 if shown.phase in ("lost", "fault"):
                     self._note(shown.code, failure["message"])

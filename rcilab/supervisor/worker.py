@@ -19,10 +19,12 @@ import numpy as np
 from rcilab.client.address import parse_address
 from rcilab.client.commands import RciCommands
 from rcilab.client.control_loop import ControlLoop
+from rcilab.client.following import follow
 from rcilab.client.link import Link
+from rcilab.client.opening import await_first_state, require_arm_there
 from rcilab.client.punctual import PRIORITY
 from rcilab.client.recorder import CycleLog
-from rcilab.client.session import await_first_state, follow, recover
+from rcilab.client.recovery import recover
 from rcilab.client.start_check import describe_start_mismatch
 from rcilab.client.transport import SocketTransport
 from rcilab.errors import ConnectionLostError, ControlError, RcilabError, UsageError
@@ -131,7 +133,7 @@ class Worker:
     def _fail(self, request: dict[str, Any], error: Exception) -> None:
         if isinstance(error, StoppedError):
             pass  # Said already.
-        elif isinstance(error, ConnectionLostError):
+        elif isinstance(error, ConnectionLostError) or (request["kind"] == "connect" and self._link is None):
             self._disconnect()
             self._say("lost", "lost.unreachable", error=str(error))
         elif isinstance(error, ControlError) and error.faults:
@@ -148,6 +150,7 @@ class Worker:
         transport = SocketTransport(place, STATE_SIZE, request["timeout"])
         try:
             link = Link(transport, self._settings.n, str(place), request["timeout"])
+            require_arm_there(RciCommands(link), self._settings.name, self._settings.lengths, str(place))
             await_first_state(link, place, transport.local_address, request["timeout"])
         except BaseException:
             transport.close()

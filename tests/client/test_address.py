@@ -32,6 +32,9 @@ def test_options_name_the_ports_that_differ():
         ("rci://host/robot", "a host and a port"),
         ("rci://host?udp_prt=1", "known: udp_port, client_port"),
         ("rci://host?udp_port=x", "udp_port 'x'"),
+        ("rci://[::1]:1337", "IPv6, which is not supported; write the robot's IPv4 address"),
+        ("::1", "IPv6"),
+        ("foo", "is no address; write it like rci://"),
     ],
 )
 def test_a_wrong_address_says_what_is_wrong_with_it(text, hint):

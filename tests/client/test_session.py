@@ -2,30 +2,39 @@
 
 from __future__ import annotations
 
+import math
 import socket
+import threading
 import time
 
 import numpy as np
 import pytest
 
+from rcilab.cli import _build_parser
 from rcilab.client import connect
+from rcilab.client.identify import require_same_arm
 from rcilab.client.session import open_session
 from rcilab.command import CartesianPosition, JointPosition
+from rcilab.conformance import check
 from rcilab.errors import (
+    CertificateError,
     CommandRejectedError,
     ConnectionLostError,
     ControlError,
     DeadlineError,
     InvalidValueError,
+    ModelError,
     UsageError,
 )
 from rcilab.faults import Fault
 from rcilab.model import load_model
+from rcilab.motion import plan_joint
 from rcilab.protocols import rci
 from rcilab.spatial import Pose
 from tests.client.peer import HOST, Peer, Script
 
 MODEL = load_model("xMatePro7")
+REST = plan_joint(MODEL, MODEL.home, MODEL.home)
 
 
 @pytest.fixture
@@ -101,14 +110,21 @@ def test_every_command_reaches_the_controller_as_the_protocol_spells_it(make_rob
         (lambda r: r.set_joint_limit([1] * 7, [0] * 7), "below upper"),
         (lambda r: r.set_filters(1001, 1, 1), "0 to 1000"),
         (lambda r: r.set_do(6, True), "0 to 5"),
-        (lambda r: r.set_load(-1, [0, 0, 0], np.eye(3)), "below 0"),
+        (lambda r: r.set_load(-1, [0, 0, 0], np.eye(3)), "negative"),
+        (lambda r: r.set_load(100, [0, 0, 0], np.eye(3)), "load mass: 100.* kg is above 7 kg for xMatePro7"),
+        (lambda r: r.set_coor(None), "Pose"),
+        (lambda r: r.set_cartesian_limit([1, 1, 1], "x"), "center: 'x' must be a Pose"),
+        (lambda r: r.set_motor_power("no"), "True or False"),
+        (lambda r: r.receive_state(0), "timeout: 0 must be above 0"),
+        (lambda r: r.execute(None), "motion: None is no motion"),
+        (lambda r: r.execute(REST, check(REST, MODEL)), r"pass report\.certificate, not the report"),
     ],
 )
 def test_a_bad_argument_is_named_and_not_sent(make_robot, call, hint):
     peer, robot = make_robot()
     with pytest.raises(InvalidValueError, match=hint):
         call(robot)
-    assert peer.requests == []
+    assert peer.requests == [rci.LoadRobotModel()]  # Asked by connect.
 
 
 def test_a_refusal_says_what_to_do(make_robot):
@@ -138,11 +154,144 @@ def test_without_a_model_the_controller_is_asked_which_arm_it_is():
         assert robot.state.q.shape == (7,)
 
 
+@pytest.mark.parametrize("name", ["xMate3", "xMate7", "xMatePro3"])
+def test_another_arm_than_the_controller_s_is_refused_and_both_are_named(name):
+    model = load_model(name)
+    with Peer() as peer:
+        with pytest.raises(ModelError, match=rf"is an xMatePro7 \(7 axes\), you gave {name} \({model.n}\)") as caught:
+            connect(peer.url, model)
+        assert "load_model('xMatePro7')" in str(caught.value)
+        assert peer.requests == [rci.LoadRobotModel()]
+
+
+def test_an_unknown_arm_must_have_the_given_lengths_up_to_a_calibration():
+    lengths = [(0.0, d) for d in (0.404, 0.0, 0.4375, 0.0, 0.4125, 0.0, 0.2755)]
+    served = [number for _, d in lengths for number in (0.0, 0.0, 1000.0 * d + 0.8, 0.0)]
+    require_same_arm(served, "xMatePro7", lengths, "rci://x")
+    require_same_arm([0.0] * 28, "xMatePro7", lengths, "rci://x")
+    served[2] += 20.0
+    with pytest.raises(ModelError, match=r"7 axes with the DH lengths d 424\.8, .* you gave xMatePro7 \(7 axes, 404,"):
+        require_same_arm(served, "xMatePro7", lengths, "rci://x")
+
+
+@pytest.mark.parametrize("timeout", [-1, 0, math.nan, math.inf, "a", None, True])
+def test_a_timeout_that_is_no_time_is_named(timeout):
+    with pytest.raises(InvalidValueError, match=r"timeout: .* above 0 \[s\]"):
+        connect("rci://127.0.0.2:9", timeout=timeout)
+
+
+def test_the_name_of_a_model_is_no_model():
+    with pytest.raises(InvalidValueError, match=r"use load_model\('xMatePro7'\)"):
+        connect("rci://127.0.0.2:9", "xMatePro7")
+
+
+@pytest.mark.parametrize(
+    "change", [lambda r: r.set_coor(Pose((0.0, 0.0, 0.1))), lambda r: r.set_load(2, [0, 0, 0], np.eye(3))]
+)
+def test_another_tool_or_load_makes_a_certificate_stale(make_robot, change):
+    peer, robot = make_robot()
+    rest = plan_joint(robot.model, peer.script.q, peer.script.q)
+    certificate = check(rest, robot.model).certificate
+    change(robot)
+    with pytest.raises(CertificateError, match=r"stale: (tool|load) has changed"):
+        robot.execute(rest, certificate)
+    assert robot.execute(rest, check(rest, robot.model).certificate).stopped is None
+
+
+def test_a_refused_tool_leaves_the_model_as_it_is(make_robot):
+    _, robot = make_robot(Script(statuses={rci.SetCoor: rci.SettingStatus.INVALID_ARGUMENT}))
+    with pytest.raises(CommandRejectedError):
+        robot.set_coor(Pose((0.0, 0.0, 0.1)))
+    assert robot.model.fingerprint == MODEL.fingerprint
+
+
+def test_whoever_calls_in_mid_motion_is_refused_and_the_motion_goes_on(make_robot):
+    peer, robot = make_robot()
+    refused = []
+
+    def disturb():
+        for call in (robot.receive_state, robot.recover, robot.power_off, lambda: robot.set_coor(Pose()),
+                     robot.get_motor_state, lambda: robot.control(wave(10))):  # fmt: skip
+            with pytest.raises(UsageError, match="a motion is running already") as caught:
+                call()
+            refused.append(caught.value)
+        assert robot.state.message_id > 0
+
+    other = threading.Thread(target=disturb)
+    good = wave(400)
+
+    def callback(state, t):
+        if round(t * 1000) == 100:
+            disturb()
+            other.start()
+        if round(t * 1000) == 350:
+            other.join()
+        return good(state, t)
+
+    run = robot.control(callback)
+    assert len(refused) == 12
+    assert run.stopped is None
+    assert run.timing.lost == 0
+    assert [type(request) for request in peer.requests] == [rci.LoadRobotModel, rci.StartMove, rci.StopMove]
+
+
+@pytest.mark.parametrize("from_callback", [True, False])
+def test_closing_in_mid_motion_brings_the_arm_to_rest_first(make_robot, from_callback):
+    peer, robot = make_robot()
+    other = threading.Thread(target=robot.close)
+    good = wave(400, size=0.2)
+
+    def callback(state, t):
+        if round(t * 1000) == 200:
+            robot.close() if from_callback else other.start()
+        return good(state, t)
+
+    run = robot.control(callback)
+    if not from_callback:
+        other.join()
+    assert run.stopped == "the session was closed while a motion ran"
+    assert_controlled_stop(peer)
+    with pytest.raises(UsageError, match="closed; connect again"):
+        robot.power_on()
+
+
+def test_two_threads_may_ask_in_turn(make_robot):
+    _, robot = make_robot()
+    states, errors = [], []
+
+    def ask():
+        try:
+            states.extend(robot.receive_state() for _ in range(20))
+        except Exception as error:
+            errors.append(error)
+
+    threads = [threading.Thread(target=ask) for _ in range(2)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert errors == []
+    assert len(states) == 40
+
+
+def test_a_client_that_is_turned_away_hears_of_the_other_one():
+    with socket.create_server((HOST, 0)) as server:
+        turn_away = threading.Thread(target=lambda: server.accept()[0].close())
+        turn_away.start()
+        with pytest.raises(ConnectionLostError, match="probably because another client is connected: it takes one"):
+            connect(f"rci://{HOST}:{server.getsockname()[1]}", MODEL, timeout=2.0)
+        turn_away.join()
+
+
 def test_nobody_there_names_address_and_timeout_and_what_to_check():
     with socket.create_server((HOST, 0)) as taken:
         port = taken.getsockname()[1]
-    with pytest.raises(ConnectionLostError, match=rf"no robot at rci://{HOST}:{port} .*of 0\.5 s.*teach pendant"):
+    with pytest.raises(
+        ConnectionLostError, match=rf"no robot at rci://{HOST}:{port} .*of 0\.5 s.*teach pendant"
+    ) as caught:
         connect(f"rci://{HOST}:{port}", MODEL, timeout=0.5)
+    advice = str(caught.value).rpartition("rcilab ")[2]
+    assert _build_parser().parse_args(advice.split()).model == "xMatePro7"
 
 
 def test_a_controller_that_sends_no_states_is_told_apart():
@@ -160,7 +309,7 @@ def test_garbage_for_an_answer_is_a_lost_connection():
     with socket.create_server((HOST, 0)) as server:
         port = server.getsockname()[1]
         udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        with pytest.raises(ConnectionLostError, match="no state"):
+        with pytest.raises(DeadlineError, match="did not answer LoadRobotModel"):
             connect(f"rci://{HOST}:{port}", MODEL, timeout=0.2)
         udp.close()
 
@@ -325,8 +474,10 @@ def test_a_closed_session_says_so(make_robot):
     _, robot = make_robot()
     robot.close()
     robot.close()
-    with pytest.raises(UsageError, match="connect again"):
-        robot.receive_state()
+    for call in (robot.receive_state, robot.power_on, robot.get_motor_state, robot.recover, lambda: robot.state,
+                 lambda: robot.set_do(0, 1), lambda: robot.control(wave(10)), lambda: robot.execute(REST)):  # fmt: skip
+        with pytest.raises(UsageError, match="closed; connect again"):
+            call()
 
 
 def test_an_arm_angle_of_zero_can_be_commanded(make_robot):

@@ -18,6 +18,7 @@ from rcilab.errors import (
     ConformanceError,
     ConnectionLostError,
     ControlError,
+    InvalidValueError,
     UsageError,
 )
 from rcilab.faults import Fault
@@ -182,9 +183,12 @@ def test_every_arm_runs_with_its_tool_and_knows_its_name(name):
         assert identify_robot(robot.load_robot_model().dh) == name
 
 
-def test_an_unknown_plant_says_what_there_is():
-    with pytest.raises(ConnectionLostError, match=r"did not start.*ideal, mujoco"):
+def test_an_unknown_plant_or_model_is_refused_before_anything_starts(monkeypatch):
+    monkeypatch.setattr("rcilab.supervisor.simulate.start_controller", None)
+    with pytest.raises(InvalidValueError, match=r"plant: 'rubber' is unknown; known: ideal, mujoco"):
         simulate(MODEL, plant="rubber")
+    with pytest.raises(InvalidValueError, match="use load_model"):
+        simulate("xMatePro7")
 
 
 def test_closing_ends_the_private_controller():

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from rcilab.conformance import check
-from rcilab.errors import CertificateError, ConnectionLostError, ControlError, InvalidValueError, UsageError
+from rcilab.errors import CertificateError, ConnectionLostError, ControlError, InvalidValueError, ModelError, UsageError
 from rcilab.model import load_model
 from rcilab.motion import plan_joint
 from rcilab.state import RobotMode
 from rcilab.supervisor import Supervisor
+from rcilab.supervisor.launch import start_controller
 
 MODEL = load_model("xMatePro7")
 GOAL = np.array([0.3, 0.4, 0.2, 1.2, 0.1, 0.8, 0.5])
@@ -176,8 +177,23 @@ def test_wrong_use_is_named():
             call()
     with pytest.raises(UsageError, match=r"nothing can move now: The supervisor is closed"):
         begin_nowhere(supervisor)
-    with pytest.raises(ConnectionLostError, match=r"did not start.*ideal, mujoco"):
-        Supervisor(MODEL, plant="rubber").start()
+    with pytest.raises(InvalidValueError, match=r"known: ideal, mujoco"):
+        Supervisor(MODEL, plant="rubber")
+    with pytest.raises(InvalidValueError, match="use load_model"):
+        Supervisor("xMatePro7")
+
+
+def test_another_arm_than_the_controller_s_is_refused_and_both_are_named():
+    controller = start_controller("xMatePro7")
+    try:
+        with Supervisor(load_model("xMate3"), controller.address) as supervisor:
+            status = supervisor.status()
+            assert (status.phase, status.code) == ("lost", "lost.unreachable")
+            assert "is an xMatePro7 (7 axes), you gave xMate3 (6)" in status.message
+            with pytest.raises(ModelError, match="xMatePro7"):
+                supervisor.reconnect().wait(SOON)
+    finally:
+        controller.end()
 
 
 def begin_nowhere(supervisor):

@@ -1,0 +1,31 @@
+"""Out of a fault: asks the controller to clear it, and looks until it is gone."""
+
+from __future__ import annotations
+
+import time
+
+from rcilab.client.commands import RciCommands
+from rcilab.client.link import Link
+from rcilab.errors import DeadlineError
+
+RECOVERY_TIMEOUT = 3.0  # [s] for the error bits to go after the controller has agreed to clear them; a choice.
+_FRESH = 0.1  # [s] Longest wait for one state while faults are expected to go.
+
+
+def recover(commands: RciCommands, link: Link) -> None:
+    """Clears the controller's faults and returns once no state shows them any more; see `RobotSession.recover`."""
+    commands.automatic_error_recovery()
+    deadline = time.monotonic() + RECOVERY_TIMEOUT
+    faults = link.latest.faults if link.latest is not None else ()
+    while time.monotonic() < deadline:
+        states = link.poll(_FRESH)
+        link.on_states(states)
+        if states:
+            faults = states[-1].faults
+            if not faults:
+                return
+    names = ", ".join(fault.name for fault in faults)
+    raise DeadlineError(
+        f"{link.name}: {names or 'the faults'} did not clear within {RECOVERY_TIMEOUT:g} s; remove the cause first"
+        + (f": {faults[0].remedy}" if faults else "")
+    )
