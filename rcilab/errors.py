@@ -105,8 +105,10 @@ class DecodeError(ProtocolError):
 class VersionMismatchError(ProtocolError):
     """Two sides of an interface were built from different versions of it."""
 
-    def __init__(self, what: str, found: object, expected: object) -> None:
-        super().__init__(f"{what}: found version {found}, need {expected}; restart both sides from one rcilab")
+    def __init__(
+        self, what: str, found: object, expected: object, advice: str = "restart both sides from one rcilab"
+    ) -> None:
+        super().__init__(f"{what}: found version {found}, need {expected}; {advice}")
         self.found = found
         self.expected = expected
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from rcilab.motion.differences import derivatives_from_differences, differences_from_derivatives
 from rcilab.motion.joint import plan_joint
 from rcilab.motion.margin import LIMIT_MARGIN
-from rcilab.motion.motion import Law, Motion, MotionSample
+from rcilab.motion.motion import Law, Motion, MotionSample, require_motion
 from rcilab.motion.piecewise import PiecewisePolynomial
 from rcilab.motion.stop import plan_stop
 
@@ -19,4 +19,5 @@ __all__ = [
     "differences_from_derivatives",
     "plan_joint",
     "plan_stop",
+    "require_motion",
 ]

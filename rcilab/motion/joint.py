@@ -9,9 +9,10 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.arrays import JointVector, as_vector
+from rcilab.arrays import JointVector, as_number, as_vector
 from rcilab.errors import InvalidValueError, PlanningError
 from rcilab.limits import JointLimits, Limits
+from rcilab.model import require_model
 from rcilab.motion import _ruckig
 from rcilab.motion.margin import LIMIT_MARGIN
 from rcilab.motion.motion import Motion, standing
@@ -19,6 +20,10 @@ from rcilab.motion.piecewise import PiecewisePolynomial, join_pieces
 from rcilab.motion.s_curve import STANDSTILL_DISTANCE, plan_s_curve, synchronize
 
 JointLaw = Literal["jerk_limited", "s_profile"]
+
+MIN_SPEED = 0.001
+"""Slowest speed to plan with. A choice: a full turn then takes most of an hour and its rows 200 MB; a motion of more
+than about two hours is beyond what ruckig counts."""
 
 S_PROFILE_VELOCITY = {7: (1.0, 1.0, 1.0, 1.0, 1.25, 1.25, 1.25), 6: (1.0, 1.0, 1.0, 1.25, 1.25, 1.25)}
 """Speeds of the vendor's joint generator at speed 1, by number of joints, [rad/s]; six joints: without joint 3."""
@@ -53,10 +58,11 @@ def plan_joint(
     """Returns a motion to rest at `goal` on which all joints start and arrive together.
 
     Args:
-        model: The arm.
+        model: The arm: a RobotModel, or whatever else has `n` and `limits`.
         start: Joint angles at the start, shape (n,), [rad]. Plan from the commanded angles (`state.q_c`).
         goal: Joint angles at the end, shape (n,), [rad]; strictly inside the limits, as the robot demands.
-        speed: Part of the velocity and acceleration limits to use, in (0, 1]; the jerk limit is used in full.
+        speed: Part of the velocity and acceleration limits to use, from `MIN_SPEED` = 0.001 to 1; the
+            jerk limit is used in full.
         law: "jerk_limited": the fastest motion inside the limits, with `LIMIT_MARGIN` to spare; from rest a straight
             line in joint space. "s_profile": exactly the motion of the vendor's joint generator (manual 3.5). That one
             has speeds of its own and does not know the robot's limits: `rcilab.check` judges it. A joint that is to
@@ -66,20 +72,23 @@ def plan_joint(
         start_acceleration: Joint accelerations at the start, shape (n,), [rad/s^2]; None is zero.
 
     Raises:
-        InvalidValueError: Wrong shape, not finite, an unknown law, or a speed outside (0, 1].
+        InvalidValueError: Wrong shape, not finite, an unknown law, a speed out of range, or what is no arm.
         PlanningError: A joint is, or cannot help getting, outside its limits.
     """
+    if not hasattr(model, "limits"):
+        require_model(model)
     n, limits = model.n, model.limits.joint
     start, goal = as_vector(start, n, "start", "rad"), as_vector(goal, n, "goal", "rad")
     dq = as_vector(np.zeros(n) if start_velocity is None else start_velocity, n, "start_velocity", "rad/s")
     ddq = as_vector(np.zeros(n) if start_acceleration is None else start_acceleration, n, "start_acceleration")
-    if not 0.0 < speed <= 1.0:
-        raise InvalidValueError("speed", speed, "must be in (0, 1]: the part of the limits to use")
-    if law not in _PLANNERS:
+    speed = as_number(speed, "speed")
+    if not MIN_SPEED <= speed <= 1.0:
+        raise InvalidValueError("speed", speed, f"must be from {MIN_SPEED:g} to 1: the part of the limits to use")
+    if not isinstance(law, str) or law not in _PLANNERS:
         raise InvalidValueError("law", law, f"is unknown; known: {', '.join(_PLANNERS)}")
     _require_inside("start", start, limits)
     _require_inside("goal", goal, limits)
-    return _PLANNERS[law](limits, start, goal, float(speed), dq, ddq)
+    return _PLANNERS[law](limits, start, goal, speed, dq, ddq)
 
 
 def _plan_jerk_limited(

@@ -11,7 +11,7 @@ from typing import BinaryIO, Literal, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.arrays import Array, JointPath, JointVector, as_vector, frozen
+from rcilab.arrays import Array, JointPath, JointVector, as_number, as_path, as_vector, described, frozen
 from rcilab.clock import CYCLE_TIME
 from rcilab.errors import InvalidValueError
 from rcilab.motion.piecewise import DERIVATIVES, PiecewisePolynomial
@@ -75,11 +75,9 @@ class Motion:
             q: Joint angles, shape (N, n), N >= 1, [rad].
 
         Raises:
-            InvalidValueError: Not a finite table of at least one row.
+            InvalidValueError: Not a finite table of at least one row; the message names the row and the joint.
         """
-        rows = np.array(q, dtype=np.float64, ndmin=2)
-        if rows.ndim != 2 or rows.size == 0 or not np.isfinite(rows).all():
-            raise InvalidValueError("q", f"array of shape {rows.shape}", "must be a finite table of shape (N, n) [rad]")
+        rows = as_path(q, None, "q", "rad")
         if len(rows) == 1:
             return standing(rows[0], law="samples")
         h = CYCLE_TIME
@@ -150,7 +148,11 @@ class Motion:
 
         Args:
             t: Time since the start, [s].
+
+        Raises:
+            InvalidValueError: t is no number, or NaN.
         """
+        t = as_number(t, "t", "s")
         if math.isnan(t):
             raise InvalidValueError("t", t, "is not a time [s]")
         if t >= self.duration:
@@ -163,7 +165,11 @@ class Motion:
         return _sample(self.polynomial.at_end())
 
     def save(self, file: str | PathLike[str] | BinaryIO) -> None:
-        """Writes the motion to a file (.npz) that `Motion.load` reads back to the last bit."""
+        """Writes the motion to a file (.npz) that `Motion.load` reads back to the last bit.
+
+        Raises:
+            InvalidValueError: The file cannot be written.
+        """
         from rcilab.motion.storage import save_motion
 
         save_motion(self, file)
@@ -209,6 +215,17 @@ class Motion:
             array[-1] = 0.0 if derivative else self.goal
         array.flags.writeable = False
         return array
+
+
+def require_motion(motion: object) -> Motion:
+    """Returns `motion` if it is one: for borders where model and motion are easily swapped.
+
+    Raises:
+        InvalidValueError: It is something else; the message says how to make one.
+    """
+    if isinstance(motion, Motion):
+        return motion
+    raise InvalidValueError("motion", described(motion), "is no motion; plan_joint or Motion.from_samples makes one")
 
 
 def standing(q: ArrayLike, *, law: Law = "jerk_limited", speed: float = 1.0) -> Motion:

@@ -49,6 +49,10 @@ class PiecewisePolynomial:
         object.__setattr__(self, "_tables", _derivative_tables(coefficients))
         object.__setattr__(self, "_starts", breaks[:-1].tolist())
 
+    def __repr__(self) -> str:
+        pieces, n, powers = self.coefficients.shape
+        return f"<PiecewisePolynomial of {pieces} pieces, {n} joints, degree {powers - 1}, {self.duration:.3f} s>"
+
     def __reduce__(self) -> tuple[object, ...]:
         return type(self), (self.breaks, self.coefficients)
 

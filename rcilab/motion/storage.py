@@ -9,12 +9,16 @@ from typing import BinaryIO
 
 import numpy as np
 
+from rcilab.arrays import as_number
 from rcilab.errors import InvalidValueError, VersionMismatchError
 from rcilab.motion.motion import Motion
 from rcilab.motion.piecewise import PiecewisePolynomial
 
 KIND = "rcilab motion"
 VERSION = 1
+
+_SIGNATURES = (b"PK", b"\x93NUMPY")
+"""How an archive and a single array of numpy's begin."""
 
 
 def save_motion(motion: Motion, file: str | PathLike[str] | BinaryIO) -> None:
@@ -33,6 +37,7 @@ def save_motion(motion: Motion, file: str | PathLike[str] | BinaryIO) -> None:
         "goal": motion.goal,
     }
     if not isinstance(file, str | PathLike):
+        _require_stream(file, "write")
         np.savez(file, **content)
         return
     try:
@@ -49,6 +54,8 @@ def load_motion(file: str | PathLike[str] | BinaryIO) -> Motion:
         InvalidValueError: There is no such file, or it holds no sound motion.
         VersionMismatchError: It was written by another version of this format.
     """
+    if not isinstance(file, str | PathLike):
+        _require_stream(file, "read")
     name = fspath(file) if isinstance(file, str | PathLike) else "stream"
     content = _read(file, name)
     if str(content.get("kind", "")) != KIND:
@@ -56,19 +63,24 @@ def load_motion(file: str | PathLike[str] | BinaryIO) -> Motion:
         raise InvalidValueError("motion file", name, f"holds no motion (found: {found}); save one with Motion.save")
     version = content.get("version")
     if version is None or version.shape != () or version != VERSION:
-        raise VersionMismatchError(f"motion file {name!r}", None if version is None else version.tolist(), VERSION)
+        found = None if version is None else version.tolist()
+        advice = "plan the motion again and save it, or read it with the rcilab that wrote it"
+        raise VersionMismatchError(f"motion file {name!r}", found, VERSION, advice)
     try:
         curve = PiecewisePolynomial(content["breaks"], content["coefficients"])
         return Motion(
             polynomial=curve,
             goal=content["goal"],
             law=str(content["law"]),  # type: ignore[arg-type]  # Motion checks it.
-            speed=float(content["speed"]),
+            speed=as_number(content["speed"], "speed"),
         )
     except KeyError as error:
         raise InvalidValueError("motion file", name, f"is incomplete: no {error}") from error
-    except (TypeError, ValueError) as error:
+    except InvalidValueError as error:
         raise InvalidValueError("motion file", name, f"holds a damaged motion: {error}") from error
+    except (TypeError, ValueError) as error:
+        problem = "holds a damaged motion: breaks and coefficients are not all numbers"
+        raise InvalidValueError("motion file", name, problem) from error
 
 
 def _read(file: str | PathLike[str] | BinaryIO, name: str) -> dict[str, np.ndarray]:
@@ -81,6 +93,10 @@ def _read(file: str | PathLike[str] | BinaryIO, name: str) -> dict[str, np.ndarr
             raise InvalidValueError("motion file", name, f"cannot be read: {error.strerror}") from error
     else:
         content = file.read()
+    if not content:
+        raise InvalidValueError("motion file", name, "cannot be read as a motion: it is empty")
+    if not content.startswith(_SIGNATURES):
+        raise InvalidValueError("motion file", name, "cannot be read as a motion: Motion.save did not write it")
     try:
         archive = np.load(BytesIO(content), allow_pickle=False)
         if isinstance(archive, np.ndarray):
@@ -89,4 +105,10 @@ def _read(file: str | PathLike[str] | BinaryIO, name: str) -> dict[str, np.ndarr
             return {key: archive[key] for key in archive.files}
     # Foreign bytes make numpy, zipfile and zlib raise a dozen kinds of errors, NotImplementedError among them.
     except Exception as error:
-        raise InvalidValueError("motion file", name, f"cannot be read as a motion: {error}") from error
+        problem = "cannot be read as a motion: it is damaged, or holds something else; save the motion again"
+        raise InvalidValueError("motion file", name, problem) from error
+
+
+def _require_stream(file: object, method: str) -> None:
+    if not hasattr(file, method):
+        raise InvalidValueError("motion file", file, "is no file name, and no open binary file")

@@ -7,6 +7,7 @@ from rcilab.clock import CYCLE_TIME
 from rcilab.errors import InvalidValueError, PlanningError
 from rcilab.model import load_model
 from rcilab.motion import LIMIT_MARGIN, _ruckig, plan_joint
+from rcilab.motion.joint import MIN_SPEED
 
 MODELS = [load_model(name) for name in ("xMatePro7", "xMate3")]
 MODEL = MODELS[0]
@@ -142,7 +143,7 @@ def test_start_states_beyond_the_limits_are_refused():
 
 @pytest.mark.parametrize("speed", [0.0, -0.1, 1.0001, float("nan"), float("inf")])
 def test_a_speed_outside_its_range_is_refused(speed):
-    with pytest.raises(InvalidValueError, match=r"speed: .* must be in \(0, 1\]"):
+    with pytest.raises(InvalidValueError, match=r"speed: .* must be from 0\.001 to 1"):
         plan_joint(MODEL, np.zeros(7), MODEL.home, speed=speed)
 
 
@@ -172,3 +173,26 @@ def test_every_result_of_ruckig_has_a_reason_in_words():
     failures = {result for result in Result if int(result) < 0}
     assert failures == set(_ruckig._REASONS)
     assert all("Error" not in reason for reason in _ruckig._REASONS.values())
+
+
+@pytest.mark.parametrize("law", ["jerk_limited", "s_profile"])
+def test_a_speed_is_bounded_from_below_and_plans_at_the_bound(law):
+    model = load_model("xMatePro7")
+    lower, upper = model.limits.joint.lower + 1e-6, model.limits.joint.upper - 1e-6
+    assert plan_joint(model, lower, upper, speed=MIN_SPEED, law=law).duration > 3600.0
+    with pytest.raises(InvalidValueError, match=r"speed: 1e-09 must be from 0\.001 to 1"):
+        plan_joint(model, lower, upper, speed=1e-9, law=law)
+
+
+@pytest.mark.parametrize("change", [{"speed": "fast"}, {"speed": None}, {"speed": np.ones(2)}, {"law": [1]}])
+def test_a_speed_or_law_of_the_wrong_type_is_refused_in_words(change):
+    model = load_model("xMatePro7")
+    with pytest.raises(InvalidValueError, match=f"{next(iter(change))}: "):
+        plan_joint(model, model.home, model.home, **change)
+
+
+def test_a_name_where_the_model_belongs_says_what_to_write_and_a_description_is_enough():
+    model = load_model("xMatePro7")
+    with pytest.raises(InvalidValueError, match=r"use load_model\('xMatePro7'\)"):
+        plan_joint("xMatePro7", model.home, model.home)
+    assert plan_joint(model.description, model.home, model.home).duration == 0.0

@@ -100,7 +100,7 @@ def test_samples_of_a_smooth_curve_give_nearly_its_velocity():
 
 @pytest.mark.parametrize("rows", [np.zeros((0, 7)), np.full((3, 7), np.nan), np.zeros((2, 2, 2))])
 def test_rows_that_are_no_path_are_refused(rows):
-    with pytest.raises(InvalidValueError, match="finite table"):
+    with pytest.raises(InvalidValueError, match="q"):
         Motion.from_samples(rows)
 
 
@@ -142,3 +142,22 @@ def test_its_texts_are_short_and_name_duration_and_law():
     assert len(repr(motion)) < 80
     assert "jerk_limited" in motion._repr_html_()
     assert len(motion._repr_html_()) < 800
+
+
+@pytest.mark.parametrize("q", ["abc", None, [], [[1.0, 2.0], [1.0]], np.zeros((2, 2, 2))])
+def test_samples_that_are_no_table_are_refused_in_words(q):
+    with pytest.raises(InvalidValueError, match=r"^q: "):
+        Motion.from_samples(q)
+
+
+def test_a_sample_that_is_not_finite_is_named_by_row_and_joint():
+    q = np.zeros((5, 6))
+    q[3, 1] = np.nan
+    with pytest.raises(InvalidValueError, match=r"q at row 3 \(from 0\), joint 2: nan must be finite"):
+        Motion.from_samples(q)
+
+
+@pytest.mark.parametrize("t", ["a", None])
+def test_a_time_that_is_no_number_is_refused_in_words(t):
+    with pytest.raises(InvalidValueError, match=r"t: .* is not a number"):
+        Motion.from_samples(np.zeros((3, 6))).at(t)

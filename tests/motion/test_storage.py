@@ -117,3 +117,29 @@ def test_missing_and_unwritable_files_are_named(tmp_path):
         MOTION.save(tmp_path / "no" / "such" / "folder.npz")
     with pytest.raises(InvalidValueError, match="cannot be read"):
         Motion.load(tmp_path)
+
+
+def test_no_text_of_numpy_or_zip_reaches_the_user(tmp_path):
+    contents = [b"", b"hello", b"PK\x03\x04 broken"]
+    np.savez(tmp_path / "pickle.npz", kind=np.array([{}], dtype=object))
+    np.savez(tmp_path / "speeds.npz", **fields(speed=np.array([1.0, 2.0])))
+    contents += [(tmp_path / name).read_bytes() for name in ("pickle.npz", "speeds.npz")]
+    for content in contents:
+        with pytest.raises(InvalidValueError) as caught:
+            Motion.load(io.BytesIO(content))
+        assert not any(word in str(caught.value) for word in ("pickle", "zip", "dimensional", "EOF", "array("))
+
+
+def test_another_version_says_what_to_do_with_the_file(tmp_path):
+    np.savez(tmp_path / "x.npz", **fields(version=VERSION + 1))
+    with pytest.raises(VersionMismatchError, match="plan the motion again") as caught:
+        Motion.load(tmp_path / "x.npz")
+    assert "both sides" not in str(caught.value)
+
+
+@pytest.mark.parametrize("file", [None, 3])
+def test_what_is_no_file_is_refused_in_words(file):
+    with pytest.raises(InvalidValueError, match="is no file name"):
+        MOTION.save(file)
+    with pytest.raises(InvalidValueError, match="is no file name"):
+        Motion.load(file)
