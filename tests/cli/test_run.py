@@ -1,11 +1,17 @@
 from __future__ import annotations
 
 import io
+import re
+import signal
+import subprocess
+import sys
+import time
 
 import numpy as np
 import pytest
 
 from rcilab.cli import main
+from rcilab.client import connect
 from rcilab.model import load_model
 from rcilab.motion import Motion, plan_joint
 from rcilab.supervisor.launch import start_controller
@@ -33,19 +39,74 @@ def test_without_a_yes_nothing_is_sent_and_with_one_the_arm_arrives(address, mot
     assert main(["run", motion_file, "--robot", address]) == 1
     captured = capsys.readouterr()
     assert "xMatePro7 at rci://127.0.0.2" in captured.out
-    assert "Nothing was sent" in captured.err
+    assert "'no' is not 'yes': nothing was sent." in captured.err.splitlines()
     monkeypatch.setattr("sys.stdin", io.StringIO("yes\n"))
     assert main(["run", motion_file, "--robot", address]) == 0
     assert "<Run" in capsys.readouterr().out
     # The arm has moved: the same motion now starts elsewhere, and a refusal says so.
-    assert main(["run", motion_file, "--robot", address, "--yes"]) in (1, 2)
+    assert main(["run", motion_file, "--robot", address, "--yes"]) == 2
     captured = capsys.readouterr()
-    assert "joint" in captured.out + captured.err
+    assert captured.out == ""
+    (line,) = captured.err.splitlines()
+    assert line.startswith("rcilab: the motion starts elsewhere than the arm is: joint ")
+    assert "plan_joint(robot.model, robot.state.q_c, motion.q[0])" in line
+
+
+def test_another_arm_than_the_robot_s_is_refused_and_both_are_named(address, motion_file, capsys):
+    assert main(["run", motion_file, "--robot", address, "--model", "xMatePro3", "--yes"]) == 2
+    assert "is an xMatePro7 (7 axes), you gave xMatePro3 (7)" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_brings_the_arm_to_rest_and_says_where(number, tmp_path):
+    controller = start_controller(MODEL.name)
+    try:
+        file = tmp_path / "slow.npz"
+        plan_joint(MODEL, MODEL.home, GOAL, speed=0.05).save(file)
+        process = subprocess.Popen(
+            [sys.executable, "-m", "rcilab.cli", "run", str(file), "--robot", controller.address, "--yes"],
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        )  # fmt: skip
+        while "will move for" not in (line := process.stdout.readline()):
+            assert line, process.stderr.read()
+        time.sleep(1.5)
+        process.send_signal(number)
+        out, err = process.communicate(timeout=20)
+        assert process.returncode == 1, err
+        assert re.search(r"^stopped on request at t = \d+\.\d\d s; the arm is at rest", err, re.MULTILINE)
+        assert "<Run" in out
+        with connect(controller.address) as robot:
+            state = robot.state
+            assert state.faults == ()
+            assert np.abs(state.dq).max() < 1e-9
+            assert 0.0 < np.abs(state.q_c - MODEL.home).max() < np.abs(GOAL - MODEL.home).max()
+    finally:
+        controller.end()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_at_the_prompt_sends_nothing_and_says_so(number, address, tmp_path):
+    with connect(address) as robot:
+        q = robot.state.q_c
+    file = tmp_path / "motion.npz"
+    plan_joint(MODEL, q, q + 0.01).save(file)
+    process = subprocess.Popen(
+        [sys.executable, "-u", "-m", "rcilab.cli", "run", str(file), "--robot", address],
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    while "will move for" not in (line := process.stdout.readline()):
+        assert line, process.stderr.read()
+    time.sleep(0.3)
+    process.send_signal(number)
+    _, err = process.communicate(timeout=20)
+    assert (process.returncode, err.strip()) == (1, "Nothing was sent.")
 
 
 def test_a_motion_that_breaks_a_condition_is_shown_and_not_sent(address, tmp_path, capsys):
     file = tmp_path / "jump.npz"
-    Motion.from_samples(np.vstack([MODEL.home, MODEL.home + 0.5])).save(file)
+    with connect(address) as robot:
+        q = robot.state.q_c
+    Motion.from_samples(np.vstack([q, q + 0.5])).save(file)
     assert main(["run", str(file), "--robot", address, "--yes", "--model", "xMatePro7"]) == 1
     assert "does not conform" in capsys.readouterr().err
 
