@@ -15,6 +15,8 @@ from rcilab.conformance.check import HOLD_SAMPLES, check
 from rcilab.conformance.conditions import CYCLE_CONDITIONS, Condition
 from rcilab.errors import InvalidValueError
 from rcilab.limits import JointLimits
+from rcilab.model import RobotModel, require_model
+from rcilab.motion.motion import Motion, require_motion
 from rcilab.notebook.installed import require_installed
 from rcilab.views.plots import QUANTITIES, recorded_curves
 
@@ -24,8 +26,6 @@ if TYPE_CHECKING:
 
     from rcilab.client.run import Run
     from rcilab.conformance.report import Violation
-    from rcilab.model import RobotModel
-    from rcilab.motion.motion import Motion
 
 # Okabe and Ito's palette, told apart with every kind of colour vision, without its yellow (too pale on white).
 JOINT_COLORS = ("#0072B2", "#E69F00", "#009E73", "#D55E00", "#56B4E9", "#CC79A7", "#000000")
@@ -53,11 +53,12 @@ class _Panel:
 def plot(motion: Motion, model: RobotModel, run: Run | None = None, *, joints: Sequence[int] | None = None) -> Figure:
     """Draws angle, velocity, acceleration and jerk of a motion against the arm's limits.
 
-    Velocity, acceleration and jerk are backward differences at 1 ms, because those are what the controller judges.
-    Grey lies beyond a limit; where joints have different limits the grey gets darker at each. What `check` finds is
-    hatched in red over the time it lasts, and the title counts it. With a run, what the robot did is drawn as a broad
-    line under the dashed plan (acceleration and jerk: of its commanded angles), and a fifth panel shows the
-    difference. Needs no display: the figure shows itself in a notebook and takes `savefig` anywhere.
+    Velocity, acceleration and jerk are backward differences at 1 ms, because those are what the controller judges. Grey
+    lies beyond a limit; where joints have different limits the grey gets darker at each. What `check` finds is hatched
+    in red over the time it lasts, and the title counts the places, a jump of all joints as one. With a run, what the
+    robot did is drawn as a broad line under the dashed plan (acceleration and jerk: of its commanded angles), and a
+    fifth panel shows the difference; all of it on the plan's time, with the robot's play-out delay (`run.delay`) taken
+    out. Needs no display: the figure shows itself in a notebook and takes `savefig` anywhere.
 
     Args:
         motion: What to draw.
@@ -66,10 +67,14 @@ def plot(motion: Motion, model: RobotModel, run: Run | None = None, *, joints: S
         joints: Numbers of the joints to draw, from 1; None draws all.
 
     Raises:
-        InvalidValueError: A joint number is none of this arm's.
+        InvalidValueError: A joint number is none of this arm's, or an argument is something else altogether.
         UsageError: matplotlib is not installed.
     """
     require_installed("matplotlib", "plot")
+    require_motion(motion)
+    require_model(model)
+    if run is not None:
+        _require_run(run)
     chosen = _joint_indices(joints, model.n)
     report = check(motion, model)
     panels = _panels(motion, model.limits.joint, run)
@@ -84,8 +89,12 @@ def plot(motion: Motion, model: RobotModel, run: Run | None = None, *, joints: S
     axes[0].legend(
         loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=len(chosen) + 1, frameon=False, fontsize="small"
     )
-    axes[-1].set_xlabel("time [s]")
-    axes[-1].set_xlim(0.0, max(motion.duration, run.duration if run is not None else 0.0) + HOLD_SAMPLES * CYCLE_TIME)
+    axes[-1].set_xlabel("time [s]" if run is None else f"time [s], the robot's delay of {run.delay} ms taken out")
+    axes[-1].set_xlim(
+        0.0,
+        max(motion.duration, float(_plan_times(run)[-1]) if run is not None and len(run.t) else 0.0)
+        + HOLD_SAMPLES * CYCLE_TIME,
+    )
     figure.suptitle(_title(model, motion, report.violations), fontsize="medium")
     return figure
 
@@ -139,7 +148,7 @@ def _draw_panel(ax: Axes, panel: _Panel, run: Run | None, joints: Sequence[int])
     if run is not None and panel.actual is not None:
         planned = {"linestyle": (0, (4, 2)), "linewidth": 1.0, "zorder": 3.0}
         for joint in joints:
-            ax.plot(run.t, panel.actual[:, joint], color=_color(joint), linewidth=3.0, alpha=0.45)
+            ax.plot(_plan_times(run), panel.actual[:, joint], color=_color(joint), linewidth=3.0, alpha=0.45)
     for joint in joints:
         ax.plot(times, panel.values[:, joint], color=_color(joint), label=f"joint {joint + 1}", **planned)
     ax.set_ylabel(f"{QUANTITIES[panel.condition.order]} [{panel.condition.unit.replace('^2', '²').replace('^3', '³')}]")
@@ -192,10 +201,22 @@ def _union(spans: Iterable[tuple[float, float]]) -> list[tuple[float, float]]:
     return merged
 
 
+def _plan_times(run: Run) -> Array:
+    """Returns the times of the plan that the rows of a run show, shape (N,), [s]: without the play-out delay."""
+    return run.t - run.delay * CYCLE_TIME
+
+
+def _require_run(run: object) -> None:
+    from rcilab.client.run import Run
+
+    if not isinstance(run, Run):
+        raise InvalidValueError("run", run, "is no run; execute returns one")
+
+
 def _draw_error(ax: Axes, run: Run, joints: Sequence[int]) -> None:
     error = 1e3 * run.error
     for joint in joints:
-        ax.plot(run.t, error[:, joint], color=_color(joint), linewidth=1.0)
+        ax.plot(_plan_times(run), error[:, joint], color=_color(joint), linewidth=1.0)
     ax.set_ylabel("actual - plan [mrad]")
     ax.margins(x=0.0)
     ax.grid(visible=True, color="#E0E0E0", linewidth=0.6)
@@ -206,13 +227,21 @@ def _color(joint: int) -> str:
 
 
 def _title(model: RobotModel, motion: Motion, violations: Sequence[Violation]) -> str:
-    verdict = f"{len(violations)} × beyond a limit, hatched" if violations else "inside all limits"
+    verdict = "inside all limits"
+    if violations:
+        # A jump shows in one first difference, two second and three third ones: within HOLD_SAMPLES cycles it is one.
+        reach = HOLD_SAMPLES * CYCLE_TIME
+        places = len(_union((v.time - CYCLE_TIME, v.time + v.count * CYCLE_TIME + reach) for v in violations))
+        verdict = f"beyond a limit at {places} {'place' if places == 1 else 'places'}, hatched"
     return f"{model.name}, {motion.duration:.3f} s: {verdict}"
 
 
 def _joint_indices(joints: Sequence[int] | None, n: int) -> list[int]:
     if joints is None:
         return list(range(n))
+    if not isinstance(joints, Iterable):
+        raise InvalidValueError("joints", joints, f"must be a list of numbers from 1 to {n}, such as [{n}]")
+    joints = list(joints)
     numbers = as_vector(joints, len(joints), "joints").tolist()
     if not numbers or any(number not in range(1, n + 1) for number in numbers):
         raise InvalidValueError("joints", list(joints), f"must be numbers from 1 to {n}")

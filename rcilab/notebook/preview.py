@@ -8,20 +8,18 @@ import os
 import warnings
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rcilab.arrays import Array, as_vector
 from rcilab.errors import UsageError
+from rcilab.model import RobotModel, require_model
 from rcilab.motion.motion import Motion
 from rcilab.notebook.installed import require_installed
 from rcilab.robots.upright import upright_joints
 from rcilab.views.arm_view import ArmView
-
-if TYPE_CHECKING:
-    from rcilab.model import RobotModel
 
 HEIGHT = 420  # [px]
 _RATE = 30  # [1/s] Keyframes; the viewer turns smoothly between them.
@@ -52,6 +50,7 @@ class Preview:
 
     def __init__(self, what: Motion | ArrayLike, model: RobotModel, *, live: bool = True, height: int = HEIGHT) -> None:
         require_installed("meshcat", "preview")
+        require_model(model)
         pose = as_vector(what.start if isinstance(what, Motion) else what, model.n, "q", "rad")
         with warnings.catch_warnings():  # meshcat 0.3 loads pyzmq's old event loop, which says that it is old.
             warnings.simplefilter("ignore", DeprecationWarning)

@@ -11,15 +11,14 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 from rcilab.errors import UsageError
+from rcilab.model import RobotModel, require_model
+from rcilab.motion.motion import Motion, require_motion
 from rcilab.views.arm_view import ArmView
 from rcilab.views.viser_scene import ViserScene
 from rcilab.views.viser_stage import set_stage
 
 if TYPE_CHECKING:
     import viser
-
-    from rcilab.model import RobotModel
-    from rcilab.motion.motion import Motion
 
 LOOPBACK = "127.0.0.1"
 _TICK = 1.0 / 30.0  # [s] As often as a slider sends, and more than software rendering shows.
@@ -43,6 +42,8 @@ class PreviewPage:
     """
 
     def __init__(self, motion: Motion, model: RobotModel, *, port: int = 0) -> None:
+        require_motion(motion)
+        require_model(model)
         bound = _bind(port)
         self.port: int = bound.getsockname()[1]
         self._motion = motion

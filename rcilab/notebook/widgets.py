@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import ipywidgets
 import numpy as np
@@ -12,9 +12,7 @@ from numpy.typing import ArrayLike
 
 from rcilab.arrays import JointVector, as_vector, frozen
 from rcilab.errors import InvalidValueError, KinematicsError
-
-if TYPE_CHECKING:
-    from rcilab.model import RobotModel
+from rcilab.model import RobotModel, require_model
 
 _STEP_DEG = 0.5
 _POSITION_FORMAT = "x {:.1f}, y {:.1f}, z {:.1f} mm; roll {:.1f}, pitch {:.1f}, yaw {:.1f}°"
@@ -31,7 +29,7 @@ class JointSliders:
             is slow; ipywidgets drops what comes too fast, so dragging is safe either way.
 
     Raises:
-        InvalidValueError: q is not n angles inside the limits.
+        InvalidValueError: q is not n angles inside the limits, or the model is no model.
     """
 
     def __init__(
@@ -42,7 +40,7 @@ class JointSliders:
         show: Callable[[JointVector], object] | None = None,
         continuous: bool = True,
     ) -> None:
-        self._model = model
+        self._model = require_model(model)
         self._show = show
         self._setting = False
         limits = model.limits.joint

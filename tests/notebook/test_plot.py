@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +13,8 @@ from matplotlib.figure import Figure
 import rcilab
 from rcilab.errors import InvalidValueError
 from rcilab.notebook.plot import JOINT_COLORS, VIOLATION_COLOR, plot
+from rcilab.notebook.preview import preview
+from rcilab.notebook.widgets import JointSliders
 
 PRO7 = rcilab.load_model("xMatePro7")
 MOTION = rcilab.plan_joint(PRO7, PRO7.home, PRO7.home + np.array([0.5, -0.4, 0.3, -0.6, 0.7, -0.8, 1.0]))
@@ -89,6 +92,17 @@ def test_a_run_adds_what_the_robot_did_and_the_difference() -> None:
         actual = [line for line in ax.lines if line.get_alpha() == 0.45]
         np.testing.assert_array_equal(actual[2].get_ydata(), measured[:, 2])
     np.testing.assert_allclose(axes[-1].lines[2].get_ydata(), 1e3 * run.error[:, 2])
+    # On a still line a curve can be late unseen: in the jerk of what was commanded a cycle is plain to see.
+    actual, planned = (
+        next(line for line in axes[3].lines if line.get_alpha() == alpha and len(line.get_xdata()) > 10)
+        for alpha in (0.45, None)
+    )
+    assert run.delay > 0
+    late = np.interp(planned.get_xdata(), actual.get_xdata(), actual.get_ydata()) - planned.get_ydata()
+    assert np.abs(late[5:-5]).max() < 1.0
+    for ax in axes:
+        drawn = [line.get_xdata()[0] for line in ax.lines if len(line.get_xdata()) == len(run.t)]
+        assert set(drawn) == {run.t[0] - run.delay * 1e-3}
 
 
 def test_a_figure_shows_itself_without_pyplot_or_a_display() -> None:
@@ -100,3 +114,35 @@ assert figure._repr_png_()[:8] == b"\\x89PNG\\r\\n\\x1a\\n"
 assert "matplotlib.pyplot" not in sys.modules
 """
     subprocess.run([sys.executable, "-W", "error", "-c", code], check=True, env={"PATH": "", "HOME": "/nonexistent"})
+
+
+def test_one_jump_of_all_joints_is_one_place_in_the_title() -> None:
+    q = MOTION.q.copy()
+    q[len(q) // 2 :] += 0.05
+    assert len(rcilab.check(rcilab.Motion.from_samples(q), PRO7).violations) == 21
+    assert "beyond a limit at 1 place," in plot(rcilab.Motion.from_samples(q), PRO7).get_suptitle()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        ((MOTION, "xMatePro7"), r"use load_model\('xMatePro7'\)"),
+        ((PRO7, MOTION), "motion: RobotModel.* is no motion"),
+        ((None, PRO7), "motion: None is no motion"),
+        ((MOTION, PRO7, "x"), "run: 'x' is no run"),
+    ],
+)
+def test_wrong_types_are_refused_in_words(arguments: tuple[Any, ...], sentence: str) -> None:
+    with pytest.raises(InvalidValueError, match=sentence):
+        plot(*arguments)
+
+
+def test_a_bare_joint_number_is_refused_in_words() -> None:
+    with pytest.raises(InvalidValueError, match=r"joints: 3 must be a list"):
+        plot(MOTION, PRO7, joints=3)  # type: ignore[arg-type]
+
+
+def test_a_name_where_a_model_belongs_is_refused_by_previews_and_sliders_too() -> None:
+    for make in (lambda name: preview(MOTION, name), JointSliders):
+        with pytest.raises(InvalidValueError, match=r"use load_model\('xMatePro7'\)"):
+            make("xMatePro7")
