@@ -40,10 +40,10 @@ class Words(str):
 
 
 def described(value: object) -> object:
-    """Returns what an error should show of a value: a table's shape instead of its rows, anything else as it is."""
+    """Returns what an error should show of a value, in one line: of a table its shape, anything else as it is."""
     if getattr(value, "ndim", 0) > 1:
         return Words(f"an array of shape {getattr(value, 'shape', '')}")
-    return value
+    return value.tolist() if isinstance(value, np.ndarray) else value
 
 
 def as_number(value: object, name: str, unit: str = "") -> float:

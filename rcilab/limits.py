@@ -33,6 +33,9 @@ class JointLimits:
     stiffness: JointVector
     """Largest stiffness that `setJointImpedance` takes, [N m/rad]."""
 
+    def __repr__(self) -> str:
+        return f"<JointLimits of {len(self.velocity)} joints: {', '.join(self.__slots__)}>"
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CartesianLimits:
@@ -82,6 +85,10 @@ class Limits:
     """None for an arm without a redundant joint."""
     sources: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
     """Where each bound was taken from, by dotted name."""
+
+    def __repr__(self) -> str:
+        arm_angle = "" if self.arm_angle is None else ", .arm_angle"
+        return f"<Limits of {len(self.joint.velocity)} joints: .joint, .cartesian{arm_angle}, .source(name)>"
 
     def source(self, name: str) -> str:
         """Returns where a bound was taken from.

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
+from math import degrees
 
 from rcilab.arrays import Array, JointVector, Matrix
 from rcilab.faults import Fault
@@ -105,3 +106,9 @@ class RobotState:
     motion_generator_mode: MotionGeneratorMode
     controller_mode: ControllerMode
     robot_mode: RobotMode
+
+    def __repr__(self) -> str:
+        angles = " ".join(f"{degrees(angle):.2f}" for angle in self.q)
+        faults = ", ".join(fault.name for fault in self.faults) or "none"
+        modes = f"{self.robot_mode.name}, {self.controller_mode.name}"
+        return f"<RobotState {self.message_id}: q = {angles} deg; {modes}; faults: {faults}>"

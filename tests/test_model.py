@@ -108,3 +108,19 @@ def test_an_angle_that_is_not_finite_is_named_by_row_and_joint():
     path[2, 4] = np.nan
     with pytest.raises(InvalidValueError, match=r"q at row 2 \(from 0\), joint 5: nan must be finite \[rad\]"):
         load_model("xMatePro7").forward_path(path)
+
+
+def test_limits_show_themselves_in_one_short_line():
+    limits = load_model("xMatePro7").limits
+    for value in (limits, limits.joint):
+        assert "7 joints" in repr(value)
+        assert len(repr(value)) < 200
+
+
+def test_a_state_shows_itself_in_one_short_line():
+    with rcilab.simulate(load_model("xMatePro7")) as robot:
+        text = repr(robot.state)
+    assert text.startswith("<RobotState ")
+    assert "deg" in text
+    assert "faults: none" in text
+    assert len(text) < 200

@@ -8,7 +8,12 @@ from pathlib import Path
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Adds `rcilab lab`."""
-    parser = subparsers.add_parser("lab", help="open JupyterLab on the lessons")
+    parser = subparsers.add_parser(
+        "lab",
+        help="open JupyterLab on the lessons",
+        description="Opens JupyterLab on the lessons, or on a directory of yours, in the browser. It listens on this "
+        "machine only and asks for the token in the address it prints. Ctrl-C twice ends it.",
+    )
     parser.add_argument("directory", nargs="?", type=Path, help="where your notebooks are (default: the lessons)")
     parser.add_argument("--port", type=int, help="TCP port (default: 8888 or the next free one)")
     parser.add_argument("--no-browser", action="store_true", help="only print the address")

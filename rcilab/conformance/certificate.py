@@ -7,18 +7,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from math import degrees
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rcilab.arrays import Words
 from rcilab.conformance.conditions import START_POSITION_TOLERANCE
 from rcilab.conformance.start import StartState, as_start
-from rcilab.errors import CertificateError
-from rcilab.motion.motion import Motion
-
-if TYPE_CHECKING:
-    from rcilab.model import RobotModel
+from rcilab.errors import CertificateError, InvalidValueError
+from rcilab.model import RobotModel, require_model
+from rcilab.motion.motion import Motion, require_motion
 
 NO_SAFETY_BOX = "none"
 """The part of a certificate that says that the motion was judged without a safety box."""
@@ -55,7 +53,10 @@ class Certificate:
 
         Raises:
             CertificateError: Something is not what was judged; `.changed` and the message name it.
+            InvalidValueError: The motion is no motion, the model no model, or the start no state of the arm.
         """
+        require_motion(motion)
+        require_model(model)
         start = as_start(start_q, len(self.start_q)) if motion.n == len(self.start_q) else None
         now = dict(issue_certificate(motion, model, start).entries) if start is not None else {"motion": ""}
         changed = [name for name, fingerprint in self.entries if now.get(name, fingerprint) != fingerprint]
@@ -63,6 +64,9 @@ class Certificate:
             changed.remove("start state")
         if changed:
             raise CertificateError(self._reason(changed, start), changed)
+
+    def __repr__(self) -> str:
+        return f"<Certificate {self.digest[:8]} for motion {self.parts['motion'][:8]}>"
 
     def _same_start(self, start: StartState) -> bool:
         near = np.abs(start.q - np.array(self.start_q)).max() <= START_POSITION_TOLERANCE
@@ -104,6 +108,7 @@ def verify_certificate(
 
     Raises:
         CertificateError: There is none, or it is stale.
+        InvalidValueError: It is something else: the report, say.
     """
     if certificate is None:
         raise CertificateError(
@@ -111,7 +116,21 @@ def verify_certificate(
             "which exists when the report is ok",
             ("certificate",),
         )
+    require_certificate(certificate)
     certificate.verify(motion, model, start_q)
+
+
+def require_certificate(certificate: object) -> Certificate:
+    """Returns `certificate` if it is one; a report in its place is an easy slip.
+
+    Raises:
+        InvalidValueError: It is something else.
+    """
+    if isinstance(certificate, Certificate):
+        return certificate
+    if hasattr(certificate, "certificate"):
+        raise InvalidValueError("certificate", Words("pass report.certificate,"), "not the report")
+    raise InvalidValueError("certificate", certificate, "is no certificate; pass check(motion, model).certificate")
 
 
 def _start_fingerprint(start: StartState) -> str:

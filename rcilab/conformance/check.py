@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,10 +15,8 @@ from rcilab.conformance.report import ConditionResult, Report, Violation
 from rcilab.conformance.start import StartState, as_start
 from rcilab.conformance.wording import advise
 from rcilab.errors import InvalidValueError
-from rcilab.motion.motion import Motion, MotionSample
-
-if TYPE_CHECKING:
-    from rcilab.model import RobotModel
+from rcilab.model import RobotModel, require_model
+from rcilab.motion.motion import Motion, MotionSample, require_motion
 
 HOLD_SAMPLES = 3
 """Cycles judged after the last row, in which the controller repeats it: a third difference looks back that far."""
@@ -39,8 +36,11 @@ def check(motion: Motion, model: RobotModel, *, start: ArrayLike | StartState | 
             an arm that stands where the motion starts.
 
     Raises:
-        InvalidValueError: The motion is for another number of joints, or the start is no state of this arm.
+        InvalidValueError: The motion is for another number of joints, the start is no state of this arm,
+            or one of them is something else altogether.
     """
+    require_motion(motion)
+    require_model(model)
     if motion.n != model.n:
         raise InvalidValueError("motion", motion, f"is for {motion.n} joints, {model.name} has {model.n}")
     state = as_start(motion.start if start is None else start, model.n)

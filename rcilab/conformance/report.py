@@ -19,6 +19,7 @@ class ConditionResult:
     """One condition, and how near the motion comes to its bound."""
 
     condition: Condition
+    """What is demanded: its quantity, its formula and its source."""
     value: float
     """The worst value, in the condition's unit."""
     bound: float
@@ -79,9 +80,22 @@ class ConditionResult:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Violation:
-    """Consecutive samples of one joint that break one condition."""
+    """Consecutive samples of one joint that break one condition; `str` makes a sentence of it.
+
+    Attributes:
+        condition: What is broken.
+        joint: From 1.
+        time: The first of the samples, [s] since the start of the motion.
+        count: How many samples in a row, at 1 ms each.
+        value: The worst of them, in the condition's unit.
+        worst_time: When it is worst, [s].
+        bound: The bound it passes.
+        ratio: As in ConditionResult; 1 is the bound.
+        advice: What to do about it.
+    """
 
     condition: Condition
+    """What is broken."""
     joint: int
     """From 1."""
     time: float
@@ -104,6 +118,9 @@ class Violation:
         """What the controller raises; None for a recommended condition."""
         return self.condition.fault
 
+    def __repr__(self) -> str:
+        return f"<Violation: {self}>"
+
     def __str__(self) -> str:
         value, bound = amount(self.value, self.bound)
         row = self.condition
@@ -122,7 +139,18 @@ class Violation:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Report:
-    """The verdict on one motion."""
+    """The verdict on one motion; `print` shows it as a table with a sentence for each violation.
+
+    Attributes:
+        ok: Whether every necessary condition holds.
+        certificate: The proof that `execute` asks for; None when the report is not ok.
+        title: Which motion on which arm, in words.
+        rows: One ConditionResult a condition, in the manual's order: worst value, bound, joint and time.
+        worst: The row of the necessary condition nearest to, or farthest past, its bound.
+        violations: Necessary conditions that are broken, worst first: the robot would stop.
+        warnings: Recommended conditions that are broken, worst first.
+        issue: Makes the certificate when somebody asks for it.
+    """
 
     title: str
     """Which motion on which arm, in words."""

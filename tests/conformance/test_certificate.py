@@ -5,7 +5,7 @@ import pytest
 
 from rcilab.conformance import StartState, check, verify_certificate
 from rcilab.dynamics.payload import Payload
-from rcilab.errors import CertificateError
+from rcilab.errors import CertificateError, InvalidValueError
 from rcilab.model import load_model
 from rcilab.motion import Motion, plan_joint
 from rcilab.spatial import Pose
@@ -72,3 +72,18 @@ def test_it_travels_between_processes():
     again.verify(pickle.loads(pickle.dumps(MOTION)), MODEL, START)
     assert again == CERTIFICATE
     assert again.digest == CERTIFICATE.digest
+
+
+def test_what_is_no_certificate_is_refused_in_words():
+    with pytest.raises(InvalidValueError, match=r"certificate: pass report\.certificate, not the report"):
+        verify_certificate(check(MOTION, MODEL), MOTION, MODEL, START)
+    with pytest.raises(InvalidValueError, match="certificate: 'yes' is no certificate"):
+        verify_certificate("yes", MOTION, MODEL, START)
+    with pytest.raises(InvalidValueError, match=r"use load_model\('xMatePro7'\)"):
+        CERTIFICATE.verify(MOTION, "xMatePro7", START)
+    with pytest.raises(InvalidValueError, match="motion: None is no motion"):
+        CERTIFICATE.verify(None, MODEL, START)
+
+
+def test_a_certificate_shows_itself_in_one_short_line():
+    assert repr(CERTIFICATE) == f"<Certificate {CERTIFICATE.digest[:8]} for motion {MOTION.fingerprint[:8]}>"

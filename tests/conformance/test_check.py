@@ -1,5 +1,4 @@
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,7 +9,7 @@ from rcilab.clock import CYCLE_TIME
 from rcilab.conformance import StartState, check
 from rcilab.errors import ConformanceError, InvalidValueError
 from rcilab.faults import Fault
-from rcilab.model import load_model
+from rcilab.model import RobotModel, load_model
 from rcilab.motion import Motion, differences_from_derivatives, plan_joint
 
 MODEL = load_model("xMatePro7")
@@ -57,7 +56,7 @@ def test_the_bound_itself_breaks_a_condition_and_a_hair_more_room_does_not(name)
         bound = getattr(LIMITS, name).copy()
         bound[worst.joint - 1] = room
         limits = replace(MODEL.limits, joint=replace(LIMITS, **{name: bound}))
-        report = check(MOTION, SimpleNamespace(name="tight", n=7, limits=limits))
+        report = check(MOTION, RobotModel(replace(MODEL.description, limits=limits)))
         assert report.ok is ok
         if not ok:
             assert {(v.condition.id, v.joint) for v in report.violations} == {(f"joint.{name}", worst.joint)}
@@ -138,3 +137,17 @@ def test_a_motion_or_start_for_another_arm_is_refused():
 
 def test_rows_that_end_at_rest_to_within_a_cycle_are_not_blamed_for_their_grid():
     assert not check(Motion.from_samples(MOTION.q), MODEL).warnings
+
+
+@pytest.mark.parametrize(
+    ("motion", "model", "sentence"),
+    [
+        (MODEL, MOTION, r"motion: RobotModel.* is no motion"),
+        (MODEL.home, MODEL, r"motion: .* is no motion"),
+        (MOTION, "xMatePro7", r"use load_model\('xMatePro7'\)"),
+    ],
+    ids=["swapped", "angles", "name"],
+)
+def test_wrong_types_are_refused_in_words(motion, model, sentence):
+    with pytest.raises(InvalidValueError, match=sentence):
+        check(motion, model)

@@ -4,7 +4,7 @@ import re
 import numpy as np
 import pytest
 
-from rcilab.conformance import check
+from rcilab.conformance import Report, check
 from rcilab.conformance.html import COLORS
 from rcilab.conformance.wording import amount
 from rcilab.model import load_model
@@ -95,3 +95,9 @@ def test_the_table_is_green_amber_or_red():
 )
 def test_value_and_bound_never_look_alike_when_they_differ(value, bound, texts):
     assert amount(value, bound) == texts
+
+
+def test_a_violation_shows_itself_as_its_sentence_and_help_names_the_fields():
+    violation = check(spoiled(), MODEL).violations[0]
+    assert repr(violation) == f"<Violation: {violation}>"
+    assert {"rows:", "violations:", "warnings:", "certificate:"} <= set(Report.__doc__.split())
