@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import argparse
 import signal
+import sys
 import threading
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rcilab.supervisor import SupervisorStatus
 
 
 def add_parser(subparsers: Any) -> None:
@@ -50,9 +54,19 @@ def run(args: argparse.Namespace) -> int:
             import webbrowser
 
             webbrowser.open(bench.url)
+        trouble = ""
         while not ending.wait(0.5):
-            pass
+            trouble = _tell_trouble(bench.session.status(), trouble)
     return 0
+
+
+def _tell_trouble(status: SupervisorStatus, told: str) -> str:
+    """Prints why the robot is not there, once until it is there again; returns what has been told."""
+    if status.phase not in ("lost", "crashed"):
+        return "" if status.phase in ("idle", "moving") else told
+    if status.message != told:
+        print(f"rcilab workbench: {status.message}", file=sys.stderr, flush=True)
+    return status.message
 
 
 def _port(text: str) -> int:

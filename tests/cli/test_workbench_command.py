@@ -70,6 +70,7 @@ def test_it_prints_one_line_serves_the_page_and_ends_cleanly(number):
         (["--model", "kuka"], "known robots: xMatePro3"),
         (["--host", "0.0.0.0"], "--token"),
         (["--robot", "http://x"], "rci://"),
+        (["--robot", "foo"], "'foo' is no address; write it like rci://"),
         (["--port", "70000"], "0 to 65535"),
         (["--port", "abc"], "0 to 65535"),
     ],
@@ -81,6 +82,23 @@ def test_bad_arguments_get_one_sentence(arguments, answer):
     assert done.returncode == 2
     assert answer in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_an_unreachable_robot_gets_a_line_in_the_terminal():
+    process = subprocess.Popen(
+        [*COMMAND, "--no-browser", "--port", "0", "--quality", "light", "--robot", "rci://127.0.0.2:9"],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert process.stderr.readline().startswith("rcilab workbench: no robot at rci://127.0.0.2:9")
+        process.send_signal(signal.SIGINT)
+        _, more = process.communicate(timeout=30)
+    finally:
+        process.kill()
+        process.wait()
+    assert (process.returncode, more) == (0, "")
 
 
 def test_a_busy_port_gets_one_sentence_that_says_what_to_change():
