@@ -17,26 +17,28 @@ _ARRIVED = 1e-12  # [rad] The commanded angles come back over the wire bit by bi
 _POSE_ARRIVED = 1e-9  # [m], or an element of a rotation: a controller may normalise what it was sent.
 
 
-def check_command(command: Any, kind: type[Command], n: int) -> Command:
+def check_command(command: Any, kind: type[Command], n: int, t: float) -> Command:
     """Returns a command of ours with a copy of its numbers, so that the caller may go on writing into his array.
 
     Args:
         command: What a callback returned.
         kind: What the mode asks for.
         n: Number of joints.
+        t: Motion time it is for, [s], to name in an error.
 
     Raises:
         InvalidValueError: It is of another kind, of the wrong shape, or not finite.
     """
+    name = f"command at t = {t:.3f} s"
     if not isinstance(command, kind):
-        raise InvalidValueError("command", command, f"must be a {kind.__name__} in this mode")
+        raise InvalidValueError(name, command, f"must be a {kind.__name__} in this mode")
     if isinstance(command, JointPosition):
-        return JointPosition(_numbers(command.q, (n,), "rad"), command.finished)
+        return JointPosition(_numbers(name, command.q, (n,), "rad"), command.finished)
     if isinstance(command, JointTorque):
-        return JointTorque(_numbers(command.tau, (n,), "N m"), command.finished)
+        return JointTorque(_numbers(name, command.tau, (n,), "N m"), command.finished)
     if command.psi is not None and not math.isfinite(command.psi):
         raise InvalidValueError("psi", command.psi, "must be finite [rad], or None")
-    return CartesianPosition(_numbers(command.T_base_tool, (4, 4), "m"), command.psi, command.finished)
+    return CartesianPosition(_numbers(name, command.T_base_tool, (4, 4), "m"), command.psi, command.finished)
 
 
 def require_first(command: Command, state: RobotState) -> None:
@@ -77,13 +79,15 @@ def has_arrived(state: RobotState, command: Command) -> bool:
     return True
 
 
-def _numbers(values: Any, shape: tuple[int, ...], unit: str) -> Array:
+def _numbers(name: str, values: Any, shape: tuple[int, ...], unit: str) -> Array:
     try:
         numbers = np.array(values, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise InvalidValueError("command", values, f"is not {shape} numbers [{unit}]") from error
+        raise InvalidValueError(name, values, f"is not {shape} numbers [{unit}]") from error
     if numbers.shape != shape:
-        raise InvalidValueError("command", values, f"has shape {numbers.shape}, needs {shape} [{unit}]")
+        raise InvalidValueError(name, values, f"has shape {numbers.shape}, needs {shape} [{unit}]")
     if not np.isfinite(numbers).all():
-        raise InvalidValueError("command", values, f"must be finite in every element [{unit}]")
+        place = np.argwhere(~np.isfinite(numbers))[0].tolist()
+        where = f"joint {place[0] + 1}" if len(shape) == 1 else f"element {place}"
+        raise InvalidValueError(name, numbers[tuple(place)], f"in {where}: must be finite [{unit}]")
     return numbers

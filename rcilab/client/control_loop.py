@@ -270,7 +270,7 @@ class ControlLoop:
 
     def _checked(self, command: Any, state: RobotState) -> Command:
         """Returns the callback's command once it is found good; the first one must also be where the arm is."""
-        checked = check_command(command, self._kind, self._link.n)
+        checked = check_command(command, self._kind, self._link.n, self._time(state))
         if self._command is None:
             require_first(checked, state)
         return checked

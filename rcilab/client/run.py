@@ -121,15 +121,24 @@ class Run:
 
         Without a plan, measured minus commanded.
         """
-        delay = self.delay
         if self.plan is None:
-            wanted = np.full_like(self.q, np.nan)
-            if len(wanted) > delay:
-                wanted[delay:] = self.command[:-delay]
-                wanted[:delay] = self.command[0]
-            return self.q - wanted
+            return self._lag()
+        delay = self.delay
         rows = np.clip(np.rint(self.t / CYCLE_TIME).astype(np.intp) - delay, 0, len(self.plan.q) - 1)
         return self.q - self.plan.q[rows]
+
+    def _lag(self) -> JointPath:
+        """Measured minus commanded joint angles, shape (N, n), [rad], with the play-out delay taken out."""
+        delay = self.delay
+        wanted = np.full_like(self.q, np.nan)
+        if len(wanted) > delay:
+            wanted[delay:] = self.command[:-delay]
+            wanted[:delay] = self.command[0]
+        return self.q - wanted
+
+    def _largest_error(self) -> str:
+        """In words; of a motion that was stopped against the commands, because it left its plan on purpose."""
+        return f"{_degrees(self._lag() if self.stopped else self.error):.3g} deg"
 
     @property
     def timing(self) -> Timing:
@@ -160,7 +169,7 @@ class Run:
     def __repr__(self) -> str:
         facts = [f"{self.duration:.3f} s", f"{len(self.cycles)} cycles"]
         if len(self.cycles):
-            facts.append(f"largest error {_degrees(self.error):.3g} deg")
+            facts.append(f"largest error {self._largest_error()}")
             facts.append(f"success rate {float(self.success_rate[-1]):.3f}")
         if self.stopped:
             facts.append(f"stopped: {self.stopped}")
@@ -174,7 +183,7 @@ class Run:
             ("duration", f"{self.duration:.3f} s, {len(self.cycles)} cycles"),
             ("ended", self.stopped or ("with a fault" if self.faults else "at its goal")),
             ("faults", ", ".join(fault.name for fault in self.faults) or "none"),
-            ("largest error", f"{_degrees(self.error):.3g} deg"),
+            ("largest error", self._largest_error()),
             ("success rate", f"{float(self.success_rate[-1]):.3f}" if len(self.cycles) else "-"),
             ("lost cycles", f"{timing.lost}"),
         ]

@@ -255,6 +255,15 @@ def test_closing_in_mid_motion_brings_the_arm_to_rest_first(make_robot, from_cal
         robot.power_on()
 
 
+def test_a_stopped_run_is_not_compared_with_the_plan_it_left(make_robot):
+    peer, robot = make_robot()
+    motion = plan_joint(MODEL, peer.script.q, MODEL.home, speed=0.5)
+    run = robot.execute(motion, progress=lambda t, duration: robot.stop() if t > 0.1 else None)
+    assert run.stopped == "on request"
+    assert "largest error 0 deg" in repr(run)
+    assert "<td>0 deg" in run._repr_html_()
+
+
 def test_two_threads_may_ask_in_turn(make_robot):
     _, robot = make_robot()
     states, errors = [], []
@@ -377,7 +386,10 @@ def test_a_first_command_elsewhere_names_the_joint_and_both_angles(make_robot):
 @pytest.mark.parametrize(
     ("bad", "hint"),
     [
-        (lambda q: JointPosition(np.full(7, np.nan)), "finite"),
+        (
+            lambda q: JointPosition([0, 0, np.nan, 0, 0, 0, 0]),
+            r"command at t = 0\.201 s: .*nan.* in joint 3: must be finite",
+        ),
         (lambda q: JointPosition(np.zeros(6)), r"needs \(7,\)"),
         (lambda q: JointPosition([1.0, [2.0]]), "is not"),
         (lambda q: q, "must be a JointPosition"),
