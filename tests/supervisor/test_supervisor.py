@@ -92,7 +92,8 @@ def test_status_says_what_runs_and_how_punctual_it_is(supervisor):
 
 def test_stop_ends_in_one_controlled_stop_and_the_next_motion_can_begin(supervisor):
     _, ticket = begin(supervisor)
-    wait_for(lambda: (supervisor.status().motion_time or 0.0) > 0.3 and supervisor.status().phase == "moving")
+    # One snapshot: the time of one and the phase of the next belong to two motions.
+    wait_for(lambda: (now := supervisor.status()).phase == "moving" and (now.motion_time or 0.0) > 0.3)
     supervisor.stop().wait(SOON)
     with pytest.raises(ControlError, match="stopped on request"):
         ticket.wait(SOON)
