@@ -1,7 +1,7 @@
 // The bar of the workbench. It speaks to Python over its own websocket, so that Stop works whatever viser shows.
 (() => {
   "use strict";
-  let live = null, said = {}, bar, chips, stop, toast, notice = null, hideTimer = 0;
+  let live = null, said = {}, bar, chips, stop, toast, notice = null, greeted = false, hideTimer = 0;
 
   const send = (message) => {
     if (live && live.readyState === WebSocket.OPEN) { live.send(JSON.stringify(message)); return true; }
@@ -78,16 +78,17 @@
     if ("stop" in news || "stopHint" in news) label();
     if (news.chips) draw(news.chips);
     if (news.notice && news.notice.serial !== notice) {
-      if (notice !== null || news.notice.fresh) show(news.notice);
+      if (greeted || notice !== null) show(news.notice);  // What was said before this page came is no news to it.
       notice = news.notice.serial;
     }
+    greeted = true;
     if (news.language) document.documentElement.lang = news.language;
   };
 
   const connect = () => {
     const scheme = location.protocol === "https:" ? "wss://" : "ws://";
     live = new WebSocket(scheme + location.host + "/rcilab/live");
-    live.onopen = () => { bar.classList.remove("rl-lost"); size(); };
+    live.onopen = () => { greeted = false; bar.classList.remove("rl-lost"); size(); };
     live.onmessage = hear;
     live.onclose = () => {
       bar.classList.add("rl-lost");
