@@ -18,6 +18,8 @@ Quantity = Literal["q", "dq", "ddq", "jerk"]
 QUANTITIES: tuple[Quantity, ...] = ("q", "dq", "ddq", "jerk")
 
 
+_WIDENED = 3  # Points that a marked violation reaches to both sides: one bad cycle is still some pixels wide.
+_FARTHEST = 3.0  # Multiple of the limit that a plot reaches at most; `rcilab.check` gives the number beyond.
 _ROUND_ENDS = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 15.0, 20.0, 25.0, 30.0, 40.0, 50.0, 60.0)
 
 
@@ -43,11 +45,10 @@ class Frame:
     upper: float
     lower: float
     """The limit, in the unit of the curves."""
-    above: Array
-    """The highest planned curve where it is above the limit, the limit elsewhere."""
-    below: Array
+    violated: Array
+    """Where a planned curve is outside its limits, widened to what an eye can see, boolean."""
     bound: float
-    """The plot reaches from -bound to bound."""
+    """The plot reaches from -bound to bound; a curve far beyond its limit leaves it, so that the limit stays seen."""
     end: float
     """Where the time axis ends, [s]: a round number, so that the axis stands still while a plan is dragged."""
 
@@ -158,10 +159,11 @@ def build_frame(
     if joint:
         lower, upper = float(np.degrees(low[joint - 1])), float(np.degrees(high[joint - 1]))
     planned, recorded = thin(plan), thin(actual)
-    curves = np.array(planned) if planned else np.zeros((1, len(t)))
-    above = np.maximum(np.nan_to_num(curves, nan=upper).max(axis=0), upper)
-    below = np.minimum(np.nan_to_num(curves, nan=lower).min(axis=0), lower)
-    peak = max(abs(upper), abs(lower), float(above.max()), -float(below.min()))
+    curves = np.nan_to_num(np.array(planned)) if planned else np.zeros((1, len(t)))
+    outside = ((curves > upper) | (curves < lower)).any(axis=0)
+    violated = np.convolve(outside, np.ones(2 * _WIDENED + 1), mode="same") > 0.5
+    violated[-2:] = False  # The last two points span the empty rest of the axis.
+    limit = max(abs(upper), abs(lower))
     return Frame(
         t=t,
         end=float(t[-1]),
@@ -169,7 +171,6 @@ def build_frame(
         actual=recorded,
         upper=upper,
         lower=lower,
-        above=above,
-        below=below,
-        bound=1.12 * peak,
+        violated=violated,
+        bound=min(1.12 * max(limit, float(np.abs(curves).max())), _FARTHEST * limit),
     )

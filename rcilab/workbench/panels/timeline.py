@@ -125,7 +125,7 @@ class TimelinePanel:
 
 
 def plot_contents(frame: Frame, joint: int, n: int) -> tuple[tuple[np.ndarray, ...], tuple[Any, ...], tuple[Any, ...]]:
-    """Returns data, series and bands of one plot: limits as tinted bands, violations as solid areas, then curves.
+    """Returns data, series and bands of one plot: limits as tinted bands, violations as columns, then curves.
 
     The number of series never changes, whatever is shown: viser sends data and series one after the other, and uPlot
     fails when they do not fit each other in between. Unused curves hold NaN.
@@ -143,15 +143,11 @@ def plot_contents(frame: Frame, joint: int, n: int) -> tuple[tuple[np.ndarray, .
         level(frame.upper),
         level(frame.lower),
         level(-frame.bound),
-        frame.above,
-        frame.below,
+        np.where(frame.violated, frame.bound, -frame.bound),
     ]
-    series: list[Any] = [{}, hidden, edge, edge, hidden, hidden, hidden]
-    pale, solid = "rgba(209,57,43,0.08)", "rgba(209,57,43,0.75)"
-    bands = tuple(
-        {"series": pair, "fill": fill}
-        for pair, fill in (((1, 2), pale), ((3, 4), pale), ((5, 2), solid), ((3, 6), solid))
-    )
+    series: list[Any] = [{}, hidden, edge, edge, hidden, hidden]
+    pale, strong = "rgba(209,57,43,0.08)", "rgba(209,57,43,0.38)"
+    bands = tuple({"series": pair, "fill": fill} for pair, fill in (((1, 2), pale), ((3, 4), pale), ((5, 4), strong)))
     for curves, look in ((frame.plan, {"width": 1.5}), (frame.actual, {"width": 2, "dash": (2, 5)})):
         for index in range(n):
             color = COLORS[(joint - 1 if joint else index) % len(COLORS)]
