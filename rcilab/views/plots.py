@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rcilab.arrays import Array
 from rcilab.clock import CYCLE_TIME
@@ -45,7 +46,7 @@ class Frame:
     upper: float
     lower: float
     """The limit, in the unit of the curves."""
-    violated: Array
+    violated: NDArray[np.bool_]
     """Where a planned curve is outside its limits, widened to what an eye can see, boolean."""
     bound: float
     """The plot reaches from -bound to bound; a curve far beyond its limit leaves it, so that the limit stays seen."""
