@@ -232,6 +232,11 @@ class Supervisor:
             self._require_block()
             return self._ring.drain()
 
+    def open_reader(self) -> RingReader:
+        """Returns a reader of the recorded cycles with a place of its own, beside `drain`; good until `close`."""
+        with self._lock:
+            return RingReader(self._require_block())
+
     def __enter__(self) -> Supervisor:
         self.start()
         return self

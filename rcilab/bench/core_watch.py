@@ -1,0 +1,90 @@
+"""Watches the machine's cores while something else runs on them: how often a core itself stood still.
+
+On every core a loop that does nothing wakes up each millisecond under the highest priority there is. When it wakes up
+late, nothing on that core ran in time: the hypervisor had taken the core away, or the kernel did not let go of it. No
+program can be punctual there, so what a control loop is blamed for is what is left. `python -m rcilab.bench.core_watch
+CORE` is one of those loops; it runs until its standard input ends.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import select
+import subprocess
+import sys
+import time
+from types import TracebackType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rcilab.clock import CYCLE_TIME
+from rcilab.realtime import enter_realtime
+
+SHORTEST_PAUSE = 2e-4  # [s] Later than this is a pause; a loop in Python wakes up within some 0.1 ms otherwise.
+
+_PRIORITY = 99  # Above everything else, so that only the machine itself can hold it up.
+
+
+class CoreWatch:
+    """One loop a core, from `with` to its end. Owned by one thread.
+
+    Attributes:
+        pauses: After the end: every pause as a row (begin, end), monotonic, shape (m, 2), [s].
+        stolen: After the end: how long the hypervisor says it has kept the cores from us, all together, [s].
+    """
+
+    def __init__(self) -> None:
+        self.pauses: NDArray[np.float64] = np.empty((0, 2))
+        self.stolen = 0.0
+        self._loops: list[subprocess.Popen[str]] = []
+
+    def __enter__(self) -> CoreWatch:
+        self.stolen = -_stolen_time()
+        for core in sorted(os.sched_getaffinity(0)):
+            command = [sys.executable, "-m", "rcilab.bench.core_watch", str(core)]
+            self._loops.append(subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True))
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        found = [json.loads(loop.communicate()[0]) for loop in self._loops]
+        self.pauses = np.array([pause for pauses in found for pause in pauses]).reshape(-1, 2)
+        self.stolen += _stolen_time()
+
+    def explains(self, times: NDArray[np.float64], window: NDArray[np.float64] | float) -> NDArray[np.bool_]:
+        """Returns for each time, shape (k,), monotonic, [s], whether a core stood still then or up to `window` before.
+
+        The beginning of a pause is known to one cycle only: it may have begun that much earlier.
+        """
+        ends = np.sort(self.pauses[:, 1])
+        begins = self.pauses[np.argsort(self.pauses[:, 1]), 0] - CYCLE_TIME
+        first = np.searchsorted(ends, times - window)
+        latest = np.append(np.minimum.accumulate(begins[::-1])[::-1], np.inf)  # Earliest begin of any later pause.
+        return latest[first] <= times
+
+
+def _stolen_time() -> float:
+    with open("/proc/stat", encoding="ascii") as file:
+        return int(file.readline().split()[8]) / 100.0  # proc(5): in hundredths of a second.
+
+
+def _watch(core: int) -> list[tuple[float, float]]:
+    os.sched_setaffinity(0, {core})
+    enter_realtime(_PRIORITY)
+    pauses: list[tuple[float, float]] = []
+    deadline = time.monotonic()
+    while True:
+        deadline += CYCLE_TIME
+        if select.select([sys.stdin], [], [], max(deadline - time.monotonic(), 0.0))[0]:
+            return pauses
+        now = time.monotonic()
+        if now - deadline > SHORTEST_PAUSE:
+            pauses.append((deadline, now))
+            deadline = now
+
+
+if __name__ == "__main__":
+    print(json.dumps(_watch(int(sys.argv[1]))))
