@@ -45,6 +45,9 @@ class CoreWatch:
         for core in sorted(os.sched_getaffinity(0)):
             command = [sys.executable, "-m", "rcilab.bench.core_watch", str(core)]
             self._loops.append(subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True))
+        for loop in self._loops:
+            assert loop.stdout is not None
+            loop.stdout.readline()  # It watches from now on.
         return self
 
     def __exit__(
@@ -75,6 +78,7 @@ def _watch(core: int) -> list[tuple[float, float]]:
     os.sched_setaffinity(0, {core})
     enter_realtime(_PRIORITY)
     pauses: list[tuple[float, float]] = []
+    print("watching", flush=True)
     deadline = time.monotonic()
     while True:
         deadline += CYCLE_TIME
