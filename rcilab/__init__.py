@@ -22,10 +22,13 @@ if TYPE_CHECKING:
     from rcilab.faults import Fault as Fault
     from rcilab.model import RobotModel as RobotModel
     from rcilab.model import load_model as load_model
+    from rcilab.motion.cartesian import plan_arc as plan_arc
+    from rcilab.motion.cartesian import plan_line as plan_line
     from rcilab.motion.joint import plan_joint as plan_joint
     from rcilab.motion.motion import Motion as Motion
     from rcilab.notebook.plot import plot as plot
     from rcilab.notebook.preview import preview as preview
+    from rcilab.safety_box import SafetyBox as SafetyBox
     from rcilab.spatial import Pose as Pose
     from rcilab.supervisor.simulate import simulate as simulate
 
@@ -44,10 +47,13 @@ _HOMES = {
     "RobotModel": "rcilab.model",
     "RobotSession": "rcilab.client.session",
     "Run": "rcilab.client.run",
+    "SafetyBox": "rcilab.safety_box",
     "check": "rcilab.conformance.check",
     "connect": "rcilab.client.session",
     "load_model": "rcilab.model",
+    "plan_arc": "rcilab.motion.cartesian",
     "plan_joint": "rcilab.motion.joint",
+    "plan_line": "rcilab.motion.cartesian",
     "plot": "rcilab.notebook.plot",
     "preview": "rcilab.notebook.preview",
     "simulate": "rcilab.supervisor.simulate",

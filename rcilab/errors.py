@@ -24,6 +24,8 @@ Facts stay on the exception as attributes; nobody has to search a message for me
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from os import PathLike
+from typing import Any
 
 
 class RcilabError(Exception):
@@ -137,13 +139,26 @@ class ControlError(RcilabError):
 
     Attributes:
         faults: The faults that were set, in wire order.
-        record: The last cycles before the stop, as recorded, or None.
+        record: The last cycles before the stop, as recorded: a structured array, one row a cycle; or None.
     """
 
-    def __init__(self, message: str, faults: Sequence[object] = (), record: object = None) -> None:
+    def __init__(self, message: str, faults: Sequence[object] = (), record: Any = None) -> None:
         super().__init__(message)
         self.faults = tuple(faults)
         self.record = record
+
+    def save(self, file: str | PathLike[str]) -> None:
+        """Writes the last cycles to a file; its ending chooses the format: .csv or .npz.
+
+        Raises:
+            UsageError: There is no record.
+            InvalidValueError: The ending is unknown, or the file cannot be written.
+        """
+        from rcilab.cycle_file import save_cycles
+
+        if self.record is None:
+            raise UsageError("this error carries no record: nothing was recorded before it")
+        save_cycles(self.record, file)
 
 
 class DeadlineError(RcilabError, TimeoutError):

@@ -137,6 +137,11 @@ class RobotModel:
         T = forward_kinematics.forward_path(self._chain, as_path(q, self.n, "q", "rad"))
         return T @ self.T_flange_tool.matrix if self._has_tool else T
 
+    def position_path(self, q: ArrayLike) -> Array:
+        """Returns where the tool is in base along a path, shape (N, 3), [m], for q of shape (N, n)."""
+        point = self.T_flange_tool.parts[1]
+        return forward_kinematics.position_path(self._chain, as_path(q, self.n, "q", "rad"), point)
+
     def joint_frames(self, q: ArrayLike) -> tuple[Pose, ...]:
         """Returns the Denavit-Hartenberg frames after joint 1, 2, ..., n in base; the last one is the flange."""
         return forward_kinematics.joint_frames(self._chain, self._floats(q))
@@ -235,7 +240,7 @@ class RobotModel:
         """The rigid-body model behind `torque`."""
         from rcilab.dynamics.rigid_body import RigidBody
 
-        return RigidBody(self.description, self.load)
+        return RigidBody(self.description, self.load, self.T_flange_tool)
 
     @cached_property
     def fingerprint(self) -> Mapping[str, str]:

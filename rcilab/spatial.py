@@ -256,3 +256,37 @@ def rpy_from_rotation(r: Rotation9) -> tuple[float, float, float]:
     if cosine < 1e-9:
         return 0.0, pitch, math.atan2(-r[1], r[4])
     return math.atan2(r[7], r[8]), pitch, math.atan2(r[3], r[0])
+
+
+def turn_between(old: Rotation9, new: Rotation9) -> tuple[float, float, float]:
+    """Returns the rotation vector, [rad], that turns `old` into `new`; in the axes in which both are given.
+
+    Its direction is the axis, its length the angle, 0 to pi: log(R_new R_old^T). Exact also for the tiny turns of one
+    cycle, where the trace alone would lose half of the digits.
+
+    Args:
+        old: Rotation matrix, row-major.
+        new: Rotation matrix, row-major.
+    """
+    a, b, c, d, e, f, g, h, i = old
+    p, q, r, s, t, u, v, w, x = new
+    sx = 0.5 * ((v * d + w * e + x * f) - (s * g + t * h + u * i))
+    sy = 0.5 * ((p * g + q * h + r * i) - (v * a + w * b + x * c))
+    sz = 0.5 * ((s * a + t * b + u * c) - (p * d + q * e + r * f))
+    sine = math.sqrt(sx * sx + sy * sy + sz * sz)
+    cosine = 0.5 * (p * a + q * b + r * c + s * d + t * e + u * f + v * g + w * h + x * i - 1.0)
+    if sine > 1e-8:
+        scale = math.atan2(sine, cosine) / sine
+        return scale * sx, scale * sy, scale * sz
+    if cosine > 0.0:
+        return sx, sy, sz
+    # Half a turn: the matrix is 2 a a^T - 1, and its largest diagonal element tells the axis a best.
+    m = (
+        (p * a + q * b + r * c, p * d + q * e + r * f, p * g + q * h + r * i),
+        (s * a + t * b + u * c, s * d + t * e + u * f, s * g + t * h + u * i),
+        (v * a + w * b + x * c, v * d + w * e + x * f, v * g + w * h + x * i),
+    )
+    k = max(range(3), key=lambda j: m[j][j])
+    axis = [m[j][k] + (1.0 if j == k else 0.0) for j in range(3)]
+    scale = math.pi / math.sqrt(axis[0] ** 2 + axis[1] ** 2 + axis[2] ** 2)
+    return scale * axis[0], scale * axis[1], scale * axis[2]

@@ -13,7 +13,20 @@ import pytest
 ROOT = Path(__file__).parents[1]
 
 LAYERS = [  # From the bottom. A part imports from lines below its own, and from itself; the base may import the base.
-    {"errors", "arrays", "clock", "faults", "limits", "command", "state", "spatial", "realtime"},
+    {
+        "errors",
+        "arrays",
+        "clock",
+        "faults",
+        "limits",
+        "command",
+        "state",
+        "spatial",
+        "realtime",
+        "safety_box",
+        "closing",
+        "cycle_file",
+    },
     {"protocols", "robots"},
     {"kinematics", "dynamics"},
     {"model"},
@@ -23,6 +36,7 @@ LAYERS = [  # From the bottom. A part imports from lines below its own, and from
     {"supervisor"},
     {"workbench", "notebook"},
     {"bench"},
+    {"doctor"},
     {""},  # rcilab itself, the lazy front door: only the top goes through it.
     {"cli"},
     {"__main__"},

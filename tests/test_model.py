@@ -124,3 +124,15 @@ def test_a_state_shows_itself_in_one_short_line():
     assert "deg" in text
     assert "faults: none" in text
     assert len(text) < 200
+
+
+def test_values_of_a_model_show_themselves_in_one_short_line():
+    model = load_model("xMatePro7", load=rcilab.Payload(mass=1.5, center_of_mass=[0.0, 0.01, 0.1]))
+    sample = rcilab.plan_joint(model, model.home, model.home + 0.5).at(0.2)
+    values = (model.description, model.description.base, model.load, model.torque(model.home, model.home, model.home))
+    for value in (*values, sample):
+        assert repr(value).startswith(f"<{type(value).__name__}")
+        assert "\n" not in repr(value)
+        assert len(repr(value)) < 180
+    assert "xMatePro7: 7 joints" in repr(model.description)
+    assert "1.5 kg, centre of mass at 0 0.01 0.1 m" in repr(model.load)

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rcilab.errors import InvalidValueError
-from rcilab.spatial import IDENTITY, Pose
+from rcilab.spatial import IDENTITY, Pose, turn_between
 
 angles = st.floats(-3.1, 3.1)
 lengths = st.floats(-2.0, 2.0)
@@ -65,3 +65,28 @@ def test_a_matrix_that_is_no_pose_is_shown_in_one_short_line():
     broken[1, 3] = np.nan
     with pytest.raises(InvalidValueError, match=r"^pose\[1, 3\]: nan must be finite$"):
         Pose.from_matrix(broken)
+
+
+@given(poses, st.tuples(lengths, lengths, lengths), st.floats(-9.0, 0.49))
+def test_the_turn_between_two_rotations_is_the_one_that_was_made(pose, axis, exponent):
+    if np.linalg.norm(axis) < 1e-3:
+        return
+    angle = 10.0**exponent  # 1 nrad, which is one cycle of a slow wrist, up to nearly half a turn.
+    axis = np.array(axis) / np.linalg.norm(axis)
+    step = Pose(wxyz=[np.cos(angle / 2.0), *(np.sin(angle / 2.0) * axis)])
+    turn = turn_between(pose.parts[0], (step @ pose).parts[0])
+    np.testing.assert_allclose(turn, angle * axis, rtol=1e-6, atol=1e-15 + 1e-6 * angle)
+
+
+@pytest.mark.parametrize("axis", [(1, 0, 0), (0, 1, 0), (0, 0, 1), (0.6, 0.0, -0.8), (-0.48, 0.6, 0.64)])
+def test_half_a_turn_has_an_axis_and_a_length_of_pi(axis):
+    a = np.array(axis, dtype=float)
+    old = Pose.from_rpy((0.0, 0.0, 0.0), (0.2, 0.4, -0.3))
+    turn = np.array(turn_between(old.parts[0], (Pose(wxyz=[0.0, *a]) @ old).parts[0]))
+    assert np.linalg.norm(turn) == pytest.approx(np.pi)
+    assert abs(turn @ a) == pytest.approx(np.pi)
+
+
+def test_no_turn_is_zero():
+    old = Pose.from_rpy((0.0, 0.0, 0.0), (0.2, 0.4, -0.3)).parts[0]
+    np.testing.assert_allclose(turn_between(old, old), np.zeros(3), atol=1e-16)

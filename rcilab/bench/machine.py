@@ -12,7 +12,7 @@ from typing import Any
 
 PACKAGES = ("rcilab", "numpy", "pin", "ruckig", "mujoco", "viser")
 
-_PRIORITY = 50  # Any will do for the question: the permission is for all or for none.
+_PRIORITY = 80  # The highest that any of our processes asks for: the controller.
 
 
 def describe_machine() -> dict[str, Any]:

@@ -15,7 +15,11 @@ from rcilab.errors import UsageError
 if TYPE_CHECKING:
     from rcilab.bench.measure import Measurement
 
-BENCHES = ("forward", "inverse", "plan_joint", "check", "drag", "import", "start", "control_loop")
+BENCHES = (
+    *("forward", "inverse", "plan_joint", "check"),
+    *("controller_ideal", "controller_mujoco", "controller_cartesian", "client_answer"),
+    *("drag", "import", "start", "state_period", "control_loop"),
+)
 """In the order they run; the slow ones last."""
 
 _STREAMING = 30.0  # [s]
@@ -68,6 +72,19 @@ def _chosen(names: list[str]) -> list[str]:
 
 def _bench(name: str, seconds: float) -> Callable[[], Measurement]:
     """Returns a bench by name; what it needs is loaded now, so that it is not part of what the next one measures."""
+    if name == "client_answer":
+        from rcilab.bench.client import bench_client_answer
+
+        return bench_client_answer
+    if name in ("controller_ideal", "controller_mujoco", "controller_cartesian", "state_period"):
+        from rcilab.bench import controller
+
+        return {
+            "controller_ideal": lambda: controller.bench_controller("ideal"),
+            "controller_mujoco": lambda: controller.bench_controller("mujoco"),
+            "controller_cartesian": controller.bench_controller_cartesian,
+            "state_period": controller.bench_state_period,
+        }[name]
     if name in ("import", "start"):
         from rcilab.bench import start
 
@@ -91,11 +108,11 @@ def _print_machine(machine: dict[str, Any]) -> None:
     fifo = "in force" if machine["sched_fifo"] else "NOT permitted"
     print(f"{machine['cpu']}, {machine['cores']} cores, load {machine['load']}; {machine['kernel']}; SCHED_FIFO {fifo}")
     print(f"Python {machine['python']}, {versions}")
-    print(f"\n{'':4} {'bench':14} {'median':>10} {'p99':>10} {'target':>10}")
+    print(f"\n{'':4} {'bench':20} {'median':>10} {'p99':>10} {'target':>10}")
 
 
 def _row(found: Measurement) -> str:
     verdict = {True: "ok", False: "SLOW", None: "-"}[found.ok]
     target = "-" if found.target is None else f"{found.target:g}"
-    numbers = f"{verdict:4} {found.name:14} {found.median:10.3g} {found.p99:10.3g} {target:>10} {found.unit}"
+    numbers = f"{verdict:4} {found.name:20} {found.median:10.3g} {found.p99:10.3g} {target:>10} {found.unit}"
     return numbers + "\n" + textwrap.fill(found.note, 110, initial_indent=" " * 7, subsequent_indent=" " * 7)

@@ -6,10 +6,15 @@ import argparse
 import os
 import signal
 import sys
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rcilab.protocols.world import NetworkFaults, Stall
 
 DESCRIPTION = """\
 Runs a virtual RCI controller. Any RCI client can connect to it: this package, or a C++ program that uses the vendor's
-client library. It prints one line when it is ready and ends on Ctrl-C.
+client library. It prints one line when it is ready, a second one with the address of its world port, and ends on
+Ctrl-C.
 """
 
 
@@ -35,8 +40,51 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         metavar="N",
         help="lost commands in a row that stop a motion, 10 to 20; 0: none do (%(default)s)",
     )
+    parser.add_argument("--auto-limit", action="store_true", help="lead commands to rest inside the soft joint limits")
+    parser.add_argument("--loop-back", action="store_true", help="wire digital outputs to the inputs")
+    parser.add_argument(
+        "--limits", default="manual", metavar="TABLE", help="Cartesian limits: manual or sdk (%(default)s)"
+    )
+    _add_world_options(parser)
+    _add_network_options(parser)
     parser.add_argument("--exit-with-parent", nargs="?", type=int, const=0, metavar="PID", help=argparse.SUPPRESS)
     parser.set_defaults(run=run)
+
+
+def _add_world_options(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("world port", "through which things happen to the robot from outside")
+    choice = group.add_mutually_exclusive_group()
+    choice.add_argument("--world-port", type=int, default=0, metavar="N", help="TCP port, on loopback (any free one)")
+    choice.add_argument("--no-world", action="store_true", help="have none")
+
+
+def _add_network_options(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("faults", "of the network and of the controller's clock")
+    for name, meaning in (
+        ("loss", "of the datagrams that never arrive"),
+        ("reorder", "that are overtaken by later ones"),
+        ("duplicate", "that arrive twice"),
+        ("corrupt", "in which a bit is flipped"),
+    ):
+        group.add_argument(f"--{name}", type=float, default=0.0, metavar="SHARE", help=f"share {meaning}, 0 to 1")
+    group.add_argument("--delay", type=float, default=0.0, metavar="S", help="delay of every datagram")
+    group.add_argument("--jitter", type=float, default=0.0, metavar="S", help="largest random delay in addition")
+    group.add_argument(
+        "--faults-on", default="both", metavar="WAY", help="datagrams meant: commands, states or both (%(default)s)"
+    )
+    group.add_argument("--tcp-delay", type=float, default=0.0, metavar="S", help="delay of every answer over TCP")
+    group.add_argument(
+        "--tcp-split", nargs="?", type=int, const=1, default=0, metavar="N", help="answers come N bytes at a time (1)"
+    )
+    group.add_argument("--tcp-break", type=int, metavar="N", help="TCP breaks after N bytes of answers")
+    group.add_argument("--seed", type=int, default=0, metavar="N", help="of all that is random (%(default)s)")
+    group.add_argument(
+        "--stall",
+        action="append",
+        default=[],
+        metavar="S[@T][/P]",
+        help="the clock stands still for S seconds, first after T, then every P, such as 0.05@2.0 or 0.02/1.0",
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -45,6 +93,7 @@ def run(args: argparse.Namespace) -> int:
     from rcilab.controller.server import ControllerServer
 
     client_host, client_port = _client(args.client)
+    network, states_network = _networks(args)
     config = ControllerConfig(
         model=args.model,
         host=args.host,
@@ -56,6 +105,13 @@ def run(args: argparse.Namespace) -> int:
         lockstep=args.lockstep,
         prefill=args.prefill,
         lost_limit=args.lost_limit or None,  # 0 switches it off.
+        auto_limit=args.auto_limit,
+        loop_back=args.loop_back,
+        limit_table=args.limits,
+        network=network,
+        states_network=states_network,
+        stalls=tuple(map(parse_stall, args.stall)),
+        world_port=None if args.no_world else args.world_port,
         # Without a number: whoever started us, as long as that one is still there to be asked for.
         parent_pid=os.getppid() if args.exit_with_parent == 0 else args.exit_with_parent,
     )
@@ -69,7 +125,10 @@ def run(args: argparse.Namespace) -> int:
             file=sys.stderr,
             flush=True,
         )
-    print(server.description, flush=True)
+    # In one piece, so that whoever waits for the first line has the second one, too.
+    world = "" if server.world_address is None else f"\nworld {server.world_address}"
+    sys.stdout.write(f"{server.description}{world}\n")
+    sys.stdout.flush()
     server.run()
     return 0
 
@@ -83,3 +142,37 @@ def _client(text: str | None) -> tuple[str | None, int | None]:
     if not host or (colon and not port.isascii()) or (colon and not port.isdigit()):
         raise InvalidValueError("--client", text, "needs HOST or HOST:PORT, such as 127.0.0.1:1337")
     return host, int(port) if colon else None
+
+
+def _networks(args: argparse.Namespace) -> tuple[NetworkFaults, NetworkFaults]:
+    """Returns what is wrong with the network towards the controller, and towards the client."""
+    from rcilab.errors import InvalidValueError
+    from rcilab.protocols.world import DIRECTIONS, NetworkFaults
+
+    if args.faults_on not in DIRECTIONS:
+        raise InvalidValueError("--faults-on", args.faults_on, f"is unknown; known: {', '.join(DIRECTIONS)}")
+    tcp = {"tcp_delay": args.tcp_delay, "tcp_split": args.tcp_split, "tcp_break": args.tcp_break, "seed": args.seed}
+    names = ("loss", "delay", "jitter", "reorder", "duplicate", "corrupt")
+    bad = NetworkFaults(**{name: getattr(args, name) for name in names}, **tcp)
+    good = NetworkFaults(**tcp)
+    return (good if args.faults_on == "states" else bad), (good if args.faults_on == "commands" else bad)
+
+
+def parse_stall(text: str) -> Stall:
+    """Returns the pause that `S[@T][/P]` means: S seconds, first after T, then every P.
+
+    Raises:
+        InvalidValueError: It is none.
+    """
+    from rcilab.errors import InvalidValueError
+    from rcilab.protocols.world import Stall
+
+    rest, slash, period = text.partition("/")
+    duration, at, after = rest.partition("@")
+    try:
+        numbers = float(duration), float(after) if at else 0.0, float(period) if slash else None
+    except ValueError:
+        raise InvalidValueError(
+            "--stall", text, "needs seconds, as 0.05@2.0 (once, after 2 s), 0.02/1.0 (every second) or 0.02@5/1.0"
+        ) from None
+    return Stall(duration=numbers[0], after=numbers[1], period=numbers[2])

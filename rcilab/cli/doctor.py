@@ -3,178 +3,75 @@
 from __future__ import annotations
 
 import argparse
-import os
-import re
-import socket
+import json
 import sys
-from dataclasses import dataclass
-from importlib import metadata
-from pathlib import Path
-from typing import Literal
 
-from rcilab.bench.browser import BROWSERS, find_browser
-from rcilab.bench.machine import ask_realtime
+from rcilab.doctor.finding import Finding, summary
+from rcilab.errors import InvalidValueError
 
-OLDEST_PYTHON = (3, 11)
-CONTROLLER_ADDRESS = "127.0.0.2"  # Where `rcilab controller` listens unless told otherwise.
-CONTROLLER_PORT = 1337
-FEWEST_CORES = 2
-"""One for the 1 kHz loops, one for the page and the browser."""
-
-_REAL_TIME_LIMITS = (
-    "add '@realtime - rtprio 80' and '@realtime - memlock unlimited' to /etc/security/limits.conf, join that group"
-)
-
-
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """The answer to one question about this machine."""
-
-    name: str
-    verdict: Literal["ok", "note", "bad"]
-    """`note`: works, with a drawback; `bad`: a part of rcilab does not work."""
-    value: str
-    """What was found."""
-    advice: str = ""
-    """What to do about it; empty when all is well."""
-
-    def __str__(self) -> str:
-        return f"{self.verdict:4}  {self.name:20}  {self.value}" + (f"; {self.advice}" if self.advice else "")
+DESCRIPTION = """\
+Says what this machine lacks, and the exact remedy. "ok": nothing to do; "note": works, with a drawback; "bad": a part
+of rcilab does not work. Ends with 1 when something is bad, else with 0. Nothing is changed, and nothing moves.
+"""
+LONGEST = 3600.0  # [s]
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Adds `rcilab doctor`."""
-    parser = subparsers.add_parser("doctor", help="say what this machine lacks for planning, simulating and streaming")
+    parser = subparsers.add_parser(
+        "doctor", help="say what this machine lacks for planning, simulating and streaming", description=DESCRIPTION
+    )
+    parser.add_argument("--robot", metavar="rci://HOST:PORT", help="look for the way to this robot too")
+    parser.add_argument(
+        "--seconds", type=float, default=10.0, metavar="S", help="how long to measure jitter (%(default)g); 0: not"
+    )
+    parser.add_argument("--json", action="store_true", help="print one JSON list, an entry a finding")
     parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Prints every finding; returns 1 when something does not work, else 0."""
-    findings = examine()
-    print("\n".join(map(str, findings)))
-    bad = [finding.name for finding in findings if finding.verdict == "bad"]
-    print(f"\n{len(bad)} to mend: {', '.join(bad)}" if bad else "\nready: nothing is in the way")
-    return 1 if bad else 0
+    """Prints every finding as it is found; returns 1 when something does not work, else 0."""
+    from rcilab.client.address import parse_address
+    from rcilab.doctor.examine import examine
+    from rcilab.doctor.system import System
 
-
-def examine() -> list[Finding]:
-    """Returns every finding about this machine, most basic first."""
-    return [
-        check_python(sys.version_info[:3]),
-        *check_packages("rcilab"),
-        *check_realtime(*ask_realtime()),
-        check_address(CONTROLLER_ADDRESS),
-        check_port(CONTROLLER_ADDRESS, CONTROLLER_PORT),
-        check_cores(len(os.sched_getaffinity(0))),
-        check_kernel(Path("/sys/kernel/realtime")),
-        check_browser(BROWSERS),
-    ]
-
-
-def check_python(version: tuple[int, ...]) -> Finding:
-    """Is this Python new enough?"""
-    found = ".".join(map(str, version))
-    if version < OLDEST_PYTHON:
-        return Finding("Python", "bad", found, f"needs {'.'.join(map(str, OLDEST_PYTHON))} or newer")
-    return Finding("Python", "ok", found)
-
-
-def check_packages(distribution: str) -> list[Finding]:
-    """Is every package that `distribution` asks for here, and in the versions it was made for?
-
-    Packages of the extra `lab` are good to have; those of other extras are not looked at.
-    """
+    if not 0.0 <= args.seconds <= LONGEST:
+        raise InvalidValueError("--seconds", args.seconds, f"must be from 0 to {LONGEST:g} s")
+    robot = None if args.robot is None else parse_address(args.robot)
+    shown = Progress(args.seconds)
     findings: list[Finding] = []
-    for requirement in metadata.requires(distribution) or []:
-        specification, _, marker = requirement.partition(";")
-        optional = "extra" in marker
-        match = re.match(r"\s*([A-Za-z0-9._-]+)(?:\[.*\])?\s*(.*)", specification)
-        if match and (not optional or re.search(r"extra\s*==\s*['\"]lab['\"]", marker)):
-            findings.append(check_package(match[1], match[2].strip(), optional=optional))
-    return findings
+    for finding in examine(System(), robot=robot, seconds=args.seconds, progress=shown):
+        findings.append(finding)
+        shown.clear()
+        if not args.json:
+            print(finding, flush=True)
+    if args.json:
+        print(json.dumps([finding.as_json() for finding in findings], indent=1))
+    else:
+        print(f"\n{summary(findings)}")
+    return 1 if any(finding.verdict == "bad" for finding in findings) else 0
 
 
-def check_package(name: str, bounds: str, *, optional: bool = False) -> Finding:
-    """Is one package here, inside its bounds such as `>=1.1,<1.2`?"""
-    missing = Finding(name, "note", "not installed", "the notebooks need it: pip install -e '.[lab]'")
-    try:
-        version = metadata.version(name)
-    except metadata.PackageNotFoundError:
-        return missing if optional else Finding(name, "bad", "not installed", "pip install -e .")
-    for operator, bound in re.findall(r"(>=|<)\s*([0-9.]+)", bounds):
-        if (_numbers(version) >= _numbers(bound)) != (operator == ">="):
-            return Finding(name, "bad", version, f"needs {bounds}: pip install '{name}{bounds}'")
-    return Finding(name, "ok", version)
+class Progress:
+    """How far a measurement is, on stderr: one line that rewrites itself on a terminal, else a line a second.
 
+    Args:
+        seconds: How long it takes, [s].
+    """
 
-def check_realtime(fifo: bool, locked: bool) -> list[Finding]:
-    """Does a loop of ours run ahead of everything else on a core, and is its memory never paged out?"""
-    refused = "not permitted, so cycles can be late on a busy machine"
-    return [
-        Finding("SCHED_FIFO", "ok", "permitted") if fifo else Finding("SCHED_FIFO", "note", refused, _REAL_TIME_LIMITS),
-        Finding("locked memory", "ok", "permitted")
-        if locked
-        else Finding("locked memory", "note", refused, _REAL_TIME_LIMITS),
-    ]
+    def __init__(self, seconds: float) -> None:
+        self._seconds = seconds
+        self._rewrites = sys.stderr.isatty()
+        self._width = 0
 
+    def __call__(self, spent: float, worst: float) -> None:
+        """Shows the time spent so far and the largest lateness so far, [s]."""
+        line = f"measuring jitter: {spent:.0f} of {self._seconds:g} s, longest so far {1e6 * worst:.0f} us"
+        self._width = len(line)
+        print(f"\r{line}" if self._rewrites else line, end="" if self._rewrites else "\n", file=sys.stderr, flush=True)
 
-def check_address(address: str) -> Finding:
-    """Can the virtual controller have an address of its own on this machine?"""
-    try:
-        with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
-            probe.bind((address, 0))
-    except OSError as error:
-        advice = (
-            f"bring it up, such as `ip addr add {address}/8 dev lo`, or pass --host 127.0.0.1 --client 127.0.0.1:PORT"
-        )
-        return Finding(f"loopback {address}", "bad", f"cannot be bound ({error.strerror})", advice)
-    return Finding(f"loopback {address}", "ok", "can be bound")
-
-
-def check_port(address: str, port: int) -> Finding:
-    """Is the port of `rcilab controller` free, for TCP and for UDP?"""
-    name = f"port {port}"
-    for kind, label in ((socket.SOCK_STREAM, "TCP"), (socket.SOCK_DGRAM, "UDP")):
-        try:
-            with socket.socket(socket.AF_INET, kind) as probe:
-                if kind == socket.SOCK_STREAM:  # A connection closed a minute ago is no reason to worry anybody.
-                    probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-                probe.bind((address, port))
-        except OSError as error:
-            advice = "another controller runs; use it, or start `rcilab controller --port 0` (any free port)"
-            return Finding(name, "note", f"{label} is taken at {address} ({error.strerror})", advice)
-    return Finding(name, "ok", f"free at {address}, TCP and UDP")
-
-
-def check_cores(cores: int) -> Finding:
-    """Are there enough cores for a loop and a page at a time?"""
-    if cores < FEWEST_CORES:
-        return Finding("cores", "note", str(cores), f"{FEWEST_CORES} keep the page out of the 1 kHz loop's way")
-    return Finding("cores", "ok", str(cores))
-
-
-def check_kernel(flag: Path) -> Finding:
-    """Is this a PREEMPT_RT kernel?"""
-    kernel = f"Linux {os.uname().release}"
-    if flag.exists() and flag.read_text(encoding="ascii").strip() == "1":
-        return Finding("kernel", "ok", f"{kernel}, PREEMPT_RT")
-    return Finding(
-        "kernel",
-        "note",
-        f"{kernel}, not PREEMPT_RT",
-        "good for the virtual controller; install an RT kernel for a real arm",
-    )
-
-
-def check_browser(names: tuple[str, ...]) -> Finding:
-    """Is there a browser to open the page in?"""
-    path = find_browser(names)
-    if path is not None:
-        return Finding("browser", "ok", path)
-    return Finding("browser", "note", "none found", "install one (Debian: apt-get install chromium)")
-
-
-def _numbers(version: str) -> tuple[int, ...]:
-    """Returns the first four numbers of a version, which is what a bound compares: 4.6rc1 gives (4, 6, 0, 0)."""
-    numbers = re.findall(r"\d+", re.split(r"[^0-9.]", version, maxsplit=1)[0])
-    return tuple(int(number) for number in [*numbers, 0, 0, 0, 0][:4])
+    def clear(self) -> None:
+        """Takes the line away again where it can."""
+        if self._rewrites and self._width:
+            print("\r" + " " * self._width + "\r", end="", file=sys.stderr, flush=True)
+        self._width = 0

@@ -115,7 +115,7 @@ def _run(args: Namespace, stopper: _Stopper) -> int:
         print(_what_will_move(motion, robot))
         if not args.yes and not _agreed():
             return _NOT_DONE
-        if not robot.get_motor_state():
+        if not robot.motor_state():
             robot.power_on()
         result = stopper.execute(robot, motion, report.certificate)
     print(result, flush=True)

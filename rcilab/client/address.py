@@ -12,13 +12,13 @@ DEFAULT_PORT = 1337  # By convention of the manual; the teach pendant's RCI page
 SPARE_LOOPBACK = "127.0.0.3"
 """Our address when the robot already owns the one that we would have used; any other in 127/8 would do."""
 
-_KNOWN_OPTIONS = ("udp_port", "client_port")
+_KNOWN_OPTIONS = ("udp_port", "client_port", "world_port")
 _EXAMPLE = "rci://192.168.0.160:1337"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RobotAddress:
-    """A parsed `rci://HOST:PORT[?udp_port=N&client_port=M]`."""
+    """A parsed `rci://HOST:PORT[?udp_port=N&client_port=M&world_port=W]`."""
 
     host: str
     port: int = DEFAULT_PORT
@@ -27,6 +27,9 @@ class RobotAddress:
     """Where the controller receives commands; None: at the same number as `port`."""
     client_port: int | None = None
     """Where the controller sends states; None: at the same number as `port`, as the RCI does it by itself."""
+
+    world_port: int | None = None
+    """Where a virtual controller lets things happen to its robot; None: unknown, or a real robot."""
 
     @property
     def command_port(self) -> int:
@@ -82,6 +85,7 @@ def parse_address(text: str) -> RobotAddress:
         port=DEFAULT_PORT if port is None else _port(text, "port", str(port)),
         udp_port=options.get("udp_port"),
         client_port=options.get("client_port"),
+        world_port=options.get("world_port"),
     )
 
 

@@ -4,17 +4,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from rcilab.arrays import Array, JointVector
+from rcilab.client.rotation import rotation_matrix, rotation_vector
 from rcilab.clock import CYCLE_TIME
 from rcilab.command import CartesianPosition, Command, JointPosition, JointTorque
+from rcilab.errors import SingularError
 from rcilab.limits import JointLimits, Limits
-from rcilab.motion import plan_stop
+from rcilab.motion import LIMIT_MARGIN, plan_stop
 from rcilab.state import RobotState
 
+if TYPE_CHECKING:
+    from rcilab.model import RobotModel
+
+_JOINT_SHARE = 0.6  # Part of the joints' acceleration and jerk that a stop of the tool uses; a choice.
+_STEP = 1e-6  # [rad] Of a difference.
+_SINGULAR = 1e-3  # Part of the largest singular value below which a direction counts as lost.
+_FLOOR = 1e-9  # So that a joint with nothing to do asks for no division by zero.
 _FAR = 1e3  # Position bounds that a Cartesian brake never meets: [m], [rad].
 
 
@@ -25,8 +34,8 @@ class Brake(Protocol):
         """Starts from the arm standing at its commanded state."""
         ...
 
-    def remember(self, command: Any, cycle: int) -> None:
-        """Takes note of a command that was sent in answer to a controller cycle."""
+    def remember(self, command: Any, cycle: int, state: RobotState) -> None:
+        """Takes note of a command that was sent in answer to a controller cycle's state."""
         ...
 
     def plan(self) -> Sequence[Command]:
@@ -81,7 +90,7 @@ class JointBrake:
         """Starts from the arm standing at its commanded angles."""
         self._stream.begin(*((cycle, state.q_c) for cycle in (-3, -2, -1)))
 
-    def remember(self, command: JointPosition, cycle: int) -> None:
+    def remember(self, command: JointPosition, cycle: int, state: RobotState) -> None:
         """Takes note of a command."""
         self._stream.remember(command.q, cycle)
 
@@ -93,35 +102,30 @@ class JointBrake:
 class CartesianBrake:
     """Brings a commanded pose to rest: position, rotation about the last orientation, and arm angle each by itself.
 
+    The controller judges the joints that it computes, too, and they are often the narrower bound: a tool stopped with
+    10 m/s^2 asks more of an elbow than it may give. So acceleration and jerk are taken down to what the joints allow
+    where the arm is.
+
     Args:
         limits: Bounds of the arm.
+        model: The arm, for what the joints allow; None looks at the tool's own bounds alone.
     """
 
-    def __init__(self, limits: Limits) -> None:
-        c, psi = limits.cartesian, limits.arm_angle
-        velocity = [c.translation_velocity] * 3 + [c.rotation_velocity] * 3
-        acceleration = [c.translation_acceleration] * 3 + [c.rotation_acceleration] * 3
-        jerk = [c.translation_jerk] * 3 + [c.rotation_jerk] * 3
-        # An arm without an arm angle leaves the seventh coordinate at 0, where any bound will do.
-        velocity.append(psi.velocity if psi else 1.0)
-        acceleration.append(psi.acceleration if psi else 1.0)
-        jerk.append(psi.jerk if psi else 1.0)
-        unused, far = np.zeros(7), np.full(7, _FAR)
-        self._stream = StreamBrake(
-            JointLimits(
-                lower=-far, upper=far, velocity=np.array(velocity), acceleration=np.array(acceleration),
-                jerk=np.array(jerk), torque=unused, torque_rate=unused, collision_threshold=unused, stiffness=unused,
-            )
-        )  # fmt: skip
+    def __init__(self, limits: Limits, model: RobotModel | None = None) -> None:
+        self._limits = limits
+        self._model = model
         self._poses: list[tuple[int, CartesianPosition]] = []
+        self._q: JointVector | None = None
 
     def begin(self, state: RobotState) -> None:
         """Starts from the arm standing at its commanded pose."""
         still = CartesianPosition(state.T_base_tool_c)
         self._poses = [(cycle, still) for cycle in (-3, -2, -1)]
+        self._q = state.q_c
 
-    def remember(self, command: CartesianPosition, cycle: int) -> None:
+    def remember(self, command: CartesianPosition, cycle: int, state: RobotState) -> None:
         """Takes note of a command."""
+        self._q = state.q_c
         if cycle > self._poses[-1][0]:
             self._poses = [*self._poses[-2:], (cycle, command)]
 
@@ -131,17 +135,40 @@ class CartesianBrake:
         R = last.T_base_tool[:3, :3]
         past: list[tuple[int, Array]] = []
         for cycle, pose in self._poses:
-            turn = _rotation_vector(pose.T_base_tool[:3, :3] @ R.T)
+            turn = rotation_vector(R, pose.T_base_tool[:3, :3])
             psi = 0.0 if pose.psi is None or last.psi is None else pose.psi - last.psi
             past.append((cycle, np.concatenate((pose.T_base_tool[:3, 3], turn, [psi]))))
-        self._stream.begin(*past)
+        stream = StreamBrake(self._bounds())
+        stream.begin(*past)
         way: list[Command] = []
-        for row in self._stream.rows():
+        for row in stream.rows():
             T = np.eye(4)
-            T[:3, :3] = _rotation(row[3:6]) @ R
+            T[:3, :3] = rotation_matrix(row[3:6]) @ R
             T[:3, 3] = row[:3]
             way.append(CartesianPosition(T, None if last.psi is None else last.psi + float(row[6])))
         return way
+
+    def _bounds(self) -> JointLimits:
+        """Returns bounds of position, rotation and arm angle, seven coordinates, as if they were joints."""
+        c, psi = self._limits.cartesian, self._limits.arm_angle
+        velocity = np.array([c.translation_velocity] * 3 + [c.rotation_velocity] * 3 + [1.0])
+        acceleration = np.array([c.translation_acceleration] * 3 + [c.rotation_acceleration] * 3 + [1.0])
+        jerk = np.array([c.translation_jerk] * 3 + [c.rotation_jerk] * 3 + [1.0])
+        if psi is not None:  # Without one the seventh coordinate stays at 0, where any bound will do.
+            velocity[6], acceleration[6], jerk[6] = psi.velocity, psi.acceleration, psi.jerk
+        # The tool's bounds hold for the length of a vector, these here for each of its three coordinates.
+        acceleration[:6] /= math.sqrt(3.0)
+        jerk[:6] /= math.sqrt(3.0)
+        if self._model is not None and self._q is not None:
+            needed = _joint_shares(self._model, self._q)
+            joint = self._limits.joint
+            acceleration *= min(1.0, _JOINT_SHARE * float((joint.acceleration / (needed @ acceleration)).min()))
+            jerk *= min(1.0, _JOINT_SHARE * float((joint.jerk / (needed @ jerk)).min()))
+        unused, far = np.zeros(7), np.full(7, _FAR)
+        return JointLimits(
+            lower=-far, upper=far, velocity=velocity, acceleration=acceleration, jerk=jerk, torque=unused,
+            torque_rate=unused, collision_threshold=unused, stiffness=unused,
+        )  # fmt: skip
 
 
 class TorqueBrake:
@@ -152,14 +179,14 @@ class TorqueBrake:
     """
 
     def __init__(self, limits: JointLimits) -> None:
-        self._step = limits.torque_rate * CYCLE_TIME
+        self._step = LIMIT_MARGIN * limits.torque_rate * CYCLE_TIME
         self._tau: JointVector = np.zeros_like(limits.torque_rate)
 
     def begin(self, state: RobotState) -> None:
         """Starts without torque."""
         self._tau = np.zeros_like(self._step)
 
-    def remember(self, command: JointTorque, cycle: int) -> None:
+    def remember(self, command: JointTorque, cycle: int, state: RobotState) -> None:
         """Takes note of a command."""
         self._tau = command.tau
 
@@ -172,18 +199,20 @@ class TorqueBrake:
         return way
 
 
-def _rotation_vector(R: Array) -> Array:
-    """Returns the axis times the angle, shape (3,), [rad], of a rotation well below half a turn."""
-    skew = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]) / 2.0
-    sine = float(np.linalg.norm(skew))
-    return skew if sine < 1e-12 else skew * (math.asin(min(1.0, sine)) / sine)
+def _joint_shares(model: RobotModel, q: JointVector) -> Array:
+    """Returns how much of each joint's motion each coordinate of the tool asks for at most, shape (n, 7).
 
-
-def _rotation(vector: Array) -> Array:
-    """Returns the rotation, shape (3, 3), about an axis by an angle, given as their product (Rodrigues)."""
-    angle = float(np.linalg.norm(vector))
-    x, y, z = vector if angle < 1e-12 else vector / angle
-    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    if angle < 1e-12:
-        return np.eye(3) + K
-    return np.eye(3) + math.sin(angle) * K + (1.0 - math.cos(angle)) * (K @ K)
+    The absolute values of the inverse Jacobian, with the arm angle as seventh row where there is one; at a singularity
+    those of the least-squares inverse.
+    """
+    J = np.zeros((7, model.n))
+    J[:6] = model.jacobian(q)
+    if model.n == 7:
+        try:
+            for i, unit in enumerate(np.eye(7) * _STEP):
+                J[6, i] = math.remainder(model.arm_angle(q + unit) - model.arm_angle(q - unit), math.tau) / (
+                    2.0 * _STEP
+                )
+        except SingularError:
+            J[6] = 0.0
+    return np.abs(np.linalg.pinv(J, rcond=_SINGULAR)) + _FLOOR

@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 
 from rcilab.arrays import Array
+from rcilab.clock import CYCLE_TIME
 from rcilab.command import CartesianPosition, Command, JointPosition, JointTorque
 from rcilab.errors import InvalidValueError
+from rcilab.limits import Limits
 from rcilab.state import RobotState
 
 START_TOLERANCE = 1e-6  # [rad] or [m] A first command this far off makes a jerk of 1000 rad/s^3, below every limit.
@@ -41,11 +43,16 @@ def check_command(command: Any, kind: type[Command], n: int, t: float) -> Comman
     return CartesianPosition(_numbers(name, command.T_base_tool, (4, 4), "m"), command.psi, command.finished)
 
 
-def require_first(command: Command, state: RobotState) -> None:
+def require_first(command: Command, state: RobotState, limits: Limits) -> None:
     """Refuses a first command that is not the commanded state: the arm would jump.
 
+    Args:
+        command: The first command of a motion.
+        state: The state that it answers.
+        limits: Bounds of the arm: torques begin at zero, so the first ones are at most one cycle's rate away from it.
+
     Raises:
-        InvalidValueError: It is elsewhere; the message names the joint, both angles and the tolerance.
+        InvalidValueError: It is elsewhere; the message names the joint, both values and the tolerance.
     """
     if isinstance(command, JointPosition):
         off = np.abs(command.q - state.q_c)
@@ -67,6 +74,17 @@ def require_first(command: Command, state: RobotState) -> None:
                 command.T_base_tool[:3, 3].tolist(),
                 f"must be the pose the arm is at: an element differs by {off:.3g} (tolerance {START_TOLERANCE:g}); "
                 "begin with state.T_base_tool_c",
+            )
+    else:
+        off = np.abs(command.tau) - limits.joint.torque_rate * CYCLE_TIME
+        joint = int(off.argmax())
+        if off[joint] >= 0.0:
+            bound = limits.joint.torque_rate[joint] * CYCLE_TIME
+            raise InvalidValueError(
+                "first command",
+                command.tau.tolist(),
+                f"N m must be near zero: joint {joint + 1} begins with {command.tau[joint]:.4g} N m, and the torque "
+                f"rate allows less than {bound:g} N m at first; begin with zeros, or give rate_limit='manual'",
             )
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 import time
 from collections import deque
-from collections.abc import Callable
-from typing import Any, TypeAlias
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from rcilab.client.brake import Brake, CartesianBrake, JointBrake, TorqueBrake
 from rcilab.client.checked_command import check_command, has_arrived, require_first
 from rcilab.client.commands import RciCommands
 from rcilab.client.fault_report import describe_faults
+from rcilab.client.filters import CommandFilter, is_near
 from rcilab.client.link import Link
 from rcilab.client.recorder import CycleLog
 from rcilab.clock import CYCLE_TIME
@@ -29,12 +30,17 @@ from rcilab.limits import Limits
 from rcilab.protocols.rci import StartMotionMode, build_command
 from rcilab.state import ControllerMode, RobotState
 
+if TYPE_CHECKING:
+    from rcilab.model import RobotModel
+
 SILENCE = 0.1  # [s] without a state while moving means that the connection is lost; a choice.
 CATCH_UP = 20  # Cycles: as many lost commands as a controller bridges at most (manual 4.6: 10 to 20).
 MODE_TIMEOUT = 3.0  # [s] for the controller to show the requested modes; virtual ones take 0.2 to 1.05 s.
 STOP_TIMEOUT = 1.0  # [s] for the answer to StopMove when something has gone wrong already.
+FILTER_CYCLES = 5000  # Cycles that filters get at most to arrive at the last command.
 SETTLE_CYCLES = 200  # Cycles that the last command is repeated at most until the controller has played it.
 REST_TIMEOUT = 1.0  # [s] for the controller's own stop after a fault; the slowest joint needs 0.3 s from full speed.
+_NEAR_CYCLES = 2  # Cycles in a row that a filter is at its command until it counts as standing there.
 RECORD_CYCLES = 50  # Cycles that a ControlError carries, as many as the vendor's client writes.
 
 Callback: TypeAlias = Callable[[RobotState, float], Command]
@@ -67,6 +73,8 @@ class ControlLoop:
         log: Where every cycle is written.
         watch: Asked in every cycle whether to stop.
         silence: Time without a state that counts as a lost connection, [s].
+        model: The arm, for stopping a tool within what its joints allow; not needed in the other modes.
+        filters: What every command of a callback passes before it is sent, in this order.
     """
 
     def __init__(
@@ -79,6 +87,8 @@ class ControlLoop:
         *,
         watch: Watch = lambda t: None,
         silence: float = SILENCE,
+        model: RobotModel | None = None,
+        filters: Sequence[CommandFilter] = (),
     ) -> None:
         if mode not in _MOTION_MODES:
             raise InvalidValueError("mode", mode, f"is no mode to move in; there are {[m.name for m in _MOTION_MODES]}")
@@ -91,6 +101,7 @@ class ControlLoop:
         self._log = log
         self._watch = watch
         self._silence = silence
+        self._filters = tuple(filters)
         self._first_id = 0
         self._answered_id = -1
         self._t = math.nan
@@ -98,7 +109,7 @@ class ControlLoop:
         self._pending: deque[RobotState] = deque()
         self._brake: Brake = {
             StartMotionMode.JOINT: lambda: JointBrake(limits.joint),
-            StartMotionMode.CARTESIAN: lambda: CartesianBrake(limits),
+            StartMotionMode.CARTESIAN: lambda: CartesianBrake(limits, model),
             StartMotionMode.IDLE: lambda: TorqueBrake(limits.joint),
         }[self._motion_mode]()
 
@@ -163,15 +174,32 @@ class ControlLoop:
                 self._pending.appendleft(state)  # Still without an answer: the way to rest begins with it.
                 return reason
             try:
-                command = self._checked(callback(state, t), state)
+                wanted = self._checked(callback(state, t), state)
+                command = self._filtered(wanted, state)
             except BaseException:
                 self._pending.appendleft(state)
                 raise
             self._answer(state, command)
-            if command.finished:
-                self._hold(command)
-                return None
+            if wanted.finished:
+                return self._finish(wanted, command)
             state = self._next()
+
+    def _finish(self, wanted: Command, sent: Command) -> str | None:
+        """Lets the filters arrive at the last command, then the controller; returns what `watch` said, as `run`."""
+        near = 0
+        for _ in range(FILTER_CYCLES if self._filters else 0):
+            near = near + 1 if is_near(sent, wanted) else 0
+            if near > _NEAR_CYCLES:
+                break
+            state = self._next()
+            reason = self._watch(self._time(state))
+            if reason is not None:
+                self._pending.appendleft(state)
+                return reason
+            sent = self._filtered(wanted, state)
+            self._answer(state, sent)
+        self._hold(wanted if near else sent)
+        return None
 
     def _next(self) -> RobotState:
         """Returns the next state that has not been answered yet, oldest first.
@@ -207,9 +235,8 @@ class ControlLoop:
         self._answered_id = state.message_id
         self._command = command
         self._t = self._time(state)
-        self._brake.remember(command, state.message_id - self._first_id)
-        joints = command.q.tolist() if isinstance(command, JointPosition) else None
-        self._log.write(state, self._link.received_ns, self._t, sent_ns, joints)
+        self._brake.remember(command, state.message_id - self._first_id, state)
+        self._log.write(state, self._link.received_ns, self._t, sent_ns, command)
 
     def _hold(self, command: Command) -> None:
         """Repeats the last command until the controller has played it: StopMove may overtake a queued one."""
@@ -269,11 +296,19 @@ class ControlLoop:
             before = states[-1]
 
     def _checked(self, command: Any, state: RobotState) -> Command:
-        """Returns the callback's command once it is found good; the first one must also be where the arm is."""
-        checked = check_command(command, self._kind, self._link.n, self._time(state))
-        if self._command is None:
-            require_first(checked, state)
-        return checked
+        """Returns the callback's command once it is found good."""
+        return check_command(command, self._kind, self._link.n, self._time(state))
+
+    def _filtered(self, command: Command, state: RobotState) -> Command:
+        """Returns what is to be sent for a command; the first one starts the filters, and must be where the arm is."""
+        is_first = self._command is None
+        for link in self._filters:
+            if is_first:
+                link.begin(command)
+            command = link.step(command)
+        if is_first:
+            require_first(command, state, self._limits)
+        return command
 
     def _time(self, state: RobotState) -> float:
         return (state.message_id - self._first_id) * CYCLE_TIME
@@ -282,7 +317,7 @@ class ControlLoop:
         t = self._time(state) if self._command is not None else math.nan
         self._log.write(state, self._link.received_ns, t)
         record = self._log.recorder.last(RECORD_CYCLES)
-        return ControlError(describe_faults(state.faults, record, t, self._limits.joint), state.faults, record)
+        return ControlError(describe_faults(state.faults, record, t, self._limits), state.faults, record)
 
     def _ended_by_controller(self, state: RobotState) -> ControlError:
         self._log.write(state, self._link.received_ns, self._time(state))

@@ -3,25 +3,30 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rcilab.arrays import Array
+from rcilab.client.rotation import nine
 from rcilab.clock import CYCLE_TIME
-from rcilab.conformance import JointMonitor
+from rcilab.conformance import Breach, CartesianMonitor, JointMonitor, TorqueMonitor
 from rcilab.faults import Fault
-from rcilab.limits import JointLimits
+from rcilab.limits import Limits
+from rcilab.spatial import Pose
+
+_HISTORY = 3  # Commands that a third difference looks back to.
 
 
-def describe_faults(faults: Iterable[Fault], record: NDArray[np.void], t: float, limits: JointLimits) -> str:
+def describe_faults(faults: Iterable[Fault], record: NDArray[np.void], t: float, limits: Limits) -> str:
     """Returns what to tell a person.
 
     Args:
         faults: What the controller reported, in wire order.
         record: The last cycles, see `cycle_dtype`.
         t: Motion time of the state that carried the faults, [s]; NaN before the first command.
-        limits: Bounds of the joints.
+        limits: Bounds of the arm.
     """
     faults = tuple(faults)
     when = "before the first command" if math.isnan(t) else f"at t = {t:.3f} s"
@@ -36,27 +41,77 @@ def describe_faults(faults: Iterable[Fault], record: NDArray[np.void], t: float,
     return "; ".join(parts)
 
 
-def _numbers(faults: tuple[Fault, ...], record: NDArray[np.void], limits: JointLimits) -> str:
-    """Returns the first command in the record that breaks a condition of one of the faults, or the fastest joint."""
+def _numbers(faults: tuple[Fault, ...], record: NDArray[np.void], limits: Limits) -> str:
+    """Returns the first command in the record that breaks a condition of one of the faults, or what the last one was.
+
+    What the controller measured, and the torques it computed, are not judged again here.
+    """
     sent = record[record["sent_ns"] != 0]
-    sent = sent[np.isfinite(sent["command"]).all(axis=1)]
-    if len(sent) < 4:
-        return ""
-    q, t = sent["command"], sent["t"]
-    monitor = JointMonitor(limits)
-    dq = (q[1:3] - q[:2]) / CYCLE_TIME
+    for field, judge, describe in (
+        ("command", _judge_joints, _describe_joints),
+        ("command_pose", _judge_poses, _describe_pose),
+        ("command_tau", _judge_torques, _describe_torques),
+    ):
+        rows = sent[np.isfinite(sent[field].reshape(len(sent), -1)).all(axis=1)]
+        if len(rows) < _HISTORY + 1:
+            continue
+        for place, breaches in judge(rows, limits):
+            for breach in breaches:
+                if breach.condition.fault in faults:
+                    return f"{breach.text} in the command at t = {rows['t'][place]:.3f} s"
+        return f"last command at t = {rows['t'][-1]:.3f} s, {describe(rows)}"
+    return ""
+
+
+def _judge_joints(rows: NDArray[np.void], limits: Limits) -> Iterator[tuple[int, list[Breach]]]:
+    q = rows["command"]
+    dq = np.diff(q[:_HISTORY], axis=0) / CYCLE_TIME
+    monitor = JointMonitor(limits.joint)
     monitor.reset(q[2].tolist(), dq[1].tolist(), ((dq[1] - dq[0]) / CYCLE_TIME).tolist())
-    for row in range(3, len(q)):
-        if set(monitor.step(q[row].tolist())) & set(faults):
-            for condition, joint, value, bound in monitor.broken():
-                if condition.fault in faults:
-                    return (
-                        f"joint {joint}: {condition.quantity} {value:.4g} {condition.unit} passes {bound:.4g} "
-                        f"{condition.unit} in the command at t = {t[row]:.3f} s"
-                    )
+    for place in range(_HISTORY, len(q)):
+        monitor.step(q[place].tolist())
+        yield place, monitor.broken()
+
+
+def _judge_poses(rows: NDArray[np.void], limits: Limits) -> Iterator[tuple[int, list[Breach]]]:
+    monitor = CartesianMonitor(limits)
+    poses = [_pose(T) for T in rows["command_pose"]]
+    psi = [angle if math.isfinite(angle) else None for angle in rows["command_psi"].tolist()]
+    monitor.reset(poses[0], psi[0])
+    for place in range(1, len(poses)):
+        monitor.step(poses[place], psi[place])
+        if place >= _HISTORY:  # The first differences only fill the monitor's memory.
+            yield place, monitor.broken()
+
+
+def _judge_torques(rows: NDArray[np.void], limits: Limits) -> Iterator[tuple[int, list[Breach]]]:
+    monitor = TorqueMonitor(limits.joint)
+    monitor.reset(rows["command_tau"][0].tolist())
+    for place in range(1, len(rows)):
+        monitor.step(rows["command_tau"][place].tolist())
+        yield place, monitor.broken()
+
+
+def _describe_joints(rows: NDArray[np.void]) -> str:
+    q = rows["command"]
     velocity = np.abs(q[-1] - q[-2]) / CYCLE_TIME
     joint = int(velocity.argmax())
-    return (
-        f"last command at t = {t[-1]:.3f} s, joint {joint + 1} the fastest with {velocity[joint]:.3g} rad/s "
-        f"at {math.degrees(q[-1][joint]):.2f} deg"
-    )
+    return f"joint {joint + 1} the fastest with {velocity[joint]:.3g} rad/s at {math.degrees(q[-1][joint]):.2f} deg"
+
+
+def _describe_pose(rows: NDArray[np.void]) -> str:
+    position = rows["command_pose"][:, :3, 3]
+    speed = float(np.linalg.norm(position[-1] - position[-2])) / CYCLE_TIME
+    x, y, z = position[-1].tolist()
+    return f"tool at {x:.3f}, {y:.3f}, {z:.3f} m with {speed:.3g} m/s"
+
+
+def _describe_torques(rows: NDArray[np.void]) -> str:
+    tau = rows["command_tau"][-1]
+    joint = int(np.abs(tau).argmax())
+    return f"largest torque {tau[joint]:.3g} N m at joint {joint + 1}"
+
+
+def _pose(T: Array) -> Pose:
+    x, y, z = T[:3, 3].tolist()
+    return Pose.from_parts(nine(T[:3, :3]), (x, y, z))

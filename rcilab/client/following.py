@@ -1,18 +1,19 @@
-"""A prepared motion as a callback: one row of joint angles for every controller cycle."""
+"""A prepared motion as a callback: one row of joint angles, or one pose of a path, for every controller cycle."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import TYPE_CHECKING, TypeAlias
 
-from rcilab.arrays import JointPath
+from rcilab.arrays import Array, JointPath
 from rcilab.client.control_loop import Callback
 from rcilab.clock import CYCLE_TIME
-from rcilab.command import JointPosition
+from rcilab.command import CartesianPosition, JointPosition
 from rcilab.state import RobotState
 
 if TYPE_CHECKING:
     from rcilab.motion import Motion
+    from rcilab.motion.path import Path
 
 Progress: TypeAlias = Callable[[float, float], None]
 """`(t, duration)`, both [s]; called about 20 times a second from inside the loop, so it must be quick."""
@@ -34,6 +35,27 @@ def follow(rows: JointPath, on_cycle: Callable[[int], None] | None = None) -> Ca
         if on_cycle is not None:
             on_cycle(cycle)
         return JointPosition(rows[cycle], finished=cycle == last)
+
+    return callback
+
+
+def follow_poses(path: Path, shares: Array, with_psi: bool, on_cycle: Callable[[int], None] | None = None) -> Callback:
+    """Returns the callback that streams a path of the tool: the pose at share k of the way in controller cycle k.
+
+    Args:
+        path: The path.
+        shares: From 0 to 1, shape (N,).
+        with_psi: Whether to send the arm angle; if not, the controller holds its own.
+        on_cycle: Told the number of every cycle.
+    """
+    last = len(shares) - 1
+
+    def callback(state: RobotState, t: float) -> CartesianPosition:
+        cycle = min(round(t / CYCLE_TIME), last)
+        if on_cycle is not None:
+            on_cycle(cycle)
+        pose, psi = path.at(float(shares[cycle]))
+        return CartesianPosition(pose.matrix, psi if with_psi else None, finished=cycle == last)
 
     return callback
 

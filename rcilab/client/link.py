@@ -40,12 +40,24 @@ class Link:
         """The newest state received so far."""
         self.received_ns = 0
         """When that was, monotonic, [ns]."""
+        self._empty_ns = 0  # When the socket was last seen empty.
+        self._latest_since_ns = 0  # When it was last empty before the newest state came.
         self.undecodable = 0
         """Datagrams of the right size that were no state."""
         self.on_states: Callable[[list[RobotState]], None] = _ignore
         """Called at least every 0.05 s while the answer to a request is awaited, with the states that came in."""
         self._transport = transport
         self._command_id = 0
+
+    @property
+    def local_address(self) -> tuple[str, int]:
+        """Where states come to: our address and UDP port."""
+        return self._transport.local_address
+
+    @property
+    def age(self) -> float:
+        """How long ago the newest state was sent, at most: counted from when none was there before it, [s]."""
+        return (time.monotonic_ns() - self._latest_since_ns) * 1e-9
 
     def poll(self, timeout: float) -> list[RobotState]:
         """Returns every state that has arrived, oldest first; waits up to `timeout`, [s], for the first one."""
@@ -93,8 +105,9 @@ class Link:
 
     def _take_states(self) -> list[RobotState]:
         states: list[RobotState] = []
+        empty_ns = self._empty_ns
         datagrams = self._transport.receive_states()
-        self.received_ns = time.monotonic_ns()
+        self._empty_ns = self.received_ns = time.monotonic_ns()
         for datagram in datagrams:
             try:
                 states.append(decode_state(datagram, self.n))
@@ -102,6 +115,7 @@ class Link:
                 self.undecodable += 1
         if states:
             self.latest = states[-1]
+            self._latest_since_ns = empty_ns
         return states
 
 

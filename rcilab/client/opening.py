@@ -31,7 +31,7 @@ def require_arm_there(commands: RciCommands, name: str, lengths: Lengths, addres
         ModelError: It is another arm; the message names both.
     """
     try:
-        dh = commands.load_robot_model().dh
+        dh = commands.load_model().dh
     except CommandRejectedError:
         return
     require_same_arm(dh, name, lengths, address)

@@ -11,11 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rcilab.clock import CYCLE_TIME
+from rcilab.command import CartesianPosition, Command, JointPosition, JointTorque
 from rcilab.faults import Fault
 from rcilab.state import RobotState
 
 RECORD_TIME = 60.0  # [s] of cycles that a recorder keeps unless told otherwise; a choice.
 _CYCLE_NS = round(CYCLE_TIME * 1e9)
+_NO_POSE = (math.nan,) * 16
 _GRID_CYCLES = 8  # A controller that slips counts as late for so many cycles, a hiccup of ours for as many at most.
 
 
@@ -29,10 +31,14 @@ def cycle_dtype(n: int) -> np.dtype[np.void]:
     lateness                how late the cycle was handled, against the robot's own 1 ms grid, [s]
     success_rate            share of commands that arrived in time, as the controller reports it, 0 to 1
     q, q_c, dq              measured and commanded joint angles [rad], measured velocities [rad/s], shape (n,)
-    command                 joint angles sent in answer, [rad], shape (n,); NaN when nothing was sent
+    command                 joint angles sent in answer, [rad], shape (n,); NaN when none were sent
     faults                  the error bits as one number, bit k = `Fault(k)`
     lost                    controller cycles between the previous row and this one that never reached us
     robot_mode, controller_mode, motion_generator_mode    as on the wire
+    tau                     measured joint torques, [N m], shape (n,)
+    command_pose            pose of the tool in base sent in answer, [m], shape (4, 4); NaN when none was sent
+    command_psi             arm angle sent with it, [rad]; NaN when none was sent
+    command_tau             joint torques sent in answer, [N m], shape (n,); NaN when none were sent
     ======================  ==================================================================================
     """
     vector = ("<f8", (n,))
@@ -54,6 +60,10 @@ def cycle_dtype(n: int) -> np.dtype[np.void]:
             ("controller_mode", "u1"),
             ("motion_generator_mode", "u1"),
             ("reserved", "u1", (5,)),
+            ("tau", *vector),
+            ("command_pose", "<f8", (4, 4)),
+            ("command_psi", "<f8"),
+            ("command_tau", *vector),
         ]
     )
 
@@ -79,7 +89,8 @@ class Recorder:
         memory = bytearray(capacity * self._size) if buffer is None else buffer
         self._memory = memory
         self._rows: NDArray[np.void] = np.frombuffer(memory, dtype=dtype, count=capacity)
-        self._pack = struct.Struct(f"<Qdqqdd{4 * n}dIIBBB5x").pack_into
+        self._pack = struct.Struct(f"<Qdqqdd{4 * n}dIIBBB5x{2 * n + 17}d").pack_into
+        self._nothing = (math.nan,) * n
 
     def write(
         self,
@@ -96,14 +107,22 @@ class Recorder:
         faults: int,
         lost: int,
         modes: Sequence[int],
+        tau: Sequence[float] | None = None,
+        pose: Sequence[float] = _NO_POSE,
+        psi: float = math.nan,
+        command_tau: Sequence[float] | None = None,
     ) -> None:
-        """Writes one row; see `cycle_dtype` for the meaning. `modes`: robot, controller, motion generator."""
+        """Writes one row; see `cycle_dtype` for the meaning.
+
+        `modes`: robot, controller, motion generator. `pose`: 16 numbers, row-major, sent in answer like `psi`.
+        """
         self._pack(
             self._memory,
             self.count % self.capacity * self._size,
             message_id, t, received_ns, sent_ns, lateness, success_rate,
             *q, *q_c, *dq, *command,
             faults, lost, *modes,
+            *(tau or self._nothing), *pose, psi, *(command_tau or self._nothing),
         )  # fmt: skip
         self.count += 1
 
@@ -159,7 +178,7 @@ class CycleLog:
         received_ns: int,
         t: float = math.nan,
         sent_ns: int = 0,
-        command: Sequence[float] | None = None,
+        command: Command | None = None,
     ) -> None:
         """Records one state and, where there was one, the answer to it.
 
@@ -168,7 +187,7 @@ class CycleLog:
             received_ns: When it arrived, monotonic, [ns].
             t: Motion time, [s].
             sent_ns: When it was answered, monotonic, [ns]; 0 when it was not.
-            command: Joint angles sent in answer, n numbers, [rad].
+            command: What was sent in answer.
         """
         number = state.message_id
         lost = 0
@@ -180,6 +199,14 @@ class CycleLog:
         self._last_id = number
         self._origins.append(received_ns - number * _CYCLE_NS)
         self.lateness = ((sent_ns or received_ns) - number * _CYCLE_NS - min(self._origins)) * 1e-9
+        q, pose, psi, tau = self._nothing, _NO_POSE, math.nan, self._nothing
+        if isinstance(command, JointPosition):
+            q = command.q.tolist()
+        elif isinstance(command, CartesianPosition):
+            pose = command.T_base_tool.ravel().tolist()
+            psi = math.nan if command.psi is None else command.psi
+        elif isinstance(command, JointTorque):
+            tau = command.tau.tolist()
         self.recorder.write(
             number,
             t,
@@ -190,10 +217,14 @@ class CycleLog:
             state.q.tolist(),
             state.q_c.tolist(),
             state.dq.tolist(),
-            self._nothing if command is None else command,
+            q,
             _bits(state.faults) if state.faults else 0,
             lost,
             (state.robot_mode, state.controller_mode, state.motion_generator_mode),
+            state.tau.tolist(),
+            pose,
+            psi,
+            tau,
         )
         if self._on_row is not None:
             self._on_row(self)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from os import PathLike
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from rcilab.arrays import Array, JointPath
 from rcilab.clock import CYCLE_TIME
+from rcilab.cycle_file import save_cycles
 from rcilab.faults import FAULT_COUNT, Fault
 
 if TYPE_CHECKING:
@@ -86,6 +88,26 @@ class Run:
         return self.cycles["command"]
 
     @property
+    def tau(self) -> JointPath:
+        """Measured joint torques, shape (N, n), [N m]."""
+        return self.cycles["tau"]
+
+    @property
+    def command_pose(self) -> Array:
+        """Tool poses sent in answer, shape (N, 4, 4), [m]; NaN where a cycle was not answered with a pose."""
+        return self.cycles["command_pose"]
+
+    @property
+    def command_psi(self) -> Array:
+        """Arm angles sent in answer, shape (N,), [rad]; NaN where none was sent."""
+        return self.cycles["command_psi"]
+
+    @property
+    def command_tau(self) -> JointPath:
+        """Joint torques sent in answer, shape (N, n), [N m]; NaN where a cycle was not answered with torques."""
+        return self.cycles["command_tau"]
+
+    @property
     def success_rate(self) -> Array:
         """Share of commands that arrived in time, as the controller reports it, shape (N,)."""
         return self.cycles["success_rate"]
@@ -104,9 +126,12 @@ class Run:
     @property
     def delay(self) -> int:
         """Cycles between a command and the state that reports it as commanded; found by comparison, usually 1."""
+        wanted = self.command
+        if self.plan is not None and not np.isfinite(wanted).any():  # Sent as poses: the plan says which angles.
+            wanted = self._planned(0)
         best, least = 1, math.inf
         for delay in range(1, min(_LONGEST_DELAY, len(self.cycles) - 1) + 1):
-            difference = np.abs(self.q_c[delay:] - self.command[:-delay])
+            difference = np.abs(self.q_c[delay:] - wanted[:-delay])
             if np.isfinite(difference).any():
                 size = float(np.nanmax(difference))
                 if size < least:
@@ -123,12 +148,21 @@ class Run:
         """
         if self.plan is None:
             return self._lag()
-        delay = self.delay
+        return self.q - self._planned(self.delay)
+
+    def _planned(self, delay: int) -> JointPath:
+        """The plan at every row, `delay` cycles late, shape (N, n), [rad]."""
+        assert self.plan is not None
         rows = np.clip(np.rint(self.t / CYCLE_TIME).astype(np.intp) - delay, 0, len(self.plan.q) - 1)
-        return self.q - self.plan.q[rows]
+        return self.plan.q[rows]
 
     def _lag(self) -> JointPath:
-        """Measured minus commanded joint angles, shape (N, n), [rad], with the play-out delay taken out."""
+        """Measured minus commanded joint angles, shape (N, n), [rad], with the play-out delay taken out.
+
+        Where no joint angles were sent, against those that the controller reports as commanded.
+        """
+        if not np.isfinite(self.command).any():
+            return self.q - self.q_c
         delay = self.delay
         wanted = np.full_like(self.q, np.nan)
         if len(wanted) > delay:
@@ -165,6 +199,14 @@ class Run:
             lateness_max=float(lateness.max()),
             late=int((lateness > CYCLE_TIME).sum()),
         )
+
+    def save(self, file: str | PathLike[str]) -> None:
+        """Writes every recorded cycle to a file; its ending chooses the format: .csv or .npz.
+
+        Raises:
+            InvalidValueError: The ending is unknown, or the file cannot be written.
+        """
+        save_cycles(self.cycles, file)
 
     def __repr__(self) -> str:
         facts = [f"{self.duration:.3f} s", f"{len(self.cycles)} cycles"]

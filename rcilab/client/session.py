@@ -4,39 +4,38 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from types import TracebackType
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias, get_args
+from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
 
+from rcilab.arrays import as_number
 from rcilab.client.address import parse_address
 from rcilab.client.commands import RciCommands
 from rcilab.client.control_loop import SILENCE, Callback, ControlLoop
-from rcilab.client.following import Progress, follow, report_progress
+from rcilab.client.filters import CommandFilter
 from rcilab.client.identify import dh_lengths, identify_robot
 from rcilab.client.link import Link
+from rcilab.client.motions import Mode, Motions
 from rcilab.client.opening import await_first_state, require_arm_there, require_timeout
 from rcilab.client.punctual import punctual
 from rcilab.client.recorder import RECORD_TIME, CycleLog, Recorder
 from rcilab.client.recovery import recover
 from rcilab.client.run import Run, build_run
-from rcilab.client.start_check import describe_start_mismatch, require_motion
 from rcilab.client.transport import SocketTransport
+from rcilab.client.world import World
 from rcilab.clock import CYCLE_TIME
+from rcilab.closing import Closing
 from rcilab.errors import ConnectionLostError, InvalidValueError, UsageError
 from rcilab.protocols.rci import STATE_SIZE, Request
+from rcilab.safety_box import SafetyBox
 from rcilab.spatial import Pose
 from rcilab.state import ControllerMode, RobotState
 
 if TYPE_CHECKING:
-    from rcilab.conformance import Certificate
     from rcilab.model import RobotModel
     from rcilab.motion import Motion
-
-Mode: TypeAlias = Literal["joint_position", "joint_impedance", "cartesian_position", "cartesian_impedance", "torque"]
-MODES: tuple[Mode, ...] = get_args(Mode)
 
 _CLOSED = "the session was closed while a motion ran"
 _CLOSE_TIMEOUT = 10.0  # [s] for another thread to bring its motion to rest; the slowest joint needs 0.4 s.
@@ -49,7 +48,7 @@ def connect(address: str, model: RobotModel | None = None, timeout: float = 3.0)
 
     Args:
         address: `rci://HOST:PORT`; `?udp_port=N` when the robot takes commands at another UDP port,
-            `?client_port=M` when it sends states to another port of ours.
+            `?client_port=M` when it sends states to another port of ours; `?world_port=W` for `world`.
         model: The arm, with its tool and load; None takes the arm that the controller says it is.
         timeout: How long to wait for the connection, for the first state, and for every answer, [s].
 
@@ -69,6 +68,7 @@ def open_session(
     realtime: bool = True,
     silence: float = SILENCE,
     on_close: Callable[[], None] = lambda: None,
+    world: World | None = None,
 ) -> RobotSession:
     """Returns a session as `connect` does, with what only a simulation sets; see `RobotSession`."""
     place = parse_address(address)
@@ -83,18 +83,20 @@ def open_session(
         if model is None:
             from rcilab.model import load_model
 
-            model = load_model(identify_robot(RciCommands(link).load_robot_model().dh))
+            model = load_model(identify_robot(RciCommands(link).load_model().dh))
             link.n = model.n
         else:
             require_arm_there(RciCommands(link), model.name, dh_lengths(model.description.dh), str(place))
         await_first_state(link, place, transport.local_address, timeout)
-        return RobotSession(link, model, realtime=realtime, silence=silence, on_close=on_close)
+        if world is None and place.world_port is not None:
+            world = World(place.host, place.world_port)
+        return RobotSession(link, model, realtime=realtime, silence=silence, on_close=on_close, world=world)
     except BaseException:
         transport.close()
         raise
 
 
-class RobotSession(RciCommands):
+class RobotSession(Motions, Closing):
     """A connected arm: its state, every RCI command, and motions at 1 kHz. Made by `connect` and `simulate`.
 
     While a motion runs, only `stop`, `close` and `state` may be called, from any thread and from a callback; all else
@@ -106,6 +108,7 @@ class RobotSession(RciCommands):
         realtime: False for a controller in lock-step, where timing means nothing.
         silence: Time without a state, while moving, that counts as a lost connection, [s].
         on_close: Called once when the session is closed, such as to end a private controller.
+        world: What surrounds a virtual robot; None where nothing of the kind is known.
     """
 
     def __init__(
@@ -116,12 +119,15 @@ class RobotSession(RciCommands):
         realtime: bool = True,
         silence: float = SILENCE,
         on_close: Callable[[], None] = lambda: None,
+        world: World | None = None,
     ) -> None:
         super().__init__(link, model.limits)
         self._model = model
+        self._safety_box: SafetyBox | None = None
         self._realtime = realtime
         self._silence = silence
         self._on_close = on_close
+        self._world = world
         self._stop_reason: str | None = None
         self._moving = False
         self._closing = False
@@ -135,9 +141,28 @@ class RobotSession(RciCommands):
         return self._model
 
     @property
+    def safety_box(self) -> SafetyBox | None:
+        """The box that the tool must stay in, as far as this session has set one; motions are checked with it."""
+        return self._safety_box
+
+    @property
     def address(self) -> str:
         """Where the robot is."""
         return self._link.name
+
+    @property
+    def world(self) -> World:
+        """What surrounds a virtual robot: `robot.world.push([0, 0, -20, 0, 0, 0])`.
+
+        Raises:
+            UsageError: It is a real robot, or the world port of the virtual one is not known.
+        """
+        if self._world is None:
+            raise UsageError(
+                f"{self._link.name}: no world port is known; simulate() always has one, and to connect() it is told: "
+                "rcilab controller prints it (world HOST:PORT), add ?world_port=PORT to the address"
+            )
+        return self._world
 
     @property
     def state(self) -> RobotState:
@@ -146,20 +171,26 @@ class RobotSession(RciCommands):
             return self._link.latest
         return self.receive_state()
 
-    def receive_state(self, timeout: float = 1.0) -> RobotState:
+    def receive_state(self, timeout: float = 1.0, max_age: float = 0.0) -> RobotState:
         """Returns a state that was sent after this call; older ones that waited in the socket are dropped.
 
         Args:
             timeout: How long to wait for it, [s].
+            max_age: How long ago it may have been sent, [s]: a state that is certainly no older is returned without
+                waiting. 0 takes only one that is sent after the call.
 
         Raises:
             ConnectionLostError: None came.
             UsageError: The session is closed, or a motion runs: `state` is the newest then.
         """
         require_timeout(timeout)
+        if not as_number(max_age, "max_age", "s") >= 0.0:
+            raise InvalidValueError("max_age", max_age, "must not be below 0 [s]")
         with self._turn("receive_state"):
             while self._link.poll(0.0):
                 pass
+            if self._link.latest is not None and self._link.age <= max_age:
+                return self._link.latest
             states = self._link.poll(timeout)
         if not states:
             raise ConnectionLostError(
@@ -168,63 +199,18 @@ class RobotSession(RciCommands):
             )
         return states[-1]
 
-    def execute(self, motion: Motion, certificate: Certificate | None = None, progress: Progress | None = None) -> Run:
-        """Streams a motion and returns what became of it. Checks it first.
-
-        Args:
-            motion: The motion; it must begin at the commanded angles of the arm, `state.q_c`.
-            certificate: From an earlier `check(motion, model)`; then only its freshness is verified.
-            progress: Told how far it is, about 20 times a second.
-
-        Raises:
-            ConformanceError: The motion breaks a condition; nothing moved.
-            CertificateError: The certificate is for something else; nothing moved.
-            UsageError: The motion starts elsewhere than the arm is; nothing moved.
-            ControlError: The controller stopped it; `.faults` and `.record` say why. `recover()` leads on.
-            ConnectionLostError: The controller is gone.
-        """
-        require_motion(motion, certificate)
-        with self._turn("execute"):
-            return self._execute(motion, certificate, progress)
-
-    def _execute(self, motion: Motion, certificate: Certificate | None, progress: Progress | None) -> Run:
-        state = self.receive_state()
-        mismatch = describe_start_mismatch(motion.q[0], state.q_c)
-        if mismatch is not None:
-            raise UsageError(mismatch)
-        if certificate is None:
-            from rcilab.conformance import check
-
-            check(motion, self.model, start=state.q_c).require()
-        else:
-            certificate.verify(motion, self.model, state.q_c)
-        return self._run(follow(motion.q, report_progress(motion, progress)), "joint_position", motion)
-
-    def control(self, callback: Callback, mode: Mode = "joint_position") -> Run:
-        """Runs a callback in every controller cycle until it returns a command with `finished=True`.
-
-        The first command must be where the arm is: `JointPosition(state.q_c)`. t counts controller cycles since the
-        first call, in seconds, so a lost packet does not stretch time.
-
-        Args:
-            callback: `(state, t) -> JointPosition | CartesianPosition | JointTorque`, as the mode asks for.
-            mode: How the controller shall follow.
-
-        Raises:
-            ControlError: The controller stopped the motion; `.faults` and `.record` say why. `recover()` leads on.
-            ConnectionLostError: The controller is gone.
-            InvalidValueError: A command was unusable; the arm was brought to rest.
-            Exception: Whatever the callback raised; the arm was brought to rest.
-        """
-        with self._turn("control"):
-            return self._run(callback, mode, None)
-
     def set_coor(self, T_flange_tool: Pose) -> None:
         """Sets the tool by its pose in the flange frame; `model` has it from then on."""
         with self._turn("SetCoor"):
             model = self._model.with_tool(T_flange_tool)
             super().set_coor(T_flange_tool)
             self._model = model
+
+    def set_cartesian_limit(self, box: SafetyBox) -> None:
+        """Sets the safety box that the origin of the tool must stay in, and whether it is watched."""
+        with self._turn("SetCartesianLimit"):
+            super().set_cartesian_limit(box)
+            self._safety_box = box
 
     def set_load(self, mass: float, center_of_mass: ArrayLike, inertia: ArrayLike) -> None:
         """Sets the load at the flange; `model` has it from then on.
@@ -275,20 +261,16 @@ class RobotSession(RciCommands):
             if is_mine:
                 self._busy.release()
 
-    def __enter__(self) -> RobotSession:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def reboot(self) -> None:
+        """Restarts the controller. The session is closed then: connect again once it is up."""
+        with self._turn("RebootRobot"):
+            super().reboot()
         self.close()
 
     def __repr__(self) -> str:
         return f"<RobotSession {self.model.name} at {self._link.name}{', closed' if self._closed else ''}>"
 
-    def _run(self, callback: Callback, mode: Mode, plan: Motion | None) -> Run:
-        if mode not in MODES:
-            raise InvalidValueError("mode", mode, f"is unknown; known: {', '.join(MODES)}")
+    def _run(self, callback: Callback, mode: Mode, plan: Motion | None, filters: Sequence[CommandFilter] = ()) -> Run:
         time_needed = RECORD_TIME if plan is None else plan.duration
         recorder = Recorder(self.n, math.ceil(time_needed / CYCLE_TIME) + _SPARE_CYCLES)
         self._stop_reason = None
@@ -300,6 +282,8 @@ class RobotSession(RciCommands):
             CycleLog(recorder),
             watch=lambda t: _CLOSED if self._closing else self._stop_reason,
             silence=self._silence,
+            model=self.model,
+            filters=filters,
         )
         self._mover = threading.get_ident()
         self._moving = True
@@ -344,4 +328,6 @@ class RobotSession(RciCommands):
         if not self._closed:
             self._closed = True
             self._link.close()
+            if self._world is not None:
+                self._world.close()
             self._on_close()

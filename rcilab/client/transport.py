@@ -20,6 +20,11 @@ _MS = 1000.0
 class Transport(Protocol):
     """What a client needs of the wire. Owned by one thread."""
 
+    @property
+    def local_address(self) -> tuple[str, int]:
+        """Where states come to: our address and UDP port."""
+        ...
+
     def send_request(self, frame: bytes) -> None:
         """Sends one TCP frame."""
         ...

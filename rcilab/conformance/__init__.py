@@ -2,24 +2,40 @@
 
 from __future__ import annotations
 
+from rcilab.conformance.box_monitor import BoxMonitor
+from rcilab.conformance.breach import Breach, describe_breaches
+from rcilab.conformance.cartesian_monitor import CartesianMonitor
 from rcilab.conformance.certificate import Certificate, verify_certificate
 from rcilab.conformance.check import check
-from rcilab.conformance.conditions import CONDITIONS, CYCLE_CONDITIONS, Condition, find_condition
+from rcilab.conformance.condition import Condition
+from rcilab.conformance.conditions import CONDITIONS, CYCLE_CONDITIONS, explain_fault, find_condition
+from rcilab.conformance.limit_tables import LimitTable, cartesian_limits
+from rcilab.conformance.measured_monitor import MeasuredMonitor
 from rcilab.conformance.monitor import JointMonitor
 from rcilab.conformance.report import ConditionResult, Report, Violation
 from rcilab.conformance.start import StartState
+from rcilab.conformance.torque_monitor import TorqueMonitor
 
 __all__ = [
     "CONDITIONS",
     "CYCLE_CONDITIONS",
+    "BoxMonitor",
+    "Breach",
+    "CartesianMonitor",
     "Certificate",
     "Condition",
     "ConditionResult",
     "JointMonitor",
+    "LimitTable",
+    "MeasuredMonitor",
     "Report",
     "StartState",
+    "TorqueMonitor",
     "Violation",
+    "cartesian_limits",
     "check",
+    "describe_breaches",
+    "explain_fault",
     "find_condition",
     "verify_certificate",
 ]

@@ -17,6 +17,7 @@ from rcilab.conformance.start import StartState, as_start
 from rcilab.errors import CertificateError, InvalidValueError
 from rcilab.model import RobotModel, require_model
 from rcilab.motion.motion import Motion, require_motion
+from rcilab.safety_box import SafetyBox
 
 NO_SAFETY_BOX = "none"
 """The part of a certificate that says that the motion was judged without a safety box."""
@@ -43,13 +44,17 @@ class Certificate:
         """One SHA-256 over all parts, hexadecimal."""
         return hashlib.sha256(repr(self.entries).encode()).hexdigest()
 
-    def verify(self, motion: Motion, model: RobotModel, start_q: ArrayLike | StartState) -> None:
+    def verify(
+        self, motion: Motion, model: RobotModel, start_q: ArrayLike | StartState, box: SafetyBox | None = None
+    ) -> None:
         """Makes sure that this certificate is for this motion on this arm from this start.
 
         Args:
             motion: The motion that is about to run.
             model: The arm as it is now, with its tool and load.
             start_q: Commanded joint angles now (`state.q_c`), shape (n,), [rad]; or a StartState for a moving arm.
+            box: The safety box that is in force now. Where there is none, or it is not active, a motion that was
+                judged inside a box is as good as one that was not.
 
         Raises:
             CertificateError: Something is not what was judged; `.changed` and the message name it.
@@ -58,10 +63,12 @@ class Certificate:
         require_motion(motion)
         require_model(model)
         start = as_start(start_q, len(self.start_q)) if motion.n == len(self.start_q) else None
-        now = dict(issue_certificate(motion, model, start).entries) if start is not None else {"motion": ""}
+        now = dict(issue_certificate(motion, model, start, box).entries) if start is not None else {"motion": ""}
         changed = [name for name, fingerprint in self.entries if now.get(name, fingerprint) != fingerprint]
         if start is not None and "start state" in changed and self._same_start(start):
             changed.remove("start state")
+        if "safety box" in changed and (box is None or not box.active):
+            changed.remove("safety box")
         if changed:
             raise CertificateError(self._reason(changed, start), changed)
 
@@ -84,27 +91,40 @@ class Certificate:
                     f"plan it again from where the arm is (state.q_c)"
                 )
             return "the motion was judged from another start: the arm moves differently now; plan it again"
+        if changed == ["safety box"]:
+            return (
+                "the certificate is stale: it does not cover the safety box that is in force; check the motion again "
+                "with box=..., the one that set_cartesian_limit was given"
+            )
         what = " and ".join(filter(None, (", ".join(changed[:-1]), changed[-1])))
         verb = "has" if len(changed) == 1 else "have"
         return f"the certificate is stale: {what} {verb} changed since the motion was judged; check it again"
 
 
-def issue_certificate(motion: Motion, model: RobotModel, start: StartState) -> Certificate:
+def issue_certificate(
+    motion: Motion, model: RobotModel, start: StartState, box: SafetyBox | None = None
+) -> Certificate:
     """Returns the certificate of a motion; only a report that is ok may hand it out."""
     prints = model.fingerprint
     parts = {
         "motion": motion.fingerprint,
         **{name: prints[name] for name in MODEL_PARTS},
-        "safety box": NO_SAFETY_BOX,
+        "safety box": _box_fingerprint(box),
         "start state": _start_fingerprint(start),
     }
     return Certificate(tuple(parts.items()), tuple(start.q.tolist()))
 
 
 def verify_certificate(
-    certificate: Certificate | None, motion: Motion, model: RobotModel, start_q: ArrayLike | StartState
+    certificate: Certificate | None,
+    motion: Motion,
+    model: RobotModel,
+    start_q: ArrayLike | StartState,
+    box: SafetyBox | None = None,
 ) -> None:
     """Makes sure that there is a certificate and that it is for this; the gate in front of every hand-off.
+
+    Arguments as in `Certificate.verify`.
 
     Raises:
         CertificateError: There is none, or it is stale.
@@ -117,7 +137,7 @@ def verify_certificate(
             ("certificate",),
         )
     require_certificate(certificate)
-    certificate.verify(motion, model, start_q)
+    certificate.verify(motion, model, start_q, box)
 
 
 def require_certificate(certificate: object) -> Certificate:
@@ -136,3 +156,9 @@ def require_certificate(certificate: object) -> Certificate:
 def _start_fingerprint(start: StartState) -> str:
     state = np.stack([start.q, start.dq, start.ddq]) + 0.0  # Makes -0.0 and 0.0 the same bytes.
     return hashlib.sha256(state.tobytes()).hexdigest()
+
+
+def _box_fingerprint(box: SafetyBox | None) -> str:
+    if box is None or not box.active:
+        return NO_SAFETY_BOX
+    return hashlib.sha256(repr((box.size, box.T_base_box.as_row_major())).encode()).hexdigest()

@@ -7,33 +7,44 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rcilab.arrays import Array
+from rcilab.arrays import Array, described
 from rcilab.clock import CYCLE_TIME
 from rcilab.conformance.certificate import issue_certificate
-from rcilab.conformance.conditions import CONDITIONS, START_POSITION_TOLERANCE, Condition
+from rcilab.conformance.condition import Condition
+from rcilab.conformance.conditions import MOTION_CONDITIONS
 from rcilab.conformance.report import ConditionResult, Report, Violation
+from rcilab.conformance.signals import HOLD_SAMPLES as HOLD_SAMPLES
+from rcilab.conformance.signals import MotionSignals
 from rcilab.conformance.start import StartState, as_start
+from rcilab.conformance.tool_conditions import CARTESIAN_POSITION
 from rcilab.conformance.wording import advise
 from rcilab.errors import InvalidValueError
 from rcilab.model import RobotModel, require_model
-from rcilab.motion.motion import Motion, MotionSample, require_motion
-
-HOLD_SAMPLES = 3
-"""Cycles judged after the last row, in which the controller repeats it: a third difference looks back that far."""
+from rcilab.motion.motion import Motion, require_motion
+from rcilab.safety_box import SafetyBox
 
 
-def check(motion: Motion, model: RobotModel, *, start: ArrayLike | StartState | None = None) -> Report:
+def check(
+    motion: Motion,
+    model: RobotModel,
+    *,
+    start: ArrayLike | StartState | None = None,
+    box: SafetyBox | None = None,
+) -> Report:
     """Returns what the robot would say to this motion.
 
     Every row of the 1 ms grid is judged by backward differences, as the controller does it: the arm comes from the
     start state, and after the last row the controller holds it. To an arm that moves, row 0 is the command it has
-    already had, and row 1 the first new one.
+    already had, and row 1 the first new one. Torques, which the manual recommends to bound, are those of the model
+    with its tool and load and without gravity, as the manual counts commanded torques (4.4).
 
     Args:
         motion: The motion.
         model: The arm.
         start: Commanded joint angles of the standing arm, shape (n,), [rad]; a StartState for a moving one; None for
             an arm that stands where the motion starts.
+        box: Where the tool shall stay, as `set_cartesian_limit` tells the robot; None, or one that is not active, is
+            not judged.
 
     Raises:
         InvalidValueError: The motion is for another number of joints, the start is no state of this arm,
@@ -43,117 +54,105 @@ def check(motion: Motion, model: RobotModel, *, start: ArrayLike | StartState | 
     require_model(model)
     if motion.n != model.n:
         raise InvalidValueError("motion", motion, f"is for {motion.n} joints, {model.name} has {model.n}")
+    if box is not None and not isinstance(box, SafetyBox):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise InvalidValueError("box", described(box), "is no SafetyBox; SafetyBox(size=..., T_base_box=...) makes one")
     state = as_start(motion.start if start is None else start, model.n)
-    judge = _Judge(motion, model, state)
-    results = [judge.judge(row) for row in CONDITIONS]
+    box = box if box is not None and box.active else None
+    judge = _Judge(motion, model, state, box)
+    rows = MOTION_CONDITIONS if box is None else (*MOTION_CONDITIONS, CARTESIAN_POSITION)
+    results = [judge.judge(row) for row in rows]
     found = sorted((v for _, violations in results for v in violations), key=lambda v: -v.ratio)
     return Report(
         title=f"{model.name}, motion {motion.law} of {motion.duration:.3f} s at speed {motion.speed:g}",
         rows=tuple(result for result, _ in results),
         violations=tuple(v for v in found if v.condition.necessity == "necessary"),
         warnings=tuple(v for v in found if v.condition.necessity == "recommended"),
-        issue=partial(issue_certificate, motion, model, state),
+        issue=partial(issue_certificate, motion, model, state, box),
     )
 
 
 class _Judge:
-    """One motion's signals, each a table with a row a cycle."""
+    """Compares one motion's signals with the bounds."""
 
-    def __init__(self, motion: Motion, model: RobotModel, start: StartState) -> None:
+    def __init__(self, motion: Motion, model: RobotModel, start: StartState, box: SafetyBox | None) -> None:
         self._motion = motion
-        self._limits = model.limits.joint
-        self._start = start
-        self._differences = _backward_differences(motion.q, start)
-        self._off_start = bool(np.abs(motion.start - start.q).max() > START_POSITION_TOLERANCE)
+        self._limits = model.limits
+        self._signals = MotionSignals(motion, model, start, box)
+        self._depth = min(box.size) / 2.0 if box is not None else 1.0
 
     def judge(self, condition: Condition) -> tuple[ConditionResult, list[Violation]]:
-        values, first_time = self._signal(condition)
+        values, first_time = self._signals.table(condition)
         lower, upper = condition.bounds(self._limits)
-        middle = (lower + upper) / 2.0
-        ratio = np.abs(values - middle if middle.any() else values)
-        ratio /= (upper - lower) / 2.0
-        row, joint = divmod(int(ratio.argmax()), values.shape[1])
-        value = float(values[row, joint])
-        bad = ~((lower < values) & (values < upper))
+        smallest, largest = values.min(axis=0), values.max(axis=0)
+        reach = np.maximum(self._ratio(smallest, lower, upper), self._ratio(largest, lower, upper))
+        column = int(reach.argmax())
+        row = int(self._ratio(values[:, column], lower[column], upper[column]).argmax())
+        value = float(values[row, column])
+        ok = bool(((lower < smallest) & (largest < upper)).all())
+        bad = None if ok else ~((lower < values) & (values < upper))
         result = ConditionResult(
             condition=condition,
             value=value,
-            bound=float(upper[joint] if value >= middle[joint] else lower[joint]),
-            ratio=float(ratio[row, joint]),
-            joint=joint + 1,
+            bound=_passed(value, lower, upper, column),
+            ratio=float(reach[column]),
+            joint=_axis(condition, column),
             time=first_time + row * CYCLE_TIME,
-            broken=int(np.count_nonzero(bad)),
+            broken=0 if bad is None else int(np.count_nonzero(bad)),
         )
-        if result.ok:
+        if bad is None:
             return result, []
         runs = _runs(bad)
+        if condition.necessity == "recommended" and condition.stage == "throughout":
+            runs = [run for run in runs if run[0] == column and run[1] <= row < run[2]]  # One is advice enough.
+        ratio = self._ratio(values, lower, upper)
         return result, [self._violation(condition, values, ratio, first_time, run) for run in runs]
 
-    def _signal(self, condition: Condition) -> tuple[Array, float]:
-        """Returns the values to judge, shape (rows, n), and the time of the first row, [s]."""
-        if condition.stage == "throughout":
-            return self._differences[condition.order], 0.0
-        if condition.stage == "end":
-            return self._rest(condition, self._motion.end()), self._motion.duration
-        if condition.order == 0:
-            return (self._motion.start - self._start.q)[np.newaxis], 0.0
-        return self._rest(condition, self._motion.at(0.0)), 0.0
-
-    def _rest(self, condition: Condition, sample: MotionSample) -> Array:
-        """Returns velocity or acceleration at an end of the motion, shape (1, n).
-
-        Rows that somebody else made tell rest from motion only as far as one cycle at the jerk limit goes.
-        """
-        value = sample.dq if condition.order == 1 else sample.ddq
-        if self._motion.law == "samples":
-            unresolved = self._limits.jerk * CYCLE_TIME ** (3 - condition.order)
-            value = np.sign(value) * np.maximum(np.abs(value) - unresolved, 0.0)
-        return value[np.newaxis]
+    def _ratio(self, values: Array, lower: Array, upper: Array) -> Array:
+        """Returns how much of the way from the middle of the allowed range to the bound is used."""
+        if not np.isfinite(lower).all():  # The box: 0 as deep inside as can be, 1 on its faces.
+            return np.maximum(1.0 + (values - upper) / self._depth, 0.0)
+        middle = (lower + upper) / 2.0
+        ratio = np.abs(values - middle if middle.any() else values)
+        ratio /= (upper - lower) / 2.0
+        return ratio
 
     def _violation(
         self, condition: Condition, values: Array, ratio: Array, first_time: float, run: tuple[int, int, int]
     ) -> Violation:
-        joint, begin, end = run
-        row = begin + int(ratio[begin:end, joint].argmax())
-        value, worst = float(values[row, joint]), float(ratio[row, joint])
-        lower, upper = condition.bounds(self._limits)
-        low, high = float(lower[joint]), float(upper[joint])
-        advice = advise(condition, self._motion, row=begin, count=end - begin, ratio=worst, off_start=self._off_start)
+        column, begin, end = run
+        row = begin + int(ratio[begin:end, column].argmax())
+        value, worst = float(values[row, column]), float(ratio[row, column])
+        off_start = self._signals.is_off_start
+        advice = advise(condition, self._motion, row=begin, count=end - begin, ratio=worst, off_start=off_start)
         return Violation(
             condition=condition,
-            joint=joint + 1,
+            joint=_axis(condition, column),
             time=first_time + begin * CYCLE_TIME,
             count=end - begin,
             value=value,
             worst_time=first_time + row * CYCLE_TIME,
-            bound=high if value >= (low + high) / 2.0 else low,
+            bound=_passed(value, *condition.bounds(self._limits), column),
             ratio=worst,
             advice=advice,
         )
 
 
-def _backward_differences(q: Array, start: StartState) -> tuple[Array, Array, Array, Array]:
-    """Returns angles, velocity, acceleration and jerk in every cycle, hold included, each of shape (N + 3, n).
+def _passed(value: float, lower: Array, upper: Array, column: int) -> float:
+    """Returns the bound on the side of a value."""
+    low, high = float(lower[column]), float(upper[column])
+    return high if value >= (low + high) / 2.0 else low
 
-    Divisions by the cycle time one after the other, as the monitor does it: equal to the last bit.
-    """
-    moving = start.moving
-    commands = q[1:] if moving else q
-    path = np.concatenate((start.q[np.newaxis], commands, np.repeat(q[-1:], HOLD_SAMPLES, axis=0)))
-    dq = np.concatenate((start.dq[np.newaxis], np.diff(path, axis=0) / CYCLE_TIME))
-    ddq = np.concatenate((start.ddq[np.newaxis], np.diff(dq, axis=0) / CYCLE_TIME))
-    jerk = np.diff(ddq, axis=0) / CYCLE_TIME
-    if moving:
-        return path, dq, ddq, np.concatenate((np.zeros_like(jerk[:1]), jerk))
-    return path[1:], dq[1:], ddq[1:], jerk
+
+def _axis(condition: Condition, column: int) -> int:
+    return column + 1 if condition.is_per_joint else 0
 
 
 def _runs(bad: NDArray[np.bool_]) -> list[tuple[int, int, int]]:
-    """Returns joint, first row and row after the last of every run of consecutive rows that are bad."""
+    """Returns column, first row and row after the last of every run of consecutive rows that are bad."""
     edges = np.diff(np.pad(bad, ((1, 1), (0, 0))).astype(np.int8), axis=0)
     runs: list[tuple[int, int, int]] = []
-    for joint in np.flatnonzero(bad.any(axis=0)).tolist():
-        begins = np.flatnonzero(edges[:, joint] == 1).tolist()
-        ends = np.flatnonzero(edges[:, joint] == -1).tolist()
-        runs += [(joint, begin, end) for begin, end in zip(begins, ends, strict=True)]
+    for column in np.flatnonzero(bad.any(axis=0)).tolist():
+        begins = np.flatnonzero(edges[:, column] == 1).tolist()
+        ends = np.flatnonzero(edges[:, column] == -1).tolist()
+        runs += [(column, begin, end) for begin, end in zip(begins, ends, strict=True)]
     return runs

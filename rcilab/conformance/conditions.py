@@ -1,30 +1,24 @@
-"""The manual's conditions on joint motion as one table: check, monitor, report, plots and lessons read these rows.
+"""The manual's conditions as one table: check, monitors, report, plots and lessons read these rows.
 
-A condition is a quantity between two bounds, strictly, as the manual prints it (4.1): `lower < value < upper`. The
-necessary ones are judged on backward differences of the commanded angles at 1 ms, as the controller does it, and
-breaking one stops the robot; the recommended ones ask for a motion that starts and ends at rest.
+A condition is a quantity between two bounds, strictly, as the manual prints it (4.1 to 4.3): `lower < value < upper`.
+The necessary ones are judged on backward differences at 1 ms, as the controller does it, and breaking one stops the
+robot with the fault of its row; the recommended ones ask for a motion that starts and ends at rest and for torques that
+the arm can give. Every one of the twenty faults has a row that explains it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from typing import Literal
 
 import numpy as np
 
 from rcilab.arrays import JointVector
+from rcilab.conformance.condition import MANUAL, AnyLimits, Bounds, Condition, joint_limits
+from rcilab.conformance.measured_conditions import EXTERNAL_TORQUE, LOST_COMMANDS, MEASURED_CONDITIONS
+from rcilab.conformance.tool_conditions import CARTESIAN_FRAME, TOOL_CONDITIONS, TORQUE_CONDITIONS
 from rcilab.errors import InvalidValueError
 from rcilab.faults import Fault
-from rcilab.limits import JointLimits
-
-Necessity: TypeAlias = Literal["necessary", "recommended"]
-Stage: TypeAlias = Literal["throughout", "start", "end"]
-
-Bounds: TypeAlias = tuple[JointVector, JointVector]
-"""Lower and upper bound, each of shape (n,)."""
-
-MANUAL = "RCI manual V1.3.1"
 
 START_POSITION_TOLERANCE = 1e-9  # [rad]
 """How far from the arm a motion may start. A step of 1 nrad is a jerk of 2 rad/s^3: inside the planner's margin."""
@@ -34,52 +28,25 @@ REST_ACCELERATION_TOLERANCE = 1e-2  # [rad/s^2]
 """What counts as zero acceleration. A choice, as above: a thousandth of the smallest acceleration limit."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Condition:
-    """One row of the table."""
-
-    id: str
-    """Short stable name, such as "joint.velocity"."""
-    quantity: str
-    """What is judged, in words, such as "commanded velocity"."""
-    formula: str
-    """As the manual prints it."""
-    necessity: Necessity
-    """The robot stops when a necessary condition is broken."""
-    unit: str
-    source: str
-    """Where condition and bound come from."""
-    fault: Fault | None
-    """What the controller raises; None for a recommended condition."""
-    stage: Stage
-    """When it is judged."""
-    order: int
-    """Which derivative of the angles it judges: 0 the angles themselves, 3 the jerk."""
-    bounds: Callable[[JointLimits], Bounds]
-    """Returns its bounds from the limits of an arm."""
-
-    def __repr__(self) -> str:
-        return f"<Condition {self.id}: {self.formula} ({self.necessity})>"
-
-
-def _symmetric(name: str) -> Callable[[JointLimits], Bounds]:
-    def bounds(limits: JointLimits) -> Bounds:
-        bound: JointVector = getattr(limits, name)
+def _symmetric(name: str) -> Callable[[AnyLimits], Bounds]:
+    def bounds(limits: AnyLimits) -> Bounds:
+        bound: JointVector = getattr(joint_limits(limits), name)
         return -bound, bound
 
     return bounds
 
 
-def _tolerance(value: float) -> Callable[[JointLimits], Bounds]:
-    def bounds(limits: JointLimits) -> Bounds:
-        bound = np.full(len(limits.velocity), value)
+def _tolerance(value: float) -> Callable[[AnyLimits], Bounds]:
+    def bounds(limits: AnyLimits) -> Bounds:
+        bound = np.full(len(joint_limits(limits).velocity), value)
         return -bound, bound
 
     return bounds
 
 
-def _range(limits: JointLimits) -> Bounds:
-    return limits.lower, limits.upper
+def _range(limits: AnyLimits) -> Bounds:
+    joint = joint_limits(limits)
+    return joint.lower, joint.upper
 
 
 JOINT_POSITION = Condition(
@@ -150,21 +117,55 @@ def _recommended(
     )
 
 
-CONDITIONS: tuple[Condition, ...] = (
-    JOINT_POSITION,
-    JOINT_VELOCITY,
-    JOINT_ACCELERATION,
-    JOINT_JERK,
+def _torque(quantity: str, limit: str, order: int) -> Condition:
+    """Returns a recommended row on torques; 4.4 bounds them for direct control, where the arm adds gravity itself."""
+    dots = "d" * order
+    return Condition(
+        id=f"joint.{limit}",
+        quantity=f"{quantity} of the motion",
+        formula=f"-{dots}tau_max < {dots}tau_c < {dots}tau_max",
+        necessity="recommended",
+        unit="N m/s" if order else "N m",
+        source=f"{MANUAL}, 4.1 and 4.4 (gravity excepted)",
+        fault=None,
+        stage="throughout",
+        signal="torque",
+        order=order,
+        bounds=_symmetric(limit),
+    )
+
+
+JOINT_CONDITIONS: tuple[Condition, ...] = (JOINT_POSITION, JOINT_VELOCITY, JOINT_ACCELERATION, JOINT_JERK)
+"""What commanded joint angles have to keep in every cycle, in wire order of the faults."""
+
+JOINT_TORQUE = _torque("torque", "torque", 0)
+JOINT_TORQUE_RATE = _torque("torque rate", "torque_rate", 1)
+
+MOTION_CONDITIONS: tuple[Condition, ...] = (
+    *JOINT_CONDITIONS,
+    JOINT_TORQUE,
+    JOINT_TORQUE_RATE,
     _recommended("start", "distance of the start from the arm", "q_c = q", 0, START_POSITION_TOLERANCE),
     _recommended("start", "velocity at the start", "dq_c = 0", 1, REST_VELOCITY_TOLERANCE),
     _recommended("start", "acceleration at the start", "ddq_c = 0", 2, REST_ACCELERATION_TOLERANCE),
     _recommended("end", "velocity at the end", "dq_c = 0", 1, REST_VELOCITY_TOLERANCE),
     _recommended("end", "acceleration at the end", "ddq_c = 0", 2, REST_ACCELERATION_TOLERANCE),
 )
-"""Every condition on joint motion, in the manual's order."""
+"""What `check` judges of every joint motion, in the manual's order; with a safety box also "cartesian.position"."""
 
-CYCLE_CONDITIONS: tuple[Condition, ...] = tuple(row for row in CONDITIONS if row.stage == "throughout")
-"""Those that hold in every cycle: what the controller's monitor evaluates, in wire order of their faults."""
+CYCLE_CONDITIONS = JOINT_CONDITIONS
+"""What curves of joint angles are drawn against."""
+
+CONDITIONS: tuple[Condition, ...] = (
+    *MOTION_CONDITIONS,
+    *TOOL_CONDITIONS,
+    CARTESIAN_FRAME,
+    *TORQUE_CONDITIONS,
+    *MEASURED_CONDITIONS,
+    EXTERNAL_TORQUE,
+    LOST_COMMANDS,
+)
+"""Every condition: on joint motion (4.1), on tool poses (4.2), on torques (4.3), on what the arm does (4.6)."""
 
 
 def find_condition(name: str) -> Condition:
@@ -176,4 +177,10 @@ def find_condition(name: str) -> Condition:
     for row in CONDITIONS:
         if row.id == name:
             return row
-    raise InvalidValueError("condition", name, f"is unknown; known: {', '.join(row.id for row in CONDITIONS)}")
+    known = ", ".join(row.id for row in CONDITIONS)
+    raise InvalidValueError("condition", name, f"is unknown; known: {known}")
+
+
+def explain_fault(fault: Fault) -> tuple[Condition, ...]:
+    """Returns the conditions that raise a fault, at least one for each of the twenty."""
+    return tuple(row for row in CONDITIONS if row.fault is fault)

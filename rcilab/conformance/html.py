@@ -13,7 +13,7 @@ COLORS = {"ok": "#1a7f37", "advice": "#b26a00", "violated": "#c62828"}
 
 _LISTED = 8
 _CELL = 'style="text-align:left;white-space:nowrap;padding:2px 10px"'
-_HEADINGS = ("", "condition", "worst", "bound", "used", "joint", "t [s]", "source")
+_HEADINGS = ("", "condition", "worst", "bound", "used", "where", "t [s]", "source")
 
 
 def report_html(report: Report) -> str:
@@ -47,7 +47,7 @@ def _row(row: ConditionResult) -> str:
         f"{value} {unit}",
         f"{bound} {unit}",
         used,
-        str(row.joint),
+        row.place,
         f"{row.time:.3f}",
         escape(row.source),
     )

@@ -1,22 +1,26 @@
-"""The conditions, cycle by cycle, in plain floats: what the controller runs every millisecond."""
+"""The conditions on commanded joint angles, cycle by cycle, in plain floats."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from rcilab.clock import CYCLE_TIME
-from rcilab.conformance.conditions import CYCLE_CONDITIONS, Condition
+from rcilab.conformance.breach import Breach, faults_of
+from rcilab.conformance.condition import Condition
+from rcilab.conformance.conditions import JOINT_CONDITIONS
+from rcilab.conformance.spans import spans
 from rcilab.errors import InvalidValueError
 from rcilab.faults import Fault
 from rcilab.limits import JointLimits
-
-_ORDERS = 4
 
 
 class JointMonitor:
     """Judges one commanded position a cycle by the same rows as `check`, with the same arithmetic.
 
-    Owned by the thread that runs the cycle. About 5 us a cycle for 7 joints; it allocates four short lists.
+    Owned by the thread that runs the cycle. It allocates four short lists.
+
+    Behind a gap in the commands the differences are Newton's divided ones, over the cycles that really passed. Those
+    are weighted means of the differences that the full row of commands would have had, so a motion that keeps its
+    bounds never breaks them for a gap, whatever it was that is missing.
 
     Attributes:
         q: Last commanded joint angles, [rad].
@@ -30,11 +34,14 @@ class JointMonitor:
 
     def __init__(self, limits: JointLimits) -> None:
         self._n = len(limits.velocity)
-        self._rows: list[tuple[int, Condition, Fault, list[float], list[float]]] = []
-        for row in CYCLE_CONDITIONS:
-            assert row.fault is not None
+        self._rows: list[tuple[Condition, int]] = []
+        self._lower: list[float] = []
+        self._upper: list[float] = []
+        for row in JOINT_CONDITIONS:
             lower, upper = row.bounds(limits)
-            self._rows.append((row.order, row, row.fault, lower.tolist(), upper.tolist()))
+            self._rows += [(row, joint) for joint in range(1, self._n + 1)]
+            self._lower += lower.tolist()
+            self._upper += upper.tolist()
         self.reset([0.0] * self._n)
 
     def reset(self, q: Sequence[float], dq: Sequence[float] | None = None, ddq: Sequence[float] | None = None) -> None:
@@ -52,8 +59,9 @@ class JointMonitor:
         self.dq = self._numbers(dq, "dq") if dq is not None else [0.0] * self._n
         self.ddq = self._numbers(ddq, "ddq") if ddq is not None else [0.0] * self._n
         self.jerk = [0.0] * self._n
+        self._spacing = (1, 1)
 
-    def step(self, q_c: Sequence[float]) -> tuple[Fault, ...]:
+    def step(self, q_c: Sequence[float], cycles: int = 1) -> tuple[Fault, ...]:
         """Takes the commanded angles of this cycle and returns the faults they raise, in wire order.
 
         A value that is not a number breaks every condition. The history moves on in any case; after a fault it is for
@@ -61,29 +69,26 @@ class JointMonitor:
 
         Args:
             q_c: Commanded joint angles, at least n numbers (a 6-axis arm ignores the wire's seventh), [rad].
+            cycles: Cycles since the last step, 1 or more.
         """
-        h = CYCLE_TIME
+        first, second, third = spans(cycles, self._spacing)
+        self._spacing = (cycles, self._spacing[0])
         q = list(q_c[: self._n])
-        dq = [(new - old) / h for new, old in zip(q, self.q, strict=True)]
-        ddq = [(new - old) / h for new, old in zip(dq, self.dq, strict=True)]
-        jerk = [(new - old) / h for new, old in zip(ddq, self.ddq, strict=True)]
+        dq = [(new - old) / first for new, old in zip(q, self.q, strict=True)]
+        ddq = [(new - old) / second for new, old in zip(dq, self.dq, strict=True)]
+        jerk = [(new - old) / third for new, old in zip(ddq, self.ddq, strict=True)]
         self.q, self.dq, self.ddq, self.jerk = q, dq, ddq, jerk
-        signals = (q, dq, ddq, jerk)
-        faults: list[Fault] = []
-        for order, _, fault, lower, upper in self._rows:
-            for value, low, high in zip(signals[order], lower, upper, strict=True):
-                if not low < value < high:
-                    faults.append(fault)
-                    break
-        return tuple(faults)
+        for value, low, high in zip([*q, *dq, *ddq, *jerk], self._lower, self._upper, strict=True):
+            if not low < value < high:
+                return faults_of(self.broken())
+        return ()
 
-    def broken(self) -> list[tuple[Condition, int, float, float]]:
-        """Returns what the last step broke: condition, joint (from 1), value, and the bound it passed."""
-        signals = (self.q, self.dq, self.ddq, self.jerk)
+    def broken(self) -> list[Breach]:
+        """Returns what the last step broke."""
+        values = (*self.q, *self.dq, *self.ddq, *self.jerk)
         return [
-            (row, joint, value, low if value <= low else high)
-            for order, row, _, lower, upper in self._rows
-            for joint, (value, low, high) in enumerate(zip(signals[order], lower, upper, strict=True), start=1)
+            Breach(row, joint, value, low if value <= low else high)
+            for (row, joint), value, low, high in zip(self._rows, values, self._lower, self._upper, strict=True)
             if not low < value < high
         ]
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from rcilab.conformance.certificate import Certificate
-from rcilab.conformance.conditions import Condition, Necessity
+from rcilab.conformance.condition import Condition, Necessity
 from rcilab.conformance.wording import amount, share, with_degrees
 from rcilab.errors import ConformanceError
 from rcilab.faults import Fault
@@ -27,7 +27,7 @@ class ConditionResult:
     ratio: float
     """How much of the way from the middle of the allowed range to the bound is used; 1 is the bound."""
     joint: int
-    """Joint with the worst value, from 1."""
+    """Joint with the worst value, from 1; 0 for the tool."""
     time: float
     """When, [s] since the start of the motion."""
     broken: int
@@ -64,9 +64,16 @@ class ConditionResult:
         return self.condition.unit
 
     @property
+    def place(self) -> str:
+        """Whose value it is: "joint 2", or "tool"."""
+        return self.condition.place(self.joint)
+
+    @property
     def texts(self) -> tuple[str, str, str]:
-        """Worst value, bound and used part as text; what is to be zero, and is, reads 0."""
-        if self.necessity == "necessary":
+        """Worst value, bound and used part as text; what is to be zero at an end, and is, reads 0."""
+        if self.condition.signal == "position":
+            return f"{self.value:.4g}", "0", share(self.ratio)
+        if self.condition.stage == "throughout":
             return *amount(self.value, self.bound), share(self.ratio)
         return "0" if self.ok else f"{self.value:.4g}", f"0 ± {abs(self.bound):g}", ""
 
@@ -84,7 +91,7 @@ class Violation:
 
     Attributes:
         condition: What is broken.
-        joint: From 1.
+        joint: From 1; 0 for the tool.
         time: The first of the samples, [s] since the start of the motion.
         count: How many samples in a row, at 1 ms each.
         value: The worst of them, in the condition's unit.
@@ -97,7 +104,7 @@ class Violation:
     condition: Condition
     """What is broken."""
     joint: int
-    """From 1."""
+    """From 1; 0 for the tool."""
     time: float
     """The first of the samples, [s] since the start of the motion."""
     count: int
@@ -122,19 +129,22 @@ class Violation:
         return f"<Violation: {self}>"
 
     def __str__(self) -> str:
-        value, bound = amount(self.value, self.bound)
         row = self.condition
-        if row.necessity == "recommended":
-            what = f"{row.quantity} is {value} {row.unit}, not 0"
-            return f"joint {self.joint}: {what} ({row.necessity} condition); {self.advice}"
-        if row.order == 0:
-            what = f"{row.quantity} {with_degrees(self.value, value)} passes {with_degrees(self.bound, bound)}"
-        else:
-            what = f"{row.quantity} {value} {row.unit} exceeds {bound.lstrip('-')} {row.unit}"
         lasting = f" and for {self.count} ms" if self.count > 1 else ""
-        return (
-            f"joint {self.joint}: {what} at t = {self.time:.3f} s{lasting} ({row.necessity} condition); {self.advice}"
-        )
+        when = f" at t = {self.time:.3f} s{lasting}" if row.stage == "throughout" else ""
+        return f"{row.place(self.joint)}: {self._what()}{when} ({row.necessity} condition); {self.advice}"
+
+    def _what(self) -> str:
+        """Returns quantity, value and bound in words."""
+        row = self.condition
+        value, bound = amount(self.value, self.bound)
+        if row.stage != "throughout":
+            return f"{row.quantity} is {value} {row.unit}, not 0"
+        if row.signal == "position":
+            return f"{row.quantity} is {self.value:.4g} m outside the safety box"
+        if row.unit == "rad":
+            return f"{row.quantity} {with_degrees(self.value, value)} passes {with_degrees(self.bound, bound)}"
+        return f"{row.quantity} {value} {row.unit} exceeds {bound.lstrip('-')} {row.unit}"
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -194,7 +204,7 @@ class Report:
         lines = [self.title, self._verdict()]
         for row in self.rows:
             value, bound, used = row.texts
-            place = f"joint {row.joint}, t = {row.time:.3f} s"
+            place = f"{row.place}, t = {row.time:.3f} s"
             size = f"{value:>9} of {bound:>10} {row.unit:7} {used:>7}"
             lines.append(f"  {row.verdict:8}  {row.id:18}  {size}  {place}  [{row.source}]")
         found = (*self.violations, *self.warnings)
@@ -214,7 +224,7 @@ class Report:
     def _verdict(self) -> str:
         worst = self.worst
         if self.ok:
-            near = f"{worst.condition.quantity} of joint {worst.joint}, {share(worst.ratio)} of its bound"
+            near = f"{worst.condition.quantity} of {worst.place}, {share(worst.ratio)} of its bound"
             advice = f"; {_plural(len(self.warnings), 'recommendation')} not met" if self.warnings else ""
             return f"conforms{advice}; nearest: {near}"
         broken = [row for row in self.rows if not row.ok and row.necessity == "necessary"]

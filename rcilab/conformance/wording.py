@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import ceil, degrees, floor, isfinite
 
-from rcilab.conformance.conditions import Condition
+from rcilab.conformance.condition import Condition
 from rcilab.motion.motion import Motion
 
 
@@ -44,6 +44,10 @@ def advise(condition: Condition, motion: Motion, *, row: int, count: int, ratio:
         return "let the motion start at rest"
     if condition.stage == "end":
         return "let the motion end at rest"
+    if condition.signal == "position":
+        return "choose a path inside the safety box"
+    if condition.signal == "torque":
+        return _softer(condition, motion)
     if condition.order == 0:
         return "choose a path inside the joint's range"
     if row <= condition.order and off_start:
@@ -62,3 +66,10 @@ def advise(condition: Condition, motion: Motion, *, row: int, count: int, ratio:
         return "lower speed"
     slower = ceil(1000.0 * ratio ** (1.0 / condition.order)) / 1000.0
     return f"run it {slower:.3f} times slower, or smooth it"
+
+
+def _softer(condition: Condition, motion: Motion) -> str:
+    """Returns what to do about torques: only an arm that gives them exactly as asked feels it."""
+    if condition.order == 1 and motion.law == "jerk_limited":
+        return 'law="s_profile" plans it with accelerations that rise more gently'
+    return "lower speed" if motion.law in ("jerk_limited", "s_profile") else "run it slower, or smooth it"

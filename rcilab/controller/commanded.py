@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+import numpy as np
+
 from rcilab.clock import CYCLE_TIME
 from rcilab.limits import JointLimits
-from rcilab.motion.differences import derivatives_from_differences
+from rcilab.motion.differences import derivatives_from_differences, differences_from_derivatives
 from rcilab.motion.stop import plan_stop
+
+JOIN_SHARE = 2.0  # Of the arm's limits: what a stop starts from at most, however hard the arm was thrown; a choice.
 
 
 class CommandedMotion:
@@ -27,6 +31,8 @@ class CommandedMotion:
 
     def __init__(self, limits: JointLimits, q: Sequence[float]) -> None:
         self._limits = limits
+        self._fastest = JOIN_SHARE * limits.velocity
+        self._hardest = JOIN_SHARE * limits.acceleration
         self._acceleration: list[float] = limits.acceleration.tolist()
         self._jerk: list[float] = limits.jerk.tolist()
         self.version = 0
@@ -55,27 +61,21 @@ class CommandedMotion:
             self._stop = self._plan()
         self._advance(next(self._stop, self.q))
 
-    def predict(self, steps: int, target: Sequence[float] | None = None, target_steps: int = 1) -> list[float]:
-        """Returns where the arm will be in a number of cycles when nothing new is commanded, [rad].
-
-        Without a target the acceleration goes on as it is. With one, the jerk is what leads there.
+    def join(self, q: Sequence[float], dq: Sequence[float], ddq: Sequence[float]) -> None:
+        """Puts the commanded angles on an arm that moves by itself, and along with it: before it is brought to rest.
 
         Args:
-            steps: Cycles from now.
-            target: Commanded angles that are known for a later cycle, [rad].
-            target_steps: How many cycles from now that is.
+            q: Measured joint angles, n plain floats, [rad].
+            dq: Their velocities, [rad/s].
+            ddq: Their accelerations, [rad/s^2]; beyond the largest ones that a stop starts from, those are taken.
         """
-        h = CYCLE_TIME
-        even = [
-            q + steps * h * dq + steps * (steps + 1) / 2.0 * h * h * ddq
-            for q, dq, ddq in zip(self.q, self.dq, self.ddq, strict=True)
-        ]
-        if target is None:
-            return even
-        # Newton's form of the cubic through the last three angles and the target, at cycles -2, -1, 0, target_steps.
-        share = steps * (steps + 1) * (steps + 2) / (target_steps * (target_steps + 1) * (target_steps + 2))
-        there = self.predict(target_steps)
-        return [x + share * (goal - far) for x, goal, far in zip(even, target, there, strict=True)]
+        velocity, acceleration = differences_from_derivatives(
+            np.clip(dq, -self._fastest, self._fastest), np.clip(ddq, -self._hardest, self._hardest)
+        )
+        self.q, self.dq, self.ddq = list(q), velocity.tolist(), acceleration.tolist()
+        self.is_at_rest = not any(self.dq) and not any(self.ddq)
+        self._stop = None
+        self.version += 1
 
     def _advance(self, q: list[float]) -> None:
         h = CYCLE_TIME

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal, TypeAlias, get_args
 
 from rcilab.clock import CYCLE_TIME
 from rcilab.controller.cycle import PREFILL
 from rcilab.errors import InvalidValueError
+from rcilab.protocols.world import LIMIT_TABLES, LimitTable, NetworkFaults, Stall
 
 PlantKind: TypeAlias = Literal["ideal", "mujoco"]
 PLANT_KINDS: tuple[PlantKind, ...] = get_args(PlantKind)
@@ -48,9 +49,24 @@ class ControllerConfig:
     """From StartMove to the requested modes, [s]; None: 0.2, or 0.02 in lock-step. The vendor's client wants 0.1 at
     least, or it answers old states."""
     prefill: int | None = None
-    """Cycles by which commands are played late, to absorb jitter; None: 10, or 0 in lock-step."""
+    """Cycles by which commands are played late, to absorb jitter, torques by 2 at most; None: 10, or 0 in lock-step."""
     lost_limit: int | None = MOST_LOST
     """Lost cycles in a row that are an instability, 10 to 20; None: any number is bridged."""
+    auto_limit: bool = False
+    """Whether commanded joint angles are led to rest inside the soft limits, instead of raising a fault beyond them."""
+    loop_back: bool = False
+    """Whether every digital output is wired to the input of the same number."""
+    limit_table: LimitTable = "manual"
+    """Whose Cartesian limits commands are judged by: the manual's, or those of the vendor's SDK."""
+    network: NetworkFaults = field(default_factory=NetworkFaults)
+    """What is wrong with the network, from power-up on."""
+    states_network: NetworkFaults | None = None
+    """The same for the way to the client alone, states and TCP; None: as `network`, which is for commands then."""
+    stalls: tuple[Stall, ...] = ()
+    """Pauses of the controller's clock; their `after` counts from the beginning of `run`."""
+    world_port: int | None = 0
+    """TCP port on loopback through which things happen to the robot from outside; 0: any free one, None: there is
+    none."""
     realtime: bool = True
     """Whether to ask for SCHED_FIFO and locked memory; never done in lock-step, where nothing is late."""
     parent_pid: int | None = None
@@ -58,7 +74,7 @@ class ControllerConfig:
 
     def __post_init__(self) -> None:
         """Checks every value."""
-        for name in ("port", "udp_port", "client_port"):
+        for name in ("port", "udp_port", "client_port", "world_port"):
             port = getattr(self, name)
             lowest = 1 if name == "client_port" else 0
             if port is not None and not lowest <= port <= 65535:
@@ -67,6 +83,8 @@ class ControllerConfig:
             raise InvalidValueError("host", self.host, "is no address; use 127.0.0.2 for this machine only")
         if self.plant not in PLANT_KINDS:
             raise InvalidValueError("plant", self.plant, f"is unknown; known: {', '.join(PLANT_KINDS)}")
+        if self.limit_table not in LIMIT_TABLES:
+            raise InvalidValueError("limit_table", self.limit_table, f"is unknown; known: {', '.join(LIMIT_TABLES)}")
         if self.mode_delay is not None and not 0.0 <= self.mode_delay <= 5.0:
             raise InvalidValueError("mode_delay", self.mode_delay, "needs 0 to 5 s")
         if self.prefill is not None and not 0 <= self.prefill <= 100:

@@ -1,27 +1,33 @@
 """One millisecond of the controller: requests and commands in, one state out. No sockets, no clock.
 
-Each `step` plays one command (or goes on coming to rest), judges it, moves the plant and reports. A command that
-breaks a necessary condition is never given to the arm: its fault is raised in the same cycle, and the stop begins
-from the last good command. Whatever ends a motion, the arm comes to rest on one path: `CommandedMotion.come_to_rest`.
+Each `step` plays one command (or goes on coming to rest), judges it, moves the plant, looks at its sensors and reports.
+
+What a position controller does on a fault, and every other one here: the offending command is never given to the arm;
+the fault's bit is in the state of that very cycle, and stays; queued commands are forgotten; the arm comes to rest on
+one path, `CommandedMotion.come_to_rest`, inside its acceleration and jerk limits, under the position servo; then the
+brakes close. Where the arm followed its angles the stop begins from the last good command; where it yielded
+(impedance, torque, hand guiding), from where it is and how it moves. `fault_stop` lists it fault by fault.
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
-from typing import NamedTuple
 
-from rcilab.arrays import JointVector, frozen
-from rcilab.conformance.monitor import JointMonitor
-from rcilab.controller.commanded import CommandedMotion
+from rcilab.arrays import JointVector
+from rcilab.conformance import LimitTable
+from rcilab.controller.actuator import Law
+from rcilab.controller.answers import Reply, answer_query, conclude, judge_recovery, judge_request
+from rcilab.controller.arm import Arm
 from rcilab.controller.model_download import model_response
-from rcilab.controller.plant import Drive, Plant, Setpoint
+from rcilab.controller.modes import MODES, Mode, build_generator
+from rcilab.controller.modes.generator import MotionGenerator, Step
+from rcilab.controller.modes.terms import build_terms
+from rcilab.controller.plant import Plant
 from rcilab.controller.playout import Playback, Playout
 from rcilab.controller.reporter import StateReporter
-from rcilab.controller.settings import SIGNAL_COUNT, apply_request, default_settings
-from rcilab.controller.state_machine import GROUNDED, POWER_OFF, Action, Event, Phase, Transition, When, transition
+from rcilab.controller.settings import apply_request, default_settings
+from rcilab.controller.state_machine import GROUNDED, POWER_OFF, Action, Event, Phase, Transition, transition
 from rcilab.faults import Fault
-from rcilab.limits import JointLimits
 from rcilab.model import RobotModel
 from rcilab.protocols import rci
 from rcilab.state import ControllerMode, MotionGeneratorMode, RobotState
@@ -29,36 +35,34 @@ from rcilab.state import ControllerMode, MotionGeneratorMode, RobotState
 MODE_DELAY = 200  # [cycles] After StartMove; by then the vendor client's buffer is full of idle states, which it skips.
 PREFILL = 10  # [cycles] Pauses of client and network that a motion survives unharmed, and its delay. Both ends on one
 # busy machine, even under SCHED_FIFO, were measured to pause for 5 to 10 ms now and then.
+TORQUE_STOCK = 2  # [cycles] The same for torques, where the client closes the loop and delay makes it ring; a choice.
 LOST_LIMIT = 20  # [cycles] Lost commands in a row that are an instability (manual 4.6: usually 10 to 20).
 RECOVERY_TIME = 50  # [cycles] How long an error recovery takes at least; a choice.
 DRAIN_LIMIT = 300  # [cycles] How long queued commands are played after StopMove; longer than any queue.
-_BLURRED = 3  # [cycles] A third difference reaches this far back: after lost cycles it judges our bridge, too.
-
-MODES = {
-    (ControllerMode.JOINT_POSITION, rci.StartMotionMode.JOINT): Drive.POSITION,
-    (ControllerMode.JOINT_IMPEDANCE, rci.StartMotionMode.JOINT): Drive.IMPEDANCE,
-}
-"""The modes that this controller can run, and the drive each needs. All others are refused as not possible."""
-
-
-class Reply(NamedTuple):
-    """What to answer, and when."""
-
-    response: rci.Response
-    when: When = When.NOW
-    ends_connection: bool = False
+_IDLE_MODES = (ControllerMode.OTHER, MotionGeneratorMode.IDLE)
+_REPORTED = (
+    rci.CommandCode.SET_COOR,
+    rci.CommandCode.SET_LOAD,
+    rci.CommandCode.SET_FC_COOR,
+    rci.CommandCode.SET_TORQUE_FILTER_CUT_OFF_FREQUENCY,
+)
+"""Setters that change how states are reported."""
 
 
 class ControlCycle:
     """The controller without its sockets. Owned by the loop that calls `step`, once a millisecond.
 
     Attributes:
+        settings: Everything that was set.
         phase: What the robot is doing.
         faults: The error bits that are set, in wire order.
         reason: Why the last fault was raised, in words and numbers.
         state: The last reported state.
         playout: The queue of commands, with its counts.
         ignored: Commands that came while none was wanted.
+        safety_stop: Which emergency stop is pressed.
+        lost_limit: Lost cycles in a row that raise INSTABILITY_DETECTION; None never does.
+        limit_table: Whose bounds of the tool's motion commands are judged by; counts from the next motion on.
 
     Args:
         model: The arm.
@@ -79,52 +83,86 @@ class ControlCycle:
         lost_limit: int | None = LOST_LIMIT,
         recovery_time: int = RECOVERY_TIME,
     ) -> None:
-        self.model = model
-        self._plant = plant
-        self._mode_delay = mode_delay
-        self._lost_limit = lost_limit
-        self._recovery_time = recovery_time
+        self.lost_limit = lost_limit
+        self.limit_table: LimitTable = "manual"
         self.playout = Playout(prefill)
         self.settings = default_settings(model.description)
-        self.safety_stop = rci.SafetyStop.NONE
+        self.safety_stop: rci.SafetyStop = rci.SafetyStop.NONE
         self.phase = Phase.OFF
         self.faults: tuple[Fault, ...] = ()
         self.reason = ""
         self.ignored = 0
-        self._measured = plant.reset(model.home)
-        self._commanded = CommandedMotion(model.limits.joint, self._measured.q.tolist())
-        self._monitor = JointMonitor(model.limits.joint)
-        self._reporter = StateReporter(model, self.settings)
+        self._mode_delay = mode_delay
+        self._recovery_time = recovery_time
+        self._loop_back = False
         self._model_response = model_response(model.description)  # Now: it takes longer than a cycle.
-        self._countdown = 0
-        self._drain = 0
+        self._arm = Arm(model, plant, self.settings)
+        self._reporter = StateReporter(model, self.settings)
+        self._generator: MotionGenerator | None = None
+        self._mode = Mode(Law.POSITION, False)
+        self._tau: list[float] | None = None
+        self._drag = (rci.DragSpace.JOINT, rci.DragType.FREE)
+        self._requested = self._shown = _IDLE_MODES
+        self._countdown = self._drain = 0
         self._followed = -1
-        self._blurred_until = -1
-        self._requested = (ControllerMode.OTHER, MotionGeneratorMode.IDLE)
-        self._shown = (ControllerMode.OTHER, MotionGeneratorMode.IDLE)
-        self._drive = Drive.POSITION
         self._message_id = 0
         self.state = self._report()
 
     @property
+    def model(self) -> RobotModel:
+        """The arm with the tool and load that were set."""
+        return self._arm.model
+
+    @property
+    def plant(self) -> Plant:
+        """What moves."""
+        return self._arm.plant
+
+    @property
     def is_settled(self) -> bool:
         """Whether the arm rests and no phase is under way that ends by itself: deferred replies are due."""
-        return self._commanded.is_at_rest and self.phase not in (Phase.STOPPING, Phase.RECOVERING)
+        return self._arm.stands and self.phase not in (Phase.STOPPING, Phase.RECOVERING)
 
     @property
     def is_moving(self) -> bool:
-        """Whether the arm is commanded to move, or listens for commands that would."""
-        return self.phase in (Phase.MOVING, Phase.STOPPING) or not self._commanded.is_at_rest
+        """Whether the arm moves, or listens for commands that would make it."""
+        return self.phase in (Phase.MOVING, Phase.STOPPING) or not self._arm.commanded.is_at_rest
 
     @property
     def wants_commands(self) -> bool:
         """Whether a client's motion is under way."""
         return self.phase is Phase.MOVING and not self.playout.is_finished
 
+    @property
+    def loop_back(self) -> bool:
+        """Whether every digital output is wired to the input of the same number."""
+        return self._loop_back
+
+    @loop_back.setter
+    def loop_back(self, on: bool) -> None:
+        self._loop_back = on
+        self._wire()
+
+    @property
+    def auto_limit(self) -> bool:
+        """Whether joints are led to rest inside their soft limits instead of a fault, from the next motion on."""
+        return self.settings.auto_limit
+
+    @auto_limit.setter
+    def auto_limit(self, on: bool) -> None:
+        self.settings = replace(self.settings, auto_limit=on)
+
+    def set_input(self, signal: int, level: bool) -> None:
+        """Sets the level of a digital input, 0 to 5; with loop-back on, until the outputs are set again.
+
+        Raises:
+            InvalidValueError: There is no such input.
+        """
+        self.settings = self.settings.with_input(signal, level)
+
     def reset(self, q: JointVector) -> None:
         """Puts the resting arm somewhere else: what a virtual robot can do and a real one cannot."""
-        self._measured = self._plant.reset(frozen(q))
-        self._commanded.place(self._measured.q.tolist())
+        self._arm.reset(q)
 
     def receive(self, packet: rci.CommandPacket) -> None:
         """Takes a command that came from the network; it is kept while a motion is under way."""
@@ -135,50 +173,56 @@ class ControlCycle:
 
     def handle(self, request: rci.Request) -> Reply:
         """Takes a request and returns the answer to it."""
+        content = answer_query(request, self.phase, self.safety_stop, self.settings, self._model_response)
+        if content is not None:
+            return Reply(content)
         cell = transition(self.phase, request.code)
+        refusal = judge_request(request, self.model, self._arm.commanded)
         match request:
-            case rci.SetMotorPower(power=power):
-                if power not in (0, 1):
-                    return _reply(rci.SettingStatus.INVALID_ARGUMENT)
-                cell = cell if power else POWER_OFF[self.phase]
-            case rci.StartMove():
-                refusal = self._judge_start(request)
-                if refusal is not None and cell.status is rci.StartStatus.SUCCESS:
-                    return _reply(refusal)
-            case rci.StartDrag(space=space, type=kind):
-                if space not in tuple(rci.DragSpace) or kind not in tuple(rci.DragType):
-                    return _reply(rci.SettingStatus.INVALID_ARGUMENT)
-                if Drive.GUIDED not in self._plant.drives:
-                    return _reply(rci.SettingStatus.NOT_POSSIBLE)
-            case rci.GetMotorState():
-                is_on = self.phase not in (Phase.OFF, Phase.USER_STOPPED)
-                return Reply(rci.MotorStateResponse(int(is_on)))
-            case rci.GetSafetyStopState():
-                return Reply(rci.SafetyStopResponse(self.safety_stop))
-            case rci.GetDIState(signal=signal):
-                return Reply(self._digital_input(signal))
-            case rci.LoadRobotModel():
-                return Reply(self._model_response)
+            case rci.SetMotorPower(power=0):
+                cell = POWER_OFF[self.phase]
+            case rci.StartMove() if cell.status is rci.StartStatus.SUCCESS and refusal is None:
+                modes = ControllerMode(request.controller_mode), rci.StartMotionMode(request.motion_mode)
+                self._mode, self._requested = MODES[modes], (modes[0], modes[1].shown_as)
+            case rci.StartMove() if cell.status is not rci.StartStatus.SUCCESS:
+                refusal = None  # What the phase says comes first.
+            case rci.StartDrag() if refusal is None:
+                self._drag = rci.DragSpace(request.space), rci.DragType(request.type)
+            case rci.AutomaticErrorRecovery() if self.phase is Phase.REFLEX:
+                refusal = judge_recovery(self.settings, self._arm.watch)
             case _:
                 pass
+        if refusal is not None:
+            return Reply(rci.StatusResponse(refusal))
         if Action.APPLY in cell.actions:
-            if request.code in GROUNDED and not self._commanded.is_at_rest:
-                return _reply(rci.SettingStatus.NOT_POSSIBLE)
+            if request.code in GROUNDED and not self._arm.commanded.is_at_rest:
+                return Reply(rci.StatusResponse(rci.SettingStatus.NOT_POSSIBLE))
             if not self._apply(request):
-                return _reply(rci.SettingStatus.INVALID_ARGUMENT)
+                return Reply(rci.StatusResponse(rci.SettingStatus.INVALID_ARGUMENT))
         self._enter(cell)
         assert cell.status is not None
         return Reply(rci.StatusResponse(cell.status), cell.when, Action.REBOOT in cell.actions)
+
+    def conclude(self, reply: Reply) -> rci.Response:
+        """Returns what to answer now that a reply is due: meanwhile a recovery may have been overtaken."""
+        return conclude(reply, self.phase)
 
     def happen(self, event: Event, *faults: Fault) -> None:
         """Takes an event that is not a client's request; `faults` are the bits that it may set."""
         self._enter(transition(self.phase, event), *faults)
 
     def press_safety_stop(self, kind: rci.SafetyStop) -> None:
-        """Presses an emergency stop, or releases it with NONE. Pressed in mid-motion it also sets an error bit."""
+        """Presses an emergency stop or opens the safety gate, or ends either with NONE.
+
+        Both stop the arm and hold it stopped; in mid-motion they also set an error bit, or the client would not notice.
+        """
         if kind is not self.safety_stop:
             self.safety_stop = kind
-            self.reason = "an emergency stop was pressed"
+            if kind is not rci.SafetyStop.NONE:
+                cause = (
+                    "an emergency stop was pressed" if kind is rci.SafetyStop.ESTOP else "the safety gate was opened"
+                )
+                self.reason = cause
             event = Event.SAFETY_RELEASE if kind is rci.SafetyStop.NONE else Event.SAFETY_STOP
             self.happen(event, Fault.INSTABILITY_DETECTION)
 
@@ -186,116 +230,74 @@ class ControlCycle:
         """Lives through one millisecond and returns the state at its end."""
         self._message_id += 1
         self._count_down()
-        faults = self._follow()
-        if faults:
-            self.happen(Event.FAULT, *faults)
-        if not self._commanded.is_at_rest and not self._is_following:
-            self._commanded.come_to_rest()
-        self._move_plant()
-        if self.phase is Phase.STOPPING and self._commanded.is_at_rest and self._drain == 0:
+        step = self._follow()
+        if step.faults:
+            self._raise(step.faults, step.reason)
+        law = self._current_law()
+        if law is not Law.TORQUE:
+            self._tau = None
+        self._arm.move(law, self._tau, has_moved=self._followed == self._message_id)
+        if self.phase in (Phase.MOVING, Phase.STOPPING):
+            # Our own stop is one of the joints: how the tool turns meanwhile is nobody's command.
+            faults, reason = self._arm.watch.judge(is_commanded=self.phase is Phase.MOVING or self._drain > 0)
+            if faults:
+                self._raise(faults, reason)
+        if self.phase is Phase.STOPPING and self._arm.stands and self._drain == 0:
             self.happen(Event.AT_REST)
         self.state = self._report()
         return self.state
-
-    @property
-    def _is_following(self) -> bool:
-        """Whether this cycle's angles came from the play-out already."""
-        return self._followed == self._message_id
 
     def _count_down(self) -> None:
         if self._countdown > 0:
             self._countdown -= 1
         if self._countdown == 0 and self.phase is Phase.STARTING:
             self.happen(Event.MODES_SHOWN)
-        if self._countdown == 0 and self.phase is Phase.RECOVERING and self._commanded.is_at_rest:
+        if self._countdown == 0 and self.phase is Phase.RECOVERING and self._arm.commanded.is_at_rest:
             self.happen(Event.RECOVERED)
 
-    def _follow(self) -> tuple[Fault, ...]:
-        """Plays what is due in this cycle and returns the faults it raises; a faulty command is not followed."""
+    def _raise(self, faults: tuple[Fault, ...], reason: str) -> None:
+        self.reason = reason
+        self.happen(Event.FAULT, *faults)
+
+    def _follow(self) -> Step:
+        """Plays what is due in this cycle; a step that raises faults is not followed."""
         if self._drain > 0:
             self._drain = self._drain - 1 if len(self.playout) else 0
-        if self.phase is not Phase.MOVING and self._drain == 0:
-            return ()
-        playback = self.playout.take(self._is_next)
+        if (self.phase is not Phase.MOVING and self._drain == 0) or self._generator is None:
+            return Step()
+        playback = self.playout.take(self._generator.is_next)
         if playback.packet is None and not playback.is_lost:
-            return ()
-        q = self._position(playback)
-        faults = self._judge(q, playback)
-        if not faults:
-            self._commanded.move(q)
+            return Step()
+        step = self._count_losses(self._generator.step(playback), playback)
+        if not step.faults:
             self._followed = self._message_id
-        return faults
+            self._tau = step.tau
+            if step.q is not None:
+                self._arm.commanded.move(step.q)
+        return step
 
-    def _position(self, playback: Playback) -> list[float]:
-        packet, steps, is_lost = playback
-        if packet is None:
-            return self._commanded.predict(1)
-        q = list(packet.q_c[: self.model.n])
-        return self._commanded.predict(1, q, steps) if is_lost else q
-
-    def _judge(self, q: list[float], playback: Playback) -> tuple[Fault, ...]:
+    def _count_losses(self, step: Step, playback: Playback) -> Step:
+        """Raises the instability of too many lost commands in a row."""
         lost = self.playout.lost_in_row
-        if playback.is_lost:
-            self._blurred_until = self._message_id + _BLURRED
-            if self._lost_limit is not None and lost >= self._lost_limit:
-                self.reason = f"{lost} commands in a row were lost"
-                return (Fault.INSTABILITY_DETECTION,)
-        if not math.isfinite(sum(q)):  # Not a number is in no range; the derivatives say nothing then.
-            self.reason = f"commanded positions {q} rad are not all finite numbers"
-            return (Fault.COMMAND_JOINT_POSITION_LIMITS_VIOLATION,)
-        faults = self._monitor.step(q)
-        if faults:
-            self.reason = "; ".join(
-                f"joint {joint}: {row.quantity} {value:.6g} {row.unit} passes {bound:.6g} {row.unit}"
-                for row, joint, value, bound in self._monitor.broken()
-            )
-            if self._message_id <= self._blurred_until:
-                self.reason = f"lost commands broke the motion ({self.playout.lost} lost so far): {self.reason}"
-                return (Fault.INSTABILITY_DETECTION,)
-        return faults
+        if playback.is_lost and self.lost_limit is not None and lost >= self.lost_limit:
+            return Step(faults=(Fault.INSTABILITY_DETECTION,), reason=f"{lost} commands in a row were lost")
+        return step
 
-    def _is_next(self, packet: rci.CommandPacket, steps: int) -> bool:
-        q = packet.q_c
-        near, far = self._commanded.predict(1), self._commanded.predict(steps)
-        off_near = sum(abs(a - b) for a, b in zip(q, near, strict=False))
-        off_far = sum(abs(a - b) for a, b in zip(q, far, strict=False))
-        return off_near <= off_far
-
-    def _move_plant(self) -> None:
-        commanded, drive = self._commanded, self._current_drive()
-        setpoint = Setpoint(drive, commanded.q, commanded.dq, commanded.ddq, stiffness=self.settings.joint_stiffness)
-        self._measured = self._plant.step(setpoint)
-        if drive in (Drive.BRAKED, Drive.GUIDED):
-            q = self._measured.q.tolist()
-            if q != commanded.q:
-                commanded.place(q)
-        elif self.phase in (Phase.MOVING, Phase.STOPPING) and self._collides():
-            self.happen(Event.FAULT, Fault.COLLISION)
-
-    def _current_drive(self) -> Drive:
-        if self.phase is Phase.GUIDING:
-            return Drive.GUIDED
-        if self.phase in (Phase.MOVING, Phase.STOPPING):
-            return self._drive
-        is_braked = self.phase in (Phase.OFF, Phase.REFLEX, Phase.USER_STOPPED, Phase.RECOVERING)
-        return Drive.BRAKED if is_braked and self._commanded.is_at_rest else Drive.POSITION
-
-    def _collides(self) -> bool:
-        pairs = zip(self._measured.tau_ext.tolist(), self.settings.collision_thresholds, strict=True)
-        for joint, (torque, threshold) in enumerate(pairs, start=1):
-            if abs(torque) > threshold:
-                self.reason = (
-                    f"joint {joint}: external torque {torque:.3g} N m is above its threshold {threshold:g} N m"
-                )
-                return True
-        return False
+    def _current_law(self) -> Law:
+        phase = self.phase
+        if phase is Phase.GUIDING:
+            return Law.GUIDE
+        if phase is Phase.MOVING or (phase is Phase.STOPPING and self._drain > 0):
+            is_over = self._mode.law is Law.TORQUE and self.playout.is_finished  # Nobody holds the arm any more.
+            return Law.POSITION if is_over else self._mode.law
+        is_braked = phase in (Phase.OFF, Phase.REFLEX, Phase.USER_STOPPED, Phase.RECOVERING)
+        return Law.BRAKED if is_braked and self._arm.may_be_braked else Law.POSITION
 
     def _report(self) -> RobotState:
         controller_mode, motion_mode = self._shown
         return self._reporter.report(
             self._message_id,
-            self._commanded,
-            self._measured,
+            self._arm.read(self._tau),
             faults=self.faults,
             success_rate=self.playout.success_rate,
             motion_generator_mode=motion_mode,
@@ -314,14 +316,12 @@ class ControlCycle:
         match action:
             case Action.BEGIN:
                 self._countdown = self._mode_delay
-                self.playout.begin()
+                self.playout.begin(most=TORQUE_STOCK if self._mode.law is Law.TORQUE else None)
             case Action.SHOW_MODES:
                 self._shown = self._requested
-                self._monitor = JointMonitor(self._soft_limits())
-                self._monitor.reset(self._commanded.q)
-                self._blurred_until = -1
+                self._begin_motion()
             case Action.HIDE_MODES:
-                self._shown = (ControllerMode.OTHER, MotionGeneratorMode.IDLE)
+                self._shown = _IDLE_MODES
             case Action.DRAIN:
                 self._drain = DRAIN_LIMIT
             case Action.DISCARD:
@@ -331,61 +331,39 @@ class ControlCycle:
                 self.faults = tuple(sorted({*self.faults, *faults}))
             case Action.CLEAR_FAULTS:
                 self.faults = ()
+            case Action.GUIDE:
+                self._arm.actuator.begin_guiding(*self._drag, self._arm.watch.measured)
             case Action.REBOOT:
-                self.settings = default_settings(self.model.description)
-                self._configure()
+                self.settings = self.settings.rebooted(self.model.description)
+                self._arm.configure(self.settings)
+                self._reporter.configure(self.model, self.settings)
             case Action.APPLY:
                 pass  # Done before, because it may fail.
+
+    def _begin_motion(self) -> None:
+        q, watch = list(self._arm.commanded.q), self._arm.watch
+        terms = build_terms(self._mode, self.model, self.settings, self.limit_table, watch.measured, watch.tool.pose)
+        self._generator = build_generator(self._mode, terms, q)
+        watch.begin(
+            terms.limits,
+            terms.box,
+            self.settings.collision_thresholds,
+            judges_tool=self._mode.is_cartesian,
+            yields=self._mode.law.yields,
+        )
+        self._tau = [0.0] * self.model.n if self._mode.law is Law.TORQUE else None
 
     def _apply(self, request: rci.Request) -> bool:
         settings = apply_request(self.settings, request, self.model.description)
         if settings is None:
             return False
-        is_changed = settings is not self.settings
         self.settings = settings
-        if is_changed and request.code in _RECONFIGURING:
-            self._configure()
+        self._wire()
+        self._arm.configure(settings)
+        if request.code in _REPORTED:
+            self._reporter.configure(self.model, settings)
         return True
 
-    def _configure(self) -> None:
-        """Hands tool, load and filters on to whatever computes with them."""
-        tool, load = self.settings.T_flange_tool, self.settings.load
-        if tool is not self.model.T_flange_tool or load is not self.model.load:
-            self.model = self.model.with_tool(tool).with_load(load)
-            self._plant.configure(self.model)
-        self._reporter.configure(self.model, self.settings)
-
-    def _soft_limits(self) -> JointLimits:
-        joint = self.model.limits.joint
-        return replace(joint, lower=frozen(self.settings.joint_lower), upper=frozen(self.settings.joint_upper))
-
-    def _judge_start(self, request: rci.StartMove) -> rci.StartStatus | None:
-        """Returns why these modes cannot be started, or remembers them and returns None."""
-        controller_mode, motion_mode = request.controller_mode, request.motion_mode
-        if controller_mode >= ControllerMode.OTHER or motion_mode not in tuple(rci.StartMotionMode):
-            return rci.StartStatus.INVALID_ARGUMENT
-        modes = ControllerMode(controller_mode), rci.StartMotionMode(motion_mode)
-        drive = MODES.get(modes)
-        if drive is None or drive not in self._plant.drives:
-            return rci.StartStatus.NOT_POSSIBLE
-        if self.phase is Phase.IDLE:
-            self._requested = (modes[0], modes[1].shown_as)
-            self._drive = drive
-        return None
-
-    def _digital_input(self, signal: int) -> rci.DigitalInputResponse:
-        if signal >= SIGNAL_COUNT:
-            return rci.DigitalInputResponse(rci.SettingStatus.INVALID_ARGUMENT, False)
-        return rci.DigitalInputResponse(rci.SettingStatus.SUCCESS, self.settings.inputs[signal])
-
-
-_RECONFIGURING = (
-    rci.CommandCode.SET_COOR,
-    rci.CommandCode.SET_LOAD,
-    rci.CommandCode.SET_FC_COOR,
-    rci.CommandCode.SET_TORQUE_FILTER_CUT_OFF_FREQUENCY,
-)
-
-
-def _reply(status: rci.Status) -> Reply:
-    return Reply(rci.StatusResponse(status))
+    def _wire(self) -> None:
+        if self._loop_back:
+            self.settings = replace(self.settings, inputs=self.settings.outputs)

@@ -6,6 +6,7 @@ import errno
 import select
 import socket
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -55,7 +56,14 @@ class ClientRefused:
     holder: str
 
 
-Arrival: TypeAlias = ClientJoined | ClientLeft | FrameArrived | DatagramArrived | ClientRefused
+@dataclass(frozen=True, slots=True)
+class GuestsReady:
+    """Sockets of somebody else, watched along with ours, have something to read."""
+
+    sockets: list[socket.socket]
+
+
+Arrival: TypeAlias = ClientJoined | ClientLeft | FrameArrived | DatagramArrived | ClientRefused | GuestsReady
 
 
 class Endpoint:
@@ -85,9 +93,14 @@ class Endpoint:
         """Whether somebody is connected."""
         return self._connection is not None
 
-    def poll(self, timeout: float) -> list[Arrival]:
-        """Returns what has arrived; waits up to `timeout`, [s], for the first thing. Datagrams come before frames."""
-        sockets = [self._datagrams, self._listener]
+    def poll(self, timeout: float, guests: Sequence[socket.socket] = ()) -> list[Arrival]:
+        """Returns what has arrived; waits up to `timeout`, [s], for the first thing. Datagrams come before frames.
+
+        Args:
+            timeout: Longest wait, [s].
+            guests: Sockets of somebody else to be watched, too.
+        """
+        sockets = [self._datagrams, self._listener, *guests]
         if self._connection is not None:
             sockets.append(self._connection)
         readable = select.select(sockets, (), (), 0.0 if self._arrivals else max(timeout, 0.0))[0]
@@ -97,6 +110,9 @@ class Endpoint:
             self._receive_frames(self._connection)
         if self._listener in readable:
             self._accept()
+        ready_guests = [guest for guest in guests if guest in readable] if readable else []
+        if ready_guests:
+            self._arrivals.append(GuestsReady(ready_guests))
         arrivals = list(self._arrivals)
         self._arrivals.clear()
         return arrivals

@@ -12,10 +12,12 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Protocol
 
-import numpy as np
+from numpy.typing import ArrayLike
 
-from rcilab.arrays import Array, JointVector, frozen
+from rcilab.arrays import Array, JointVector
+from rcilab.dynamics.payload import Payload
 from rcilab.model import RobotModel
+from rcilab.spatial import Pose
 
 
 class Drive(Enum):
@@ -25,12 +27,8 @@ class Drive(Enum):
     """Motors off, brakes closed. The arm comes to rest by itself and stays; setpoints are ignored."""
     POSITION = "position"
     """The servo follows `q` (with `dq` and `ddq` as feed-forward). Also how an arm stands still under power."""
-    IMPEDANCE = "impedance"
-    """Joint springs of `stiffness` pull towards `q`; gravity and friction are compensated."""
     TORQUE = "torque"
-    """`tau` acts at the joints, on top of the compensation of gravity and friction."""
-    GUIDED = "guided"
-    """The arm is weightless and yields to outside forces: hand guiding."""
+    """`tau` acts at the joints, on top of the compensation of gravity and friction: M ddq + C dq = tau."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,10 +42,8 @@ class Setpoint:
     """Commanded joint velocities, [rad/s]."""
     ddq: Sequence[float]
     """Commanded joint accelerations, [rad/s^2]."""
-    stiffness: Sequence[float] | None = None
-    """Joint stiffness, [N m/rad], for IMPEDANCE."""
-    tau: Sequence[float] | None = None
-    """Commanded joint torques, [N m], for TORQUE."""
+    tau: Sequence[float] | Array | None = None
+    """Commanded joint torques without gravity and friction, [N m], for TORQUE."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,11 +55,7 @@ class Measurement:
     dq: JointVector
     """Joint velocities, shape (n,), [rad/s]."""
     tau: JointVector
-    """Torques in the joints, gravity included, shape (n,), [N m]."""
-    tau_ext: JointVector
-    """Share of `tau` that the arm's own model does not explain: contact, shape (n,), [N m]."""
-    wrench_ext: Array
-    """The same as force and moment on the tool, base axes, at the tool's origin, shape (6,), [N, N m]."""
+    """Torques in the joints, link side, gravity included, shape (n,), [N m]."""
 
 
 class Plant(Protocol):
@@ -72,11 +64,6 @@ class Plant(Protocol):
     @property
     def kind(self) -> str:
         """One word for it, such as "ideal"."""
-        ...
-
-    @property
-    def drives(self) -> frozenset[Drive]:
-        """The drives it can follow; BRAKED and POSITION always. Modes that need another are refused."""
         ...
 
     def configure(self, model: RobotModel) -> None:
@@ -96,49 +83,54 @@ class Plant(Protocol):
         """
         ...
 
+    def push(self, wrench: ArrayLike, link: int | None = None, point: ArrayLike | None = None) -> None:
+        """Lets something outside press on the arm until told otherwise; a new push replaces the last.
 
-class IdealPlant:
-    """The arm that is exactly where it was told to be; its torques are those of the rigid-body model.
+        Args:
+            wrench: Force and moment on the arm, base axes, shape (6,), [N, N m]; zeros let go.
+            link: Number of the link that is pressed on, from 1; the tool when absent.
+            point: Where the force acts, in the frame of that link (see `Link`), or of the tool, shape (3,), [m]; its
+                origin when absent. It moves along with the arm.
 
-    Nothing outside can touch it. So impedance is exact tracking too (a spring without a load is not stretched), and
-    guided by a hand that does not exist it stays where it is. What commands torques (TORQUE) is beyond it.
+        Raises:
+            InvalidValueError: Not six and three finite numbers, or the arm has no such link.
+        """
+        ...
 
-    Args:
-        model: The arm with its tool and load.
-    """
+    def mount(self, load: Payload | None) -> None:
+        """Fixes a payload to the flange that the controller need not know of.
 
-    kind = "ideal"
-    drives = frozenset({Drive.BRAKED, Drive.POSITION, Drive.IMPEDANCE, Drive.GUIDED})
+        Args:
+            load: What is really there; None: what the model says (setLoad).
+        """
+        ...
 
-    def __init__(self, model: RobotModel) -> None:
-        self._model = model
-        self._zeros = frozen(np.zeros(model.n))
-        self._no_wrench = frozen(np.zeros(6))
-        self._rests = True
-        self._measurement = self.reset(model.home)
+    def place_box(self, name: str, size: ArrayLike, pose: Pose) -> None:
+        """Puts a solid box into the arm's way, or moves it when there is one of this name.
 
-    def configure(self, model: RobotModel) -> None:
-        """Takes a new tool or load."""
-        self._model = model
-        self.reset(self._measurement.q)
+        Args:
+            name: How `remove_box` will call it.
+            size: Edges along x, y and z of its frame, shape (3,), [m].
+            pose: Its centre and directions in the base frame.
 
-    def reset(self, q: JointVector) -> Measurement:
-        """Puts the arm at `q`, shape (n,), [rad], at rest."""
-        self._rests = True
-        return self._measure(frozen(q), self._zeros, self._zeros)
+        Raises:
+            InvalidValueError: The size is not three positive finite numbers.
+            UsageError: This plant knows no contact.
+        """
+        ...
 
-    def step(self, setpoint: Setpoint) -> Measurement:
-        """Moves the arm to the setpoint; braked or guided, it stays where it is."""
-        last = self._measurement
-        if setpoint.drive in (Drive.BRAKED, Drive.GUIDED):
-            return last if self._rests else self.reset(last.q)
-        stays = not any(setpoint.dq) and not any(setpoint.ddq) and last.q.tolist() == list(setpoint.q)
-        if stays and self._rests:
-            return last
-        self._rests = stays
-        return self._measure(frozen(setpoint.q), frozen(setpoint.dq), frozen(setpoint.ddq))
+    def remove_box(self, name: str) -> None:
+        """Takes a box away.
 
-    def _measure(self, q: JointVector, dq: JointVector, ddq: JointVector) -> Measurement:
-        tau = self._model.rigid_body.full_torque(q, dq, ddq)
-        self._measurement = Measurement(q, dq, frozen(tau), self._zeros, self._no_wrench)
-        return self._measurement
+        Raises:
+            InvalidValueError: There is none of this name; the message lists those there are.
+        """
+        ...
+
+    def set_floor(self, on: bool) -> None:
+        """Lets the floor, the plane z = 0 of the base frame, be solid or not.
+
+        Raises:
+            UsageError: This plant knows no contact.
+        """
+        ...

@@ -7,9 +7,14 @@
   queue; its old message ids do not matter.
 * Where ids advance one by one, they are cycle numbers. An empty queue is a lost cycle, and the command for it, when
   it comes after all, is dropped: the arm has passed that place already.
-* A repeated id is the next command: the vendor's client answers the last state again when none came in time.
+* A repeated id is the next command: the vendor's client answers the last state again when none came in time. A
+  datagram that is the same in every number is the network's copy and dropped; it only shows that the client lives.
+* A command that was overtaken on its way is put back in its place.
 * A short gap in the ids is either a lost command, or a lost state whose cycle the client never saw; only the command
   itself can tell, so the caller is asked whether it continues the motion by one step or by the whole gap.
+* More commands than the prefill in stock for a long time mean a client that made more of them than there are cycles;
+  the loop is told to live through some more, or their delay would only ever grow.
+* Commands that close a control loop (torques) must be fresh: more than the prefill in stock are skipped, oldest first.
 * A long gap, or ids that start again far behind, mean another numbering: the command is simply the next one.
 """
 
@@ -23,6 +28,7 @@ from rcilab.protocols.rci import CommandPacket
 
 CAPACITY = 256  # Commands. Two and a half of the vendor client's worst bursts (about 92).
 WINDOW = 1000  # Cycles that the success rate looks back over, 1 s; a choice.
+STOCK_WINDOW = 100  # Cycles in which the lowest stock is looked for; longer than any jitter, a choice.
 LONGEST_GAP = 20  # Ids. The largest loss that the controller bridges at all (manual 4.6: 10 to 20).
 
 
@@ -35,6 +41,8 @@ class Playback(NamedTuple):
     """Cycles from now to when `packet` is due, 1 for now."""
     is_lost: bool
     """The motion runs and this cycle has no command."""
+    skipped: int = 0
+    """Commands before this one that were skipped for being too old."""
 
 
 _WAITING = Playback(None, 1, False)
@@ -49,6 +57,7 @@ class Playout:
         lost_in_row: Lost cycles since the last command.
         late: Commands dropped because their cycle had passed.
         dropped: Commands dropped, oldest first, because the queue was full.
+        copies: Datagrams dropped because they were the same as the one before.
 
     Args:
         prefill: Cycles between the first command's arrival and its play-out.
@@ -61,10 +70,19 @@ class Playout:
         self._capacity = capacity
         self.begin()
 
-    def begin(self) -> None:
-        """Forgets everything, ready for the first command of a motion."""
+    def begin(self, *, most: int | None = None) -> None:
+        """Forgets everything, ready for the first command of a motion.
+
+        Args:
+            most: Commands that may be in stock beside the one that is played: a smaller prefill, and what is older is
+                skipped. None is as many as fit.
+        """
         self._queue.clear()
-        self._countdown = self._prefill
+        self._stock = most if most is None else min(most, self._prefill)
+        self._countdown = self._prefill if self._stock is None else self._stock
+        self._newest: CommandPacket | None = None
+        self._lives = False
+        self._lowest, self._looked, self._excess = self._capacity, 0, 0
         self._outcomes: deque[bool] = deque(maxlen=WINDOW)
         self._played_in_window = 0
         self._last_id = 0
@@ -72,7 +90,7 @@ class Playout:
         self._surplus = 0
         self.is_playing = False
         self.is_finished = False
-        self.lost = self.lost_in_row = self.late = self.dropped = 0
+        self.lost = self.lost_in_row = self.late = self.dropped = self.copies = 0
 
     def clear(self) -> None:
         """Drops what is queued; what was counted stays."""
@@ -88,10 +106,30 @@ class Playout:
 
     def push(self, packet: CommandPacket) -> None:
         """Takes a command from the network."""
-        if len(self._queue) >= self._capacity:
-            self._queue.popleft()
+        queue, newest = self._queue, self._newest
+        behind = 0 if newest is None else newest.message_id - packet.message_id
+        if 0 < behind <= LONGEST_GAP:
+            self._put_in_place(packet)
+            return
+        if packet == newest:
+            self.copies += 1
+            self._lives = True
+            return
+        if len(queue) >= self._capacity:
+            queue.popleft()
             self.dropped += 1
-        self._queue.append(packet)
+        queue.append(packet)
+        self._newest = packet
+
+    def work_off(self) -> bool:
+        """Returns whether a cycle more is due now: more commands than the prefill waited all through the last window.
+
+        That is no jitter; the client has made more commands than there were cycles.
+        """
+        if self._excess == 0:
+            return False
+        self._excess -= 1
+        return True
 
     def take(self, is_next: Callable[[CommandPacket, int], bool]) -> Playback:
         """Returns what this cycle plays.
@@ -109,10 +147,14 @@ class Playout:
                 self._countdown -= 1
                 return _WAITING
             self.is_playing = True
+            self._skip_old()
             self._last_id = self._queue[0].message_id - 1
         self._drop_late()
+        self._look_for_excess()
+        skipped = self._skip_old()
+        lives, self._lives = self._lives, False
         if not self._queue:
-            return self._lose(_EMPTY)
+            return self._wait_alive() if lives else self._lose(_EMPTY)
         packet = self._queue[0]
         ahead = packet.message_id - self._last_id
         if ahead == 0:
@@ -126,16 +168,49 @@ class Playout:
                 return self._lose(Playback(packet, ahead, True))
         elif ahead != 1:
             self._surplus = 0
-        return self._play(packet)
+        return self._play(packet, skipped)
 
-    def _play(self, packet: CommandPacket) -> Playback:
+    def _put_in_place(self, packet: CommandPacket) -> None:
+        """Takes a command that was overtaken."""
+        queue, place = self._queue, len(self._queue)
+        while place > 0 and queue[place - 1].message_id > packet.message_id:
+            place -= 1
+        if place > 0 and queue[place - 1] == packet:
+            self.copies += 1
+        else:
+            queue.insert(place, packet)
+
+    def _look_for_excess(self) -> None:
+        self._lowest = min(self._lowest, len(self._queue) - 1)
+        self._looked += 1
+        if self._looked >= STOCK_WINDOW:
+            self._excess = max(0, self._lowest - self._prefill)
+            self._looked, self._lowest = 0, self._capacity
+
+    def _skip_old(self) -> int:
+        """Skips commands beyond the stock that is wanted; returns how many."""
+        if self._stock is None:
+            return 0
+        skipped = max(0, len(self._queue) - self._stock - 1)
+        for _ in range(skipped):
+            self._last_id = self._queue.popleft().message_id
+        return skipped
+
+    def _wait_alive(self) -> Playback:
+        """Bridges a cycle in which the client had nothing new to say: it answered a state again, word by word."""
+        self._surplus += 1
+        self.lost_in_row = 0
+        self._count(True)
+        return _EMPTY
+
+    def _play(self, packet: CommandPacket, skipped: int) -> Playback:
         self._queue.popleft()
         self._last_id = packet.message_id
         self._extrapolated_through = None
         self.lost_in_row = 0
         self.is_finished = packet.finished
         self._count(True)
-        return Playback(packet, 1, False)
+        return Playback(packet, 1, False, skipped)
 
     def _lose(self, playback: Playback) -> Playback:
         self._last_id += 1

@@ -3,32 +3,63 @@
 What this virtual arm knows and how (each documented here because a state must not lie):
 
 * Commanded velocities and accelerations are backward differences of the commanded angles over one cycle, the tool's
-  twist is the Jacobian times them, the tool's acceleration the twist's backward difference.
-* The drive ratio is one and the joints are stiff: motor angles, velocities and torques equal those of the joints.
+  twist is the Jacobian times them, the tool's acceleration the twist's backward difference; so for the arm angle.
+* While the arm goes where forces take it (torque commands, hand guiding), the commanded angles are the measured ones.
 * The arm angle is undefined where shoulder and wrist are one above the other or the arm is stretched: there its last
   value stays, and at first 0. On 6-axis arms it is 0.
-* Filtered torques pass a first-order low pass at the frequency of SetTorqueFilterCutOffFrequency.
+* `tau_c` is what the client commands while it commands torques (without gravity), otherwise what the rigid-body model
+  says the commanded motion takes (with gravity). Where the one gives way to the other its rate is said to be zero.
+* Outside torques are the observer's estimates of what the surroundings exert on the arm. `tau_ext_in_base` is the
+  wrench on the tool, base axes, at the tool's origin. `tau_ext_in_stiff` is the same wrench at the origin of the force
+  frame of setFcCoor, in axes that its type names: WORLD those of the base, TOOL those of the force frame, PATH x along
+  the commanded velocity of the tool (where it stands still, its last direction), z as near to the force frame's z as
+  that allows.
+* Motor angles, velocities and torques come from the drive model. Filtered torques pass a first-order low pass at the
+  frequency of SetTorqueFilterCutOffFrequency.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from rcilab.arrays import Array, JointVector, Matrix, frozen
 from rcilab.clock import CYCLE_TIME
 from rcilab.controller.commanded import CommandedMotion
+from rcilab.controller.drive_model import DriveModel
+from rcilab.controller.filters import low_pass_gain
 from rcilab.controller.plant import Measurement
-from rcilab.controller.settings import MAX_FREQUENCY, Settings
-from rcilab.errors import SingularError
+from rcilab.controller.settings import Settings
+from rcilab.controller.tool import ToolMotion
 from rcilab.faults import Fault
 from rcilab.model import RobotModel
-from rcilab.spatial import Pose
+from rcilab.protocols.rci import ForceFrame
+from rcilab.spatial import Pose, Rotation9
 from rcilab.state import ControllerMode, MotionGeneratorMode, RobotMode, RobotState
 
 _SETTLED_TORQUE = 1e-6  # [N m] A filtered torque this close to the true one takes its value, so that rest is rest.
+_STANDING = 1e-6  # [m/s] Below this the tool has no direction of its path.
+_ALONG = 0.999  # Cosine of an angle above which two directions count as parallel.
+
+
+class Readings(NamedTuple):
+    """What one cycle came to, inside the controller."""
+
+    commanded: CommandedMotion
+    tool_c: ToolMotion
+    """The tool of the commanded motion."""
+    measured: Measurement
+    tool: ToolMotion
+    """The tool as measured."""
+    tau_c: list[float] | None
+    """Commanded torques, [N m]; None while none are commanded."""
+    tau_ext: JointVector
+    """Outside joint torques, [N m]."""
+    wrench: Array
+    """Outside wrench on the tool, base axes, [N, N m]."""
 
 
 class StateReporter:
@@ -42,24 +73,25 @@ class StateReporter:
     def __init__(self, model: RobotModel, settings: Settings) -> None:
         self._zeros = frozen(np.zeros(model.n))
         self._zeros6 = frozen(np.zeros(6))
+        self._drive_model = DriveModel(model)
+        self._path = (0.0, 0.0, 0.0)
         self.configure(model, settings)
 
     def configure(self, model: RobotModel, settings: Settings) -> None:
         """Takes a new tool, load, force frame or filter; only while the arm is at rest."""
         self._model = model
         self._T_tool_force = model.T_flange_tool.inverse() @ settings.T_flange_force
-        self._gain = _low_pass_gain(settings.torque_report_filter)
-        self._state: RobotState | None = None
-        self._measurement: Measurement | None = None
+        self._force_frame = settings.force_frame
+        self._gain = low_pass_gain(settings.torque_report_filter)
+        self._body: dict[str, Any] | None = None
+        self._readings: Readings | None = None
         self._version = -1
         self._is_settled = False
-        self._psi = self._psi_c = self._dpsi_c = 0.0
 
     def report(
         self,
         message_id: int,
-        commanded: CommandedMotion,
-        measurement: Measurement,
+        readings: Readings,
         *,
         faults: tuple[Fault, ...],
         success_rate: float,
@@ -68,105 +100,141 @@ class StateReporter:
         robot_mode: RobotMode,
     ) -> RobotState:
         """Returns the state of this cycle."""
-        is_same = measurement is self._measurement and commanded.version == self._version
-        base = self._state if is_same and self._is_settled else None
-        if base is None:
-            base = self._compute(commanded, measurement)
-        state = self._state = replace(
-            base,
+        body = self._body
+        if body is None or not self._is_settled or not self._is_same(readings):
+            body = self._body = self._compute(readings)
+            self._readings, self._version = readings, readings.commanded.version
+        return RobotState(
             message_id=message_id,
             faults=faults,
             success_rate=success_rate,
             motion_generator_mode=motion_generator_mode,
             controller_mode=controller_mode,
             robot_mode=robot_mode,
+            **body,
         )
-        self._measurement, self._version = measurement, commanded.version
-        return state
 
-    def _compute(self, commanded: CommandedMotion, measured: Measurement) -> RobotState:
-        model, last, h = self._model, self._state, CYCLE_TIME
+    def _is_same(self, readings: Readings) -> bool:
+        last = self._readings
+        return (
+            last is not None
+            and readings.measured is last.measured
+            and readings.tau_ext is last.tau_ext
+            and readings.tau_c == last.tau_c
+            and readings.commanded.version == self._version
+        )
+
+    def _compute(self, readings: Readings) -> dict[str, Any]:
+        commanded, tool_c, measured, tool, tau_commanded, _, wrench = readings
+        last, before, h = self._body, self._readings, CYCLE_TIME
         q_c, dq_c, ddq_c = frozen(commanded.q), frozen(commanded.dq), frozen(commanded.ddq)
-        is_exact = measured.q.tolist() == commanded.q
-        pose_c = model.forward(q_c)
-        pose = pose_c if is_exact else model.forward(measured.q)
-        twist_c = self._zeros6 if commanded.is_at_rest else model.jacobian(q_c) @ dq_c
-        acceleration_c = self._zeros6 if last is None else (twist_c - last.tool_velocity_c) / h
-        psi_c = self._arm_angle(q_c, self._psi_c)
-        psi = psi_c if is_exact else self._arm_angle(measured.q, self._psi)
-        dpsi_c = 0.0 if last is None else math.remainder(psi_c - self._psi_c, math.tau) / h
-        ddpsi_c = 0.0 if last is None else (dpsi_c - self._dpsi_c) / h
-        follows = is_exact and measured.dq.tolist() == commanded.dq
-        tau_c = measured.tau if follows else model.rigid_body.full_torque(q_c, dq_c, ddq_c)
-        dtau_c = self._zeros if last is None else (tau_c - last.tau_c) / h
-        tau_filtered = measured.tau if last is None else self._low_pass(last.tau_filtered, measured.tau)
-        self._psi, self._psi_c, self._dpsi_c = psi, psi_c, dpsi_c
+        if tau_commanded is not None:
+            tau_c = frozen(tau_commanded)
+        else:
+            tau_c = self._model.rigid_body.full_torque(q_c, dq_c, ddq_c)
+        tau, ddq, dtau, dtau_c = measured.tau, self._zeros, self._zeros, self._zeros
+        tau_filtered = tau
+        drive = self._drive_model
+        if last is not None and before is not None:
+            if measured is not before.measured:
+                ddq = (measured.dq - before.measured.dq) / h
+                dtau = (tau - before.measured.tau) / h
+            if (tau_commanded is None) == (before.tau_c is None):
+                dtau_c = (tau_c - last["tau_c"]) / h
+            tau_filtered = self._low_pass(last["tau_filtered"], tau, commanded.is_at_rest)
+        motor_tau = motor_filtered = drive.motor_tau(tau, measured.dq, ddq)
+        if last is not None:
+            motor_filtered = self._low_pass(last["motor_tau_filtered"], motor_tau, commanded.is_at_rest)
         self._is_settled = (
             commanded.is_at_rest
-            and not (dpsi_c or ddpsi_c or acceleration_c.any() or dtau_c.any())
-            and tau_filtered is measured.tau
+            and tool_c.is_at_rest
+            and tau_filtered is tau
+            and motor_filtered is motor_tau
+            and before is not None
+            and measured is before.measured
+            and not dtau_c.any()
         )
-        return RobotState(
-            message_id=0,
-            q=measured.q,
-            q_c=q_c,
-            dq=measured.dq,
-            dq_c=dq_c,
-            ddq_c=ddq_c,
-            T_base_tool=_matrix(pose),
-            T_base_tool_c=_matrix(pose_c),
-            tool_velocity_c=twist_c,
-            tool_acceleration_c=acceleration_c,
-            psi=psi,
-            psi_c=psi_c,
-            dpsi_c=dpsi_c,
-            ddpsi_c=ddpsi_c,
-            tau=measured.tau,
-            tau_filtered=tau_filtered,
-            tau_c=tau_c,
-            dtau_c=dtau_c,
-            tau_ext_in_base=measured.wrench_ext,
-            tau_ext_in_stiff=self._in_force_frame(measured.wrench_ext, pose),
-            theta=measured.q,
-            dtheta=measured.dq,
-            motor_tau=measured.tau,
-            motor_tau_filtered=tau_filtered,
-            faults=(),
-            success_rate=1.0,
-            motion_generator_mode=MotionGeneratorMode.IDLE,
-            controller_mode=ControllerMode.OTHER,
-            robot_mode=RobotMode.OTHER,
-        )
+        T_base_tool_c = _matrix(tool_c.pose)
+        return {
+            "q": measured.q,
+            "q_c": q_c,
+            "dq": measured.dq,
+            "dq_c": dq_c,
+            "ddq_c": ddq_c,
+            "T_base_tool": T_base_tool_c if tool.pose is tool_c.pose else _matrix(tool.pose),
+            "T_base_tool_c": T_base_tool_c,
+            "tool_velocity_c": frozen(tool_c.twist),
+            "tool_acceleration_c": frozen(tool_c.acceleration),
+            "psi": tool.psi,
+            "psi_c": tool_c.psi,
+            "dpsi_c": tool_c.dpsi,
+            "ddpsi_c": tool_c.ddpsi,
+            "tau": tau,
+            "tau_filtered": tau_filtered,
+            "tau_c": tau_c,
+            "dtau_c": dtau_c,
+            "tau_ext_in_base": wrench,
+            "tau_ext_in_stiff": self._in_force_frame(wrench, tool.pose, tool_c.twist[:3]),
+            "theta": drive.theta(measured.q, tau),
+            "dtheta": drive.dtheta(measured.dq, dtau),
+            "motor_tau": motor_tau,
+            "motor_tau_filtered": motor_filtered,
+        }
 
-    def _arm_angle(self, q: JointVector, last: float) -> float:
-        if self._model.n != 7:
-            return 0.0
-        try:
-            return self._model.arm_angle(q)
-        except SingularError:
-            return last
+    def _low_pass(self, last: JointVector, tau: JointVector, may_settle: bool) -> JointVector:
+        if self._gain == 1.0:
+            return tau
+        missing = tau - last
+        if may_settle and max(missing.max(), -missing.min()) * (1.0 - self._gain) < _SETTLED_TORQUE:
+            return tau
+        return last + self._gain * missing
 
-    def _low_pass(self, last: JointVector, tau: JointVector) -> JointVector:
-        filtered = last + self._gain * (tau - last)
-        return tau if np.abs(tau - filtered).max() < _SETTLED_TORQUE else filtered
-
-    def _in_force_frame(self, wrench: Array, T_base_tool: Pose) -> Array:
-        """Returns a wrench on the tool (base axes, tool's origin) in axes and at the origin of the force frame."""
+    def _in_force_frame(self, wrench: Array, T_base_tool: Pose, velocity: Sequence[float]) -> Array:
+        """Returns a wrench on the tool (base axes, tool's origin) at the force frame's origin, in its type's axes."""
+        speed = math.hypot(*velocity)
+        if speed > _STANDING:
+            x, y, z = velocity
+            self._path = (x / speed, y / speed, z / speed)
         if not wrench.any():
             return self._zeros6
-        T_base_force = T_base_tool @ self._T_tool_force
-        R = T_base_force.rotation.T
-        arm = T_base_tool.position - T_base_force.position
-        moment = wrench[3:] + np.cross(arm, wrench[:3])
-        return np.concatenate((R @ wrench[:3], R @ moment))
+        r, (x, y, z) = (T_base_tool @ self._T_tool_force).parts
+        tx, ty, tz = T_base_tool.parts[1]
+        ax, ay, az = tx - x, ty - y, tz - z
+        fx, fy, fz, mx, my, mz = wrench.tolist()
+        mx, my, mz = mx + ay * fz - az * fy, my + az * fx - ax * fz, mz + ax * fy - ay * fx
+        if self._force_frame is ForceFrame.WORLD:
+            return frozen((fx, fy, fz, mx, my, mz))
+        if self._force_frame is ForceFrame.PATH:
+            r = _path_axes(self._path, r)
+        return frozen((*_inwards(r, fx, fy, fz), *_inwards(r, mx, my, mz)))
+
+
+def _inwards(r: Rotation9, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """Returns a vector of the base in axes that are the columns of a rotation."""
+    return r[0] * x + r[3] * y + r[6] * z, r[1] * x + r[4] * y + r[7] * z, r[2] * x + r[5] * y + r[8] * z
+
+
+def _path_axes(x: tuple[float, float, float], r: Rotation9) -> Rotation9:
+    """Returns axes with x along a path and z as near as possible to the force frame's z, or its y if that is along x.
+
+    Before the first motion there is no path, and the axes are those of the force frame.
+    """
+    ax, ay, az = x
+    if not any(x):
+        return r
+    near = (r[2], r[5], r[8])
+    if abs(near[0] * ax + near[1] * ay + near[2] * az) > _ALONG:
+        near = (r[1], r[4], r[7])
+    along = near[0] * ax + near[1] * ay + near[2] * az
+    cx, cy, cz = near[0] - along * ax, near[1] - along * ay, near[2] - along * az
+    length = math.hypot(cx, cy, cz)
+    cx, cy, cz = cx / length, cy / length, cz / length
+    return (
+        ax, cy * az - cz * ay, cx,
+        ay, cz * ax - cx * az, cy,
+        az, cx * ay - cy * ax, cz,
+    )  # fmt: skip
 
 
 def _matrix(pose: Pose) -> Matrix:
     return np.array(pose.as_row_major()).reshape(4, 4)
-
-
-def _low_pass_gain(frequency: float) -> float:
-    """Returns the share of the difference that a first-order low pass takes up in one cycle; 1000 Hz is no filter."""
-    if frequency >= MAX_FREQUENCY:
-        return 1.0
-    return CYCLE_TIME / (CYCLE_TIME + 1.0 / (2.0 * math.pi * frequency)) if frequency > 0.0 else 0.0

@@ -2,6 +2,8 @@
 
 Free-running, a cycle is due every millisecond on a fixed grid. A cycle that this process itself missed is left out
 and counted: the simulated time slips, rather than the client being blamed for commands it had no state to answer.
+A client that went on meanwhile, as the vendor's does on its old state, has then sent more commands than cycles; such
+cycles are made up for, one in each millisecond and unseen, or its commands would be played later and later.
 In lock-step a motion's next cycle is due when its command has come, however long or short that takes.
 """
 
@@ -13,8 +15,9 @@ from collections import deque
 from collections.abc import Callable
 
 from rcilab.clock import CYCLE_TIME, SystemClock
+from rcilab.controller.answers import Reply
 from rcilab.controller.config import ControllerConfig
-from rcilab.controller.cycle import ControlCycle, Reply
+from rcilab.controller.cycle import ControlCycle
 from rcilab.controller.endpoint import (
     Arrival,
     ClientJoined,
@@ -23,10 +26,16 @@ from rcilab.controller.endpoint import (
     DatagramArrived,
     Endpoint,
     FrameArrived,
+    GuestsReady,
 )
-from rcilab.controller.plant import IdealPlant, Plant
+from rcilab.controller.faulty_network import FaultyNetwork
+from rcilab.controller.ideal_plant import IdealPlant
+from rcilab.controller.plant import Plant
+from rcilab.controller.stalls import StallPlan
 from rcilab.controller.state_machine import Event, Phase, When
-from rcilab.errors import DecodeError
+from rcilab.controller.surroundings import Mishaps, Surroundings
+from rcilab.controller.world_port import WorldPort
+from rcilab.errors import DecodeError, UsageError
 from rcilab.model import RobotModel, load_model
 from rcilab.protocols.rci import (
     COMMAND_SIZE,
@@ -43,7 +52,7 @@ PRIORITY = 80  # Under SCHED_FIFO; above the client's process, whose clock this 
 RESEND_TIME = 0.02  # [s] In lock-step a state is sent again after this time until the first command has come.
 PATIENCE = 1.0  # [s] In lock-step, for the next command; then its cycle is lost, and each following one at 1 kHz.
 GRACE = 2.0  # [s] For the arm to come to rest when the controller shall end.
-_LOOK = 0.1  # [s] Between looks at whether the parent process still lives.
+_LOOK = 0.1  # [s] Between looks at whether the parent process still lives, or a stalled controller shall end.
 
 
 class ControllerServer:
@@ -81,6 +90,9 @@ class ControllerServer:
             prefill=config.prefill_cycles,
             lost_limit=config.lost_limit,
         )
+        self.cycle.auto_limit = config.auto_limit
+        self.cycle.loop_back = config.loop_back
+        self.cycle.limit_table = config.limit_table
         self.missed = 0
         self.misfits = 0
         self._log = log if log is not None else _to_stderr
@@ -90,6 +102,13 @@ class ControllerServer:
         self._is_ending = False
         self._next_look = 0.0
         self._endpoint = Endpoint(config)
+        states_network = config.network if config.states_network is None else config.states_network
+        self._network = FaultyNetwork(self._endpoint, self._clock, config.network, states_network)
+        self._stalls = StallPlan()
+        self._surroundings = Surroundings(
+            self.cycle, self._network, self._stalls, self._clock, lambda: Mishaps(self.missed, self.misfits)
+        )
+        self._world = self._open_world()
 
     @property
     def url(self) -> str:
@@ -101,6 +120,11 @@ class ControllerServer:
     def description(self) -> str:
         """The line that says the controller is ready."""
         return f"listening {self.url} model={self.cycle.model.name} plant={self._plant.kind}"
+
+    @property
+    def world_address(self) -> str | None:
+        """Where the world port is, as ADDR:PORT; None: there is none."""
+        return None if self._world is None else "{}:{}".format(*self._world.address)
 
     def run(self) -> None:
         """Runs until `request_stop`, then brings the arm to rest and closes every socket."""
@@ -114,7 +138,7 @@ class ControllerServer:
         finally:
             if use_realtime:
                 leave_realtime()
-            self._endpoint.close()
+            self.close()
 
     def request_stop(self) -> None:
         """Asks for the end: one controlled stop if the arm moves, then `run` returns."""
@@ -123,11 +147,24 @@ class ControllerServer:
     def close(self) -> None:
         """Closes the sockets of a server that does not run."""
         self._endpoint.close()
+        if self._world is not None:
+            self._world.close()
+
+    def _open_world(self) -> WorldPort | None:
+        if self.config.world_port is None:
+            return None
+        try:
+            return WorldPort(self._endpoint.host, self.config.world_port, self._surroundings.handle)
+        except UsageError:
+            self._endpoint.close()
+            raise
 
     def _loop(self) -> None:
         deadline = self._clock.now()
+        self._stalls.replace(self.config.stalls, deadline)
         last_moment: float | None = None
         while True:
+            self._stand_still(self._stalls.take(self._clock.now()))
             if self._is_ending and last_moment is None:
                 last_moment = self._clock.now() + GRACE
                 self.cycle.happen(Event.CLIENT_LOST)
@@ -140,6 +177,16 @@ class ControllerServer:
                 deadline = self._next_deadline(deadline)
                 self._await(deadline)
             self._step()
+
+    def _stand_still(self, duration: float) -> None:
+        """Does nothing at all for so long, [s], as a controller whose clock stalls; an end asked for goes before."""
+        until = self._clock.now() + duration
+        while duration > 0.0 and self._clock.now() < until and not self._is_ending:
+            self._clock.sleep_until(min(until, self._clock.now() + _LOOK))
+
+    def _poll(self, timeout: float) -> None:
+        """Serves the sockets once; waits up to `timeout`, [s], for something to serve."""
+        self._take(self._network.poll(timeout, () if self._world is None else self._world.sockets))
 
     def _next_deadline(self, deadline: float) -> float:
         deadline += CYCLE_TIME
@@ -154,7 +201,7 @@ class ControllerServer:
         """Serves the sockets until the deadline, and at least once."""
         while True:
             remaining = deadline - self._clock.now()
-            self._take(self._endpoint.poll(remaining))
+            self._poll(remaining)
             if remaining <= 0.0:
                 return
 
@@ -165,7 +212,7 @@ class ControllerServer:
         patience = CYCLE_TIME if cycle.playout.lost_in_row else PATIENCE
         deadline = self._clock.now() + patience
         while True:
-            self._take(self._endpoint.poll(0.0 if len(cycle.playout) else RESEND_TIME if is_first else patience))
+            self._poll(0.0 if len(cycle.playout) else RESEND_TIME if is_first else patience)
             if len(cycle.playout) or not cycle.wants_commands or self._is_ending:
                 return
             if is_first:
@@ -174,11 +221,10 @@ class ControllerServer:
                 return
 
     def _step(self) -> None:
-        faults = self.cycle.faults
-        state = self.cycle.step()
+        if not self.config.lockstep and self.cycle.wants_commands and self.cycle.playout.work_off():
+            self._live()
+        self._live()
         self._send_state()
-        if state.faults and state.faults != faults:
-            self._log(f"{', '.join(fault.name for fault in state.faults)}: {self.cycle.reason}; the arm comes to rest")
         if self._pending is not None and self.cycle.is_settled:
             request, command_id, reply = self._pending
             self._pending = None
@@ -189,8 +235,16 @@ class ControllerServer:
             if os.getppid() != self.config.parent_pid:
                 self.request_stop()
 
+    def _live(self) -> None:
+        """Lives through one millisecond."""
+        faults = self.cycle.faults
+        state = self.cycle.step()
+        self._surroundings.step()
+        if state.faults and state.faults != faults:
+            self._log(f"{', '.join(fault.name for fault in state.faults)}: {self.cycle.reason}; the arm comes to rest")
+
     def _send_state(self) -> None:
-        self._endpoint.send_state(encode_state(self.cycle.state))
+        self._network.send_state(encode_state(self.cycle.state))
 
     def _take(self, arrivals: list[Arrival]) -> None:
         for arrival in arrivals:
@@ -207,6 +261,9 @@ class ControllerServer:
                     self._send_state()  # Before anything else: the vendor's client waits for it a few milliseconds.
                 case ClientLeft(reason):
                     self._lose_client(reason)
+                case GuestsReady(sockets):
+                    if self._world is not None:
+                        self._world.serve(sockets)
                 case ClientRefused(address, holder):
                     self._log(f"refused a second client from {address}: {holder} is connected; one at a time")
 
@@ -218,7 +275,7 @@ class ControllerServer:
                 command_id, request = decode_request(frame)
             except DecodeError as error:
                 self._requests.clear()
-                self._endpoint.drop_client(f"sent bytes that are no RCI: {error}")
+                self._network.drop_client(f"sent bytes that are no RCI: {error}")
                 return
             reply = self.cycle.handle(request)
             if isinstance(request, Connect):
@@ -230,9 +287,9 @@ class ControllerServer:
                 self._answer(request, command_id, reply)
 
     def _answer(self, request: Request, command_id: int, reply: Reply) -> None:
-        self._endpoint.send_frame(encode_response(request.code, command_id, reply.response))
+        self._network.send_frame(encode_response(request.code, command_id, self.cycle.conclude(reply)))
         if reply.ends_connection:
-            self._endpoint.drop_client("asked for a reboot")
+            self._network.drop_client("asked for a reboot")
 
     def _lose_client(self, reason: str) -> None:
         was_moving = self.cycle.phase in (Phase.MOVING, Phase.STOPPING, Phase.GUIDING)

@@ -14,28 +14,22 @@ from math import isfinite
 
 import numpy as np
 
+from rcilab.arrays import frozen
+from rcilab.controller.filters import MAX_FREQUENCY
 from rcilab.dynamics.payload import NO_LOAD, Payload
 from rcilab.errors import InvalidValueError
+from rcilab.limits import JointLimits
 from rcilab.protocols import rci
 from rcilab.robots import RobotDescription
+from rcilab.safety_box import SafetyBox
 from rcilab.spatial import IDENTITY, Pose
 
 SIGNAL_COUNT = 6  # Digital inputs, and outputs: DI0_0 to DI0_3, DI1_0, DI1_1 (manual 3.1.13 and 3.1.14).
-MAX_FREQUENCY = 1000.0  # [Hz] Largest cut-off frequency; there it means "no filter" (wire notes, section 4).
+FARTHEST = 10.0  # [m] from flange or base that a tool, a load or a box may be; a choice: more is a slip of units.
+LARGEST_BOX = 100.0  # [m] A choice, as above.
 _LIMIT_TOLERANCE = 1e-9  # [rad] For soft limits that were converted from degrees elsewhere.
 
 Floats = tuple[float, ...]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SafetyBox:
-    """The box that the tool shall stay in."""
-
-    size: Floats
-    """Edges along x, y and z of its frame, [m]."""
-    T_base_box: Pose
-    """Its centre and directions."""
-    active: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,12 +50,13 @@ class Settings:
     """What Cartesian impedance presses with, [N, N m]."""
     T_flange_tool: Pose = IDENTITY
     load: Payload = NO_LOAD
-    joint_filter: float = 100.0
-    """Cut-off frequency, [Hz]; 100 as the vendor's client starts with."""
-    cartesian_filter: float = 100.0
-    """[Hz]."""
-    torque_filter: float = 100.0
-    """[Hz]."""
+    joint_filter: float = MAX_FREQUENCY
+    """Cut-off frequency of the low pass on commanded joint angles, [Hz]. It wakes up switched off, a choice: the
+    vendor's client filters before it sends, and whoever does not is followed exactly."""
+    cartesian_filter: float = MAX_FREQUENCY
+    """The same for commanded poses, [Hz]."""
+    torque_filter: float = MAX_FREQUENCY
+    """The same for commanded torques, [Hz]."""
     torque_report_filter: float = 100.0
     """Cut-off frequency of the filtered torques in the state, [Hz]."""
     safety_box: SafetyBox | None = None
@@ -72,6 +67,27 @@ class Settings:
     outputs: tuple[bool, ...] = (False,) * SIGNAL_COUNT
     inputs: tuple[bool, ...] = (False,) * SIGNAL_COUNT
     """Levels of the digital inputs; nothing is wired to a virtual controller, they are set from outside."""
+    auto_limit: bool = False
+    """Whether commanded joint angles are led to rest inside the soft limits instead of raising a fault beyond them.
+    `auto_limit` of setJointLimit is not on the wire: it is set from outside."""
+
+    def soft_limits(self, joint: JointLimits) -> JointLimits:
+        """Returns the limits of an arm's joints with the soft limits as position bounds."""
+        return replace(joint, lower=frozen(self.joint_lower), upper=frozen(self.joint_upper))
+
+    def with_input(self, signal: int, level: bool) -> Settings:
+        """Returns the settings with another level at a digital input.
+
+        Raises:
+            InvalidValueError: There is no such input.
+        """
+        if not 0 <= signal < SIGNAL_COUNT:
+            raise InvalidValueError("digital input", signal, f"does not exist; needs 0 to {SIGNAL_COUNT - 1}")
+        return replace(self, inputs=(*self.inputs[:signal], bool(level), *self.inputs[signal + 1 :]))
+
+    def rebooted(self, arm: RobotDescription) -> Settings:
+        """Returns what is left after a reboot: the defaults, and what is wired or chosen outside of the controller."""
+        return replace(default_settings(arm), inputs=self.inputs, auto_limit=self.auto_limit)
 
 
 def default_settings(arm: RobotDescription) -> Settings:
@@ -123,7 +139,7 @@ def _judge(request: rci.Request, arm: RobotDescription, settings: Settings) -> d
             return _soft_limits(request, arm)
         case rci.SetCartesianLimit():
             pose = _pose(request.frame)
-            if pose is None or not all(isfinite(edge) and edge > 0.0 for edge in request.size):
+            if pose is None or not all(0.0 < edge <= LARGEST_BOX for edge in request.size):
                 return None
             return {"safety_box": SafetyBox(size=request.size, T_base_box=pose, active=request.active)}
         case rci.SetCoor(T_flange_tool=numbers):
@@ -169,6 +185,8 @@ def _load(request: rci.SetLoad, arm: RobotDescription) -> dict[str, object] | No
     numbers = chain(request.center_of_mass, request.inertia)
     if not 0.0 <= request.mass <= arm.rated_payload or not all(map(isfinite, numbers)):
         return None
+    if not all(abs(x) <= FARTHEST for x in request.center_of_mass):
+        return None
     try:
         load = Payload(
             mass=request.mass,
@@ -182,6 +200,7 @@ def _load(request: rci.SetLoad, arm: RobotDescription) -> dict[str, object] | No
 
 def _pose(numbers: Floats) -> Pose | None:
     try:
-        return Pose.from_row_major(numbers)
+        pose = Pose.from_row_major(numbers)
     except InvalidValueError:
         return None
+    return pose if all(abs(x) <= FARTHEST for x in pose.position.tolist()) else None

@@ -44,7 +44,7 @@ class Phase(Enum):
     REFLEX = (RobotMode.REFLEX, 0)
     """A fault stopped the arm; brakes closed once it rests."""
     USER_STOPPED = (RobotMode.USER_STOPPED, 0)
-    """An emergency stop is pressed."""
+    """An emergency stop is pressed or the safety gate is open."""
     RECOVERING = (RobotMode.AUTOMATIC_ERROR_RECOVERY, 0)
     """Faults are being cleared."""
 
@@ -62,8 +62,8 @@ class Event(Enum):
     AT_REST = "the arm has come to rest"
     RECOVERED = "the recovery has taken its time and the arm rests"
     CLIENT_LOST = "the client's connection ended"
-    SAFETY_STOP = "an emergency stop was pressed"
-    SAFETY_RELEASE = "the emergency stop was released"
+    SAFETY_STOP = "an emergency stop was pressed or the safety gate opened"
+    SAFETY_RELEASE = "neither is so any more"
 
 
 class Action(Enum):
@@ -77,6 +77,7 @@ class Action(Enum):
     DISCARD = "forget commands that were not played and come to rest"
     SET_FAULTS = "set the error bits"
     CLEAR_FAULTS = "clear the error bits"
+    GUIDE = "remember where the arm is guided from"
     REBOOT = "forget all settings and end the connection"
 
 
@@ -164,14 +165,16 @@ def _motion(phase: Phase) -> dict[Trigger, Transition]:
         rows[C.STOP_MOVE] = Transition(P.IDLE, (A.HIDE_MODES, A.DISCARD), stopped, When.AT_REST)
     elif phase is P.MOVING:
         rows[C.STOP_MOVE] = Transition(P.STOPPING, (A.HIDE_MODES, A.DRAIN), stopped, When.AT_REST)
-    else:
-        rows[C.STOP_MOVE] = Transition(phase, (), stopped, When.AT_REST)
+    else:  # An arm in somebody's hand need not come to rest at all.
+        rows[C.STOP_MOVE] = Transition(phase, (), stopped, When.NOW if phase is P.GUIDING else When.AT_REST)
     if phase is P.IDLE:
-        rows[C.START_DRAG] = Transition(P.GUIDING, (), SettingStatus.SUCCESS)
+        rows[C.START_DRAG] = Transition(P.GUIDING, (A.GUIDE,), SettingStatus.SUCCESS)
     else:
         rows[C.START_DRAG] = Transition(phase, (), SettingStatus.NOT_POSSIBLE)
-    after = P.IDLE if phase is P.GUIDING else phase
-    rows[C.STOP_DRAG] = Transition(after, (), SettingStatus.SUCCESS, When.AT_REST)
+    if phase is P.GUIDING:
+        rows[C.STOP_DRAG] = Transition(P.IDLE, (), SettingStatus.SUCCESS, When.AT_REST)
+    else:
+        rows[C.STOP_DRAG] = Transition(phase, (), SettingStatus.SUCCESS)
     return rows
 
 

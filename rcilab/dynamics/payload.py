@@ -9,13 +9,15 @@ import numpy as np
 from rcilab.arrays import Matrix, Vector3, as_vector, frozen
 from rcilab.errors import InvalidValueError
 
+_LARGEST = 100.0  # [kg m^2] A choice: a hundred times that of anything an xMate can carry.
+
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Payload:
     """A rigid body fixed to the flange.
 
     Raises:
-        InvalidValueError: The mass is negative, the inertia is no symmetric 3 x 3 tensor, or something is not finite.
+        InvalidValueError: The mass is negative, the inertia is no body's, or something is not finite.
     """
 
     mass: float = 0.0
@@ -33,9 +35,29 @@ class Payload:
         inertia = as_vector(np.ravel(self.inertia), 9, "load inertia", "kg m^2").reshape(3, 3)
         if np.abs(inertia - inertia.T).max() > 1e-9 * max(1.0, float(np.abs(inertia).max())):
             raise InvalidValueError("load inertia", inertia.tolist(), "must be symmetric")
+        _require_possible(inertia)
         object.__setattr__(self, "mass", mass)
         object.__setattr__(self, "center_of_mass", as_vector(self.center_of_mass, 3, "load centre of mass", "m"))
         object.__setattr__(self, "inertia", frozen(inertia))
+
+    def __repr__(self) -> str:
+        centre = " ".join(f"{x:.4g}" for x in self.center_of_mass.tolist())
+        moments = " ".join(f"{x:.4g}" for x in np.diagonal(self.inertia).tolist())
+        return f"<Payload of {self.mass:.4g} kg, centre of mass at {centre} m, moments of inertia {moments} kg m^2>"
+
+
+def _require_possible(inertia: Matrix) -> None:
+    """Every body's principal moments are positive or zero, and none exceeds the sum of the other two."""
+    is_small = bool(np.abs(inertia).max() <= _LARGEST)
+    smallest, middle, largest = np.linalg.eigvalsh(inertia).tolist() if is_small else (-1.0, 0.0, 0.0)
+    tolerance = 1e-9 * max(1.0, largest)
+    if smallest < -tolerance or largest > smallest + middle + tolerance:
+        raise InvalidValueError(
+            "load inertia",
+            inertia.tolist(),
+            f"is no body's: its principal moments must be from 0 to {_LARGEST:g} kg m^2, "
+            "and none larger than the sum of the other two",
+        )
 
 
 NO_LOAD = Payload()

@@ -10,10 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin  # pyright: ignore[reportMissingImports]  # It lives behind a .pth file.
 
-from rcilab.arrays import JointVector, Matrix
+from rcilab.arrays import Array, JointPath, JointVector, Matrix, Vector3
 from rcilab.dynamics.payload import Payload
 from rcilab.robots.description import Link, RobotDescription
 from rcilab.robots.upright import upright_joints
+from rcilab.spatial import IDENTITY, Pose, Rotation9
 
 GRAVITY = 9.81  # [m/s^2] along -z of the base; the figure the vendor's dynamics library computes with.
 
@@ -31,11 +32,43 @@ class TorqueTerms:
     gravity: JointVector
     """g(q): what holds the arm still."""
 
+    def __repr__(self) -> str:
+        full = " ".join(f"{x:.2f}" for x in self.full.tolist())
+        return f"<TorqueTerms: full = {full} N m; .inertial, .coriolis, .gravity>"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ArmTerms:
+    """Everything a control law needs to know of the arm in one state. Arrays are views: do not write to them."""
+
+    mass_matrix: Matrix
+    """Joint-space inertia M, shape (n, n), [kg m^2]."""
+    mass_inverse: Matrix
+    """M^-1, shape (n, n), [1/(kg m^2)]."""
+    coriolis: JointVector
+    """C(q, dq) dq, shape (n,), [N m]."""
+    gravity: JointVector
+    """g(q), shape (n,), [N m]."""
+    jacobian: Matrix
+    """At the tool, linear rows first, base axes, shape (6, n)."""
+    drift: Array
+    """The tool's acceleration when the joints have none: dJ/dt dq, base axes, shape (6,), [m/s^2, rad/s^2]."""
+    rotation: Rotation9
+    """Orientation of the tool in base, row-major."""
+    position: tuple[float, float, float]
+    """Origin of the tool in base, [m]."""
+
 
 class RigidBody:
-    """The rigid-body model of an arm with a load at the flange. One instance serves one thread at a time."""
+    """The rigid-body model of an arm with a load and a tool at the flange. One instance serves one thread at a time.
 
-    def __init__(self, description: RobotDescription, load: Payload) -> None:
+    Args:
+        description: The arm.
+        load: What is fixed to the flange.
+        tool: Pose of the tool in the flange; it has no mass.
+    """
+
+    def __init__(self, description: RobotDescription, load: Payload, tool: Pose = IDENTITY) -> None:
         model = pin.Model()
         model.gravity.linear = np.array([0.0, 0.0, -GRAVITY])
         parent = 0
@@ -46,8 +79,12 @@ class RigidBody:
         if load.mass > 0.0:
             body = pin.Inertia(load.mass, load.center_of_mass.copy(), load.inertia.copy())
             model.appendBodyToJoint(parent, body, pin.SE3.Identity())
+        T = pin.SE3(tool.rotation, tool.position)
+        self._tool = model.addFrame(pin.Frame("tool", parent, 0, T, pin.FrameType.OP_FRAME))
         self._model = model
         self._data = model.createData()
+        self._zeros = np.zeros(description.n)
+        self._terms: tuple[JointVector, JointVector, ArmTerms] | None = None
 
     def torque(self, q: JointVector, dq: JointVector, ddq: JointVector) -> TorqueTerms:
         """Returns the torques and their terms; every argument of shape (n,), [rad], [rad/s], [rad/s^2]."""
@@ -61,10 +98,83 @@ class RigidBody:
         """Returns only the sum of all terms, shape (n,), [N m]."""
         return pin.rnea(self._model, self._data, q, dq, ddq).copy()
 
+    def motion_torques(self, q: JointPath, dq: JointPath, ddq: JointPath) -> JointPath:
+        """Returns what a motion takes beyond holding the arm still: M ddq + C dq in every row, shape (N, n), [N m].
+
+        Args:
+            q: Joint angles, shape (N, n), [rad].
+            dq: Joint velocities, shape (N, n), [rad/s].
+            ddq: Joint accelerations, shape (N, n), [rad/s^2].
+        """
+        model = pin.Model(self._model)
+        model.gravity.linear = np.zeros(3)
+        columns = (np.asfortranarray(table.T) for table in (q, dq, ddq))
+        return pin.rneaInParallel(1, pin.ModelPool(model, 1), *columns).T
+
     def mass_matrix(self, q: JointVector) -> Matrix:
         """Returns the joint-space inertia matrix, shape (n, n), [kg m^2]."""
         upper = np.triu(pin.crba(self._model, self._data, q))
         return upper + np.triu(upper, 1).T
+
+    def gravity(self, q: JointVector) -> JointVector:
+        """Returns g(q), shape (n,), [N m]."""
+        return pin.computeGeneralizedGravity(self._model, self._data, q).copy()
+
+    def acceleration(self, q: JointVector, dq: JointVector, tau: JointVector) -> JointVector:
+        """Returns the joint accelerations that torques cause (forward dynamics), shape (n,), [rad/s^2].
+
+        Args:
+            q: Joint angles, shape (n,), [rad].
+            dq: Joint velocities, shape (n,), [rad/s].
+            tau: Joint torques, gravity included, shape (n,), [N m].
+        """
+        return pin.aba(self._model, self._data, q, dq, tau).copy()
+
+    def link_jacobian(self, q: JointVector, link: int, point: Vector3) -> Matrix:
+        """Returns the Jacobian at a point of a link, linear rows first, base axes, shape (6, n).
+
+        Args:
+            q: Joint angles, shape (n,), [rad].
+            link: Number of the link, from 1.
+            point: In the link's frame, shape (3,), [m].
+        """
+        model, data = self._model, self._data
+        pin.computeJointJacobians(model, data, q)
+        J = pin.getJointJacobian(model, data, link, pin.LOCAL_WORLD_ALIGNED)
+        x, y, z = (data.oMi[link].rotation @ point).tolist()
+        J[:3] -= np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0))) @ J[3:]  # omega x arm
+        return J
+
+    def tool_jacobian(self, q: JointVector) -> Matrix:
+        """Returns the Jacobian at the tool, linear rows first, base axes, shape (6, n)."""
+        return pin.computeFrameJacobian(self._model, self._data, q, self._tool, pin.LOCAL_WORLD_ALIGNED)
+
+    def terms(self, q: JointVector, dq: JointVector) -> ArmTerms:
+        """Returns all terms of a state at once.
+
+        The last answer is kept, and given again when the very same arrays come: laws that act in one cycle share it.
+
+        Args:
+            q: Joint angles, shape (n,), [rad]; an array that nobody writes to any more.
+            dq: Joint velocities, shape (n,), [rad/s]; likewise.
+        """
+        last = self._terms
+        if last is not None and last[0] is q and last[1] is dq:
+            return last[2]
+        model, data = self._model, self._data
+        pin.computeAllTerms(model, data, q, dq)
+        gravity, M = data.g.copy(), data.M.copy()
+        coriolis = data.nle - gravity
+        inverse = pin.computeMinverse(model, data, q).copy()
+        pin.forwardKinematics(model, data, q, dq, self._zeros)
+        pin.updateFramePlacement(model, data, self._tool)
+        J = pin.getFrameJacobian(model, data, self._tool, pin.LOCAL_WORLD_ALIGNED)
+        drift = pin.getFrameClassicalAcceleration(model, data, self._tool, pin.LOCAL_WORLD_ALIGNED).vector.copy()
+        pose = data.oMf[self._tool]
+        rotation = tuple(pose.rotation.ravel().tolist())
+        terms = ArmTerms(M, inverse, coriolis, gravity, J, drift, rotation, tuple(pose.translation.tolist()))
+        self._terms = (q, dq, terms)
+        return terms
 
 
 def _inertia(link: Link) -> pin.Inertia:

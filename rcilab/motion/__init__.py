@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from rcilab.motion.cartesian import plan_arc, plan_line
 from rcilab.motion.differences import derivatives_from_differences, differences_from_derivatives
 from rcilab.motion.joint import plan_joint
 from rcilab.motion.margin import LIMIT_MARGIN
@@ -17,7 +18,9 @@ __all__ = [
     "PiecewisePolynomial",
     "derivatives_from_differences",
     "differences_from_derivatives",
+    "plan_arc",
     "plan_joint",
+    "plan_line",
     "plan_stop",
     "require_motion",
 ]

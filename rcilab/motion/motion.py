@@ -39,6 +39,10 @@ class MotionSample:
     jerk: JointVector
     """Joint jerks, [rad/s^3]."""
 
+    def __repr__(self) -> str:
+        q, dq = (" ".join(f"{x:.2f}" for x in np.degrees(row).tolist()) for row in (self.q, self.dq))
+        return f"<MotionSample: q = {q} deg; dq = {dq} deg/s; .ddq, .jerk>"
+
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Motion:

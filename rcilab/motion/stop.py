@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from numpy.typing import ArrayLike
 
-from rcilab.arrays import as_vector
+from rcilab.arrays import as_vector, described
+from rcilab.errors import InvalidValueError
 from rcilab.limits import JointLimits
 from rcilab.motion import _ruckig
 from rcilab.motion.margin import LIMIT_MARGIN
@@ -27,9 +28,11 @@ def plan_stop(limits: JointLimits, q: ArrayLike, dq: ArrayLike, ddq: ArrayLike) 
         ddq: Their accelerations, shape (n,), [rad/s^2], likewise.
 
     Raises:
-        InvalidValueError: The state is not n finite numbers each.
+        InvalidValueError: The state is not n finite numbers each, or the limits are none, such as a model.
         PlanningError: The state is absurd (velocities far beyond any robot's).
     """
+    if not isinstance(limits, JointLimits):
+        raise InvalidValueError("limits", described(limits), "are no JointLimits; pass model.limits.joint")
     n = len(limits.velocity)
     q, dq, ddq = as_vector(q, n, "q", "rad"), as_vector(dq, n, "dq", "rad/s"), as_vector(ddq, n, "ddq", "rad/s^2")
     if not dq.any() and not ddq.any():

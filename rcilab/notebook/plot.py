@@ -12,7 +12,8 @@ import numpy as np
 from rcilab.arrays import Array, as_vector
 from rcilab.clock import CYCLE_TIME
 from rcilab.conformance.check import HOLD_SAMPLES, check
-from rcilab.conformance.conditions import CYCLE_CONDITIONS, Condition
+from rcilab.conformance.condition import Condition
+from rcilab.conformance.conditions import CYCLE_CONDITIONS
 from rcilab.errors import InvalidValueError
 from rcilab.limits import JointLimits
 from rcilab.model import RobotModel, require_model

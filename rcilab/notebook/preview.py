@@ -7,13 +7,13 @@ import math
 import os
 import warnings
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rcilab.arrays import Array, as_vector
+from rcilab.closing import Closing
 from rcilab.errors import UsageError
 from rcilab.model import RobotModel, require_model
 from rcilab.motion.motion import Motion
@@ -31,7 +31,7 @@ _FAR_AWAY = ("JUPYTERHUB_SERVICE_PREFIX", "BINDER_SERVICE_HOST", "COLAB_RELEASE_
 """Set where the kernel's loopback is not the browser's."""
 
 
-class Preview:
+class Preview(Closing):
     """An arm in a meshcat viewer; shows itself in a notebook. Nothing in it can move a robot.
 
     Live, it is served on loopback by the kernel, and `show` moves it while you look. Static, it is part of the
@@ -103,14 +103,6 @@ class Preview:
             self._markup = self._scene.as_html()
             self._scene.close()
             self._live = False
-
-    def __enter__(self) -> Preview:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def __repr__(self) -> str:
         return f"<Preview of {self._model.name}, {self.url or 'static'}>"

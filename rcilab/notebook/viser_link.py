@@ -5,20 +5,16 @@ from __future__ import annotations
 import math
 import socket
 import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
-from types import TracebackType
-from typing import TYPE_CHECKING, Any
 
+from rcilab.closing import Closing
 from rcilab.errors import UsageError
 from rcilab.model import RobotModel, require_model
 from rcilab.motion.motion import Motion, require_motion
 from rcilab.views.arm_view import ArmView
+from rcilab.views.gate import Gate
+from rcilab.views.guarded_server import GuardedServer, listen
 from rcilab.views.viser_scene import ViserScene
 from rcilab.views.viser_stage import set_stage
-
-if TYPE_CHECKING:
-    import viser
 
 LOOPBACK = "127.0.0.1"
 _TICK = 1.0 / 30.0  # [s] As often as a slider sends, and more than software rendering shows.
@@ -27,7 +23,7 @@ _MARKUP = """<p>viser: <a href="{url}" target="_blank">{url}</a></p>
 <iframe src="{url}" style="width: 100%; height: {height}px; border: none"></iframe>"""
 
 
-class PreviewPage:
+class PreviewPage(Closing):
     """A page that plays one motion: the arm solid, its goal as a ghost. Nothing on it can move a robot.
 
     Shows itself in a notebook as a link and a frame. Close it, or let it end with the kernel.
@@ -47,14 +43,15 @@ class PreviewPage:
         bound = _bind(port)
         self.port: int = bound.getsockname()[1]
         self._motion = motion
-        self._server = _open_server(bound)
-        self._server.gui.configure_theme(show_logo=False, show_share_button=False)
-        set_stage(self._server, quality="light")
-        scene = ViserScene(self._server, shadows=False)
+        self._door = GuardedServer(bound, Gate(host=LOOPBACK, port=self.port))
+        server = self._door.viser
+        server.gui.configure_theme(show_logo=False, show_share_button=False)
+        set_stage(server, quality="light")
+        scene = ViserScene(server, shadows=False)
         ArmView(scene, "goal", model, "plan").show(motion.goal)
         self._arm = ArmView(scene, "arm", model)
         self._arm.show(motion.start)
-        gui = self._server.gui
+        gui = server.gui
         last = max(math.ceil(1e3 * motion.duration) / 1e3, _TICK)
         self._play = gui.add_checkbox("Play", True)
         self._slider = gui.add_slider("Time [s]", min=0.0, max=last, step=0.001, initial_value=0.0)
@@ -78,16 +75,7 @@ class PreviewPage:
         if not self._closed.is_set():
             self._closed.set()
             self._player.join()
-            with _quiet():  # viser says that it stopped; whoever called us knows.
-                self._server.stop()
-
-    def __enter__(self) -> PreviewPage:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
+            self._door.close()
 
     def __repr__(self) -> str:
         return f"<PreviewPage {self.url}>"
@@ -128,59 +116,9 @@ def serve_preview(motion: Motion, model: RobotModel, *, port: int = 0) -> Previe
 
 
 def _bind(port: int) -> socket.socket:
-    bound = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     try:
-        bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        bound.bind((LOOPBACK, port))
-        bound.listen(100)
+        return listen(LOOPBACK, port)
     except OSError as error:
-        bound.close()
         raise UsageError(
             f"cannot listen on {LOOPBACK} port {port} ({error.strerror}); port=0 takes a free one"
         ) from error
-    return bound
-
-
-def _open_server(bound: socket.socket) -> viser.ViserServer:
-    """Starts viser on a bound socket, for pages of our own origin only and without its share tunnel."""
-    import viser
-    from viser import _messages
-
-    port = bound.getsockname()[1]
-    with _guarded_serve(bound, [f"http://{LOOPBACK}:{port}", f"http://localhost:{port}"]):
-        server = viser.ViserServer(host=LOOPBACK, port=port, verbose=False)
-    server._websock_server.unregister_handler(_messages.ShareUrlRequest)
-    server._websock_server.unregister_handler(_messages.ShareUrlDisconnect)
-    return server
-
-
-@contextmanager
-def _guarded_serve(bound: socket.socket, origins: list[Any]) -> Iterator[None]:
-    """While it lasts, viser's server takes our socket, and websockets answers foreign origins with 403."""
-    from websockets.asyncio import server as serving
-
-    original = serving.serve
-
-    def serve(handler: Any, host: str, port: int, **options: Any) -> Any:
-        del host, port  # viser would move on to the next port; the socket is bound already.
-        return original(handler, sock=bound, origins=origins, **options)
-
-    serving.serve = serve
-    try:
-        with _quiet():  # viser prints a box of addresses; ours is one line.
-            yield
-    finally:
-        serving.serve = original
-
-
-@contextmanager
-def _quiet() -> Iterator[None]:
-    """Keeps viser from printing: it goes through rich, which in a notebook does not go through stdout."""
-    import rich
-
-    console = rich.get_console()
-    before, console.quiet = console.quiet, True
-    try:
-        yield
-    finally:
-        console.quiet = before

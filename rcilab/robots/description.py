@@ -40,6 +40,10 @@ class Link:
     source: str
     """Where mass, centre and tensor were taken from."""
 
+    def __repr__(self) -> str:
+        centre = " ".join(f"{x:.4g}" for x in self.center_of_mass.tolist())
+        return f"<Link of {self.mass:.4g} kg, centre of mass at {centre} m: .inertia, .origin_height, .source>"
+
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class RobotDescription:
@@ -66,3 +70,10 @@ class RobotDescription:
     def n(self) -> int:
         """Number of joints."""
         return len(self.dh)
+
+    def __repr__(self) -> str:
+        mass = sum(link.mass for link in self.links)
+        return (
+            f"<RobotDescription {self.name}: {self.n} joints, {mass:.4g} kg moving, carries {self.rated_payload:g} kg; "
+            ".dh, .base, .links, .limits, .home>"
+        )

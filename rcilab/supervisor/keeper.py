@@ -9,12 +9,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from rcilab.errors import ConnectionLostError
-from rcilab.supervisor.launch import Child, VirtualController
+from rcilab.supervisor.launch import START_TIMEOUT, Child, VirtualController
 from rcilab.supervisor.layout import ControlBlock, Word
 from rcilab.supervisor.snapshot import read_snapshot
 from rcilab.supervisor.status import MESSAGES
 
 ANSWER_TIMEOUT = 3.0  # [s] for the connection and for every answer of the controller.
+LOAD_TIMEOUT = START_TIMEOUT  # [s] for the control process to load; as long as the virtual controller may take.
 FROZEN_AFTER = 1.0  # [s] without a sign of life of the control process; a choice above every wait of its own.
 END_TIMEOUT = 3.0  # [s] for the control process to bring the arm to rest and go; the longest stop takes 0.4 s.
 _RESTARTS, _RESTART_WINDOW = 3, 60.0  # Restarts by itself, in so many seconds.
@@ -55,6 +56,7 @@ class ProcessKeeper:
         self._foreign_address = address
         self._auto_restart = auto_restart
         self._worker: Child | None = None
+        self._worker_started = 0.0
         self._controller: VirtualController | None = None
         self._restarts: deque[float] = deque(maxlen=_RESTARTS)
         self.address: str | None = None
@@ -69,6 +71,11 @@ class ProcessKeeper:
     def controller_pid(self) -> int | None:
         """Process id of the virtual controller; None when there is none of ours or it does not run."""
         return self._controller.pid if self._controller is not None and self._controller.is_alive else None
+
+    @property
+    def world_address(self) -> str | None:
+        """Where the world port of our virtual controller is, as HOST:PORT; None when there is none."""
+        return self._controller.world_address if self._controller is not None and self.address is not None else None
 
     @property
     def is_ready(self) -> bool:
@@ -109,6 +116,7 @@ class ProcessKeeper:
         for word in (Word.REQUESTS_POSTED, Word.REQUESTS_TAKEN, Word.REPLIES_POSTED, Word.REPLIES_TAKEN):
             words[word] = 0
         words[Word.WORKER_BEAT] = 0
+        self._worker_started = time.monotonic()
         words[Word.SUPERVISOR_BEAT] = time.monotonic_ns()
         self._worker = Child(
             ["-m", "rcilab.supervisor.worker", "--block", str(self._block.descriptor)],
@@ -153,8 +161,9 @@ class ProcessKeeper:
     def _silence_of_worker(self) -> float:
         """Returns how long the control process has given no sign of life, [s]; 0 while that is to be expected."""
         beat = self._block.words[Word.WORKER_BEAT]
-        if beat == 0:  # It is still loading; the timeout of whoever called start() bounds that.
-            return 0.0
+        if beat == 0:  # It is still loading.
+            loading = time.monotonic() - self._worker_started
+            return loading if loading > LOAD_TIMEOUT else 0.0
         silence = (time.monotonic_ns() - beat) * 1e-9
         # While it waits for a TCP connection it cannot do anything else.
         is_connecting = read_snapshot(self._block.snapshot, self._block.words).phase == "connecting"

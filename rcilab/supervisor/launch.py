@@ -18,6 +18,7 @@ from rcilab.errors import ConnectionLostError, InvalidValueError
 START_TIMEOUT = 20.0  # [s] A cold Python with its numerical libraries takes about 1 s; a busy machine several.
 _END_TIMEOUT = 3.0  # [s] Between asking a process to end and ending it.
 _LISTENING = re.compile(r"^listening (rci://\S+)( |$)")
+_WORLD = re.compile(r"^world (\S+)$", re.MULTILINE)
 _TAIL = 2000  # [bytes] of what a process said last that go into an error.
 
 
@@ -169,6 +170,12 @@ class VirtualController(Child):
                     "try again when the machine is less busy"
                 )
         return self._address
+
+    @property
+    def world_address(self) -> str | None:
+        """Where its world port is, as HOST:PORT, once it listens; None: it has none."""
+        found = _WORLD.search(self._said)
+        return found[1] if found else None
 
 
 def start_controller(

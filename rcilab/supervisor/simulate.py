@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from rcilab.client.control_loop import SILENCE
 from rcilab.client.session import RobotSession, open_session
+from rcilab.client.world import World
 from rcilab.spatial import IDENTITY
 from rcilab.supervisor.launch import require_plant, start_controller
 
@@ -43,6 +44,7 @@ def simulate(model: RobotModel, *, plant: str = "ideal", lockstep: bool = True) 
             realtime=not lockstep,
             silence=SILENCE_IN_LOCKSTEP if lockstep else SILENCE,
             on_close=controller.end,
+            world=_world(controller.world_address),
         )
     except BaseException:
         controller.end()
@@ -56,3 +58,10 @@ def simulate(model: RobotModel, *, plant: str = "ideal", lockstep: bool = True) 
         session.close()
         raise
     return session
+
+
+def _world(address: str | None) -> World | None:
+    if address is None:
+        return None
+    host, _, port = address.partition(":")
+    return World(host, int(port))

@@ -103,6 +103,8 @@ class SupervisorStatus:
     """"virtual", or the address it was started with."""
     address: str | None = None
     """Where the controller really is, such as rci://127.0.0.2:40123; None while it has none."""
+    world_address: str | None = None
+    """Where its world port is, as HOST:PORT, see `rcilab.client.world`; None: it is not ours, or has none."""
     q: JointVector | None = None
     """Measured joint angles, shape (n,), [rad]; None as long as no state has arrived."""
     q_c: JointVector | None = None

@@ -149,6 +149,7 @@ class Supervisor:
                 incident=self._incident,
                 target=self._target,
                 address=self._keeper.address,
+                world_address=self._keeper.world_address,
                 controller_pid=self._keeper.controller_pid,
                 worker_pid=self._keeper.worker_pid,
                 **fields,

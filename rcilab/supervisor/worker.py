@@ -246,7 +246,7 @@ class Worker:
         return time.monotonic_ns() - oldest > OPERATOR_TIMEOUT * 1e9
 
     def _learn_power(self) -> None:
-        self._publisher.update(powered=self._commands.get_motor_state())
+        self._publisher.update(powered=self._commands.motor_state())
 
     def _say_ready(self) -> None:
         if self._link is not None and self._link.latest is not None and self._link.latest.faults:

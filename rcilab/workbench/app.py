@@ -8,10 +8,12 @@ from types import TracebackType
 from typing import TYPE_CHECKING
 
 from rcilab.model import load_model
+from rcilab.views.gate import Gate
+from rcilab.views.guarded_server import GuardedServer
 from rcilab.workbench import requests, security
 from rcilab.workbench.conductor import Conductor
 from rcilab.workbench.goal_actions import initial_goal
-from rcilab.workbench.live import LiveChannel
+from rcilab.workbench.live import LIVE_PATH, LiveChannel
 from rcilab.workbench.page import decorate
 from rcilab.workbench.session import Session
 from rcilab.workbench.store import Store, UiState
@@ -89,8 +91,9 @@ class Workbench:
             on_seek=lambda place: ask(requests.Seek(place=place)),
             on_size=lambda height: ask(requests.SetView(name="height", value=height)),
         )
-        gate = security.Gate(host=self._config.host, port=self.port, token=self._config.token)
-        self.server = security.open_server(self._bound, gate, decorate=decorate, live=live.serve)
+        gate = Gate(host=self._config.host, port=self.port, token=self._config.token, title="this workbench")
+        self._door = GuardedServer(self._bound, gate, decorate=decorate, routes={LIVE_PATH: live.serve})
+        self.server = self._door.viser
         self._opened = True
         self.server.gui.configure_theme(
             brand_color=_BRAND, show_logo=False, show_share_button=False, control_width="medium"
@@ -113,7 +116,7 @@ class Workbench:
         self.conductor.close()
         self.session.close()
         self.presenter.close()
-        security.close_server(self.server)
+        self._door.close()
 
     def _follow_pages(self) -> None:
         ask = self.conductor.ask

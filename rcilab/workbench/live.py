@@ -11,6 +11,8 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+LIVE_PATH = "/rcilab/live"
+
 _LARGEST_MESSAGE = 4096  # [bytes] A page sends a few words; anything longer is not ours.
 
 

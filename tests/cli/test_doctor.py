@@ -1,92 +1,64 @@
 from __future__ import annotations
 
-import argparse
-import socket
-from pathlib import Path
+import json
 
 import pytest
 
-from rcilab.cli import doctor
+from rcilab.cli import main
+from rcilab.doctor.finding import Finding, summary
 
-
-@pytest.mark.parametrize("kind", [socket.SOCK_STREAM, socket.SOCK_DGRAM])
-def test_a_taken_port_is_noted_with_the_way_round_it(kind: socket.SocketKind) -> None:
-    with socket.socket(socket.AF_INET, kind) as taken:
-        taken.bind(("127.0.0.1", 0))
-        finding = doctor.check_port("127.0.0.1", taken.getsockname()[1])
-    assert finding.verdict == "note"
-    assert ("TCP" if kind == socket.SOCK_STREAM else "UDP") in finding.value
-    assert "--port 0" in finding.advice
-
-
-def test_a_port_that_was_let_go_is_free() -> None:
-    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as taken:
-        taken.bind(("127.0.0.1", 0))
-        port = taken.getsockname()[1]
-    assert doctor.check_port("127.0.0.1", port).verdict == "ok"
-
-
-def test_an_address_that_is_not_ours_is_bad_and_says_how_to_get_it() -> None:
-    finding = doctor.check_address("192.0.2.1")  # Reserved for documentation: no machine has it.
-    assert finding.verdict == "bad"
-    assert "ip addr add" in finding.advice
-
-
-def test_an_old_python_is_bad() -> None:
-    finding = doctor.check_python((3, 10, 9))
-    assert finding.verdict == "bad"
-    assert finding.value == "3.10.9"
-    assert "3.11" in finding.advice
-
-
-def test_a_new_python_is_good() -> None:
-    assert doctor.check_python((3, 13, 0)).verdict == "ok"
-
-
-@pytest.mark.parametrize(
-    ("bounds", "verdict"), [("", "ok"), (">=1,<99", "ok"), (">=99", "bad"), ("<1", "bad"), (">=1.0.0.0", "ok")]
-)
-def test_a_package_is_judged_by_its_bounds(bounds: str, verdict: str) -> None:
-    assert doctor.check_package("numpy", bounds).verdict == verdict
-
-
-def test_a_missing_package_is_bad_unless_it_is_optional() -> None:
-    assert doctor.check_package("no-such-package-at-all", ">=1").verdict == "bad"
-    assert doctor.check_package("no-such-package-at-all", ">=1", optional=True).verdict == "note"
-
-
-def test_every_runtime_package_of_ours_is_looked_at() -> None:
-    names = [finding.name for finding in doctor.check_packages("rcilab")]
-    assert {"numpy", "pin", "ruckig", "mujoco", "viser", "yourdfpy", "meshcat", "jupyterlab"} <= set(names)
-    assert "pytest" not in names
-
-
-def test_one_core_is_noted() -> None:
-    assert doctor.check_cores(1).verdict == "note"
-    assert doctor.check_cores(2).verdict == "ok"
-
-
-@pytest.mark.parametrize(("flag", "verdict"), [("1\n", "ok"), ("0\n", "note"), (None, "note")])
-def test_a_kernel_is_real_time_by_its_own_word(tmp_path: Path, flag: str | None, verdict: str) -> None:
-    file = tmp_path / "realtime"
-    if flag is not None:
-        file.write_text(flag, encoding="ascii")
-    assert doctor.check_kernel(file).verdict == verdict
-
-
-def test_no_browser_is_noted() -> None:
-    assert doctor.check_browser(("no-such-browser-at-all",)).verdict == "note"
-
-
-@pytest.mark.parametrize("granted", [True, False])
-def test_real_time_is_good_to_have_and_its_lack_is_noted_with_the_remedy(granted: bool) -> None:
-    for finding in doctor.check_realtime(granted, granted):
-        assert finding.verdict == ("ok" if granted else "note")
-        assert ("limits.conf" in finding.advice) is not granted
+KEYS = {"name", "verdict", "value", "advice", "figures"}
+QUESTIONS = {
+    "Python", "numpy", "browser", "port 1337", "kernel", "preemption", "SCHED_FIFO", "locked memory", "real-time share",
+    "cores", "isolated cores", "CPU governor", "clock source", "hypervisor", "socket buffers", "ksoftirqd",
+}  # fmt: skip
 
 
 def test_the_exit_code_says_whether_something_is_bad(capsys: pytest.CaptureFixture[str]) -> None:
-    code = doctor.run(argparse.Namespace())
-    printed = capsys.readouterr().out
-    assert code == (1 if any(line.startswith("bad") for line in printed.splitlines()) else 0)
-    assert len(printed.splitlines()) >= 15
+    code = main(["doctor", "--seconds", "0"])
+    *lines, empty, last = capsys.readouterr().out.splitlines()
+    assert code == (1 if any(line.startswith("bad") for line in lines) else 0)
+    assert all(line.split()[0] in ("ok", "note", "bad") for line in lines)
+    assert (empty, last.startswith("ready")) == ("", code == 0)
+
+
+def test_json_is_one_list_of_every_question(capsys: pytest.CaptureFixture[str]) -> None:
+    code = main(["doctor", "--json", "--seconds", "0.2", "--robot", "rci://127.0.0.2:1337"])
+    said = capsys.readouterr()
+    findings = {finding["name"]: finding for finding in json.loads(said.out)}
+    assert findings.keys() >= QUESTIONS | {"route", "round trip", "jitter"}
+    assert all(finding.keys() == KEYS for finding in findings.values())
+    assert findings["jitter"]["figures"]["seconds"] == pytest.approx(0.2)
+    assert "measuring jitter: 0 of 0.2 s" in said.err
+    assert code == (1 if any(finding["verdict"] == "bad" for finding in findings.values()) else 0)
+
+
+def test_nobody_is_looked_for_and_nothing_measured_unasked(capsys: pytest.CaptureFixture[str]) -> None:
+    main(["doctor", "--json", "--seconds", "0"])
+    said = capsys.readouterr()
+    assert not {"route", "round trip", "jitter"} & {finding["name"] for finding in json.loads(said.out)}
+    assert said.err == ""
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--seconds", "-1"], "0 to 3600 s"),
+        (["--seconds", "nan"], "0 to 3600 s"),
+        (["--robot", "fci://192.168.0.160"], "needs rci://"),
+    ],
+)
+def test_a_question_that_is_none_is_refused_before_anything_is_asked(
+    arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["doctor", *arguments]) == 2
+    captured = capsys.readouterr()
+    assert said in captured.err
+    assert captured.out == ""
+
+
+def test_a_finding_is_one_line_and_the_bad_ones_are_named_at_the_end() -> None:
+    findings = [Finding("one", "ok", "fine"), Finding("two", "bad", "broken", "mend it")]
+    assert str(findings[1]).split() == ["bad", "two", "broken;", "mend", "it"]
+    assert summary(findings) == "1 to mend: two"
+    assert summary(findings[:1]) == "ready: nothing is in the way"

@@ -15,10 +15,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from rcilab.command import JointPosition
 from rcilab.faults import Fault
+from rcilab.model import load_model
 from rcilab.protocols import rci
 from rcilab.state import ControllerMode, MotionGeneratorMode, RobotMode, RobotState
 
+MODEL = load_model("xMatePro7")
 HOST = "127.0.0.2"
 MODE_DELAY = 10  # States between StartMove and the new modes.
 
@@ -202,3 +205,30 @@ class Peer:
 
 
 _DH_PRO7 = tuple(number for d in (404.0, 0.0, 437.5, 0.0, 412.5, 0.0, 275.5) for number in (0.0, 0.0, d, 0.0))
+
+
+def wave(cycles: int, joint: int = 0, size: float = 0.02):
+    """Returns a callback that turns a joint by `size` with the least jerk."""
+    s = np.arange(cycles + 1) / cycles
+    rows = size * (10.0 * s**3 - 15.0 * s**4 + 6.0 * s**5)
+    start = {}
+
+    def callback(state, t):
+        start.setdefault("q", state.q_c)
+        k = min(round(t / 0.001), cycles)
+        q = np.array(start["q"])
+        q[joint] += rows[k]
+        return JointPosition(q, finished=k == cycles)
+
+    return callback
+
+
+def assert_controlled_stop(peer: Peer) -> None:
+    """What was commanded ends at rest and keeps velocity, acceleration and jerk limits to its last sample."""
+    q = np.array([packet.q_c for packet in peer.commands])
+    limits = MODEL.limits.joint
+    assert np.abs(np.diff(q, axis=0)[-1]).max() < 1e-9
+    assert (np.abs(np.diff(q, axis=0)) / 1e-3 <= limits.velocity).all()
+    assert (np.abs(np.diff(q, 2, axis=0)) / 1e-6 <= limits.acceleration).all()
+    assert (np.abs(np.diff(q, 3, axis=0)) / 1e-9 <= limits.jerk).all()
+    assert isinstance(peer.requests[-1], rci.StopMove)

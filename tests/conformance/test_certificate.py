@@ -8,6 +8,7 @@ from rcilab.dynamics.payload import Payload
 from rcilab.errors import CertificateError, InvalidValueError
 from rcilab.model import load_model
 from rcilab.motion import Motion, plan_joint
+from rcilab.safety_box import SafetyBox
 from rcilab.spatial import Pose
 
 MODEL = load_model("xMatePro7")
@@ -53,6 +54,26 @@ def test_an_arm_that_moves_is_another_start():
 def test_a_motion_for_another_number_of_joints_is_another_motion():
     six = load_model("xMate7")
     assert "motion" in changed(plan_joint(six, six.home, -six.home), six, six.home)
+
+
+def test_a_certificate_covers_the_safety_box_it_was_judged_with():
+    box = SafetyBox(size=(4.0, 4.0, 4.0), T_base_box=Pose())
+    covered = check(MOTION, MODEL, box=box).certificate
+    covered.verify(MOTION, MODEL, START, SafetyBox(size=(4.0, 4.0, 4.0), T_base_box=Pose()))
+    with pytest.raises(CertificateError, match=r"does not cover the safety box that is in force.*box=") as caught:
+        covered.verify(MOTION, MODEL, START, SafetyBox(size=(4.0, 4.0, 3.0), T_base_box=Pose()))
+    assert caught.value.changed == ("safety box",)
+    with pytest.raises(CertificateError, match="safety box"):
+        verify_certificate(CERTIFICATE, MOTION, MODEL, START, box)
+
+
+def test_a_box_that_bounds_nothing_needs_no_cover():
+    covered = check(MOTION, MODEL, box=SafetyBox(size=(4.0, 4.0, 4.0), T_base_box=Pose())).certificate
+    idle = SafetyBox(size=(0.1, 0.1, 0.1), T_base_box=Pose(), active=False)
+    for certificate in (covered, CERTIFICATE):
+        certificate.verify(MOTION, MODEL, START)
+        certificate.verify(MOTION, MODEL, START, idle)
+    assert check(MOTION, MODEL, box=idle).certificate == CERTIFICATE
 
 
 def test_a_report_that_is_not_ok_has_no_certificate():

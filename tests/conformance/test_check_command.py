@@ -9,7 +9,7 @@ from rcilab.model import load_model
 from rcilab.motion import Motion, plan_joint
 
 MODEL = load_model("xMate3")
-MOTION = plan_joint(MODEL, MODEL.home, MODEL.home + 0.4)
+MOTION = plan_joint(MODEL, MODEL.home, MODEL.home + 0.4, speed=0.5, law="s_profile")
 
 
 def run(*arguments: object) -> int:

@@ -1,15 +1,17 @@
 import pytest
 
-from rcilab.conformance import CONDITIONS, CYCLE_CONDITIONS, find_condition
+from rcilab.conformance import CONDITIONS, CYCLE_CONDITIONS, explain_fault, find_condition
+from rcilab.conformance.conditions import MOTION_CONDITIONS
 from rcilab.errors import InvalidValueError
 from rcilab.faults import Fault
 from rcilab.model import load_model
 
-LIMITS = load_model("xMatePro3").limits.joint
+ARM = load_model("xMatePro3").limits
+LIMITS = ARM.joint
 
 
-def test_the_necessary_conditions_are_the_manuals_with_their_faults():
-    table = {row.id: (row.formula, row.fault, row.unit) for row in CONDITIONS if row.necessity == "necessary"}
+def test_the_necessary_conditions_on_joints_are_the_manuals_with_their_faults():
+    table = {row.id: (row.formula, row.fault, row.unit) for row in CYCLE_CONDITIONS}
     assert table == {
         "joint.position": ("q_min < q_c < q_max", Fault.COMMAND_JOINT_POSITION_LIMITS_VIOLATION, "rad"),
         "joint.velocity": ("-dq_max < dq_c < dq_max", Fault.COMMAND_JOINT_VELOCITY_LIMITS_VIOLATION, "rad/s"),
@@ -22,16 +24,88 @@ def test_the_necessary_conditions_are_the_manuals_with_their_faults():
     }
 
 
-def test_the_recommended_conditions_ask_for_rest_at_both_ends_and_raise_nothing():
-    recommended = [row for row in CONDITIONS if row.necessity == "recommended"]
-    assert [row.id for row in recommended] == [
+def test_all_twenty_faults_are_explained_by_the_rows_that_the_manual_names_them_after():
+    rows = {int(fault): {row.id for row in explain_fault(fault)} for fault in Fault}
+    kinds = ("translation", "rotation")
+    assert rows == {
+        0: {"measured.joint.position"},
+        1: {"measured.cartesian.position"},
+        2: {"measured.arm_angle.velocity"},
+        3: {"measured.joint.velocity"},
+        4: {f"measured.cartesian.velocity.{kind}" for kind in kinds},
+        5: {"measured.joint.acceleration"},
+        6: {f"measured.cartesian.acceleration.{kind}" for kind in kinds},
+        7: {"joint.position"},
+        8: {"cartesian.position"},
+        9: {f"arm_angle.{name}" for name in ("position", "velocity", "acceleration", "jerk")},
+        10: {"joint.velocity"},
+        11: {f"cartesian.velocity.{kind}" for kind in kinds},
+        12: {"joint.acceleration"},
+        13: {f"cartesian.{name}.{kind}" for name in ("acceleration", "jerk") for kind in kinds},
+        14: {"joint.jerk"},
+        15: {"external.torque"},
+        16: {"cartesian.frame"},
+        17: {"torque.rate"},
+        18: {"torque.range"},
+        19: {"lost.commands"},
+    }
+
+
+def test_a_condition_is_necessary_exactly_when_it_raises_a_fault():
+    assert all((row.fault is not None) == (row.necessity == "necessary") for row in CONDITIONS)
+    assert len({row.id for row in CONDITIONS}) == len(CONDITIONS)
+
+
+def test_the_recommended_conditions_ask_for_bearable_torques_and_rest_at_both_ends():
+    assert [row.id for row in MOTION_CONDITIONS if row.necessity == "recommended"] == [
+        "joint.torque",
+        "joint.torque_rate",
         "start.position",
         "start.velocity",
         "start.acceleration",
         "end.velocity",
         "end.acceleration",
     ]
-    assert all(row.fault is None for row in recommended)
+
+
+@pytest.mark.parametrize("name", ["xMatePro3", "xMate7"])
+def test_every_row_has_one_pair_of_bounds_a_joint_or_one_for_the_tool(name):
+    limits = load_model(name).limits
+    for row in CONDITIONS:
+        lower, upper = row.bounds(limits)
+        n = len(limits.joint.velocity) if row.is_per_joint else 1
+        assert lower.shape == upper.shape == (n,), row.id
+        assert (lower < upper).all(), row.id
+
+
+def test_the_tools_bounds_are_the_manuals_numbers():
+    bounds = {
+        row.id: float(row.bounds(ARM)[1][0])
+        for row in CONDITIONS
+        if row.signal in ("translation", "rotation") and not row.is_measured
+    }
+    assert bounds == {
+        "cartesian.velocity.translation": 1.0,
+        "cartesian.velocity.rotation": 2.5,
+        "cartesian.acceleration.translation": 10.0,
+        "cartesian.acceleration.rotation": 10.0,
+        "cartesian.jerk.translation": 5000.0,
+        "cartesian.jerk.rotation": 5000.0,
+    }
+
+
+def test_measured_bounds_leave_a_servo_room_over_the_commanded_ones_and_say_so():
+    for row in (row for row in CONDITIONS if row.is_measured):
+        assert "allowance" in row.source, row.id
+        commanded = row.id.removeprefix("measured.")
+        if row.order > 0:
+            factor = row.bounds(ARM)[1] / find_condition(commanded).bounds(ARM)[1]
+            assert factor.tolist() == pytest.approx([(1.1, 1.5)[row.order - 1]] * len(factor)), row.id
+
+
+def test_conditions_on_the_tool_need_all_limits():
+    with pytest.raises(InvalidValueError, match=r"are of the joints only; pass model\.limits"):
+        find_condition("cartesian.velocity.rotation").bounds(LIMITS)
 
 
 def test_the_bounds_come_from_the_limits_of_the_arm():
@@ -44,8 +118,9 @@ def test_the_bounds_come_from_the_limits_of_the_arm():
 
 
 def test_every_condition_names_its_source_and_the_manuals_section():
-    assert all("4.1" in row.source for row in CONDITIONS)
-    assert all("4.4" in row.source for row in CYCLE_CONDITIONS)
+    sections = {"throughout": "4.4", "start": "4.1", "end": "4.1"}
+    assert all("manual V1.3.1, " in row.source for row in CONDITIONS)
+    assert all(sections[row.stage] in row.source for row in MOTION_CONDITIONS)
 
 
 def test_an_unknown_condition_lists_those_that_exist():

@@ -11,7 +11,7 @@ from rcilab.model import load_model
 from rcilab.motion import Motion, plan_joint
 
 MODEL = load_model("xMatePro7")
-GOOD = plan_joint(MODEL, MODEL.home, -MODEL.home, speed=0.6)
+GOOD = plan_joint(MODEL, MODEL.home, -MODEL.home, speed=0.4, law="s_profile")
 
 
 def spoiled() -> Motion:

@@ -9,19 +9,23 @@ import numpy as np
 import pytest
 
 from rcilab.controller.cycle import ControlCycle
-from rcilab.controller.plant import IdealPlant
+from rcilab.controller.server import build_plant
 from rcilab.model import RobotModel, load_model
 from rcilab.protocols import rci
+from rcilab.spatial import Pose
 from rcilab.state import RobotState
 
 
 class Hand:
     """Sends requests and commands to a cycle, one step a command, and keeps every state."""
 
-    def __init__(self, model: RobotModel, **options: object) -> None:
-        self.model = model
-        self.cycle = ControlCycle(model, IdealPlant(model), mode_delay=3, **{"prefill": 0, **options})  # type: ignore[arg-type]
+    def __init__(self, model: RobotModel, plant: str = "ideal", **options: object) -> None:
+        self.cycle = ControlCycle(model, build_plant(plant, model), mode_delay=3, **{"prefill": 0, **options})  # type: ignore[arg-type]
         self.states: list[RobotState] = [self.cycle.state]
+
+    @property
+    def model(self) -> RobotModel:
+        return self.cycle.model
 
     @property
     def state(self) -> RobotState:
@@ -45,13 +49,33 @@ class Hand:
         """Powers on and starts a motion, up to the first state that shows its modes."""
         assert self.ask(rci.SetMotorPower(1)) == 0
         assert self.ask(rci.StartMove(controller_mode, motion_mode)) == 0
-        while self.state.motion_generator_mode == 0:
+        while self.state.controller_mode != controller_mode:
             self.step()
 
-    def command(self, q: Sequence[float], **fields: object) -> RobotState:
+    def command(self, q: Sequence[float] = (0.0,) * 7, **fields: object) -> RobotState:
         """Answers the newest state and steps."""
         self.cycle.receive(rci.CommandPacket(self.state.message_id, tuple(map(float, q)), **fields))  # type: ignore[arg-type]
         return self.step()
+
+    def pose(self, pose: Pose | np.ndarray, psi: float | None = None, **fields: object) -> RobotState:
+        """Answers the newest state with a tool pose and steps."""
+        numbers = pose.as_row_major() if isinstance(pose, Pose) else tuple(pose.ravel().tolist())
+        return self.command(T_base_tool_c=numbers, psi_valid=psi is not None, psi_c=psi or 0.0, **fields)
+
+    def torque(self, tau: Sequence[float], **fields: object) -> RobotState:
+        """Answers the newest state with joint torques and steps."""
+        return self.command(tau_c=tuple(map(float, tau)), **fields)
+
+    def shift(self, offset: Sequence[float], duration: float, psi: float = 0.0) -> RobotState:
+        """Moves the commanded tool smoothly by an offset in base, [m], and its arm angle; from rest to rest."""
+        start, psi_start = self.state.T_base_tool_c.copy(), self.state.psi_c
+        for k in range(1, round(duration * 1000) + 1):
+            share = smooth(k / (duration * 1000))
+            T = start.copy()
+            T[:3, 3] += share * np.asarray(offset)
+            if self.pose(T, psi_start + share * psi if psi else None).faults:
+                break
+        return self.state
 
     def play(self, rows: np.ndarray) -> RobotState:
         for row in rows:
@@ -66,6 +90,11 @@ class Hand:
             if self.cycle.is_settled:
                 return self.state
         raise AssertionError("the arm did not come to rest")
+
+    def box(self, edge: float) -> rci.SetCartesianLimit:
+        """An active safety box around where the tool is, [m]."""
+        x, y, z = self.state.T_base_tool[:3, 3].tolist()
+        return rci.SetCartesianLimit((edge,) * 3, (1, 0, 0, x, 0, 1, 0, y, 0, 0, 1, z, 0, 0, 0, 1), True)
 
     def swing(self, joint: int, peak: float, duration: float) -> np.ndarray:
         """Rows that bring one joint (from 1) smoothly to a velocity: a quarter of a (1 - cos) swing, from rest."""
@@ -89,6 +118,11 @@ class Hand:
         assert (np.abs(jerk) < limits.jerk).all(), np.abs(jerk).max(axis=0)
 
 
+def smooth(u: float) -> float:
+    """A share from 0 to 1 with no velocity, acceleration and jerk at either end."""
+    return u**4 * (35.0 - 84.0 * u + 70.0 * u * u - 20.0 * u**3)
+
+
 @pytest.fixture
 def model() -> RobotModel:
     return load_model("xMatePro7")
@@ -101,7 +135,7 @@ def hand(model: RobotModel) -> Hand:
 
 @pytest.fixture
 def make_hand():
-    def make(name: str = "xMatePro7", **options: object) -> Hand:
-        return Hand(load_model(name), **options)
+    def make(name: str = "xMatePro7", plant: str = "ideal", **options: object) -> Hand:
+        return Hand(load_model(name), plant, **options)
 
     return make

@@ -1,13 +1,18 @@
 from __future__ import annotations
 
+import itertools
+
 import pytest
 
 from rcilab.controller.playout import CAPACITY, Playback, Playout
 from rcilab.protocols.rci import CommandPacket
 
+_numbers = itertools.count()
+
 
 def command(message_id: int, *, finished: bool = False) -> CommandPacket:
-    return CommandPacket(message_id, finished=finished)
+    """A command unlike any other."""
+    return CommandPacket(message_id, psi_c=next(_numbers), finished=finished)
 
 
 def by_whole_gap(packet: CommandPacket, steps: int) -> bool:
@@ -106,12 +111,13 @@ def test_a_repeated_id_explains_the_gap_that_follows() -> None:
 
 def test_a_lost_command_leaves_a_gap_that_can_be_bridged_to_the_next_one() -> None:
     playout = Playout(prefill=0)
-    for k in (5, 8):
-        playout.push(command(k))
+    last, later = command(5), command(8)
+    playout.push(last)
+    playout.push(later)
     playout.take(by_whole_gap)
-    assert playout.take(by_whole_gap) == Playback(command(8), 3, True)
-    assert playout.take(by_whole_gap) == Playback(command(8), 2, True)
-    assert playout.take(by_whole_gap) == Playback(command(8), 1, False)
+    assert playout.take(by_whole_gap) == Playback(later, 3, True)
+    assert playout.take(by_whole_gap) == Playback(later, 2, True)
+    assert playout.take(by_whole_gap) == Playback(later, 1, False)
     assert playout.lost == 2
 
 
@@ -124,12 +130,81 @@ def test_a_gap_of_ids_without_a_gap_of_the_motion_is_no_loss() -> None:
     assert playout.lost == 0
 
 
-def test_a_reordered_command_is_dropped() -> None:
+def test_a_command_that_was_overtaken_is_put_back_in_its_place() -> None:
     playout = Playout(prefill=0)
-    for k in (5, 6, 8, 7, 9):
+    for k in (5, 6, 9, 8, 7, 10):
         playout.push(command(k))
-    assert take_ids(playout, 5) == [5, 6, "lost", 8, 9]
+    assert take_ids(playout, 6) == [5, 6, 7, 8, 9, 10]
+    assert (playout.late, playout.lost) == (0, 0)
+
+
+def test_an_overtaken_command_whose_cycle_has_passed_is_dropped() -> None:
+    playout = Playout(prefill=0)
+    for k in (5, 7, 8):
+        playout.push(command(k))
+    assert take_ids(playout, 2) == [5, "lost"]
+    playout.push(command(6))
+    assert take_ids(playout, 2) == [7, 8]
     assert playout.late == 1
+
+
+@pytest.mark.parametrize("order", [(0, 0, 1, 1, 2, 2), (0, 1, 0, 2, 1, 2), (0, 1, 2, 0, 1, 2)])
+def test_a_copy_made_by_the_network_is_dropped(order: tuple[int, ...]) -> None:
+    playout = Playout(prefill=0)
+    commands = [command(k) for k in (5, 6, 7)]
+    for k in order:
+        playout.push(commands[k])
+    assert take_ids(playout, 3) == [5, 6, 7]
+    assert (len(playout), playout.copies, playout.lost) == (0, 3, 0)
+
+
+def test_who_says_the_same_again_has_nothing_new_but_is_not_lost() -> None:
+    playout = Playout(prefill=0)
+    first = command(5)
+    playout.push(first)
+    playout.take(by_whole_gap)
+    for _ in range(3):
+        playout.push(first)
+        assert playout.take(by_whole_gap).packet is None
+    assert (playout.lost, playout.lost_in_row, playout.success_rate) == (0, 0, 1.0)
+    playout.push(command(9))  # The states 6 to 8 never came; their cycles were spent on what it said again.
+    assert take_ids(playout, 1) == [9]
+
+
+def test_more_commands_than_cycles_are_worked_off_but_jitter_is_not() -> None:
+    playout = Playout(prefill=3)
+    ids = itertools.count()
+
+    def live(commands: list[int]) -> int:
+        extra = 0
+        for count in commands:
+            for _ in range(count):
+                playout.push(command(next(ids)))
+            playout.take(by_whole_gap)
+            if playout.work_off():
+                playout.take(by_whole_gap)
+                extra += 1
+        return extra
+
+    assert live([1] * 3 + [0, 0, 3] * 200) == 0
+    assert live([2] * 20 + [1] * 400) == 20
+    assert len(playout) == 3
+    assert playout.lost == 0
+
+
+def test_commands_that_close_a_loop_are_fresh() -> None:
+    playout = Playout(prefill=10)
+    playout.begin(most=2)
+    ids, played = itertools.count(), []
+    for k in range(20):
+        for _ in range(3 if k < 8 else 1):  # For a while three a cycle.
+            playout.push(command(next(ids)))
+        played += [playout.take(by_whole_gap)]
+    assert [playback.packet is None for playback in played[:3]] == [True, True, False]
+    assert all(playback.packet is not None for playback in played[2:])
+    assert len(playout) <= 2
+    assert sum(playback.skipped for playback in played) >= 10
+    assert playout.lost == 0
 
 
 def test_ids_that_begin_again_are_another_numbering() -> None:

@@ -24,6 +24,7 @@ from rcilab.faults import Fault
 from rcilab.model import load_model
 from rcilab.motion.joint import plan_joint
 from rcilab.protocols import rci
+from rcilab.protocols.world import Stall
 from rcilab.state import ControllerMode, MotionGeneratorMode, RobotMode, RobotState
 
 PATIENCE = 10.0  # [s] A peer that waits longer than this has found a bug, or the machine has stopped.
@@ -209,7 +210,7 @@ def test_every_request_is_answered_once_with_its_id_in_one_piece(lockstep: Runni
         assert peer.ask(rci.StartDrag(1, 2)) == 0
         assert peer.ask(rci.StopDrag()) == 0
         assert peer.ask(rci.GetSafetyStopState()) == rci.SafetyStopResponse(rci.SafetyStop.NONE)
-        assert peer.ask(rci.StartMove(4, 0)) is rci.StartStatus.NOT_POSSIBLE
+        assert peer.ask(rci.StartMove(4, 2)) is rci.StartStatus.NOT_POSSIBLE
 
 
 def test_ninety_commands_at_once_with_old_ids_are_the_motion_they_are(lockstep: Running) -> None:
@@ -430,6 +431,30 @@ def test_running_free_a_motion_answered_in_time_arrives(capsys: pytest.CaptureFi
             state = peer.receive_state()
         assert peer.ask(rci.StopMove()) is rci.StopStatus.SUCCESS
         assert not peer.receive_newest_state().faults
+
+
+def test_commands_sent_while_the_controller_stood_still_are_made_up_for() -> None:
+    """The vendor's client goes on meanwhile; the delay of its commands does not stay."""
+    with running(mode_delay=0.005, prefill=10, stalls=(Stall(duration=0.1, after=0.5),)) as found, Peer(found) as peer:
+        state = peer.start()
+        playout, q = found.server.cycle.playout, np.array(state.q_c)
+        most = sent = 0
+        peer.udp.settimeout(0.001)
+        for _ in range(20_000):
+            try:
+                state = peer.receive_state()
+            except TimeoutError:
+                pass  # It answers the old one again.
+            sent += 1
+            peer.send(state.message_id, q + 1e-12 * (sent % 2))
+            most = max(most, len(playout))
+            if most > 30 and len(playout) <= 11:
+                break
+        assert most > 30
+        assert len(playout) <= 11
+        peer.udp.settimeout(PATIENCE)
+        assert peer.ask(rci.StopMove()) == 0
+        assert peer.receive_live_state().faults == ()
 
 
 def test_asked_to_end_in_mid_motion_it_brings_the_arm_to_rest_first() -> None:

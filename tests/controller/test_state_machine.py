@@ -74,9 +74,10 @@ def test_each_pair_leads_where_it_should_and_answers_what_it_should(pair) -> Non
 
 
 @pytest.mark.parametrize("phase", Phase)
-def test_stop_move_succeeds_everywhere_and_only_at_rest(phase: Phase) -> None:
+def test_stop_move_succeeds_everywhere_and_at_rest_unless_a_hand_leads_the_arm(phase: Phase) -> None:
     cell = transition(phase, CommandCode.STOP_MOVE)
-    assert (cell.status, cell.when) == (StopStatus.SUCCESS, When.AT_REST)
+    when = When.NOW if phase is Phase.GUIDING else When.AT_REST
+    assert (cell.status, cell.when) == (StopStatus.SUCCESS, when)
 
 
 @pytest.mark.parametrize("phase", Phase)

@@ -7,6 +7,7 @@ from rcilab.dynamics.payload import Payload
 from rcilab.errors import InvalidValueError
 from rcilab.model import load_model
 from rcilab.robots import ROBOT_NAMES
+from rcilab.spatial import Pose
 
 
 def random_state(model, seed=11):
@@ -63,3 +64,36 @@ def test_a_load_that_is_none_is_refused():
         Payload(mass=1.0, inertia=[[1, 2, 0], [0, 1, 0], [0, 0, 1]])
     with pytest.raises(InvalidValueError, match="finite"):
         Payload(mass=1.0, center_of_mass=(0, 0, float("nan")))
+
+
+@pytest.mark.parametrize("name", ROBOT_NAMES)
+def test_what_a_motion_takes_beyond_gravity_is_the_same_row_by_row_and_all_at_once(name):
+    model = load_model(name).with_load(Payload(mass=2.0, center_of_mass=(0.01, 0.02, 0.05)))
+    states = [random_state(model, seed) for seed in range(5)]
+    together = model.rigid_body.motion_torques(*(np.array(column) for column in zip(*states, strict=True)))
+    terms = [model.torque(*state) for state in states]
+    np.testing.assert_allclose(together, [t.inertial + t.coriolis for t in terms], atol=1e-11)
+    np.testing.assert_allclose(model.torque(states[0][0]).gravity, terms[0].gravity, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ROBOT_NAMES)
+def test_all_terms_at_once_are_those_of_the_single_questions(name):
+    tool = Pose.from_rpy([0.0, 0.05, 0.1], [0.2, 0.1, -0.7])
+    model = load_model(name, tool=tool, load=Payload(mass=2.0, center_of_mass=(0.01, 0.02, 0.05)))
+    body, (q, dq, ddq) = model.rigid_body, random_state(model)
+    terms, torque, step = body.terms(q, dq), model.torque(q, dq, ddq), 1e-6  # [s]
+    np.testing.assert_allclose(terms.mass_matrix, body.mass_matrix(q), atol=1e-12)
+    np.testing.assert_allclose(terms.mass_inverse @ terms.mass_matrix, np.eye(model.n), atol=1e-9)
+    np.testing.assert_allclose(terms.coriolis, torque.coriolis, atol=1e-11)
+    np.testing.assert_allclose(terms.gravity, torque.gravity, atol=1e-11)
+    np.testing.assert_allclose(body.gravity(q), torque.gravity, atol=1e-11)
+    np.testing.assert_allclose(terms.jacobian, model.jacobian(q), atol=1e-12)
+    np.testing.assert_allclose(body.tool_jacobian(q), model.jacobian(q), atol=1e-12)
+    np.testing.assert_allclose(body.link_jacobian(q, model.n, tool.position), model.jacobian(q), atol=1e-12)
+    np.testing.assert_allclose(terms.position, model.forward(q).position, atol=1e-12)
+    np.testing.assert_allclose(terms.rotation, model.forward(q).rotation.ravel(), atol=1e-12)
+    slope = (model.jacobian(q + step * dq) - model.jacobian(q - step * dq)) / (2.0 * step)
+    np.testing.assert_allclose(terms.drift, slope @ dq, atol=1e-8)
+    np.testing.assert_allclose(body.acceleration(q, dq, torque.full), ddq, atol=1e-9)
+    assert body.terms(q, dq) is terms
+    assert body.terms(q.copy(), dq) is not terms

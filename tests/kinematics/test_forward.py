@@ -24,6 +24,13 @@ def test_at_zero_the_arm_stands_upright(name):
 
 
 @pytest.mark.parametrize("name", ROBOT_NAMES)
+def test_the_path_of_the_tools_origin_is_that_of_its_poses(name):
+    model = load_model(name, tool=TOOL)
+    q = configurations(model)
+    np.testing.assert_allclose(model.position_path(q), model.forward_path(q)[:, :3, 3], atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ROBOT_NAMES)
 def test_path_frames_and_single_pose_agree(name):
     model = load_model(name, tool=TOOL)
     q = configurations(model)

@@ -99,3 +99,9 @@ def test_differences_and_derivatives_of_a_cubic_convert_exactly(v, a, j):
     back = differences_from_derivatives(v, a, j)
     assert np.allclose([dq[0], ddq[0]], back, atol=1e-9)
     assert np.allclose(derivatives_from_differences(dq, ddq, jerk), [[v], [a]], atol=1e-9)
+
+
+@pytest.mark.parametrize("wrong", [MODEL, MODEL.limits, None])
+def test_what_are_no_joint_limits_is_named(wrong):
+    with pytest.raises(InvalidValueError, match=r"limits: .* are no JointLimits; pass model\.limits\.joint"):
+        plan_stop(wrong, np.zeros(7), np.zeros(7), np.zeros(7))

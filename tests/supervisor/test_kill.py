@@ -16,7 +16,7 @@ import pytest
 
 from rcilab.client import connect
 from rcilab.controller.config import ControllerConfig
-from rcilab.controller.plant import IdealPlant
+from rcilab.controller.ideal_plant import IdealPlant
 from rcilab.controller.server import ControllerServer
 from rcilab.errors import ConnectionLostError
 from rcilab.motion import plan_joint
@@ -136,6 +136,19 @@ def test_a_frozen_control_process_is_replaced():
         assert supervisor.status().worker_pid != pid
         assert not is_alive(pid)
         go_home(supervisor)
+
+
+def test_a_control_process_that_freezes_while_it_loads_is_replaced_too(monkeypatch):
+    with running() as supervisor:
+        monkeypatch.setattr("rcilab.supervisor.keeper.LOAD_TIMEOUT", 4.0)
+        first = supervisor.status().worker_pid
+        os.kill(first, signal.SIGKILL)
+        second = wait_for(lambda: pid if (pid := supervisor.status().worker_pid) not in (None, first) else None)
+        os.kill(second, signal.SIGSTOP)
+        wait_for(lambda: supervisor.status().incident.number == 2)
+        assert "has not answered for" in supervisor.status().incident.message
+        assert not is_alive(second)
+        wait_for_phase(supervisor, "idle")
 
 
 def test_what_dies_again_and_again_is_left_alone_until_somebody_restarts_it():

@@ -218,7 +218,7 @@ def test_a_row_takes_what_was_written():
 
 def test_lateness_is_against_the_robot_s_grid_and_forgets_a_slip():
     class State:
-        q = q_c = dq = np.zeros(7)
+        q = q_c = dq = tau = np.zeros(7)
         faults = ()
         success_rate = 1.0
         robot_mode = controller_mode = motion_generator_mode = 0

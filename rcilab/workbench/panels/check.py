@@ -70,7 +70,8 @@ class CheckPanel:
         name = text(f"condition.{condition.id}")
         width = min(100.0, 100.0 * row.ratio)
         facts = [f"{_number(row.value)} / {_number(row.bound)} {pretty_unit(condition.unit)}"]
-        facts += [text("check.joint", joint=row.joint), f"t = {row.time:.3f} s"]
+        facts += [text("check.joint", joint=row.joint)] if row.joint else []
+        facts.append(f"t = {row.time:.3f} s")
         fault = "" if condition.fault is None else f"<br>{esc(text('check.raises', fault=condition.fault.manual_name))}"
         return (
             f'<div class="rl-card rl-{tone}"><div class="rl-line"><b>{esc(name)}</b>'

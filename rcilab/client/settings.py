@@ -1,0 +1,252 @@
+"""Every setter of the RCI as a method: arguments checked before they are sent, in the words of the axis they are for.
+
+Settable while nothing moves; the controller answers "not possible" otherwise.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from enum import IntEnum
+from typing import Any, Literal, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rcilab.arrays import Array, as_number, described
+from rcilab.client.link import Link
+from rcilab.errors import CommandRejectedError, InvalidValueError
+from rcilab.limits import Limits
+from rcilab.protocols import rci
+from rcilab.safety_box import SafetyBox
+from rcilab.spatial import Pose
+
+HIGHEST_FREQUENCY = 1000.0  # [Hz] RCI manual 3.1.9: cut-off frequencies end there; it switches the filter off.
+LONGEST_TOOL = 2.0  # [m] from the flange; a choice: more than any xMate reaches, so what is longer is a slip of units.
+
+_AXES = ("x", "y", "z", "about x", "about y", "about z")
+_ADVICE: dict[tuple[type[rci.Request], IntEnum], str] = {
+    (rci.StartMove, rci.StartStatus.NOT_POSSIBLE): "is the motor power on (power_on()), and does nothing move yet?",
+    (rci.StartMove, rci.StartStatus.SINGULAR_START_POSE): "move away from the singularity in joint space first",
+    (rci.StartMove, rci.StartStatus.REFLEX): "faults are set: recover() clears them",
+    (rci.StartMove, rci.StartStatus.USER_STOP): "an emergency stop is pressed: release it, then recover()",
+    (
+        rci.AutomaticErrorRecovery,
+        rci.RecoveryStatus.NOT_POSSIBLE,
+    ): "the arm still moves: try again at rest",
+    (rci.AutomaticErrorRecovery, rci.RecoveryStatus.MANUAL_RECOVERY_NEEDED): (
+        "a person has to bring the arm out of it: see the teach pendant"
+    ),
+    (rci.AutomaticErrorRecovery, rci.RecoveryStatus.REFLEX): (
+        "the cause is still there: look what touches or loads the arm, remove it, and try again"
+    ),
+    (rci.AutomaticErrorRecovery, rci.RecoveryStatus.USER_STOP): (
+        "an emergency stop or the safety gate is open: release it first (safety_stop() tells which)"
+    ),
+    (rci.AutomaticErrorRecovery, rci.RecoveryStatus.ABORTED): "something ended it half-way: try again",
+}
+_WHILE_IDLE = "it is settable while nothing moves and nobody guides the arm"
+
+_Member = TypeVar("_Member", bound=IntEnum)
+
+
+class RciSettings:
+    """The setters of the RCI manual, section 3.1, and how a command is sent.
+
+    Args:
+        link: The connection.
+        limits: Bounds of the arm, to check arguments with; None leaves that to the controller.
+    """
+
+    def __init__(self, link: Link, limits: Limits | None = None) -> None:
+        self._link = link
+        self._limits = limits
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return self._link.n
+
+    def set_collision_behavior(self, thresholds: ArrayLike) -> None:
+        """Sets the external torques that count as a collision, shape (n,), [N m]; see `limits.joint`."""
+        largest = None if self._limits is None else self._limits.joint.collision_threshold
+        values = _vector("thresholds", thresholds, self._joints(), "N m", 0.0, largest)
+        self._ask(rci.SetCollisionBehavior(_floats(values)))
+
+    def set_cartesian_limit(self, box: SafetyBox) -> None:
+        """Sets the safety box that the origin of the tool must stay in, and whether it is watched."""
+        if not isinstance(box, SafetyBox):
+            raise InvalidValueError(
+                "box", described(box), "is no SafetyBox; SafetyBox(size=(1, 1, 1), T_base_box=Pose(), active=True) is"
+            )
+        self._ask(rci.SetCartesianLimit(box.size, box.T_base_box.as_row_major(), box.active))
+
+    def set_joint_limit(self, lower: ArrayLike, upper: ArrayLike) -> None:
+        """Sets soft limits of the joint angles, each of shape (n,), [rad], inside the arm's own limits.
+
+        What happens there is the controller's choice: the manual's `auto_limit` never goes over the wire.
+        """
+        joint = None if self._limits is None else self._limits.joint
+        least, largest = (None, None) if joint is None else (joint.lower, joint.upper)
+        low = _vector("lower", lower, self._joints(), "rad", least, largest)
+        high = _vector("upper", upper, self._joints(), "rad", least, largest)
+        for i in range(self.n):
+            if low[i] >= high[i]:
+                raise InvalidValueError(f"lower, joint {i + 1}", float(low[i]), f"rad must be below upper {high[i]:g}")
+        self._ask(rci.SetJointLimit(_floats(high), _floats(low)))
+
+    def set_joint_impedance(self, stiffness: ArrayLike) -> None:
+        """Sets the stiffness of joint impedance, shape (n,), [N m/rad]."""
+        largest = None if self._limits is None else self._limits.joint.stiffness
+        values = _vector("stiffness", stiffness, self._joints(), "N m/rad", 0.0, largest)
+        self._ask(rci.SetJointImpedance(_floats(values)))
+
+    def set_cartesian_impedance(self, stiffness: ArrayLike) -> None:
+        """Sets the stiffness of Cartesian impedance, shape (6,): three [N/m], three [N m/rad]."""
+        largest = None
+        if self._limits is not None:
+            c = self._limits.cartesian
+            largest = np.repeat((c.translation_stiffness, c.rotation_stiffness), 3)
+        self._ask(
+            rci.SetCartesianImpedance(_floats(_vector("stiffness", stiffness, _AXES, "N/m, N m/rad", 0.0, largest)))
+        )
+
+    def set_cart_imp_desired_tau(self, wrench: ArrayLike) -> None:
+        """Sets the force and moment that Cartesian impedance presses with, shape (6,), [N, N m]."""
+        largest = None
+        if self._limits is not None:
+            largest = np.repeat((self._limits.cartesian.force, self._limits.cartesian.moment), 3)
+        least = None if largest is None else -largest
+        self._ask(rci.SetCartImpDesiredTau(_floats(_vector("wrench", wrench, _AXES, "N, N m", least, largest))))
+
+    def set_coor(self, T_flange_tool: Pose) -> None:
+        """Sets the tool by its pose in the flange frame, at most 2 m long."""
+        pose = _pose("T_flange_tool", T_flange_tool)
+        length = math.hypot(*pose.parts[1])
+        if not length <= LONGEST_TOOL:
+            raise InvalidValueError(
+                "T_flange_tool", round(length, 6), f"m from the flange is farther than {LONGEST_TOOL:g} m; give metres"
+            )
+        self._ask(rci.SetCoor(pose.as_row_major()))
+
+    def set_load(self, mass: float, center_of_mass: ArrayLike, inertia: ArrayLike) -> None:
+        """Sets the load at the flange.
+
+        Args:
+            mass: [kg], up to the arm's payload.
+            center_of_mass: In the flange frame, shape (3,), [m].
+            inertia: About the centre of mass, shape (3, 3), [kg m^2].
+        """
+        kilograms = float(_vector("mass", [mass], ("",), "kg", 0.0)[0])
+        center = _vector("center_of_mass", center_of_mass, _AXES[:3], "m")
+        try:
+            flat = np.asarray(inertia, dtype=np.float64).ravel()
+        except (TypeError, ValueError) as error:
+            raise InvalidValueError("inertia", described(inertia), "is not 3 x 3 numbers [kg m^2]") from error
+        names = [f"row {row}, column {column}" for row in (1, 2, 3) for column in (1, 2, 3)]
+        self._ask(rci.SetLoad(kilograms, _floats(center), _floats(_vector("inertia", flat, names, "kg m^2"))))
+
+    def set_filters(self, joint: float, cartesian: float, torque: float) -> None:
+        """Sets the cut-off frequencies of the controller's own filters of commands, [Hz]; 1000 switches one off."""
+        names = ("joint", "cartesian", "torque")
+        values = _vector("cut-off frequency", [joint, cartesian, torque], names, "Hz", 0.0, HIGHEST_FREQUENCY)
+        self._ask(rci.SetFilters(*_floats(values)))
+
+    def set_torque_filter_cut_off_frequency(self, frequency: float) -> None:
+        """Sets the cut-off frequency of the reported torques' filter, [Hz]; 1000 switches it off."""
+        values = _vector("frequency", [frequency], ("",), "Hz", 0.0, HIGHEST_FREQUENCY)
+        self._ask(rci.SetTorqueFilterCutOffFrequency(float(values[0])))
+
+    def set_fc_coor(
+        self, T_flange_force: Pose, type: rci.ForceFrame | Literal["world", "tool", "path"] = rci.ForceFrame.TOOL
+    ) -> None:
+        """Sets the force-control frame, in which `state.tau_ext_in_stiff` is reported.
+
+        Args:
+            T_flange_force: Its pose in the flange frame.
+            type: What its axes follow: the base ("world"), the tool, or the path.
+        """
+        kind = member(rci.ForceFrame, "type", type)
+        self._ask(rci.SetFcCoor(_pose("T_flange_force", T_flange_force).as_row_major(), kind))
+
+    def enable_virtual_guide(self, enable: bool) -> None:
+        """Switches the virtual guide: walls at the faces of the safety box while a person or a force moves the arm."""
+        self._ask(rci.EnableVirtualGuide(flag("enable", enable)))
+
+    def _joints(self) -> list[str]:
+        return [f"joint {i + 1}" for i in range(self.n)]
+
+    def _ask(self, request: rci.Request, also_good: IntEnum | None = None, timeout: float | None = None) -> None:
+        status = self._request(request, timeout).status
+        if status != 0 and status != also_good:
+            advice = _ADVICE.get((type(request), status), "")
+            if not advice and status == rci.SettingStatus.NOT_POSSIBLE and isinstance(status, rci.SettingStatus):
+                advice = _WHILE_IDLE
+            raise CommandRejectedError(type(request).__name__, status, advice)
+
+    def _request(self, request: rci.Request, timeout: float | None = None) -> Any:
+        """Sends a request and returns the answer; every command comes through here."""
+        return self._link.request(request, timeout)
+
+
+def member(kind: type[_Member], name: str, value: object) -> _Member:
+    """Returns the member of an enumeration that a value means: the member itself, or its name in any case.
+
+    Raises:
+        InvalidValueError: It means none; the message lists those that exist.
+    """
+    if isinstance(value, kind):
+        return value
+    if isinstance(value, str) and value.upper() in kind.__members__:
+        return kind[value.upper()]
+    known = ", ".join(repr(name.lower()) for name in kind.__members__)
+    raise InvalidValueError(name, described(value), f"is unknown; known: {known}")
+
+
+def flag(name: str, value: object) -> bool:
+    """Returns a switch as a bool; 0 and 1 will do.
+
+    Raises:
+        InvalidValueError: It is anything else, such as the text "off", which Python takes for true.
+    """
+    if isinstance(value, bool | np.bool_) or (isinstance(value, int) and value in (0, 1)):
+        return bool(value)
+    raise InvalidValueError(name, described(value), "must be True or False")
+
+
+def _vector(
+    name: str, values: ArrayLike, axes: Sequence[str], unit: str, least: ArrayLike | None = None,
+    largest: ArrayLike | None = None,
+) -> Array:  # fmt: skip
+    """Returns a vector, one number an axis, each finite and inside its bounds; None is no bound."""
+    try:
+        array = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        if len(axes) == 1:
+            as_number(values[0], name, unit)  # type: ignore[index]  # A single number was put in a list.
+        raise InvalidValueError(name, described(values), f"is not {len(axes)} numbers [{unit}]") from error
+    if array.shape != (len(axes),):
+        raise InvalidValueError(name, described(values), f"has shape {array.shape}, needs ({len(axes)},) [{unit}]")
+    low = np.broadcast_to(-np.inf if least is None else least, array.shape)
+    high = np.broadcast_to(np.inf if largest is None else largest, array.shape)
+    for axis, value, lowest, highest in zip(axes, array.tolist(), low.tolist(), high.tolist(), strict=True):
+        place = f"{name}, {axis}" if axis else name
+        if not math.isfinite(value):
+            raise InvalidValueError(place, value, f"must be finite [{unit}]")
+        if not lowest <= value <= highest:
+            bounds = f"must not be below {lowest:g}" if highest == math.inf else f"is outside {lowest:g} to {highest:g}"
+            raise InvalidValueError(place, value, f"{bounds} [{unit}]")
+    return array
+
+
+def _pose(name: str, value: object) -> Pose:
+    if not isinstance(value, Pose):
+        raise InvalidValueError(name, described(value), "must be a Pose; Pose.from_matrix makes one")
+    rotation, position = value.parts
+    if not math.isfinite(sum(rotation) + sum(position)):
+        raise InvalidValueError(name, repr(value), "must be finite in every element")
+    return value
+
+
+def _floats(values: Array) -> tuple[float, ...]:
+    return tuple(values.tolist())

@@ -1,0 +1,49 @@
+"""The safety box, cycle by cycle, for motions that command no tool pose."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rcilab.conformance.breach import Breach
+from rcilab.conformance.tool_conditions import BOX_TOLERANCE, CARTESIAN_POSITION
+from rcilab.faults import Fault
+from rcilab.safety_box import SafetyBox
+
+
+class BoxMonitor:
+    """Judges where commanded joint angles bring the tool: the row "cartesian.position" alone.
+
+    Owned by the thread that runs the cycle.
+
+    Attributes:
+        excess: How far the tool was outside in the last step, [m]; below zero inside.
+
+    Args:
+        box: Where the tool shall stay; None, or one that is not active, bounds nothing.
+    """
+
+    def __init__(self, box: SafetyBox | None) -> None:
+        self._box = box if box is not None and box.active else None
+        self.excess = -1.0
+
+    @property
+    def is_active(self) -> bool:
+        """Whether there is a box at all: without one nobody needs the tool's position."""
+        return self._box is not None
+
+    def step(self, position: Sequence[float]) -> tuple[Fault, ...]:
+        """Takes the commanded tool of this cycle and returns the fault it raises, if any.
+
+        Args:
+            position: Origin of the tool in the base, three numbers, [m].
+        """
+        if self._box is None:
+            return ()
+        self.excess = self._box.excess(position)
+        return () if self.excess < BOX_TOLERANCE else (Fault.COMMAND_CARTESIAN_POSITION_LIMITS_VIOLATION,)
+
+    def broken(self) -> list[Breach]:
+        """Returns what the last step broke."""
+        if self.excess < BOX_TOLERANCE:
+            return []
+        return [Breach(CARTESIAN_POSITION, 0, self.excess, BOX_TOLERANCE)]

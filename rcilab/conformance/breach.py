@@ -1,0 +1,41 @@
+"""One broken condition in one cycle, with its numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from rcilab.conformance.condition import Condition
+from rcilab.faults import Fault
+
+
+class Breach(NamedTuple):
+    """What a monitor's last step broke."""
+
+    condition: Condition
+    axis: int
+    """The joint, from 1; 0 for a norm, an arm angle or anything else that has no axis."""
+    value: float
+    """In the condition's unit."""
+    bound: float
+    """The bound that it passed."""
+
+    @property
+    def text(self) -> str:
+        """The fact in words: "joint 2: commanded velocity 2.3 rad/s passes 2.175 rad/s"."""
+        row = self.condition
+        if row.signal == "position":
+            return f"{row.place(0)}: {row.quantity} is {self.value:.4g} m outside the safety box"
+        if row.signal == "frame":
+            return f"{row.place(0)}: {row.quantity} is improper, out of reach or singular"
+        return f"{row.place(self.axis)}: {row.quantity} {self.value:.6g} {row.unit} passes {self.bound:.6g} {row.unit}"
+
+
+def describe_breaches(breaches: Iterable[Breach]) -> str:
+    """Returns all of them in one line."""
+    return "; ".join(breach.text for breach in breaches)
+
+
+def faults_of(breaches: Iterable[Breach]) -> tuple[Fault, ...]:
+    """Returns the faults they raise, in wire order and once each."""
+    return tuple(sorted({fault for row, *_ in breaches if (fault := row.fault) is not None}))

@@ -1,0 +1,135 @@
+"""The conditions on commanded tool poses, cycle by cycle, in plain floats."""
+
+from __future__ import annotations
+
+import math
+from typing import TypeAlias
+
+from rcilab.conformance.breach import Breach, faults_of
+from rcilab.conformance.spans import spans
+from rcilab.conformance.tool_conditions import TOOL_CONDITIONS
+from rcilab.faults import Fault
+from rcilab.limits import Limits
+from rcilab.safety_box import SafetyBox
+from rcilab.spatial import IDENTITY, Pose, turn_between
+
+_TURN = 2.0 * math.pi  # [rad]
+Six: TypeAlias = tuple[float, float, float, float, float, float]
+Four: TypeAlias = tuple[float, float, float, float]
+
+_REST: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+_NO_BOX = -1.0  # [m] Inside, when there is no box to be outside of.
+
+
+class CartesianMonitor:
+    """Judges one commanded tool pose a cycle, and the arm angle when one is commanded.
+
+    Owned by the thread that runs the cycle. Twist, acceleration and jerk are backward differences over one cycle in
+    base axes; translation and rotation are judged by their norms. An arm angle's differences are taken the short way
+    round, so that passing pi is no jump. Behind a gap they are divided differences, as those of `JointMonitor`.
+
+    Attributes:
+        twist: Velocity of the tool, linear first, 6 floats, [m/s, rad/s].
+        acceleration: Its backward difference, 6 floats, [m/s^2, rad/s^2].
+        jerk: The acceleration's backward difference, 6 floats, [m/s^3, rad/s^3].
+        arm_angle: The arm angle and its first, second and third difference, [rad, rad/s, rad/s^2, rad/s^3]; None while
+            none is commanded.
+
+    Args:
+        limits: Bounds of the tool and the arm angle.
+        box: Where the tool shall stay; None, or one that is not active, bounds nothing. The monitor starts at rest at
+            the base; `reset` places it.
+    """
+
+    def __init__(self, limits: Limits, box: SafetyBox | None = None) -> None:
+        self._box = box if box is not None and box.active else None
+        self._rows = [(row, *(float(bound[0]) for bound in row.bounds(limits))) for row in TOOL_CONDITIONS]
+        self.reset(IDENTITY)
+
+    def reset(self, pose: Pose, psi: float | None = None) -> None:
+        """Forgets the past: the tool rests at `pose`, the elbow at `psi`.
+
+        Args:
+            pose: Pose of the tool in the base.
+            psi: Arm angle, [rad]; None while none is commanded.
+        """
+        self._pose = pose
+        self._spacing = (1, 1)
+        self.twist: Six = _REST
+        self.acceleration: Six = _REST
+        self.jerk: Six = _REST
+        self.arm_angle: Four | None = None if psi is None else (psi, 0.0, 0.0, 0.0)
+        self._values: tuple[float, ...] = self._signals()
+
+    def step(self, pose: Pose, psi: float | None = None, cycles: int = 1) -> tuple[Fault, ...]:
+        """Takes the commanded pose of this cycle and returns the faults it raises, in wire order.
+
+        A value that is not a number breaks every condition on it. The history moves on in any case; after a fault it
+        is for the caller to `reset`.
+
+        Args:
+            pose: Pose of the tool in the base.
+            psi: Arm angle, [rad]; None is not judged, and the next one counts as at rest.
+            cycles: Cycles since the last step, 1 or more.
+        """
+        times = spans(cycles, self._spacing)
+        h, second, third = times
+        self._spacing = (cycles, self._spacing[0])
+        rotation, (x, y, z) = pose.parts
+        last_rotation, (last_x, last_y, last_z) = self._pose.parts
+        wx, wy, wz = turn_between(last_rotation, rotation)
+        twist = ((x - last_x) / h, (y - last_y) / h, (z - last_z) / h, wx / h, wy / h, wz / h)
+        acceleration = _difference(twist, self.twist, second)
+        self.jerk = _difference(acceleration, self.acceleration, third)
+        self._pose, self.twist, self.acceleration = pose, twist, acceleration
+        self.arm_angle = _arm_angle_differences(self.arm_angle, psi, times)
+        self._values = self._signals()
+        for value, (_, low, high) in zip(self._values, self._rows, strict=True):
+            if not low < value < high:
+                return faults_of(self.broken())
+        return ()
+
+    def broken(self) -> list[Breach]:
+        """Returns what the last step broke."""
+        return [
+            Breach(row, 0, value, low if value <= low else high)
+            for value, (row, low, high) in zip(self._values, self._rows, strict=True)
+            if not low < value < high
+        ]
+
+    def _signals(self) -> tuple[float, ...]:
+        """Returns the value of every row of TOOL_CONDITIONS."""
+        outside = _NO_BOX if self._box is None else self._box.excess(self._pose.parts[1])
+        angle = self.arm_angle or (0.0, 0.0, 0.0, 0.0)
+        return (
+            outside,
+            *angle,
+            *_norms(self.twist),
+            *_norms(self.acceleration),
+            *_norms(self.jerk),
+        )
+
+
+def _difference(new: Six, old: Six, h: float) -> Six:
+    a, b, c, d, e, f = new
+    p, q, r, s, t, u = old
+    return (a - p) / h, (b - q) / h, (c - r) / h, (d - s) / h, (e - t) / h, (f - u) / h
+
+
+def _norms(values: Six) -> tuple[float, float]:
+    a, b, c, d, e, f = values
+    return math.sqrt(a * a + b * b + c * c), math.sqrt(d * d + e * e + f * f)
+
+
+def _arm_angle_differences(last: Four | None, psi: float | None, times: tuple[float, float, float]) -> Four | None:
+    if psi is None:
+        return None
+    if last is None:
+        return psi, 0.0, 0.0, 0.0
+    step = psi - last[0]
+    if not -math.pi <= step <= math.pi and math.isfinite(step):
+        step = math.remainder(step, _TURN)
+    first, second, third = times
+    dpsi = step / first
+    ddpsi = (dpsi - last[1]) / second
+    return psi, dpsi, ddpsi, (ddpsi - last[2]) / third

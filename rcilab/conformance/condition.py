@@ -1,0 +1,107 @@
+"""What a condition is: a quantity, two bounds, the place it was taken from, and the fault it raises."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+import numpy as np
+
+from rcilab.arrays import Array
+from rcilab.errors import InvalidValueError
+from rcilab.faults import Fault
+from rcilab.limits import JointLimits, Limits
+
+Necessity: TypeAlias = Literal["necessary", "recommended"]
+Stage: TypeAlias = Literal["throughout", "start", "end"]
+
+Signal: TypeAlias = Literal[
+    "joint",
+    "torque",
+    "position",
+    "translation",
+    "rotation",
+    "arm_angle",
+    "frame",
+    "external_torque",
+    "lost_commands",
+]
+"""What is judged: every joint's angle or torque; the tool's position, the norms of its translation and rotation; the
+arm angle; the tool's pose as a whole; external torques; commands that did not come."""
+
+Bounds: TypeAlias = tuple[Array, Array]
+"""Lower and upper bound, each of shape (n,) for joints and (1,) for anything else."""
+
+AnyLimits: TypeAlias = Limits | JointLimits
+"""All limits of an arm; a condition on joints makes do with those of the joints."""
+
+MANUAL = "RCI manual V1.3.1"
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Condition:
+    """One row of the table."""
+
+    id: str
+    """Short stable name, such as "joint.velocity"."""
+    quantity: str
+    """What is judged, in words, such as "commanded velocity"."""
+    formula: str
+    """As the manual prints it."""
+    necessity: Necessity
+    """The robot stops when a necessary condition is broken."""
+    unit: str
+    source: str
+    """Where condition and bound come from."""
+    fault: Fault | None
+    """What the controller raises; None for a recommended condition."""
+    stage: Stage
+    """When it is judged."""
+    signal: Signal = "joint"
+    """What it judges."""
+    order: int
+    """Which derivative of the signal it judges: 0 the signal itself, 3 its jerk."""
+    bounds: Callable[[AnyLimits], Bounds]
+    """Returns its bounds from the limits of an arm."""
+
+    @property
+    def is_measured(self) -> bool:
+        """Whether it judges what the arm does, not what it is told to do."""
+        return self.id.startswith("measured.")
+
+    @property
+    def is_per_joint(self) -> bool:
+        """Whether every joint has a value and a bound of its own."""
+        return self.signal in ("joint", "torque", "external_torque")
+
+    def place(self, axis: int) -> str:
+        """Returns whose value it is, in words: "joint 2", "tool", "elbow", "network"."""
+        if self.is_per_joint:
+            return f"joint {axis}"
+        return {"arm_angle": "elbow", "lost_commands": "network"}.get(self.signal, "tool")
+
+    def __repr__(self) -> str:
+        return f"<Condition {self.id}: {self.formula} ({self.necessity})>"
+
+
+def joint_limits(limits: AnyLimits) -> JointLimits:
+    """Returns the bounds of the joints."""
+    return limits if isinstance(limits, JointLimits) else limits.joint
+
+
+def all_limits(limits: AnyLimits) -> Limits:
+    """Returns the bounds of the whole arm.
+
+    Raises:
+        InvalidValueError: They are those of the joints only.
+    """
+    if isinstance(limits, JointLimits):
+        raise InvalidValueError("limits", limits, "are of the joints only; pass model.limits")
+    return limits
+
+
+def same(value: float) -> Bounds:
+    """Returns a single pair of bounds around zero."""
+    bound = np.array([value])
+    return -bound, bound

@@ -1,0 +1,44 @@
+"""Whose Cartesian numbers count: the manual's, or those of the vendor SDK's rate limiter."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import MappingProxyType
+from typing import Literal, TypeAlias, get_args
+
+from rcilab.errors import InvalidValueError
+from rcilab.limits import Limits
+
+LimitTable: TypeAlias = Literal["manual", "sdk"]
+
+SDK_TRANSLATION_VELOCITY = 1.5  # [m/s] Vendor SDK, rate limiter.
+SDK_ROTATION_ACCELERATION = 25.0  # [rad/s^2] Vendor SDK, rate limiter.
+SDK_ROTATION_JERK = 12500.0  # [rad/s^3] Vendor SDK, rate limiter.
+
+_SDK = "vendor SDK, rate limiter"
+
+
+def cartesian_limits(limits: Limits, table: LimitTable = "manual") -> Limits:
+    """Returns the limits with the Cartesian bounds of a table.
+
+    A program that limits its rates with the vendor's SDK may legally exceed the manual's numbers (4.4); whoever wants
+    to run it unchanged judges by "sdk".
+
+    Args:
+        limits: The bounds of an arm as its model has them: the manual's.
+        table: "manual" leaves them as they are; "sdk" puts the vendor's constants in their place.
+
+    Raises:
+        InvalidValueError: There is no such table; the message lists those that exist.
+    """
+    if table not in get_args(LimitTable):
+        raise InvalidValueError("limit table", table, f"is unknown; known: {', '.join(get_args(LimitTable))}")
+    if table == "manual":
+        return limits
+    changes = {
+        "translation_velocity": SDK_TRANSLATION_VELOCITY,
+        "rotation_acceleration": SDK_ROTATION_ACCELERATION,
+        "rotation_jerk": SDK_ROTATION_JERK,
+    }
+    sources = {**limits.sources, **{f"cartesian.{name}": _SDK for name in changes}}
+    return replace(limits, cartesian=replace(limits.cartesian, **changes), sources=MappingProxyType(sources))

@@ -1,0 +1,121 @@
+"""The conditions on what the moving arm does, cycle by cycle, in plain floats."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from rcilab.clock import CYCLE_TIME
+from rcilab.conformance.breach import Breach, faults_of
+from rcilab.conformance.condition import Condition
+from rcilab.conformance.measured_conditions import ACCELERATION_CUTOFF, MEASURED_CONDITIONS
+from rcilab.errors import InvalidValueError
+from rcilab.faults import Fault
+from rcilab.limits import Limits
+from rcilab.safety_box import SafetyBox
+
+_SHARE = CYCLE_TIME / (CYCLE_TIME + 1.0 / (2.0 * math.pi * ACCELERATION_CUTOFF))
+"""How much of a new difference the first-order low pass takes in one cycle."""
+
+
+class MeasuredMonitor:
+    """Judges what the sensors say of an arm that moves, once a cycle.
+
+    Owned by the thread that runs the cycle. The bounds are the commanded ones with the allowances of
+    `measured_conditions`. Accelerations are low-passed differences of the measured velocities; the first step after a
+    `reset` has none.
+
+    Attributes:
+        acceleration: Low-passed joint accelerations, n floats, [rad/s^2].
+        tool_acceleration: Low-passed acceleration of the tool, linear first, 6 floats, [m/s^2, rad/s^2].
+
+    Args:
+        limits: Bounds of the arm.
+        box: Where the tool shall stay; None, or one that is not active, bounds nothing.
+    """
+
+    def __init__(self, limits: Limits, box: SafetyBox | None = None) -> None:
+        self._n = len(limits.joint.velocity)
+        self._box = box if box is not None and box.active else None
+        self._rows: list[tuple[Condition, int]] = []
+        self._lower: list[float] = []
+        self._upper: list[float] = []
+        for row in MEASURED_CONDITIONS:
+            lower, upper = row.bounds(limits)
+            self._rows += [(row, joint if row.is_per_joint else 0) for joint in range(1, len(lower) + 1)]
+            self._lower += lower.tolist()
+            self._upper += upper.tolist()
+        self.reset([0.0] * self._n)
+
+    def reset(self, q: Sequence[float]) -> None:
+        """Forgets the past: the arm is at `q`, and what it does there shows in the next step.
+
+        Args:
+            q: Measured joint angles, n numbers, [rad].
+
+        Raises:
+            InvalidValueError: Not n numbers.
+        """
+        if len(q) != self._n:
+            raise InvalidValueError("q", q, f"needs {self._n} numbers [rad]")
+        self._dq: list[float] | None = None
+        self._twist: list[float] | None = None
+        self._psi: float | None = None
+        self.acceleration = [0.0] * self._n
+        self.tool_acceleration = [0.0] * 6
+        self._values: list[float] = []
+
+    def step(
+        self,
+        q: Sequence[float],
+        dq: Sequence[float],
+        position: Sequence[float],
+        twist: Sequence[float] | None,
+        psi: float | None,
+    ) -> tuple[Fault, ...]:
+        """Takes the measurements of this cycle and returns the faults they raise, in wire order.
+
+        Args:
+            q: Joint angles, n numbers, [rad].
+            dq: Joint velocities, n numbers, [rad/s].
+            position: The tool in the base, 3 numbers, [m].
+            twist: Velocity of the tool in base axes, linear first, 6 numbers, [m/s, rad/s]; None in motions of the
+                joints, which may move the tool as fast as they like (manual 4.1).
+            psi: Arm angle, [rad]; None is not judged.
+        """
+        self.acceleration = _low_passed(self.acceleration, dq, self._dq)
+        self.tool_acceleration = _low_passed(self.tool_acceleration, twist, self._twist)
+        speed = 0.0
+        if psi is not None and self._psi is not None:
+            speed = math.remainder(psi - self._psi, 2.0 * math.pi) / CYCLE_TIME if math.isfinite(psi) else math.nan
+        self._dq, self._psi = list(dq), psi
+        self._twist = None if twist is None else list(twist)
+        outside = -1.0 if self._box is None else self._box.excess(position)
+        velocity = (0.0, 0.0) if twist is None else _norms(twist)
+        acceleration = _norms(self.tool_acceleration)
+        self._values = [*q, outside, speed, *dq, *velocity, *self.acceleration, *acceleration]
+        for value, low, high in zip(self._values, self._lower, self._upper, strict=True):
+            if not low < value < high:
+                return faults_of(self.broken())
+        return ()
+
+    def broken(self) -> list[Breach]:
+        """Returns what the last step broke."""
+        bounds = zip(self._rows, self._values, self._lower, self._upper, strict=False)
+        return [
+            Breach(row, axis, value, low if value <= low else high)
+            for (row, axis), value, low, high in bounds
+            if not low < value < high
+        ]
+
+
+def _low_passed(state: list[float], new: Sequence[float] | None, old: Sequence[float] | None) -> list[float]:
+    """Returns the filtered difference one cycle later; from rest when there is nothing to take a difference of."""
+    if new is None or old is None:
+        return [0.0] * len(state)
+    return [x + _SHARE * ((a - b) / CYCLE_TIME - x) for x, a, b in zip(state, new, old, strict=False)]
+
+
+def _norms(values: Sequence[float]) -> tuple[float, float]:
+    a, b, c, d, e, f = values
+    return math.sqrt(a * a + b * b + c * c), math.sqrt(d * d + e * e + f * f)

@@ -1,0 +1,113 @@
+"""What a controller would see of a motion, cycle by cycle, as tables: the values that the conditions judge."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rcilab.arrays import Array
+from rcilab.clock import CYCLE_TIME
+from rcilab.conformance.condition import Condition
+from rcilab.conformance.conditions import START_POSITION_TOLERANCE
+from rcilab.conformance.start import StartState
+from rcilab.model import RobotModel
+from rcilab.motion.motion import Motion, MotionSample
+from rcilab.safety_box import SafetyBox
+
+HOLD_SAMPLES = 3
+"""Cycles judged after the last row, in which the controller repeats it: a third difference looks back that far."""
+
+_SMOOTH_JERK = 0.01
+"""Part of the jerk limits below which torques change smoothly. A choice: a tenth of what the torque rate allows."""
+_SMOOTH_STEP = 16
+"""[cycles] How far apart torques are computed where they change smoothly; straight lines between them. A choice."""
+
+
+class MotionSignals:
+    """One motion's signals, each a table with a row a cycle.
+
+    Args:
+        motion: The motion.
+        model: The arm, with its tool and load.
+        start: Where the arm comes from.
+        box: Where the tool shall stay, or None.
+    """
+
+    def __init__(self, motion: Motion, model: RobotModel, start: StartState, box: SafetyBox | None) -> None:
+        self._motion = motion
+        self._model = model
+        self._start = start
+        self._box = box
+        self._differences = _backward_differences(motion.q, start)
+        self.is_off_start = bool(np.abs(motion.start - start.q).max() > START_POSITION_TOLERANCE)
+
+    def table(self, condition: Condition) -> tuple[Array, float]:
+        """Returns the values that a condition judges, shape (rows, n) or (rows, 1), and the first row's time, [s]."""
+        if condition.stage == "throughout":
+            return self._throughout(condition), 0.0
+        if condition.stage == "end":
+            return self._rest(condition, self._motion.end()), self._motion.duration
+        if condition.order == 0:
+            return (self._motion.start - self._start.q)[np.newaxis], 0.0
+        return self._rest(condition, self._motion.at(0.0)), 0.0
+
+    def _throughout(self, condition: Condition) -> Array:
+        if condition.signal == "torque":
+            return self._torques[condition.order]
+        if condition.signal == "position":
+            assert self._box is not None
+            return self._box.excess_path(self._model.position_path(self._differences[0]))[:, np.newaxis]
+        return self._differences[condition.order]
+
+    @cached_property
+    def _torques(self) -> tuple[Array, Array]:
+        """Torques without gravity and their backward differences over a cycle, each of shape (N + 3, n)."""
+        q, dq, ddq, jerk = self._differences
+        rows = _eventful_rows(jerk, _SMOOTH_JERK * self._model.limits.joint.jerk)
+        known = np.ascontiguousarray(self._model.rigid_body.motion_torques(q[rows], dq[rows], ddq[rows]).T)
+        every = np.arange(len(q))
+        tau = np.empty(q.T.shape)
+        for joint, values in enumerate(known):
+            tau[joint] = np.interp(every, rows, values)
+        before = tau[:, :1] if self._start.moving else np.zeros_like(tau[:, :1])
+        return tau.T, (np.diff(np.concatenate((before, tau), axis=1)) / CYCLE_TIME).T
+
+    def _rest(self, condition: Condition, sample: MotionSample) -> Array:
+        """Returns velocity or acceleration at an end of the motion, shape (1, n).
+
+        Rows that somebody else made tell rest from motion only as far as one cycle at the jerk limit goes.
+        """
+        value = sample.dq if condition.order == 1 else sample.ddq
+        if self._motion.law == "samples":
+            unresolved = self._model.limits.joint.jerk * CYCLE_TIME ** (3 - condition.order)
+            value = np.sign(value) * np.maximum(np.abs(value) - unresolved, 0.0)
+        return value[np.newaxis]
+
+
+def _eventful_rows(jerk: Array, smooth: Array) -> NDArray[np.intp]:
+    """Returns the rows between which torques run straight: all on either side of a jerk, and some in between."""
+    jerks: NDArray[np.bool_] = np.asarray((np.abs(jerk) > smooth).any(axis=1))
+    chosen = jerks.copy()
+    chosen[:-1] |= jerks[1:]
+    chosen[::_SMOOTH_STEP] = True
+    chosen[-1] = True
+    return np.flatnonzero(chosen)
+
+
+def _backward_differences(q: Array, start: StartState) -> tuple[Array, Array, Array, Array]:
+    """Returns angles, velocity, acceleration and jerk in every cycle, hold included, each of shape (N + 3, n).
+
+    Divisions by the cycle time one after the other, as the monitor does it: equal to the last bit. In memory a joint's
+    values lie side by side, which makes everything that is done joint by joint several times faster.
+    """
+    commands = (q[1:] if start.moving else q).T
+    hold = np.repeat(q[-1:].T, HOLD_SAMPLES, axis=1)
+    path = np.concatenate((start.q[:, np.newaxis], commands, hold), axis=1)
+    dq = np.concatenate((start.dq[:, np.newaxis], np.diff(path) / CYCLE_TIME), axis=1)
+    ddq = np.concatenate((start.ddq[:, np.newaxis], np.diff(dq) / CYCLE_TIME), axis=1)
+    jerk = np.diff(ddq) / CYCLE_TIME
+    if start.moving:
+        return path.T, dq.T, ddq.T, np.concatenate((np.zeros_like(jerk[:, :1]), jerk), axis=1).T
+    return path[:, 1:].T, dq[:, 1:].T, ddq[:, 1:].T, jerk.T

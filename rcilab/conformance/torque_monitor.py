@@ -1,0 +1,81 @@
+"""The conditions on commanded torques, cycle by cycle, in plain floats."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rcilab.clock import CYCLE_TIME
+from rcilab.conformance.breach import Breach, faults_of
+from rcilab.conformance.condition import Condition
+from rcilab.conformance.tool_conditions import TORQUE_CONDITIONS
+from rcilab.errors import InvalidValueError
+from rcilab.faults import Fault
+from rcilab.limits import JointLimits
+
+
+class TorqueMonitor:
+    """Judges one commanded torque a cycle: its range, and its backward difference over one cycle.
+
+    Owned by the thread that runs the cycle. Commanded torques come on top of gravity and friction, which the
+    controller compensates.
+
+    Attributes:
+        tau: Last commanded torques, [N m].
+        dtau: Their backward difference, [N m/s].
+
+    Args:
+        limits: Bounds of the joints. The monitor starts from no torque.
+    """
+
+    def __init__(self, limits: JointLimits) -> None:
+        self._n = len(limits.torque)
+        self._rows: list[tuple[Condition, int]] = []
+        self._lower: list[float] = []
+        self._upper: list[float] = []
+        for row in TORQUE_CONDITIONS:
+            lower, upper = row.bounds(limits)
+            self._rows += [(row, joint) for joint in range(1, self._n + 1)]
+            self._lower += lower.tolist()
+            self._upper += upper.tolist()
+        self.reset([0.0] * self._n)
+
+    def reset(self, tau: Sequence[float]) -> None:
+        """Forgets the past: these torques have been commanded for a while.
+
+        Args:
+            tau: Joint torques, n numbers, [N m].
+
+        Raises:
+            InvalidValueError: Not n numbers.
+        """
+        if len(tau) != self._n:
+            raise InvalidValueError("tau", tau, f"needs {self._n} numbers [N m]")
+        self.tau = [float(value) for value in tau]
+        self.dtau = [0.0] * self._n
+
+    def step(self, tau: Sequence[float], cycles: int = 1) -> tuple[Fault, ...]:
+        """Takes the commanded torques of this cycle and returns the faults they raise, in wire order.
+
+        A value that is not a number breaks both conditions. The history moves on in any case.
+
+        Args:
+            tau: Joint torques, at least n numbers (a 6-axis arm ignores the wire's seventh), [N m].
+            cycles: Cycles since the last step, 1 or more; the rate is that over all of them.
+        """
+        h = cycles * CYCLE_TIME
+        new = list(tau[: self._n])
+        self.dtau = [(value - old) / h for value, old in zip(new, self.tau, strict=True)]
+        self.tau = new
+        for value, low, high in zip([*self.dtau, *new], self._lower, self._upper, strict=True):
+            if not low < value < high:
+                return faults_of(self.broken())
+        return ()
+
+    def broken(self) -> list[Breach]:
+        """Returns what the last step broke."""
+        values = (*self.dtau, *self.tau)
+        return [
+            Breach(row, joint, value, low if value <= low else high)
+            for (row, joint), value, low, high in zip(self._rows, values, self._lower, self._upper, strict=True)
+            if not low < value < high
+        ]

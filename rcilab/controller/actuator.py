@@ -1,0 +1,131 @@
+"""What the drives are told in one cycle: the laws that turn a reference into a setpoint.
+
+    POSITION              the servo follows the commanded angles; also how an arm comes to rest and stands still
+    JOINT_IMPEDANCE       springs at the joints pull towards the commanded angles
+    CARTESIAN_IMPEDANCE   springs at the tool pull towards the commanded pose, and press with the desired wrench
+    TORQUE                the commanded torques act, gravity and friction are compensated
+    GUIDE                 the arm is weightless and follows a hand
+    BRAKED                the brakes hold
+
+With the virtual guide on and a safety box active, walls push the tool back into the box, as stiff as the Cartesian
+impedance, wherever the arm yields: under both impedances and while it is guided. The box is then not judged.
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+
+from rcilab.arrays import JointVector
+from rcilab.controller.commanded import CommandedMotion
+from rcilab.controller.guiding import guide_torque, wall_torque
+from rcilab.controller.plant import Drive, Measurement, Setpoint
+from rcilab.controller.servo import cartesian_impedance, joint_impedance
+from rcilab.controller.settings import Settings
+from rcilab.controller.tool import ToolMotion
+from rcilab.model import RobotModel
+from rcilab.protocols import rci
+from rcilab.safety_box import SafetyBox
+
+
+class Law(Enum):
+    """How a reference becomes a setpoint."""
+
+    POSITION = "position"
+    JOINT_IMPEDANCE = "joint impedance"
+    CARTESIAN_IMPEDANCE = "Cartesian impedance"
+    TORQUE = "torque"
+    GUIDE = "guide"
+    BRAKED = "braked"
+
+    @property
+    def yields(self) -> bool:
+        """Whether the arm may be elsewhere than it was told, so that a stop has to begin from where it really is."""
+        return self not in (Law.POSITION, Law.BRAKED)
+
+    @property
+    def leads(self) -> bool:
+        """Whether the arm goes where forces take it and commanded angles only follow."""
+        return self in (Law.TORQUE, Law.GUIDE)
+
+
+class Actuator:
+    """Computes setpoints. Owned by the controller's cycle.
+
+    Args:
+        model: The arm with its tool and load.
+        settings: What the client has set.
+    """
+
+    def __init__(self, model: RobotModel, settings: Settings) -> None:
+        self.configure(model, settings)
+        self._space, self._kind = rci.DragSpace.JOINT, rci.DragType.FREE
+
+    def configure(self, model: RobotModel, settings: Settings) -> None:
+        """Takes new settings, and the model with the tool and load that they say."""
+        self._model = model
+        self._settings = settings
+        self._soft_limits = settings.soft_limits(model.limits.joint)
+
+    def begin_guiding(self, space: rci.DragSpace, kind: rci.DragType, measured: Measurement) -> None:
+        """Remembers what a hand is to leave where it is now."""
+        self._space, self._kind = space, kind
+        self._q_held = measured.q
+        self._T_held = self._model.forward(measured.q)
+
+    def setpoint(
+        self,
+        law: Law,
+        commanded: CommandedMotion,
+        tool_c: ToolMotion,
+        measured: Measurement,
+        tau: list[float] | None,
+    ) -> Setpoint:
+        """Returns what the drives shall do in this cycle.
+
+        Args:
+            law: How.
+            commanded: The reference of the joints.
+            tool_c: The same for the tool, up to date.
+            measured: Where the arm is.
+            tau: Commanded torques, n plain floats, [N m], for TORQUE; None is none yet.
+        """
+        match law:
+            case Law.POSITION:
+                return Setpoint(Drive.POSITION, commanded.q, commanded.dq, commanded.ddq)
+            case Law.BRAKED:
+                return Setpoint(Drive.BRAKED, commanded.q, commanded.dq, commanded.ddq)
+            case Law.TORQUE:
+                torque = [0.0] * len(commanded.q) if tau is None else tau
+                return Setpoint(Drive.TORQUE, commanded.q, commanded.dq, commanded.ddq, tau=torque)
+            case _:
+                torque = self._compliance(law, commanded, tool_c, measured)
+                box = guiding_box(self._settings)
+                if box is not None:
+                    torque = torque + wall_torque(self._model, measured, box, self._settings.cartesian_stiffness)
+                return Setpoint(Drive.TORQUE, commanded.q, commanded.dq, commanded.ddq, tau=torque.tolist())
+
+    def _compliance(
+        self, law: Law, commanded: CommandedMotion, tool_c: ToolMotion, measured: Measurement
+    ) -> JointVector:
+        model, settings = self._model, self._settings
+        if law is Law.JOINT_IMPEDANCE:
+            q, dq, ddq = commanded.q, commanded.dq, commanded.ddq
+            return joint_impedance(model, q, dq, ddq, measured, settings.joint_stiffness)
+        if law is Law.CARTESIAN_IMPEDANCE:
+            return cartesian_impedance(
+                model,
+                tool_c.pose,
+                tool_c.twist,
+                tool_c.acceleration,
+                commanded.q,
+                measured,
+                settings.cartesian_stiffness,
+                settings.desired_wrench,
+            )
+        return guide_torque(model, measured, self._space, self._kind, self._T_held, self._q_held, self._soft_limits)
+
+
+def guiding_box(settings: Settings) -> SafetyBox | None:
+    """Returns the box whose walls push, or None when there are none."""
+    box = settings.safety_box
+    return box if settings.virtual_guide and box is not None and box.active else None

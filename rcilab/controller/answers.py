@@ -1,0 +1,111 @@
+"""What the controller answers to a request beyond its table of phases: contents, and arguments that cannot be."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from rcilab.conformance.measured_conditions import ANGLE_ALLOWANCE, BOX_ALLOWANCE
+from rcilab.controller.actuator import guiding_box
+from rcilab.controller.commanded import CommandedMotion
+from rcilab.controller.modes import MODES
+from rcilab.controller.modes.inverse import find_singularity
+from rcilab.controller.settings import SIGNAL_COUNT, Settings
+from rcilab.controller.state_machine import Phase, When
+from rcilab.controller.watch import Watch
+from rcilab.kinematics.inverse import build_geometry
+from rcilab.model import RobotModel
+from rcilab.protocols import rci
+from rcilab.state import ControllerMode
+
+
+class Reply(NamedTuple):
+    """What to answer, and when."""
+
+    response: rci.Response
+    when: When = When.NOW
+    ends_connection: bool = False
+
+
+def answer_query(
+    request: rci.Request,
+    phase: Phase,
+    safety_stop: rci.SafetyStop,
+    settings: Settings,
+    model_response: rci.Response,
+) -> rci.Response | None:
+    """Returns the content that a query asks for, or None when the request is no query."""
+    match request:
+        case rci.GetMotorState():
+            return rci.MotorStateResponse(int(phase not in (Phase.OFF, Phase.USER_STOPPED)))
+        case rci.GetSafetyStopState():
+            return rci.SafetyStopResponse(safety_stop)
+        case rci.GetDIState(signal=signal):
+            if signal >= SIGNAL_COUNT:
+                return rci.DigitalInputResponse(rci.SettingStatus.INVALID_ARGUMENT, False)
+            return rci.DigitalInputResponse(rci.SettingStatus.SUCCESS, settings.inputs[signal])
+        case rci.LoadRobotModel():
+            return model_response
+        case _:
+            return None
+
+
+def judge_request(request: rci.Request, model: RobotModel, commanded: CommandedMotion) -> rci.Status | None:
+    """Returns why a request cannot be granted whatever the phase is, or None when nothing speaks against it."""
+    match request:
+        case rci.SetMotorPower(power=power):
+            return None if power in (0, 1) else rci.SettingStatus.INVALID_ARGUMENT
+        case rci.StartMove():
+            return _judge_start(request, model, commanded)
+        case rci.StartDrag(space=space, type=kind):
+            is_known = space in tuple(rci.DragSpace) and kind in tuple(rci.DragType)
+            return None if is_known else rci.SettingStatus.INVALID_ARGUMENT
+        case _:
+            return None
+
+
+def _judge_start(request: rci.StartMove, model: RobotModel, commanded: CommandedMotion) -> rci.StartStatus | None:
+    controller_mode, motion_mode = request.controller_mode, request.motion_mode
+    if controller_mode >= ControllerMode.OTHER or motion_mode not in tuple(rci.StartMotionMode):
+        return rci.StartStatus.INVALID_ARGUMENT
+    mode = MODES.get((ControllerMode(controller_mode), rci.StartMotionMode(motion_mode)))
+    if mode is None or not commanded.is_at_rest:
+        return rci.StartStatus.NOT_POSSIBLE
+    if mode.is_cartesian and find_singularity(build_geometry(model.description), commanded.q) is not None:
+        return rci.StartStatus.SINGULAR_START_POSE
+    return None
+
+
+def judge_recovery(settings: Settings, watch: Watch) -> rci.RecoveryStatus | None:
+    """Returns why a stopped arm cannot recover by itself, or None when it can.
+
+    Beyond a soft limit or the safety box by more than a measurement may be, a person has to bring it back (power off
+    and on, then hand guiding, or a motion that leads back): MANUAL_RECOVERY_NEEDED. While something still presses on
+    it harder than the collision thresholds: REFLEX.
+
+    Args:
+        settings: With soft limits, box and thresholds.
+        watch: Where the arm is, and what presses on it.
+    """
+    for q, lower, upper in zip(watch.measured.q.tolist(), settings.joint_lower, settings.joint_upper, strict=True):
+        if not lower - ANGLE_ALLOWANCE < q < upper + ANGLE_ALLOWANCE:
+            return rci.RecoveryStatus.MANUAL_RECOVERY_NEEDED
+    box = settings.safety_box
+    if box is not None and box.active and guiding_box(settings) is None:
+        if box.excess(watch.tool.pose.parts[1]) > BOX_ALLOWANCE:
+            return rci.RecoveryStatus.MANUAL_RECOVERY_NEEDED
+    return None if watch.find_collision(settings.collision_thresholds) is None else rci.RecoveryStatus.REFLEX
+
+
+def conclude(reply: Reply, phase: Phase) -> rci.Response:
+    """Returns what to answer once a reply is due: a recovery that was overtaken by something says by what."""
+    status = getattr(reply.response, "status", None)
+    if reply.when is When.AT_REST and isinstance(status, rci.RecoveryStatus):
+        return rci.StatusResponse(_OVERTAKEN.get(phase, rci.RecoveryStatus.ABORTED))
+    return reply.response
+
+
+_OVERTAKEN = {
+    Phase.IDLE: rci.RecoveryStatus.SUCCESS,
+    Phase.USER_STOPPED: rci.RecoveryStatus.USER_STOP,
+    Phase.REFLEX: rci.RecoveryStatus.REFLEX,
+}

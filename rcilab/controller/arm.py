@@ -1,0 +1,122 @@
+"""The arm as the controller has it: where it is told to be, what drives it, and what its sensors say."""
+
+from __future__ import annotations
+
+from rcilab.arrays import JointVector, frozen
+from rcilab.clock import CYCLE_TIME
+from rcilab.controller.actuator import Actuator, Law
+from rcilab.controller.commanded import CommandedMotion
+from rcilab.controller.plant import Plant
+from rcilab.controller.reporter import Readings
+from rcilab.controller.settings import Settings
+from rcilab.controller.tool import ToolMotion
+from rcilab.controller.watch import Watch
+from rcilab.model import RobotModel
+
+STANDSTILL = 1e-4  # [rad/s] Below it every joint stands, 0.006 deg/s; a choice.
+SETTLE_LIMIT = 300  # [cycles] How long one waits for an arm that something keeps from where it was told; a choice.
+
+
+class Arm:
+    """Commanded motion, plant and sensors, moved together one cycle at a time. Owned by the controller's cycle.
+
+    Attributes:
+        model: The arm with the tool and load that were set.
+        plant: What moves.
+        commanded: The commanded joint angles.
+        tool_c: The tool on them.
+        watch: The sensors.
+
+    Args:
+        model: The arm.
+        plant: What moves.
+        settings: What the client has set.
+    """
+
+    def __init__(self, model: RobotModel, plant: Plant, settings: Settings) -> None:
+        self.model = model
+        self.plant = plant
+        measured = plant.reset(model.home)
+        q = measured.q.tolist()
+        self.commanded = CommandedMotion(model.limits.joint, q)
+        self.tool_c = ToolMotion(model, q)
+        self.watch = Watch(model, measured)
+        self.actuator = Actuator(model, settings)
+        self._tool_version = self.commanded.version
+        self._law = Law.BRAKED
+        self._ddq: list[float] = [0.0] * model.n
+        self._is_there: bool = True
+        self._is_slow: bool = True
+        self._standing = 0
+
+    @property
+    def stands(self) -> bool:
+        """Whether it was told to stay where it is, and its joints have come to a standstill."""
+        return self.commanded.is_at_rest and (self._is_slow or self._standing > SETTLE_LIMIT)
+
+    @property
+    def may_be_braked(self) -> bool:
+        """Whether it was told to stay where it is and does: servos settle, and a yielding arm moves in any case."""
+        return self.commanded.is_at_rest and not self._law.yields and (self._is_there or self._standing > SETTLE_LIMIT)
+
+    def reset(self, q: JointVector) -> None:
+        """Puts the resting arm somewhere else."""
+        measured = self.plant.reset(frozen(q))
+        self.commanded.place(measured.q.tolist())
+        self.tool_c.place(self.commanded.q)
+        self._tool_version = self.commanded.version
+        self.watch.configure(self.model, measured)
+
+    def configure(self, settings: Settings) -> None:
+        """Takes new settings; another tool or load only at rest."""
+        tool, load = settings.T_flange_tool, settings.load
+        if tool is not self.model.T_flange_tool or load is not self.model.load:
+            self.model = self.model.with_tool(tool).with_load(load)
+            self.plant.configure(self.model)
+            measured = self.plant.reset(self.watch.measured.q)
+            self.tool_c = ToolMotion(self.model, self.commanded.q)
+            self.watch.configure(self.model, measured)
+        self.actuator.configure(self.model, settings)
+
+    def move(self, law: Law, tau: list[float] | None, *, has_moved: bool) -> None:
+        """Lives through one millisecond: the reference goes on, the plant moves, the sensors are read.
+
+        Args:
+            law: How the reference becomes a setpoint. When an arm that yielded is not to yield any more, the
+                reference starts anew from where the arm is and how it moves.
+            tau: Commanded torques, [N m]; None when none are commanded.
+            has_moved: Whether the commanded angles are those of this cycle already; otherwise they come to rest.
+        """
+        commanded, last = self.commanded, self.watch.measured
+        if self._law.yields and not law.yields:
+            commanded.join(last.q.tolist(), last.dq.tolist(), self._ddq)
+        if not (law.leads or commanded.is_at_rest or has_moved):
+            commanded.come_to_rest()
+        if not law.leads:
+            self._move_tool()
+        measured = self.plant.step(self.actuator.setpoint(law, commanded, self.tool_c, last, tau))
+        if law.leads:
+            commanded.move(measured.q.tolist())
+            self._move_tool()
+        elif law is Law.BRAKED and measured.q.tolist() != commanded.q:
+            commanded.place(measured.q.tolist())
+            self._move_tool()
+        if law.yields:
+            self._ddq = ((measured.dq - last.dq) / CYCLE_TIME).tolist()
+        self._law = law
+        self._is_there = measured.q.tolist() == commanded.q
+        speeds: list[float] = measured.dq.tolist()
+        self._is_slow = -STANDSTILL < min(speeds) and max(speeds) < STANDSTILL
+        self._standing = self._standing + 1 if commanded.is_at_rest else 0
+        self.watch.observe(measured, commanded, self.tool_c)
+
+    def read(self, tau: list[float] | None) -> Readings:
+        """Returns what this cycle came to; `tau` are commanded torques, [N m], or None."""
+        watch = self.watch
+        return Readings(self.commanded, self.tool_c, watch.measured, watch.tool, tau, watch.tau_ext, watch.wrench)
+
+    def _move_tool(self) -> None:
+        commanded, tool = self.commanded, self.tool_c
+        if commanded.version != self._tool_version or not tool.is_at_rest:
+            tool.update(commanded.q, commanded.dq)
+            self._tool_version = commanded.version

@@ -1,0 +1,143 @@
+"""Tool poses commanded one by one: Cartesian position and Cartesian impedance.
+
+A commanded pose passes the low pass of setFilters and the conditions of the manual's section 4.2, then the inverse on
+the branch that the arm is on, then the fence of auto_limit if it is up, and then the conditions on joint angles too.
+
+The arm angle of a 7-axis arm is the commanded one when it is valid. Otherwise it stays what it was: as it was at the
+start of the motion, or as commanded last. The vendor's client cannot command an arm angle of exactly zero (it goes out
+as "not valid"); so on its way through zero an arm angle that is not valid is zero.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import isfinite, pi, remainder, tau
+
+from rcilab.clock import CYCLE_TIME
+from rcilab.conformance.breach import describe_breaches
+from rcilab.conformance.cartesian_monitor import CartesianMonitor
+from rcilab.conformance.tool_conditions import ARM_ANGLE_TOLERANCE
+from rcilab.controller.filters import PoseLowPass
+from rcilab.controller.modes.generator import Gap, JointReference, Step, Terms, lost_motion
+from rcilab.controller.modes.inverse import Follower
+from rcilab.controller.playout import Playback
+from rcilab.controller.stream import Stream
+from rcilab.errors import InvalidValueError, KinematicsError
+from rcilab.faults import Fault
+from rcilab.protocols.rci import CommandPacket
+from rcilab.spatial import Pose, rotation_from_wxyz, wxyz_from_rotation
+
+FRAME_TOLERANCE = 1e-5  # How far rows may be from unit length and perpendicular; the vendor's client uses the same.
+_INVALID = (Fault.CARTESIAN_POSITION_MOTION_GENERATOR_INVALID_FRAME,)
+_ELBOW = (Fault.COMMAND_CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION,)
+
+
+class CartesianGenerator:
+    """Follows commanded tool poses and arm angles.
+
+    Args:
+        terms: Of the motion.
+        q: Where the arm stands, n plain floats, [rad]; not at a singularity.
+    """
+
+    def __init__(self, terms: Terms, q: list[float]) -> None:
+        model = terms.model
+        self._has_psi = model.n == 7
+        self._q = q
+        self._psi = model.arm_angle(q) if self._has_psi else 0.0
+        limits = terms.limits.arm_angle
+        self._smallest_psi = 2.0 * CYCLE_TIME * limits.velocity if limits is not None else 0.0
+        pose = model.forward(q)
+        self._follower = Follower(model)
+        self._stream = Stream([*pose.parts[1], *wxyz_from_rotation(pose.parts[0]), self._psi])
+        self._filter = PoseLowPass(terms.settings.cartesian_filter, pose, self._psi)
+        self._monitor = CartesianMonitor(terms.limits, terms.box)
+        self._monitor.reset(pose, self._psi if self._has_psi else None)
+        self._gap = Gap()
+        self._reference = JointReference(terms, q, judges_box=False)
+
+    def is_next(self, packet: CommandPacket, steps: int) -> bool:
+        """Returns whether a command continues the motion by one cycle rather than by `steps`."""
+        if find_frame_error(packet.T_base_tool_c) is not None:
+            return True  # It is refused when it is played.
+        return self._stream.is_next(self._read(packet), steps)
+
+    def step(self, playback: Playback) -> Step:
+        """Takes this cycle's pose, or bridges a cycle that has none."""
+        packet, is_lost = playback.packet, playback.is_lost
+        cycles = self._gap.step(playback)
+        if packet is None:
+            values = self._stream.predict(1)
+        else:
+            error = find_frame_error(packet.T_base_tool_c)
+            if error is not None:
+                return Step(faults=_INVALID, reason=error)
+            if self._has_psi and packet.psi_valid and not abs(packet.psi_c) <= pi + ARM_ANGLE_TOLERANCE:
+                return Step(faults=_ELBOW, reason=f"arm angle: commanded position {packet.psi_c} rad passes +-pi rad")
+            values = self._read(packet)
+            if is_lost:
+                values = self._stream.predict(1, values, playback.steps)
+        self._stream.take(values)
+        self._psi = remainder(values[7], tau) if packet is None or is_lost else self._arm_angle(packet)
+        try:
+            pose = Pose.from_parts(rotation_from_wxyz(values[3:7]), (values[0], values[1], values[2]))
+            pose, psi = self._filter.step(pose, self._psi)
+        except InvalidValueError as error:  # Numbers so absurd that bridge or filter made no pose of them.
+            return Step(faults=_INVALID, reason=f"commanded pose: {error}")
+        return self._judge(pose, psi, cycles)
+
+    def _judge(self, pose: Pose, psi: float, cycles: int) -> Step:
+        if cycles > 0:
+            faults = self._monitor.step(pose, psi if self._has_psi else None, cycles)
+            if faults:
+                return Step(faults=faults, reason=describe_breaches(self._monitor.broken()))
+        try:
+            q = self._follower.solve(pose, psi, self._q)
+        except KinematicsError as error:
+            if cycles == 0:
+                return lost_motion(f"no joint angles for a pose on its way: {error}")
+            return Step(faults=_INVALID, reason=f"commanded pose: {error}")
+        step = self._reference.step(q, cycles)
+        if step.q is not None:
+            self._q = step.q
+        return step
+
+    def _read(self, packet: CommandPacket) -> list[float]:
+        """Returns position, quaternion and arm angle of a command, with sign and turn that continue the last one."""
+        m = packet.T_base_tool_c
+        wxyz = wxyz_from_rotation((m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]))
+        last = self._stream.last
+        if sum([a * b for a, b in zip(wxyz, last[3:7], strict=True)]) < 0.0:
+            wxyz = (-wxyz[0], -wxyz[1], -wxyz[2], -wxyz[3])
+        psi = last[7] + remainder(self._arm_angle(packet) - last[7], tau)
+        return [m[3], m[7], m[11], *wxyz, psi]
+
+    def _arm_angle(self, packet: CommandPacket) -> float:
+        if not self._has_psi:
+            return 0.0
+        if packet.psi_valid:
+            return packet.psi_c
+        passes_zero = packet.psi_c == 0.0 and abs(self._psi) <= self._smallest_psi
+        return 0.0 if passes_zero else self._psi
+
+
+def find_frame_error(numbers: Sequence[float]) -> str | None:
+    """Returns why 16 numbers, row-major, are no pose of a tool, or None when they are one."""
+    a, b, c, x, d, e, f, y, g, h, i, z, *last_row = numbers
+    if not isfinite(a + b + c + d + e + f + g + h + i + x + y + z):
+        return "commanded pose is not all finite numbers"
+    if last_row != [0.0, 0.0, 0.0, 1.0]:
+        return f"commanded pose has {last_row} as its last row; needs 0 0 0 1"
+    off = max(
+        abs(a * a + b * b + c * c - 1.0),
+        abs(d * d + e * e + f * f - 1.0),
+        abs(g * g + h * h + i * i - 1.0),
+        abs(a * d + b * e + c * f),
+        abs(a * g + b * h + c * i),
+        abs(d * g + e * h + f * i),
+    )
+    if off > FRAME_TOLERANCE:
+        return f"commanded pose holds no rotation: its rows are off by {off:.3g}, {FRAME_TOLERANCE:g} is allowed"
+    if a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) < 0.0:
+        return "commanded pose holds a reflection, not a rotation"
+    return None

@@ -1,0 +1,144 @@
+"""What a motion generator is: one for each motion, from the client's commands to a reference the arm can follow."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
+
+from rcilab.clock import CYCLE_TIME
+from rcilab.conformance.box_monitor import BoxMonitor
+from rcilab.conformance.breach import describe_breaches
+from rcilab.conformance.monitor import JointMonitor
+from rcilab.controller.commanded import JOIN_SHARE
+from rcilab.controller.fence import Fence
+from rcilab.controller.playout import Playback
+from rcilab.controller.settings import Settings
+from rcilab.faults import Fault
+from rcilab.limits import Limits
+from rcilab.model import RobotModel
+from rcilab.protocols.rci import CommandPacket
+from rcilab.safety_box import SafetyBox
+
+_REACH = 2  # [cycles] that a second difference reaches back, after a gap
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Terms:
+    """What a motion is filtered with and judged by; fixed when it begins."""
+
+    model: RobotModel
+    """The arm with its tool and load."""
+    settings: Settings
+    limits: Limits
+    """With the soft limits as position bounds, and the tool's bounds from the table in force."""
+    box: SafetyBox | None
+    """Where the commanded tool shall stay; None when nothing is to be judged."""
+
+
+class Step(NamedTuple):
+    """What one cycle's command comes to."""
+
+    q: list[float] | None = None
+    """Joint angles to be at, [rad]; None where torques are commanded."""
+    tau: list[float] | None = None
+    """Joint torques, [N m]; None where angles are commanded."""
+    faults: tuple[Fault, ...] = ()
+    """Broken conditions, in wire order; then nothing of this step is given to the arm."""
+    reason: str = ""
+    """What broke, in words and numbers."""
+
+
+class MotionGenerator(Protocol):
+    """Turns what the play-out gives into a reference, and judges it. Made when a motion begins, at rest."""
+
+    def is_next(self, packet: CommandPacket, steps: int) -> bool:
+        """Returns whether a command continues the motion by one cycle rather than by `steps`."""
+        ...
+
+    def step(self, playback: Playback) -> Step:
+        """Takes this cycle's command, or bridges a cycle that has none."""
+        ...
+
+
+class Gap:
+    """Counts the cycles that commands are apart. Owned by a motion generator."""
+
+    def __init__(self) -> None:
+        self._missing = 0
+
+    def step(self, playback: Playback) -> int:
+        """Returns how many cycles after the last command this one is due; 0 in a cycle that has none."""
+        if playback.is_lost:
+            self._missing += 1
+            return 0
+        cycles = 1 + self._missing + playback.skipped
+        self._missing = 0
+        return cycles
+
+
+def lost_motion(reason: str) -> Step:
+    """Returns the step of a motion that could not go on without the commands that were lost."""
+    return Step(faults=(Fault.INSTABILITY_DETECTION,), reason=f"lost commands broke the motion: {reason}")
+
+
+class JointReference:
+    """What every motion of joint angles passes last: the fence when it is up, then the conditions on joint angles.
+
+    The conditions are those of the client's commands. What is played in place of a lost one is ours: it only may not
+    throw the arm about, with more than `JOIN_SHARE` times its acceleration, nor leave its range.
+
+    Args:
+        terms: Of the motion.
+        q: Where the arm stands, n plain floats, [rad].
+        judges_box: Whether the safety box is judged here, from the joint angles.
+    """
+
+    def __init__(self, terms: Terms, q: list[float], *, judges_box: bool) -> None:
+        joint = terms.limits.joint
+        self._model = terms.model
+        self._box = BoxMonitor(terms.box if judges_box else None)
+        self._fence = Fence(joint, q) if terms.settings.auto_limit else None
+        self._monitor = JointMonitor(joint)
+        self._monitor.reset(q)
+        self._range = list(zip(joint.lower.tolist(), joint.upper.tolist(), strict=True))
+        self._hardest: list[float] = (JOIN_SHARE * joint.acceleration).tolist()
+        self._last = self._before = q
+        self._shaken = 0
+
+    def step(self, q: list[float], cycles: int) -> Step:
+        """Takes the joint angles of this cycle.
+
+        Args:
+            q: Finite numbers, [rad].
+            cycles: How many cycles the last command was before; 0 when these are no command but stand in for one.
+        """
+        if self._fence is not None:
+            q = self._fence.step(q)
+        reason = "" if cycles == 1 and self._shaken == 0 else self._find_throw(q, cycles)
+        self._last, self._before = q, self._last
+        if reason:
+            return lost_motion(reason)
+        return Step(q=q) if cycles == 0 else self._judge(q, cycles)
+
+    def _find_throw(self, q: list[float], cycles: int) -> str:
+        """Returns what the arm cannot be asked to do, or nothing; for as long as a difference reaches to a gap."""
+        self._shaken = self._shaken - 1 if cycles == 1 else _REACH
+        h2 = CYCLE_TIME * CYCLE_TIME
+        columns = zip(q, self._last, self._before, self._hardest, self._range, strict=True)
+        for number, (x, y, z, hardest, (lower, upper)) in enumerate(columns, 1):
+            ddq = (x - 2.0 * y + z) / h2
+            if abs(ddq) > hardest:
+                return f"joint {number} would need {ddq:.4g} rad/s^2 to go on, more than {hardest:g} rad/s^2"
+            if cycles == 0 and not lower < x < upper:
+                return f"joint {number} would go on to {x:.4g} rad, beyond its range {lower:.4g} to {upper:.4g} rad"
+        return ""
+
+    def _judge(self, q: list[float], cycles: int) -> Step:
+        faults = self._monitor.step(q, cycles)
+        breaches = self._monitor.broken() if faults else []
+        if self._box.is_active:
+            faults += self._box.step(self._model.forward(q).parts[1])
+            breaches += self._box.broken()
+        if faults:
+            return Step(faults=tuple(sorted(faults)), reason=describe_breaches(breaches))
+        return Step(q=q)

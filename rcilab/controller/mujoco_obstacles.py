@@ -1,0 +1,125 @@
+"""Solid things around a MuJoCo arm: a floor, boxes, the walls of a safety box.
+
+MuJoCo's models are of fixed size, and compiling one takes many cycles of the controller. So the geoms are there from
+the start and switched off; to place something is to set its numbers.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rcilab.arrays import as_vector
+from rcilab.errors import InvalidValueError
+from rcilab.safety_box import SafetyBox
+from rcilab.spatial import Pose
+
+MOST_BOXES = 16
+_FLOOR = "floor"
+_WALLS = tuple(f"wall{number}" for number in range(6))
+_BOXES = tuple(f"box{number}" for number in range(MOST_BOXES))
+_ARM, _SOLID = 1, 1  # Bits: an arm's geom takes part as `conaffinity`, a solid one as `contype`.
+
+
+class Obstacles:
+    """What is solid around one arm. Owned by its plant; outlives the compiled models it is installed in."""
+
+    def __init__(self) -> None:
+        self._boxes: dict[str, tuple[float, float, float, Pose]] = {}
+        self._has_floor = False
+        self._walls: SafetyBox | None = None
+        self._model: Any = None
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether nothing is solid."""
+        return not (self._boxes or self._has_floor or self._walls)
+
+    def add_to(self, spec: Any, mj: Any) -> None:
+        """Adds the geoms to an `MjSpec` and takes contact among the arm's own geoms out of it."""
+        for geom in spec.geoms:
+            geom.contype, geom.conaffinity = 0, _ARM
+        for names, kind in (((_FLOOR, *_WALLS), mj.mjtGeom.mjGEOM_PLANE), (_BOXES, mj.mjtGeom.mjGEOM_BOX)):
+            for name in names:
+                size = [1.0, 1.0, 1.0]
+                spec.worldbody.add_geom(name=name, type=kind, size=size, contype=_SOLID, conaffinity=0, group=4)
+
+    def install(self, model: Any, mj: Any) -> None:
+        """Puts everything into a compiled model."""
+        self._model, self._mj = model, mj
+        model.opt.disableflags |= mj.mjtDisableBit.mjDSBL_MIDPHASE  # Its trees were built for the places at compiling.
+        for name in (_FLOOR, *_WALLS, *_BOXES):
+            model.geom_sameframe[model.geom(name).id] = 0
+        self._apply()
+
+    def place_box(self, name: str, size: ArrayLike, pose: Pose) -> None:
+        """Puts a box somewhere, or moves it; see `Plant.place_box`."""
+        x, y, z = as_vector(size, 3, "box size", "m").tolist()
+        if min(x, y, z) <= 0.0:
+            raise InvalidValueError("box size", [x, y, z], "must be three lengths above 0 [m]")
+        if name not in self._boxes and len(self._boxes) == MOST_BOXES:
+            raise InvalidValueError("box", name, f"would be one too many; {MOST_BOXES} can be there, remove another")
+        self._boxes[name] = (x, y, z, pose)
+        self._apply()
+
+    def remove_box(self, name: str) -> None:
+        """Takes a box away; see `Plant.remove_box`."""
+        if name not in self._boxes:
+            known = ", ".join(self._boxes) or "none"
+            raise InvalidValueError("box", name, f"is not there; there are: {known}")
+        del self._boxes[name]
+        self._apply()
+
+    def set_floor(self, on: bool) -> None:
+        """Lets the plane z = 0 be solid or not."""
+        self._has_floor = on
+        self._apply()
+
+    def set_walls(self, box: SafetyBox | None) -> None:
+        """Lets the faces of a box be solid from inside; None takes them away."""
+        self._walls = box
+        self._apply()
+
+    def _apply(self) -> None:
+        model, mj = self._model, self._mj
+        self._show(_FLOOR, self._has_floor, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
+        for slot, (position, wxyz) in zip(_WALLS, _faces(self._walls), strict=True):
+            self._show(slot, self._walls is not None, position, wxyz)
+        for slot in _BOXES[len(self._boxes) :]:
+            self._show(slot, False, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
+        for slot, (x, y, z, pose) in zip(_BOXES, self._boxes.values(), strict=False):
+            index = self._show(slot, True, pose.position, pose.wxyz)
+            half = (x / 2.0, y / 2.0, z / 2.0)
+            model.geom_size[index] = half
+            model.geom_aabb[index] = (0.0, 0.0, 0.0, *half)
+            model.geom_rbound[index] = math.hypot(*half)
+        flags = model.opt.disableflags & ~int(mj.mjtDisableBit.mjDSBL_CONTACT)
+        model.opt.disableflags = flags | (int(mj.mjtDisableBit.mjDSBL_CONTACT) if self.is_empty else 0)
+
+    def _show(self, name: str, on: bool, position: ArrayLike, wxyz: ArrayLike) -> int:
+        model = self._model
+        index = int(model.geom(name).id)
+        model.geom_contype[index] = _SOLID if on else 0
+        model.geom_pos[index], model.geom_quat[index] = position, wxyz
+        return index
+
+
+def _faces(box: SafetyBox | None) -> list[tuple[ArrayLike, ArrayLike]]:
+    """Returns position and quaternion of six planes whose z axes, the sides that are free, point into the box."""
+    turns = {0: (0.0, 1.0, 0.0), 1: (-1.0, 0.0, 0.0), 2: (0.0, 0.0, 0.0)}  # of +z to +x, +y, +z by +90 degrees
+    faces: list[tuple[ArrayLike, ArrayLike]] = []
+    for axis in range(3):
+        for sign in (-1.0, 1.0):  # the lower face looks up its axis, the upper one down
+            offset = np.zeros(3)
+            size = 1.0 if box is None else box.size[axis]
+            offset[axis] = sign * size / 2.0
+            turn = np.array(turns[axis]) * -sign * math.pi / 2.0
+            if axis == 2:
+                turn = np.array([math.pi if sign > 0.0 else 0.0, 0.0, 0.0])
+            T_base_box = Pose() if box is None else box.T_base_box
+            T = T_base_box @ Pose.from_rpy(offset, turn)
+            faces.append((T.position, T.wxyz))
+    return faces

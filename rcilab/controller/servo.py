@@ -1,0 +1,133 @@
+"""Impedance control: the torque of springs between the commanded and the measured arm.
+
+Both laws are computed from measurement and model alone and act through `Drive.TORQUE`, where gravity and friction are
+compensated already, so M ddq + C dq = tau + J^T w. They give
+
+    tau = springs + dampers + M ddq_c + C dq
+
+so that an arm that nothing touches follows without an error, and one that something presses on yields by force over
+stiffness. Every mode is damped with `DAMPING_RATIO` of critical, see `compliance`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rcilab.arrays import Array, JointVector, Matrix
+from rcilab.controller.compliance import DAMPING_RATIO, spring_torque
+from rcilab.controller.plant import Measurement
+from rcilab.dynamics.rigid_body import ArmTerms
+from rcilab.model import RobotModel
+from rcilab.spatial import Pose, turn_between
+
+NULL_FREQUENCY = 5.0  # [rad/s] of the spring that holds the elbow of a 7-axis arm; soft, a choice
+NULL_DAMPING = 2.0 * DAMPING_RATIO * NULL_FREQUENCY  # [1/s]
+_DAMPED_INVERSE = 1e-4  # [1/kg] keeps feed-forward finite at a singularity; off it, below 0.1 % of it are lost
+
+
+def joint_impedance(
+    model: RobotModel,
+    q_c: Sequence[float],
+    dq_c: Sequence[float],
+    ddq_c: Sequence[float],
+    measured: Measurement,
+    stiffness: Sequence[float],
+) -> JointVector:
+    """Returns the torque of a spring at every joint, without gravity, shape (n,), [N m].
+
+    Args:
+        model: The arm as the controller knows it.
+        q_c: Commanded joint angles, n numbers, [rad].
+        dq_c: Their velocities, [rad/s].
+        ddq_c: Their accelerations, [rad/s^2].
+        measured: Where the arm is.
+        stiffness: n numbers, [N m/rad].
+    """
+    terms = model.rigid_body.terms(measured.q, measured.dq)
+    K = np.array(stiffness)
+    tau = spring_torque(terms, np.diag(K), K * (q_c - measured.q), dq_c - measured.dq)
+    tau += terms.coriolis
+    return tau + terms.mass_matrix @ np.array(ddq_c) if any(ddq_c) else tau
+
+
+def cartesian_impedance(
+    model: RobotModel,
+    T_c: Pose,
+    twist_c: ArrayLike,
+    acc_c: ArrayLike,
+    q_null: Sequence[float],
+    measured: Measurement,
+    stiffness6: Sequence[float],
+    desired_wrench6: Sequence[float] = (0.0,) * 6,
+    axes: Matrix | None = None,
+) -> JointVector:
+    """Returns the torque of springs between the commanded and the measured tool, without gravity, shape (n,), [N m].
+
+    The orientation spring acts on the rotation vector from the measured to the commanded orientation. A 7-axis arm
+    keeps its elbow near `q_null`, softly and without a force on the tool. The manual names no axes for stiffness and
+    desired force; here they are the base's, unless `axes` says otherwise.
+
+    Args:
+        model: The arm as the controller knows it, with its tool.
+        T_c: Commanded pose of the tool in base.
+        twist_c: Its velocity, base axes, linear first, shape (6,), [m/s, rad/s].
+        acc_c: Its acceleration, shape (6,), [m/s^2, rad/s^2].
+        q_null: Joint angles whose arm angle a 7-axis arm keeps, n numbers, [rad]. Others have no choice.
+        measured: Where the arm is.
+        stiffness6: Three translations [N/m], three rotations [N m/rad].
+        desired_wrench6: Force and moment that the arm exerts on its surroundings in addition, [N, N m].
+        axes: Rotation whose columns, in base, are the directions that both refer to, shape (3, 3).
+    """
+    terms = model.rigid_body.terms(measured.q, measured.dq)
+    M, J = terms.mass_matrix, terms.jacobian
+    # Rows of J, error and desired wrench in the axes of the springs, where the stiffness is diagonal.
+    along = J if axes is None else _turned(J, axes)
+    error = _pose_error(T_c, terms)
+    wrench = np.array(stiffness6) * (error if axes is None else _turned(error, axes)) + desired_wrench6
+    dq_c, ddq_c = _joint_reference(model, terms, twist_c, acc_c, q_null, measured)
+    tau = spring_torque(terms, along.T * stiffness6 @ along, wrench @ along, dq_c - measured.dq)
+    tau += terms.coriolis
+    tau += M @ ddq_c
+    return tau
+
+
+def _pose_error(T_c: Pose, terms: ArmTerms) -> Array:
+    """Returns position and rotation vector from the measured to the commanded tool, base axes, shape (6,)."""
+    r, (x, y, z) = T_c.parts
+    px, py, pz = terms.position
+    return np.array((x - px, y - py, z - pz, *turn_between(terms.rotation, r)))
+
+
+def _turned(rows: Array, axes: Matrix) -> Array:
+    """Returns what is linear in its first three rows and angular in the other three, given in base, in other axes."""
+    return np.concatenate((axes.T @ rows[:3], axes.T @ rows[3:]))
+
+
+def _joint_reference(
+    model: RobotModel, terms: ArmTerms, twist: ArrayLike, acc: ArrayLike, q_null: Sequence[float], measured: Measurement
+) -> tuple[JointVector, JointVector]:
+    """Returns joint velocities and accelerations, each of shape (n,), that move the tool as commanded.
+
+    Of all that do, they are those of least kinetic energy (Khatib's dynamically consistent inverse), and on a 7-axis
+    arm the accelerations besides are those of a damped spring at `q_null`, as far as the tool does not feel it.
+    """
+    twist, acc = np.asarray(twist), np.asarray(acc)
+    is_moved = bool(twist.any() or acc.any())
+    if not is_moved and model.n == 6:
+        return np.zeros(6), np.zeros(6)
+    J = terms.jacobian
+    back = terms.mass_inverse @ J.T
+    compliance = J @ back
+    compliance.flat[::7] += _DAMPED_INVERSE
+    wanted = np.zeros((6, 2))
+    if is_moved:
+        wanted[:, 0], wanted[:, 1] = twist, acc - terms.drift
+    free: Array | float = 0.0
+    if model.n == 7:
+        free = NULL_FREQUENCY**2 * (q_null - measured.q) - NULL_DAMPING * measured.dq
+        wanted[:, 1] -= J @ free
+    both = back @ np.linalg.solve(compliance, wanted)
+    return both[:, 0], both[:, 1] + free

@@ -1,0 +1,57 @@
+"""The stream of commands as it comes: what the next one would be, when it is not there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+_CLEARLY = 4.0  # Times nearer, so that an unforeseen jerk does not decide; a choice.
+
+
+class Stream:
+    """The last three commands of a motion, as vectors of numbers. Owned by a motion generator.
+
+    Attributes:
+        last: The last command, or what was played in its place.
+
+    Args:
+        start: Where the arm is when the motion begins; it has been there for ever.
+    """
+
+    def __init__(self, start: Sequence[float]) -> None:
+        self.last = self._before = self._oldest = list(start)
+
+    def take(self, values: Sequence[float]) -> None:
+        """Takes the command of this cycle, or what was played in its place."""
+        self._oldest, self._before, self.last = self._before, self.last, list(values)
+
+    def predict(self, steps: int, target: Sequence[float] | None = None, target_steps: int = 1) -> list[float]:
+        """Returns what is commanded in a number of cycles when nothing new comes.
+
+        Without a target the acceleration goes on as it is. With one, the jerk is what leads there.
+
+        Args:
+            steps: Cycles from now.
+            target: A command that is known for a later cycle.
+            target_steps: How many cycles from now that is.
+        """
+        bend = steps * (steps + 1) / 2.0
+        even = [
+            x + steps * (x - y) + bend * (x - 2.0 * y + z)
+            for x, y, z in zip(self.last, self._before, self._oldest, strict=True)
+        ]
+        if target is None:
+            return even
+        # Newton's form of the cubic through the last three commands and the target, at cycles -2, -1, 0, target_steps.
+        share = steps * (steps + 1) * (steps + 2) / (target_steps * (target_steps + 1) * (target_steps + 2))
+        there = self.predict(target_steps)
+        return [x + share * (goal - far) for x, goal, far in zip(even, target, there, strict=True)]
+
+    def is_next(self, values: Sequence[float], steps: int) -> bool:
+        """Returns whether a command continues the stream by one step rather than by `steps`.
+
+        In doubt it does not: a step too small for the time harms a motion less than one too large.
+        """
+        near, far = self.predict(1), self.predict(steps)
+        off_near = sum(abs(a - b) for a, b in zip(values, near, strict=True))
+        off_far = sum(abs(a - b) for a, b in zip(values, far, strict=True))
+        return _CLEARLY * off_near <= off_far

@@ -1,0 +1,168 @@
+"""What surrounds a virtual robot: hands, boxes, buttons, wires, the network and the clock; and requests to change it.
+
+Everything is done in the thread of the controller between two cycles, so a request takes effect at the next cycle, and
+in lock-step every run with the same requests at the same cycles comes out the same.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from rcilab.clock import CYCLE_TIME, Clock
+from rcilab.controller.cycle import ControlCycle
+from rcilab.controller.faulty_network import FaultyNetwork
+from rcilab.controller.stalls import StallPlan
+from rcilab.dynamics.payload import Payload
+from rcilab.errors import RcilabError
+from rcilab.protocols.rci import SafetyStop
+from rcilab.protocols.world import (
+    AutoLimit,
+    Done,
+    Floor,
+    GetStatus,
+    Limits,
+    LoopBack,
+    Mount,
+    Network,
+    PlaceBox,
+    Press,
+    Push,
+    Refused,
+    Release,
+    RemoveBox,
+    SetInput,
+    StallClock,
+    WorldAnswer,
+    WorldRequest,
+    WorldStatus,
+)
+from rcilab.spatial import Pose
+
+_NOTHING = Push((0.0,) * 6)
+
+
+@dataclass(frozen=True, slots=True)
+class Mishaps:
+    """What the server counts: cycles left out, datagrams of a wrong size."""
+
+    missed: int
+    misfits: int
+
+
+class Surroundings:
+    """Carries out world requests. Owned by the thread that runs the controller.
+
+    Args:
+        cycle: The controller.
+        network: Its network.
+        stalls: Pauses of its clock.
+        clock: What these pauses are measured with.
+        mishaps: What the server has counted so far.
+    """
+
+    def __init__(
+        self,
+        cycle: ControlCycle,
+        network: FaultyNetwork,
+        stalls: StallPlan,
+        clock: Clock,
+        mishaps: Callable[[], Mishaps],
+    ) -> None:
+        self._cycle = cycle
+        self._plant = cycle.plant
+        self._network = network
+        self._stalls = stalls
+        self._clock = clock
+        self._mishaps = mishaps
+        self._is_pushed = False
+        self._end_of_push = math.inf  # Number of the cycle that ends it.
+
+    def handle(self, request: WorldRequest) -> WorldAnswer:
+        """Carries a request out, or says why not."""
+        if isinstance(request, GetStatus):
+            return self._status()
+        try:
+            self._change(request)
+        except RcilabError as error:
+            return Refused(str(error))
+        return Done()
+
+    def step(self) -> None:
+        """Takes away what has pressed on the arm for long enough; called after every cycle."""
+        if self._cycle.state.message_id >= self._end_of_push:
+            self._push(_NOTHING)
+
+    def _change(self, request: WorldRequest) -> None:
+        match request:
+            case Push():
+                self._push(request)
+            case Release():
+                self._push(_NOTHING)
+            case Press(button):
+                self._cycle.press_safety_stop(SafetyStop[button.upper()])
+            case SetInput(signal, level):
+                self._cycle.set_input(signal, level)
+            case LoopBack(on):
+                self._cycle.loop_back = on
+            case AutoLimit(on):
+                self._cycle.auto_limit = on
+            case Limits(table):
+                self._cycle.limit_table = table
+            case Network(faults, direction):
+                self._network.replace(faults, direction)
+            case StallClock():
+                self._stalls.replace([] if request.stall is None else [request.stall], self._clock.now())
+            case PlaceBox(box, size, position, wxyz):
+                self._plant.place_box(box, size, Pose(position, wxyz))
+            case RemoveBox(box):
+                self._plant.remove_box(box)
+            case Floor(on):
+                self._plant.set_floor(on)
+            case Mount():
+                self._plant.mount(_payload(request))
+            case GetStatus():
+                pass  # Answered before; it changes nothing.
+
+    def _push(self, push: Push) -> None:
+        self._plant.push(push.wrench, push.link, push.point)
+        self._is_pushed = any(push.wrench)
+        self._end_of_push = math.inf
+        if push.duration is not None and self._is_pushed:
+            self._end_of_push = self._cycle.state.message_id + round(push.duration / CYCLE_TIME)
+
+    def _status(self) -> WorldStatus:
+        cycle, mishaps = self._cycle, self._mishaps()
+        commands, states = self._network.faults
+        return WorldStatus(
+            model=cycle.model.name,
+            plant=self._plant.kind,
+            cycle=cycle.state.message_id,
+            phase=cycle.phase.name.lower(),
+            faults=tuple(fault.name for fault in cycle.faults),
+            reason=cycle.reason,
+            button=cycle.safety_stop.name.lower(),
+            q=tuple(cycle.state.q.tolist()),
+            lost=cycle.playout.lost,
+            success_rate=cycle.playout.success_rate,
+            missed=mishaps.missed,
+            misfits=mishaps.misfits,
+            ignored=cycle.ignored,
+            pushed=self._is_pushed,
+            stalls=self._stalls.count,
+            commands=commands,
+            states=states,
+        )
+
+
+def _payload(request: Mount) -> Payload | None:
+    if request.mass is None:
+        return None
+    return Payload(
+        mass=request.mass,
+        center_of_mass=np.array(request.center_of_mass),
+        inertia=np.array(request.inertia).reshape(3, 3),
+    )

@@ -1,0 +1,81 @@
+"""How the tool and the elbow move when the joints do: pose, twist, acceleration and arm angle, one update a cycle."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from rcilab.clock import CYCLE_TIME
+from rcilab.errors import SingularError
+from rcilab.kinematics.arm_angle import arm_angle
+from rcilab.kinematics.forward import build_chain
+from rcilab.kinematics.inverse import build_geometry
+from rcilab.kinematics.twist import Twist, tool_motion
+from rcilab.model import RobotModel
+from rcilab.spatial import IDENTITY, Pose
+
+_REST: Twist = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+class ToolMotion:
+    """Follows one motion of the joints, commanded or measured. Owned by the controller's cycle.
+
+    The arm angle is undefined where shoulder and wrist are one above the other or the arm is stretched: there its last
+    value stays, and at first 0. On 6-axis arms it is 0.
+
+    Attributes:
+        pose: Pose of the tool in base.
+        twist: Its velocity in base axes, linear first, [m/s, rad/s]: Jacobian times joint velocity.
+        acceleration: The twist's backward difference over one cycle, [m/s^2, rad/s^2].
+        psi: Arm angle, [rad].
+        dpsi: Its backward difference over one cycle, the short way round, [rad/s].
+        ddpsi: The second, [rad/s^2].
+
+    Args:
+        model: The arm with its tool.
+        q: Where it rests, n plain floats, [rad].
+    """
+
+    def __init__(self, model: RobotModel, q: Sequence[float]) -> None:
+        self._chain = build_chain(model.description.dh)
+        self._geometry = build_geometry(model.description)
+        self._tool = None if model.T_flange_tool.is_close(IDENTITY, 0.0) else model.T_flange_tool
+        self.pose: Pose
+        self.twist = self.acceleration = _REST
+        self.psi = self.dpsi = self.ddpsi = 0.0
+        self.place(q)
+
+    @property
+    def is_at_rest(self) -> bool:
+        """Whether nothing would change if the joints stayed where they are."""
+        return not (any(self.twist) or any(self.acceleration) or self.dpsi or self.ddpsi)
+
+    def place(self, q: Sequence[float]) -> None:
+        """Puts the arm somewhere, at rest."""
+        self.pose, _ = tool_motion(self._chain, q, [0.0] * len(q), self._tool)
+        self.twist = self.acceleration = _REST
+        self.psi, self.dpsi, self.ddpsi = self._arm_angle(q), 0.0, 0.0
+
+    def update(self, q: Sequence[float], dq: Sequence[float]) -> None:
+        """Takes joint angles and velocities of this cycle, n plain floats each, [rad], [rad/s]."""
+        h = CYCLE_TIME
+        self.pose, twist = tool_motion(self._chain, q, dq, self._tool)
+        a, b, c, d, e, f = twist
+        p, r, s, t, u, v = self.twist
+        self.acceleration = ((a - p) / h, (b - r) / h, (c - s) / h, (d - t) / h, (e - u) / h, (f - v) / h)
+        self.twist = twist
+        psi = self._arm_angle(q)
+        dpsi = math.remainder(psi - self.psi, math.tau) / h
+        self.psi, self.dpsi, self.ddpsi = psi, dpsi, (dpsi - self.dpsi) / h
+
+    def coincide(self, other: ToolMotion) -> None:
+        """Takes over where another one is: the arm is exactly where it was told to be."""
+        self.pose, self.twist, self.psi = other.pose, other.twist, other.psi
+
+    def _arm_angle(self, q: Sequence[float]) -> float:
+        if self._geometry.n != 7:
+            return 0.0
+        try:
+            return arm_angle(self._geometry.upper, self._geometry.fore, q)
+        except SingularError:
+            return self.psi

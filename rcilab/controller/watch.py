@@ -1,0 +1,124 @@
+"""What the controller makes of its sensors: where the tool is, what presses on the arm, and whether that is allowed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from rcilab.arrays import frozen
+from rcilab.conformance.breach import describe_breaches
+from rcilab.conformance.measured_monitor import MeasuredMonitor
+from rcilab.controller.commanded import CommandedMotion
+from rcilab.controller.observer import Observer
+from rcilab.controller.plant import Measurement
+from rcilab.controller.tool import ToolMotion
+from rcilab.faults import Fault
+from rcilab.limits import Limits
+from rcilab.model import RobotModel
+from rcilab.safety_box import SafetyBox
+
+YIELDING_ALLOWANCE = 8.0
+"""How much more acceleration than under the position servo a yielding arm may have. A choice: the light last joints of
+an arm that is pushed with 30 N, or told a torque of a few N m, are thrown harder than any command could ask for."""
+
+
+class Watch:
+    """Follows the measured arm. Owned by the controller's cycle.
+
+    Attributes:
+        measured: The last measurement.
+        tool: The tool as measured.
+        tau_ext: Outside joint torques, shape (n,), [N m].
+        wrench: Outside wrench on the tool, base axes, shape (6,), [N, N m].
+
+    Args:
+        model: The arm with its tool and load.
+        measured: Where it rests.
+    """
+
+    def __init__(self, model: RobotModel, measured: Measurement) -> None:
+        self.configure(model, measured)
+
+    def configure(self, model: RobotModel, measured: Measurement) -> None:
+        """Takes another tool or load, or an arm that was put elsewhere; only at rest."""
+        self._model = model
+        self.tool = ToolMotion(model, measured.q.tolist())
+        self._observer = Observer(model)
+        self._observer.reset(measured)
+        self.measured = measured
+        self.tau_ext, self.wrench = self._observer.step(measured)
+        self._monitor: MeasuredMonitor | None = None
+        self._thresholds: Sequence[float] = ()
+        self._judges_tool = False
+        self._tool_version: int = -1
+
+    def begin(
+        self,
+        limits: Limits,
+        box: SafetyBox | None,
+        thresholds: Sequence[float],
+        *,
+        judges_tool: bool,
+        yields: bool,
+    ) -> None:
+        """Begins to judge a motion.
+
+        Args:
+            limits: Bounds of the arm, soft limits included.
+            box: Where the tool shall stay; None is anywhere.
+            thresholds: Outside joint torques that are a collision, n numbers, [N m].
+            judges_tool: Whether the motion is one of the tool, so that its speed and the arm angle's count.
+            yields: Whether forces move the arm, and not its commands alone.
+        """
+        self._monitor = MeasuredMonitor(_widened(limits) if yields else limits, box)
+        self._monitor.reset(self.measured.q.tolist())
+        self._thresholds = thresholds
+        self._judges_tool = judges_tool
+
+    def observe(self, measured: Measurement, commanded: CommandedMotion, tool_c: ToolMotion) -> None:
+        """Takes the measurement of this cycle; where the arm is exactly where it was told, so is the tool."""
+        if measured is not self.measured or commanded.version != self._tool_version:
+            self.measured, self._tool_version = measured, commanded.version
+            q, dq = measured.q.tolist(), measured.dq.tolist()
+            if q == commanded.q and dq == commanded.dq:
+                self.tool.coincide(tool_c)
+            else:
+                self.tool.update(q, dq)
+        self.tau_ext, self.wrench = self._observer.step(measured)
+
+    def judge(self, *, is_commanded: bool = True) -> tuple[tuple[Fault, ...], str]:
+        """Returns the faults that the measurement of this cycle raises, in wire order, and why.
+
+        Args:
+            is_commanded: Whether a client's commands are followed; without, tool speed and arm angle do not count.
+        """
+        monitor, measured, tool = self._monitor, self.measured, self.tool
+        assert monitor is not None
+        twist, psi = (tool.twist, tool.psi) if self._judges_tool and is_commanded else (None, None)
+        faults = monitor.step(measured.q.tolist(), measured.dq.tolist(), tool.pose.parts[1], twist, psi)
+        reasons = [describe_breaches(monitor.broken())] if faults else []
+        collision = self.find_collision(self._thresholds)
+        if collision is not None:
+            faults = (*faults, Fault.COLLISION)
+            reasons.append(collision)
+        return faults, "; ".join(reasons)
+
+    def find_collision(self, thresholds: Sequence[float]) -> str | None:
+        """Returns which outside torque is above its threshold, in words, or None."""
+        for joint, (torque, threshold) in enumerate(zip(self.tau_ext.tolist(), thresholds, strict=True), start=1):
+            if abs(torque) > threshold:
+                return f"joint {joint}: external torque {torque:.3g} N m is above its threshold {threshold:g} N m"
+        return None
+
+
+def _widened(limits: Limits) -> Limits:
+    joint, cartesian = limits.joint, limits.cartesian
+    return replace(
+        limits,
+        joint=replace(joint, acceleration=frozen(YIELDING_ALLOWANCE * joint.acceleration)),
+        cartesian=replace(
+            cartesian,
+            translation_acceleration=YIELDING_ALLOWANCE * cartesian.translation_acceleration,
+            rotation_acceleration=YIELDING_ALLOWANCE * cartesian.rotation_acceleration,
+        ),
+    )

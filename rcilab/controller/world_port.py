@@ -1,0 +1,130 @@
+"""The world port: a second listener, on loopback, through which things happen to the virtual robot from outside.
+
+Lines of JSON, see `rcilab.protocols.world`. Whoever sends a line that is no request gets one line that says why and is
+cut off, so that a web page's POST gets nowhere: its first line already is none, and what follows is not looked at.
+"""
+
+from __future__ import annotations
+
+import ipaddress
+import socket
+from collections.abc import Callable, Sequence
+
+from rcilab.errors import DecodeError, UsageError
+from rcilab.protocols.world import (
+    LineReader,
+    Refused,
+    WorldAnswer,
+    WorldRequest,
+    decode_world_request,
+    encode_world_answer,
+)
+
+MOST_GUESTS = 8  # At once; a choice. One script and one page need two.
+_FALLBACK = "127.0.0.1"  # For a controller that listens on an address which others can reach.
+_BYTES_AT_ONCE = 4096
+
+
+class WorldPort:
+    """Owns the listener and its connections. Never waits; owned by the thread that runs the controller.
+
+    Args:
+        host: Address of the controller; the world port is there, too, if that is a loopback address.
+        port: TCP port; 0 takes any free one.
+        handle: Carries a request out.
+
+    Raises:
+        UsageError: The port cannot be used.
+    """
+
+    def __init__(self, host: str, port: int, handle: Callable[[WorldRequest], WorldAnswer]) -> None:
+        self._handle = handle
+        self._listener = _listen(host if ipaddress.ip_address(host).is_loopback else _FALLBACK, port)
+        self._guests: dict[socket.socket, LineReader] = {}
+        self.sockets: Sequence[socket.socket] = (self._listener,)
+        """What to watch; another object whenever it changes."""
+
+    @property
+    def address(self) -> tuple[str, int]:
+        """Where it listens."""
+        host, port = self._listener.getsockname()
+        return host, port
+
+    def serve(self, readable: Sequence[socket.socket]) -> None:
+        """Reads from these sockets and carries out what they ask for."""
+        for sock in readable:
+            if sock is self._listener:
+                self._accept()
+            elif sock in self._guests:
+                self._read(sock)
+
+    def close(self) -> None:
+        """Closes every socket."""
+        for sock in (*self._guests, self._listener):
+            sock.close()
+        self._guests.clear()
+        self.sockets = ()
+
+    def _accept(self) -> None:
+        try:
+            guest, _ = self._listener.accept()
+        except OSError:  # It was gone before we looked.
+            return
+        if len(self._guests) >= MOST_GUESTS:
+            guest.close()
+            return
+        guest.setblocking(False)
+        guest.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._guests[guest] = LineReader()
+        self.sockets = (self._listener, *self._guests)
+
+    def _read(self, guest: socket.socket) -> None:
+        try:
+            data = guest.recv(_BYTES_AT_ONCE)
+        except BlockingIOError:
+            return
+        except OSError:
+            data = b""
+        if not data:
+            self._drop(guest)
+            return
+        try:
+            for line in self._guests[guest].feed(data):
+                request_id, request = decode_world_request(line)
+                if not self._answer(guest, self._handle(request), request_id):
+                    return
+        except DecodeError as error:
+            if self._answer(guest, Refused(str(error)), 0):
+                self._drop(guest)
+
+    def _answer(self, guest: socket.socket, answer: WorldAnswer, request_id: int) -> bool:
+        """Returns whether the guest is still there."""
+        line = encode_world_answer(answer, request_id)
+        try:
+            is_sent = guest.send(line) == len(line)
+        except OSError:
+            is_sent = False
+        if not is_sent:  # It is gone, or does not read its answers.
+            self._drop(guest)
+        return is_sent
+
+    def _drop(self, guest: socket.socket) -> None:
+        guest.close()
+        del self._guests[guest]
+        self.sockets = (self._listener, *self._guests)
+
+
+def _listen(host: str, port: int) -> socket.socket:
+    listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    try:
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.bind((host, port))
+        listener.listen(MOST_GUESTS)
+        listener.setblocking(False)
+    except OSError as error:
+        listener.close()
+        raise UsageError(
+            f"the world port {port} on {host} cannot be used ({error.strerror}); choose another with --world-port N "
+            "(0 takes any free one), or none with --no-world"
+        ) from error
+    return listener

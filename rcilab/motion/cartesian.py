@@ -1,0 +1,214 @@
+"""Motions of the tool along a line or an arc, by the manual's S profile (3.5), as joint angles on the 1 ms grid."""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rcilab.arrays import Array, JointPath, JointVector, as_number, as_vector, described
+from rcilab.clock import CYCLE_TIME
+from rcilab.errors import InvalidValueError, PlanningError, SingularError, UnreachableError
+from rcilab.model import RobotModel, require_model
+from rcilab.motion.joint import MIN_SPEED
+from rcilab.motion.motion import Motion, standing
+from rcilab.motion.path import Path, build_arc, build_line
+from rcilab.motion.piecewise import join_pieces
+from rcilab.motion.s_curve import plan_s_curve
+from rcilab.spatial import Pose
+
+PathLaw = Literal["s_profile"]
+
+S_PROFILE_PATH_VELOCITY = 1.0
+"""Speed of the vendor's path generator at speed 1, [m/s]; of a mere turn, [rad/s]."""
+S_PROFILE_PATH_ACCELERATION = 2.5
+"""Acceleration of the vendor's path generator at speed 1, [m/s^2] or [rad/s^2]."""
+
+_JUMP = 4.0
+"""Times the velocity limit, and times the turn of the tool, within a cycle: beyond it a joint does not follow the tool
+but changes branches at a singularity. A choice; what is slower is a motion, and `check` judges it."""
+_LEVER = 0.1
+"""Length that makes a turn of the tool's way, [m]; a choice."""
+
+
+def plan_line(
+    model: RobotModel,
+    start: ArrayLike,
+    goal: Pose,
+    *,
+    speed: float = 0.2,
+    psi: float | None = None,
+    law: PathLaw = "s_profile",
+) -> Motion:
+    """Returns the motion on which the tool goes straight from where it is at `start` to `goal`.
+
+    It is the vendor's MOVEL: position linear, orientation by slerp and arm angle linear, all in proportion to the way,
+    with at most `speed` times 1 m/s and 2.5 m/s^2. So a turn on a short way is fast, and the profile knows neither the
+    joints' limits nor the tool's: `rcilab.check` judges them. Unlike the vendor's, a line from a pose to itself is a
+    motion of no length, and a mere turn takes its angle for the way about every axis.
+
+    Args:
+        model: The arm, with its tool.
+        start: Joint angles at the start, shape (n,), [rad]. Plan from the commanded angles (`state.q_c`).
+        goal: Pose of the tool in base at the end.
+        speed: Part of the generator's velocity and acceleration to use, from `MIN_SPEED` = 0.001 to 1.
+        psi: Arm angle of a 7-axis arm at the end, [rad]; None holds the one of the start.
+        law: "s_profile", the only one.
+
+    Raises:
+        PlanningError: A pose on the way is out of reach, a joint limit or a singularity is in the way; the message
+            says where and why.
+        InvalidValueError: An argument is of the wrong shape or kind, not finite, or out of range.
+    """
+    q = _require_start(model, start, psi, law)
+    return follow_path(model, q, build_line(model.forward(q), goal, *arm_angles(model, q, psi)), speed)
+
+
+def plan_arc(
+    model: RobotModel,
+    start: ArrayLike,
+    via: Pose,
+    goal: Pose,
+    *,
+    speed: float = 0.2,
+    psi: float | None = None,
+    law: PathLaw = "s_profile",
+) -> Motion:
+    """Returns the motion on which the tool goes on the arc from where it is at `start` over `via` to `goal`.
+
+    It is the vendor's MOVEC, with its habits: the way is the arc's length, the orientation turns by slerp from start to
+    goal, and that of `via` is ignored. What `plan_line` says of speed and limits holds here too.
+
+    Args:
+        model: The arm, with its tool.
+        start: Joint angles at the start, shape (n,), [rad]. Plan from the commanded angles (`state.q_c`).
+        via: A pose whose position lies on the arc.
+        goal: Pose of the tool in base at the end.
+        speed: Part of the generator's velocity and acceleration to use, from `MIN_SPEED` = 0.001 to 1.
+        psi: Arm angle of a 7-axis arm at the end, [rad]; None holds the one of the start.
+        law: "s_profile", the only one.
+
+    Raises:
+        PlanningError: The three positions make no circle, or a pose on the way is out of reach, a joint limit or a
+            singularity is in the way; the message says where and why.
+        InvalidValueError: An argument is of the wrong shape or kind, not finite, or out of range.
+    """
+    q = _require_start(model, start, psi, law)
+    return follow_path(model, q, build_arc(model.forward(q), via, goal, *arm_angles(model, q, psi)), speed)
+
+
+def arm_angles(model: RobotModel, q: JointVector, psi: float | None) -> tuple[float | None, float | None]:
+    """Returns the arm angles at the start and at the end of a path from q, [rad]; None twice for a 6-axis arm.
+
+    Args:
+        model: The arm.
+        q: Joint angles at the start, shape (n,), [rad].
+        psi: Arm angle wanted at the end, [rad]; None holds the one of the start.
+
+    Raises:
+        PlanningError: The arm angle has no meaning at the start.
+        InvalidValueError: `psi` is no angle within +-pi, or the arm has none.
+    """
+    if model.n != 7:
+        if psi is not None:
+            raise InvalidValueError("psi", psi, f"has no meaning for {model.name}: a 6-axis arm has no arm angle")
+        return None, None
+    try:
+        here = model.arm_angle(q)
+    except SingularError as error:
+        raise PlanningError(f"at the start {error}; move to a bent pose in joint space first") from error
+    wanted = here if psi is None else as_number(psi, "psi", "rad")
+    if not abs(wanted) <= math.pi:
+        raise InvalidValueError("psi", psi, "must be from -pi to pi [rad]")
+    return here, wanted
+
+
+def schedule(path: Path, speed: float) -> Array:
+    """Returns the shares of the way, 0 to 1, at every cycle of the S profile, shape (N,).
+
+    Args:
+        path: The path.
+        speed: Part of the generator's velocity and acceleration to use, from `MIN_SPEED` to 1.
+
+    Raises:
+        InvalidValueError: The speed is out of range.
+    """
+    speed = as_number(speed, "speed")
+    if not MIN_SPEED <= speed <= 1.0:
+        raise InvalidValueError("speed", speed, f"must be from {MIN_SPEED:g} to 1: the part of the generator's speed")
+    if path.distance == 0.0:
+        return np.array([1.0])
+    curve = plan_s_curve(path.distance, S_PROFILE_PATH_VELOCITY * speed, S_PROFILE_PATH_ACCELERATION * speed)
+    starts, coefficients = curve.pieces()
+    profile = join_pieces(starts[np.newaxis], coefficients[np.newaxis], curve.duration)
+    count = math.ceil(curve.duration / CYCLE_TIME - 1e-9) + 1
+    shares = profile.sample(np.arange(count) * CYCLE_TIME)[:, 0] / path.distance
+    shares[-1] = 1.0
+    return np.clip(shares, 0.0, 1.0)
+
+
+def follow_path(model: RobotModel, q: JointVector, path: Path, speed: float) -> Motion:
+    """Returns the motion along a path: the inverse of every pose, each next to the one before.
+
+    Args:
+        model: The arm, with its tool.
+        q: Joint angles at the start of the path, shape (n,), [rad]: they choose the branch.
+        path: The path.
+        speed: Part of the generator's velocity and acceleration to use, from `MIN_SPEED` to 1.
+
+    Raises:
+        PlanningError: A pose on the way is out of reach, a joint limit or a singularity is in the way.
+        InvalidValueError: The speed is out of range.
+    """
+    shares = schedule(path, speed)
+    if len(shares) == 1:
+        return standing(q, law="s_profile", speed=speed)
+    rows: JointPath = np.empty((len(shares), model.n))
+    rows[0] = q
+    fastest = model.limits.joint.velocity * CYCLE_TIME
+    whole_turn = path.turn + (path.distance / _LEVER if path.unit == "m" else path.distance)
+    for k in range(1, len(shares)):
+        share = float(shares[k])
+        pose, psi = path.at(share)
+        try:
+            rows[k] = model.inverse(pose, psi, rows[k - 1]).nearest(rows[k - 1])
+        except UnreachableError as error:
+            raise PlanningError(f"{_place(path, share, k, pose)}: {error}") from error
+        step = np.abs(rows[k] - rows[k - 1])
+        longest = _JUMP * (fastest + whole_turn * (share - float(shares[k - 1])))
+        if (step > longest).any():
+            joint = int((step - longest).argmax())
+            raise PlanningError(
+                f"{_place(path, share, k, pose)}: joint {joint + 1} would have to jump by "
+                f"{math.degrees(step[joint]):.1f} deg within one cycle, because a singularity is in the way; lead the "
+                "tool around it, go there in joint space" + (", or give another arm angle" if model.n == 7 else "")
+            )
+    samples = Motion.from_samples(rows)
+    return Motion(polynomial=samples.polynomial, goal=rows[-1], law="s_profile", speed=speed)
+
+
+def _require_start(model: RobotModel, start: ArrayLike, psi: float | None, law: str) -> JointVector:
+    require_model(model)
+    if law != "s_profile":
+        raise InvalidValueError("law", described(law), "is unknown for a path; known: s_profile")
+    q = as_vector(start, model.n, "start", "rad")
+    limits = model.limits.joint
+    outside = np.flatnonzero(~((limits.lower < q) & (q < limits.upper)))
+    if outside.size:
+        i = int(outside[0])
+        raise PlanningError(
+            f"joint {i + 1}: start {math.degrees(q[i]):.2f} deg is not strictly between "
+            f"{math.degrees(limits.lower[i]):.2f} and {math.degrees(limits.upper[i]):.2f} deg"
+        )
+    return q
+
+
+def _place(path: Path, share: float, cycle: int, pose: Pose) -> str:
+    kind = "line" if path.circle is None else "arc"
+    x, y, z = pose.parts[1]
+    return (
+        f"the {kind} cannot be followed at {share * path.distance:.3f} of {path.distance:.3f} {path.unit} "
+        f"(t = {cycle * CYCLE_TIME:.3f} s, tool at {x:.3f}, {y:.3f}, {z:.3f} m)"
+    )

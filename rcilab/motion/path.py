@@ -1,0 +1,200 @@
+"""Paths of the tool as geometry, without time: the straight line and the arc of the manual's blocking moves (3.5).
+
+On both the orientation turns from start to goal by slerp, in proportion to the way, and so does the arm angle.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+
+from rcilab.arrays import described
+from rcilab.errors import InvalidValueError, PlanningError
+from rcilab.motion.s_curve import STANDSTILL_DISTANCE
+from rcilab.spatial import Pose, Rotation9, rotation_from_wxyz, wxyz_from_rotation
+
+_COLLINEAR = 1e-4
+"""Sine of the angle between two chords below which three points make no circle: its radius would be 5 000 chords."""
+
+Point: TypeAlias = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Circle:
+    """The circle through the first, a middle and the last point of an arc."""
+
+    center: Point
+    """[m]."""
+    first: Point
+    """From the centre to the first point, [m]."""
+    second: Point
+    """As long as `first`, at right angles to it, towards the middle point, [m]."""
+    angle: float
+    """From the first point over the middle one to the last, in (0, 2 pi), [rad]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Path:
+    """Poses of the tool in base, and arm angles, as functions of the share of the way, 0 to 1."""
+
+    start: Pose
+    goal: Pose
+    psi_start: float | None
+    """Arm angle at the start, [rad]; None leaves it to whoever follows the path."""
+    psi_goal: float | None
+    """[rad]."""
+    circle: Circle | None
+    """None for a straight line."""
+    distance: float
+    """The way that a profile of speed runs along: the tool's, [m]; that of a mere turn, or of the arm angle when the
+    tool stands still, [rad]. 0 where start and goal are the same."""
+    unit: str
+    """m or rad."""
+    turn: float
+    """Angle between the orientations of start and goal, 0 to pi, [rad]."""
+
+    def at(self, share: float) -> tuple[Pose, float | None]:
+        """Returns pose and arm angle, [rad], at a share of the way."""
+        if share >= 1.0:
+            return self.goal, self.psi_goal
+        if share <= 0.0:
+            return self.start, self.psi_start
+        (ra, a), (rb, b) = self.start.parts, self.goal.parts
+        if self.circle is None:
+            position = (a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1]), a[2] + share * (b[2] - a[2]))
+        else:
+            c, e, f = self.circle.center, self.circle.first, self.circle.second
+            x, y = math.cos(share * self.circle.angle), math.sin(share * self.circle.angle)
+            position = (c[0] + x * e[0] + y * f[0], c[1] + x * e[1] + y * f[1], c[2] + x * e[2] + y * f[2])
+        psi = None
+        if self.psi_start is not None and self.psi_goal is not None:
+            psi = self.psi_start + share * (self.psi_goal - self.psi_start)
+        return Pose.from_parts(slerp(ra, rb, share), position), psi
+
+
+def build_line(start: Pose, goal: Pose, psi_start: float | None = None, psi_goal: float | None = None) -> Path:
+    """Returns the straight line from start to goal.
+
+    The way is the tool's. Where the tool only turns, it is the angle, whatever the axis (the vendor's helper agrees for
+    turns about base z and takes some other number for the rest); where the arm angle changes alone, it is that.
+
+    Args:
+        start: Pose of the tool in base at the start.
+        goal: Pose of the tool in base at the end.
+        psi_start: Arm angle at the start, [rad]; None leaves it open.
+        psi_goal: Arm angle at the end, [rad]; it changes in proportion to the way, never across +-pi.
+
+    Raises:
+        InvalidValueError: A pose is none, or not finite.
+    """
+    _require_poses(start=start, goal=goal)
+    turn = _angle_between(start, goal)
+    return _path(start, goal, psi_start, psi_goal, None, math.dist(start.parts[1], goal.parts[1]), turn)
+
+
+def build_arc(
+    start: Pose, via: Pose, goal: Pose, psi_start: float | None = None, psi_goal: float | None = None
+) -> Path:
+    """Returns the arc from start over via to goal.
+
+    As the vendor's helper does it, the orientation of `via` is ignored: it turns from start to goal by slerp.
+
+    Args:
+        start: Pose of the tool in base at the start.
+        via: A pose whose position lies on the arc.
+        goal: Pose of the tool in base at the end.
+        psi_start: Arm angle at the start, [rad]; None leaves it open.
+        psi_goal: Arm angle at the end, [rad].
+
+    Raises:
+        PlanningError: The three positions lie on a line, or two of them are the same.
+        InvalidValueError: A pose is none, or not finite.
+    """
+    _require_poses(start=start, via=via, goal=goal)
+    circle = _circle(start.position, via.position, goal.position)
+    distance = circle.angle * math.hypot(*circle.first)
+    return _path(start, goal, psi_start, psi_goal, circle, distance, _angle_between(start, goal))
+
+
+def _path(
+    start: Pose, goal: Pose, psi_start: float | None, psi_goal: float | None, circle: Circle | None, length: float,
+    turn: float,
+) -> Path:  # fmt: skip
+    distance, unit = length, "m"
+    if length <= STANDSTILL_DISTANCE:
+        swing = 0.0 if psi_start is None or psi_goal is None else abs(psi_goal - psi_start)
+        distance, unit = max(turn, swing), "rad"
+        if distance <= STANDSTILL_DISTANCE:
+            distance = 0.0
+    return Path(
+        start=start, goal=goal, psi_start=psi_start, psi_goal=psi_goal, circle=circle, distance=distance, unit=unit,
+        turn=turn,
+    )  # fmt: skip
+
+
+def _circle(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> Circle:
+    """Returns the circle through three points."""
+    to_b, to_c = b - a, c - a
+    normal = np.cross(to_b, to_c)
+    chords = sorted(float(np.linalg.norm(chord)) for chord in (to_b, to_c, c - b))
+    if chords[0] <= STANDSTILL_DISTANCE:
+        raise PlanningError(
+            f"two of the three points of the arc are the same (start {_shown(a)}, via {_shown(b)}, goal {_shown(c)}); "
+            "an arc needs three different ones, a full circle two arcs"
+        )
+    if float(np.linalg.norm(normal)) <= _COLLINEAR * chords[1] * chords[2]:
+        raise PlanningError(
+            f"the three points of the arc lie on a line (start {_shown(a)}, via {_shown(b)}, goal {_shown(c)}); "
+            "move via off the line, or go straight with plan_line or move_l"
+        )
+    # The circumcentre seen from a: https://en.wikipedia.org/wiki/Circumcircle, "higher dimensions".
+    spread = float(to_b @ to_b) * to_c - float(to_c @ to_c) * to_b
+    square = float(normal @ normal)
+    offset = np.cross(spread, normal) / (2.0 * square)
+    center, first = a + offset, -offset
+    second = np.cross(normal / math.sqrt(square), first)
+    last = c - center
+    angle = math.atan2(float(last @ second), float(last @ first)) % math.tau
+    return Circle(_point(center), _point(first), _point(second), angle)
+
+
+def slerp(a: Rotation9, b: Rotation9, share: float) -> Rotation9:
+    """Returns the rotation a share of the shorter way from a to b (Shoemake 1985, spherical linear interpolation)."""
+    qa, qb = wxyz_from_rotation(a), wxyz_from_rotation(b)
+    dot = qa[0] * qb[0] + qa[1] * qb[1] + qa[2] * qb[2] + qa[3] * qb[3]
+    if dot < 0.0:
+        qb, dot = (-qb[0], -qb[1], -qb[2], -qb[3]), -dot
+    angle = math.acos(min(1.0, dot))
+    if angle < 1e-9:
+        wa, wb = 1.0 - share, share
+    else:
+        sine = math.sin(angle)
+        wa, wb = math.sin((1.0 - share) * angle) / sine, math.sin(share * angle) / sine
+    return rotation_from_wxyz([wa * x + wb * y for x, y in zip(qa, qb, strict=True)])
+
+
+def _angle_between(a: Pose, b: Pose) -> float:
+    """Returns the angle of the rotation from a to b, 0 to pi, [rad]."""
+    w, x, y, z = wxyz_from_rotation((a.inverse() @ b).parts[0])
+    return 2.0 * math.atan2(math.hypot(x, y, z), w)
+
+
+def _require_poses(**poses: object) -> None:
+    for name, pose in poses.items():
+        if not isinstance(pose, Pose):
+            raise InvalidValueError(name, described(pose), "is no Pose; Pose.from_matrix makes one of a 4 x 4 matrix")
+        rotation, position = pose.parts
+        if not math.isfinite(sum(rotation) + sum(position)):
+            raise InvalidValueError(name, repr(pose), "must be finite in every element")
+
+
+def _point(values: np.ndarray) -> Point:
+    x, y, z = values.tolist()
+    return x, y, z
+
+
+def _shown(values: np.ndarray) -> str:
+    return "(" + ", ".join(f"{value:.4f}" for value in values.tolist()) + ") m"

@@ -1,0 +1,74 @@
+"""The box that the tool shall stay in: `setCartesianLimit`, RCI manual V1.3.1, section 3.1.4."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+from math import hypot, isfinite
+
+import numpy as np
+
+from rcilab.arrays import Array
+from rcilab.errors import InvalidValueError
+from rcilab.spatial import Pose
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SafetyBox:
+    """A box in the base frame. It bounds the origin of the tool frame, not the links.
+
+    Raises:
+        InvalidValueError: An edge is not a positive, finite length, or the pose is none.
+    """
+
+    size: tuple[float, ...]
+    """Edges along x, y and z of its frame, three numbers, [m]."""
+    T_base_box: Pose
+    """Its centre and directions."""
+    active: bool = True
+    """Whether it bounds anything; one that is not active is kept and does nothing."""
+
+    def __post_init__(self) -> None:
+        """Checks the values."""
+        size = tuple(float(edge) for edge in self.size)
+        if len(size) != 3 or not all(isfinite(edge) and edge > 0.0 for edge in size):
+            raise InvalidValueError("safety box size", size, "must be three lengths above 0 [m]")
+        if not isinstance(self.T_base_box, Pose):  # pyright: ignore[reportUnnecessaryIsInstance]
+            raise InvalidValueError("safety box pose", self.T_base_box, "is no Pose; give its centre in the base")
+        object.__setattr__(self, "size", size)
+
+    def excess(self, position: Sequence[float]) -> float:
+        """Returns how far a point lies outside, [m]: its distance from the box, or minus its depth inside.
+
+        Args:
+            position: The point in the base frame, three numbers, [m].
+        """
+        r, (cx, cy, cz) = self.T_base_box.parts
+        x, y, z = position[0] - cx, position[1] - cy, position[2] - cz
+        length, width, height = self.size
+        dx = abs(r[0] * x + r[3] * y + r[6] * z) - 0.5 * length
+        dy = abs(r[1] * x + r[4] * y + r[7] * z) - 0.5 * width
+        dz = abs(r[2] * x + r[5] * y + r[8] * z) - 0.5 * height
+        if dx <= 0.0 and dy <= 0.0 and dz <= 0.0:
+            return max(dx, dy, dz)
+        return hypot(dx if dx > 0.0 else 0.0, dy if dy > 0.0 else 0.0, dz if dz > 0.0 else 0.0)
+
+    def excess_path(self, positions: Array) -> Array:
+        """Returns `excess` of many points.
+
+        Args:
+            positions: Points in the base frame, shape (N, 3), [m].
+
+        Returns:
+            Shape (N,), [m].
+        """
+        local = (positions - self.T_base_box.position) @ self.T_base_box.rotation
+        beyond = np.abs(local) - 0.5 * np.array(self.size)
+        outside = np.sqrt(np.square(np.maximum(beyond, 0.0)).sum(axis=1))
+        return np.where(outside > 0.0, outside, beyond.max(axis=1))
+
+    def corners(self) -> Array:
+        """Returns its corners in the base frame, shape (8, 3), [m]."""
+        signs = np.array(list(product((-0.5, 0.5), repeat=3)))
+        return signs * np.array(self.size) @ self.T_base_box.rotation.T + self.T_base_box.position

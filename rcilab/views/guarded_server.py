@@ -1,0 +1,204 @@
+"""A viser server behind a gate: who may open the page, who may talk to it, and what they may say.
+
+viser 1.1 binds every interface by default, takes the next port when the wanted one is busy, answers a websocket from
+any Origin (so any web page in the operator's browser could press our buttons), opens a public tunnel when a client
+asks for it, and writes whatever a client sends into its handles, NaN and callback lists included. Everything that
+stands against this is in this file and in `gate`, and the tests try each door.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+import socket
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from http import HTTPStatus
+from typing import TYPE_CHECKING, Any
+from urllib.parse import urlsplit
+
+from rcilab.closing import Closing
+from rcilab.views.gate import COOKIE, Gate
+
+if TYPE_CHECKING:
+    import viser
+
+_BACKLOG = 100  # As viser.
+
+
+def listen(host: str, port: int) -> socket.socket:
+    """Returns a listening socket on exactly this address and port; port 0 takes any free one.
+
+    Raises:
+        OSError: The host has no address, or the port is taken or not ours.
+    """
+    family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+    bound = socket.socket(family, kind, protocol)
+    try:
+        bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        bound.bind(address)
+        bound.listen(_BACKLOG)
+    except OSError:
+        bound.close()
+        raise
+    return bound
+
+
+class GuardedServer(Closing):
+    """viser on a socket that is bound already, behind a gate. Owns both.
+
+    Args:
+        bound: From `listen`.
+        gate: Decides about every request.
+        decorate: Makes our page out of viser's `index.html`. Such a page is not cached, and pages of other machines
+            may not show it in a frame.
+        routes: Other websockets that are served here: path -> async function of the connection.
+
+    Attributes:
+        viser: The server itself.
+    """
+
+    def __init__(
+        self,
+        bound: socket.socket,
+        gate: Gate,
+        *,
+        decorate: Callable[[bytes], bytes] | None = None,
+        routes: Mapping[str, Callable[[Any], Any]] | None = None,
+    ) -> None:
+        import viser
+        from viser import _messages
+
+        self._gate = gate
+        self._decorate = decorate
+        self._routes = dict(routes or {})
+        with self._serving(bound), _quiet():
+            self.viser: viser.ViserServer = viser.ViserServer(host=gate.host, port=gate.port, verbose=False)
+        sockets = self.viser._websock_server  # What is called on it below has no public spelling in viser 1.1.
+        sockets.unregister_handler(_messages.ShareUrlRequest)
+        sockets.unregister_handler(_messages.ShareUrlDisconnect)
+        _guard_updates(sockets)
+
+    def close(self) -> None:
+        """Stops serving."""
+        with _quiet():
+            self.viser.stop()
+
+    @contextmanager
+    def _serving(self, bound: socket.socket) -> Iterator[None]:
+        """Replaces the `serve` that viser's server thread is about to call."""
+        import websockets.asyncio.server as serving
+
+        original = serving.serve
+
+        def serve(handler: Any, host: str, port: int, **options: Any) -> Any:
+            del host, port  # viser would try the next port; the socket is bound to the one we want.
+            answer = options.pop("process_request")
+
+            async def route(connection: Any) -> None:
+                chosen = self._routes.get(urlsplit(connection.request.path).path) or handler
+                await chosen(connection)
+
+            def process(connection: Any, request: Any) -> Any:
+                return self._answer(answer, connection, request)
+
+            # A browser opens connections ahead of need and drops them unused; that is no error worth a traceback.
+            quiet = logging.getLogger("rcilab.page")
+            quiet.setLevel(logging.CRITICAL)
+            return original(route, sock=bound, process_request=process, **{**options, "logger": quiet})
+
+        serving.serve = serve
+        try:
+            yield
+        finally:
+            serving.serve = original
+
+    def _answer(self, answer: Callable[[Any, Any], Any], connection: Any, request: Any) -> Any:
+        """Returns the response to a request, or None to go on and open a websocket."""
+        headers = request.headers
+        host, cookie = headers.get("Host"), headers.get("Cookie")
+        if headers.get("Upgrade", "").lower() == "websocket":
+            reason = self._gate.refuse_socket(host, headers.get("Origin"), cookie)
+            return None if reason is None else _refusal(reason)
+        reason = self._gate.refuse_page(host, request.path, cookie)
+        if reason is not None:
+            return _refusal(reason)
+        if self._decorate is None or urlsplit(request.path).path not in ("/", "/index.html"):
+            return answer(connection, request)
+        if "Accept-Encoding" in headers:
+            del headers["Accept-Encoding"]  # We want to read the page before it is packed.
+        response = answer(connection, request)
+        if response is None or response.status_code != HTTPStatus.OK:
+            return response
+        return self._dress(self._decorate(response.body))
+
+    def _dress(self, body: bytes) -> Any:
+        from websockets.datastructures import Headers
+        from websockets.http11 import Response
+
+        headers = Headers({
+            "Content-Type": "text/html; charset=utf-8",
+            "Content-Length": str(len(body)),
+            "Cache-Control": "no-store",
+            "X-Content-Type-Options": "nosniff",
+            "Referrer-Policy": "no-referrer",
+            # A page of another site must not show ours in a frame and steer the operator's clicks.
+            "Content-Security-Policy": "frame-ancestors 'self' http://localhost:* http://127.0.0.1:*",
+        })  # fmt: skip
+        if self._gate.token is not None:
+            headers["Set-Cookie"] = f"{COOKIE}={self._gate.token}; Path=/; HttpOnly; SameSite=Strict"
+        return Response(HTTPStatus.OK.value, "OK", headers, body)
+
+
+def is_finite(value: object) -> bool:
+    """Returns whether every number in a value, however nested, is finite."""
+    if isinstance(value, float):
+        return math.isfinite(value)
+    if isinstance(value, list | tuple):
+        return all(is_finite(item) for item in value)
+    return True
+
+
+def _refusal(reason: str) -> Any:
+    from websockets.datastructures import Headers
+    from websockets.http11 import Response
+
+    body = f"403: {reason}\n".encode()
+    headers = Headers({"Content-Type": "text/plain; charset=utf-8", "Content-Length": str(len(body))})
+    return Response(HTTPStatus.FORBIDDEN.value, "Forbidden", headers, body)
+
+
+def _guard_updates(sockets: Any) -> None:
+    """Lets a client change the value of a control and nothing else about it, and only to finite numbers.
+
+    Without this a client can erase a control's Python callbacks (`updates={"update_cb": []}`) and send NaN.
+    """
+    from viser import _messages
+
+    handlers = sockets._incoming_handlers.pop(_messages.GuiUpdateMessage)
+
+    async def guarded(client_id: Any, message: Any) -> None:
+        if set(message.updates) != {"value"} or not is_finite(message.updates["value"]):
+            return
+        for handler in handlers:
+            outcome = handler(client_id, message)
+            if outcome is not None:
+                await outcome
+
+    sockets.register_handler(_messages.GuiUpdateMessage, guarded)
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keeps viser's box of addresses and its parting words away: our callers say where the page is, in one line.
+
+    viser prints through rich, which in a notebook does not go through stdout.
+    """
+    import rich
+
+    console = rich.get_console()
+    before, console.quiet = console.quiet, True
+    try:
+        yield
+    finally:
+        console.quiet = before

@@ -1,0 +1,100 @@
+"""Commands that are no motions against the real virtual controller: drag, safety stops, inputs, recovery, reboot."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rcilab.command import JointPosition
+from rcilab.errors import CommandRejectedError, ControlError, UsageError
+from rcilab.model import load_model
+from rcilab.protocols.rci import RecoveryStatus, SafetyStop, SettingStatus
+from rcilab.spatial import Pose
+from rcilab.state import RobotMode
+from rcilab.supervisor.simulate import simulate
+
+MODEL = load_model("xMate3")
+
+
+@pytest.fixture(scope="module")
+def robot():
+    with simulate(MODEL) as robot:
+        robot.power_on()
+        yield robot
+
+
+def hold(state, t):
+    return JointPosition(state.q_c, finished=t >= 0.02)
+
+
+def test_every_setting_is_taken_in_rest(robot):
+    joint = MODEL.limits.joint
+    robot.connect()
+    robot.set_joint_limit(0.9 * joint.lower, 0.9 * joint.upper)
+    robot.set_joint_limit(joint.lower, joint.upper)
+    robot.set_collision_behavior(joint.collision_threshold)
+    robot.set_joint_impedance(0.5 * joint.stiffness)
+    robot.set_cartesian_impedance([1000.0] * 3 + [100.0] * 3)
+    robot.set_cart_imp_desired_tau(np.zeros(6))
+    robot.set_filters(1000.0, 1000.0, 1000.0)
+    robot.set_torque_filter_cut_off_frequency(200.0)
+    robot.set_fc_coor(Pose(), "world")
+    robot.enable_virtual_guide(False)
+    figures = robot.load_model()
+    assert [len(part) for part in (figures.dh, figures.dimensions)] == [28, 21]
+    assert [len(part) for part in (figures.dynamics_with_friction, figures.dynamics)] == [66, 45]
+    assert robot.motor_state() is True
+
+
+def test_outputs_come_back_as_inputs_when_looped(robot):
+    robot.world.set_loop_back(True)
+    for level in (True, False):
+        robot.set_do(3, level)
+        assert robot.get_di(3) is level
+
+
+def test_a_drag_shows_in_the_mode_and_refuses_settings_until_it_ends(robot):
+    robot.start_drag("cartesian", "free")
+    assert robot.state.robot_mode is RobotMode.GUIDING
+    with pytest.raises(CommandRejectedError, match="settable while nothing moves and nobody guides") as caught:
+        robot.set_joint_impedance(MODEL.limits.joint.stiffness)
+    assert caught.value.status is SettingStatus.NOT_POSSIBLE
+    robot.stop_drag()
+    assert robot.state.robot_mode is RobotMode.IDLE
+    assert robot.control(hold).stopped is None
+
+
+@pytest.mark.parametrize(("button", "shown"), [("estop", SafetyStop.ESTOP), ("gstop", SafetyStop.GSTOP)])
+def test_a_safety_stop_is_shown_and_recovery_waits_for_its_release(robot, button, shown):
+    assert robot.safety_stop() is SafetyStop.NONE
+    robot.world.press(button)
+    assert robot.safety_stop() is shown
+    with pytest.raises(CommandRejectedError, match="release it first") as caught:
+        robot.recover()
+    assert caught.value.status is RecoveryStatus.USER_STOP
+    robot.world.press("none")
+    robot.recover()
+    robot.power_on()
+    assert robot.control(hold).stopped is None
+
+
+def test_a_safety_stop_in_mid_motion_ends_it_with_a_record_and_the_session_goes_on(robot):
+    def callback(state, t):
+        if t > 0.05:
+            robot.world.press("estop")
+        return JointPosition(state.q_c)
+
+    with pytest.raises(ControlError, match="emergency stop") as caught:
+        robot.control(callback)
+    assert len(caught.value.record) > 20
+    robot.world.press("none")
+    robot.recover()
+    robot.power_on()
+    assert robot.control(hold).stopped is None
+
+
+def test_a_reboot_closes_the_session():
+    with simulate(MODEL) as robot:
+        robot.reboot()
+        with pytest.raises(UsageError, match="closed; connect again"):
+            robot.motor_state()

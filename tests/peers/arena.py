@@ -1,0 +1,100 @@
+"""A virtual controller for a peer to meet: in a thread of this process, or as the command a user would start."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+import threading
+from collections import deque
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from rcilab.controller.config import ControllerConfig
+from rcilab.controller.cycle import ControlCycle
+from rcilab.controller.server import ControllerServer, build_plant
+from rcilab.model import load_model
+from tests.peers.robot import PATIENCE, Robot
+
+PLANTS = ("ideal", "mujoco")
+
+
+class Arena:
+    """A controller in lock-step in a thread, whose cycle a test can reach between two steps.
+
+    Attributes:
+        cycle: The controller without its sockets; touch it inside `between` only.
+        lines: What the controller logged.
+    """
+
+    def __init__(self, *, wrap_plant: Callable[[Any], Any] | None = None, **options: Any) -> None:
+        self.lines: list[str] = []
+        settings = {"model": "xMatePro7", "port": 0, "realtime": False, "lockstep": True, "mode_delay": 0.005}
+        config = ControllerConfig(**{**settings, **options})
+        plant = build_plant(config.plant, load_model(config.model))
+        self.plant = plant if wrap_plant is None else wrap_plant(plant)
+        self.server = ControllerServer(config, plant=self.plant, log=self.lines.append)
+        self.cycle: ControlCycle = self.server.cycle
+        self.host, port = re.match(r"rci://([\d.]+):(\d+)", self.server.url).groups()  # type: ignore[union-attr]
+        self.port = int(port)
+        self._actions: deque[Callable[[ControlCycle], object]] = deque()
+        self._step = self.cycle.step
+        self.cycle.step = self._stepping  # type: ignore[method-assign]
+        self.thread = threading.Thread(target=self.server.run)
+
+    def between(self, action: Callable[[ControlCycle], object]) -> None:
+        """Lets the controller's own thread do something before its next step."""
+        self._actions.append(action)
+
+    def _stepping(self) -> Any:
+        while self._actions:
+            self._actions.popleft()(self.cycle)
+        return self._step()
+
+    def connect(self, **options: Any) -> Robot:
+        """Returns a robot object that waits for its states patiently and does not dawdle after StartMove."""
+        settings: dict[str, Any] = {"start_sleep": 0.0, "receive_timeout": PATIENCE, "first_timeout": PATIENCE}
+        settings["axes"] = self.cycle.model.n
+        return Robot(self.host, self.port, **{**settings, **options})
+
+
+@contextmanager
+def arena(**options: Any) -> Iterator[Arena]:
+    """A running `Arena`."""
+    found = Arena(**options)
+    found.thread.start()
+    try:
+        yield found
+    finally:
+        found.server.request_stop()
+        found.thread.join(PATIENCE)
+        assert not found.thread.is_alive()
+
+
+class Process:
+    """`rcilab controller` in a process of its own."""
+
+    def __init__(self, *arguments: str, model: str = "xMatePro7") -> None:
+        command = [sys.executable, "-m", "rcilab.cli", "controller", "--model", model, "--port", "0", *arguments]
+        self.process = subprocess.Popen([*command, "--exit-with-parent"], stdout=subprocess.PIPE, text=True)
+        assert self.process.stdout is not None
+        line = self.process.stdout.readline()
+        found = re.match(r"listening rci://([\d.]+):(\d+) ", line)
+        assert found, f"instead of listening the controller said {line!r}"
+        self.host, self.port = found[1], int(found[2])
+
+    def memory(self) -> int:
+        """Returns the resident memory, [bytes]."""
+        pages = int(Path(f"/proc/{self.process.pid}/statm").read_text().split()[1])
+        return pages * 4096
+
+    def __enter__(self) -> Process:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.process.terminate()
+        self.process.wait(PATIENCE)
+        assert self.process.stdout is not None
+        self.process.stdout.close()

@@ -1,0 +1,91 @@
+"""A guarded viser without a page of ours: what the preview uses. The decorated one is tried in tests/workbench."""
+
+from __future__ import annotations
+
+import http.client
+import socket
+import time
+from collections.abc import Iterator
+
+import msgspec
+import pytest
+import viser
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import connect
+
+from rcilab.views.gate import Gate
+from rcilab.views.guarded_server import GuardedServer, is_finite, listen
+
+PROTOCOL = f"viser-v{viser.__version__}"
+
+
+@pytest.fixture(scope="module")
+def guarded() -> Iterator[tuple[GuardedServer, int]]:
+    bound = listen("127.0.0.1", 0)
+    port = bound.getsockname()[1]
+    with GuardedServer(bound, Gate(host="127.0.0.1", port=port)) as server:
+        yield server, port
+
+
+def fetch(port: int, host: str) -> tuple[int, dict[str, str]]:
+    link = http.client.HTTPConnection("127.0.0.1", port, timeout=10)
+    link.request("GET", "/", headers={"Host": host})
+    answer = link.getresponse()
+    answer.read()
+    link.close()
+    return answer.status, dict(answer.getheaders())
+
+
+def test_the_page_is_visers_own_and_a_notebook_elsewhere_may_frame_it(guarded) -> None:
+    _, port = guarded
+    status, headers = fetch(port, f"localhost:{port}")
+    assert status == 200
+    assert "Content-Security-Policy" not in headers
+
+
+def test_a_rebound_name_gets_no_page(guarded) -> None:
+    assert fetch(guarded[1], "evil.example")[0] == 403
+
+
+@pytest.mark.parametrize("path", ["/", "/rcilab/live"])
+def test_a_foreign_origin_gets_no_websocket(guarded, path: str) -> None:
+    with pytest.raises(InvalidStatus) as caught:
+        connect(f"ws://127.0.0.1:{guarded[1]}{path}", additional_headers={"Origin": "http://evil.example"})
+    assert caught.value.response.status_code == 403
+
+
+def test_a_number_that_is_none_reaches_no_control(guarded) -> None:
+    server, port = guarded
+    spoiled, after = (server.viser.gui.add_slider(name, 0.0, 1.0, 0.1, 0.5) for name in ("x", "y"))
+    origin = {"Origin": f"http://127.0.0.1:{port}"}
+    with connect(f"ws://127.0.0.1:{port}/", additional_headers=origin, subprotocols=[PROTOCOL]) as page:  # type: ignore[list-item]
+        for slider, value in ((spoiled, 0.25), (spoiled, float("nan")), (spoiled, float("inf")), (after, 0.75)):
+            message = {"type": "GuiUpdateMessage", "uuid": slider._impl.uuid, "updates": {"value": value}}
+            page.send(msgspec.msgpack.encode(message))
+        end = time.monotonic() + 10.0
+        while after.value != 0.75 and time.monotonic() < end:
+            time.sleep(0.01)
+    assert (spoiled.value, after.value) == (0.25, 0.75)
+
+
+def test_closing_lets_go_of_the_port() -> None:
+    bound = listen("127.0.0.1", 0)
+    port = bound.getsockname()[1]
+    GuardedServer(bound, Gate(host="127.0.0.1", port=port)).close()
+    listen("127.0.0.1", port).close()
+
+
+def test_a_taken_port_is_refused_and_nothing_stays_open() -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        with pytest.raises(OSError, match="in use"):
+            listen("127.0.0.1", taken.getsockname()[1])
+
+
+@pytest.mark.parametrize(
+    ("value", "finite"),
+    [(1.0, True), (float("nan"), False), ([0.0, float("inf")], False), ("nan", True), ([[1], (2.0,)], True)],
+)
+def test_is_finite_looks_into_everything(value, finite):
+    assert is_finite(value) is finite
