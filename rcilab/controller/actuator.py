@@ -17,6 +17,7 @@ from enum import Enum
 
 from rcilab.arrays import JointVector
 from rcilab.controller.commanded import CommandedMotion
+from rcilab.controller.compliance import Damper
 from rcilab.controller.guiding import guide_torque, wall_torque
 from rcilab.controller.plant import Drive, Measurement, Setpoint
 from rcilab.controller.servo import cartesian_impedance, joint_impedance
@@ -62,6 +63,8 @@ class Actuator:
 
     def configure(self, model: RobotModel, settings: Settings) -> None:
         """Takes new settings, and the model with the tool and load that they say."""
+        self._law = Law.BRAKED
+        self._damper = Damper()
         self._model = model
         self._settings = settings
         self._soft_limits = settings.soft_limits(model.limits.joint)
@@ -89,6 +92,8 @@ class Actuator:
             measured: Where the arm is.
             tau: Commanded torques, n plain floats, [N m], for TORQUE; None is none yet.
         """
+        if law is not self._law:
+            self._law, self._damper = law, Damper()
         match law:
             case Law.POSITION:
                 return Setpoint(Drive.POSITION, commanded.q, commanded.dq, commanded.ddq)
@@ -110,7 +115,7 @@ class Actuator:
         model, settings = self._model, self._settings
         if law is Law.JOINT_IMPEDANCE:
             q, dq, ddq = commanded.q, commanded.dq, commanded.ddq
-            return joint_impedance(model, q, dq, ddq, measured, settings.joint_stiffness)
+            return joint_impedance(model, q, dq, ddq, measured, settings.joint_stiffness, self._damper)
         if law is Law.CARTESIAN_IMPEDANCE:
             return cartesian_impedance(
                 model,
@@ -121,6 +126,7 @@ class Actuator:
                 measured,
                 settings.cartesian_stiffness,
                 settings.desired_wrench,
+                damper=self._damper,
             )
         return guide_torque(model, measured, self._space, self._kind, self._T_held, self._q_held, self._soft_limits)
 

@@ -8,11 +8,15 @@ al. (2003).
 
 The controller computes torques once a millisecond, so a spring must not be much faster than that: modes are slowed
 down to `FASTEST_MODE`. Only light links feel it, such as the last one behind a long tool at full stiffness.
+
+How an arm vibrates changes with its pose, and that takes longer than a cycle: a `Damper` keeps its design for some.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,33 +26,67 @@ from rcilab.dynamics.rigid_body import ArmTerms
 DAMPING_RATIO = 0.7  # of critical; a choice: some 5 % overshoot
 FASTEST_MODE = 600.0  # [rad/s] w times 1 ms stays at 0.6; computed torques become unstable at about 1.0; a choice
 SLOWEST_DAMPING = 1.0  # [rad/s] Modes without a spring are damped as if theirs were that slow; a choice
+DESIGN_PERIOD = 10  # [cycles] How long a design is kept; a joint at full speed turns by 0.02 rad meanwhile; a choice
 
 
-def spring_torque(
-    terms: ArmTerms,
-    stiffness: Matrix,
-    spring: JointVector,
-    speed_error: JointVector,
-    slowest: float = SLOWEST_DAMPING,
-) -> JointVector:
-    """Returns the torque of springs with their dampers, shape (n,), [N m].
+class Damping(NamedTuple):
+    """The dampers of springs at one pose."""
+
+    damper: Matrix
+    """Torque per speed error, symmetric, shape (n, n), [N m s/rad]."""
+    slowing: Matrix | None
+    """What is taken from the springs' torque where they are too fast, shape (n, n); None: they are not."""
+
+    def torque(self, spring: JointVector, speed_error: JointVector) -> JointVector:
+        """Returns the torque of springs with these dampers, shape (n,), [N m].
+
+        Args:
+            spring: Torque of the springs alone, shape (n,), [N m].
+            speed_error: Wanted minus measured joint velocities, shape (n,), [rad/s].
+        """
+        tau = spring + self.damper @ speed_error
+        return tau if self.slowing is None else tau - self.slowing @ spring
+
+
+def design_damping(terms: ArmTerms, stiffness: Matrix, slowest: float = SLOWEST_DAMPING) -> Damping:
+    """Returns the dampers of springs.
 
     Args:
         terms: The arm as it is now.
         stiffness: Of the springs, in joint space, symmetric, shape (n, n), [N m/rad].
-        spring: Torque of the springs without damping, shape (n,), [N m].
-        speed_error: Wanted minus measured joint velocities, shape (n,), [rad/s].
         slowest: Least angular frequency that damping is computed with, [rad/s].
     """
     F = np.linalg.cholesky(terms.mass_inverse)
     eigenvalues, V = np.linalg.eigh(F.T @ stiffness @ F)
     U = F @ V
+    back = terms.mass_matrix @ U
     squares = eigenvalues.tolist()
-    momenta = (terms.mass_matrix @ speed_error @ U).tolist()
     gains = [2.0 * DAMPING_RATIO * math.sqrt(min(max(square, slowest**2), FASTEST_MODE**2)) for square in squares]
-    forces = [gain * momentum for gain, momentum in zip(gains, momenta, strict=True)]
+    slowing = None
     if squares[-1] > FASTEST_MODE**2:
-        pulls = (spring @ U).tolist()
-        shares = [max(0.0, 1.0 - FASTEST_MODE**2 / square) if square > 0.0 else 0.0 for square in squares]
-        forces = [force - share * pull for force, share, pull in zip(forces, shares, pulls, strict=True)]
-    return spring + terms.mass_matrix @ (U @ forces)
+        slowing = back * [max(0.0, 1.0 - FASTEST_MODE**2 / square) if square > 0.0 else 0.0 for square in squares] @ U.T
+    return Damping(back * gains @ back.T, slowing)
+
+
+class Damper:
+    """Dampers that follow an arm, designed anew every few cycles. Owned by whoever computes torques cycle by cycle."""
+
+    def __init__(self) -> None:
+        self._design: Damping | None = None
+        self._age = 0
+
+    def torque(
+        self, terms: ArmTerms, stiffness: Callable[[], Matrix], spring: JointVector, speed_error: JointVector
+    ) -> JointVector:
+        """Returns the torque of springs with their dampers, shape (n,), [N m].
+
+        Args:
+            terms: The arm as it is now.
+            stiffness: Gives the stiffness of the springs when a design is due, see `design_damping`.
+            spring: Torque of the springs alone, shape (n,), [N m].
+            speed_error: Wanted minus measured joint velocities, shape (n,), [rad/s].
+        """
+        self._age += 1
+        if self._design is None or self._age >= DESIGN_PERIOD:
+            self._design, self._age = design_damping(terms, stiffness()), 0
+        return self._design.torque(spring, speed_error)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from rcilab.arrays import Array, JointVector
-from rcilab.controller.compliance import spring_torque
+from rcilab.controller.compliance import design_damping
 from rcilab.controller.plant import Measurement
 from rcilab.dynamics.rigid_body import ArmTerms
 from rcilab.limits import JointLimits
@@ -54,7 +54,7 @@ def guide_torque(
         stiffness = stiffness + hold * (J.T @ J)
         spring = spring + J.T @ (hold * error)
     spring = spring - JOINT_DAMPING * model.limits.joint.torque * measured.dq
-    return spring_torque(terms, stiffness, spring, -measured.dq, GUIDE_DAMPING) + terms.coriolis
+    return design_damping(terms, stiffness, GUIDE_DAMPING).torque(spring, -measured.dq) + terms.coriolis
 
 
 def wall_torque(model: RobotModel, measured: Measurement, box: SafetyBox, stiffness6: tuple[float, ...]) -> JointVector:
@@ -80,7 +80,7 @@ def wall_torque(model: RobotModel, measured: Measurement, box: SafetyBox, stiffn
     J = directions.T @ terms.jacobian[:3]
     stiffness = np.array([stiffness6[axis] for axis in faces])
     spring = J.T @ (stiffness * [-outside[axis] for axis in faces])
-    return spring_torque(terms, J.T * stiffness @ J, spring, -measured.dq, _DAMPED_OUTWARD)
+    return design_damping(terms, J.T * stiffness @ J, _DAMPED_OUTWARD).torque(spring, -measured.dq)
 
 
 def _held(model: RobotModel, terms: ArmTerms, kind: rci.DragType, T_held: Pose) -> tuple[float, Array]:

@@ -90,7 +90,7 @@ class IdealPlant:
         stays = not any(setpoint.dq) and not any(setpoint.ddq) and last.q.tolist() == list(setpoint.q)
         if stays:
             return last if self._rests else self._rest_at(last.q)
-        return self._measure(frozen(setpoint.q), frozen(setpoint.dq), frozen(setpoint.ddq))
+        return self._measure(*frozen((setpoint.q, setpoint.dq, setpoint.ddq)))
 
     def _rest_at(self, q: JointVector) -> Measurement:
         measurement = self._measure(q, self._zeros, self._zeros)

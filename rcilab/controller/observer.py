@@ -20,7 +20,7 @@ from rcilab.model import RobotModel
 BANDWIDTH = 200.0  # [rad/s] of the residual: a push shows with a time constant of 5 ms; a choice
 _GAIN = BANDWIDTH * CYCLE_TIME / (1.0 + BANDWIDTH * CYCLE_TIME)
 _NOTHING = 1e-6  # [N m] A residual this small is rounding: it is called zero.
-_DAMPED_INVERSE = 2.5e-5  # [m^2, rad^2] keeps the wrench finite at a singularity
+_DAMPING = 2.5e-5 * np.eye(6)  # [m^2, rad^2] keeps the wrench finite at a singularity
 
 
 class Observer:
@@ -78,9 +78,7 @@ class Observer:
         if tau_ext is self._zeros:
             return self._none
         J = self._body.tool_jacobian(measured.q)
-        A = J @ J.T
-        A.flat[::7] += _DAMPED_INVERSE
-        return tau_ext, frozen(np.linalg.solve(A, J @ tau_ext))
+        return tau_ext, frozen(np.linalg.solve(J @ J.T + _DAMPING, J @ tau_ext))
 
 
 def _is_tiny(vector: Array, bound: float) -> bool:

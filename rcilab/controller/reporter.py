@@ -127,7 +127,7 @@ class StateReporter:
     def _compute(self, readings: Readings) -> dict[str, Any]:
         commanded, tool_c, measured, tool, tau_commanded, _, wrench = readings
         last, before, h = self._body, self._readings, CYCLE_TIME
-        q_c, dq_c, ddq_c = frozen(commanded.q), frozen(commanded.dq), frozen(commanded.ddq)
+        q_c, dq_c, ddq_c = frozen((commanded.q, commanded.dq, commanded.ddq))
         if tau_commanded is not None:
             tau_c = frozen(tau_commanded)
         else:
@@ -155,6 +155,7 @@ class StateReporter:
             and not dtau_c.any()
         )
         T_base_tool_c = _matrix(tool_c.pose)
+        tool_velocity_c, tool_acceleration_c = frozen((tool_c.twist, tool_c.acceleration))
         return {
             "q": measured.q,
             "q_c": q_c,
@@ -163,8 +164,8 @@ class StateReporter:
             "ddq_c": ddq_c,
             "T_base_tool": T_base_tool_c if tool.pose is tool_c.pose else _matrix(tool.pose),
             "T_base_tool_c": T_base_tool_c,
-            "tool_velocity_c": frozen(tool_c.twist),
-            "tool_acceleration_c": frozen(tool_c.acceleration),
+            "tool_velocity_c": tool_velocity_c,
+            "tool_acceleration_c": tool_acceleration_c,
             "psi": tool.psi,
             "psi_c": tool_c.psi,
             "dpsi_c": tool_c.dpsi,

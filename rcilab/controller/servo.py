@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rcilab.arrays import Array, JointVector, Matrix
-from rcilab.controller.compliance import DAMPING_RATIO, spring_torque
+from rcilab.controller.compliance import DAMPING_RATIO, Damper
 from rcilab.controller.plant import Measurement
 from rcilab.dynamics.rigid_body import ArmTerms
 from rcilab.model import RobotModel
@@ -35,6 +35,7 @@ def joint_impedance(
     ddq_c: Sequence[float],
     measured: Measurement,
     stiffness: Sequence[float],
+    damper: Damper | None = None,
 ) -> JointVector:
     """Returns the torque of a spring at every joint, without gravity, shape (n,), [N m].
 
@@ -45,10 +46,12 @@ def joint_impedance(
         ddq_c: Their accelerations, [rad/s^2].
         measured: Where the arm is.
         stiffness: n numbers, [N m/rad].
+        damper: The one of the cycles before; None designs another.
     """
     terms = model.rigid_body.terms(measured.q, measured.dq)
     K = np.array(stiffness)
-    tau = spring_torque(terms, np.diag(K), K * (q_c - measured.q), dq_c - measured.dq)
+    spring, speed_error = K * (q_c - measured.q), dq_c - measured.dq
+    tau = (damper or Damper()).torque(terms, lambda: np.diag(K), spring, speed_error)
     tau += terms.coriolis
     return tau + terms.mass_matrix @ np.array(ddq_c) if any(ddq_c) else tau
 
@@ -63,6 +66,7 @@ def cartesian_impedance(
     stiffness6: Sequence[float],
     desired_wrench6: Sequence[float] = (0.0,) * 6,
     axes: Matrix | None = None,
+    damper: Damper | None = None,
 ) -> JointVector:
     """Returns the torque of springs between the commanded and the measured tool, without gravity, shape (n,), [N m].
 
@@ -80,6 +84,7 @@ def cartesian_impedance(
         stiffness6: Three translations [N/m], three rotations [N m/rad].
         desired_wrench6: Force and moment that the arm exerts on its surroundings in addition, [N, N m].
         axes: Rotation whose columns, in base, are the directions that both refer to, shape (3, 3).
+        damper: The one of the cycles before; None designs another.
     """
     terms = model.rigid_body.terms(measured.q, measured.dq)
     M, J = terms.mass_matrix, terms.jacobian
@@ -88,7 +93,8 @@ def cartesian_impedance(
     error = _pose_error(T_c, terms)
     wrench = np.array(stiffness6) * (error if axes is None else _turned(error, axes)) + desired_wrench6
     dq_c, ddq_c = _joint_reference(model, terms, twist_c, acc_c, q_null, measured)
-    tau = spring_torque(terms, along.T * stiffness6 @ along, wrench @ along, dq_c - measured.dq)
+    speed_error = dq_c - measured.dq
+    tau = (damper or Damper()).torque(terms, lambda: along.T * stiffness6 @ along, wrench @ along, speed_error)
     tau += terms.coriolis
     tau += M @ ddq_c
     return tau

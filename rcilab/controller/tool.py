@@ -5,14 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+import numpy as np
+
 from rcilab.clock import CYCLE_TIME
+from rcilab.dynamics.rigid_body import Twist
 from rcilab.errors import SingularError
 from rcilab.kinematics.arm_angle import arm_angle
-from rcilab.kinematics.forward import build_chain
 from rcilab.kinematics.inverse import build_geometry
-from rcilab.kinematics.twist import Twist, tool_motion
 from rcilab.model import RobotModel
-from rcilab.spatial import IDENTITY, Pose
+from rcilab.spatial import Pose
 
 _REST: Twist = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -37,9 +38,8 @@ class ToolMotion:
     """
 
     def __init__(self, model: RobotModel, q: Sequence[float]) -> None:
-        self._chain = build_chain(model.description.dh)
+        self._body = model.rigid_body
         self._geometry = build_geometry(model.description)
-        self._tool = None if model.T_flange_tool.is_close(IDENTITY, 0.0) else model.T_flange_tool
         self.pose: Pose
         self.twist = self.acceleration = _REST
         self.psi = self.dpsi = self.ddpsi = 0.0
@@ -52,14 +52,14 @@ class ToolMotion:
 
     def place(self, q: Sequence[float]) -> None:
         """Puts the arm somewhere, at rest."""
-        self.pose, _ = tool_motion(self._chain, q, [0.0] * len(q), self._tool)
+        self.pose, _ = self._body.tool_motion(np.array(q), np.zeros(len(q)))
         self.twist = self.acceleration = _REST
         self.psi, self.dpsi, self.ddpsi = self._arm_angle(q), 0.0, 0.0
 
     def update(self, q: Sequence[float], dq: Sequence[float]) -> None:
         """Takes joint angles and velocities of this cycle, n plain floats each, [rad], [rad/s]."""
         h = CYCLE_TIME
-        self.pose, twist = tool_motion(self._chain, q, dq, self._tool)
+        self.pose, twist = self._body.tool_motion(np.array(q), np.array(dq))
         a, b, c, d, e, f = twist
         p, r, s, t, u, v = self.twist
         self.acceleration = ((a - p) / h, (b - r) / h, (c - s) / h, (d - t) / h, (e - u) / h, (f - v) / h)

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 import pinocchio as pin  # pyright: ignore[reportMissingImports]  # It lives behind a .pth file.
@@ -17,6 +18,9 @@ from rcilab.robots.upright import upright_joints
 from rcilab.spatial import IDENTITY, Pose, Rotation9
 
 GRAVITY = 9.81  # [m/s^2] along -z of the base; the figure the vendor's dynamics library computes with.
+
+Twist: TypeAlias = tuple[float, float, float, float, float, float]
+"""Linear and angular velocity, [m/s, rad/s]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -148,6 +152,20 @@ class RigidBody:
     def tool_jacobian(self, q: JointVector) -> Matrix:
         """Returns the Jacobian at the tool, linear rows first, base axes, shape (6, n)."""
         return pin.computeFrameJacobian(self._model, self._data, q, self._tool, pin.LOCAL_WORLD_ALIGNED)
+
+    def tool_motion(self, q: JointVector, dq: JointVector) -> tuple[Pose, Twist]:
+        """Returns the pose of the tool in base and its twist at the tool's origin, base axes.
+
+        Args:
+            q: Joint angles, shape (n,), [rad].
+            dq: Joint velocities, shape (n,), [rad/s].
+        """
+        model, data, tool = self._model, self._data, self._tool
+        pin.forwardKinematics(model, data, q, dq)
+        pose = pin.updateFramePlacement(model, data, tool)
+        twist = pin.getFrameVelocity(model, data, tool, pin.LOCAL_WORLD_ALIGNED)
+        rotation = tuple(pose.rotation.ravel().tolist())
+        return Pose.from_parts(rotation, tuple(pose.translation.tolist())), tuple(twist.vector.tolist())
 
     def terms(self, q: JointVector, dq: JointVector) -> ArmTerms:
         """Returns all terms of a state at once.

@@ -30,6 +30,8 @@ _STRETCHED = 1e-15  # 1 - cos of the elbow angle that rounding alone can cause; 
 _QUARTER = pi / 2
 _SEVEN = (-_QUARTER, _QUARTER, -_QUARTER, _QUARTER, -_QUARTER, _QUARTER, 0.0)
 _SIX = (-_QUARTER, 0.0, _QUARTER, -_QUARTER, _QUARTER, 0.0)
+ALL_FLIPS: tuple[Angles, ...] = tuple(product((0.0, pi), repeat=3))
+"""Every branch of a 7-axis arm; see `inverse_seven`."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,7 +71,13 @@ def build_geometry(description: RobotDescription) -> ArmGeometry:
     )
 
 
-def inverse_seven(arm: ArmGeometry, T_base_flange: Pose, psi: float, near: Sequence[float] | None) -> list[Angles]:
+def inverse_seven(
+    arm: ArmGeometry,
+    T_base_flange: Pose,
+    psi: float,
+    near: Sequence[float] | None,
+    flips: Sequence[Angles] = ALL_FLIPS,
+) -> list[Angles]:
     """Returns the 8 branches of a 7-axis arm at one arm angle, [rad], without regard to joint limits.
 
     Args:
@@ -77,6 +85,7 @@ def inverse_seven(arm: ArmGeometry, T_base_flange: Pose, psi: float, near: Seque
         T_base_flange: Pose of the flange in base.
         psi: Arm angle, [rad]. Where the shoulder-wrist line is vertical it is counted from base x instead.
         near: Joint angles, [rad], that decide what a singularity leaves open; None means zeros.
+        flips: Which branches: pi where upright joint 2, 4 or 6 shall be negative, 0 where not.
 
     Raises:
         UnreachableError: The wrist centre is out of reach.
@@ -114,7 +123,7 @@ def inverse_seven(arm: ArmGeometry, T_base_flange: Pose, psi: float, near: Seque
     rotation = _turn_zy(_turn_zy((1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), q1, q2), q3, q4)
     q5, q6, q7 = _wrist(rotation, r, guess[4])
     branches: list[Angles] = []
-    for flip_2, flip_4, flip_6 in _FLIPS:
+    for flip_2, flip_4, flip_6 in flips:
         branches.append(
             (
                 _wrap(q1 + flip_2),
@@ -163,9 +172,6 @@ def inverse_six(arm: ArmGeometry, T_base_flange: Pose, near: Sequence[float] | N
             branches.append((*head, _wrap(q4), q5, _wrap(q6)))
             branches.append((*head, _wrap(q4 + pi), -q5, _wrap(q6 + pi)))
     return branches if not any(arm.offsets) else [_shift(q, arm.offsets) for q in branches]
-
-
-_FLIPS = tuple(product((0.0, pi), repeat=3))
 
 
 def _wrist_centre(arm: ArmGeometry, T: Pose) -> tuple[Rotation9, float, float, float, float, float]:

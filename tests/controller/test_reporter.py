@@ -25,7 +25,7 @@ def test_the_state_tells_the_truth_about_a_moving_arm(make_hand, name: str) -> N
     assert np.allclose(state.dq_c, (state.q_c - before.q_c) / h, rtol=0, atol=1e-9)
     assert np.allclose(state.ddq_c, (state.dq_c - before.dq_c) / h, rtol=0, atol=1e-6)
     assert np.array_equal(state.q, state.q_c)
-    assert np.array_equal(state.T_base_tool_c, model.forward(state.q_c).matrix)
+    assert np.allclose(state.T_base_tool_c, model.forward(state.q_c).matrix, rtol=0, atol=1e-14)
     assert np.allclose(state.tool_velocity_c, model.jacobian(state.q_c) @ state.dq_c, rtol=0, atol=1e-12)
     assert np.allclose(
         state.tool_acceleration_c, (state.tool_velocity_c - before.tool_velocity_c) / h, rtol=0, atol=1e-9

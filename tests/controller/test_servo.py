@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from rcilab.arrays import Array
+from rcilab.controller.compliance import DESIGN_PERIOD, Damper, design_damping
 from rcilab.controller.ideal_plant import IdealPlant
 from rcilab.controller.mujoco_plant import MuJoCoPlant
 from rcilab.controller.plant import Drive, Measurement, Plant, Setpoint
@@ -185,3 +186,16 @@ def test_the_elbow_of_a_seven_axis_arm_is_led_softly_and_the_tool_does_not_feel_
         worst = max(worst, float(np.abs(offset(model.forward(measured.q), T_c)).max()))
     assert model.arm_angle(measured.q) == pytest.approx(0.3, abs=0.01)
     assert worst < 1e-3  # [m, rad]
+
+
+def test_a_damper_keeps_its_design_for_some_cycles_and_then_follows_the_arm() -> None:
+    model, rng = load_model("xMatePro7"), np.random.default_rng(3)
+    stiffness, damper = np.diag(np.full(7, 300.0)), Damper()
+    poses = [model.home + 0.02 * k for k in range(2 * DESIGN_PERIOD)]
+    terms = [model.rigid_body.terms(q, np.zeros(7)) for q in poses]
+    error = rng.normal(size=7)
+    designs = [design_damping(at, stiffness).torque(np.zeros(7), error) for at in terms]
+    found = [damper.torque(at, lambda: stiffness, np.zeros(7), error) for at in terms]
+    kept = [k - k % DESIGN_PERIOD for k in range(2 * DESIGN_PERIOD)]
+    assert all(np.allclose(tau, designs[k], rtol=1e-12) for tau, k in zip(found, kept, strict=True))
+    assert not np.allclose(designs[0], designs[DESIGN_PERIOD], rtol=1e-3)

@@ -97,3 +97,13 @@ def test_all_terms_at_once_are_those_of_the_single_questions(name):
     np.testing.assert_allclose(body.acceleration(q, dq, torque.full), ddq, atol=1e-9)
     assert body.terms(q, dq) is terms
     assert body.terms(q.copy(), dq) is not terms
+
+
+@pytest.mark.parametrize("name", ROBOT_NAMES)
+@pytest.mark.parametrize("tool", [None, Pose([0.1, -0.05, 0.2], [0.9, 0.1, 0.3, 0.2])])
+def test_the_motion_of_the_tool_is_that_of_forward_kinematics_and_jacobian(name, tool):
+    model, rng = load_model(name, tool=tool), np.random.default_rng(5)
+    for q, dq in rng.normal(size=(50, 2, model.n)):
+        pose, twist = model.rigid_body.tool_motion(q, dq)
+        assert pose.is_close(model.forward(q), 1e-14)
+        assert np.allclose(twist, model.jacobian(q) @ dq, rtol=0, atol=1e-12)

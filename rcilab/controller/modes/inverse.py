@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import cos, degrees, hypot, remainder, sin, sqrt, tau
+from itertools import product
+from math import cos, degrees, hypot, pi, remainder, sin, sqrt, tau
 
 from rcilab.errors import SingularError
 from rcilab.kinematics.inverse import ArmGeometry, build_geometry, inverse_seven, inverse_six
@@ -13,6 +14,7 @@ from rcilab.spatial import IDENTITY, Pose
 SINGULAR = (
     0.02  # Sine of an angle, or share of the reach: about one degree from a singularity counts as on it; a choice.
 )
+_STEP = 0.1  # [rad] What no joint passes in a cycle, by far: an arm bent more than that stays bent to the same side.
 
 
 class Follower:
@@ -45,7 +47,7 @@ class Follower:
         """
         flange = T_base_tool @ self._T_tool_flange if self._has_tool else T_base_tool
         if self._geometry.n == 7:
-            branches = inverse_seven(self._geometry, flange, psi, near)
+            branches = inverse_seven(self._geometry, flange, psi, near, self._near_flips(near))
         else:
             branches = inverse_six(self._geometry, flange, near)
         best: list[float] = []
@@ -64,6 +66,18 @@ class Follower:
         if singularity is not None:
             raise SingularError(singularity)
         return q
+
+    def _near_flips(self, near: Sequence[float]) -> list[tuple[float, ...]]:
+        """Returns the branches that a step from `near` may end on: those of its own sides, and of both next to zero."""
+        offsets = self._geometry.offsets
+        sides = [_sides(near[i] - offsets[i]) for i in (1, 3, 5)]
+        return list(product(*sides))
+
+
+def _sides(bend: float) -> tuple[float, ...]:
+    if abs(bend) < _STEP:
+        return 0.0, pi
+    return (pi,) if remainder(bend, tau) < 0.0 else (0.0,)
 
 
 def find_singularity(arm: ArmGeometry, q: Sequence[float]) -> str | None:
