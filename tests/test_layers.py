@@ -23,6 +23,7 @@ LAYERS = [  # From the bottom. A part imports from lines below its own, and from
         "state",
         "spatial",
         "realtime",
+        "awake",
         "safety_box",
         "closing",
         "cycle_file",

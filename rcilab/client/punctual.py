@@ -6,6 +6,7 @@ import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from rcilab.awake import awake_cores
 from rcilab.realtime import enter_realtime, leave_realtime
 
 PRIORITY = 60  # SCHED_FIFO, of 1 to 99: below the kernel's own threads' usual 90s, above ordinary drivers' 50.
@@ -16,7 +17,7 @@ _warned = False
 
 @contextmanager
 def punctual(wanted: bool = True) -> Iterator[None]:
-    """Runs the body under SCHED_FIFO with a still garbage collector, as far as the system permits.
+    """Runs the body under SCHED_FIFO with a still garbage collector on cores that do not sleep, as far as permitted.
 
     Where it does not, one line says so, once a process.
 
@@ -32,6 +33,7 @@ def punctual(wanted: bool = True) -> Iterator[None]:
         _warned = True
         _log.warning("%s", scheduling.warning)
     try:
-        yield
+        with awake_cores():
+            yield
     finally:
         leave_realtime()

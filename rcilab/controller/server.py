@@ -14,6 +14,7 @@ import sys
 from collections import deque
 from collections.abc import Callable
 
+from rcilab.awake import AwakeCores
 from rcilab.clock import CYCLE_TIME, SystemClock
 from rcilab.controller.answers import Reply
 from rcilab.controller.config import ControllerConfig
@@ -101,6 +102,7 @@ class ControllerServer:
         self._pending: tuple[Request, int, Reply] | None = None
         self._is_ending = False
         self._next_look = 0.0
+        self._cores = AwakeCores()
         self._endpoint = Endpoint(config)
         states_network = config.network if config.states_network is None else config.states_network
         self._network = FaultyNetwork(self._endpoint, self._clock, config.network, states_network)
@@ -136,6 +138,7 @@ class ControllerServer:
         try:
             self._loop()
         finally:
+            self._cores.switch(False)
             if use_realtime:
                 leave_realtime()
             self.close()
@@ -237,6 +240,8 @@ class ControllerServer:
 
     def _live(self) -> None:
         """Lives through one millisecond."""
+        if self.config.realtime and not self.config.lockstep:
+            self._cores.switch(self.cycle.is_moving)
         faults = self.cycle.faults
         state = self.cycle.step()
         self._surroundings.step()

@@ -46,6 +46,7 @@ def examine(
     yield processor.check_cores(cores)
     yield processor.check_isolation(cores, system)
     yield processor.check_governor(system)
+    yield processor.check_sleep(system)
     yield processor.check_clock(system)
     yield processor.check_hypervisor(system)
     yield network.check_buffers(system)

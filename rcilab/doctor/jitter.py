@@ -1,7 +1,7 @@
 """How late a 1 kHz loop is on this machine, measured: `python -m rcilab.doctor.jitter SECONDS` is that loop.
 
-It does nothing but wake up, with the priority of the control process; whatever it is late by is the machine's. Once a
-second it prints the lateness of that second's cycles, [ns], as one JSON list.
+It does nothing but wake up, with the priority of the control process and on cores that do not sleep; whatever it is late
+by is the machine's. Once a second it prints the lateness of that second's cycles, [ns], as one JSON list.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from collections.abc import Callable
 import numpy as np
 
 from rcilab.arrays import Array, frozen
+from rcilab.awake import awake_cores
 from rcilab.client.punctual import PRIORITY
 from rcilab.clock import CYCLE_TIME
 from rcilab.doctor.finding import Finding
@@ -131,4 +132,5 @@ def _run(seconds: float) -> None:
 
 
 if __name__ == "__main__":
-    _run(float(sys.argv[1]))
+    with awake_cores():
+        _run(float(sys.argv[1]))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from rcilab.awake import DEVICE, awake_cores
 from rcilab.doctor.finding import Finding
 from rcilab.doctor.system import System
 
@@ -55,6 +56,22 @@ def check_governor(system: System) -> Finding:
         advice = f"echo performance | sudo tee {_CPU}/cpu*/cpufreq/scaling_governor"
         return Finding(name, "note", f"{' and '.join(sorted(slow))}: the first cycles after a pause run slowly", advice)
     return Finding(name, "ok", "performance")
+
+
+def check_sleep(system: System) -> Finding:
+    """May a motion keep the cores awake between its cycles?"""
+    name = "sleeping cores"
+    if not system.has(DEVICE):
+        return Finding(name, "note", f"this kernel has no {DEVICE}", "boot with idle=poll for a real arm")
+    with awake_cores() as is_permitted:
+        pass
+    if is_permitted:
+        return Finding(name, "ok", "kept awake while something moves")
+    advice = (
+        """echo 'KERNEL=="cpu_dma_latency", GROUP="realtime", MODE="0660"' | sudo tee /etc/udev/rules.d/99-realtime.rules, """
+        "sudo groupadd -f realtime, sudo usermod -aG realtime $USER, and reboot"
+    )
+    return Finding(name, "note", f"{DEVICE} is not ours to use: cores that fall asleep wake up late", advice)
 
 
 def check_clock(system: System) -> Finding:

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from rcilab.awake import awake_cores
 from rcilab.client.address import parse_address
 from rcilab.client.commands import RciCommands
 from rcilab.client.control_loop import ControlLoop
@@ -199,7 +200,8 @@ class Worker:
             link, self._commands, self._settings.limits, ControllerMode.JOINT_POSITION, self._log, watch=self._watch
         )
         try:
-            reason = loop.run(follow(rows, self._publisher.on_cycle))
+            with awake_cores():
+                reason = loop.run(follow(rows, self._publisher.on_cycle))
         finally:
             gc.collect()
         if reason is None:

@@ -90,3 +90,14 @@ def test_every_question_has_an_answer_here_and_where_nothing_can_be_read(root: P
         processor.check_hypervisor(system),
     ]
     assert all(finding.value and "\n" not in str(finding) for finding in findings)
+
+
+def test_a_kernel_without_a_hold_on_sleeping_cores_is_noted(tree) -> None:
+    finding = processor.check_sleep(tree({}))
+    assert finding.verdict == "note"
+    assert "cpu_dma_latency" in finding.value
+
+
+def test_here_cores_are_kept_awake_or_the_remedy_is_named() -> None:
+    finding = processor.check_sleep(System())
+    assert finding.verdict == "ok" or "sudo" in finding.advice or "idle=poll" in finding.advice
