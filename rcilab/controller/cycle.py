@@ -104,7 +104,7 @@ class ControlCycle:
         self._drag = (rci.DragSpace.JOINT, rci.DragType.FREE)
         self._requested = self._shown = _IDLE_MODES
         self._countdown = self._drain = 0
-        self._followed = -1
+        self._has_moved = False
         self._message_id = 0
         self.state = self._report()
 
@@ -226,9 +226,15 @@ class ControlCycle:
             event = Event.SAFETY_RELEASE if kind is rci.SafetyStop.NONE else Event.SAFETY_STOP
             self.happen(event, Fault.INSTABILITY_DETECTION)
 
-    def step(self) -> RobotState:
-        """Lives through one millisecond and returns the state at its end."""
-        self._message_id += 1
+    def step(self, *, is_seen: bool = True) -> RobotState:
+        """Lives through one millisecond and returns the state at its end.
+
+        Args:
+            is_seen: Whether anybody will see that state. One that nobody sees has no number of its own: for the client,
+                which takes numbers for cycles, nothing is missing.
+        """
+        self._message_id += is_seen
+        self._has_moved = False
         self._count_down()
         step = self._follow()
         if step.faults:
@@ -236,7 +242,7 @@ class ControlCycle:
         law = self._current_law()
         if law is not Law.TORQUE:
             self._tau = None
-        self._arm.move(law, self._tau, has_moved=self._followed == self._message_id)
+        self._arm.move(law, self._tau, has_moved=self._has_moved)
         if self.phase in (Phase.MOVING, Phase.STOPPING):
             # Our own stop is one of the joints: how the tool turns meanwhile is nobody's command.
             faults, reason = self._arm.watch.judge(is_commanded=self.phase is Phase.MOVING or self._drain > 0)
@@ -270,7 +276,7 @@ class ControlCycle:
             return Step()
         step = self._count_losses(self._generator.step(playback), playback)
         if not step.faults:
-            self._followed = self._message_id
+            self._has_moved = True
             self._tau = step.tau
             if step.q is not None:
                 self._arm.commanded.move(step.q)

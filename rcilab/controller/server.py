@@ -225,7 +225,7 @@ class ControllerServer:
 
     def _step(self) -> None:
         if not self.config.lockstep and self.cycle.wants_commands and self.cycle.playout.work_off():
-            self._live()
+            self._live(is_seen=False)
         self._live()
         self._send_state()
         if self._pending is not None and self.cycle.is_settled:
@@ -238,12 +238,12 @@ class ControllerServer:
             if os.getppid() != self.config.parent_pid:
                 self.request_stop()
 
-    def _live(self) -> None:
+    def _live(self, *, is_seen: bool = True) -> None:
         """Lives through one millisecond."""
         if self.config.realtime and not self.config.lockstep:
             self._cores.switch(self.cycle.is_moving)
         faults = self.cycle.faults
-        state = self.cycle.step()
+        state = self.cycle.step(is_seen=is_seen)
         self._surroundings.step()
         if state.faults and state.faults != faults:
             self._log(f"{', '.join(fault.name for fault in state.faults)}: {self.cycle.reason}; the arm comes to rest")

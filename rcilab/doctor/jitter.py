@@ -1,7 +1,7 @@
 """How late a 1 kHz loop is on this machine, measured: `python -m rcilab.doctor.jitter SECONDS` is that loop.
 
-It does nothing but wake up, with the priority of the control process and on cores that do not sleep; whatever it is late
-by is the machine's. Once a second it prints the lateness of that second's cycles, [ns], as one JSON list.
+It does nothing but wake up, with the priority of the control process and on cores that do not sleep; whatever it is
+late by is the machine's. Once a second it prints the lateness of that second's cycles, [ns], as one JSON list.
 """
 
 from __future__ import annotations

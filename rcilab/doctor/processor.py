@@ -68,8 +68,8 @@ def check_sleep(system: System) -> Finding:
     if is_permitted:
         return Finding(name, "ok", "kept awake while something moves")
     advice = (
-        """echo 'KERNEL=="cpu_dma_latency", GROUP="realtime", MODE="0660"' | sudo tee /etc/udev/rules.d/99-realtime.rules, """
-        "sudo groupadd -f realtime, sudo usermod -aG realtime $USER, and reboot"
+        """echo 'KERNEL=="cpu_dma_latency", GROUP="realtime", MODE="0660"' | sudo tee """
+        "/etc/udev/rules.d/99-realtime.rules, sudo groupadd -f realtime, sudo usermod -aG realtime $USER, and reboot"
     )
     return Finding(name, "note", f"{DEVICE} is not ours to use: cores that fall asleep wake up late", advice)
 

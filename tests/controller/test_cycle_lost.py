@@ -128,6 +128,26 @@ def test_a_bad_network_does_not_stop_a_good_line(make_hand, plant) -> None:
     assert np.abs(hand.state.T_base_tool_c - np.reshape(commands[-1]["T_base_tool_c"], (4, 4))).max() < 1e-6
 
 
+def test_a_cycle_that_nobody_sees_is_no_gap_for_the_client(make_hand) -> None:
+    """More commands than the prefill are in stock from the beginning: they are worked off once, and that is all."""
+    hand = make_hand(prefill=3)
+    hand.start()
+    rows = hand.swing(1, 1.0, 0.5)
+    first = hand.state.message_id
+    for k in range(5):
+        hand.cycle.receive(rci.CommandPacket(first - 5 + k, tuple(rows[k])))
+    extra = 0
+    for row in rows[5:]:
+        hand.cycle.receive(rci.CommandPacket(hand.state.message_id, tuple(row)))
+        if hand.cycle.playout.work_off():
+            hand.cycle.step(is_seen=False)
+            extra += 1
+        assert hand.step().faults == ()
+    assert extra == 5  # The countdown of the prefill came on top of them.
+    assert np.diff([state.message_id for state in hand.states[-400:]]).max() == 1
+    assert (hand.cycle.playout.lost, hand.state.success_rate) == (0, 1.0)
+
+
 def test_a_client_that_jumps_behind_a_gap_is_told_so(make_hand) -> None:
     hand = make_hand(prefill=4)
     hand.start()

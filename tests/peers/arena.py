@@ -48,10 +48,10 @@ class Arena:
         """Lets the controller's own thread do something before its next step."""
         self._actions.append(action)
 
-    def _stepping(self) -> Any:
+    def _stepping(self, **options: Any) -> Any:
         while self._actions:
             self._actions.popleft()(self.cycle)
-        return self._step()
+        return self._step(**options)
 
     def connect(self, **options: Any) -> Robot:
         """Returns a robot object that waits for its states patiently and does not dawdle after StartMove."""
