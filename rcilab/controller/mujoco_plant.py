@@ -18,6 +18,7 @@ accelerations need up to 3.9 times of it. The arm does not touch itself: the con
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from typing import Any
 
@@ -44,6 +45,8 @@ _BRAKES_HOLD = 1e-4  # [rad/s] below this closed brakes hold
 _STILL_SPEED = 1e-7  # [rad/s] below this a resting arm is said to rest
 _STILL_ERROR = 1e-9  # [rad] nearer than this to its setpoint a resting arm is said to be there
 _STILL_CYCLES = 100  # Cycles of stillness after which an arm that something keeps off its setpoint rests where it is.
+
+_log = logging.getLogger("rcilab.controller")
 
 
 class MuJoCoPlant:
@@ -198,6 +201,7 @@ class MuJoCoPlant:
         import mujoco  # pyright: ignore[reportMissingTypeStubs]
 
         mj: Any = mujoco
+        mj.set_mju_user_warning(_pass_on)  # Else MuJoCo would write a file into the user's directory.
         load = model.load if self._mounted is None else self._mounted
         spec: Any = mj.MjSpec.from_string(build_mjcf(model.description, T_flange_tool=model.T_flange_tool, load=load))
         self._obstacles.add_to(spec, mj)
@@ -218,3 +222,8 @@ class MuJoCoPlant:
         self._product = np.zeros(model.n)
         self._rotors_are_felt = True
         self._still_for = 0
+
+
+def _pass_on(warning: str) -> None:
+    """Takes what MuJoCo finds odd about a simulation; it says each thing once an arm."""
+    _log.warning("MuJoCo: %s", warning)

@@ -198,3 +198,14 @@ def test_the_same_setpoints_give_the_same_bits() -> None:
         return b"".join(plant.step(target).q.tobytes() for _ in range(50))
 
     assert life() == life()
+
+
+def test_what_mujoco_warns_of_is_logged_and_no_file_is_written(tmp_path, monkeypatch, caplog) -> None:
+    monkeypatch.chdir(tmp_path)
+    model = load_model("xMatePro7")
+    plant = MuJoCoPlant(model)
+    plant.push([1e13, 0.0, 0.0, 0.0, 0.0, 0.0])
+    for _ in range(3):
+        plant.step(Setpoint(Drive.TORQUE, model.home.tolist(), [0.0] * 7, [0.0] * 7, tau=[0.0] * 7))
+    assert any("MuJoCo" in record.message for record in caplog.records)
+    assert list(tmp_path.iterdir()) == []
