@@ -1,6 +1,7 @@
 """The running controller: the cycle at 1 kHz or in lock-step, and its sockets. One thread; everything happens in it.
 
-Free-running, a cycle is due every millisecond on a fixed grid. A cycle that this process itself missed is left out
+Free-running, a state is due every millisecond on a fixed grid; its cycle is lived through a little before, so that it
+leaves in time however long that took. A cycle that this process itself missed is left out
 and counted: the simulated time slips, rather than the client being blamed for commands it had no state to answer.
 A client that went on meanwhile, as the vendor's does on its old state, has then sent more commands than cycles; such
 cycles are made up for, one in each millisecond and unseen, or its commands would be played later and later.
@@ -50,6 +51,7 @@ from rcilab.protocols.rci import (
 from rcilab.realtime import enter_realtime, leave_realtime
 
 PRIORITY = 80  # Under SCHED_FIFO; above the client's process, whose clock this is.
+LEAD_TIME = 0.0005  # [s] Before its state is due a cycle begins: longer than nearly all of them take; a choice.
 RESEND_TIME = 0.02  # [s] In lock-step a state is sent again after this time until the first command has come.
 PATIENCE = 1.0  # [s] In lock-step, for the next command; then its cycle is lost, and each following one at 1 kHz.
 GRACE = 2.0  # [s] For the arm to come to rest when the controller shall end.
@@ -176,10 +178,11 @@ class ControllerServer:
             if self.config.lockstep and self.cycle.wants_commands:
                 self._await_command()
                 deadline = self._clock.now()
+                self._step(deadline)
             else:
                 deadline = self._next_deadline(deadline)
-                self._await(deadline)
-            self._step()
+                self._await(deadline - LEAD_TIME)
+                self._step(deadline)
 
     def _stand_still(self, duration: float) -> None:
         """Does nothing at all for so long, [s], as a controller whose clock stalls; an end asked for goes before."""
@@ -223,10 +226,12 @@ class ControllerServer:
             elif self._clock.now() >= deadline:
                 return
 
-    def _step(self) -> None:
+    def _step(self, due: float) -> None:
+        """Lives through a cycle and sends its state when it is due, or at once when that is over."""
         if not self.config.lockstep and self.cycle.wants_commands and self.cycle.playout.work_off():
             self._live(is_seen=False)
         self._live()
+        self._clock.sleep_until(due)
         self._send_state()
         if self._pending is not None and self.cycle.is_settled:
             request, command_id, reply = self._pending
