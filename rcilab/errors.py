@@ -175,6 +175,7 @@ class InvalidValueError(UsageError, ValueError):
     Attributes:
         name: What the value is called.
         value: The value as it came in.
+        requirement: What it has to be, and what it is not.
     """
 
     def __init__(self, name: str, value: object, requirement: str) -> None:
@@ -182,3 +183,4 @@ class InvalidValueError(UsageError, ValueError):
         super().__init__(f"{name}: {text if len(text) < 120 else text[:117] + '...'} {requirement}")
         self.name = name
         self.value = value
+        self.requirement = requirement

@@ -9,6 +9,8 @@ import sys
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from rcilab.controller.config import ControllerConfig
+    from rcilab.errors import InvalidValueError
     from rcilab.protocols.world import NetworkFaults, Stall
 
 DESCRIPTION = """\
@@ -16,6 +18,9 @@ Runs a virtual RCI controller. Any RCI client can connect to it: this package, o
 client library. It prints one line when it is ready, a second one with the address of its world port, and ends on
 Ctrl-C.
 """
+
+_OPTIONS = {"limit_table": "--limits", "client_host": "--client", "client_port": "--client"}
+"""Where an option is not called as what it sets."""
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -32,6 +37,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--lockstep", action="store_true", help="advance a motion only as its commands come")
     parser.add_argument(
         "--prefill", type=int, metavar="N", help="play commands N cycles late, which absorbs jitter (10; lock-step: 0)"
+    )
+    parser.add_argument(
+        "--patience",
+        type=float,
+        metavar="S",
+        help="lock-step: how long to wait for a command (as long as the connection lives; 1 with a bad network)",
     )
     parser.add_argument(
         "--lost-limit",
@@ -89,32 +100,13 @@ def _add_network_options(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Runs the controller until it is told to end."""
-    from rcilab.controller.config import ControllerConfig
     from rcilab.controller.server import ControllerServer
+    from rcilab.errors import InvalidValueError
 
-    client_host, client_port = _client(args.client)
-    network, states_network = _networks(args)
-    config = ControllerConfig(
-        model=args.model,
-        host=args.host,
-        port=args.port,
-        udp_port=args.udp_port,
-        client_host=client_host,
-        client_port=client_port,
-        plant=args.plant,
-        lockstep=args.lockstep,
-        prefill=args.prefill,
-        lost_limit=args.lost_limit or None,  # 0 switches it off.
-        auto_limit=args.auto_limit,
-        loop_back=args.loop_back,
-        limit_table=args.limits,
-        network=network,
-        states_network=states_network,
-        stalls=tuple(map(parse_stall, args.stall)),
-        world_port=None if args.no_world else args.world_port,
-        # Without a number: whoever started us, as long as that one is still there to be asked for.
-        parent_pid=os.getppid() if args.exit_with_parent == 0 else args.exit_with_parent,
-    )
+    try:
+        config = _config(args)
+    except InvalidValueError as error:
+        raise _named(error, args) from error
     server = ControllerServer(config)
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: server.request_stop())
@@ -131,6 +123,43 @@ def run(args: argparse.Namespace) -> int:
     sys.stdout.flush()
     server.run()
     return 0
+
+
+def _config(args: argparse.Namespace) -> ControllerConfig:
+    from rcilab.controller.config import ControllerConfig
+
+    client_host, client_port = _client(args.client)
+    network, states_network = _networks(args)
+    return ControllerConfig(
+        model=args.model,
+        host=args.host,
+        port=args.port,
+        udp_port=args.udp_port,
+        client_host=client_host,
+        client_port=client_port,
+        plant=args.plant,
+        lockstep=args.lockstep,
+        prefill=args.prefill,
+        patience=args.patience,
+        lost_limit=args.lost_limit or None,  # 0 switches it off.
+        auto_limit=args.auto_limit,
+        loop_back=args.loop_back,
+        limit_table=args.limits,
+        network=network,
+        states_network=states_network,
+        stalls=tuple(map(parse_stall, args.stall)),
+        world_port=None if args.no_world else args.world_port,
+        # Without a number: whoever started us, as long as that one is still there to be asked for.
+        parent_pid=os.getppid() if args.exit_with_parent == 0 else args.exit_with_parent,
+    )
+
+
+def _named(error: InvalidValueError, args: argparse.Namespace) -> InvalidValueError:
+    """Returns an error about a value by the name of the option that gave it."""
+    if error.name not in _OPTIONS and error.name not in vars(args):
+        return error
+    option = _OPTIONS.get(error.name, "--" + error.name.replace("_", "-"))
+    return type(error)(option, error.value, error.requirement)
 
 
 def _client(text: str | None) -> tuple[str | None, int | None]:

@@ -50,6 +50,9 @@ class ControllerConfig:
     least, or it answers old states."""
     prefill: int | None = None
     """Cycles by which commands are played late, to absorb jitter, torques by 2 at most; None: 10, or 0 in lock-step."""
+    patience: float | None = None
+    """How long lock-step waits for a command before it counts as lost, [s]; None: as long as the connection lives, so
+    that a client may stand still in a debugger, or 1 s while the network is bad on purpose."""
     lost_limit: int | None = MOST_LOST
     """Lost cycles in a row that are an instability, 10 to 20; None: any number is bridged."""
     auto_limit: bool = False
@@ -87,11 +90,13 @@ class ControllerConfig:
             raise InvalidValueError("limit_table", self.limit_table, f"is unknown; known: {', '.join(LIMIT_TABLES)}")
         if self.mode_delay is not None and not 0.0 <= self.mode_delay <= 5.0:
             raise InvalidValueError("mode_delay", self.mode_delay, "needs 0 to 5 s")
+        if self.patience is not None and not 0.01 <= self.patience <= 3600.0:
+            raise InvalidValueError("patience", self.patience, "needs 0.01 to 3600 s")
         if self.prefill is not None and not 0 <= self.prefill <= 100:
             raise InvalidValueError("prefill", self.prefill, "needs 0 to 100 cycles")
         if self.lost_limit is not None and not FEWEST_LOST <= self.lost_limit <= MOST_LOST:
             raise InvalidValueError(
-                "lost_limit", self.lost_limit, f"needs {FEWEST_LOST} to {MOST_LOST} cycles, or None for no limit"
+                "lost_limit", self.lost_limit, f"needs {FEWEST_LOST} to {MOST_LOST} cycles, or none for no limit"
             )
 
     @property

@@ -89,6 +89,11 @@ class Endpoint:
         self._arrivals: deque[Arrival] = deque()
 
     @property
+    def fixed_host(self) -> str | None:
+        """Where states go whoever connects; None: to whoever connects."""
+        return None if self._fixed_target is None else self._fixed_target[0]
+
+    @property
     def has_client(self) -> bool:
         """Whether somebody is connected."""
         return self._connection is not None
@@ -241,12 +246,16 @@ def _bind(kind: socket.SocketKind, address: str, port: int, option: str, *, shar
 def _explain(error: OSError, kind: socket.SocketKind, address: str, port: int, option: str) -> str:
     name = "TCP" if kind is socket.SOCK_STREAM else "UDP"
     if error.errno == errno.EADDRINUSE:
+        others = "controller" if kind is socket.SOCK_STREAM else "controller, or the client that took every address,"
         return (
-            f"{name} port {port} on {address} is in use; stop the other controller there, or choose another port "
+            f"{name} port {port} on {address} is in use; stop the other {others} there, or choose another port "
             f"with {option} N (0 takes any free one)"
         )
     if error.errno == errno.EADDRNOTAVAIL:
-        return f"{address} is no address of this machine; choose one with --host, such as 127.0.0.2"
+        return (
+            f"{address} is no address of this machine; choose one with --host, such as 127.0.0.2, or start the "
+            "controller where that address is: ip netns exec NAME rcilab controller …"
+        )
     if error.errno == errno.EACCES:
         return f"{name} port {port} needs privileges; choose one above 1023 with {option} N"
     return f"{name} port {port} on {address} cannot be used: {error.strerror}; choose others with --host and {option}"

@@ -48,7 +48,7 @@ class FaultyNetwork:
 
     def poll(self, timeout: float, guests: Sequence[socket.socket] = ()) -> list[Arrival]:
         """Returns what has come through; see `Endpoint.poll`. What is under way goes on meanwhile."""
-        if self._is_clean:
+        if self.is_clean:
             return self._endpoint.poll(timeout, guests)
         deadline = self._clock.now() + timeout
         while True:
@@ -85,7 +85,8 @@ class FaultyNetwork:
             self._send_what_is_due()
 
     @property
-    def _is_clean(self) -> bool:
+    def is_clean(self) -> bool:
+        """Whether nothing is wrong."""
         return self._commands.is_clean and self._states.is_clean and self._answers.is_clean
 
     def _send_what_is_due(self) -> None:

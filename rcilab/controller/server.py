@@ -5,7 +5,9 @@ leaves in time however long that took. A cycle that this process itself missed i
 and counted: the simulated time slips, rather than the client being blamed for commands it had no state to answer.
 A client that went on meanwhile, as the vendor's does on its old state, has then sent more commands than cycles; such
 cycles are made up for, one in each millisecond and unseen, or its commands would be played later and later.
-In lock-step a motion's next cycle is due when its command has come, however long or short that takes.
+In lock-step a motion's next cycle is due when its command has come, however long or short that takes. When several
+commands wait, as after the vendor client's sleep, they are lived through without a word, and the state after the last
+one is the one to answer.
 """
 
 from __future__ import annotations
@@ -38,6 +40,7 @@ from rcilab.controller.state_machine import Event, Phase, When
 from rcilab.controller.surroundings import Mishaps, Surroundings
 from rcilab.controller.world_port import WorldPort
 from rcilab.errors import DecodeError, UsageError
+from rcilab.faults import Fault
 from rcilab.model import RobotModel, load_model
 from rcilab.protocols.rci import (
     COMMAND_SIZE,
@@ -53,7 +56,10 @@ from rcilab.realtime import enter_realtime, leave_realtime
 PRIORITY = 80  # Under SCHED_FIFO; above the client's process, whose clock this is.
 LEAD_TIME = 0.0005  # [s] Before its state is due a cycle begins: longer than nearly all of them take; a choice.
 RESEND_TIME = 0.02  # [s] In lock-step a state is sent again after this time until the first command has come.
-PATIENCE = 1.0  # [s] In lock-step, for the next command; then its cycle is lost, and each following one at 1 kHz.
+PATIENCE = 1.0  # [s] In lock-step over a bad network, for the next command; then its cycle is lost, and each following
+# one at 1 kHz.
+FAREWELL = 20  # [cycles] In which a client learns of the end from the error bit of its states.
+SLIP = 20  # [cycles] A motion that took so much longer than it should is worth a line.
 GRACE = 2.0  # [s] For the arm to come to rest when the controller shall end.
 _LOOK = 0.1  # [s] Between looks at whether the parent process still lives, or a stalled controller shall end.
 
@@ -105,6 +111,7 @@ class ControllerServer:
         self._is_ending = False
         self._next_look = 0.0
         self._cores = AwakeCores()
+        self._missed_before = 0
         self._endpoint = Endpoint(config)
         states_network = config.network if config.states_network is None else config.states_network
         self._network = FaultyNetwork(self._endpoint, self._clock, config.network, states_network)
@@ -168,13 +175,16 @@ class ControllerServer:
         deadline = self._clock.now()
         self._stalls.replace(self.config.stalls, deadline)
         last_moment: float | None = None
+        farewell = 0
         while True:
             self._stand_still(self._stalls.take(self._clock.now()))
             if self._is_ending and last_moment is None:
                 last_moment = self._clock.now() + GRACE
-                self.cycle.happen(Event.CLIENT_LOST)
-            if last_moment is not None and (not self.cycle.is_moving or self._clock.now() > last_moment):
-                return
+                farewell = self._say_farewell()
+            if last_moment is not None:
+                farewell -= 1
+                if (not self.cycle.is_moving and farewell < 0) or self._clock.now() > last_moment:
+                    return
             if self.config.lockstep and self.cycle.wants_commands:
                 self._await_command()
                 deadline = self._clock.now()
@@ -183,6 +193,16 @@ class ControllerServer:
                 deadline = self._next_deadline(deadline)
                 self._await(deadline - LEAD_TIME)
                 self._step(deadline)
+
+    def _say_farewell(self) -> int:
+        """Ends what is under way; returns for how many cycles states shall still tell a client that moved of it."""
+        if self.cycle.phase is not Phase.MOVING:
+            self.cycle.happen(Event.CLIENT_LOST)
+            return 0
+        self.cycle.reason = "the controller was told to end"
+        self._log("told to end in mid-motion: the arm comes to rest, and the error bit tells the client")
+        self.cycle.happen(Event.FAULT, Fault.INSTABILITY_DETECTION)
+        return FAREWELL
 
     def _stand_still(self, duration: float) -> None:
         """Does nothing at all for so long, [s], as a controller whose clock stalls; an end asked for goes before."""
@@ -215,10 +235,11 @@ class ControllerServer:
         """Serves the sockets until a command is there, the motion is over or patience is."""
         cycle = self.cycle
         is_first = not cycle.playout.is_playing
-        patience = CYCLE_TIME if cycle.playout.lost_in_row else PATIENCE
-        deadline = self._clock.now() + patience
+        deadline = self._clock.now() + self._patience
         while True:
-            self._poll(0.0 if len(cycle.playout) else RESEND_TIME if is_first else patience)
+            remaining = min(deadline - self._clock.now(), _LOOK)
+            self._poll(0.0 if len(cycle.playout) else RESEND_TIME if is_first else remaining)
+            self._look_for_parent()
             if len(cycle.playout) or not cycle.wants_commands or self._is_ending:
                 return
             if is_first:
@@ -226,22 +247,54 @@ class ControllerServer:
             elif self._clock.now() >= deadline:
                 return
 
+    @property
+    def _patience(self) -> float:
+        """How long lock-step waits for the next command, [s]."""
+        if self.cycle.playout.lost_in_row:
+            return CYCLE_TIME
+        if self.config.patience is not None:
+            return self.config.patience
+        return float("inf") if self._network.is_clean else PATIENCE
+
     def _step(self, due: float) -> None:
         """Lives through a cycle and sends its state when it is due, or at once when that is over."""
+        was_moving = self.cycle.is_moving
+        if self.config.lockstep:
+            self._live_through_stock()
         if not self.config.lockstep and self.cycle.wants_commands and self.cycle.playout.work_off():
             self._live(is_seen=False)
         self._live()
         self._clock.sleep_until(due)
         self._send_state()
+        if self.cycle.is_moving is not was_moving and not self.config.lockstep:
+            self._tell_slip()
         if self._pending is not None and self.cycle.is_settled:
             request, command_id, reply = self._pending
             self._pending = None
             self._answer(request, command_id, reply)
             self._serve()
+        self._look_for_parent()
+
+    def _look_for_parent(self) -> None:
         if self.config.parent_pid is not None and self._clock.now() >= self._next_look:
             self._next_look = self._clock.now() + _LOOK
             if os.getppid() != self.config.parent_pid:
                 self.request_stop()
+
+    def _live_through_stock(self) -> None:
+        """Plays all commands that wait but the last one and the prefill."""
+        playout = self.cycle.playout
+        for _ in range(len(playout) - 1 - self.config.prefill_cycles):
+            if not self.cycle.wants_commands:
+                return
+            self._live(is_seen=False)
+
+    def _tell_slip(self) -> None:
+        """Says how much longer than it should a motion took, when one has ended."""
+        if not self.cycle.is_moving and self.missed - self._missed_before >= SLIP:
+            slipped = 1e3 * CYCLE_TIME * (self.missed - self._missed_before)
+            self._log(f"that motion took {slipped:.0f} ms longer than it should: this machine, or a stall, held us up")
+        self._missed_before = self.missed
 
     def _live(self, *, is_seen: bool = True) -> None:
         """Lives through one millisecond."""
@@ -252,6 +305,10 @@ class ControllerServer:
         self._surroundings.step()
         if state.faults and state.faults != faults:
             self._log(f"{', '.join(fault.name for fault in state.faults)}: {self.cycle.reason}; the arm comes to rest")
+            if Fault.INSTABILITY_DETECTION in state.faults and self.cycle.playout.lost_in_row:
+                self._log(
+                    "a client that pauses needs a deeper play-out (--prefill 50), SCHED_FIFO for itself, or --lockstep"
+                )
 
     def _send_state(self) -> None:
         self._network.send_state(encode_state(self.cycle.state))
@@ -267,7 +324,8 @@ class ControllerServer:
                 case FrameArrived(frame):
                     self._requests.append(frame)
                     self._serve()
-                case ClientJoined():
+                case ClientJoined(address):
+                    self._warn_of_other_target(address)
                     self._send_state()  # Before anything else: the vendor's client waits for it a few milliseconds.
                 case ClientLeft(reason):
                     self._lose_client(reason)
@@ -300,6 +358,14 @@ class ControllerServer:
         self._network.send_frame(encode_response(request.code, command_id, self.cycle.conclude(reply)))
         if reply.ends_connection:
             self._network.drop_client("asked for a reboot")
+
+    def _warn_of_other_target(self, address: str) -> None:
+        target = self._endpoint.fixed_host
+        if target not in (None, address):
+            self._log(
+                f"{address} connected, but states go to {target}, as --client says: it will not see any; start with "
+                f"--client {address}, or without"
+            )
 
     def _lose_client(self, reason: str) -> None:
         was_moving = self.cycle.phase in (Phase.MOVING, Phase.STOPPING, Phase.GUIDING)

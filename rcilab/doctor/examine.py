@@ -12,7 +12,7 @@ from rcilab.client.address import RobotAddress
 from rcilab.doctor import kernel, network, processor, software
 from rcilab.doctor.finding import Finding
 from rcilab.doctor.jitter import check_jitter
-from rcilab.doctor.round_trip import check_round_trip
+from rcilab.doctor.round_trip import check_controller, check_round_trip
 from rcilab.doctor.system import System
 
 
@@ -43,6 +43,7 @@ def examine(
     yield kernel.check_fifo(fifo, system)
     yield kernel.check_memory_lock(locked, system)
     yield kernel.check_throttling(system)
+    yield kernel.check_vendor_library(fifo, system)
     yield processor.check_cores(cores)
     yield processor.check_isolation(cores, system)
     yield processor.check_governor(system)
@@ -57,6 +58,7 @@ def examine(
         yield finding
         if route is not None:
             is_for_real = not network.is_here(route)
+            yield check_controller(route.robot_tcp, is_here=not is_for_real)
             yield check_round_trip(route.robot_tcp[0])
     if seconds > 0.0:
         yield check_jitter(seconds, system, progress, is_for_real=is_for_real)

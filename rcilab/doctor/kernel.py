@@ -16,11 +16,12 @@ _FULL_PREEMPTION = (
     "next boot, echo full | sudo tee /sys/kernel/debug/sched/preempt"
 )
 _USER_LIMITS = (
-    "add '@realtime - rtprio 80' and '@realtime - memlock unlimited' to /etc/security/limits.conf, then sudo groupadd "
+    "add '@realtime - rtprio 99' and '@realtime - memlock unlimited' to /etc/security/limits.conf, then sudo groupadd "
     "-f realtime, sudo usermod -aG realtime $USER, and log in again"
 )
 _CONTAINER = "docker run --cap-add SYS_NICE --cap-add IPC_LOCK --ulimit rtprio=99 --ulimit memlock=-1"
 _DEBUG_FILE = "/sys/kernel/debug/sched/preempt"
+_VENDOR_FILE = "/sys/kernel/realtime"  # RCI manual 2.2
 _BUILT_MODES = {  # Options of a kernel with PREEMPT_DYNAMIC, and the mode that each makes the default.
     "CONFIG_PREEMPT_NONE": "none",
     "CONFIG_PREEMPT_VOLUNTARY": "voluntary",
@@ -99,6 +100,28 @@ def check_memory_lock(granted: bool, system: System) -> Finding:
     )
 
 
+def check_vendor_library(fifo: bool, system: System) -> Finding:
+    """Would the vendor's client library start here? It looks for one file, and asks for the highest priority.
+
+    Args:
+        fifo: Whether a process of ours got SCHED_FIFO.
+        system: Has the file, or not.
+    """
+    name = "vendor's library"
+    if system.read(_VENDOR_FILE).text != "1":
+        return Finding(
+            name,
+            "note",
+            f"{_VENDOR_FILE} does not say 1: programs that use it end with an error, unless they are built with "
+            "enforce_realtime = false",
+            "for such a program alone: sudo unshare -m sh -c 'mount -t tmpfs none /sys/kernel; echo 1 > "
+            f"{_VENDOR_FILE}; exec ./program'",
+        )
+    if not fifo:
+        return Finding(name, "note", "needs SCHED_FIFO 99, or it ends with an error", f"run as root, or {_USER_LIMITS}")
+    return Finding(name, "ok", "finds what it asks for")
+
+
 def check_throttling(system: System) -> Finding:
     """Does the kernel leave real-time loops enough of every period? Ours need less than half."""
     name = "real-time share"
@@ -119,8 +142,8 @@ def check_throttling(system: System) -> Finding:
 
 def _is_realtime(system: System) -> bool:
     version = system.read("/proc/sys/kernel/version").text or ""
-    # Kernels before 5.3 wrote "PREEMPT RT"; the file of the manual, 2.2, came with the patch and is newer in mainline.
-    return system.read("/sys/kernel/realtime").text == "1" or bool(re.search(r"PREEMPT[_ ]RT\b", version))
+    # Kernels before 5.3 wrote "PREEMPT RT". The file of the manual, 2.2, is no proof: people make it for the library.
+    return bool(re.search(r"PREEMPT[_ ]RT\b", version))
 
 
 def _dynamic_mode(system: System) -> tuple[str | None, str]:

@@ -1,7 +1,8 @@
 """How long a packet takes to the robot and back: ICMP echoes of the size of a state, at a tenth of its rate.
 
-An echo is answered by the other end's kernel. Nothing is said to the robot's program, so this disturbs nobody who
-drives it, and says nothing about how quick that program is.
+An echo is answered by the other end's kernel. Nothing is said to a real robot's program, so this disturbs nobody who
+drives it, and says nothing about how quick that program is. A virtual controller on this machine is knocked at: it
+turns a second client away.
 """
 
 from __future__ import annotations
@@ -43,6 +44,26 @@ def check_round_trip(host: str) -> Finding:
         except OSError as error:
             return Finding(name, "bad", f"{host}: {error.strerror or error}", "check the cable and the address")
     return judge_round_trips(host, times)
+
+
+def check_controller(place: tuple[str, int], *, is_here: bool) -> Finding:
+    """Does a controller listen there?
+
+    Args:
+        place: Address and TCP port.
+        is_here: Whether it is a virtual one on this machine; another one is left in peace.
+    """
+    name, (host, port) = "controller", place
+    if not is_here:
+        return Finding(
+            name, "ok", f"not knocked at: that could disturb whoever drives {host}; rcilab run and connect() will tell"
+        )
+    try:
+        socket.create_connection(place, timeout=_PATIENCE).close()
+    except OSError as error:
+        advice = f"start one: rcilab controller --model NAME --host {host} --port {port}"
+        return Finding(name, "bad", f"nobody answers at {host}:{port}: {error.strerror or error}", advice)
+    return Finding(name, "ok", f"listens at {host}:{port}")
 
 
 def measure_round_trips(echo: Echo, *, interval: float = _INTERVAL, count: int = ECHOES) -> list[float | None]:

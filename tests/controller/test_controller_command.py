@@ -101,15 +101,15 @@ def test_without_a_world_there_is_no_second_line() -> None:
 @pytest.mark.parametrize(
     ("option", "value", "message"),
     [
-        ("--loss", "1.5", r"loss: 1\.5 needs 0 to 1"),
-        ("--delay", "nan", "delay: nan must be a finite number"),
-        ("--tcp-split", "-1", "tcp_split: -1 needs a whole number"),
+        ("--loss", "1.5", r"--loss: 1\.5 needs 0 to 1"),
+        ("--delay", "nan", "--delay: nan must be a finite number"),
+        ("--tcp-split", "-1", "--tcp-split: -1 needs a whole number"),
         ("--faults-on", "tcp", "--faults-on: 'tcp' is unknown; known: both, commands, states"),
         ("--stall", "soon", r"--stall: 'soon' needs seconds, as 0\.05@2\.0"),
         ("--stall", "9", "duration: 9.0 needs 0.001 to 5"),
         ("--stall", "0.5/0.1", "period: 0.1 needs"),
-        ("--limits", "none", "limit_table: 'none' is unknown; known: manual, sdk"),
-        ("--world-port", "70000", "world_port: 70000 is no port"),
+        ("--limits", "none", "--limits: 'none' is unknown; known: manual, sdk"),
+        ("--world-port", "70000", "--world-port: 70000 is no port"),
     ],
 )
 def test_an_option_out_of_range_is_one_sentence(option: str, value: str, message: str) -> None:

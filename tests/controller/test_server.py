@@ -373,7 +373,7 @@ def test_connect_tells_the_controller_another_port(lockstep: Running) -> None:
 
 
 def test_a_client_that_falls_silent_is_an_instability_and_one_stop() -> None:
-    with running(lockstep=True, lost_limit=10) as found, Peer(found) as peer:
+    with running(lockstep=True, lost_limit=10, patience=0.2) as found, Peer(found) as peer:
         peer.run(MOTION.q[:150])
         while not peer.receive_state().faults:
             pass
@@ -386,6 +386,71 @@ def test_a_client_that_falls_silent_is_an_instability_and_one_stop() -> None:
         assert peer.ask(rci.StartMove(0, 1)) is rci.StartStatus.REFLEX
         assert peer.ask(rci.AutomaticErrorRecovery()) is rci.RecoveryStatus.SUCCESS
         assert not peer.receive_newest_state().faults
+
+
+def test_in_lock_step_a_client_may_stand_in_a_debugger() -> None:
+    with running(lockstep=True) as found, Peer(found) as peer:
+        peer.run(MOTION.q[:150])
+        peer.udp.settimeout(1.5)
+        with pytest.raises(TimeoutError):  # Nothing happens, for longer than any cycle could be late.
+            peer.receive_state()
+        peer.udp.settimeout(PATIENCE)
+        for row in MOTION.q[150:]:
+            peer.send(peer.seen[-1].message_id, row)
+            peer.receive_state()
+        assert peer.ask(rci.StopMove()) is rci.StopStatus.SUCCESS
+        assert peer.receive_live_state().faults == ()
+        assert found.server.cycle.playout.lost == 0
+
+
+def test_in_lock_step_answers_to_repeated_states_do_not_stay_in_stock(lockstep: Running) -> None:
+    """While the vendor's client sleeps after StartMove the first state comes again and again; it answers each."""
+    with Peer(lockstep) as peer:
+        state = peer.start()
+        for row in MOTION.q[:40]:
+            peer.send(state.message_id, row)
+        lag = []
+        for row in MOTION.q[40:]:
+            state = peer.receive_newest_state()
+            peer.send(state.message_id, row)
+            lag.append(len(lockstep.server.cycle.playout))
+        assert max(lag[20:]) <= 2
+        assert peer.ask(rci.StopMove()) is rci.StopStatus.SUCCESS
+        state = peer.receive_live_state()
+        assert state.faults == ()
+        assert np.array_equal(state.q_c, MOTION.q[-1])
+
+
+def test_told_to_end_in_mid_motion_it_tells_the_client_with_an_error_bit() -> None:
+    with running(lockstep=True) as found, Peer(found) as peer:
+        peer.run(MOTION.q[:150])
+        found.server.request_stop()
+        while not peer.receive_state().faults:
+            pass
+        assert peer.seen[-1].faults == (Fault.INSTABILITY_DETECTION,)
+        while peer.seen[-1].dq_c.any():
+            peer.receive_state()
+        found.thread.join(PATIENCE)
+        assert not found.thread.is_alive()
+        assert stop_is_smooth(peer.seen)
+        assert closes(peer.tcp)
+    assert any("told to end in mid-motion" in line for line in found.lines)
+
+
+def test_states_that_go_to_another_address_than_the_client_are_pointed_out() -> None:
+    with running(client_host="127.0.0.3", udp_port=0) as found, Peer(found):
+        assert "--client 127.0.0.1" in found.wait_for_line("it will not see any")
+
+
+def test_a_motion_that_the_machine_held_up_says_so() -> None:
+    with running(mode_delay=0.005, stalls=(Stall(duration=0.1, after=0.3),)) as found, Peer(found) as peer:
+        state = peer.start()
+        q = np.array(state.q_c)
+        while found.server.missed < 50:
+            peer.send(state.message_id, q)
+            state = peer.receive_state()
+        assert peer.ask(rci.StopMove()) == 0
+        assert "longer than it should" in found.wait_for_line("that motion took")
 
 
 def test_a_command_that_jumps_is_a_fault_in_the_state_that_answers_it(lockstep: Running) -> None:
@@ -455,19 +520,6 @@ def test_commands_sent_while_the_controller_stood_still_are_made_up_for() -> Non
         peer.udp.settimeout(PATIENCE)
         assert peer.ask(rci.StopMove()) == 0
         assert peer.receive_live_state().faults == ()
-
-
-def test_asked_to_end_in_mid_motion_it_brings_the_arm_to_rest_first() -> None:
-    with running(lockstep=True) as found, Peer(found) as peer:
-        peer.run(MOTION.q[:150])
-        found.server.request_stop()
-        while peer.receive_state().robot_mode is not RobotMode.IDLE:
-            pass
-        found.thread.join(PATIENCE)
-        assert not found.thread.is_alive()
-        assert not peer.seen[-1].dq_c.any()
-        assert stop_is_smooth(peer.seen)
-        assert closes(peer.tcp)
 
 
 def test_a_reboot_is_answered_and_then_ends_the_connection(lockstep: Running) -> None:

@@ -28,8 +28,7 @@ def is_judged(finding: Finding, verdict: str, *words: str) -> bool:
 @pytest.mark.parametrize(
     ("files", "verdict"),
     [
-        ({"/sys/kernel/realtime": "1\n"}, "ok"),
-        ({"/sys/kernel/realtime": "0\n"}, "note"),
+        ({**DYNAMIC, "/sys/kernel/realtime": "1\n"}, "note"),
         ({"/proc/sys/kernel/version": "#1 SMP PREEMPT_RT Debian 6.1.90-1"}, "ok"),
         ({"/proc/sys/kernel/version": "#1 SMP PREEMPT RT Fri Jan 5"}, "ok"),
         (DYNAMIC, "note"),
@@ -98,7 +97,7 @@ def test_a_mode_that_was_built_in_is_told_by_the_version(tree, version: str, ver
     ("rtprio", "words"),
     [
         ("0", ("limit is 0", "limits.conf", "--cap-add SYS_NICE")),
-        ("40", ("limit is 40", "rtprio 80")),
+        ("40", ("limit is 40", "rtprio 99")),
         ("unlimited", ("although", "--cap-add SYS_NICE")),
     ],
 )
@@ -144,3 +143,16 @@ def test_every_question_has_an_answer_here_and_where_nothing_can_be_read(root: P
         assert finding.value
         assert "\n" not in str(finding)
         assert finding.advice or finding.verdict == "ok" or "unknown" in finding.value
+
+
+@pytest.mark.parametrize(
+    ("files", "fifo", "verdict", "said"),
+    [
+        ({"/sys/kernel/realtime": "1\n"}, True, "ok", "finds"),
+        ({"/sys/kernel/realtime": "1\n"}, False, "note", "rtprio 99"),
+        ({"/sys/kernel/realtime": "0\n"}, True, "note", "unshare"),
+        ({}, True, "note", "enforce_realtime = false"),
+    ],
+)
+def test_what_the_vendors_library_asks_for_is_looked_at(tree, files, fifo: bool, verdict: str, said: str) -> None:
+    assert is_judged(kernel.check_vendor_library(fifo, tree(files)), verdict, said)

@@ -1,10 +1,12 @@
 from __future__ import annotations
 
+import socket
 import struct
 
 import pytest
 
 from rcilab.doctor import round_trip
+from rcilab.doctor.round_trip import check_controller
 
 
 def test_this_machine_answers_itself_or_says_why_not() -> None:
@@ -43,3 +45,13 @@ def test_a_quick_way_that_loses_nothing_is_good(times: list[float | None], verdi
     assert finding.verdict == verdict
     assert finding.figures["lost"] == times.count(None)
     assert ("RCI manual 2.5" in finding.advice) is (verdict == "note")
+
+
+def test_a_controller_on_this_machine_is_knocked_at_and_no_other() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        place = listener.getsockname()
+        assert check_controller(place, is_here=True).verdict == "ok"
+    finding = check_controller(place, is_here=True)
+    assert finding.verdict == "bad"
+    assert f"--port {place[1]}" in finding.advice
+    assert "not knocked at" in check_controller(("192.0.2.1", 1337), is_here=False).value
