@@ -259,10 +259,7 @@ class ControllerServer:
     def _step(self, due: float) -> None:
         """Lives through a cycle and sends its state when it is due, or at once when that is over."""
         was_moving = self.cycle.is_moving
-        if self.config.lockstep:
-            self._live_through_stock()
-        if not self.config.lockstep and self.cycle.wants_commands and self.cycle.playout.work_off():
-            self._live(is_seen=False)
+        self._catch_up()
         self._live()
         self._clock.sleep_until(due)
         self._send_state()
@@ -281,13 +278,13 @@ class ControllerServer:
             if os.getppid() != self.config.parent_pid:
                 self.request_stop()
 
-    def _live_through_stock(self) -> None:
-        """Plays all commands that wait but the last one and the prefill."""
+    def _catch_up(self) -> None:
+        """Lives through cycles that nobody sees, when more commands wait than should."""
         playout = self.cycle.playout
-        for _ in range(len(playout) - 1 - self.config.prefill_cycles):
-            if not self.cycle.wants_commands:
-                return
-            self._live(is_seen=False)
+        extra = len(playout) - 1 - self.config.prefill_cycles if self.config.lockstep else int(playout.work_off())
+        for _ in range(extra):
+            if self.cycle.wants_commands:
+                self._live(is_seen=False)
 
     def _tell_slip(self) -> None:
         """Says how much longer than it should a motion took, when one has ended."""
