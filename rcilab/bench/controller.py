@@ -18,7 +18,7 @@ from rcilab.bench.machine import ask_realtime
 from rcilab.bench.measure import Measurement, summarise
 from rcilab.client.address import parse_address
 from rcilab.clock import CYCLE_TIME
-from rcilab.controller.config import PlantKind
+from rcilab.controller.config import PLANT_KINDS, PlantKind
 from rcilab.controller.cycle import ControlCycle
 from rcilab.controller.server import build_plant
 from rcilab.errors import DeadlineError
@@ -50,9 +50,25 @@ def bench_controller(plant: PlantKind) -> Measurement:
 def bench_controller_cartesian() -> Measurement:
     """The same while the tool is commanded, inverse kinematics included; with MuJoCo in the note."""
     model = load_model(_ROBOT)
-    start, commands = rci.StartMove(1, 2), _line_commands(model, _DURATION)
-    found = _measure("controller_cartesian", model, "ideal", start, commands)
-    other = _measure("controller_cartesian", model, "mujoco", start, commands)
+    return _in_both_plants("controller_cartesian", model, rci.StartMove(1, 2), _line_commands(model, _DURATION))
+
+
+def bench_controller_impedance() -> Measurement:
+    """The same with springs at the tool, the mode that computes most; joint impedance and torque in the note."""
+    model = load_model(_ROBOT)
+    found = _in_both_plants("controller_impedance", model, rci.StartMove(3, 2), _line_commands(model, _DURATION))
+    others: list[str] = []
+    for start, commands in (
+        (rci.StartMove(2, 1), joint_commands(model, _DURATION)),
+        (rci.StartMove(4, 0), lambda message_id, cycle: rci.encode_command(rci.CommandPacket(message_id))),
+    ):
+        ideal, mujoco = (_measure("controller_impedance", model, plant, start, commands) for plant in PLANT_KINDS)
+        others.append(f"{_mode_name(start)} {ideal.median:.0f} us, in MuJoCo {mujoco.median:.0f} us")
+    return replace(found, note="; ".join((found.note, *others)))
+
+
+def _in_both_plants(name: str, model: RobotModel, start: rci.StartMove, commands: Command) -> Measurement:
+    found, other = (_measure(name, model, plant, start, commands) for plant in PLANT_KINDS)
     note = f"{found.note}; in MuJoCo {other.median:.0f} us, p99 {other.p99:.0f} us"
     return replace(found, note=note, ok=bool(found.ok and other.ok))
 
@@ -118,15 +134,18 @@ def _measure(name: str, model: RobotModel, plant: PlantKind, start: rci.StartMov
     cycle.handle(rci.SetMotorPower(1))
     resting = _times(cycle, lambda message_id, k: None, 1000)
     cycle.handle(start)
-    while cycle.state.motion_generator_mode is MotionGeneratorMode.IDLE and cycle.state.message_id < 2000:
+    while cycle.state.controller_mode is ControllerMode.OTHER and cycle.state.message_id < 2000:
         cycle.step()
     moving = _times(cycle, command, round(_DURATION / CYCLE_TIME))
-    mode = ControllerMode(start.controller_mode).name.lower().replace("_", " ")
-    note = f"{_ROBOT}, {mode}, {_DURATION:g} s of motion; at rest {1e6 * np.median(resting):.0f} us"
+    note = f"{_ROBOT}, {_mode_name(start)}, {_DURATION:g} s of motion; at rest {1e6 * np.median(resting):.0f} us"
     found = summarise(name, moving, "us", _TARGETS[plant], note)
-    if cycle.state.motion_generator_mode is MotionGeneratorMode.IDLE:
+    if cycle.state.controller_mode is ControllerMode.OTHER:
         return replace(found, ok=False, note=f"{note}; THE MOTION DID NOT RUN: {cycle.reason or 'refused'}")
     return found
+
+
+def _mode_name(start: rci.StartMove) -> str:
+    return ControllerMode(start.controller_mode).name.lower().replace("_", " ")
 
 
 def _times(cycle: ControlCycle, command: Callable[[int, int], bytes | None], count: int) -> Array:

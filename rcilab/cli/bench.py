@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 BENCHES = (
     *("forward", "inverse", "plan_joint", "check"),
-    *("controller_ideal", "controller_mujoco", "controller_cartesian", "client_answer"),
+    *("controller_ideal", "controller_mujoco", "controller_cartesian", "controller_impedance", "client_answer"),
     *("drag", "import", "start", "state_period", "control_loop"),
 )
 """In the order they run; the slow ones last."""
@@ -76,13 +76,14 @@ def _bench(name: str, seconds: float) -> Callable[[], Measurement]:
         from rcilab.bench.client import bench_client_answer
 
         return bench_client_answer
-    if name in ("controller_ideal", "controller_mujoco", "controller_cartesian", "state_period"):
+    if name.startswith("controller_") or name == "state_period":
         from rcilab.bench import controller
 
         return {
             "controller_ideal": lambda: controller.bench_controller("ideal"),
             "controller_mujoco": lambda: controller.bench_controller("mujoco"),
             "controller_cartesian": controller.bench_controller_cartesian,
+            "controller_impedance": controller.bench_controller_impedance,
             "state_period": controller.bench_state_period,
         }[name]
     if name in ("import", "start"):

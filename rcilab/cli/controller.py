@@ -36,7 +36,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--plant", default="ideal", metavar="KIND", help="what moves: ideal or mujoco (%(default)s)")
     parser.add_argument("--lockstep", action="store_true", help="advance a motion only as its commands come")
     parser.add_argument(
-        "--prefill", type=int, metavar="N", help="play commands N cycles late, which absorbs jitter (10; lock-step: 0)"
+        "--prefill",
+        type=int,
+        metavar="N",
+        help="play commands N cycles late, which absorbs jitter (10, torques 2; lock-step: 0)",
     )
     parser.add_argument(
         "--patience",

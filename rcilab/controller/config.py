@@ -49,7 +49,7 @@ class ControllerConfig:
     """From StartMove to the requested modes, [s]; None: 0.2, or 0.02 in lock-step. The vendor's client wants 0.1 at
     least, or it answers old states."""
     prefill: int | None = None
-    """Cycles by which commands are played late, to absorb jitter, torques by 2 at most; None: 10, or 0 in lock-step."""
+    """Cycles by which commands are played late, to absorb jitter; None: 10, and 2 for torques, or 0 in lock-step."""
     patience: float | None = None
     """How long lock-step waits for a command before it counts as lost, [s]; None: as long as the connection lives, so
     that a client may stand still in a debugger, or 1 s while the network is bad on purpose."""

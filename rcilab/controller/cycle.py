@@ -35,7 +35,7 @@ from rcilab.state import ControllerMode, MotionGeneratorMode, RobotState
 MODE_DELAY = 200  # [cycles] After StartMove; by then the vendor client's buffer is full of idle states, which it skips.
 PREFILL = 10  # [cycles] Pauses of client and network that a motion survives unharmed, and its delay. Both ends on one
 # busy machine, even under SCHED_FIFO, were measured to pause for 5 to 10 ms now and then.
-TORQUE_STOCK = 2  # [cycles] The same for torques, where the client closes the loop and delay makes it ring; a choice.
+TORQUE_PREFILL = 2  # [cycles] The same for torques, where the client closes the loop and delay makes it ring; a choice.
 LOST_LIMIT = 20  # [cycles] Lost commands in a row that are an instability (manual 4.6: usually 10 to 20).
 RECOVERY_TIME = 50  # [cycles] How long an error recovery takes at least; a choice.
 DRAIN_LIMIT = 300  # [cycles] How long queued commands are played after StopMove; longer than any queue.
@@ -69,6 +69,7 @@ class ControlCycle:
         plant: What moves.
         mode_delay: Cycles from StartMove to the requested modes in the state.
         prefill: Cycles between the first command of a motion and its play-out.
+        torque_prefill: The same for torques; what is older is skipped. None: `prefill`, `TORQUE_PREFILL` at most.
         lost_limit: Lost cycles in a row that raise INSTABILITY_DETECTION; None never does.
         recovery_time: Cycles that an error recovery takes at least.
     """
@@ -80,12 +81,14 @@ class ControlCycle:
         *,
         mode_delay: int = MODE_DELAY,
         prefill: int = PREFILL,
+        torque_prefill: int | None = None,
         lost_limit: int | None = LOST_LIMIT,
         recovery_time: int = RECOVERY_TIME,
     ) -> None:
         self.lost_limit = lost_limit
         self.limit_table: LimitTable = "manual"
         self.playout = Playout(prefill)
+        self._torque_prefill = min(prefill, TORQUE_PREFILL) if torque_prefill is None else torque_prefill
         self.settings = default_settings(model.description)
         self.safety_stop: rci.SafetyStop = rci.SafetyStop.NONE
         self.phase = Phase.OFF
@@ -322,7 +325,7 @@ class ControlCycle:
         match action:
             case Action.BEGIN:
                 self._countdown = self._mode_delay
-                self.playout.begin(most=TORQUE_STOCK if self._mode.law is Law.TORQUE else None)
+                self.playout.begin(most=self._torque_prefill if self._mode.law is Law.TORQUE else None)
             case Action.SHOW_MODES:
                 self._shown = self._requested
                 self._begin_motion()

@@ -74,11 +74,11 @@ class Playout:
         """Forgets everything, ready for the first command of a motion.
 
         Args:
-            most: Commands that may be in stock beside the one that is played: a smaller prefill, and what is older is
+            most: Commands that may be in stock beside the one that is played: another prefill, and what is older is
                 skipped. None is as many as fit.
         """
         self._queue.clear()
-        self._stock = most if most is None else min(most, self._prefill)
+        self._stock = most
         self._countdown = self._prefill if self._stock is None else self._stock
         self._newest: CommandPacket | None = None
         self._lives = False

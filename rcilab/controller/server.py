@@ -97,6 +97,7 @@ class ControllerServer:
             self._plant,
             mode_delay=config.mode_delay_cycles,
             prefill=config.prefill_cycles,
+            torque_prefill=config.prefill,
             lost_limit=config.lost_limit,
         )
         self.cycle.auto_limit = config.auto_limit

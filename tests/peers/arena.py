@@ -32,6 +32,7 @@ class Arena:
     def __init__(self, *, wrap_plant: Callable[[Any], Any] | None = None, **options: Any) -> None:
         self.lines: list[str] = []
         settings = {"model": "xMatePro7", "port": 0, "realtime": False, "lockstep": True, "mode_delay": 0.005}
+        settings["patience"] = 1.0  # A client that falls silent is given up.
         config = ControllerConfig(**{**settings, **options})
         plant = build_plant(config.plant, load_model(config.model))
         self.plant = plant if wrap_plant is None else wrap_plant(plant)
