@@ -9,6 +9,7 @@ Imported with this module and not at the first call (3 ms), because the first ca
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ import ruckig
 from ruckig import Result
 
 from rcilab.arrays import JointVector
+from rcilab.clock import CYCLE_TIME
 from rcilab.errors import PlanningError
 from rcilab.motion.piecewise import PiecewisePolynomial, join_pieces
 
@@ -84,6 +86,97 @@ def plan_standstill(
     problem.max_acceleration = acceleration.tolist()
     problem.max_jerk = jerk.tolist()
     return _polynomial(_solve(problem))
+
+
+class Stepper:
+    """Leads every axis for itself towards a velocity or a position, one cycle a call, always the fastest way.
+
+    Owned by the thread that runs the cycle. Ruckig computes a curve only when something was changed since the last
+    call; a call without a change follows the last curve.
+
+    Attributes:
+        q: Positions now, plain floats, [rad].
+        dq: Velocities now, [rad/s].
+        ddq: Accelerations now, [rad/s^2].
+
+    Args:
+        q: Positions at the start, [rad].
+        dq: Velocities, [rad/s].
+        ddq: Accelerations, [rad/s^2].
+        acceleration: Bounds, [rad/s^2].
+        jerk: Bounds, [rad/s^3].
+    """
+
+    def __init__(
+        self,
+        q: Sequence[float],
+        dq: Sequence[float],
+        ddq: Sequence[float],
+        acceleration: Sequence[float],
+        jerk: Sequence[float],
+    ) -> None:
+        n = len(q)
+        self.q, self.dq, self.ddq = list(q), list(dq), list(ddq)
+        self._ruckig = ruckig.Ruckig(n, CYCLE_TIME)
+        self._out = ruckig.OutputParameter(n)
+        problem = ruckig.InputParameter(n)
+        problem.synchronization = ruckig.Synchronization.No
+        problem.current_position, problem.current_velocity, problem.current_acceleration = self.q, self.dq, self.ddq
+        self._standstill = [0.0] * n
+        self._problem = problem
+        self.limit(acceleration, jerk)
+
+    def limit(self, acceleration: Sequence[float], jerk: Sequence[float]) -> None:
+        """Sets the bounds from now on, all of them above zero, [rad/s^2] and [rad/s^3]."""
+        self._problem.max_acceleration = acceleration
+        self._problem.max_jerk = jerk
+
+    def towards_velocity(self, dq: Sequence[float]) -> bool:
+        """Goes on for one cycle towards velocities, [rad/s]; returns False where it had to brake instead."""
+        self._problem.control_interface = ruckig.ControlInterface.Velocity
+        self._problem.per_dof_control_interface = None
+        self._problem.target_velocity = dq
+        return self._step()
+
+    def towards(self, by_position: Sequence[bool], goals: Sequence[float], speeds: Sequence[float]) -> bool:
+        """Goes on for one cycle, each axis towards its own kind of goal.
+
+        Args:
+            by_position: For each axis, whether its goal is a position, to be at rest at, or a velocity, to keep.
+            goals: Positions [rad] or velocities [rad/s].
+            speeds: Bounds of the velocity on the way to a position, above zero, [rad/s].
+
+        Returns:
+            False where ruckig found no curve and every axis braked for this cycle instead.
+        """
+        position, velocity = ruckig.ControlInterface.Position, ruckig.ControlInterface.Velocity
+        problem = self._problem
+        problem.per_dof_control_interface = [position if kind else velocity for kind in by_position]
+        problem.target_position = [
+            goal if kind else q for kind, goal, q in zip(by_position, goals, self.q, strict=True)
+        ]
+        problem.target_velocity = [0.0 if kind else goal for kind, goal in zip(by_position, goals, strict=True)]
+        problem.max_velocity = speeds
+        return self._step()
+
+    def _step(self) -> bool:
+        found = self._update()
+        if not found:
+            self._problem.control_interface = ruckig.ControlInterface.Velocity
+            self._problem.per_dof_control_interface = None
+            self._problem.target_velocity = self._standstill
+            if not self._update():
+                raise PlanningError("no way to stand still from this state; it is beyond any robot's")
+        out = self._out
+        self.q, self.dq, self.ddq = out.new_position, out.new_velocity, out.new_acceleration
+        out.pass_to_input(self._problem)
+        return found
+
+    def _update(self) -> bool:
+        try:
+            return self._ruckig.update(self._problem, self._out) in (Result.Working, Result.Finished)
+        except (ruckig.RuckigError, ValueError):  # ValueError: a result that its Python binding does not know.
+            return False
 
 
 _REASONS: dict[Any, str] = {
