@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import cos, sin
 
 import numpy as np
 
 from rcilab.arrays import Matrix
-from rcilab.kinematics.forward import Chain, joint_frames
-from rcilab.spatial import IDENTITY, Pose
+from rcilab.kinematics.forward import Chain
+from rcilab.spatial import IDENTITY, Pose, Rotation9
 
 
 def jacobian(chain: Chain, q: Sequence[float], T_flange_tool: Pose = IDENTITY) -> Matrix:
@@ -25,12 +26,40 @@ def jacobian(chain: Chain, q: Sequence[float], T_flange_tool: Pose = IDENTITY) -
     Returns:
         Shape (6, n), linear rows first, [m/rad] and [rad/rad].
     """
-    frames = (IDENTITY, *joint_frames(chain, q))
-    _, (x, y, z) = (frames[-1] @ T_flange_tool).parts
-    columns: list[tuple[float, ...]] = []
-    for frame in frames[:-1]:
-        r, (px, py, pz) = frame.parts
-        ax, ay, az = r[2], r[5], r[8]
-        dx, dy, dz = x - px, y - py, z - pz
-        columns.append((ay * dz - az * dy, az * dx - ax * dz, ax * dy - ay * dx, ax, ay, az))
-    return np.array(columns).T
+    return tool_jacobian(chain, q, T_flange_tool)[0]
+
+
+def tool_jacobian(chain: Chain, q: Sequence[float], T_flange_tool: Pose = IDENTITY) -> tuple[Matrix, Rotation9]:
+    """Returns the Jacobian as `jacobian` does, and the rotation of the tool in base, nine numbers row by row.
+
+    One walk along the arm in plain floats, a third of the cost of one over `Pose` objects.
+    """
+    # Columns x, y, z of the rotation and the position p, all in base.
+    xx, xy, xz, yx, yy, yz, zx, zy, zz = 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0
+    px = py = pz = 0.0
+    axes: list[tuple[float, float, float, float, float, float]] = []
+    for (offset, d, a, ca, sa), angle in zip(chain, q, strict=True):
+        axes.append((zx, zy, zz, px, py, pz))
+        angle += offset
+        c, s = cos(angle), sin(angle)
+        ux, uy, uz = c * xx + s * yx, c * xy + s * yy, c * xz + s * yz
+        vx, vy, vz = c * yx - s * xx, c * yy - s * xy, c * yz - s * xz
+        px, py, pz = px + d * zx + a * ux, py + d * zy + a * uy, pz + d * zz + a * uz
+        xx, xy, xz = ux, uy, uz
+        yx, yy, yz, zx, zy, zz = (
+            ca * vx + sa * zx,
+            ca * vy + sa * zy,
+            ca * vz + sa * zz,
+            ca * zx - sa * vx,
+            ca * zy - sa * vy,
+            ca * zz - sa * vz,
+        )
+    tool = Pose.from_parts((xx, yx, zx, xy, yy, zy, xz, yz, zz), (px, py, pz))
+    if T_flange_tool is not IDENTITY:
+        tool = tool @ T_flange_tool
+    rotation, (x, y, z) = tool.parts
+    columns: list[float] = []
+    for ax, ay, az, ox, oy, oz in axes:
+        dx, dy, dz = x - ox, y - oy, z - oz
+        columns += (ay * dz - az * dy, az * dx - ax * dz, ax * dy - ay * dx, ax, ay, az)
+    return np.array(columns).reshape(-1, 6).T, rotation

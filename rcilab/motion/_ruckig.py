@@ -22,6 +22,7 @@ from rcilab.errors import PlanningError
 from rcilab.motion.piecewise import PiecewisePolynomial, join_pieces
 
 _FACTORIALS = (1.0, 1.0, 2.0, 6.0)
+_POSITION, _VELOCITY = ruckig.ControlInterface.Position, ruckig.ControlInterface.Velocity
 _NO_MISS = 1e-13  # [rad] Rounding of the angles themselves.
 
 
@@ -131,38 +132,31 @@ class Stepper:
         self._problem.max_acceleration = acceleration
         self._problem.max_jerk = jerk
 
-    def towards_velocity(self, dq: Sequence[float]) -> bool:
-        """Goes on for one cycle towards velocities, [rad/s]; returns False where it had to brake instead."""
-        self._problem.control_interface = ruckig.ControlInterface.Velocity
+    def towards_velocity(self, dq: Sequence[float]) -> None:
+        """Goes on for one cycle towards velocities, to keep them, [rad/s]."""
+        self._problem.control_interface = _VELOCITY
         self._problem.per_dof_control_interface = None
         self._problem.target_velocity = dq
-        return self._step()
+        self._step()
 
-    def towards(self, by_position: Sequence[bool], goals: Sequence[float], speeds: Sequence[float]) -> bool:
-        """Goes on for one cycle, each axis towards its own kind of goal.
+    def towards_ends(self, ends: Sequence[float | None], dq: Sequence[float]) -> None:
+        """Goes on for one cycle towards positions, to be at rest there.
 
         Args:
-            by_position: For each axis, whether its goal is a position, to be at rest at, or a velocity, to keep.
-            goals: Positions [rad] or velocities [rad/s].
-            speeds: Bounds of the velocity on the way to a position, above zero, [rad/s].
-
-        Returns:
-            False where ruckig found no curve and every axis braked for this cycle instead.
+            ends: Positions, [rad]; an axis without one goes on towards its velocity.
+            dq: The bound of the velocity on the way to a position, above zero, or else the velocity to keep, [rad/s].
         """
-        position, velocity = ruckig.ControlInterface.Position, ruckig.ControlInterface.Velocity
         problem = self._problem
-        problem.per_dof_control_interface = [position if kind else velocity for kind in by_position]
-        problem.target_position = [
-            goal if kind else q for kind, goal, q in zip(by_position, goals, self.q, strict=True)
-        ]
-        problem.target_velocity = [0.0 if kind else goal for kind, goal in zip(by_position, goals, strict=True)]
-        problem.max_velocity = speeds
-        return self._step()
+        problem.per_dof_control_interface = [_VELOCITY if end is None else _POSITION for end in ends]
+        problem.target_position = [q if end is None else end for end, q in zip(ends, self.q, strict=True)]
+        problem.target_velocity = [v if end is None else 0.0 for end, v in zip(ends, dq, strict=True)]
+        problem.max_velocity = [1.0 if end is None else v for end, v in zip(ends, dq, strict=True)]
+        self._step()
 
-    def _step(self) -> bool:
-        found = self._update()
-        if not found:
-            self._problem.control_interface = ruckig.ControlInterface.Velocity
+    def _step(self) -> None:
+        """Goes on by one cycle; where ruckig finds no curve, every axis brakes for this cycle instead."""
+        if not self._update():
+            self._problem.control_interface = _VELOCITY
             self._problem.per_dof_control_interface = None
             self._problem.target_velocity = self._standstill
             if not self._update():
@@ -170,7 +164,6 @@ class Stepper:
         out = self._out
         self.q, self.dq, self.ddq = out.new_position, out.new_velocity, out.new_acceleration
         out.pass_to_input(self._problem)
-        return found
 
     def _update(self) -> bool:
         try:

@@ -11,10 +11,10 @@ from rcilab.arrays import JointVector, as_number, as_vector, frozen
 from rcilab.errors import InvalidValueError
 from rcilab.model import RobotModel, require_model
 from rcilab.motion import _ruckig
-from rcilab.motion.joint import MIN_SPEED
 from rcilab.motion.jog_start import require_stoppable
+from rcilab.motion.joint import MIN_SPEED
 from rcilab.motion.margin import LIMIT_MARGIN
-from rcilab.motion.twist import Frame, TwistRamp
+from rcilab.motion.twist import Frame, TwistFollower
 
 POSITION_MARGIN = 1e-4  # [rad] How far inside its position limits a joint is brought to rest. A choice.
 
@@ -72,16 +72,16 @@ class Jog:
         self._speeds: list[float] = (LIMIT_MARGIN * speed * limits.velocity).tolist()
         self._accelerations: list[float] = (LIMIT_MARGIN * limits.acceleration).tolist()
         self._jerks: list[float] = (LIMIT_MARGIN * limits.jerk).tolist()
-        self._speed = speed
+        self._tool = TwistFollower(
+            model, self._lower, self._upper, self._speeds, self._accelerations, self._jerks, speed
+        )
         self._axes = _ruckig.Stepper(
             start.tolist(), velocity.tolist(), acceleration.tolist(), self._accelerations, self._jerks
         )
-        self._all = [True] * n
         self._rest = [0.0] * n
         self._goal = self._rest
         self._part = 1.0
-        self._ramp: TwistRamp | None = None
-        self._advance: Callable[[], object] = self._brake
+        self._advance: Callable[[], None] = self._brake
 
     @property
     def q(self) -> JointVector:
@@ -116,7 +116,7 @@ class Jog:
     @property
     def is_damped(self) -> bool:
         """True when the arm was so close to a singularity in the last cycle that the tool left the asked twist."""
-        return self._ramp is not None and self._ramp.is_damped
+        return self._advance == self._follow_twist and self._tool.is_damped
 
     def set_joint_velocity(self, dq: ArrayLike) -> None:
         """Moves with these joint velocities from now on.
@@ -133,7 +133,6 @@ class Jog:
         wanted = as_vector(dq, self._model.n, "dq", "rad/s").tolist()
         self._part = min([1.0, *(bound / abs(v) for v, bound in zip(wanted, self._speeds, strict=True) if v)])
         self._goal = [self._part * v for v in wanted]
-        self._ramp = None
         self._advance = self._keep_velocity
 
     def set_twist(self, twist: ArrayLike, *, frame: Frame = "base") -> None:
@@ -152,7 +151,7 @@ class Jog:
         Raises:
             InvalidValueError: twist is not six finite numbers, or the frame is unknown.
         """
-        self._ramp = TwistRamp(self._model, as_vector(twist, 6, "twist", "m/s, rad/s"), frame, self._speed)
+        self._tool.lead(as_vector(twist, 6, "twist", "m/s, rad/s"), frame)
         self._advance = self._follow_twist
 
     def set_target(self, q: ArrayLike) -> None:
@@ -172,13 +171,11 @@ class Jog:
             min(max(angle, low), high) for angle, low, high in zip(wanted, self._lower, self._upper, strict=True)
         ]
         self._part = 1.0
-        self._ramp = None
         self._advance = self._go_to_target
 
     def stop(self) -> None:
         """Comes to rest from now on, every joint for itself as fast as its limits allow: the way `plan_stop` gives."""
         self._part = 1.0
-        self._ramp = None
         self._advance = self._brake
 
     def step(self) -> JointVector:
@@ -194,20 +191,15 @@ class Jog:
         self._axes.towards_velocity(self._rest)
 
     def _go_to_target(self) -> None:
-        self._axes.towards(self._all, self._goal, self._speeds)
+        self._axes.towards_ends(self._goal, self._speeds)
 
     def _keep_velocity(self) -> None:
         self._lead(self._goal)
 
     def _follow_twist(self) -> None:
-        assert self._ramp is not None
         axes = self._axes
-        room = [
-            (q - low, high - q) for q, low, high in zip(axes.q, self._lower, self._upper, strict=True)
-        ]
-        wanted, self._part = self._ramp.step(
-            axes.q, axes.dq, axes.ddq, room, self._speeds, self._accelerations, self._jerks
-        )
+        wanted = self._tool.step(axes.q, axes.dq, axes.ddq)
+        self._part = self._tool.part
         self._lead(wanted)
 
     def _lead(self, wanted: Sequence[float]) -> None:
@@ -218,23 +210,23 @@ class Jog:
         the fastest stop from every state stays inside: it does at the start, and each kind of step keeps it so.
         """
         axes = self._axes
-        by_position: list[bool] = []
-        goals: list[float] = []
-        speeds: list[float] = []
+        ends: list[float | None] = []
+        velocities: list[float] = []
         for v_c, q, v, a, low, high, a_max, j_max in zip(
             wanted, axes.q, axes.dq, axes.ddq, self._lower, self._upper, self._accelerations, self._jerks, strict=True
         ):
             end, room = (high, high - q) if v_c > 0.0 else (low, q - low)
             speed = abs(v_c)
-            kind, goal = False, 0.0
-            if v_c and room > 0.0:
-                peak = max(speed, abs(v)) + a * a / (2.0 * j_max)
-                # No longer than it takes to let go of a, to change over to v_c and to stop from there.
-                if room > peak * ((abs(v_c - v) + peak) / a_max + 3.0 * a_max / j_max):
-                    goal = v_c
-                elif speed * _LONGEST > room:
-                    kind, goal = True, end
-            by_position.append(kind)
-            goals.append(goal)
-            speeds.append(speed or 1.0)
-        axes.towards(by_position, goals, speeds)
+            peak = max(speed, abs(v)) + a * a / (2.0 * j_max)
+            # No longer than it takes to let go of a, to change over to v_c and to stop from there.
+            if v_c == 0.0 or room > peak * ((abs(v_c - v) + peak) / a_max + 3.0 * a_max / j_max):
+                ends.append(None)
+                velocities.append(v_c)
+            else:
+                creeps = speed * _LONGEST < room
+                ends.append(None if creeps or room <= 0.0 else end)
+                velocities.append(0.0 if ends[-1] is None else speed)
+        if any(end is not None for end in ends):
+            axes.towards_ends(ends, velocities)
+        else:
+            axes.towards_velocity(velocities)

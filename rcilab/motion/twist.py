@@ -11,6 +11,8 @@ import numpy as np
 from rcilab.arrays import Array, Matrix
 from rcilab.clock import CYCLE_TIME
 from rcilab.errors import InvalidValueError
+from rcilab.kinematics.forward import build_chain
+from rcilab.kinematics.jacobian import tool_jacobian
 from rcilab.model import RobotModel
 from rcilab.motion import _ruckig
 from rcilab.motion.margin import LIMIT_MARGIN
@@ -19,94 +21,95 @@ Frame: TypeAlias = Literal["base", "tool"]
 """Axes in which a twist is given; its point is the tool tip in both."""
 
 DAMPED_BELOW = 0.02
-"""Singular value of the Jacobian under which a direction is damped, metres and radians taken as they are. A choice:
-three to ten percent of all configurations of the xMates are that close to a singularity."""
+"""Singular value of the Jacobian under which a direction is damped, metres and radians taken as they are. A choice: a
+tenth of all configurations of the xMates is that close to a singularity, their homes are at 0.15 and above."""
 
 RAMP_PART = 0.5
 """Part of the joints' acceleration and jerk that changes of the twist use. A choice: the rest is for the bending of the
 joints' curves, so that the tool keeps its direction."""
 
-_SAME = 1e-9  # [m/s, rad/s] Twists closer than this are the same.
+_SAME = 1e-9  # [m/s, rad/s] Twists closer than this are the same; as a number, a weight closer to 1 is 1.
 _SLOWEST = 1e-12  # [rad/s] Below this a joint stands.
 
 
-class TwistRamp:
-    """Leads the tool from the twist it has to the wanted one. Owned by the thread that runs the cycle.
+class TwistFollower:
+    """Turns one twist after another into joint velocities. Owned by the thread that runs the cycle.
 
     Attributes:
         is_damped: Whether the last step was so close to a singularity that the tool leaves the twist.
+        part: Part of the wanted twist that the last step gave, from 0 to 1.
 
     Args:
         model: The arm, with its tool.
-        twist: Wanted twist, shape (6,), linear first, [m/s, rad/s].
-        frame: Its axes.
+        lower: Joint angles to stop at, [rad].
+        upper: Likewise, [rad].
+        velocity: Bounds of the joints, [rad/s].
+        acceleration: Bounds, [rad/s^2].
+        jerk: Bounds, [rad/s^3].
         speed: Part of the tool's velocity limits to use, in (0, 1].
-
-    Raises:
-        InvalidValueError: The frame is unknown.
     """
 
-    def __init__(self, model: RobotModel, twist: Array, frame: Frame, speed: float) -> None:
-        if frame not in get_args(Frame):
-            raise InvalidValueError("frame", frame, f"is unknown; known: {', '.join(get_args(Frame))}")
-        tool = model.limits.cartesian
-        part = LIMIT_MARGIN * speed
-        norms = _norms(twist)
-        bounds = (part * tool.translation_velocity, part * tool.rotation_velocity)
-        self._cut = min([1.0, *(bound / norm for norm, bound in zip(norms, bounds, strict=True) if norm)])
-        self._model = model
-        self._in_tool = frame == "tool"
-        self._goal = self._cut * twist
-        self._start = self._goal
-        self._blend: _ruckig.Stepper | None = None  # Made at the first step, when the tool's twist is known.
-        self._weight = 0.0
-        self._accelerations = (tool.translation_acceleration, tool.rotation_acceleration)
-        self._jerks = (tool.translation_jerk, tool.rotation_jerk)
-        self.is_damped = False
-
-    def step(
+    def __init__(
         self,
-        q: Sequence[float],
-        dq: Sequence[float],
-        ddq: Sequence[float],
-        room: Sequence[tuple[float, float]],
+        model: RobotModel,
+        lower: Sequence[float],
+        upper: Sequence[float],
         velocity: Sequence[float],
         acceleration: Sequence[float],
         jerk: Sequence[float],
-    ) -> tuple[list[float], float]:
-        """Returns joint velocities to go on with, plain floats, [rad/s], and the part of the wanted twist they give.
+        speed: float,
+    ) -> None:
+        tool = model.limits.cartesian
+        self._chain, self._T_flange_tool = build_chain(model.description.dh), model.T_flange_tool
+        self._joints = list(zip(lower, upper, velocity, acceleration, jerk, strict=True))
+        self._speeds = (LIMIT_MARGIN * speed * tool.translation_velocity, LIMIT_MARGIN * speed * tool.rotation_velocity)
+        self._accelerations = (*acceleration, tool.translation_acceleration, tool.rotation_acceleration)
+        self._jerks = (*jerk, tool.translation_jerk, tool.rotation_jerk)
+        self._in_tool = False
+        self._start = self._goal = np.zeros(6)
+        self._weight = 1.0
+        self._blend: _ruckig.Stepper | None = None
+        self._cut = 1.0
+        self.is_damped = False
+        self.part = 1.0
+
+    def lead(self, twist: Array, frame: Frame) -> None:
+        """Takes another wanted twist: the next step starts towards it, from the twist that the tool has then.
+
+        Args:
+            twist: Shape (6,), linear first, [m/s, rad/s].
+            frame: Its axes.
+
+        Raises:
+            InvalidValueError: The frame is unknown.
+        """
+        if frame not in get_args(Frame):
+            raise InvalidValueError("frame", frame, f"is unknown; known: {', '.join(get_args(Frame))}")
+        self._cut = min(1.0, _smallest_ratio(self._speeds, _norms(twist)))
+        self._goal = self._cut * twist
+        self._in_tool = frame == "tool"
+        self._weight = 0.0
+        self._blend = None
+
+    def step(self, q: Sequence[float], dq: Sequence[float], ddq: Sequence[float]) -> list[float]:
+        """Returns joint velocities to go on with, plain floats, [rad/s].
 
         Args:
             q: Joint angles, [rad].
             dq: Joint velocities, [rad/s].
             ddq: Joint accelerations, [rad/s^2].
-            room: For each joint how far it may go down and up, [rad].
-            velocity: Bounds of the joints, [rad/s].
-            acceleration: Bounds, [rad/s^2].
-            jerk: Bounds, [rad/s^3].
         """
-        angles = np.array(q)
-        J = self._model.jacobian(angles)
+        J, rotation = tool_jacobian(self._chain, q, self._T_flange_tool)
         if self._in_tool:
-            R = self._model.forward(angles).rotation.T
-            J = np.concatenate((R @ J[:3], R @ J[3:]))
+            J = (np.array(rotation).reshape(3, 3).T @ J.reshape(2, 3, -1)).reshape(6, -1)
         inverse, self.is_damped = damped_inverse(J)
-        twist = self._goal
-        if self._weight != 1.0:
-            twist = self._blended(J, inverse, dq, ddq, acceleration, jerk)
+        twist = self._goal if self._weight == 1.0 else self._blended(J, inverse, dq, ddq)
         wanted: list[float] = (inverse @ twist).tolist()
-        part = _part_inside(wanted, room, velocity, acceleration, jerk)
-        return [part * v for v in wanted], part * self._cut
+        part = self._part_inside(q, wanted)
+        self.part = part * self._cut
+        return [part * v for v in wanted]
 
-    def _blended(
-        self,
-        J: Matrix,
-        inverse: Matrix,
-        dq: Sequence[float],
-        ddq: Sequence[float],
-        acceleration: Sequence[float],
-        jerk: Sequence[float],
-    ) -> Array:
+    def _blended(self, J: Matrix, inverse: Matrix, dq: Sequence[float], ddq: Sequence[float]) -> Array:
         """Returns the twist of this cycle, on the straight line from the twist at the first step to the goal."""
         blend = self._blend
         if blend is None:
@@ -117,25 +120,42 @@ class TwistRamp:
             self._weight = 1.0
             return self._goal
         strides = [*(abs(v) for v in (inverse @ change).tolist()), *norms]
-        rate = RAMP_PART * _smallest_ratio([*acceleration, *self._accelerations], strides)
-        rate_change = RAMP_PART * _smallest_ratio([*jerk, *self._jerks], strides)
+        rate = [RAMP_PART * _smallest_ratio(self._accelerations, strides)]
+        rate_change = [RAMP_PART * _smallest_ratio(self._jerks, strides)]
         if blend is None:
             # What the tool accelerates along the line already goes on; the rest is for the joints to lose.
             running = float(change @ (J @ ddq)) / float(change @ change)
-            blend = self._blend = _ruckig.Stepper([0.0], [0.0], [min(max(running, -rate), rate)], [rate], [rate_change])
-        blend.limit([rate], [rate_change])
+            at_most = [min(max(running, -rate[0]), rate[0])]
+            blend = self._blend = _ruckig.Stepper([0.0], [0.0], at_most, rate, rate_change)
+        blend.limit(rate, rate_change)
         blend.towards_velocity([1.0])
-        weight = blend.dq[0]
-        self._weight = 1.0 if abs(weight - 1.0) < _SAME and abs(blend.ddq[0]) < _SAME * rate_change else weight
+        (weight,), (slope,) = blend.dq, blend.ddq
+        self._weight = 1.0 if abs(weight - 1.0) < _SAME and abs(slope) < _SAME * rate_change[0] else weight
         return self._start + weight * change
+
+    def _part_inside(self, q: Sequence[float], wanted: Sequence[float]) -> float:
+        """Returns the part of joint velocities that keeps their bounds and can be taken back before a range ends."""
+        part = 1.0
+        time = rate = rate_change = math.inf  # [s], [1/s], [1/s^2] All joints as one: velocities as parts of `wanted`.
+        for v, angle, (low, high, v_max, a_max, j_max) in zip(wanted, q, self._joints, strict=True):
+            speed = abs(v)
+            if speed > _SLOWEST:
+                part = min(part, v_max / speed)
+                time = min(time, (high - angle if v > 0.0 else angle - low) / speed)
+                rate = min(rate, a_max / speed)
+                rate_change = min(rate_change, j_max / speed)
+        time -= part * CYCLE_TIME
+        if time <= 0.0:
+            return 0.0
+        return min(part, _fastest_before(time, RAMP_PART * rate, RAMP_PART * rate_change)) if time < math.inf else 1.0
 
 
 def damped_inverse(J: Matrix) -> tuple[Matrix, bool]:
     """Returns the matrix that turns a twist into the smallest joint velocities, and whether it is damped.
 
-    Damped least squares with numerical filtering (Maciejewski & Klein 1988; Siciliano et al., Robotics, 2009, 3.5.2):
-    a direction whose singular value s is below `DAMPED_BELOW` = s0 is driven by s / (s^2 + s0^2 - s^2) = s / s0^2
-    instead of 1 / s, which fades to nothing at the singularity itself; every other direction is exact.
+    Damped least squares with numerical filtering (Maciejewski and Klein 1988; Siciliano et al., Robotics, 2009, 3.5):
+    a direction whose singular value s is below s0 = `DAMPED_BELOW` is driven by s / s0^2 instead of 1 / s, which fades
+    to nothing at the singularity itself; every other direction is exact.
 
     Args:
         J: Jacobian, shape (6, n).
@@ -147,41 +167,19 @@ def damped_inverse(J: Matrix) -> tuple[Matrix, bool]:
     try:
         B = np.linalg.inv(A)
         # The Frobenius norm is no smaller than the largest eigenvalue of the inverse, 1 / s^2 of the smallest s.
-        if float(B.ravel() @ B.ravel()) < DAMPED_BELOW**-4:
+        if float(np.vdot(B, B)) < DAMPED_BELOW**-4:
             return J.T @ B, False
     except np.linalg.LinAlgError:
         pass
     squares, U = np.linalg.eigh(A)
-    weights = [1.0 / max(square, DAMPED_BELOW**2) for square in squares.tolist()]
+    weights = 1.0 / np.maximum(squares, DAMPED_BELOW**2)
     return J.T @ ((U * weights) @ U.T), bool(squares[0] < DAMPED_BELOW**2)
-
-
-def _part_inside(
-    wanted: Sequence[float],
-    room: Sequence[tuple[float, float]],
-    velocity: Sequence[float],
-    acceleration: Sequence[float],
-    jerk: Sequence[float],
-) -> float:
-    """Returns the part of joint velocities that is inside their bounds and can be taken back before a range ends."""
-    moving = [i for i, v in enumerate(wanted) if abs(v) > _SLOWEST]
-    if not moving:
-        return 1.0
-    speeds = [abs(wanted[i]) for i in moving]
-    part = min(1.0, _smallest_ratio([velocity[i] for i in moving], speeds))
-    # The time at full velocity until the first joint comes to the end of its range, and after this cycle.
-    time = _smallest_ratio([room[i][wanted[i] > 0.0] for i in moving], speeds) - part * CYCLE_TIME
-    if time <= 0.0:
-        return 0.0
-    a = RAMP_PART * _smallest_ratio([acceleration[i] for i in moving], speeds)
-    j = RAMP_PART * _smallest_ratio([jerk[i] for i in moving], speeds)
-    return min(part, _fastest_before(time, a, j))
 
 
 def _fastest_before(distance: float, a: float, j: float) -> float:
     """Returns the velocity from which a stop at acceleration a and jerk j takes this distance.
 
-    With the trapezoid of accelerations d = v / 2 (v / a + a / j), with the triangle d = v sqrt(v / j).
+    With a trapezoid of acceleration d = v / 2 (v / a + a / j), with a triangle d = v sqrt(v / j).
     """
     if distance < a**3 / j**2:
         return (distance * distance * j) ** (1.0 / 3.0)
@@ -190,7 +188,8 @@ def _fastest_before(distance: float, a: float, j: float) -> float:
 
 
 def _smallest_ratio(bounds: Sequence[float], values: Sequence[float]) -> float:
-    return min(bound / value for bound, value in zip(bounds, values, strict=True) if value > 0.0)
+    ratios = [bound / value for bound, value in zip(bounds, values, strict=True) if value > 0.0]
+    return min(ratios, default=math.inf)
 
 
 def _norms(twist: Array) -> tuple[float, float]:
