@@ -117,15 +117,20 @@ class Stepper:
         jerk: Sequence[float],
     ) -> None:
         n = len(q)
-        self.q, self.dq, self.ddq = list(q), list(dq), list(ddq)
         self._ruckig = ruckig.Ruckig(n, CYCLE_TIME)
         self._out = ruckig.OutputParameter(n)
         problem = ruckig.InputParameter(n)
         problem.synchronization = ruckig.Synchronization.No
-        problem.current_position, problem.current_velocity, problem.current_acceleration = self.q, self.dq, self.ddq
         self._standstill = [0.0] * n
         self._problem = problem
+        self.place(q, dq, ddq)
         self.limit(acceleration, jerk)
+
+    def place(self, q: Sequence[float], dq: Sequence[float], ddq: Sequence[float]) -> None:
+        """Goes on from another state, [rad], [rad/s], [rad/s^2]."""
+        self.q, self.dq, self.ddq = list(q), list(dq), list(ddq)
+        problem = self._problem
+        problem.current_position, problem.current_velocity, problem.current_acceleration = self.q, self.dq, self.ddq
 
     def limit(self, acceleration: Sequence[float], jerk: Sequence[float]) -> None:
         """Sets the bounds from now on, all of them above zero, [rad/s^2] and [rad/s^3]."""

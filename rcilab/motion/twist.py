@@ -68,8 +68,11 @@ class TwistFollower:
         self._in_tool = False
         self._start = self._goal = np.zeros(6)
         self._weight = 1.0
-        self._blend: _ruckig.Stepper | None = None
+        self._blend = _ruckig.Stepper([0.0], [0.0], [0.0], [1.0], [1.0])
+        self._begins = False
         self._cut = 1.0
+        self._allowed = 1.0
+        self._last: list[float] | None = None
         self.is_damped = False
         self.part = 1.0
 
@@ -89,7 +92,8 @@ class TwistFollower:
         self._goal = self._cut * twist
         self._in_tool = frame == "tool"
         self._weight = 0.0
-        self._blend = None
+        self._begins = True
+        self._allowed = 1.0
 
     def step(self, q: Sequence[float], dq: Sequence[float], ddq: Sequence[float]) -> list[float]:
         """Returns joint velocities to go on with, plain floats, [rad/s].
@@ -101,53 +105,72 @@ class TwistFollower:
         """
         J, rotation = tool_jacobian(self._chain, q, self._T_flange_tool)
         if self._in_tool:
-            J = (np.array(rotation).reshape(3, 3).T @ J.reshape(2, 3, -1)).reshape(6, -1)
+            # Rows are the same vectors in other axes, so that everything below holds in those, too.
+            R = np.array(rotation).reshape(3, 3).T
+            J = np.concatenate((R.dot(J[:3]), R.dot(J[3:])))
         inverse, self.is_damped = damped_inverse(J)
         twist = self._goal if self._weight == 1.0 else self._blended(J, inverse, dq, ddq)
-        wanted: list[float] = (inverse @ twist).tolist()
-        part = self._part_inside(q, wanted)
+        wanted: list[float] = inverse.dot(twist).tolist()
+        # While the twist changes, so do the joint velocities, on purpose.
+        last = wanted if self._weight != 1.0 or self._last is None else self._last
+        part = self._allowed = self._part_inside(q, wanted, last)
+        self._last = wanted
         self.part = part * self._cut
         return [part * v for v in wanted]
 
     def _blended(self, J: Matrix, inverse: Matrix, dq: Sequence[float], ddq: Sequence[float]) -> Array:
         """Returns the twist of this cycle, on the straight line from the twist at the first step to the goal."""
-        blend = self._blend
-        if blend is None:
-            self._start = J @ dq
+        if self._begins:
+            self._start = J.dot(dq)
         change = self._goal - self._start
         norms = _norms(change)
         if max(norms) < _SAME:
             self._weight = 1.0
             return self._goal
-        strides = [*(abs(v) for v in (inverse @ change).tolist()), *norms]
-        rate = [RAMP_PART * _smallest_ratio(self._accelerations, strides)]
-        rate_change = [RAMP_PART * _smallest_ratio(self._jerks, strides)]
-        if blend is None:
+        strides = [*map(abs, inverse.dot(change).tolist()), *norms]
+        rate = RAMP_PART * _smallest_ratio(self._accelerations, strides)
+        rate_change = RAMP_PART * _smallest_ratio(self._jerks, strides)
+        blend = self._blend
+        if self._begins:
             # What the tool accelerates along the line already goes on; the rest is for the joints to lose.
-            running = float(change @ (J @ ddq)) / float(change @ change)
-            at_most = [min(max(running, -rate[0]), rate[0])]
-            blend = self._blend = _ruckig.Stepper([0.0], [0.0], at_most, rate, rate_change)
-        blend.limit(rate, rate_change)
+            running = float(change.dot(J.dot(ddq)) / change.dot(change))
+            blend.place([0.0], [0.0], [min(max(running, -rate), rate)])
+            self._begins = False
+        blend.limit([rate], [rate_change])
         blend.towards_velocity([1.0])
         (weight,), (slope,) = blend.dq, blend.ddq
-        self._weight = 1.0 if abs(weight - 1.0) < _SAME and abs(slope) < _SAME * rate_change[0] else weight
+        self._weight = 1.0 if abs(weight - 1.0) < _SAME and abs(slope) < _SAME * rate_change else weight
         return self._start + weight * change
 
-    def _part_inside(self, q: Sequence[float], wanted: Sequence[float]) -> float:
-        """Returns the part of joint velocities that keeps their bounds and can be taken back before a range ends."""
-        part = 1.0
+    def _part_inside(self, q: Sequence[float], wanted: Sequence[float], last: Sequence[float]) -> float:
+        """Returns the part of joint velocities that keeps their bounds and can be taken back before a range ends.
+
+        Where the joint velocities of the twist change along the way, near singularities above all, it is also so slow
+        that the joints can follow: at the part p of the twist they accelerate by p^2 times the bend of their curve.
+        """
+        part, before = 1.0, self._allowed
         time = rate = rate_change = math.inf  # [s], [1/s], [1/s^2] All joints as one: velocities as parts of `wanted`.
-        for v, angle, (low, high, v_max, a_max, j_max) in zip(wanted, q, self._joints, strict=True):
+        bend = 1.0  # How much faster than they may the joints accelerated in the last cycle, when above 1.
+        for v, v_last, angle, (low, high, v_max, a_max, j_max) in zip(wanted, last, q, self._joints, strict=True):
             speed = abs(v)
             if speed > _SLOWEST:
-                part = min(part, v_max / speed)
-                time = min(time, (high - angle if v > 0.0 else angle - low) / speed)
-                rate = min(rate, a_max / speed)
-                rate_change = min(rate_change, j_max / speed)
+                room = high - angle if v > 0.0 else angle - low
+                # Comparisons cost a quarter of calls of min.
+                part = v_max / speed if part * speed > v_max else part
+                time = room / speed if time * speed > room else time
+                rate = a_max / speed if rate * speed > a_max else rate
+                rate_change = j_max / speed if rate_change * speed > j_max else rate_change
+            growth = abs(v - v_last) * before
+            allowed = RAMP_PART * a_max * CYCLE_TIME
+            bend = growth / allowed if growth > bend * allowed else bend
+        if time == math.inf:
+            return 1.0
         time -= part * CYCLE_TIME
         if time <= 0.0:
             return 0.0
-        return min(part, _fastest_before(time, RAMP_PART * rate, RAMP_PART * rate_change)) if time < math.inf else 1.0
+        rate *= RAMP_PART
+        part = min(part, before + rate * CYCLE_TIME, _fastest_before(time, rate, RAMP_PART * rate_change))
+        return min(part, before / math.sqrt(bend)) if bend > 1.0 else part
 
 
 def damped_inverse(J: Matrix) -> tuple[Matrix, bool]:
@@ -163,17 +186,17 @@ def damped_inverse(J: Matrix) -> tuple[Matrix, bool]:
     Returns:
         Shape (n, 6), and True when a direction was damped.
     """
-    A = J @ J.T
+    A = J.dot(J.T)  # For so small matrices half the cost of the operator.
     try:
         B = np.linalg.inv(A)
         # The Frobenius norm is no smaller than the largest eigenvalue of the inverse, 1 / s^2 of the smallest s.
         if float(np.vdot(B, B)) < DAMPED_BELOW**-4:
-            return J.T @ B, False
+            return J.T.dot(B), False
     except np.linalg.LinAlgError:
         pass
     squares, U = np.linalg.eigh(A)
     weights = 1.0 / np.maximum(squares, DAMPED_BELOW**2)
-    return J.T @ ((U * weights) @ U.T), bool(squares[0] < DAMPED_BELOW**2)
+    return J.T.dot((U * weights).dot(U.T)), bool(squares[0] < DAMPED_BELOW**2)
 
 
 def _fastest_before(distance: float, a: float, j: float) -> float:
