@@ -7,17 +7,21 @@ from rcilab.motion.differences import derivatives_from_differences, differences_
 from rcilab.motion.joint import plan_joint
 from rcilab.motion.margin import LIMIT_MARGIN
 from rcilab.motion.motion import Law, Motion, MotionSample, require_motion
+from rcilab.motion.online import Jog
 from rcilab.motion.piecewise import PiecewisePolynomial
+from rcilab.motion.spline import motion_through
 from rcilab.motion.stop import plan_stop
 
 __all__ = [
     "LIMIT_MARGIN",
+    "Jog",
     "Law",
     "Motion",
     "MotionSample",
     "PiecewisePolynomial",
     "derivatives_from_differences",
     "differences_from_derivatives",
+    "motion_through",
     "plan_arc",
     "plan_joint",
     "plan_line",

@@ -190,6 +190,32 @@ class Motion:
 
         return load_motion(file)
 
+    @classmethod
+    def load_samples(
+        cls, file: str | PathLike[str], *, rate_hz: float | None = None, unit: Literal["rad", "deg"] = "rad"
+    ) -> Motion:
+        """Returns the motion through joint samples from elsewhere, at any rate, even or not, to be judged.
+
+        A cubic spline through every sample, which starts and ends at rest; on the 1 ms grid like every motion.
+        `check` judges it: nothing is slowed down or smoothed.
+
+        A CSV file has a row a sample. With a header line, columns are found by name, and others passed over: `t`, with
+        its unit if that is not seconds (`t [ms]`), and `q1`, `q2`, ... (also `q[1]`, `joint_1`), with theirs
+        (`q1 [deg]`). Without one, the first column is the time, or, when `rate_hz` is given, all are joints. An NPZ
+        file has the angles as `q`, shape (N, n), and the times as `t`, shape (N,).
+
+        Args:
+            file: Name of the file, ending in .csv or .npz.
+            rate_hz: Samples a second, for a file without times, [Hz].
+            unit: Of the angles that do not say theirs.
+
+        Raises:
+            InvalidValueError: There is no such file, or it holds no sound samples; the message names the line.
+        """
+        from rcilab.motion.samples import load_samples
+
+        return load_samples(file, rate_hz=rate_hz, unit=unit)
+
     def __reduce__(self) -> tuple[object, ...]:
         return _rebuild, (self.polynomial, self.goal, self.law, self.speed)
 

@@ -1,0 +1,136 @@
+"""Joint samples from elsewhere: a CSV or NPZ file at any rate becomes a motion."""
+
+from __future__ import annotations
+
+import math
+import re
+from io import BytesIO
+from os import PathLike, fspath
+from pathlib import Path
+from typing import Literal, TypeAlias, get_args
+
+import numpy as np
+
+from rcilab.arrays import Array, as_number, as_path, as_vector
+from rcilab.errors import InvalidValueError
+from rcilab.motion.motion import Motion
+from rcilab.motion.spline import motion_through
+from rcilab.motion.storage import KIND
+from rcilab.motion.table import Table, read_table
+
+AngleUnit: TypeAlias = Literal["rad", "deg"]
+
+MOST = 4.0 * math.pi
+"""Angle that no joint of an arm reaches, [rad]: whoever reads more, reads degrees."""
+
+_TIME = re.compile(r"(?:t|time|times|timestamp)[ _]*[\[(]?(s|ms|us|ns)?[\])]?")
+_JOINT = re.compile(r"(?:(?:\w*[_./])?joint|q|j|axis)[ _]*(?:\[(\d+)\]|(\d+))[ _]*[\[(]?(rad|deg|°)?[\])]?")
+_SECONDS = {None: 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+
+
+def load_samples(file: str | PathLike[str], *, rate_hz: float | None = None, unit: AngleUnit = "rad") -> Motion:
+    """Returns the motion through the joint samples in a file; see `Motion.load_samples`.
+
+    Raises:
+        InvalidValueError: There is no such file, or it holds no sound samples; one sentence with the line.
+    """
+    if unit not in get_args(AngleUnit):
+        raise InvalidValueError("unit", unit, f"is unknown; known: {', '.join(get_args(AngleUnit))}")
+    if rate_hz is not None and not 0.0 < (rate_hz := as_number(rate_hz, "rate_hz", "Hz")) < math.inf:
+        raise InvalidValueError("rate_hz", rate_hz, "must be above 0: samples a second [Hz]")
+    if not isinstance(file, str | PathLike):
+        raise InvalidValueError("samples", file, "is no file name")
+    path = Path(fspath(file))
+    if path.suffix.lower() not in _READERS:
+        raise InvalidValueError("samples", str(path), f"must end in {' or '.join(_READERS)}, which tells the format")
+    try:
+        content = path.read_bytes()
+    except FileNotFoundError as error:
+        raise InvalidValueError("samples", str(path), "does not exist") from error
+    except OSError as error:
+        raise InvalidValueError("samples", str(path), f"cannot be read: {error.strerror}") from error
+    times, q, place = _READERS[path.suffix.lower()](content, path.name, rate_hz is not None, unit)
+    if times is None:
+        if rate_hz is None:
+            raise InvalidValueError("samples", path.name, "has no times; pass rate_hz, the samples a second")
+        times = np.arange(len(q)) / rate_hz
+    elif rate_hz is not None:
+        raise InvalidValueError("rate_hz", rate_hz, f"is not needed: {path.name} has times of its own; leave it out")
+    _require_later(times, place)
+    _require_angles(q, place)
+    return motion_through(times, q)
+
+
+def _from_csv(content: bytes, name: str, has_rate: bool, unit: AngleUnit) -> tuple[Array | None, Array, list[str]]:
+    table = read_table(content, name)
+    place = [f"{name}, line {line}" for line in table.lines]
+    if table.header is not None:
+        times, q = _by_header(table, table.header, name, unit)
+        return times, q, place
+    first = 0 if has_rate else 1
+    if table.columns == first:
+        raise InvalidValueError(place[0], "a single column", "needs a time and the joints, or rate_hz and the joints")
+    q = np.stack([table.column(i) for i in range(first, table.columns)], axis=1)
+    return None if has_rate else table.column(0), np.radians(q) if unit == "deg" else q, place
+
+
+def _by_header(table: Table, header: list[str], name: str, unit: AngleUnit) -> tuple[Array | None, Array]:
+    """Returns times and angles from the columns whose names say what they are; others are not looked at."""
+    where = f"{name}, line {table.header_line}"
+    times: Array | None = None
+    joints: dict[int, Array] = {}
+    for i, title in enumerate(header):
+        text = title.lower()
+        if time := _TIME.fullmatch(text):
+            if times is not None:
+                raise InvalidValueError(where, title, "is a second column of times; keep one")
+            times = table.column(i) * _SECONDS[time[1]]
+        elif joint := _JOINT.fullmatch(text):
+            number = int(joint[1] or joint[2])
+            if number in joints:
+                raise InvalidValueError(where, title, f"is a second column for joint {number}; keep one")
+            angles = table.column(i)
+            joints[number] = np.radians(angles) if (joint[3] or unit) != "rad" else angles
+    if sorted(joints) != list(range(1, len(joints) + 1)) or not joints:
+        found = ", ".join(str(number) for number in sorted(joints)) or "none"
+        needs = f"names the joints {found}; needs q1, q2, ... without a gap (t [s] for the times, q1 [deg] for degrees)"
+        raise InvalidValueError(where, ",".join(header), needs)
+    return times, np.stack([joints[number] for number in sorted(joints)], axis=1)
+
+
+def _from_npz(content: bytes, name: str, has_rate: bool, unit: AngleUnit) -> tuple[Array | None, Array, list[str]]:
+    try:
+        with np.load(BytesIO(content), allow_pickle=False) as archive:
+            arrays = {key: archive[key] for key in archive.files}
+    # Foreign bytes make numpy, zipfile and zlib raise a dozen kinds of errors; a single array is no context manager.
+    except Exception as error:
+        problem = "cannot be read: it is damaged, or no archive of numpy's; numpy.savez(file, t=..., q=...) writes one"
+        raise InvalidValueError("samples", name, problem) from error
+    if str(arrays.get("kind", "")) == KIND:
+        raise InvalidValueError("samples", name, "is a saved motion; Motion.load reads it, to the last bit")
+    if "q" not in arrays:
+        found = ", ".join(arrays) or "nothing"
+        raise InvalidValueError("samples", name, f"holds no array q of joint angles (found: {found})")
+    q = as_path(arrays["q"], None, f"{name}, q", unit)
+    key = next((key for key in ("t", "time", "times") if key in arrays), None)
+    times = None if key is None else as_vector(arrays[key], len(q), f"{name}, {key}", "s")
+    place = [f"{name}, row {row} (from 0)" for row in range(len(q))]
+    return times, np.radians(q) if unit == "deg" else q, place
+
+
+_READERS = {".csv": _from_csv, ".npz": _from_npz}
+
+
+def _require_later(times: Array, place: list[str]) -> None:
+    late = np.flatnonzero(np.diff(times) <= 0.0)
+    if late.size:
+        i = int(late[0]) + 1
+        raise InvalidValueError(place[i], float(times[i]), f"s is not later than the sample before, {times[i - 1]:g} s")
+
+
+def _require_angles(q: Array, place: list[str]) -> None:
+    beyond = np.argwhere(np.abs(q) > MOST)
+    if beyond.size:
+        row, joint = (int(i) for i in beyond[0])
+        turns = f"rad of joint {joint + 1} is more than two turns; if these are degrees, pass unit='deg'"
+        raise InvalidValueError(place[row], float(q[row, joint]), turns)

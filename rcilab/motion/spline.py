@@ -1,0 +1,83 @@
+"""The smooth curve through given samples: a cubic spline that starts and ends at rest."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rcilab.arrays import Array, JointPath, as_path, as_vector
+from rcilab.errors import InvalidValueError
+from rcilab.motion.motion import Motion, standing
+from rcilab.motion.piecewise import PiecewisePolynomial
+
+
+def motion_through(times: ArrayLike, q: ArrayLike) -> Motion:
+    """Returns the motion through joint angles at given times, with continuous acceleration.
+
+    A cubic spline that passes every sample; it starts and ends with velocity and acceleration zero, as the robot
+    demands of a motion, for which the first and the last interval are each cut in two (Biagiotti and Melchiorri,
+    Trajectory Planning for Automatic Machines and Robots, 2008, 4.4.4). Nobody has looked at limits: `check` does.
+
+    Args:
+        times: Time of each sample, shape (N,), increasing, [s]; the motion starts with the first.
+        q: Joint angles, shape (N, n), N >= 1, [rad].
+
+    Raises:
+        InvalidValueError: Not finite, not N times and N rows, or the times do not increase.
+    """
+    rows = as_path(q, None, "q", "rad")
+    t = as_vector(times, len(rows), "times", "s")
+    late = np.flatnonzero(np.diff(t) <= 0.0)
+    if late.size:
+        i = int(late[0]) + 1
+        raise InvalidValueError(f"times at row {i} (from 0)", float(t[i]), f"must be later than {t[i - 1]:g} [s]")
+    if len(rows) == 1:
+        return standing(rows[0], law="samples")
+    knots, angles, bends = _spline(t - t[0], rows)
+    h = np.diff(knots)[:, np.newaxis]
+    pieces = np.empty((len(h), rows.shape[1], 4))
+    pieces[:, :, 0] = angles[:-1]
+    pieces[:, :, 1] = np.diff(angles, axis=0) / h - h * (2.0 * bends[:-1] + bends[1:]) / 6.0
+    pieces[:, :, 2] = bends[:-1] / 2.0
+    pieces[:, :, 3] = np.diff(bends, axis=0) / (6.0 * h)
+    return Motion(polynomial=PiecewisePolynomial(knots, pieces), goal=rows[-1], law="samples")
+
+
+def _spline(t: Array, q: JointPath) -> tuple[Array, JointPath, JointPath]:
+    """Returns the knots [s], and angles [rad] and accelerations [rad/s^2] there: two knots more than samples.
+
+    The accelerations M solve h0 M0 + 2 (h0 + h1) M1 + h1 M2 = 6 ((q2 - q1) / h1 - (q1 - q0) / h0) at every inner knot.
+    At the two added knots the angles are not given but follow from rest at the ends: q1 = q0 + M1 h0^2 / 6.
+    """
+    part = 2.0 if len(t) > 2 else 3.0
+    knots = np.concatenate((t[:1], [t[0] + (t[1] - t[0]) / part], t[1:-1], [t[-1] - (t[-1] - t[-2]) / part], t[-1:]))
+    angles = np.concatenate((q[:1], q[:1], q[1:-1], q[-1:], q[-1:]))
+    h = np.diff(knots)
+    lower, upper = h[:-1].copy(), h[1:].copy()
+    diagonal = 2.0 * (h[:-1] + h[1:])
+    diagonal[0] += h[0] ** 2 * (1.0 / h[0] + 1.0 / h[1])
+    diagonal[-1] += h[-1] ** 2 * (1.0 / h[-1] + 1.0 / h[-2])
+    lower[1] -= h[0] ** 2 / h[1]
+    upper[-2] -= h[-1] ** 2 / h[-2]
+    bends = np.zeros_like(angles)
+    bends[1:-1] = _solve_tridiagonal(
+        lower, diagonal, upper, 6.0 * np.diff(np.diff(angles, axis=0) / h[:, None], axis=0)
+    )
+    angles[1] += bends[1] * h[0] ** 2 / 6.0
+    angles[-2] += bends[-2] * h[-1] ** 2 / 6.0
+    return knots, angles, bends
+
+
+def _solve_tridiagonal(lower: Array, diagonal: Array, upper: Array, right: Array) -> Array:
+    """Returns x, shape (m, n), for a matrix whose diagonal outweighs its neighbours: elimination without pivoting."""
+    a, b, c = lower.tolist(), diagonal.tolist(), upper.tolist()
+    x = right.copy()
+    for i in range(1, len(b)):
+        factor = a[i] / b[i - 1]
+        b[i] -= factor * c[i - 1]
+        x[i] -= factor * x[i - 1]
+    x[-1] /= b[-1]
+    for i in range(len(b) - 2, -1, -1):
+        x[i] -= c[i] * x[i + 1]
+        x[i] /= b[i]
+    return x
