@@ -140,8 +140,10 @@ class Jog:
 
         From one twist to the next the tool goes along the straight line between them, at half of what the joints can
         accelerate; from rest it moves in the asked direction at once. Where joints would pass a velocity limit or come
-        to the end of their range, all are slowed down by one factor. Near a singularity the direction that is lost is
-        damped (`is_damped`). Of all joint velocities that give the twist, a 7-axis arm takes the smallest.
+        to the end of their range, all are slowed down by one factor; what comes up too suddenly for that, at high
+        speed near a singularity, bends the tool's way for a moment, never a joint's limits. Closer still, the
+        direction that is lost is damped (`is_damped`). A 7-axis arm takes the smallest joint velocities that give the
+        twist.
 
         Args:
             twist: Velocity of the tool tip and angular velocity, shape (6,), linear first, [m/s, rad/s]; lowered as a

@@ -188,22 +188,24 @@ def twist_of(model, jog, frame):
 
 @arms
 @pytest.mark.parametrize("frame", ["base", "tool"])
-@settings(max_examples=6, deadline=None)
-@given(seed=seeds, size=st.floats(0.05, 0.3))
-def test_a_twist_is_followed_in_its_direction_from_rest_to_rest_at_the_end_of_a_range(model, frame, seed, size):
+@settings(max_examples=3, deadline=None)
+@given(seed=seeds, size=st.floats(0.01, 0.1))
+def test_a_twist_is_followed_in_its_direction_until_a_singularity(model, frame, seed, size):
     wanted = size * np.random.default_rng(seed).normal(size=6)
     jog = Jog(model.with_tool(Pose((0.05, 0.0, 0.1))), model.home)
     jog.set_twist(wanted, frame=frame)
     rows = [model.home] * 4
-    for k in range(1200):
+    for k in range(800):
         rows.append(jog.step())
         if jog.is_damped:
             break
+        if k % 20:
+            continue
         actual = twist_of(jog._model, jog, frame)
         along = actual @ wanted / (wanted @ wanted)
         # The joints follow each cycle's velocity with a lag of up to acceleration^2 / (2 jerk).
-        assert np.linalg.norm(actual - along * wanted) < 0.02 * np.linalg.norm(actual) + 0.012
-        assert along < jog.part + 0.05 or k < 3
+        assert np.linalg.norm(actual - along * wanted) < 0.02 * np.linalg.norm(actual) + 0.003
+        assert along < jog.part + 0.003
     assert_inside_limits(model, rows)
 
 
@@ -222,7 +224,23 @@ def test_a_twist_is_reached_exactly_and_a_zero_twist_brakes_along_it():
 
 
 @arms
-@settings(max_examples=6, deadline=None)
+def test_a_twist_to_the_end_of_a_range_ends_at_rest_with_the_tool_in_its_place(model):
+    jog = Jog(model, model.home)
+    jog.set_twist([0.0, 0.0, 0.0, 0.0, 0.0, 2.0], frame="tool")  # About the axis of the last joint.
+    rows = [model.home] * 4
+    for k in range(5000):
+        rows.append(jog.step())
+        if k > 100 and jog.is_at_rest:
+            break
+    assert jog.is_at_rest
+    assert jog.part == 0.0
+    assert_inside_limits(model, rows)
+    assert model.limits.joint.upper[-1] - rows[-1][-1] < 0.01
+    assert np.abs(model.position_path(rows[3:]) - model.forward(model.home).position).max() < 1e-4
+
+
+@arms
+@settings(max_examples=4, deadline=None)
 @given(seed=seeds)
 def test_the_tool_keeps_its_own_velocity_limits(model, seed):
     rng = np.random.default_rng(seed)
@@ -240,7 +258,7 @@ def test_the_tool_keeps_its_own_velocity_limits(model, seed):
 @arms
 def test_through_a_singularity_the_arm_says_that_it_damps_and_stays_inside_its_limits(model):
     q = model.home.copy()
-    q[model.n - 2] = 0.02  # The wrist is nearly straight.
+    q[model.n - 4] = 0.01  # The arm is nearly stretched.
     jog = Jog(model, q)
     jog.set_twist([0.0, 0.1, 0.0, 0.2, 0.0, 0.0])
     rows = [q] * 4
