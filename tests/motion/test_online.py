@@ -142,7 +142,7 @@ def test_a_target_is_reached_as_fast_as_the_slowest_joint_can():
 
 
 def test_a_moving_target_is_followed_at_its_pace_and_then_reached():
-    jog = Jog(MODEL, MODEL.home)
+    jog, target = Jog(MODEL, MODEL.home), MODEL.home
     rows = [MODEL.home] * 4
     for k in range(1500):
         target = MODEL.home + 0.3 * np.sin(2.0 * k * CYCLE_TIME)

@@ -86,9 +86,10 @@ def test_csv_and_npz_in_every_dress_give_the_same_motion(tmp_path):
     for text, options in texts.items():
         motion = Motion.load_samples(file_of(tmp_path, text), **options)
         assert np.allclose(motion.q, expected.q, rtol=0.0, atol=1e-9), text[:60]
-    for arrays, options in (({"t": t, "q": q}, {}), ({"q": degrees}, {"rate_hz": 50, "unit": "deg"})):
-        np.savez(tmp_path / "moves.npz", **arrays)
-        motion = Motion.load_samples(tmp_path / "moves.npz", **options)
+    np.savez(tmp_path / "timed.npz", t=t, q=q)
+    np.savez(tmp_path / "even.npz", q=degrees)
+    for name, options in (("timed.npz", {}), ("even.npz", {"rate_hz": 50, "unit": "deg"})):
+        motion = Motion.load_samples(tmp_path / name, **options)
         assert np.allclose(motion.q, expected.q, rtol=0.0, atol=1e-9)
 
 
