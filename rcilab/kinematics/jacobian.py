@@ -54,10 +54,9 @@ def tool_jacobian(chain: Chain, q: Sequence[float], T_flange_tool: Pose = IDENTI
             ca * zy - sa * vy,
             ca * zz - sa * vz,
         )
-    tool = Pose.from_parts((xx, yx, zx, xy, yy, zy, xz, yz, zz), (px, py, pz))
+    rotation, (x, y, z) = (xx, yx, zx, xy, yy, zy, xz, yz, zz), (px, py, pz)
     if T_flange_tool is not IDENTITY:
-        tool = tool @ T_flange_tool
-    rotation, (x, y, z) = tool.parts
+        rotation, (x, y, z) = (Pose.from_parts(rotation, (x, y, z)) @ T_flange_tool).parts
     columns: list[float] = []
     for ax, ay, az, ox, oy, oz in axes:
         dx, dy, dz = x - ox, y - oy, z - oz

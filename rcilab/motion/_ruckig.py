@@ -121,6 +121,8 @@ class Stepper:
         self._out = ruckig.OutputParameter(n)
         problem = ruckig.InputParameter(n)
         problem.synchronization = ruckig.Synchronization.No
+        problem.control_interface = _VELOCITY
+        self._by_velocity = True
         self._standstill = [0.0] * n
         self._problem = problem
         self.place(q, dq, ddq)
@@ -139,9 +141,7 @@ class Stepper:
 
     def towards_velocity(self, dq: Sequence[float]) -> None:
         """Goes on for one cycle towards velocities, to keep them, [rad/s]."""
-        self._problem.control_interface = _VELOCITY
-        self._problem.per_dof_control_interface = None
-        self._problem.target_velocity = dq
+        self._lead_by_velocity(dq)
         self._step()
 
     def towards_ends(self, ends: Sequence[float | None], dq: Sequence[float]) -> None:
@@ -152,6 +152,7 @@ class Stepper:
             dq: The bound of the velocity on the way to a position, above zero, or else the velocity to keep, [rad/s].
         """
         problem = self._problem
+        self._by_velocity = False
         problem.per_dof_control_interface = [_VELOCITY if end is None else _POSITION for end in ends]
         problem.target_position = [q if end is None else end for end, q in zip(ends, self.q, strict=True)]
         problem.target_velocity = [v if end is None else 0.0 for end, v in zip(ends, dq, strict=True)]
@@ -161,14 +162,18 @@ class Stepper:
     def _step(self) -> None:
         """Goes on by one cycle; where ruckig finds no curve, every axis brakes for this cycle instead."""
         if not self._update():
-            self._problem.control_interface = _VELOCITY
-            self._problem.per_dof_control_interface = None
-            self._problem.target_velocity = self._standstill
+            self._lead_by_velocity(self._standstill)
             if not self._update():
                 raise PlanningError("no way to stand still from this state; it is beyond any robot's")
         out = self._out
         self.q, self.dq, self.ddq = out.new_position, out.new_velocity, out.new_acceleration
         out.pass_to_input(self._problem)
+
+    def _lead_by_velocity(self, dq: Sequence[float]) -> None:
+        if not self._by_velocity:
+            self._problem.per_dof_control_interface = None
+            self._by_velocity = True
+        self._problem.target_velocity = dq
 
     def _update(self) -> bool:
         try:

@@ -63,8 +63,11 @@ class TwistFollower:
         self._chain, self._T_flange_tool = build_chain(model.description.dh), model.T_flange_tool
         self._joints = list(zip(lower, upper, velocity, acceleration, jerk, strict=True))
         self._speeds = (LIMIT_MARGIN * speed * tool.translation_velocity, LIMIT_MARGIN * speed * tool.rotation_velocity)
-        self._accelerations = (*acceleration, tool.translation_acceleration, tool.rotation_acceleration)
-        self._jerks = (*jerk, tool.translation_jerk, tool.rotation_jerk)
+        self._bounds = [
+            *zip(acceleration, jerk, strict=True),
+            (tool.translation_acceleration, tool.translation_jerk),
+            (tool.rotation_acceleration, tool.rotation_jerk),
+        ]
         self._in_tool = False
         self._start = self._goal = np.zeros(6)
         self._weight = 1.0
@@ -88,7 +91,8 @@ class TwistFollower:
         """
         if frame not in get_args(Frame):
             raise InvalidValueError("frame", frame, f"is unknown; known: {', '.join(get_args(Frame))}")
-        self._cut = min(1.0, _smallest_ratio(self._speeds, _norms(twist)))
+        norms = zip(self._speeds, _norms(twist), strict=True)
+        self._cut = min([1.0, *(bound / norm for bound, norm in norms if norm > bound)])
         self._goal = self._cut * twist
         self._in_tool = frame == "tool"
         self._weight = 0.0
@@ -127,9 +131,11 @@ class TwistFollower:
         if max(norms) < _SAME:
             self._weight = 1.0
             return self._goal
-        strides = [*map(abs, inverse.dot(change).tolist()), *norms]
-        rate = RAMP_PART * _smallest_ratio(self._accelerations, strides)
-        rate_change = RAMP_PART * _smallest_ratio(self._jerks, strides)
+        rate = rate_change = math.inf  # [1/s], [1/s^2]
+        for stride, (a_max, j_max) in zip([*inverse.dot(change).tolist(), *norms], self._bounds, strict=True):
+            if stride := abs(stride):
+                rate = min(rate, RAMP_PART * a_max / stride)
+                rate_change = min(rate_change, RAMP_PART * j_max / stride)
         blend = self._blend
         if self._begins:
             # What the tool accelerates along the line already goes on; the rest is for the joints to lose.
@@ -208,11 +214,6 @@ def _fastest_before(distance: float, a: float, j: float) -> float:
         return (distance * distance * j) ** (1.0 / 3.0)
     lost = a / j
     return 0.5 * a * (math.sqrt(lost * lost + 8.0 * distance / a) - lost)
-
-
-def _smallest_ratio(bounds: Sequence[float], values: Sequence[float]) -> float:
-    ratios = [bound / value for bound, value in zip(bounds, values, strict=True) if value > 0.0]
-    return min(ratios, default=math.inf)
 
 
 def _norms(twist: Array) -> tuple[float, float]:
