@@ -153,7 +153,8 @@ class Jog:
         Raises:
             InvalidValueError: twist is not six finite numbers, or the frame is unknown.
         """
-        self._tool.lead(as_vector(twist, 6, "twist", "m/s, rad/s"), frame)
+        wanted = as_vector(twist, 6, "twist", "m/s, rad/s")
+        self._tool.lead(wanted, frame, goes_on=self._advance == self._follow_twist)
         self._advance = self._follow_twist
 
     def set_target(self, q: ArrayLike) -> None:

@@ -79,12 +79,13 @@ class TwistFollower:
         self.is_damped = False
         self.part = 1.0
 
-    def lead(self, twist: Array, frame: Frame) -> None:
+    def lead(self, twist: Array, frame: Frame, *, goes_on: bool) -> None:
         """Takes another wanted twist: the next step starts towards it, from the twist that the tool has then.
 
         Args:
             twist: Shape (6,), linear first, [m/s, rad/s].
             frame: Its axes.
+            goes_on: Whether the tool followed this object in the last cycle: the same twist again changes nothing then.
 
         Raises:
             InvalidValueError: The frame is unknown.
@@ -93,11 +94,14 @@ class TwistFollower:
             raise InvalidValueError("frame", frame, f"is unknown; known: {', '.join(get_args(Frame))}")
         norms = zip(self._speeds, _norms(twist), strict=True)
         self._cut = min([1.0, *(bound / norm for bound, norm in norms if norm > bound)])
-        self._goal = self._cut * twist
-        self._in_tool = frame == "tool"
+        goal, in_tool = self._cut * twist, frame == "tool"
+        if goes_on and in_tool == self._in_tool and np.array_equal(goal, self._goal):
+            return
+        self._goal, self._in_tool = goal, in_tool
         self._weight = 0.0
         self._begins = True
         self._allowed = 1.0
+        self._last = None
 
     def step(self, q: Sequence[float], dq: Sequence[float], ddq: Sequence[float]) -> list[float]:
         """Returns joint velocities to go on with, plain floats, [rad/s].

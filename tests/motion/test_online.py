@@ -223,6 +223,27 @@ def test_a_twist_is_reached_exactly_and_a_zero_twist_brakes_along_it():
     assert jog.is_at_rest
 
 
+@pytest.mark.parametrize("frame", ["base", "tool"])
+def test_the_same_twist_in_every_cycle_is_the_same_as_once(frame):
+    wanted = [0.1, -0.05, 0.02, 0.1, 0.0, 0.05]
+    once, always = Jog(MODEL, MODEL.home), Jog(MODEL, MODEL.home)
+    once.set_twist(wanted, frame=frame)
+    for _ in range(200):
+        always.set_twist(wanted, frame=frame)
+        assert np.array_equal(always.step(), once.step())
+
+
+def test_a_twist_that_changes_in_every_cycle_is_followed():
+    jog = Jog(MODEL, MODEL.home)
+    rows = [MODEL.home] * 4
+    for k in range(1500):
+        wanted = 0.05 * np.sin(2.0 * k * CYCLE_TIME) * np.array([1.0, 0.0, 1.0, 0.0, 1.0, 0.0])
+        jog.set_twist(wanted)
+        rows.append(jog.step())
+        assert np.abs(twist_of(MODEL, jog, "base") - wanted).max() < 2e-3
+    assert_inside_limits(MODEL, rows)
+
+
 @arms
 def test_a_twist_to_the_end_of_a_range_ends_at_rest_with_the_tool_in_its_place(model):
     jog = Jog(model, model.home)
