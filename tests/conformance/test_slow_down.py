@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from rcilab.conformance import Report, StartState, check
 from rcilab.conformance.slow_down import PRECISION, Obstacle
 from rcilab.errors import InvalidValueError
-from rcilab.model import load_model
-from rcilab.motion import Motion, differences_from_derivatives, plan_joint
+from rcilab.model import RobotModel, load_model
+from rcilab.motion import Motion, PiecewisePolynomial, differences_from_derivatives, plan_joint
 from rcilab.motion.motion import standing
 from rcilab.safety_box import SafetyBox
 
@@ -104,6 +104,21 @@ def test_a_joint_out_of_its_range_is_not_mended():
 def test_a_tool_out_of_the_safety_box_is_not_mended():
     box = SafetyBox(size=(0.1, 0.1, 0.1), T_base_box=MODEL.forward(MODEL.home))
     assert refused(check(hurried(FULL, 2.0), MODEL, box=box)) == ("position", "cartesian.position")
+
+
+def test_a_turn_between_rows_that_only_a_slower_motion_shows_is_not_mended():
+    duration, lift = 0.401, 0.1  # Turns half-way between two rows; (4 t (T - t) / T^2)^3 starts and ends at rest.
+    bump = np.polynomial.polynomial.polypow([0.0, 4.0 / duration, -4.0 / duration**2], 3)
+    curve = np.zeros((1, 7, 7))
+    curve[0, :, 0] = MODEL.home
+    curve[0, 1, : len(bump)] += lift * bump
+    motion = Motion(polynomial=PiecewisePolynomial([0.0, duration], curve), goal=MODEL.home, law="samples")
+    upper = MODEL.limits.joint.upper.copy()
+    upper[1] = np.nextafter(motion.q[:, 1].max(), np.inf)
+    limits = replace(MODEL.limits, joint=replace(MODEL.limits.joint, upper=upper))
+    report = check(motion, RobotModel(replace(MODEL.description, limits=limits)))
+    assert {v.condition.id for v in report.violations} == {"joint.acceleration"}
+    assert refused(report) == ("position", "joint.position")
 
 
 def test_a_box_that_is_kept_is_kept_and_covered_by_the_certificate():
