@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from rcilab.errors import UnreachableError
 from rcilab.model import RobotModel, load_model
 from rcilab.motion.joint import plan_joint
 from rcilab.motion.motion import Motion
+from rcilab.motion.online import Jog
 
 _ROBOT = "xMatePro7"
 _SEED = 20
@@ -71,6 +73,38 @@ def bench_check() -> Measurement:
         )
     note = f"{_ROBOT}, {len(motions[0].times)} samples; by length: {', '.join(costs)}"
     return summarise("check", times, "ms", 10.0, note)
+
+
+def bench_jog() -> Measurement:
+    """One cycle of on-line re-planning while the tool is jogged by changing twists, other commands in the note."""
+    model = load_model(_ROBOT)
+    twists = 0.05 * np.random.default_rng(_SEED).normal(size=(20, 6))
+
+    def steps(command: Callable[[Jog, int], None], every: int) -> list[float]:
+        jog = Jog(model, model.home)
+
+        def step(k: int) -> None:
+            if k % every == 0:
+                command(jog, k)
+            jog.step()
+
+        return time_calls(step, range(2000))
+
+    def turn(jog: Jog, k: int) -> None:
+        jog.set_twist(twists[k // 100 % len(twists)], frame="tool")
+
+    def follow(jog: Jog, k: int) -> None:
+        jog.set_target(model.home + 0.3 * np.sin(2e-3 * k))
+
+    def drive(jog: Jog, k: int) -> None:
+        jog.set_joint_velocity(0.3 * np.sin(0.02 * k + np.arange(model.n)))
+
+    others = ", ".join(
+        f"{name} {1e6 * float(np.median(steps(command, every))):.0f} us"
+        for name, command, every in (("joint velocities every cycle", drive, 1), ("a target every cycle", follow, 1))
+    )
+    note = f"{_ROBOT}, tool frame, another twist every 100 cycles; {others}"
+    return summarise("jog", steps(turn, 100), "us", 50.0, note)
 
 
 def motion_of(model: RobotModel, duration: float, start: Array | None = None) -> Motion:

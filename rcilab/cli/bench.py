@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 BENCHES = (
     *("forward", "inverse", "plan_joint", "check"),
     *("controller_ideal", "controller_mujoco", "controller_cartesian", "controller_impedance", "client_answer"),
+    *("jog",),
     *("drag", "import", "start", "state_period", "control_loop"),
 )
 """In the order they run; the slow ones last."""
@@ -101,6 +102,7 @@ def _bench(name: str, seconds: float) -> Callable[[], Measurement]:
         "inverse": compute.bench_inverse,
         "plan_joint": compute.bench_plan_joint,
         "check": compute.bench_check,
+        "jog": compute.bench_jog,
     }[name]
 
 

@@ -69,7 +69,8 @@ class TwistFollower:
             (tool.rotation_acceleration, tool.rotation_jerk),
         ]
         self._in_tool = False
-        self._start = self._goal = np.zeros(6)
+        self._start = self._goal = self._change = np.zeros(6)
+        self._norms = (0.0, 0.0)
         self._weight = 1.0
         self._blend = _ruckig.Stepper([0.0], [0.0], [0.0], [1.0], [1.0])
         self._begins = False
@@ -130,8 +131,9 @@ class TwistFollower:
         """Returns the twist of this cycle, on the straight line from the twist at the first step to the goal."""
         if self._begins:
             self._start = J.dot(dq)
-        change = self._goal - self._start
-        norms = _norms(change)
+            self._change = self._goal - self._start
+            self._norms = _norms(self._change)
+        change, norms = self._change, self._norms
         if max(norms) < _SAME:
             self._weight = 1.0
             return self._goal
