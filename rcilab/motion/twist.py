@@ -15,7 +15,6 @@ from rcilab.kinematics.forward import build_chain
 from rcilab.kinematics.jacobian import tool_jacobian
 from rcilab.model import RobotModel
 from rcilab.motion import _ruckig
-from rcilab.motion.margin import LIMIT_MARGIN
 
 Frame: TypeAlias = Literal["base", "tool"]
 """Axes in which a twist is given; its point is the tool tip in both."""
@@ -27,6 +26,10 @@ tenth of all configurations of the xMates is that close to a singularity, their 
 RAMP_PART = 0.5
 """Part of the joints' acceleration and jerk that changes of the twist use. A choice: the rest is for the bending of the
 joints' curves, so that the tool keeps its direction."""
+
+TOOL_MARGIN = 0.99
+"""Part of the tool's velocity limits that a twist uses. A choice: joints follow each cycle's velocity with a lag of up
+to acceleration^2 / (2 jerk), some mm/s at the tool, and not all of them with the same."""
 
 _SAME = 1e-9  # [m/s, rad/s] Twists closer than this are the same; as a number, a weight closer to 1 is 1.
 _SLOWEST = 1e-12  # [rad/s] Below this a joint stands.
@@ -62,7 +65,7 @@ class TwistFollower:
         tool = model.limits.cartesian
         self._chain, self._T_flange_tool = build_chain(model.description.dh), model.T_flange_tool
         self._joints = list(zip(lower, upper, velocity, acceleration, jerk, strict=True))
-        self._speeds = (LIMIT_MARGIN * speed * tool.translation_velocity, LIMIT_MARGIN * speed * tool.rotation_velocity)
+        self._speeds = (TOOL_MARGIN * speed * tool.translation_velocity, TOOL_MARGIN * speed * tool.rotation_velocity)
         self._bounds = [
             *zip(acceleration, jerk, strict=True),
             (tool.translation_acceleration, tool.translation_jerk),
