@@ -70,14 +70,12 @@ class Jog:
         self._lower = (limits.lower + POSITION_MARGIN).tolist()
         self._upper = (limits.upper - POSITION_MARGIN).tolist()
         self._speeds: list[float] = (LIMIT_MARGIN * speed * limits.velocity).tolist()
-        self._accelerations: list[float] = (LIMIT_MARGIN * limits.acceleration).tolist()
-        self._jerks: list[float] = (LIMIT_MARGIN * limits.jerk).tolist()
-        self._tool = TwistFollower(
-            model, self._lower, self._upper, self._speeds, self._accelerations, self._jerks, speed
-        )
-        self._axes = _ruckig.Stepper(
-            start.tolist(), velocity.tolist(), acceleration.tolist(), self._accelerations, self._jerks
-        )
+        a: list[float] = (LIMIT_MARGIN * limits.acceleration).tolist()
+        j: list[float] = (LIMIT_MARGIN * limits.jerk).tolist()
+        let_go = [3.0 * a_max / j_max for a_max, j_max in zip(a, j, strict=True)]  # [s] To build up and take back a.
+        self._joints = list(zip(self._lower, self._upper, a, let_go, j, strict=True))
+        self._tool = TwistFollower(model, self._lower, self._upper, self._speeds, a, j, speed)
+        self._axes = _ruckig.Stepper(start.tolist(), velocity.tolist(), acceleration.tolist(), a, j)
         self._rest = [0.0] * n
         self._goal = self._rest
         self._part = 1.0
@@ -215,21 +213,25 @@ class Jog:
         axes = self._axes
         ends: list[float | None] = []
         velocities: list[float] = []
-        for v_c, q, v, a, low, high, a_max, j_max in zip(
-            wanted, axes.q, axes.dq, axes.ddq, self._lower, self._upper, self._accelerations, self._jerks, strict=True
+        by_velocity = True
+        for v_c, q, v, a, (low, high, a_max, let_go, j_max) in zip(
+            wanted, axes.q, axes.dq, axes.ddq, self._joints, strict=True
         ):
             end, room = (high, high - q) if v_c > 0.0 else (low, q - low)
             speed = abs(v_c)
             peak = max(speed, abs(v)) + a * a / (2.0 * j_max)
             # No longer than it takes to let go of a, to change over to v_c and to stop from there.
-            if v_c == 0.0 or room > peak * ((abs(v_c - v) + peak) / a_max + 3.0 * a_max / j_max):
+            if v_c == 0.0 or room > peak * ((abs(v_c - v) + peak) / a_max + let_go):
                 ends.append(None)
                 velocities.append(v_c)
+            elif room <= 0.0 or speed * _LONGEST < room:
+                ends.append(None)
+                velocities.append(0.0)
             else:
-                creeps = speed * _LONGEST < room
-                ends.append(None if creeps or room <= 0.0 else end)
-                velocities.append(0.0 if ends[-1] is None else speed)
-        if any(end is not None for end in ends):
-            axes.towards_ends(ends, velocities)
-        else:
+                ends.append(end)
+                velocities.append(speed)
+                by_velocity = False
+        if by_velocity:
             axes.towards_velocity(velocities)
+        else:
+            axes.towards_ends(ends, velocities)

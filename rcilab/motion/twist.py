@@ -31,6 +31,7 @@ TOOL_MARGIN = 0.99
 """Part of the tool's velocity limits that a twist uses. A choice: joints follow each cycle's velocity with a lag of up
 to acceleration^2 / (2 jerk), some mm/s at the tool, and not all of them with the same."""
 
+_CHANGE = RAMP_PART * CYCLE_TIME  # [s] Times an acceleration: how much a velocity may change in a cycle.
 _SAME = 1e-9  # [m/s, rad/s] Twists closer than this are the same; as a number, a weight closer to 1 is 1.
 _SLOWEST = 1e-12  # [rad/s] Below this a joint stands.
 
@@ -175,9 +176,8 @@ class TwistFollower:
                 time = room / speed if time * speed > room else time
                 rate = a_max / speed if rate * speed > a_max else rate
                 rate_change = j_max / speed if rate_change * speed > j_max else rate_change
-            growth = abs(v - v_last) * before
-            allowed = RAMP_PART * a_max * CYCLE_TIME
-            bend = growth / allowed if growth > bend * allowed else bend
+            if (growth := abs(v - v_last) * before) > (allowed := _CHANGE * a_max):
+                bend = max(bend, growth / allowed)
         if time == math.inf:
             return 1.0
         time -= part * CYCLE_TIME
