@@ -4,9 +4,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rcilab.clock import CYCLE_TIME
+from rcilab.conformance.check import check
 from rcilab.errors import InvalidValueError, PlanningError
 from rcilab.model import load_model
-from rcilab.motion import Jog, plan_joint, plan_stop
+from rcilab.motion import Jog, Motion, plan_joint, plan_stop
 from rcilab.motion.online import POSITION_MARGIN
 from rcilab.motion.twist import DAMPED_BELOW, damped_inverse
 from rcilab.spatial import Pose
@@ -345,3 +346,16 @@ def test_what_is_no_command_is_refused_and_the_last_one_goes_on():
     for _ in range(200):
         jog.step()
     assert np.allclose(jog.dq, 0.1, rtol=0.0, atol=1e-9)
+
+
+@arms
+def test_what_was_jogged_from_rest_to_rest_conforms(model):
+    rng = np.random.default_rng(5)
+    jog = Jog(model, model.home)
+    rows = [model.home]
+    for _ in range(8):
+        command_anything(jog, model, rng)
+        rows += [jog.step() for _ in range(150)]
+    jog.stop()
+    rows += until_rest(jog)
+    assert check(Motion.from_samples(rows), model).ok
