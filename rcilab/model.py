@@ -12,18 +12,24 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.arrays import Array, JointVector, Matrix, as_number, as_path, as_vector, described
+from rcilab.arrays import Array, JointVector, as_number, as_path, as_rows, as_vector, described
 from rcilab.dynamics.payload import NO_LOAD, Payload
 from rcilab.errors import InvalidValueError, KinematicsError, SingularError
 from rcilab.kinematics import arm_angle as arm_angles
 from rcilab.kinematics import forward as forward_kinematics
+from rcilab.kinematics.differential import MovingFrame, drift_path, jacobian_path, moving_frame
+from rcilab.kinematics.feasible_arcs import FeasibleArcs, feasible_arcs
+from rcilab.kinematics.frames import Frame, locate
 from rcilab.kinematics.inverse import build_geometry, inverse_seven, inverse_six
+from rcilab.kinematics.inverse_batch import SolutionBatch, as_pose_batch, inverse_batch
 from rcilab.kinematics.jacobian import jacobian
+from rcilab.kinematics.least_norm import JointRates, least_norm
 from rcilab.kinematics.reach import Reach, closest_reachable
 from rcilab.kinematics.singularity import Dexterity, dexterity
 from rcilab.kinematics.solutions import Solutions, joint_limit_lists
 from rcilab.limits import Limits
 from rcilab.robots import RobotDescription, describe_robot
+from rcilab.safety_box import SafetyBox
 from rcilab.spatial import IDENTITY, Pose
 
 if TYPE_CHECKING:
@@ -69,10 +75,20 @@ class RobotModel:
     All joint vectors have shape (n,) and are in [rad]; all poses are of the tool in the base frame.
     """
 
-    def __init__(self, description: RobotDescription, tool: Pose = IDENTITY, load: Payload = NO_LOAD) -> None:
+    def __init__(
+        self,
+        description: RobotDescription,
+        tool: Pose = IDENTITY,
+        load: Payload = NO_LOAD,
+        stiffness_frame: Pose = IDENTITY,
+    ) -> None:
         if not isinstance(tool, Pose):
             raise InvalidValueError(
                 "tool", described(tool), "is no Pose; Pose.from_matrix makes one, Pose() is no tool"
+            )
+        if not isinstance(stiffness_frame, Pose):
+            raise InvalidValueError(
+                "stiffness frame", described(stiffness_frame), "is no Pose; Pose.from_matrix makes one"
             )
         if not isinstance(load, Payload):
             raise InvalidValueError(
@@ -83,6 +99,7 @@ class RobotModel:
             raise InvalidValueError("load mass", load.mass, f"kg is above {bound}, the payload it is rated for")
         self.description = description
         self.T_flange_tool = tool
+        self.T_tool_stiffness = stiffness_frame
         self.load = load
         self.n = description.n
         self._chain = forward_kinematics.build_chain(description.dh)
@@ -105,20 +122,30 @@ class RobotModel:
         return self.description.home
 
     def with_tool(self, tool: Pose) -> RobotModel:
-        """Returns this arm with another tool, given by its pose in the flange frame.
+        """Returns this arm with another tool, given by its pose in the flange frame (SetCoor).
 
         Raises:
             InvalidValueError: It is no `Pose`.
         """
-        return RobotModel(self.description, tool, self.load)
+        return RobotModel(self.description, tool, self.load, self.T_tool_stiffness)
 
     def with_load(self, load: Payload) -> RobotModel:
-        """Returns this arm with another load.
+        """Returns this arm with another load (SetLoad).
 
         Raises:
             InvalidValueError: It is no `Payload`, or heavier than the arm is rated for.
         """
-        return RobotModel(self.description, self.T_flange_tool, load)
+        return RobotModel(self.description, self.T_flange_tool, load, self.T_tool_stiffness)
+
+    def with_stiffness_frame(self, T_tool_stiffness: Pose) -> RobotModel:
+        """Returns this arm with another stiffness frame, given by its pose in the tool frame (SetCoor).
+
+        No limit and no plan depends on it: it is one more frame to ask about, by the name "stiffness".
+
+        Raises:
+            InvalidValueError: It is no `Pose`.
+        """
+        return RobotModel(self.description, self.T_flange_tool, self.load, T_tool_stiffness)
 
     def forward(self, q: ArrayLike) -> Pose:
         """Returns the pose of the tool in base.
@@ -132,10 +159,25 @@ class RobotModel:
         T = forward_kinematics.forward(self._chain, self._floats(q))
         return T @ self.T_flange_tool if self._has_tool else T
 
-    def forward_path(self, q: ArrayLike) -> Array:
-        """Returns the poses of the tool in base along a path, shape (N, 4, 4), for q of shape (N, n)."""
-        T = forward_kinematics.forward_path(self._chain, as_path(q, self.n, "q", "rad"))
-        return T @ self.T_flange_tool.matrix if self._has_tool else T
+    def pose(self, q: ArrayLike, frame: Frame = "tool") -> Pose:
+        """Returns the pose of a frame of the arm in base (GetCartPose); `forward` is the short way for the tool.
+
+        Args:
+            q: Joint angles, shape (n,), [rad]; limits are not looked at.
+            frame: joint1 to jointn, flange, tool or stiffness.
+
+        Raises:
+            InvalidValueError: q is not n finite numbers, or there is no such frame.
+        """
+        joints, T_joint_frame = self._locate(frame)
+        return forward_kinematics.forward(self._chain[:joints], self._floats(q)[:joints]) @ T_joint_frame
+
+    def forward_path(self, q: ArrayLike, frame: Frame = "tool") -> Array:
+        """Returns the poses of a frame in base along a path (GetCartPose), shape (N, 4, 4), for q of shape (N, n)."""
+        joints, T_joint_frame = self._locate(frame)
+        table = as_path(q, self.n, "q", "rad")[:, :joints]
+        T = forward_kinematics.forward_path(self._chain[:joints], table)
+        return T if T_joint_frame is IDENTITY else T @ T_joint_frame.matrix
 
     def position_path(self, q: ArrayLike) -> Array:
         """Returns where the tool is in base along a path, shape (N, 3), [m], for q of shape (N, n)."""
@@ -146,12 +188,109 @@ class RobotModel:
         """Returns the Denavit-Hartenberg frames after joint 1, 2, ..., n in base; the last one is the flange."""
         return forward_kinematics.joint_frames(self._chain, self._floats(q))
 
-    def jacobian(self, q: ArrayLike) -> Matrix:
-        """Returns the Jacobian at the tool, shape (6, n), linear rows first, base axes, [m/rad] and [rad/rad]."""
-        return jacobian(self._chain, self._floats(q), self.T_flange_tool)
+    def jacobian(self, q: ArrayLike, frame: Frame = "tool") -> Array:
+        """Returns the Jacobian at the origin of a frame (Jacobian), linear rows first, base axes.
+
+        The vendor's library gives something else for the tool and the stiffness frame; this is the derivative of
+        `pose` for every frame.
+
+        Args:
+            q: Joint angles, shape (n,) or (N, n), [rad].
+            frame: joint1 to jointn, flange, tool or stiffness; later joints than the frame's have columns of zeros.
+
+        Returns:
+            Shape (6, n) or (N, 6, n), [m/rad] and [rad/rad].
+
+        Raises:
+            InvalidValueError: q has another shape or is not finite, or there is no such frame.
+        """
+        if frame == "tool" and getattr(q, "ndim", 0) == 1:
+            return jacobian(self._chain, self._floats(q), self.T_flange_tool)
+        angles = as_rows(q, self.n, "q", "rad")
+        return jacobian_path(self._moving(angles, frame)).reshape(*angles.shape[:-1], 6, self.n)
+
+    def velocity(self, q: ArrayLike, dq: ArrayLike, frame: Frame = "tool") -> Array:
+        """Returns the twist of a frame (GetCartVel): velocity of its origin and angular velocity, base axes.
+
+        Args:
+            q: Joint angles, shape (n,) or (N, n), [rad].
+            dq: Joint velocities, of q's shape, [rad/s].
+            frame: joint1 to jointn, flange, tool or stiffness.
+
+        Returns:
+            Shape (6,) or (N, 6), [m/s, rad/s].
+        """
+        angles = as_rows(q, self.n, "q", "rad")
+        speeds = as_rows(dq, self.n, "dq", "rad/s", angles)
+        J = jacobian_path(self._moving(angles, frame))
+        return np.einsum("nij,nj->ni", J, np.atleast_2d(speeds)).reshape(*angles.shape[:-1], 6)
+
+    def acceleration(self, q: ArrayLike, dq: ArrayLike, ddq: ArrayLike, frame: Frame = "tool") -> Array:
+        """Returns the acceleration of a frame (GetCartAcc), J ddq + dJ/dt dq: of its origin, and angular, base axes.
+
+        Args:
+            q: Joint angles, shape (n,) or (N, n), [rad].
+            dq: Joint velocities, of q's shape, [rad/s].
+            ddq: Joint accelerations, of q's shape, [rad/s^2].
+            frame: joint1 to jointn, flange, tool or stiffness.
+
+        Returns:
+            Shape (6,) or (N, 6), [m/s^2, rad/s^2].
+        """
+        angles = as_rows(q, self.n, "q", "rad")
+        speeds = np.atleast_2d(as_rows(dq, self.n, "dq", "rad/s", angles))
+        rates = np.atleast_2d(as_rows(ddq, self.n, "ddq", "rad/s^2", angles))
+        moving = self._moving(angles, frame)
+        found = np.einsum("nij,nj->ni", jacobian_path(moving), rates) + drift_path(moving, speeds)
+        return found.reshape(*angles.shape[:-1], 6)
+
+    def joint_velocity(
+        self, q: ArrayLike, twist: ArrayLike, weights: ArrayLike | None = None, frame: Frame = "tool"
+    ) -> JointRates:
+        """Returns the joint velocities of least norm that give a frame a twist (GetJointVel).
+
+        Close to a singularity they are damped, and the answer says so: `.damped`, and what is `.missed` of the twist.
+
+        Args:
+            q: Joint angles, shape (n,) or (N, n), [rad].
+            twist: Wanted motion in base axes, shape (6,) or (N, 6), linear part first, [m/s, rad/s].
+            weights: What a joint's motion costs against the others', shape (n,), positive; all the same when absent.
+            frame: joint1 to jointn, flange, tool or stiffness. What fewer than 6 joints move is always damped.
+
+        Raises:
+            InvalidValueError: An argument has another shape or is not finite, a weight is not positive.
+        """
+        angles = as_rows(q, self.n, "q", "rad")
+        wanted = as_rows(twist, 6, "twist", "m/s, rad/s", angles)
+        return least_norm(self.jacobian(angles, frame), wanted, self._weights(weights))
+
+    def joint_acceleration(
+        self,
+        q: ArrayLike,
+        dq: ArrayLike,
+        acceleration: ArrayLike,
+        weights: ArrayLike | None = None,
+        frame: Frame = "tool",
+    ) -> JointRates:
+        """Returns the joint accelerations of least norm that give a frame an acceleration (GetJointAcc).
+
+        Args:
+            q: Joint angles, shape (n,) or (N, n), [rad].
+            dq: Joint velocities, of q's shape, [rad/s].
+            acceleration: Wanted, in base axes, shape (6,) or (N, 6), linear part first, [m/s^2, rad/s^2].
+            weights: As for `joint_velocity`.
+            frame: joint1 to jointn, flange, tool or stiffness.
+
+        Raises:
+            InvalidValueError: As for `joint_velocity`.
+        """
+        angles = as_rows(q, self.n, "q", "rad")
+        wanted = as_rows(acceleration, 6, "acceleration", "m/s^2, rad/s^2", angles)
+        drift = self.acceleration(angles, dq, np.zeros(angles.shape), frame)
+        return least_norm(self.jacobian(angles, frame), wanted - drift, self._weights(weights))
 
     def inverse(self, T: Pose | ArrayLike, psi: float | None = None, near: ArrayLike | None = None) -> Solutions:
-        """Returns every analytic solution inside the joint limits.
+        """Returns every analytic solution inside the joint limits (GetJointPos); `.nearest(q)` is the vendor's answer.
 
         Args:
             T: Pose of the tool in base: a `Pose` or a homogeneous matrix, shape (4, 4).
@@ -181,6 +320,51 @@ class RobotModel:
             raise solutions.refusal()
         return solutions
 
+    def inverse_batch(self, T: ArrayLike, psi: ArrayLike = 0.0) -> SolutionBatch:
+        """Returns every analytic solution of many poses at once (GetJointPos), at one arm angle each.
+
+        Args:
+            T: Poses of the tool in base, shape (N, 4, 4), such as `forward_path` gives.
+            psi: Arm angle of a 7-axis arm, [rad], one number or shape (N,); of no meaning for 6 axes.
+
+        Returns:
+            `.q`, shape (N, 8, n), not a number where a pose is out of reach; `.inside`; `.nearest(q)`.
+
+        Raises:
+            InvalidValueError: T or psi has another shape, is not finite, or holds what is no pose.
+        """
+        poses = as_pose_batch(T)
+        angles = np.asarray(psi, dtype=np.float64)
+        if angles.shape not in ((), (len(poses),)) or not np.isfinite(angles).all():
+            raise InvalidValueError(
+                "psi", described(angles), f"needs one number or shape ({len(poses)},), finite [rad]"
+            )
+        flange = poses @ self._T_tool_flange.matrix if self._has_tool else poses
+        joint = self.limits.joint
+        return SolutionBatch(inverse_batch(self._geometry, flange, angles), joint.lower, joint.upper)
+
+    def feasible_arcs(self, T: Pose | ArrayLike, box: SafetyBox | None = None) -> FeasibleArcs:
+        """Returns which arm angles a pose leaves to a 7-axis arm, and what forbids the others.
+
+        Args:
+            T: Pose of the tool in base: a `Pose` or a homogeneous matrix, shape (4, 4).
+            box: What the tool shall stay in; nothing when absent.
+
+        Returns:
+            `.feasible`: ranges of arm angles, [rad]; `.arcs`: the whole circle, each part with its reasons.
+
+        Raises:
+            UnreachableError: The pose is out of reach at every arm angle.
+            InvalidValueError: T is not usable.
+            KinematicsError: The arm has 6 axes.
+        """
+        self._require_arm_angle()
+        pose = T if isinstance(T, Pose) else Pose.from_matrix(T)
+        is_outside = box is not None and box.active and box.excess(pose.parts[1]) > 0.0
+        flange = pose @ self._T_tool_flange if self._has_tool else pose
+        joint = self.limits.joint
+        return feasible_arcs(self._geometry, flange, joint.lower, joint.upper, is_outside)
+
     def closest(self, T: Pose | ArrayLike, near: ArrayLike, psi: float | None = None) -> Reach:
         """Returns joint angles for a target, or for the closest pose to it that the arm can take.
 
@@ -208,8 +392,7 @@ class RobotModel:
             SingularError: The shoulder-wrist line is vertical or the arm is stretched; psi has no meaning there.
             KinematicsError: The arm has 6 axes.
         """
-        if self.n != 7:
-            raise KinematicsError(f"{self.name} has 6 axes: only a 7-axis arm has an arm angle")
+        self._require_arm_angle()
         return arm_angles.arm_angle(self._geometry.upper, self._geometry.fore, self._floats(q))
 
     def dexterity(self, q: ArrayLike) -> Dexterity:
@@ -220,20 +403,32 @@ class RobotModel:
         """Returns sqrt(det(J J^T)) at the tool; 0 at a singularity."""
         return self.dexterity(q).manipulability
 
-    def torque(self, q: ArrayLike, dq: ArrayLike | None = None, ddq: ArrayLike | None = None) -> TorqueTerms:
-        """Returns the joint torques of the rigid arm with its load, and their terms, each of shape (n,), [N m].
+    def torque(
+        self, q: ArrayLike, dq: ArrayLike | None = None, ddq: ArrayLike | None = None, *, friction: bool = False
+    ) -> TorqueTerms:
+        """Returns the joint torques of the rigid arm with its load, and their terms (GetTau, GetTauNoFriction).
+
+        The rotors of the drives are not in them: with these torques the arm behind the gears moves as wanted.
 
         Args:
-            q: Joint angles, shape (n,), [rad].
-            dq: Joint velocities, shape (n,), [rad/s]; at rest when absent.
-            ddq: Joint accelerations, shape (n,), [rad/s^2]; none when absent.
+            q: Joint angles, shape (n,) or (N, n), [rad].
+            dq: Joint velocities, of q's shape, [rad/s]; at rest when absent.
+            ddq: Joint accelerations, of q's shape, [rad/s^2]; none when absent.
+            friction: Whether `.full` holds the joints' friction, too; it is that of the MuJoCo plant.
+
+        Returns:
+            Terms of q's shape, [N m].
         """
-        zeros = np.zeros(self.n)
-        return self.rigid_body.torque(
-            as_vector(q, self.n, "q", "rad"),
-            zeros if dq is None else as_vector(dq, self.n, "dq", "rad/s"),
-            zeros if ddq is None else as_vector(ddq, self.n, "ddq", "rad/s^2"),
-        )
+        angles = as_rows(q, self.n, "q", "rad")
+        zeros = np.zeros(angles.shape)
+        speeds = zeros if dq is None else as_rows(dq, self.n, "dq", "rad/s", angles)
+        rates = zeros if ddq is None else as_rows(ddq, self.n, "ddq", "rad/s^2", angles)
+        terms = (self.rigid_body.torque if angles.ndim == 1 else self.rigid_body.torque_path)(angles, speeds, rates)
+        if not friction:
+            return terms
+        from rcilab.dynamics.friction import friction_torque
+
+        return terms.with_friction(friction_torque(self.limits.joint, speeds))
 
     @cached_property
     def rigid_body(self) -> RigidBody:
@@ -288,6 +483,10 @@ class RobotModel:
             best = min(best, solutions, key=_least_excess)
         raise best.refusal()
 
+    def _require_arm_angle(self) -> None:
+        if self.n != 7:
+            raise KinematicsError(f"{self.name} has 6 axes: only a 7-axis arm has an arm angle")
+
     def _natural_psi(self, near: Sequence[float] | None) -> float:
         if near is None:
             return 0.0
@@ -295,6 +494,20 @@ class RobotModel:
             return arm_angles.arm_angle(self._geometry.upper, self._geometry.fore, near)
         except SingularError:
             return 0.0
+
+    def _locate(self, frame: str) -> tuple[int, Pose]:
+        return locate(frame, self.n, self.T_flange_tool, self.T_tool_stiffness)
+
+    def _moving(self, q: Array, frame: str) -> MovingFrame:
+        return moving_frame(self._chain, np.atleast_2d(q), *self._locate(frame))
+
+    def _weights(self, weights: ArrayLike | None) -> JointVector:
+        if weights is None:
+            return np.ones(self.n)
+        values = as_vector(weights, self.n, "weights")
+        if not (values > 0.0).all():
+            raise InvalidValueError("weights", values.tolist(), "must all be above 0")
+        return values
 
     def _floats(self, q: ArrayLike) -> list[float]:
         """Returns q as n finite plain floats; the cheap way for what is an array already."""
