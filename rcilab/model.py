@@ -12,18 +12,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.arrays import Array, JointVector, as_number, as_path, as_rows, as_vector, described
+from rcilab.arrays import JointVector, as_number, as_rows, as_vector, described
 from rcilab.dynamics.payload import NO_LOAD, Payload
 from rcilab.errors import InvalidValueError, KinematicsError, SingularError
 from rcilab.kinematics import arm_angle as arm_angles
-from rcilab.kinematics import forward as forward_kinematics
-from rcilab.kinematics.differential import MovingFrame, drift_path, jacobian_path, moving_frame
 from rcilab.kinematics.feasible_arcs import FeasibleArcs, feasible_arcs
-from rcilab.kinematics.frames import Frame, locate
 from rcilab.kinematics.inverse import build_geometry, inverse_seven, inverse_six
 from rcilab.kinematics.inverse_batch import SolutionBatch, as_pose_batch, inverse_batch
-from rcilab.kinematics.jacobian import jacobian
-from rcilab.kinematics.least_norm import JointRates, least_norm
+from rcilab.kinematics.moving_arm import MovingArm
 from rcilab.kinematics.reach import Reach, closest_reachable
 from rcilab.kinematics.singularity import Dexterity, dexterity
 from rcilab.kinematics.solutions import Solutions, joint_limit_lists
@@ -69,10 +65,11 @@ def require_model(model: object) -> RobotModel:
     raise InvalidValueError("model", described(model), "is no robot model; load_model makes one")
 
 
-class RobotModel:
+class RobotModel(MovingArm):
     """An arm with a tool and a load. Immutable: `with_tool` and `with_load` return another one.
 
-    All joint vectors have shape (n,) and are in [rad]; all poses are of the tool in the base frame.
+    All joint vectors have shape (n,) and are in [rad]; all poses are in the base frame, of the tool unless a frame is
+    named. Where its frames are and how they move is in `MovingArm`.
     """
 
     def __init__(
@@ -97,13 +94,9 @@ class RobotModel:
         if load.mass > description.rated_payload:
             bound = f"{description.rated_payload:g} kg for {description.name}"
             raise InvalidValueError("load mass", load.mass, f"kg is above {bound}, the payload it is rated for")
+        super().__init__(description.dh, tool, stiffness_frame)
         self.description = description
-        self.T_flange_tool = tool
-        self.T_tool_stiffness = stiffness_frame
         self.load = load
-        self.n = description.n
-        self._chain = forward_kinematics.build_chain(description.dh)
-        self._has_tool = not tool.is_close(IDENTITY, 0.0)
         self._T_tool_flange = tool.inverse()
 
     @property
@@ -147,148 +140,6 @@ class RobotModel:
         """
         return RobotModel(self.description, self.T_flange_tool, self.load, T_tool_stiffness)
 
-    def forward(self, q: ArrayLike) -> Pose:
-        """Returns the pose of the tool in base.
-
-        Args:
-            q: Joint angles, shape (n,), [rad]; limits are not looked at.
-
-        Raises:
-            InvalidValueError: q is not n finite numbers.
-        """
-        T = forward_kinematics.forward(self._chain, self._floats(q))
-        return T @ self.T_flange_tool if self._has_tool else T
-
-    def pose(self, q: ArrayLike, frame: Frame = "tool") -> Pose:
-        """Returns the pose of a frame of the arm in base (GetCartPose); `forward` is the short way for the tool.
-
-        Args:
-            q: Joint angles, shape (n,), [rad]; limits are not looked at.
-            frame: joint1 to jointn, flange, tool or stiffness.
-
-        Raises:
-            InvalidValueError: q is not n finite numbers, or there is no such frame.
-        """
-        joints, T_joint_frame = self._locate(frame)
-        return forward_kinematics.forward(self._chain[:joints], self._floats(q)[:joints]) @ T_joint_frame
-
-    def forward_path(self, q: ArrayLike, frame: Frame = "tool") -> Array:
-        """Returns the poses of a frame in base along a path (GetCartPose), shape (N, 4, 4), for q of shape (N, n)."""
-        joints, T_joint_frame = self._locate(frame)
-        table = as_path(q, self.n, "q", "rad")[:, :joints]
-        T = forward_kinematics.forward_path(self._chain[:joints], table)
-        return T if T_joint_frame is IDENTITY else T @ T_joint_frame.matrix
-
-    def position_path(self, q: ArrayLike) -> Array:
-        """Returns where the tool is in base along a path, shape (N, 3), [m], for q of shape (N, n)."""
-        point = self.T_flange_tool.parts[1]
-        return forward_kinematics.position_path(self._chain, as_path(q, self.n, "q", "rad"), point)
-
-    def joint_frames(self, q: ArrayLike) -> tuple[Pose, ...]:
-        """Returns the Denavit-Hartenberg frames after joint 1, 2, ..., n in base; the last one is the flange."""
-        return forward_kinematics.joint_frames(self._chain, self._floats(q))
-
-    def jacobian(self, q: ArrayLike, frame: Frame = "tool") -> Array:
-        """Returns the Jacobian at the origin of a frame (Jacobian), linear rows first, base axes.
-
-        The vendor's library gives something else for the tool and the stiffness frame; this is the derivative of
-        `pose` for every frame.
-
-        Args:
-            q: Joint angles, shape (n,) or (N, n), [rad].
-            frame: joint1 to jointn, flange, tool or stiffness; later joints than the frame's have columns of zeros.
-
-        Returns:
-            Shape (6, n) or (N, 6, n), [m/rad] and [rad/rad].
-
-        Raises:
-            InvalidValueError: q has another shape or is not finite, or there is no such frame.
-        """
-        if frame == "tool" and getattr(q, "ndim", 0) == 1:
-            return jacobian(self._chain, self._floats(q), self.T_flange_tool)
-        angles = as_rows(q, self.n, "q", "rad")
-        return jacobian_path(self._moving(angles, frame)).reshape(*angles.shape[:-1], 6, self.n)
-
-    def velocity(self, q: ArrayLike, dq: ArrayLike, frame: Frame = "tool") -> Array:
-        """Returns the twist of a frame (GetCartVel): velocity of its origin and angular velocity, base axes.
-
-        Args:
-            q: Joint angles, shape (n,) or (N, n), [rad].
-            dq: Joint velocities, of q's shape, [rad/s].
-            frame: joint1 to jointn, flange, tool or stiffness.
-
-        Returns:
-            Shape (6,) or (N, 6), [m/s, rad/s].
-        """
-        angles = as_rows(q, self.n, "q", "rad")
-        speeds = as_rows(dq, self.n, "dq", "rad/s", angles)
-        J = jacobian_path(self._moving(angles, frame))
-        return np.einsum("nij,nj->ni", J, np.atleast_2d(speeds)).reshape(*angles.shape[:-1], 6)
-
-    def acceleration(self, q: ArrayLike, dq: ArrayLike, ddq: ArrayLike, frame: Frame = "tool") -> Array:
-        """Returns the acceleration of a frame (GetCartAcc), J ddq + dJ/dt dq: of its origin, and angular, base axes.
-
-        Args:
-            q: Joint angles, shape (n,) or (N, n), [rad].
-            dq: Joint velocities, of q's shape, [rad/s].
-            ddq: Joint accelerations, of q's shape, [rad/s^2].
-            frame: joint1 to jointn, flange, tool or stiffness.
-
-        Returns:
-            Shape (6,) or (N, 6), [m/s^2, rad/s^2].
-        """
-        angles = as_rows(q, self.n, "q", "rad")
-        speeds = np.atleast_2d(as_rows(dq, self.n, "dq", "rad/s", angles))
-        rates = np.atleast_2d(as_rows(ddq, self.n, "ddq", "rad/s^2", angles))
-        moving = self._moving(angles, frame)
-        found = np.einsum("nij,nj->ni", jacobian_path(moving), rates) + drift_path(moving, speeds)
-        return found.reshape(*angles.shape[:-1], 6)
-
-    def joint_velocity(
-        self, q: ArrayLike, twist: ArrayLike, weights: ArrayLike | None = None, frame: Frame = "tool"
-    ) -> JointRates:
-        """Returns the joint velocities of least norm that give a frame a twist (GetJointVel).
-
-        Close to a singularity they are damped, and the answer says so: `.damped`, and what is `.missed` of the twist.
-
-        Args:
-            q: Joint angles, shape (n,) or (N, n), [rad].
-            twist: Wanted motion in base axes, shape (6,) or (N, 6), linear part first, [m/s, rad/s].
-            weights: What a joint's motion costs against the others', shape (n,), positive; all the same when absent.
-            frame: joint1 to jointn, flange, tool or stiffness. What fewer than 6 joints move is always damped.
-
-        Raises:
-            InvalidValueError: An argument has another shape or is not finite, a weight is not positive.
-        """
-        angles = as_rows(q, self.n, "q", "rad")
-        wanted = as_rows(twist, 6, "twist", "m/s, rad/s", angles)
-        return least_norm(self.jacobian(angles, frame), wanted, self._weights(weights))
-
-    def joint_acceleration(
-        self,
-        q: ArrayLike,
-        dq: ArrayLike,
-        acceleration: ArrayLike,
-        weights: ArrayLike | None = None,
-        frame: Frame = "tool",
-    ) -> JointRates:
-        """Returns the joint accelerations of least norm that give a frame an acceleration (GetJointAcc).
-
-        Args:
-            q: Joint angles, shape (n,) or (N, n), [rad].
-            dq: Joint velocities, of q's shape, [rad/s].
-            acceleration: Wanted, in base axes, shape (6,) or (N, 6), linear part first, [m/s^2, rad/s^2].
-            weights: As for `joint_velocity`.
-            frame: joint1 to jointn, flange, tool or stiffness.
-
-        Raises:
-            InvalidValueError: As for `joint_velocity`.
-        """
-        angles = as_rows(q, self.n, "q", "rad")
-        wanted = as_rows(acceleration, 6, "acceleration", "m/s^2, rad/s^2", angles)
-        drift = self.acceleration(angles, dq, np.zeros(angles.shape), frame)
-        return least_norm(self.jacobian(angles, frame), wanted - drift, self._weights(weights))
-
     def inverse(self, T: Pose | ArrayLike, psi: float | None = None, near: ArrayLike | None = None) -> Solutions:
         """Returns every analytic solution inside the joint limits (GetJointPos); `.nearest(q)` is the vendor's answer.
 
@@ -319,6 +170,26 @@ class RobotModel:
         if not len(solutions):
             raise solutions.refusal()
         return solutions
+
+    def closest(self, T: Pose | ArrayLike, near: ArrayLike, psi: float | None = None) -> Reach:
+        """Returns joint angles for a target, or for the closest pose to it that the arm can take.
+
+        Args:
+            T: Wanted pose of the tool in base: a `Pose` or a homogeneous matrix, shape (4, 4).
+            near: Present joint angles, shape (n,), [rad]: where to start from, and which branch to stay on.
+            psi: Arm angle of a 7-axis arm, [rad]; that of `near` when absent.
+
+        Raises:
+            InvalidValueError: T, near or psi is not usable, or psi was given for a 6-axis arm.
+        """
+        q = as_vector(near, self.n, "near", "rad")
+        target = T if isinstance(T, Pose) else Pose.from_matrix(T)
+        held = self._natural_psi(q.tolist()) if psi is None and self.n == 7 else psi
+
+        def solve(pose: Pose, may_search: bool) -> Solutions:
+            return self.inverse(pose, psi if may_search else held, q)
+
+        return closest_reachable(solve, self._geometry, self.T_flange_tool, self.forward(q), q, target)
 
     def inverse_batch(self, T: ArrayLike, psi: ArrayLike = 0.0) -> SolutionBatch:
         """Returns every analytic solution of many poses at once (GetJointPos), at one arm angle each.
@@ -364,26 +235,6 @@ class RobotModel:
         flange = pose @ self._T_tool_flange if self._has_tool else pose
         joint = self.limits.joint
         return feasible_arcs(self._geometry, flange, joint.lower, joint.upper, is_outside)
-
-    def closest(self, T: Pose | ArrayLike, near: ArrayLike, psi: float | None = None) -> Reach:
-        """Returns joint angles for a target, or for the closest pose to it that the arm can take.
-
-        Args:
-            T: Wanted pose of the tool in base: a `Pose` or a homogeneous matrix, shape (4, 4).
-            near: Present joint angles, shape (n,), [rad]: where to start from, and which branch to stay on.
-            psi: Arm angle of a 7-axis arm, [rad]; that of `near` when absent.
-
-        Raises:
-            InvalidValueError: T, near or psi is not usable, or psi was given for a 6-axis arm.
-        """
-        q = as_vector(near, self.n, "near", "rad")
-        target = T if isinstance(T, Pose) else Pose.from_matrix(T)
-        held = self._natural_psi(q.tolist()) if psi is None and self.n == 7 else psi
-
-        def solve(pose: Pose, may_search: bool) -> Solutions:
-            return self.inverse(pose, psi if may_search else held, q)
-
-        return closest_reachable(solve, self._geometry, self.T_flange_tool, self.forward(q), q, target)
 
     def arm_angle(self, q: ArrayLike) -> float:
         """Returns the arm angle psi of a 7-axis arm, [rad] in (-pi, pi].
@@ -494,28 +345,6 @@ class RobotModel:
             return arm_angles.arm_angle(self._geometry.upper, self._geometry.fore, near)
         except SingularError:
             return 0.0
-
-    def _locate(self, frame: str) -> tuple[int, Pose]:
-        return locate(frame, self.n, self.T_flange_tool, self.T_tool_stiffness)
-
-    def _moving(self, q: Array, frame: str) -> MovingFrame:
-        return moving_frame(self._chain, np.atleast_2d(q), *self._locate(frame))
-
-    def _weights(self, weights: ArrayLike | None) -> JointVector:
-        if weights is None:
-            return np.ones(self.n)
-        values = as_vector(weights, self.n, "weights")
-        if not (values > 0.0).all():
-            raise InvalidValueError("weights", values.tolist(), "must all be above 0")
-        return values
-
-    def _floats(self, q: ArrayLike) -> list[float]:
-        """Returns q as n finite plain floats; the cheap way for what is an array already."""
-        if isinstance(q, np.ndarray) and q.dtype == np.float64 and q.shape == (self.n,):
-            values = q.tolist()
-            if math.isfinite(sum(values)):
-                return values
-        return as_vector(q, self.n, "q", "rad").tolist()
 
 
 def _least_excess(solutions: Solutions) -> float:

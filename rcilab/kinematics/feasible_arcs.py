@@ -9,7 +9,7 @@ each, in closed form. Between neighbours of all of these nothing changes, and on
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from math import acos, cos, pi, sin, sqrt, tau
 from typing import Literal, TypeAlias
@@ -124,7 +124,7 @@ def feasible_arcs(
     q, lost = _angles_at(forms @ np.stack((np.ones(len(middle)), np.cos(middle), np.sin(middle))), acos(c4))
     lost |= s4 < SINGULAR or horizontal < SINGULAR * length
     broken = _broken(q, np.array(arm.offsets), lower, upper)
-    return FeasibleArcs(arcs=tuple(_arcs(starts, ends, broken, lost, outside_box)))
+    return FeasibleArcs(arcs=tuple(_arcs(starts, broken, lost, outside_box)))
 
 
 def _linear_forms(
@@ -222,24 +222,20 @@ def _broken(q: Array, offsets: Array, lower: Array, upper: Array) -> NDArray[np.
     return beyond[np.arange(7)[:, None], _TURNED]
 
 
-def _arcs(starts: Array, ends: Array, broken: NDArray[np.bool_], lost: NDArray[np.bool_], outside: bool) -> list[Arc]:
+def _arcs(starts: Array, broken: NDArray[np.bool_], lost: NDArray[np.bool_], outside: bool) -> list[Arc]:
     """Returns arcs without neighbours that are alike."""
     counts = broken.sum(axis=0)
-    best = broken[:, counts.argmin(axis=0), np.arange(len(starts))].T.tolist()
-    free = (counts == 0).T.tolist()
+    best = broken[:, counts.argmin(axis=0), np.arange(len(starts))]
+    looks = np.concatenate((best, counts == 0, lost[None]))  # All that an arc says, one column an arc.
+    is_new = (looks != np.roll(looks, 1, axis=1)).any(axis=0)
+    first = np.flatnonzero(is_new) if is_new.any() else np.array((0,))
+    begins = starts[first].tolist()
     arcs: list[Arc] = []
-    for start, end, beyond, kept, is_lost in zip(
-        starts.tolist(), ends.tolist(), best, free, lost.tolist(), strict=True
-    ):
-        joints = tuple([number for number, bad in enumerate(beyond, start=1) if bad])
-        branches = tuple([number for number, good in enumerate(kept) if good])
-        reasons = _reasons(bool(joints), is_lost, outside)
-        if arcs and _is_alike(arcs[-1], reasons, joints, branches):
-            start = arcs.pop().start
+    for start, end, look in zip(begins, [*begins[1:], begins[0] + tau], looks[:, first].T.tolist(), strict=True):
+        joints = tuple([number for number, is_beyond in enumerate(look[:7], start=1) if is_beyond])
+        branches = tuple([number for number, is_kept in enumerate(look[7:15]) if is_kept])
+        reasons = _reasons(bool(joints), look[15], outside)
         arcs.append(Arc(start=start, end=end, reasons=reasons, joints=joints, branches=branches))
-    first, last = arcs[0], arcs[-1]
-    if len(arcs) > 1 and _is_alike(first, last.reasons, last.joints, last.branches):
-        return [*arcs[1:-1], replace(last, end=first.end + tau)]
     return arcs
 
 
@@ -252,10 +248,6 @@ def _reasons(is_limited: bool, is_lost: bool, outside: bool) -> tuple[Reason, ..
     if outside:
         reasons.append("safety box")
     return tuple(reasons)
-
-
-def _is_alike(arc: Arc, reasons: tuple[Reason, ...], joints: tuple[int, ...], branches: tuple[int, ...]) -> bool:
-    return arc.reasons == reasons and arc.joints == joints and arc.branches == branches
 
 
 def _joined(ranges: list[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
