@@ -119,9 +119,11 @@ def feasible_arcs(
         return FeasibleArcs(arcs=(nowhere,))
     forms = _linear_forms(arm, r, (x, y, z), length, c4, s4)
     starts = _breaks(forms, _crossings(tuple(lower.tolist()), tuple(upper.tolist()), arm.offsets))
-    ends = np.append(starts[1:], starts[0] + tau)
-    middle = 0.5 * (starts + ends)
-    q, lost = _angles_at(forms @ np.stack((np.ones(len(middle)), np.cos(middle), np.sin(middle))), acos(c4))
+    middle = 0.5 * starts
+    middle[:-1] += middle[1:]
+    middle[-1] += 0.5 * (starts[0] + tau)
+    values = forms[:, 1:2] * np.cos(middle) + forms[:, 2:3] * np.sin(middle) + forms[:, 0:1]
+    q, lost = _angles_at(values, acos(c4))
     lost |= s4 < SINGULAR or horizontal < SINGULAR * length
     broken = _broken(q, np.array(arm.offsets), lower, upper)
     return FeasibleArcs(arcs=tuple(_arcs(starts, broken, lost, outside_box)))
@@ -170,8 +172,11 @@ def _breaks(forms: Array, crossings: tuple[Array, Array]) -> Array:
     half = np.arccos(-c[is_met] / radius[is_met])
     towards = np.arctan2(b[is_met], a[is_met])
     found = np.sort((np.concatenate((towards - half, towards + half)) + pi) % tau - pi)
-    distinct = found[np.diff(found, append=np.inf) > _SAME]
-    return distinct if len(distinct) else np.array((-pi,))
+    if not len(found):
+        return np.array((-pi,))
+    is_distinct = np.ones(len(found), dtype=np.bool_)
+    is_distinct[1:] = found[1:] - found[:-1] > _SAME
+    return found[is_distinct]
 
 
 @lru_cache(maxsize=16)
@@ -185,7 +190,8 @@ def _crossings(lower: tuple[float, ...], upper: tuple[float, ...], offsets: tupl
         levels.append(level)
 
     for joint in range(7):
-        bounds = {max(-pi, min(pi, bound[joint])) - offsets[joint] for bound in (lower, upper)}
+        low, high = max(-pi, lower[joint]), min(pi, upper[joint])
+        bounds = set[float]() if high - low >= tau else {low - offsets[joint], high - offsets[joint]}
         if joint in _TURNS:
             x = _TURNS[joint]
             bounds |= {acos(SINGULAR), acos(-SINGULAR)} if joint in (2, 4) else set()
@@ -227,8 +233,10 @@ def _arcs(starts: Array, broken: NDArray[np.bool_], lost: NDArray[np.bool_], out
     counts = broken.sum(axis=0)
     best = broken[:, counts.argmin(axis=0), np.arange(len(starts))]
     looks = np.concatenate((best, counts == 0, lost[None]))  # All that an arc says, one column an arc.
-    is_new = (looks != np.roll(looks, 1, axis=1)).any(axis=0)
-    first = np.flatnonzero(is_new) if is_new.any() else np.array((0,))
+    is_new = np.empty(len(starts), dtype=np.bool_)
+    is_new[1:] = (looks[:, 1:] != looks[:, :-1]).any(axis=0)
+    is_new[0] = (looks[:, 0] != looks[:, -1]).any() or not is_new[1:].any()
+    first = np.flatnonzero(is_new)
     begins = starts[first].tolist()
     arcs: list[Arc] = []
     for start, end, look in zip(begins, [*begins[1:], begins[0] + tau], looks[:, first].T.tolist(), strict=True):
