@@ -12,17 +12,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.arrays import JointVector, as_number, as_rows, as_vector, described
+from rcilab.arrays import JointVector, as_number, as_path, as_rows, as_vector, described
 from rcilab.dynamics.payload import NO_LOAD, Payload
 from rcilab.errors import InvalidValueError, KinematicsError, SingularError
 from rcilab.kinematics import arm_angle as arm_angles
 from rcilab.kinematics.feasible_arcs import FeasibleArcs, feasible_arcs
+from rcilab.kinematics.frames import Frame
 from rcilab.kinematics.inverse import build_geometry, inverse_seven, inverse_six
 from rcilab.kinematics.inverse_batch import SolutionBatch, as_pose_batch, inverse_batch
 from rcilab.kinematics.moving_arm import MovingArm
 from rcilab.kinematics.reach import Reach, closest_reachable
-from rcilab.kinematics.singularity import Dexterity, dexterity
+from rcilab.kinematics.singularity import Dexterity, DexterityPath, dexterity, dexterity_path
 from rcilab.kinematics.solutions import Solutions, joint_limit_lists
+from rcilab.kinematics.workspace import Workspace, sample_workspace
 from rcilab.limits import Limits
 from rcilab.robots import RobotDescription, describe_robot
 from rcilab.safety_box import SafetyBox
@@ -249,6 +251,27 @@ class RobotModel(MovingArm):
     def dexterity(self, q: ArrayLike) -> Dexterity:
         """Returns how well the tool can be moved here: manipulability, smallest singular value, condition."""
         return dexterity(self.jacobian(q))
+
+    def dexterity_path(self, q: ArrayLike, frame: Frame = "tool") -> DexterityPath:
+        """Returns the measures of `dexterity` along a path, each of shape (N,), for q of shape (N, n), [rad]."""
+        return dexterity_path(self.jacobian(as_path(q, self.n, "q", "rad"), frame))
+
+    def sample_workspace(self, count: int = 10_000, *, seed: int = 0, box: SafetyBox | None = None) -> Workspace:
+        """Returns where the tool is at joint angles that are uniformly random inside the limits.
+
+        Args:
+            count: How many configurations to try, up to 1 000 000.
+            seed: The same seed gives the same samples.
+            box: Only samples with the tool in it are kept; all when absent.
+
+        Returns:
+            `.q`, shape (N, n); `.position`, shape (N, 3), [m] in base; `.dexterity` there.
+
+        Raises:
+            InvalidValueError: `count` is out of range.
+        """
+        joint = self.limits.joint
+        return sample_workspace(self, joint.lower, joint.upper, count, seed, box)
 
     def manipulability(self, q: ArrayLike) -> float:
         """Returns sqrt(det(J J^T)) at the tool; 0 at a singularity."""

@@ -8,7 +8,7 @@ from math import cos, degrees, hypot, sin, sqrt
 
 import numpy as np
 
-from rcilab.arrays import Matrix
+from rcilab.arrays import Array, Matrix
 from rcilab.kinematics.inverse import ArmGeometry
 
 SINGULAR = (
@@ -33,6 +33,27 @@ def dexterity(J: Matrix) -> Dexterity:
     values = np.linalg.svd(J, compute_uv=False)
     smallest, largest = float(values[-1]), float(values[0])
     return Dexterity(float(np.prod(values)), smallest, largest / smallest if smallest > 0.0 else float("inf"))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DexterityPath:
+    """The measures of `Dexterity` for N configurations, each of shape (N,)."""
+
+    manipulability: Array
+    smallest: Array
+    condition: Array
+
+    def __repr__(self) -> str:
+        return f"<DexterityPath of {len(self.smallest)} rows: .manipulability, .smallest, .condition>"
+
+
+def dexterity_path(J: Array) -> DexterityPath:
+    """Returns the dexterity measures of many Jacobians, shape (N, 6, n)."""
+    values = np.asarray(np.linalg.svd(J, compute_uv=False), dtype=np.float64)
+    smallest, largest = values[:, -1], values[:, 0]
+    with np.errstate(divide="ignore"):
+        condition = np.where(smallest > 0.0, largest / smallest, np.inf)
+    return DexterityPath(np.prod(values, axis=1), smallest, condition)
 
 
 def find_singularity(arm: ArmGeometry, q: Sequence[float]) -> str | None:
