@@ -45,7 +45,7 @@ def bench_inverse() -> Measurement:
     )
     if not all(branches):
         note += f"; {branches.count(0)} POSES WITHOUT A SOLUTION"
-    return summarise("inverse", times, "us", 60.0, note)
+    return summarise("inverse", times, "us", 40.0, note)
 
 
 def bench_inverse_batch() -> Measurement:

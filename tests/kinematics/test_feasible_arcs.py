@@ -131,6 +131,19 @@ def test_a_stretched_arm_has_no_arm_angle_to_choose(q):
     assert "no arm angle" in repr(found)
 
 
+@pytest.mark.parametrize("q", [[0.3, 0.5, 0.2, 0.01, 0.1, 0.4, 0.5], [0.3, -0.5, 0.0, 1.0, 0.2, 0.4, 0.5]])
+def test_an_arm_close_to_stretched_or_with_the_wrist_above_the_shoulder_is_singular_all_round(q):
+    model = load_model("xMatePro7")
+    if q[3] > 0.5:  # Lean the upper arm so that the wrist comes to 5 mm beside the vertical.
+        upper, fore = 0.4375, 0.4125
+        q[1] = -math.atan2(fore * math.sin(q[3]), upper + fore * math.cos(q[3])) + 0.005 / 0.75
+    T = model.forward(q)
+    found = model.feasible_arcs(T)
+    assert all("singularity" in arc.reasons for arc in found.arcs)
+    assert any(arc.branches for arc in found.arcs)  # Within the joint limits all the same.
+    assert compare(model, T, np.linspace(-math.pi, math.pi, 101)) > 90
+
+
 def test_a_circle_without_any_obstacle_is_one_range():
     model = load_model("xMatePro7")
     wide = replace(model.limits.joint, lower=np.full(7, -4.0), upper=np.full(7, 4.0))
