@@ -2,7 +2,7 @@
 
 At a fixed pose the elbow E = S + e goes round the shoulder-wrist line, e = e0 + ec cos(psi) + es sin(psi). Every joint
 angle follows as atan2(Y, X), or as an angle between 0 and pi of known cosine, where X, Y and that cosine are linear in
-(1, cos(psi), sin(psi)) (Shimizu et al., IEEE Transactions on Robotics 24(5), 2008, section IV, write the same with
+(1, cos(psi), sin(psi)) (Shimizu et al., IEEE Transactions on Robotics 24(5), 2008, write the same with
 tangents). So a joint passes a limit L only where X sin(L) - Y cos(L) = 0 or where the cosine is cos(L): two arm angles
 each, in closed form. Between neighbours of all of these nothing changes, and one look in the middle judges the arc.
 """
