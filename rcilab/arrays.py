@@ -119,5 +119,29 @@ def as_path(value: ArrayLike, columns: int | None, name: str, unit: str = "") ->
     return array
 
 
+def as_rows(value: ArrayLike, columns: int, name: str, unit: str = "", like: Array | None = None) -> Array:
+    """Returns a checked, read-only copy of one vector, or of a table with one row a sample.
+
+    Args:
+        value: Anything array-like, shape (columns,) or (N, columns).
+        columns: Number of columns it must have.
+        name: What to call it in an error.
+        unit: Unit to name in an error, such as "rad".
+        like: What it must have the same number of rows as.
+
+    Raises:
+        InvalidValueError: It is neither, has another number of rows, or is not finite.
+    """
+    try:
+        is_table = np.ndim(value) > 1
+    except ValueError:  # Rows of different lengths; the error for a vector says what is wrong.
+        is_table = False
+    array = as_path(value, columns, name, unit) if is_table else as_vector(value, columns, name, unit)
+    if like is not None and array.shape[:-1] != like.shape[:-1]:
+        needed = f"needs one row for each of the {len(like)}" if like.ndim > 1 else "needs a single row"
+        raise InvalidValueError(name, Words(f"an array of shape {array.shape}"), needed + _in(unit))
+    return array
+
+
 def _in(unit: str) -> str:
     return f" [{unit}]" if unit else ""

@@ -12,18 +12,22 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.arrays import Array, JointVector, Matrix, as_number, as_path, as_vector, described
+from rcilab.arrays import JointVector, as_number, as_path, as_rows, as_vector, described
 from rcilab.dynamics.payload import NO_LOAD, Payload
 from rcilab.errors import InvalidValueError, KinematicsError, SingularError
 from rcilab.kinematics import arm_angle as arm_angles
-from rcilab.kinematics import forward as forward_kinematics
+from rcilab.kinematics.feasible_arcs import FeasibleArcs, feasible_arcs
+from rcilab.kinematics.frames import Frame
 from rcilab.kinematics.inverse import build_geometry, inverse_seven, inverse_six
-from rcilab.kinematics.jacobian import jacobian
+from rcilab.kinematics.inverse_batch import SolutionBatch, as_pose_batch, inverse_batch
+from rcilab.kinematics.moving_arm import MovingArm
 from rcilab.kinematics.reach import Reach, closest_reachable
-from rcilab.kinematics.singularity import Dexterity, dexterity
+from rcilab.kinematics.singularity import Dexterity, DexterityPath, dexterity, dexterity_path
 from rcilab.kinematics.solutions import Solutions, joint_limit_lists
+from rcilab.kinematics.workspace import Workspace, sample_workspace
 from rcilab.limits import Limits
 from rcilab.robots import RobotDescription, describe_robot
+from rcilab.safety_box import SafetyBox
 from rcilab.spatial import IDENTITY, Pose
 
 if TYPE_CHECKING:
@@ -63,16 +67,27 @@ def require_model(model: object) -> RobotModel:
     raise InvalidValueError("model", described(model), "is no robot model; load_model makes one")
 
 
-class RobotModel:
+class RobotModel(MovingArm):
     """An arm with a tool and a load. Immutable: `with_tool` and `with_load` return another one.
 
-    All joint vectors have shape (n,) and are in [rad]; all poses are of the tool in the base frame.
+    All joint vectors have shape (n,) and are in [rad]; all poses are in the base frame, of the tool unless a frame is
+    named. Where its frames are and how they move is in `MovingArm`.
     """
 
-    def __init__(self, description: RobotDescription, tool: Pose = IDENTITY, load: Payload = NO_LOAD) -> None:
+    def __init__(
+        self,
+        description: RobotDescription,
+        tool: Pose = IDENTITY,
+        load: Payload = NO_LOAD,
+        stiffness_frame: Pose = IDENTITY,
+    ) -> None:
         if not isinstance(tool, Pose):
             raise InvalidValueError(
                 "tool", described(tool), "is no Pose; Pose.from_matrix makes one, Pose() is no tool"
+            )
+        if not isinstance(stiffness_frame, Pose):
+            raise InvalidValueError(
+                "stiffness frame", described(stiffness_frame), "is no Pose; Pose.from_matrix makes one"
             )
         if not isinstance(load, Payload):
             raise InvalidValueError(
@@ -81,12 +96,9 @@ class RobotModel:
         if load.mass > description.rated_payload:
             bound = f"{description.rated_payload:g} kg for {description.name}"
             raise InvalidValueError("load mass", load.mass, f"kg is above {bound}, the payload it is rated for")
+        super().__init__(description.dh, tool, stiffness_frame)
         self.description = description
-        self.T_flange_tool = tool
         self.load = load
-        self.n = description.n
-        self._chain = forward_kinematics.build_chain(description.dh)
-        self._has_tool = not tool.is_close(IDENTITY, 0.0)
         self._T_tool_flange = tool.inverse()
 
     @property
@@ -105,53 +117,33 @@ class RobotModel:
         return self.description.home
 
     def with_tool(self, tool: Pose) -> RobotModel:
-        """Returns this arm with another tool, given by its pose in the flange frame.
+        """Returns this arm with another tool, given by its pose in the flange frame (SetCoor).
 
         Raises:
             InvalidValueError: It is no `Pose`.
         """
-        return RobotModel(self.description, tool, self.load)
+        return RobotModel(self.description, tool, self.load, self.T_tool_stiffness)
 
     def with_load(self, load: Payload) -> RobotModel:
-        """Returns this arm with another load.
+        """Returns this arm with another load (SetLoad).
 
         Raises:
             InvalidValueError: It is no `Payload`, or heavier than the arm is rated for.
         """
-        return RobotModel(self.description, self.T_flange_tool, load)
+        return RobotModel(self.description, self.T_flange_tool, load, self.T_tool_stiffness)
 
-    def forward(self, q: ArrayLike) -> Pose:
-        """Returns the pose of the tool in base.
+    def with_stiffness_frame(self, T_tool_stiffness: Pose) -> RobotModel:
+        """Returns this arm with another stiffness frame, given by its pose in the tool frame (SetCoor).
 
-        Args:
-            q: Joint angles, shape (n,), [rad]; limits are not looked at.
+        No limit and no plan depends on it: it is one more frame to ask about, by the name "stiffness".
 
         Raises:
-            InvalidValueError: q is not n finite numbers.
+            InvalidValueError: It is no `Pose`.
         """
-        T = forward_kinematics.forward(self._chain, self._floats(q))
-        return T @ self.T_flange_tool if self._has_tool else T
-
-    def forward_path(self, q: ArrayLike) -> Array:
-        """Returns the poses of the tool in base along a path, shape (N, 4, 4), for q of shape (N, n)."""
-        T = forward_kinematics.forward_path(self._chain, as_path(q, self.n, "q", "rad"))
-        return T @ self.T_flange_tool.matrix if self._has_tool else T
-
-    def position_path(self, q: ArrayLike) -> Array:
-        """Returns where the tool is in base along a path, shape (N, 3), [m], for q of shape (N, n)."""
-        point = self.T_flange_tool.parts[1]
-        return forward_kinematics.position_path(self._chain, as_path(q, self.n, "q", "rad"), point)
-
-    def joint_frames(self, q: ArrayLike) -> tuple[Pose, ...]:
-        """Returns the Denavit-Hartenberg frames after joint 1, 2, ..., n in base; the last one is the flange."""
-        return forward_kinematics.joint_frames(self._chain, self._floats(q))
-
-    def jacobian(self, q: ArrayLike) -> Matrix:
-        """Returns the Jacobian at the tool, shape (6, n), linear rows first, base axes, [m/rad] and [rad/rad]."""
-        return jacobian(self._chain, self._floats(q), self.T_flange_tool)
+        return RobotModel(self.description, self.T_flange_tool, self.load, T_tool_stiffness)
 
     def inverse(self, T: Pose | ArrayLike, psi: float | None = None, near: ArrayLike | None = None) -> Solutions:
-        """Returns every analytic solution inside the joint limits.
+        """Returns every analytic solution inside the joint limits (GetJointPos); `.nearest(q)` is the vendor's answer.
 
         Args:
             T: Pose of the tool in base: a `Pose` or a homogeneous matrix, shape (4, 4).
@@ -201,6 +193,51 @@ class RobotModel:
 
         return closest_reachable(solve, self._geometry, self.T_flange_tool, self.forward(q), q, target)
 
+    def inverse_batch(self, T: ArrayLike, psi: ArrayLike = 0.0) -> SolutionBatch:
+        """Returns every analytic solution of many poses at once (GetJointPos), at one arm angle each.
+
+        Args:
+            T: Poses of the tool in base, shape (N, 4, 4), such as `forward_path` gives.
+            psi: Arm angle of a 7-axis arm, [rad], one number or shape (N,); of no meaning for 6 axes.
+
+        Returns:
+            `.q`, shape (N, 8, n), not a number where a pose is out of reach; `.inside`; `.nearest(q)`.
+
+        Raises:
+            InvalidValueError: T or psi has another shape, is not finite, or holds what is no pose.
+        """
+        poses = as_pose_batch(T)
+        angles = np.asarray(psi, dtype=np.float64)
+        if angles.shape not in ((), (len(poses),)) or not np.isfinite(angles).all():
+            raise InvalidValueError(
+                "psi", described(angles), f"needs one number or shape ({len(poses)},), finite [rad]"
+            )
+        flange = poses @ self._T_tool_flange.matrix if self._has_tool else poses
+        joint = self.limits.joint
+        return SolutionBatch(inverse_batch(self._geometry, flange, angles), joint.lower, joint.upper)
+
+    def feasible_arcs(self, T: Pose | ArrayLike, box: SafetyBox | None = None) -> FeasibleArcs:
+        """Returns which arm angles a pose leaves to a 7-axis arm, and what forbids the others.
+
+        Args:
+            T: Pose of the tool in base: a `Pose` or a homogeneous matrix, shape (4, 4).
+            box: What the tool shall stay in; nothing when absent.
+
+        Returns:
+            `.feasible`: ranges of arm angles, [rad]; `.arcs`: the whole circle, each part with its reasons.
+
+        Raises:
+            UnreachableError: The pose is out of reach at every arm angle.
+            InvalidValueError: T is not usable.
+            KinematicsError: The arm has 6 axes.
+        """
+        self._require_arm_angle()
+        pose = T if isinstance(T, Pose) else Pose.from_matrix(T)
+        is_outside = box is not None and box.active and box.excess(pose.parts[1]) > 0.0
+        flange = pose @ self._T_tool_flange if self._has_tool else pose
+        joint = self.limits.joint
+        return feasible_arcs(self._geometry, flange, joint.lower, joint.upper, is_outside)
+
     def arm_angle(self, q: ArrayLike) -> float:
         """Returns the arm angle psi of a 7-axis arm, [rad] in (-pi, pi].
 
@@ -208,32 +245,64 @@ class RobotModel:
             SingularError: The shoulder-wrist line is vertical or the arm is stretched; psi has no meaning there.
             KinematicsError: The arm has 6 axes.
         """
-        if self.n != 7:
-            raise KinematicsError(f"{self.name} has 6 axes: only a 7-axis arm has an arm angle")
+        self._require_arm_angle()
         return arm_angles.arm_angle(self._geometry.upper, self._geometry.fore, self._floats(q))
 
     def dexterity(self, q: ArrayLike) -> Dexterity:
         """Returns how well the tool can be moved here: manipulability, smallest singular value, condition."""
         return dexterity(self.jacobian(q))
 
+    def dexterity_path(self, q: ArrayLike, frame: Frame = "tool") -> DexterityPath:
+        """Returns the measures of `dexterity` along a path, each of shape (N,), for q of shape (N, n), [rad]."""
+        return dexterity_path(self.jacobian(as_path(q, self.n, "q", "rad"), frame))
+
+    def sample_workspace(self, count: int = 10_000, *, seed: int = 0, box: SafetyBox | None = None) -> Workspace:
+        """Returns where the tool is at joint angles that are uniformly random inside the limits.
+
+        Args:
+            count: How many configurations to try, up to 1 000 000.
+            seed: The same seed gives the same samples.
+            box: Only samples with the tool in it are kept; all when absent.
+
+        Returns:
+            `.q`, shape (N, n); `.position`, shape (N, 3), [m] in base; `.dexterity` there.
+
+        Raises:
+            InvalidValueError: `count` is out of range.
+        """
+        joint = self.limits.joint
+        return sample_workspace(self, joint.lower, joint.upper, count, seed, box)
+
     def manipulability(self, q: ArrayLike) -> float:
         """Returns sqrt(det(J J^T)) at the tool; 0 at a singularity."""
         return self.dexterity(q).manipulability
 
-    def torque(self, q: ArrayLike, dq: ArrayLike | None = None, ddq: ArrayLike | None = None) -> TorqueTerms:
-        """Returns the joint torques of the rigid arm with its load, and their terms, each of shape (n,), [N m].
+    def torque(
+        self, q: ArrayLike, dq: ArrayLike | None = None, ddq: ArrayLike | None = None, *, friction: bool = False
+    ) -> TorqueTerms:
+        """Returns the joint torques of the rigid arm with its load, and their terms (GetTau, GetTauNoFriction).
+
+        The rotors of the drives are not in them: with these torques the arm behind the gears moves as wanted.
 
         Args:
-            q: Joint angles, shape (n,), [rad].
-            dq: Joint velocities, shape (n,), [rad/s]; at rest when absent.
-            ddq: Joint accelerations, shape (n,), [rad/s^2]; none when absent.
+            q: Joint angles, shape (n,) or (N, n), [rad].
+            dq: Joint velocities, of q's shape, [rad/s]; at rest when absent.
+            ddq: Joint accelerations, of q's shape, [rad/s^2]; none when absent.
+            friction: Whether `.full` holds the joints' friction, too; it is that of the MuJoCo plant.
+
+        Returns:
+            Terms of q's shape, [N m].
         """
-        zeros = np.zeros(self.n)
-        return self.rigid_body.torque(
-            as_vector(q, self.n, "q", "rad"),
-            zeros if dq is None else as_vector(dq, self.n, "dq", "rad/s"),
-            zeros if ddq is None else as_vector(ddq, self.n, "ddq", "rad/s^2"),
-        )
+        angles = as_rows(q, self.n, "q", "rad")
+        zeros = np.zeros(angles.shape)
+        speeds = zeros if dq is None else as_rows(dq, self.n, "dq", "rad/s", angles)
+        rates = zeros if ddq is None else as_rows(ddq, self.n, "ddq", "rad/s^2", angles)
+        terms = (self.rigid_body.torque if angles.ndim == 1 else self.rigid_body.torque_path)(angles, speeds, rates)
+        if not friction:
+            return terms
+        from rcilab.dynamics.friction import friction_torque
+
+        return terms.with_friction(friction_torque(self.limits.joint, speeds))
 
     @cached_property
     def rigid_body(self) -> RigidBody:
@@ -288,6 +357,10 @@ class RobotModel:
             best = min(best, solutions, key=_least_excess)
         raise best.refusal()
 
+    def _require_arm_angle(self) -> None:
+        if self.n != 7:
+            raise KinematicsError(f"{self.name} has 6 axes: only a 7-axis arm has an arm angle")
+
     def _natural_psi(self, near: Sequence[float] | None) -> float:
         if near is None:
             return 0.0
@@ -295,14 +368,6 @@ class RobotModel:
             return arm_angles.arm_angle(self._geometry.upper, self._geometry.fore, near)
         except SingularError:
             return 0.0
-
-    def _floats(self, q: ArrayLike) -> list[float]:
-        """Returns q as n finite plain floats; the cheap way for what is an array already."""
-        if isinstance(q, np.ndarray) and q.dtype == np.float64 and q.shape == (self.n,):
-            values = q.tolist()
-            if math.isfinite(sum(values)):
-                return values
-        return as_vector(q, self.n, "q", "rad").tolist()
 
 
 def _least_excess(solutions: Solutions) -> float:

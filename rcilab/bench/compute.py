@@ -47,7 +47,26 @@ def bench_inverse() -> Measurement:
     )
     if not all(branches):
         note += f"; {branches.count(0)} POSES WITHOUT A SOLUTION"
-    return summarise("inverse", times, "us", 60.0, note)
+    return summarise("inverse", times, "us", 40.0, note)
+
+
+def bench_inverse_batch() -> Measurement:
+    """Every branch of the inverse for many poses in one call, by pose."""
+    model, count = load_model(_ROBOT), 10_000
+    poses = model.forward_path(_random_q(model, count))
+    times = time_calls(model.inverse_batch, [poses] * 20, warm_up=2)
+    growth = _growth(model.inverse_batch, {n: poses[:n] for n in (10, 100, 1000, count)})
+    note = f"{_ROBOT}, time a pose in batches of {count}, limits judged; whole batches: {growth}"
+    return summarise("inverse_batch", np.array(times) / count, "us", 2.0, note)
+
+
+def bench_feasible_arcs() -> Measurement:
+    """The arm angles that a pose leaves, with the reasons against the others."""
+    model = load_model(_ROBOT)
+    poses = [model.forward(q) for q in _random_q(model, 500)]
+    arcs = np.mean([len(model.feasible_arcs(pose).arcs) for pose in poses])
+    note = f"{_ROBOT}, 500 reachable poses, {arcs:.1f} arcs on average"
+    return summarise("feasible_arcs", time_calls(model.feasible_arcs, poses), "us", 300.0, note)
 
 
 def bench_plan_joint() -> Measurement:

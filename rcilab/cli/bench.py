@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from rcilab.bench.measure import Measurement
 
 BENCHES = (
-    *("forward", "inverse", "plan_joint", "check"),
+    *("forward", "inverse", "inverse_batch", "feasible_arcs", "plan_joint", "check"),
     *("controller_ideal", "controller_mujoco", "controller_cartesian", "controller_impedance", "client_answer"),
     *("jog",),
     *("drag", "import", "start", "state_period", "control_loop"),
@@ -100,6 +100,8 @@ def _bench(name: str, seconds: float) -> Callable[[], Measurement]:
     return {
         "forward": compute.bench_forward,
         "inverse": compute.bench_inverse,
+        "inverse_batch": compute.bench_inverse_batch,
+        "feasible_arcs": compute.bench_feasible_arcs,
         "plan_joint": compute.bench_plan_joint,
         "check": compute.bench_check,
         "jog": compute.bench_jog,

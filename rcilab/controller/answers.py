@@ -8,11 +8,11 @@ from rcilab.conformance.measured_conditions import ANGLE_ALLOWANCE, BOX_ALLOWANC
 from rcilab.controller.actuator import guiding_box
 from rcilab.controller.commanded import CommandedMotion
 from rcilab.controller.modes import MODES
-from rcilab.controller.modes.inverse import find_singularity
 from rcilab.controller.settings import SIGNAL_COUNT, Settings
 from rcilab.controller.state_machine import Phase, When
 from rcilab.controller.watch import Watch
 from rcilab.kinematics.inverse import build_geometry
+from rcilab.kinematics.singularity import find_singularity
 from rcilab.model import RobotModel
 from rcilab.protocols import rci
 from rcilab.state import ControllerMode

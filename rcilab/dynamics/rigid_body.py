@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
@@ -25,20 +25,28 @@ Twist: TypeAlias = tuple[float, float, float, float, float, float]
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class TorqueTerms:
-    """The joint torques of a motion and what they are made of, each of shape (n,), [N m]."""
+    """The joint torques of a motion and what they are made of, each of shape (n,) or (N, n), [N m]."""
 
     full: JointVector
-    """inertial + coriolis + gravity."""
+    """inertial + coriolis + gravity + friction."""
     inertial: JointVector
     """M(q) ddq."""
     coriolis: JointVector
     """C(q, dq) dq: Coriolis and centrifugal torques."""
     gravity: JointVector
     """g(q): what holds the arm still."""
+    friction: JointVector
+    """What the joints lose by friction; zeros unless it was asked for."""
+
+    def with_friction(self, friction: JointVector) -> TorqueTerms:
+        """Returns these terms and those of friction on top, of the same shape, [N m]."""
+        return replace(self, full=self.full + friction, friction=friction)
 
     def __repr__(self) -> str:
+        if self.full.ndim > 1:
+            return f"<TorqueTerms of {len(self.full)} rows: .full, .inertial, .coriolis, .gravity, .friction>"
         full = " ".join(f"{x:.2f}" for x in self.full.tolist())
-        return f"<TorqueTerms: full = {full} N m; .inertial, .coriolis, .gravity>"
+        return f"<TorqueTerms: full = {full} N m; .inertial, .coriolis, .gravity, .friction>"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -96,7 +104,13 @@ class RigidBody:
         gravity = pin.computeGeneralizedGravity(model, data, q).copy()
         bias = pin.nonLinearEffects(model, data, q, dq).copy()
         full = pin.rnea(model, data, q, dq, ddq).copy()
-        return TorqueTerms(full=full, inertial=full - bias, coriolis=bias - gravity, gravity=gravity)
+        return _terms(full, bias, gravity)
+
+    def torque_path(self, q: JointPath, dq: JointPath, ddq: JointPath) -> TorqueTerms:
+        """Returns the torques and their terms in every row, each of shape (N, n); arguments likewise."""
+        zeros, model = np.zeros(q.shape), self._model
+        full, bias, gravity = (_newton_euler(model, q, *rest) for rest in ((dq, ddq), (dq, zeros), (zeros, zeros)))
+        return _terms(full, bias, gravity)
 
     def full_torque(self, q: JointVector, dq: JointVector, ddq: JointVector) -> JointVector:
         """Returns only the sum of all terms, shape (n,), [N m]."""
@@ -112,8 +126,7 @@ class RigidBody:
         """
         model = pin.Model(self._model)
         model.gravity.linear = np.zeros(3)
-        columns = (np.asfortranarray(table.T) for table in (q, dq, ddq))
-        return pin.rneaInParallel(1, pin.ModelPool(model, 1), *columns).T
+        return _newton_euler(model, q, dq, ddq)
 
     def mass_matrix(self, q: JointVector) -> Matrix:
         """Returns the joint-space inertia matrix, shape (n, n), [kg m^2]."""
@@ -197,3 +210,18 @@ class RigidBody:
 
 def _inertia(link: Link) -> pin.Inertia:
     return pin.Inertia(link.mass, link.center_of_mass.copy(), link.inertia.copy())
+
+
+def _terms(full: Array, bias: Array, gravity: Array) -> TorqueTerms:
+    return TorqueTerms(
+        full=full,
+        inertial=full - bias,
+        coriolis=bias - gravity,
+        gravity=gravity,
+        friction=np.zeros(full.shape),
+    )
+
+
+def _newton_euler(model: pin.Model, q: JointPath, dq: JointPath, ddq: JointPath) -> JointPath:
+    columns = (np.asfortranarray(table.T) for table in (q, dq, ddq))
+    return pin.rneaInParallel(1, pin.ModelPool(model, 1), *columns).T

@@ -82,14 +82,24 @@ def forward_path(chain: Chain, q: JointPath) -> Array:
         Homogeneous transforms, shape (N, 4, 4), [m].
     """
     T = np.broadcast_to(np.eye(4), (len(q), 4, 4))
-    for (offset, d, a, ca, sa), angle in zip(chain, q.T, strict=True):
-        c, s = np.cos(angle + offset), np.sin(angle + offset)
-        step = np.zeros((len(q), 4, 4))
-        step[:, 0, 0], step[:, 0, 1], step[:, 0, 2], step[:, 0, 3] = c, -s * ca, s * sa, a * c
-        step[:, 1, 0], step[:, 1, 1], step[:, 1, 2], step[:, 1, 3] = s, c * ca, -c * sa, a * s
-        step[:, 2, 1], step[:, 2, 2], step[:, 2, 3], step[:, 3, 3] = sa, ca, d, 1.0
-        T = T @ step
+    for row, angle in zip(chain, q.T, strict=True):
+        T = T @ _step_path(row, angle)
     return T
+
+
+def joint_frame_paths(chain: Chain, q: JointPath) -> list[Array]:
+    """Returns the poses in base of the frames after joint 1, 2, ..., n along a path, each of shape (N, 4, 4), [m].
+
+    Args:
+        chain: From `build_chain`.
+        q: Joint angles, shape (N, n), [rad].
+    """
+    frames: list[Array] = []
+    T = np.broadcast_to(np.eye(4), (len(q), 4, 4))
+    for row, angle in zip(chain, q.T, strict=True):
+        T = T @ _step_path(row, angle)
+        frames.append(T)
+    return frames
 
 
 def position_path(chain: Chain, q: JointPath, point: Sequence[float] = (0.0, 0.0, 0.0)) -> Array:
@@ -109,6 +119,17 @@ def position_path(chain: Chain, q: JointPath, point: Sequence[float] = (0.0, 0.0
         x, y, z = x + a, ca * y - sa * z, sa * y + ca * z + d
         x, y = c * x - s * y, s * x + c * y
     return np.stack((x, y, z), axis=1)
+
+
+def _step_path(row: tuple[float, float, float, float, float], angle: Array) -> Array:
+    """Returns the transform of one row of the table at every angle, shape (N, 4, 4)."""
+    offset, d, a, ca, sa = row
+    c, s = np.cos(angle + offset), np.sin(angle + offset)
+    step = np.zeros((len(angle), 4, 4))
+    step[:, 0, 0], step[:, 0, 1], step[:, 0, 2], step[:, 0, 3] = c, -s * ca, s * sa, a * c
+    step[:, 1, 0], step[:, 1, 1], step[:, 1, 2], step[:, 1, 3] = s, c * ca, -c * sa, a * s
+    step[:, 2, 1], step[:, 2, 2], step[:, 2, 3], step[:, 3, 3] = sa, ca, d, 1.0
+    return step
 
 
 def _snap(value: float) -> float:

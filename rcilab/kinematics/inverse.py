@@ -90,7 +90,7 @@ def inverse_seven(
     Raises:
         UnreachableError: The wrist centre is out of reach.
     """
-    r, x, y, z, length, c4 = _wrist_centre(arm, T_base_flange)
+    r, x, y, z, length, c4 = wrist_centre(arm, T_base_flange)
     guess = near or (0.0,) * 7
     if length < _REACH_TOLERANCE:  # Upper and fore arm of one length, folded up: any elbow will do.
         ux, uy, uz, along, aside = 0.0, 0.0, 1.0, 0.0, arm.upper
@@ -149,7 +149,7 @@ def inverse_six(arm: ArmGeometry, T_base_flange: Pose, near: Sequence[float] | N
     Raises:
         UnreachableError: The wrist centre is out of reach.
     """
-    r, x, y, z, _, c3 = _wrist_centre(arm, T_base_flange)
+    r, x, y, z, _, c3 = wrist_centre(arm, T_base_flange)
     guess = _shift(near, tuple(-offset for offset in arm.offsets)) if near else (0.0,) * 6
     s3 = sqrt(max(0.0, 1.0 - c3 * c3))
     horizontal = hypot(x, y)
@@ -174,7 +174,7 @@ def inverse_six(arm: ArmGeometry, T_base_flange: Pose, near: Sequence[float] | N
     return branches if not any(arm.offsets) else [_shift(q, arm.offsets) for q in branches]
 
 
-def _wrist_centre(arm: ArmGeometry, T: Pose) -> tuple[Rotation9, float, float, float, float, float]:
+def wrist_centre(arm: ArmGeometry, T: Pose) -> tuple[Rotation9, float, float, float, float, float]:
     """Returns the rotation, the wrist centre from the shoulder, its distance, and the cosine of the elbow angle."""
     r, (px, py, pz) = T.parts
     x, y, z = px - arm.hand * r[2], py - arm.hand * r[5], pz - arm.hand * r[8] - arm.shoulder

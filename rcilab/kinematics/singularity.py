@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from math import cos, degrees, hypot, sin, sqrt
 
 import numpy as np
 
-from rcilab.arrays import Matrix
+from rcilab.arrays import Array, Matrix
+from rcilab.kinematics.inverse import ArmGeometry
+
+SINGULAR = (
+    0.02  # Sine of an angle, or share of the reach: about one degree from a singularity counts as on it; a choice.
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,3 +33,71 @@ def dexterity(J: Matrix) -> Dexterity:
     values = np.linalg.svd(J, compute_uv=False)
     smallest, largest = float(values[-1]), float(values[0])
     return Dexterity(float(np.prod(values)), smallest, largest / smallest if smallest > 0.0 else float("inf"))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DexterityPath:
+    """The measures of `Dexterity` for N configurations, each of shape (N,)."""
+
+    manipulability: Array
+    smallest: Array
+    condition: Array
+
+    def __repr__(self) -> str:
+        return f"<DexterityPath of {len(self.smallest)} rows: .manipulability, .smallest, .condition>"
+
+
+def dexterity_path(J: Array) -> DexterityPath:
+    """Returns the dexterity measures of many Jacobians, shape (N, 6, n)."""
+    values = np.asarray(np.linalg.svd(J, compute_uv=False), dtype=np.float64)
+    smallest, largest = values[:, -1], values[:, 0]
+    with np.errstate(divide="ignore"):
+        condition = np.where(smallest > 0.0, largest / smallest, np.inf)
+    return DexterityPath(np.prod(values, axis=1), smallest, condition)
+
+
+def find_singularity(arm: ArmGeometry, q: Sequence[float]) -> str | None:
+    """Returns which singularity an arm is at, in words, or None where it can move its tool in every direction.
+
+    7 axes lose a direction where sin q4 = 0; sin q2 = cos q3 = 0; cos q5 = sin q6 = 0; or sin q2 = sin q6 = 0. Because
+    poses are followed at an arm angle, it counts as well when shoulder and wrist are above each other. 6 axes: sin q3 =
+    0, sin q5 = 0, and the wrist on axis 1 (Siciliano et al., Robotics, 2009, section 3.3).
+
+    Args:
+        arm: From `rcilab.kinematics.inverse.build_geometry`.
+        q: Joint angles, n plain floats, [rad].
+    """
+    upright = [angle - offset for angle, offset in zip(q, arm.offsets, strict=True)]
+    if arm.n == 7:
+        return _singular_seven(arm, upright)
+    return _singular_six(arm, upright)
+
+
+def _singular_seven(arm: ArmGeometry, q: Sequence[float]) -> str | None:
+    s2, s4, s6 = abs(sin(q[1])), abs(sin(q[3])), abs(sin(q[5]))
+    if s4 < SINGULAR:
+        return f"the arm is stretched or folded: joint 4 is at {degrees(q[3]):.2f} deg"
+    if s2 < SINGULAR and abs(cos(q[2])) < SINGULAR:
+        return f"axes 1 and 3 are in line: joints 2 and 3 are at {degrees(q[1]):.2f} and {degrees(q[2]):.2f} deg"
+    if s6 < SINGULAR and abs(cos(q[4])) < SINGULAR:
+        return f"axes 5 and 7 are in line: joints 5 and 6 are at {degrees(q[4]):.2f} and {degrees(q[5]):.2f} deg"
+    if s2 < SINGULAR and s6 < SINGULAR:
+        return f"shoulder and wrist are in line: joints 2 and 6 are at {degrees(q[1]):.2f} and {degrees(q[5]):.2f} deg"
+    c2, c3, c4 = cos(q[1]), cos(q[2]), cos(q[3])
+    side, along = arm.fore * sin(q[3]), arm.upper + arm.fore * c4
+    # Wrist from shoulder in the plane of the upper arm; its distance from the vertical through the shoulder.
+    horizontal = hypot(sin(q[1]) * along + c2 * c3 * side, sin(q[2]) * side)
+    if horizontal < SINGULAR * sqrt(side * side + along * along):
+        return "shoulder and wrist are above each other, where the arm angle has no meaning"
+    return None
+
+
+def _singular_six(arm: ArmGeometry, q: Sequence[float]) -> str | None:
+    if abs(sin(q[2])) < SINGULAR:
+        return f"the arm is stretched or folded: joint 3 is at {degrees(q[2]):.2f} deg"
+    if abs(sin(q[4])) < SINGULAR:
+        return f"axes 4 and 6 are in line: joint 5 is at {degrees(q[4]):.2f} deg"
+    radius = arm.upper * sin(q[1]) + arm.fore * sin(q[1] + q[2])
+    if abs(radius) < SINGULAR * (arm.upper + arm.fore):
+        return "the wrist is on axis 1"
+    return None

@@ -24,11 +24,11 @@ def test_a_streaming_time_that_is_none_is_refused(seconds: str, capsys: pytest.C
 
 
 def test_json_is_one_list_with_the_machine_first(capsys: pytest.CaptureFixture[str]) -> None:
-    code = main(["bench", "inverse", "forward", "--json"])
+    code = main(["bench", "inverse", "forward", "feasible_arcs", "inverse_batch", "--json"])
     machine, *found = json.loads(capsys.readouterr().out)
     assert machine["name"] == "machine"
     assert {"cpu", "cores", "kernel", "python", "sched_fifo", "versions"} <= machine.keys()
-    assert [bench["name"] for bench in found] == ["forward", "inverse"]
+    assert [bench["name"] for bench in found] == ["forward", "inverse", "inverse_batch", "feasible_arcs"]
     for bench in found:
         assert bench.keys() == KEYS
         assert 0.0 < bench["median"] <= bench["p99"]

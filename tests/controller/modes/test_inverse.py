@@ -7,9 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from rcilab.controller.modes.inverse import Follower, find_singularity
+from rcilab.controller.modes.inverse import Follower
 from rcilab.errors import SingularError, UnreachableError
 from rcilab.kinematics.inverse import build_geometry
+from rcilab.kinematics.singularity import find_singularity
 from rcilab.model import load_model
 from rcilab.spatial import Pose
 
