@@ -1,0 +1,241 @@
+"""The jerk-limited motion along a path of the tool: as fast as joints, tool and arm angle allow.
+
+Paths are followed by the closed-form inverse at every cycle, so the tool is on the path to rounding; between the cycles
+the joints run as quintics with the path's own velocities and accelerations.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from rcilab.arrays import Array, JointPath, JointVector, as_number
+from rcilab.clock import CYCLE_TIME
+from rcilab.errors import InvalidValueError, PlanningError
+from rcilab.model import RobotModel
+from rcilab.motion.joint import MIN_SPEED
+from rcilab.motion.margin import LIMIT_MARGIN
+from rcilab.motion.motion import Motion, standing
+from rcilab.motion.path import Path
+from rcilab.motion.piecewise import PiecewisePolynomial
+from rcilab.motion.time_law import PathBounds, TimeLaw, fastest_squares, smooth_law
+
+_KNOTS = 1000
+"""Steps of the path between which bounds are interpolated. A choice: a millimetre of a line of a metre."""
+_STEP = 0.1
+"""Turn of a joint from knot to knot beyond which it does not follow the tool but a singularity is in the way, [rad]. A
+choice: 100 rad on the whole way; no arm has that."""
+_SIDES = 12
+"""Half-planes on each side in place of the round bound on the tool's acceleration on an arc; they lose 0.9 %."""
+_ROUNDS = 12
+"""How often to slow down a law that passes a limit between the knots. Seen: 1 to 3."""
+_HASTE = 1.0002
+"""How much more than found to slow down each time, so that it is done soon. A choice."""
+_NUDGE = 1e-4
+"""Share of the way over which derivatives by the way are formed. A choice: both their errors are below 1e-7."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class _Bounds:
+    """Bounds of n joints, the arm angle if there is one, and the tool's turn: one a column, shape (m,)."""
+
+    velocity: Array
+    acceleration: Array
+    jerk: Array
+    tool: tuple[float, float, float]
+    """Of the tool's translation: velocity, acceleration, jerk."""
+
+
+def plan_along(model: RobotModel, q: JointVector, path: Path, speed: float) -> Motion:
+    """Returns the fastest motion along a path from rest to rest, all bounds on joints, tool and arm angle kept.
+
+    Bounds are kept as the controller judges them, by backward differences at 1 ms, with `LIMIT_MARGIN`.
+
+    Args:
+        model: The arm, with its tool.
+        q: Joint angles at the start of the path, shape (n,), [rad]: they choose the branch.
+        path: The path.
+        speed: Part of the velocity and acceleration limits to use, from `MIN_SPEED` to 1; the jerk limit is used in
+            full.
+
+    Raises:
+        PlanningError: A pose on the way is out of reach, or a joint limit or a singularity is in the way.
+        InvalidValueError: The speed is out of range.
+    """
+    speed = as_number(speed, "speed")
+    if not MIN_SPEED <= speed <= 1.0:
+        raise InvalidValueError("speed", speed, f"must be from {MIN_SPEED:g} to 1: the part of the limits to use")
+    if path.distance == 0.0:
+        return standing(q, speed=speed)
+    bounds = _bounds(model, LIMIT_MARGIN * speed)
+    squares = fastest_squares(_path_bounds(path, require_path(model, q, path), bounds))
+    cycles = max(2, math.ceil(_longest_reversal(bounds) / CYCLE_TIME))
+    slowdown, excess = 1.0, math.inf
+    for _ in range(_ROUNDS):
+        law = smooth_law(squares, slowdown, cycles)
+        T, psi = path.sample(law.u)
+        rows = model.inverse_path(T, psi, q)[0]
+        rows[0] = q
+        excess = _excess(bounds, _columns(path, rows, law.u), T[:, :3, 3])
+        if excess <= 1.0:
+            return Motion(
+                polynomial=_quintics(model, path, rows, law), goal=rows[-1], law="jerk_limited", speed=speed
+            )
+        slowdown *= excess * _HASTE
+    raise PlanningError(
+        f"the {path.name} cannot be followed within the jerk limits (at {excess:.2g} times the speed it can), because "
+        "it leads too close to a singularity; lead the tool around it or go there in joint space"
+    )
+
+
+def require_path(model: RobotModel, q: JointVector, path: Path) -> JointPath:
+    """Returns the joint angles at evenly spaced knots of a path that can be followed, shape (_KNOTS + 1, n), [rad].
+
+    Raises:
+        PlanningError: A pose on the way is out of reach, or a joint limit or a singularity is in the way.
+    """
+    shares = np.linspace(0.0, 1.0, _KNOTS + 1)
+    T, psi = path.sample(shares)
+    rows, loss = model.inverse_path(T, psi, q)
+    limits = model.limits.joint
+    steps = np.abs(np.diff(rows, axis=0, prepend=q[np.newaxis]))
+    jumps = np.flatnonzero((steps > _STEP).any(axis=1))
+    outside = np.flatnonzero(~((limits.lower < rows) & (rows < limits.upper)).all(axis=1))
+    ends = (loss.row if loss else _KNOTS + 1, *jumps[:1].tolist(), *outside[:1].tolist())
+    row = min(ends)
+    if row > _KNOTS:
+        return rows
+    if loss is not None and loss.row == row:
+        reason = str(loss.reason)
+    elif jumps.size and jumps[0] == row:
+        joint = int(steps[row].argmax())
+        reason = (
+            f"joint {joint + 1} would have to turn by {math.degrees(steps[row, joint]):.1f} deg within a thousandth of "
+            "the way, because a singularity is in the way; lead the tool around it, go there in joint space"
+            + (", or give another arm angle" if model.n == 7 else "")
+        )
+    else:
+        angles = rows[row]
+        joint = int(np.maximum(limits.lower - angles, angles - limits.upper).argmax())
+        reason = (
+            f"joint {joint + 1} would pass its limit at {math.degrees(angles[joint]):.1f} deg "
+            f"({math.degrees(limits.lower[joint]):.0f} to {math.degrees(limits.upper[joint]):.0f} deg); "
+            "start from another branch" + (" or give another arm angle" if model.n == 7 else "")
+        )
+    raise _stuck(path, float(shares[row]), reason)
+
+
+def _stuck(path: Path, share: float, reason: str) -> PlanningError:
+    x, y, z = path.at(share)[0].parts[1]
+    return PlanningError(
+        f"the {path.name} cannot be followed at {share * path.distance:.3f} of {path.distance:.3f} {path.unit} "
+        f"({100.0 * share:.1f} % of the way, tool at {x:.3f}, {y:.3f}, {z:.3f} m): {reason}",
+        share=share,
+    )
+
+
+def _bounds(model: RobotModel, part: float) -> _Bounds:
+    joint, tool, arm_angle = model.limits.joint, model.limits.cartesian, model.limits.arm_angle
+    elbow = [] if arm_angle is None else [(arm_angle.velocity, arm_angle.acceleration, arm_angle.jerk)]
+    extra = np.array([*elbow, (tool.rotation_velocity, tool.rotation_acceleration, tool.rotation_jerk)])
+    return _Bounds(
+        velocity=part * np.concatenate((joint.velocity, extra[:, 0])),
+        acceleration=part * np.concatenate((joint.acceleration, extra[:, 1])),
+        jerk=LIMIT_MARGIN * np.concatenate((joint.jerk, extra[:, 2])),
+        tool=(
+            part * tool.translation_velocity,
+            part * tool.translation_acceleration,
+            LIMIT_MARGIN * tool.translation_jerk,
+        ),
+    )
+
+
+def _longest_reversal(bounds: _Bounds) -> float:
+    """Returns the longest time from full deceleration to full acceleration, [s]."""
+    _, acceleration, jerk = bounds.tool
+    return 2.0 * max(float((bounds.acceleration / bounds.jerk).max()), acceleration / jerk)
+
+
+def _columns(path: Path, rows: JointPath, shares: Array) -> Array:
+    """Returns joint angles, the arm angle if there is one, and the tool's turn along a path, shape (N, m), [rad]."""
+    u = shares[:, np.newaxis]
+    if path.psi_start is None or path.psi_goal is None:
+        return np.hstack((rows, path.turn * u))
+    return np.hstack((rows, (path.psi_goal - path.psi_start) * u, path.turn * u))
+
+
+def _path_bounds(path: Path, knots: JointPath, bounds: _Bounds) -> PathBounds:
+    shares = np.linspace(0.0, 1.0, len(knots))
+    columns = _columns(path, knots, shares)
+    step = shares[1]
+    first = np.gradient(columns, step, axis=0, edge_order=2)
+    second = np.empty_like(columns)
+    second[1:-1] = (columns[2:] - 2.0 * columns[1:-1] + columns[:-2]) / step**2
+    second[0], second[-1] = second[1], second[-2]
+    along, toward = _tool_rows(path)
+    velocity, acceleration, _ = bounds.tool
+    round_ = 1.0 if path.circle is None else math.cos(math.pi / (2.0 * _SIDES))
+    count = len(knots)
+    return PathBounds(
+        first=np.hstack((first, np.tile(along, (count, 1)))),
+        second=np.hstack((second, np.tile(toward, (count, 1)))),
+        velocity=np.concatenate((bounds.velocity, np.full(len(along), velocity))),
+        acceleration=np.concatenate((bounds.acceleration, np.full(len(along), round_ * acceleration))),
+    )
+
+
+def _tool_rows(path: Path) -> tuple[Array, Array]:
+    """Returns the tool's path derivatives along the way and towards the centre, as rows that bound their norm, [m]."""
+    if path.circle is None:
+        return np.array([math.dist(path.start.parts[1], path.goal.parts[1])]), np.zeros(1)
+    angles = np.arange(_SIDES) * math.pi / _SIDES - math.pi / 2.0
+    return np.cos(angles) * path.distance, np.sin(angles) * path.distance * path.circle.angle
+
+
+def _excess(bounds: _Bounds, columns: Array, positions: Array) -> float:
+    """Returns how much slower the rows must be to keep every bound; 1 or less keeps them."""
+    worst = 0.0
+    column, position = _held(columns), _held(positions)
+    limits = (bounds.velocity, bounds.acceleration, bounds.jerk)
+    for order, (limit, tool_limit) in enumerate(zip(limits, bounds.tool, strict=True), start=1):
+        column, position = np.diff(column, axis=0) / CYCLE_TIME, np.diff(position, axis=0) / CYCLE_TIME
+        tool = math.sqrt(float((position * position).sum(axis=1).max())) / tool_limit
+        ratio = max(float((np.abs(column).max(axis=0) / limit).max()), tool)
+        worst = max(worst, ratio ** (1.0 / order))
+    return worst
+
+
+def _held(rows: Array) -> Array:
+    return np.concatenate((np.repeat(rows[:1], 3, axis=0), rows, np.repeat(rows[-1:], 3, axis=0)))
+
+
+def _quintics(model: RobotModel, path: Path, rows: JointPath, law: TimeLaw) -> PiecewisePolynomial:
+    """Returns the curve through the rows with the path's velocities and accelerations: continuous in both."""
+    near = np.clip(law.u, _NUDGE, 1.0 - _NUDGE)
+    before, middle, after = (
+        rows if side == 0.0 and near is law.u else model.inverse_path(*path.sample(near + side), rows[0])[0]
+        for side in (-_NUDGE, 0.0, _NUDGE)
+    )
+    second = (after - 2.0 * middle + before) / _NUDGE**2
+    first = (after - before) / (2.0 * _NUDGE) + second * (law.u - near)[:, np.newaxis]
+    du, ddu = law.du[:, np.newaxis], law.ddu[:, np.newaxis]
+    h = CYCLE_TIME
+    v = first * du * h
+    a = (second * du**2 + first * ddu) * (h * h / 2.0)
+    v[0] = v[-1] = a[0] = a[-1] = 0.0
+    # In powers of the part of the cycle: the quintic with given value, slope and bend on both ends.
+    rise, slope, bend = np.diff(rows, axis=0) - v[:-1] - a[:-1], np.diff(v, axis=0) - 2.0 * a[:-1], np.diff(a, axis=0)
+    pieces = np.stack(
+        (
+            rows[:-1],
+            v[:-1] / h,
+            a[:-1] / h**2,
+            (10.0 * rise - 4.0 * slope + bend) / h**3,
+            (-15.0 * rise + 7.0 * slope - 2.0 * bend) / h**4,
+            (6.0 * rise - 3.0 * slope + bend) / h**5,
+        ),
+        axis=2,
+    )
+    return PiecewisePolynomial(np.arange(len(rows)) * h, pieces)
