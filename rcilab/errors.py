@@ -64,7 +64,7 @@ class PlanningError(RcilabError):
     """No motion could be made from this request.
 
     Attributes:
-        share: Where on a path it cannot be followed, as a share of the way, 0 to 1; None where it is no matter of place.
+        share: Where a path cannot be followed, as a part of the way, 0 to 1; None where it is no matter of place.
     """
 
     def __init__(self, message: str, *, share: float | None = None) -> None:

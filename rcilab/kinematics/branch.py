@@ -21,6 +21,7 @@ from rcilab.kinematics.inverse import ArmGeometry, reach_error
 
 Column: TypeAlias = Array
 """Shape (N,): one number for every row of the path."""
+Vec: TypeAlias = tuple[Column, Column, Column]
 
 _REACH_TOLERANCE = 1e-9  # [m] As in `inverse.py`.
 _AXIS_LOST = 1e-12  # As in `inverse.py`: below it the azimuth is rounding, and the one before is kept.
@@ -69,20 +70,24 @@ def follow_branch(
         head, last = _six(arm, tracker, (x, y, z), elbow, guess), 3
     else:
         head, last = _seven(arm, tracker, (x, y, z), length, elbow, psi, guess), 4
-    rotation = _chain(head)
-    across = np.einsum("kij,ki->kj", rotation, rotations[:, :, 2])
+    (ax, ay, az), (bx, by, bz), (cx, cy, cz) = _forearm(head)
+    r = [[np.ascontiguousarray(rotations[:, i, j]) for j in range(3)] for i in range(3)]
+    zx = ax * r[0][2] + ay * r[1][2] + az * r[2][2]
+    zy = bx * r[0][2] + by * r[1][2] + bz * r[2][2]
+    zz = cx * r[0][2] + cy * r[1][2] + cz * r[2][2]
     axes = "joints 5 and 7" if last == 4 else "joints 4 and 6"
-    first, sign = tracker.azimuth(across[:, 0], across[:, 1], guess[last], axes)
-    tilt = sign * np.arctan2(np.hypot(across[:, 0], across[:, 1]), across[:, 2])
+    first, sign = tracker.azimuth(zx, zy, guess[last], axes)
+    tilt = sign * np.arctan2(np.hypot(zx, zy), zz)
+    c, s = np.cos(first), np.sin(first)
     # Second row of Rz(-first) A^T B is (sin third, cos third, 0).
-    c, s = np.cos(first)[:, np.newaxis], np.sin(first)[:, np.newaxis]
-    row = np.einsum("ki,kij->kj", c * rotation[:, :, 1] - s * rotation[:, :, 0], rotations)
-    third = _continued(np.arctan2(row[:, 0], row[:, 1]), guess[-1])
+    mx, my, mz = c * bx - s * ax, c * by - s * ay, c * bz - s * az
+    sine, cosine = (mx * r[0][j] + my * r[1][j] + mz * r[2][j] for j in (0, 1))
+    third = _continued(np.arctan2(sine, cosine), guess[-1])
     return np.stack((*head, first, tilt, third), axis=1) + offsets, tracker.loss
 
 
 def _seven(
-    arm: ArmGeometry, tracker: _Tracker, wrist: tuple[Column, Column, Column], length: Column, elbow: Column,
+    arm: ArmGeometry, tracker: _Tracker, wrist: Vec, length: Column, elbow: Column,
     psi: Column, guess: list[float],
 ) -> tuple[Column, ...]:  # fmt: skip
     """Returns joints 1 to 4."""
@@ -113,9 +118,7 @@ def _seven(
     return q1, q2, q3, sign * np.arctan2(np.hypot(vx, vy), vz)
 
 
-def _six(
-    arm: ArmGeometry, tracker: _Tracker, wrist: tuple[Column, Column, Column], elbow: Column, guess: list[float]
-) -> tuple[Column, ...]:
+def _six(arm: ArmGeometry, tracker: _Tracker, wrist: Vec, elbow: Column, guess: list[float]) -> tuple[Column, ...]:
     """Returns joints 1 to 3."""
     x, y, z = wrist
     reach = arm.upper + arm.fore
@@ -166,20 +169,18 @@ def _continued(angles: Column, guess: float) -> Column:
     return angles + tau * turns
 
 
-def _chain(head: tuple[Column, ...]) -> Array:
-    """Returns the rotation of the forearm in base, shape (N, 3, 3)."""
+def _forearm(head: tuple[Column, ...]) -> tuple[Vec, Vec, Vec]:
+    """Returns the axes x, y and z of the forearm in base."""
+    q1, q2 = head[0], head[1] + head[2] if len(head) == 3 else head[1]
+    c1, s1, c2, s2 = np.cos(q1), np.sin(q1), np.cos(q2), np.sin(q2)
+    x, y, z = (c1 * c2, s1 * c2, -s2), (-s1, c1, np.zeros_like(q1)), (c1 * s2, s1 * s2, c2)
     if len(head) == 3:
-        q1, q2, q3 = head
-        return _turn_zy(q1, q2 + q3)
-    q1, q2, q3, q4 = head
-    return _turn_zy(q1, q2) @ _turn_zy(q3, q4)
+        return x, y, z
+    c3, s3, c4, s4 = np.cos(head[2]), np.sin(head[2]), np.cos(head[3]), np.sin(head[3])
+    aside, across = _mixed(x, y, c3, s3), _mixed(x, y, -s3, c3)
+    return _mixed(aside, z, c4, -s4), across, _mixed(aside, z, s4, c4)
 
 
-def _turn_zy(about_z: Column, about_y: Column) -> Array:
-    """Returns Rz(about_z) Ry(about_y), shape (N, 3, 3)."""
-    c, s, cy, sy = np.cos(about_z), np.sin(about_z), np.cos(about_y), np.sin(about_y)
-    rotation = np.zeros((len(c), 3, 3))
-    rotation[:, 0, 0], rotation[:, 0, 1], rotation[:, 0, 2] = c * cy, -s, c * sy
-    rotation[:, 1, 0], rotation[:, 1, 1], rotation[:, 1, 2] = s * cy, c, s * sy
-    rotation[:, 2, 0], rotation[:, 2, 2] = -sy, cy
-    return rotation
+def _mixed(a: Vec, b: Vec, of_a: Column, of_b: Column) -> Vec:
+    x, y, z = (of_a * p + of_b * q for p, q in zip(a, b, strict=True))
+    return x, y, z

@@ -22,11 +22,11 @@ from rcilab.motion.path import Path
 from rcilab.motion.piecewise import PiecewisePolynomial
 from rcilab.motion.time_law import PathBounds, TimeLaw, fastest_squares, smooth_law
 
-_KNOTS = 1000
-"""Steps of the path between which bounds are interpolated. A choice: a millimetre of a line of a metre."""
+_KNOTS = 500
+"""Steps of the path between which bounds are interpolated. A choice: two millimetres of a line of a metre."""
 _STEP = 0.1
 """Turn of a joint from knot to knot beyond which it does not follow the tool but a singularity is in the way, [rad]. A
-choice: 100 rad on the whole way; no arm has that."""
+choice: 50 rad on the whole way; no arm has that."""
 _SIDES = 12
 """Half-planes on each side in place of the round bound on the tool's acceleration on an arc; they lose 0.9 %."""
 _ROUNDS = 12
@@ -80,9 +80,7 @@ def plan_along(model: RobotModel, q: JointVector, path: Path, speed: float) -> M
         rows[0] = q
         excess = _excess(bounds, _columns(path, rows, law.u), T[:, :3, 3])
         if excess <= 1.0:
-            return Motion(
-                polynomial=_quintics(model, path, rows, law), goal=rows[-1], law="jerk_limited", speed=speed
-            )
+            return Motion(polynomial=_quintics(model, path, rows, law), goal=rows[-1], law="jerk_limited", speed=speed)
         slowdown *= excess * _HASTE
     raise PlanningError(
         f"the {path.name} cannot be followed within the jerk limits (at {excess:.2g} times the speed it can), because "
@@ -112,8 +110,8 @@ def require_path(model: RobotModel, q: JointVector, path: Path) -> JointPath:
     elif jumps.size and jumps[0] == row:
         joint = int(steps[row].argmax())
         reason = (
-            f"joint {joint + 1} would have to turn by {math.degrees(steps[row, joint]):.1f} deg within a thousandth of "
-            "the way, because a singularity is in the way; lead the tool around it, go there in joint space"
+            f"joint {joint + 1} would have to turn by {math.degrees(steps[row, joint]):.1f} deg on 0.2 % of the way, "
+            "because a singularity is in the way; lead the tool around it, go there in joint space"
             + (", or give another arm angle" if model.n == 7 else "")
         )
     else:
@@ -213,13 +211,8 @@ def _held(rows: Array) -> Array:
 
 def _quintics(model: RobotModel, path: Path, rows: JointPath, law: TimeLaw) -> PiecewisePolynomial:
     """Returns the curve through the rows with the path's velocities and accelerations: continuous in both."""
-    near = np.clip(law.u, _NUDGE, 1.0 - _NUDGE)
-    before, middle, after = (
-        rows if side == 0.0 and near is law.u else model.inverse_path(*path.sample(near + side), rows[0])[0]
-        for side in (-_NUDGE, 0.0, _NUDGE)
-    )
-    second = (after - 2.0 * middle + before) / _NUDGE**2
-    first = (after - before) / (2.0 * _NUDGE) + second * (law.u - near)[:, np.newaxis]
+    before, after = (model.inverse_path(*path.sample(law.u + side), rows[0])[0] for side in (-_NUDGE, _NUDGE))
+    first, second = (after - before) / (2.0 * _NUDGE), (after - 2.0 * rows + before) / _NUDGE**2
     du, ddu = law.du[:, np.newaxis], law.ddu[:, np.newaxis]
     h = CYCLE_TIME
     v = first * du * h

@@ -190,8 +190,8 @@ def build_circle(
         raise PlanningError(f"the centre of the circle is where the tool is, at {_shown(middle)}; move it away")
     if abs(height) > _OUT_OF_PLANE * radius:
         raise PlanningError(
-            f"the tool at {_shown(start.position)} is {1e3 * abs(height):.2f} mm out of the plane of the circle; choose "
-            f"the centre at its height along the axis: {_shown(middle + height * normal)}"
+            f"the tool at {_shown(start.position)} is {1e3 * abs(height):.2f} mm out of the plane of the circle; "
+            f"choose the centre at its height along the axis: {_shown(middle + height * normal)}"
         )
     first = start.position - (middle + height * normal)
     circle = Circle(_point(middle + height * normal), _point(first), _point(np.cross(normal, first)), angle)

@@ -62,17 +62,18 @@ def fastest_squares(bounds: PathBounds) -> Array:
     gain = step * reserve
     factor = 1.0 + step * tilt
     inverse = np.where(factor > _LEAST, 1.0 / np.maximum(factor, _LEAST), np.inf)
-    backward = np.stack((gain, inverse), axis=2).tolist()
-    forward = np.stack((gain, factor), axis=2).tolist()
+    gains, inverses, factors = gain.tolist(), inverse.tolist(), factor.tolist()
     last = len(most) - 1
     highest = [0.0] * (last + 1)
     x = 0.0
     for k in range(last - 1, -1, -1):
-        x = highest[k] = min(most[k], min([(x + g) * f for g, f in backward[k]]))
+        x = highest[k] = min(most[k], min([(x + g) * f for g, f in zip(gains[k], inverses[k], strict=True)]))
     x = 0.0
     squares = [0.0] * (last + 1)
     for k in range(last):
-        x = squares[k + 1] = max(min(highest[k + 1], min([g + x * f for g, f in forward[k]])), _LEAST)
+        x = squares[k + 1] = max(
+            min(highest[k + 1], min([g + x * f for g, f in zip(gains[k], factors[k], strict=True)])), _LEAST
+        )
     squares[last] = 0.0
     return np.array(squares)
 

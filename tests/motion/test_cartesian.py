@@ -28,7 +28,7 @@ def moved(model, step, rpy=(0.0, 0.0, 0.0)) -> Pose:
 def test_the_tool_runs_straight_at_the_s_profiles_time_and_the_motion_is_allowed(name):
     model = load_model(name)
     goal = moved(model, (0.05, 0.1, -0.05), (0.2, -0.1, 0.1))
-    motion = plan_line(model, model.home, goal, speed=0.2)
+    motion = plan_line(model, model.home, goal, speed=0.2, law="s_profile")
     assert check(motion, model).ok
     T = model.forward_path(motion.q)
     assert np.allclose(T[-1], goal.matrix, atol=1e-9)
@@ -47,7 +47,7 @@ def test_the_tool_runs_straight_at_the_s_profiles_time_and_the_motion_is_allowed
 def test_the_tool_runs_on_the_arc(name):
     model = load_model(name)
     via, goal = moved(model, (0.05, 0.05, 0.0)), moved(model, (0.0, 0.1, 0.0))
-    motion = plan_arc(model, model.home, via, goal, speed=0.2)
+    motion = plan_arc(model, model.home, via, goal, speed=0.2, law="s_profile")
     assert check(motion, model).ok
     position = model.forward_path(motion.q)[:, :3, 3]
     center = moved(model, (0.0, 0.05, 0.0)).position
@@ -83,7 +83,7 @@ def test_a_tool_is_what_moves():
 def test_a_pose_out_of_reach_is_told_with_its_place_and_reason(model):
     goal = moved(model, (2.0, 0.0, 0.0))
     with pytest.raises(PlanningError, match=r"the line cannot be followed at 0\.\d+ of 2\.000 m \(t = .* s, tool"):
-        plan_line(model, model.home, goal)
+        plan_line(model, model.home, goal, law="s_profile")
 
 
 def test_a_wrist_flip_is_a_singularity_and_no_motion():
@@ -92,7 +92,7 @@ def test_a_wrist_flip_is_a_singularity_and_no_motion():
     # The wrist passes q6 = 0 beside, so that joints 5 and 7 would have to turn half round at once.
     goal = T @ Pose.from_rpy((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)) @ Pose.from_rpy((0, 0, 0), (1e-4, -0.8, 0.0))
     with pytest.raises(PlanningError, match=r"joint \d would have to jump by .* because a singularity is in the way"):
-        plan_line(SEVEN, q, Pose(T.position, goal.wxyz), speed=0.3)
+        plan_line(SEVEN, q, Pose(T.position, goal.wxyz), speed=0.3, law="s_profile")
 
 
 def test_a_stretched_arm_has_no_arm_angle_to_hold():
@@ -105,7 +105,7 @@ def test_a_stretched_arm_has_no_arm_angle_to_hold():
     [
         ({"speed": 0.0}, "speed: 0.0 must be from 0.001 to 1"),
         ({"speed": 1.5}, "speed: 1.5 must be from 0.001 to 1"),
-        ({"law": "jerk_limited"}, "is unknown for a path; known: s_profile"),
+        ({"law": "trapezoid"}, "is unknown for a path; known: jerk_limited, s_profile"),
         ({"psi": 4.0}, "psi: 4.0 must be from -pi to pi"),
         ({"psi": math.nan}, "psi: nan must be from -pi to pi"),
         ({"start": [0.0] * 6}, r"needs \(7,\)"),
