@@ -72,19 +72,21 @@ def plan_along(model: RobotModel, q: JointVector, path: Path, speed: float) -> M
     bounds = _bounds(model, LIMIT_MARGIN * speed)
     squares = fastest_squares(_path_bounds(path, require_path(model, q, path), bounds))
     cycles = max(2, math.ceil(_longest_reversal(bounds) / CYCLE_TIME))
-    slowdown, excess = 1.0, math.inf
+    slowdown, excess, worst = 1.0, math.inf, 0.0
     for _ in range(_ROUNDS):
         law = smooth_law(squares, slowdown, cycles)
         T, psi = path.sample(law.u)
         rows = model.inverse_path(T, psi, q)[0]
         rows[0] = q
-        excess = _excess(bounds, _columns(path, rows, law.u), T[:, :3, 3])
+        excess, row = _excess(bounds, _columns(path, rows, law.u), T[:, :3, 3])
         if excess <= 1.0:
             return Motion(polynomial=_quintics(model, path, rows, law), goal=rows[-1], law="jerk_limited", speed=speed)
-        slowdown *= excess * _HASTE
-    raise PlanningError(
-        f"the {path.name} cannot be followed within the jerk limits (at {excess:.2g} times the speed it can), because "
-        "it leads too close to a singularity; lead the tool around it or go there in joint space"
+        slowdown, worst = slowdown * excess * _HASTE, float(law.u[row])
+    raise _stuck(
+        path,
+        worst,
+        "a limit is passed however slowly it goes, because a singularity is close; lead the tool around it or go there "
+        "in joint space",
     )
 
 
@@ -192,17 +194,19 @@ def _tool_rows(path: Path) -> tuple[Array, Array]:
     return np.cos(angles) * path.distance, np.sin(angles) * path.distance * path.circle.angle
 
 
-def _excess(bounds: _Bounds, columns: Array, positions: Array) -> float:
-    """Returns how much slower the rows must be to keep every bound; 1 or less keeps them."""
-    worst = 0.0
+def _excess(bounds: _Bounds, columns: Array, positions: Array) -> tuple[float, int]:
+    """Returns how much slower the rows must be to keep every bound (1 or less keeps them), and the worst row."""
+    worst, row = 0.0, 0
     column, position = _held(columns), _held(positions)
     limits = (bounds.velocity, bounds.acceleration, bounds.jerk)
     for order, (limit, tool_limit) in enumerate(zip(limits, bounds.tool, strict=True), start=1):
         column, position = np.diff(column, axis=0) / CYCLE_TIME, np.diff(position, axis=0) / CYCLE_TIME
-        tool = math.sqrt(float((position * position).sum(axis=1).max())) / tool_limit
-        ratio = max(float((np.abs(column).max(axis=0) / limit).max()), tool)
-        worst = max(worst, ratio ** (1.0 / order))
-    return worst
+        tool = np.sqrt((position * position).sum(axis=1)) / tool_limit
+        ratio = np.maximum((np.abs(column) / limit).max(axis=1), tool)
+        k = int(ratio.argmax())
+        if (excess := float(ratio[k]) ** (1.0 / order)) > worst:
+            worst, row = excess, min(max(k + order - 3, 0), len(columns) - 1)
+    return worst, row
 
 
 def _held(rows: Array) -> Array:
