@@ -13,7 +13,7 @@ import numpy as np
 
 from rcilab.arrays import Array, JointPath, JointVector, as_number
 from rcilab.clock import CYCLE_TIME
-from rcilab.errors import InvalidValueError, PlanningError
+from rcilab.errors import InvalidValueError, PlanningError, SingularError, UnreachableError
 from rcilab.model import RobotModel
 from rcilab.motion.joint import MIN_SPEED
 from rcilab.motion.margin import LIMIT_MARGIN
@@ -24,6 +24,10 @@ from rcilab.motion.time_law import PathBounds, TimeLaw, fastest_squares, smooth_
 
 _KNOTS = 500
 """Steps of the path between which bounds are interpolated. A choice: two millimetres of a line of a metre."""
+_FINE_KNOTS = 4000
+"""The same close to a singularity, where joints turn fast on a short way. A choice: the law then takes 50 ms to find."""
+_STRETCHING = 5
+"""Knots before the end of reach on which a turning elbow is a sign of that end. Seen: 3."""
 _STEP = 0.1
 """Turn of a joint from knot to knot beyond which it does not follow the tool but a singularity is in the way, [rad]. A
 choice: 50 rad on the whole way; no arm has that."""
@@ -31,10 +35,21 @@ _SIDES = 12
 """Half-planes on each side in place of the round bound on the tool's acceleration on an arc; they lose 0.9 %."""
 _ROUNDS = 12
 """How often to slow down a law that passes a limit between the knots. Seen: 1 to 3."""
+_SLOWEST = 1.5
+"""Beyond this a limit is not passed by rounding between the knots, but by a jump. Seen: 1.02."""
 _HASTE = 1.0002
 """How much more than found to slow down each time, so that it is done soon. A choice."""
 _NUDGE = 1e-4
 """Share of the way over which derivatives by the way are formed. A choice: both their errors are below 1e-7."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Obstacle:
+    """Where a path cannot be followed, and why."""
+
+    row: int
+    reason: str
+    is_singular: bool
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -82,49 +97,59 @@ def plan_along(model: RobotModel, q: JointVector, path: Path, speed: float) -> M
         if excess <= 1.0:
             return Motion(polynomial=_quintics(model, path, rows, law), goal=rows[-1], law="jerk_limited", speed=speed)
         slowdown, worst = slowdown * excess * _HASTE, float(law.u[row])
+        if slowdown > _SLOWEST:
+            break
     raise _stuck(
         path,
         worst,
-        "a limit is passed however slowly it goes, because a singularity is close; lead the tool around it or go there "
-        "in joint space",
+        "the joints would have to jump, because a singularity is close; lead the tool around it, go there in joint space",
     )
 
 
 def require_path(model: RobotModel, q: JointVector, path: Path) -> JointPath:
-    """Returns the joint angles at evenly spaced knots of a path that can be followed, shape (_KNOTS + 1, n), [rad].
+    """Returns the joint angles at evenly spaced knots of a path that can be followed, shape (M + 1, n), [rad].
 
     Raises:
         PlanningError: A pose on the way is out of reach, or a joint limit or a singularity is in the way.
     """
-    shares = np.linspace(0.0, 1.0, _KNOTS + 1)
-    T, psi = path.sample(shares)
+    rows, obstacle = _examine(model, q, path, _KNOTS)
+    if obstacle is not None and obstacle.is_singular:
+        rows, obstacle = _examine(model, q, path, _FINE_KNOTS)
+    if obstacle is None:
+        return rows
+    raise _stuck(path, obstacle.row / (len(rows) - 1), obstacle.reason)
+
+
+def _examine(model: RobotModel, q: JointVector, path: Path, knots: int) -> tuple[JointPath, _Obstacle | None]:
+    """Returns the joint angles at the knots, and the first obstacle."""
+    T, psi = path.sample(np.linspace(0.0, 1.0, knots + 1))
     rows, loss = model.inverse_path(T, psi, q)
     limits = model.limits.joint
     steps = np.abs(np.diff(rows, axis=0, prepend=q[np.newaxis]))
-    jumps = np.flatnonzero((steps > _STEP).any(axis=1))
-    outside = np.flatnonzero(~((limits.lower < rows) & (rows < limits.upper)).all(axis=1))
-    ends = (loss.row if loss else _KNOTS + 1, *jumps[:1].tolist(), *outside[:1].tolist())
-    row = min(ends)
-    if row > _KNOTS:
-        return rows
-    if loss is not None and loss.row == row:
-        reason = str(loss.reason)
-    elif jumps.size and jumps[0] == row:
-        joint = int(steps[row].argmax())
-        reason = (
-            f"joint {joint + 1} would have to turn by {math.degrees(steps[row, joint]):.1f} deg on 0.2 % of the way, "
-            "because a singularity is in the way; lead the tool around it, go there in joint space"
-            + (", or give another arm angle" if model.n == 7 else "")
-        )
-    else:
-        angles = rows[row]
+    jumps = np.flatnonzero((steps > _STEP).any(axis=1)).tolist()
+    outside = np.flatnonzero(~((limits.lower < rows) & (rows < limits.upper)).all(axis=1)).tolist()
+    first = min(jumps[:1] + outside[:1], default=len(rows))
+    # The elbow turns ever faster before the arm is stretched: then reach is the reason.
+    if loss is not None and loss.row <= first + _STRETCHING * isinstance(loss.reason, UnreachableError):
+        return rows, _Obstacle(loss.row, str(loss.reason), isinstance(loss.reason, SingularError))
+    if first == len(rows):
+        return rows, None
+    advice = ", or give another arm angle" if model.n == 7 else ""
+    if outside[:1] == [first]:
+        angles = rows[first]
         joint = int(np.maximum(limits.lower - angles, angles - limits.upper).argmax())
         reason = (
             f"joint {joint + 1} would pass its limit at {math.degrees(angles[joint]):.1f} deg "
             f"({math.degrees(limits.lower[joint]):.0f} to {math.degrees(limits.upper[joint]):.0f} deg); "
-            "start from another branch" + (" or give another arm angle" if model.n == 7 else "")
+            f"start from another branch{advice}"
         )
-    raise _stuck(path, float(shares[row]), reason)
+        return rows, _Obstacle(first, reason, False)
+    joint = int(steps[first].argmax())
+    reason = (
+        f"joint {joint + 1} would have to turn by {math.degrees(steps[first, joint]):.1f} deg on {100.0 / knots:g} % of "
+        f"the way, because a singularity is in the way; lead the tool around it, go there in joint space{advice}"
+    )
+    return rows, _Obstacle(first, reason, True)
 
 
 def _stuck(path: Path, share: float, reason: str) -> PlanningError:
