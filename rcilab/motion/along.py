@@ -25,7 +25,7 @@ from rcilab.motion.time_law import PathBounds, TimeLaw, fastest_squares, smooth_
 _KNOTS = 500
 """Steps of the path between which bounds are interpolated. A choice: two millimetres of a line of a metre."""
 _FINE_KNOTS = 4000
-"""The same close to a singularity, where joints turn fast on a short way. A choice: the law then takes 50 ms to find."""
+"""The same close to a singularity, where joints turn fast on a short way. A choice: the law then takes 50 ms."""
 _STRETCHING = 5
 """Knots before the end of reach on which a turning elbow is a sign of that end. Seen: 3."""
 _STEP = 0.1
@@ -35,8 +35,10 @@ _SIDES = 12
 """Half-planes on each side in place of the round bound on the tool's acceleration on an arc; they lose 0.9 %."""
 _ROUNDS = 12
 """How often to slow down a law that passes a limit between the knots. Seen: 1 to 3."""
-_SLOWEST = 1.5
-"""Beyond this a limit is not passed by rounding between the knots, but by a jump. Seen: 1.02."""
+_SLOWEST = 4.0
+"""Beyond this a limit is not passed by what happens between the knots, but by a jump. A choice."""
+_INSTANTS = (0.0, 0.2, 0.4, 0.6, 0.8)
+"""Where in a cycle the curve is looked at, in cycles."""
 _HASTE = 1.0002
 """How much more than found to slow down each time, so that it is done soon. A choice."""
 _NUDGE = 1e-4
@@ -85,25 +87,27 @@ def plan_along(model: RobotModel, q: JointVector, path: Path, speed: float) -> M
     if path.distance == 0.0:
         return standing(q, speed=speed)
     bounds = _bounds(model, LIMIT_MARGIN * speed)
-    squares = fastest_squares(_path_bounds(path, require_path(model, q, path), bounds))
+    allowed = _path_bounds(path, require_path(model, q, path), bounds)
     cycles = max(2, math.ceil(_longest_reversal(bounds) / CYCLE_TIME))
-    slowdown, excess, worst = 1.0, math.inf, 0.0
+    slowdown = np.ones(len(allowed.first))
+    worst = 0.0
     for _ in range(_ROUNDS):
-        law = smooth_law(squares, slowdown, cycles)
+        law = smooth_law(fastest_squares(allowed.slowed(slowdown)), cycles)
         T, psi = path.sample(law.u)
         rows = model.inverse_path(T, psi, q)[0]
         rows[0] = q
-        excess, row = _excess(bounds, _columns(path, rows, law.u), T[:, :3, 3])
-        if excess <= 1.0:
-            return Motion(polynomial=_quintics(model, path, rows, law), goal=rows[-1], law="jerk_limited", speed=speed)
-        slowdown, worst = slowdown * excess * _HASTE, float(law.u[row])
-        if slowdown > _SLOWEST:
+        excess = _excess(bounds, _columns(path, rows, law.u), T[:, :3, 3])
+        if excess.max() <= 1.0:
+            curve = _quintics(model, path, rows, law)
+            excess = _excess_between(bounds, curve)
+            if excess.max() <= 1.0:
+                return Motion(polynomial=curve, goal=rows[-1], law="jerk_limited", speed=speed)
+        worst = float(law.u[excess.argmax()])
+        slowdown *= _spread(excess, law.u, len(slowdown), cycles)
+        if slowdown.max() > _SLOWEST:
             break
-    raise _stuck(
-        path,
-        worst,
-        "the joints would have to jump, because a singularity is close; lead the tool around it, go there in joint space",
-    )
+    reason = "the joints would have to jump, because a singularity is close; lead the tool around it"
+    raise _stuck(path, worst, reason)
 
 
 def require_path(model: RobotModel, q: JointVector, path: Path) -> JointPath:
@@ -146,8 +150,8 @@ def _examine(model: RobotModel, q: JointVector, path: Path, knots: int) -> tuple
         return rows, _Obstacle(first, reason, False)
     joint = int(steps[first].argmax())
     reason = (
-        f"joint {joint + 1} would have to turn by {math.degrees(steps[first, joint]):.1f} deg on {100.0 / knots:g} % of "
-        f"the way, because a singularity is in the way; lead the tool around it, go there in joint space{advice}"
+        f"joint {joint + 1} would have to turn by {math.degrees(steps[first, joint]):.1f} deg on {100.0 / knots:g} % "
+        f"of the way, because a singularity is in the way; lead the tool around it, go there in joint space{advice}"
     )
     return rows, _Obstacle(first, reason, True)
 
@@ -219,19 +223,50 @@ def _tool_rows(path: Path) -> tuple[Array, Array]:
     return np.cos(angles) * path.distance, np.sin(angles) * path.distance * path.circle.angle
 
 
-def _excess(bounds: _Bounds, columns: Array, positions: Array) -> tuple[float, int]:
-    """Returns how much slower the rows must be to keep every bound (1 or less keeps them), and the worst row."""
-    worst, row = 0.0, 0
+def _excess(bounds: _Bounds, columns: Array, positions: Array) -> Array:
+    """Returns how much slower each row must be passed to keep every bound, shape (N,); 1 or less keeps them."""
+    count = len(columns)
+    excess = np.zeros(count)
     column, position = _held(columns), _held(positions)
     limits = (bounds.velocity, bounds.acceleration, bounds.jerk)
     for order, (limit, tool_limit) in enumerate(zip(limits, bounds.tool, strict=True), start=1):
         column, position = np.diff(column, axis=0) / CYCLE_TIME, np.diff(position, axis=0) / CYCLE_TIME
         tool = np.sqrt((position * position).sum(axis=1)) / tool_limit
-        ratio = np.maximum((np.abs(column) / limit).max(axis=1), tool)
-        k = int(ratio.argmax())
-        if (excess := float(ratio[k]) ** (1.0 / order)) > worst:
-            worst, row = excess, min(max(k + order - 3, 0), len(columns) - 1)
-    return worst, row
+        ratio = np.maximum((np.abs(column) / limit).max(axis=1), tool) ** (1.0 / order)
+        # The difference at a row looks back; behind the end it is the end's.
+        offset = 3 - order
+        np.maximum(excess, ratio[offset : offset + count], out=excess)
+        excess[-1] = max(excess[-1], float(ratio[offset + count :].max()))
+    return excess
+
+
+def _excess_between(bounds: _Bounds, curve: PiecewisePolynomial) -> Array:
+    """Returns how much slower each cycle must be to keep the joints' bounds and between, shape (N - 1,)."""
+    excess = np.zeros(len(curve.coefficients))
+    coefficients = curve.coefficients
+    n = curve.n
+    for order, limit in enumerate((bounds.velocity, bounds.acceleration, bounds.jerk), start=1):
+        coefficients = coefficients[:, :, 1:] * np.arange(1.0, coefficients.shape[2])
+        for part in _INSTANTS:
+            powers = (part * CYCLE_TIME) ** np.arange(coefficients.shape[2])
+            ratio = (np.abs(coefficients @ powers) / limit[:n]).max(axis=1) ** (1.0 / order)
+            np.maximum(excess, ratio, out=excess)
+    return excess
+
+
+def _spread(excess: Array, u: Array, knots: int, cycles: int) -> Array:
+    """Returns by how much to slow down at each knot, given by how much each row or cycle is too fast."""
+    factor = np.ones(len(u))
+    factor[: len(excess)] = np.where(excess > 1.0, excess * _HASTE, 1.0)
+    reach = cycles + 3
+    wide = np.pad(factor, reach, constant_values=1.0)
+    factor = np.lib.stride_tricks.sliding_window_view(wide, 2 * reach + 1).max(axis=1)
+    places = np.linspace(0.0, 1.0, knots)
+    result = np.interp(places, u, factor)
+    below = np.clip((u * (knots - 1)).astype(np.intp), 0, knots - 2)
+    np.maximum.at(result, below, factor)
+    np.maximum.at(result, below + 1, factor)
+    return result
 
 
 def _held(rows: Array) -> Array:

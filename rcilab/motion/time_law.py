@@ -35,6 +35,16 @@ class PathBounds:
     acceleration: Array
     """Bounds, shape (m,) or (M + 1, m), [unit/s^2]."""
 
+    def slowed(self, factor: Array) -> PathBounds:
+        """Returns what is left when each knot is passed that much slower: 1 or more, shape (M + 1,)."""
+        slow = factor[:, np.newaxis]
+        return PathBounds(
+            first=self.first,
+            second=self.second,
+            velocity=self.velocity / slow,
+            acceleration=self.acceleration / slow**2,
+        )
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TimeLaw:
@@ -83,20 +93,19 @@ def duration_of(squares: Array) -> float:
     return float(_knot_times(squares)[-1])
 
 
-def smooth_law(squares: Array, slowdown: float, cycles: int) -> TimeLaw:
+def smooth_law(squares: Array, cycles: int) -> TimeLaw:
     """Returns the law on the grid of cycles whose acceleration is the mean of the given one's over some cycles.
 
-    It begins and ends at rest and without acceleration, takes `cycles` longer, and its jerk is at most the largest jump
-    of the given acceleration, divided by that time.
+    It begins and ends at rest and without acceleration, takes `cycles` longer and less than a cycle more, and its jerk
+    is at most the largest jump of the given acceleration, divided by that time.
 
     Args:
         squares: Squares of u' at evenly spaced knots, shape (M + 1,), [1/s^2].
-        slowdown: How much longer than those say it shall last, 1 or more; rounded up to whole cycles.
         cycles: Over how many cycles to take the mean, 1 or more.
     """
     h = CYCLE_TIME
     knots = _knot_times(squares)
-    count = max(int(np.ceil(knots[-1] * slowdown / h - 1e-9)), 1)
+    count = max(int(np.ceil(knots[-1] / h - 1e-9)), 1)
     stretch = count * h / knots[-1]
     times = (np.arange(count + 2 * cycles + 1) - cycles) * h
     du = np.interp(times, knots * stretch, np.sqrt(squares) / stretch)
