@@ -146,7 +146,7 @@ class _Tracker:
         """Returns the angle about z, continuous, and the sign, +1 or -1, of the tilt that goes with it."""
         tilt = np.hypot(x, y)
         raw = _filled(np.arctan2(y, x), tilt > _AXIS_LOST, guess)
-        halves = np.round((np.unwrap(np.concatenate(([guess], raw)), period=pi)[1:] - raw) / pi)
+        halves = _turns(raw, guess, pi)
         angle = raw + pi * halves
         swaps = np.flatnonzero(np.diff(halves % 2.0))
         if swaps.size:
@@ -179,8 +179,15 @@ def _filled(values: Column, known: np.ndarray, first: float) -> Column:
 
 def _continued(angles: Column, guess: float) -> Column:
     """Returns the angles plus whole turns, so that none jumps and the first is next to the guess."""
-    turns = np.round((np.unwrap(np.concatenate(([guess], angles)))[1:] - angles) / tau)
-    return angles + tau * turns
+    return angles + tau * _turns(angles, guess, tau)
+
+
+def _turns(angles: Column, guess: float, period: float) -> Column:
+    """Returns how many periods to add to each angle so that each is next to the one before, the first to the guess."""
+    steps = np.empty_like(angles)
+    steps[0] = angles[0] - guess
+    np.subtract(angles[1:], angles[:-1], out=steps[1:])
+    return -np.cumsum(np.round(steps / period))
 
 
 def _forearm(head: tuple[Column, ...]) -> tuple[Vec, Vec, Vec]:

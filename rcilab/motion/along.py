@@ -39,7 +39,7 @@ _SLOWEST = 4.0
 """Beyond this a limit is not passed by what happens between the knots, but by a jump. A choice."""
 _INSTANTS = (0.0, 0.2, 0.4, 0.6, 0.8)
 """Where in a cycle the curve is looked at, in cycles."""
-_HASTE = 1.0002
+_HASTE = 1.002
 """How much more than found to slow down each time, so that it is done soon. A choice."""
 _NUDGE = 1e-4
 """Share of the way over which derivatives by the way are formed. A choice: both their errors are below 1e-7."""
@@ -243,14 +243,13 @@ def _excess(bounds: _Bounds, columns: Array, positions: Array) -> Array:
 def _excess_between(bounds: _Bounds, curve: PiecewisePolynomial) -> Array:
     """Returns how much slower each cycle must be to keep the joints' bounds and between, shape (N - 1,)."""
     excess = np.zeros(len(curve.coefficients))
-    coefficients = curve.coefficients
-    n = curve.n
+    coefficients, n = curve.coefficients, curve.n
+    times = np.array(_INSTANTS) * CYCLE_TIME
     for order, limit in enumerate((bounds.velocity, bounds.acceleration, bounds.jerk), start=1):
         coefficients = coefficients[:, :, 1:] * np.arange(1.0, coefficients.shape[2])
-        for part in _INSTANTS:
-            powers = (part * CYCLE_TIME) ** np.arange(coefficients.shape[2])
-            ratio = (np.abs(coefficients @ powers) / limit[:n]).max(axis=1) ** (1.0 / order)
-            np.maximum(excess, ratio, out=excess)
+        powers = np.vander(times, coefficients.shape[2], increasing=True).T
+        largest = np.abs(coefficients.reshape(-1, len(powers)) @ powers).max(axis=1).reshape(-1, n)
+        np.maximum(excess, (largest / limit[:n]).max(axis=1) ** (1.0 / order), out=excess)
     return excess
 
 
