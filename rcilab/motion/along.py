@@ -294,4 +294,4 @@ def _quintics(model: RobotModel, path: Path, rows: JointPath, law: TimeLaw) -> P
         ),
         axis=2,
     )
-    return PiecewisePolynomial(np.arange(len(rows)) * h, pieces)
+    return PiecewisePolynomial(np.arange(len(rows), dtype=np.float64) * h, pieces)
