@@ -37,7 +37,7 @@ _ROUNDS = 12
 """How often to slow down a law that passes a limit between the knots. Seen: 1 to 3."""
 _SLOWEST = 4.0
 """Beyond this a limit is not passed by what happens between the knots, but by a jump. A choice."""
-_INSTANTS = (0.0, 0.2, 0.4, 0.6, 0.8)
+_INSTANTS = (0.0, 0.25, 0.5, 0.75)
 """Where in a cycle the curve is looked at, in cycles."""
 _HASTE = 1.002
 """How much more than found to slow down each time, so that it is done soon. A choice."""
@@ -248,8 +248,9 @@ def _excess_between(bounds: _Bounds, curve: PiecewisePolynomial) -> Array:
     for order, limit in enumerate((bounds.velocity, bounds.acceleration, bounds.jerk), start=1):
         coefficients = coefficients[:, :, 1:] * np.arange(1.0, coefficients.shape[2])
         powers = np.vander(times, coefficients.shape[2], increasing=True).T
-        largest = np.abs(coefficients.reshape(-1, len(powers)) @ powers).max(axis=1).reshape(-1, n)
-        np.maximum(excess, (largest / limit[:n]).max(axis=1) ** (1.0 / order), out=excess)
+        values = (coefficients.reshape(-1, len(powers)) @ powers).reshape(len(excess), -1)
+        ratio = np.abs(values / np.repeat(limit[:n], len(times))).max(axis=1)
+        np.maximum(excess, ratio ** (1.0 / order), out=excess)
     return excess
 
 
