@@ -152,7 +152,7 @@ class _Tracker:
         if swaps.size:
             beside = swaps[_miss(angle, tilt, swaps) > _BESIDE]
             if beside.size:
-                reason = SingularError(f"{axes} would have to turn half round at once, because a singularity is close")
+                reason = SingularError(f"{axes} would have to jump by half a turn, because a singularity is in the way")
                 self.lose(int(beside[0]) + 1, reason)
         return angle, 1.0 - 2.0 * (halves % 2.0)
 

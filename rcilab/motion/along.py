@@ -13,11 +13,12 @@ import numpy as np
 
 from rcilab.arrays import Array, JointPath, JointVector, as_number
 from rcilab.clock import CYCLE_TIME
-from rcilab.errors import InvalidValueError, PlanningError, SingularError, UnreachableError
+from rcilab.errors import InvalidValueError
 from rcilab.model import RobotModel
 from rcilab.motion.joint import MIN_SPEED
 from rcilab.motion.margin import LIMIT_MARGIN
 from rcilab.motion.motion import Motion, standing
+from rcilab.motion.obstacle import examine, refusal
 from rcilab.motion.path import Path
 from rcilab.motion.piecewise import PiecewisePolynomial
 from rcilab.motion.time_law import PathBounds, TimeLaw, fastest_squares, smooth_law
@@ -26,8 +27,6 @@ _KNOTS = 500
 """Steps of the path between which bounds are interpolated. A choice: two millimetres of a line of a metre."""
 _FINE_KNOTS = 4000
 """The same close to a singularity, where joints turn fast on a short way. A choice: the law then takes 50 ms."""
-_STRETCHING = 5
-"""Knots before the end of reach on which a turning elbow is a sign of that end. Seen: 3."""
 _STEP = 0.1
 """Turn of a joint from knot to knot beyond which it does not follow the tool but a singularity is in the way, [rad]. A
 choice: 50 rad on the whole way; no arm has that."""
@@ -43,15 +42,6 @@ _HASTE = 1.002
 """How much more than found to slow down each time, so that it is done soon. A choice."""
 _NUDGE = 1e-4
 """Share of the way over which derivatives by the way are formed. A choice: both their errors are below 1e-7."""
-
-
-@dataclass(frozen=True, slots=True)
-class _Obstacle:
-    """Where a path cannot be followed, and why."""
-
-    row: int
-    reason: str
-    is_singular: bool
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -107,7 +97,7 @@ def plan_along(model: RobotModel, q: JointVector, path: Path, speed: float) -> M
         if slowdown.max() > _SLOWEST:
             break
     reason = "the joints would have to jump, because a singularity is close; lead the tool around it"
-    raise _stuck(path, worst, reason)
+    raise refusal(path, worst, reason)
 
 
 def require_path(model: RobotModel, q: JointVector, path: Path) -> JointPath:
@@ -116,53 +106,15 @@ def require_path(model: RobotModel, q: JointVector, path: Path) -> JointPath:
     Raises:
         PlanningError: A pose on the way is out of reach, or a joint limit or a singularity is in the way.
     """
-    rows, obstacle = _examine(model, q, path, _KNOTS)
-    if obstacle is not None and obstacle.is_singular:
-        rows, obstacle = _examine(model, q, path, _FINE_KNOTS)
-    if obstacle is None:
-        return rows
-    raise _stuck(path, obstacle.row / (len(rows) - 1), obstacle.reason)
-
-
-def _examine(model: RobotModel, q: JointVector, path: Path, knots: int) -> tuple[JointPath, _Obstacle | None]:
-    """Returns the joint angles at the knots, and the first obstacle."""
-    T, psi = path.sample(np.linspace(0.0, 1.0, knots + 1))
-    rows, loss = model.inverse_path(T, psi, q)
-    limits = model.limits.joint
-    steps = np.abs(np.diff(rows, axis=0, prepend=q[np.newaxis]))
-    jumps = np.flatnonzero((steps > _STEP).any(axis=1)).tolist()
-    outside = np.flatnonzero(~((limits.lower < rows) & (rows < limits.upper)).all(axis=1)).tolist()
-    first = min(jumps[:1] + outside[:1], default=len(rows))
-    # The elbow turns ever faster before the arm is stretched: then reach is the reason.
-    if loss is not None and loss.row <= first + _STRETCHING * isinstance(loss.reason, UnreachableError):
-        return rows, _Obstacle(loss.row, str(loss.reason), isinstance(loss.reason, SingularError))
-    if first == len(rows):
-        return rows, None
-    advice = ", or give another arm angle" if model.n == 7 else ""
-    if outside[:1] == [first]:
-        angles = rows[first]
-        joint = int(np.maximum(limits.lower - angles, angles - limits.upper).argmax())
-        reason = (
-            f"joint {joint + 1} would pass its limit at {math.degrees(angles[joint]):.1f} deg "
-            f"({math.degrees(limits.lower[joint]):.0f} to {math.degrees(limits.upper[joint]):.0f} deg); "
-            f"start from another branch{advice}"
-        )
-        return rows, _Obstacle(first, reason, False)
-    joint = int(steps[first].argmax())
-    reason = (
-        f"joint {joint + 1} would have to turn by {math.degrees(steps[first, joint]):.1f} deg on {100.0 / knots:g} % "
-        f"of the way, because a singularity is in the way; lead the tool around it, go there in joint space{advice}"
-    )
-    return rows, _Obstacle(first, reason, True)
-
-
-def _stuck(path: Path, share: float, reason: str) -> PlanningError:
-    x, y, z = path.at(share)[0].parts[1]
-    return PlanningError(
-        f"the {path.name} cannot be followed at {share * path.distance:.3f} of {path.distance:.3f} {path.unit} "
-        f"({100.0 * share:.1f} % of the way, tool at {x:.3f}, {y:.3f}, {z:.3f} m): {reason}",
-        share=share,
-    )
+    for knots in (_KNOTS, _FINE_KNOTS):
+        shares = np.linspace(0.0, 1.0, knots + 1)
+        span = f"on {100.0 / knots:g} % of the way"
+        rows, obstacle = examine(model, q, path, shares, np.full(model.n, _STEP), span)
+        if obstacle is None:
+            return rows
+        if not obstacle.is_singular:
+            break
+    raise refusal(path, float(shares[obstacle.row]), obstacle.reason)
 
 
 def _bounds(model: RobotModel, part: float) -> _Bounds:

@@ -8,13 +8,14 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.arrays import Array, JointPath, JointVector, as_number, as_vector, described
+from rcilab.arrays import Array, JointVector, as_number, as_vector, described
 from rcilab.clock import CYCLE_TIME
-from rcilab.errors import InvalidValueError, PlanningError, SingularError, UnreachableError
+from rcilab.errors import InvalidValueError, PlanningError, SingularError
 from rcilab.model import RobotModel, require_model
 from rcilab.motion.along import plan_along
 from rcilab.motion.joint import MIN_SPEED
 from rcilab.motion.motion import Motion, standing
+from rcilab.motion.obstacle import examine, refusal
 from rcilab.motion.path import Path, build_arc, build_circle, build_line, circle_through
 from rcilab.motion.piecewise import join_pieces
 from rcilab.motion.s_curve import plan_s_curve
@@ -243,26 +244,12 @@ def follow_path(model: RobotModel, q: JointVector, path: Path, speed: float) -> 
     shares = schedule(path, speed)
     if len(shares) == 1:
         return standing(q, law="s_profile", speed=speed)
-    rows: JointPath = np.empty((len(shares), model.n))
-    rows[0] = q
-    fastest = model.limits.joint.velocity * CYCLE_TIME
     whole_turn = path.turn + (path.distance / _LEVER if path.unit == "m" else path.distance)
-    for k in range(1, len(shares)):
-        share = float(shares[k])
-        pose, psi = path.at(share)
-        try:
-            rows[k] = model.inverse(pose, psi, rows[k - 1]).nearest(rows[k - 1])
-        except UnreachableError as error:
-            raise PlanningError(f"{_place(path, share, k, pose)}: {error}") from error
-        step = np.abs(rows[k] - rows[k - 1])
-        longest = _JUMP * (fastest + whole_turn * (share - float(shares[k - 1])))
-        if (step > longest).any():
-            joint = int((step - longest).argmax())
-            raise PlanningError(
-                f"{_place(path, share, k, pose)}: joint {joint + 1} would have to jump by "
-                f"{math.degrees(step[joint]):.1f} deg within one cycle, because a singularity is in the way; lead the "
-                "tool around it, go there in joint space" + (", or give another arm angle" if model.n == 7 else "")
-            )
+    longest = _JUMP * (model.limits.joint.velocity * CYCLE_TIME + whole_turn * np.diff(shares)[:, np.newaxis])
+    rows, obstacle = examine(model, q, path, shares, longest, "within one cycle")
+    if obstacle is not None:
+        when = f"t = {obstacle.row * CYCLE_TIME:.3f} s, "
+        raise refusal(path, float(shares[obstacle.row]), obstacle.reason, when)
     samples = Motion.from_samples(rows)
     return Motion(polynomial=samples.polynomial, goal=rows[-1], law="s_profile", speed=speed)
 
@@ -285,11 +272,3 @@ def _require_start(model: RobotModel, start: ArrayLike, law: str) -> JointVector
             f"{math.degrees(limits.lower[i]):.2f} and {math.degrees(limits.upper[i]):.2f} deg"
         )
     return q
-
-
-def _place(path: Path, share: float, cycle: int, pose: Pose) -> str:
-    x, y, z = pose.parts[1]
-    return (
-        f"the {path.name} cannot be followed at {share * path.distance:.3f} of {path.distance:.3f} {path.unit} "
-        f"(t = {cycle * CYCLE_TIME:.3f} s, tool at {x:.3f}, {y:.3f}, {z:.3f} m)"
-    )

@@ -82,7 +82,10 @@ def test_a_tool_is_what_moves():
 @pytest.mark.parametrize("model", [SEVEN, SIX], ids=["7", "6"])
 def test_a_pose_out_of_reach_is_told_with_its_place_and_reason(model):
     goal = moved(model, (2.0, 0.0, 0.0))
-    with pytest.raises(PlanningError, match=r"the line cannot be followed at 0\.\d+ of 2\.000 m \(t = .* s, tool"):
+    with pytest.raises(
+        PlanningError,
+        match=r"the line cannot be followed at 0\.\d+ of 2\.000 m \(t = .* s, .* % of the way, tool .* out of reach by",
+    ):
         plan_line(model, model.home, goal, law="s_profile")
 
 
@@ -91,7 +94,9 @@ def test_a_wrist_flip_is_a_singularity_and_no_motion():
     T = SEVEN.forward(q)
     # The wrist passes q6 = 0 beside, so that joints 5 and 7 would have to turn half round at once.
     goal = T @ Pose.from_rpy((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)) @ Pose.from_rpy((0, 0, 0), (1e-4, -0.8, 0.0))
-    with pytest.raises(PlanningError, match=r"joint \d would have to jump by .* because a singularity is in the way"):
+    with pytest.raises(
+        PlanningError, match=r"joints? \d.* would have to jump by .* because a singularity is in the way"
+    ):
         plan_line(SEVEN, q, Pose(T.position, goal.wxyz), speed=0.3, law="s_profile")
 
 
