@@ -23,7 +23,9 @@ if TYPE_CHECKING:
     from rcilab.model import RobotModel as RobotModel
     from rcilab.model import load_model as load_model
     from rcilab.motion.cartesian import plan_arc as plan_arc
+    from rcilab.motion.cartesian import plan_circle as plan_circle
     from rcilab.motion.cartesian import plan_line as plan_line
+    from rcilab.motion.cartesian import plan_nullspace as plan_nullspace
     from rcilab.motion.joint import plan_joint as plan_joint
     from rcilab.motion.motion import Motion as Motion
     from rcilab.notebook.plot import plot as plot
@@ -52,8 +54,10 @@ _HOMES = {
     "connect": "rcilab.client.session",
     "load_model": "rcilab.model",
     "plan_arc": "rcilab.motion.cartesian",
+    "plan_circle": "rcilab.motion.cartesian",
     "plan_joint": "rcilab.motion.joint",
     "plan_line": "rcilab.motion.cartesian",
+    "plan_nullspace": "rcilab.motion.cartesian",
     "plot": "rcilab.notebook.plot",
     "preview": "rcilab.notebook.preview",
     "simulate": "rcilab.supervisor.simulate",

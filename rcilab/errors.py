@@ -61,7 +61,15 @@ class SingularError(KinematicsError):
 
 
 class PlanningError(RcilabError):
-    """No motion could be made from this request."""
+    """No motion could be made from this request.
+
+    Attributes:
+        share: Where a path cannot be followed, as a part of the way, 0 to 1; None where it is no matter of place.
+    """
+
+    def __init__(self, message: str, *, share: float | None = None) -> None:
+        super().__init__(message)
+        self.share = share
 
 
 class ConformanceError(RcilabError):

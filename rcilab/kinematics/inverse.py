@@ -183,14 +183,16 @@ def wrist_centre(arm: ArmGeometry, T: Pose) -> tuple[Rotation9, float, float, fl
     beyond = length - (upper + fore)
     inside = abs(upper - fore) - length
     if beyond > _REACH_TOLERANCE or inside > _REACH_TOLERANCE:
-        raise _out_of_reach(length, upper + fore, abs(upper - fore))
+        raise reach_error(arm, length)
     c = (length * length - upper * upper - fore * fore) / (2.0 * upper * fore)
     if c > 1.0 - _STRETCHED:
         c = 1.0
     return r, x, y, z, length, max(-1.0, c)
 
 
-def _out_of_reach(length: float, longest: float, shortest: float) -> UnreachableError:
+def reach_error(arm: ArmGeometry, length: float) -> UnreachableError:
+    """Returns the error that says how far a wrist centre at this distance from the shoulder, [m], is out of reach."""
+    longest, shortest = arm.upper + arm.fore, abs(arm.upper - arm.fore)
     if length > longest:
         return UnreachableError(
             f"out of reach by {1e3 * (length - longest):.1f} mm: the wrist centre would be {length:.3f} m from the "

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rcilab.motion.cartesian import plan_arc, plan_line
+from rcilab.motion.cartesian import plan_arc, plan_circle, plan_line, plan_nullspace
 from rcilab.motion.differences import derivatives_from_differences, differences_from_derivatives
 from rcilab.motion.joint import plan_joint
 from rcilab.motion.margin import LIMIT_MARGIN
@@ -23,8 +23,10 @@ __all__ = [
     "differences_from_derivatives",
     "motion_through",
     "plan_arc",
+    "plan_circle",
     "plan_joint",
     "plan_line",
+    "plan_nullspace",
     "plan_stop",
     "require_motion",
 ]

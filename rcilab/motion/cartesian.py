@@ -1,4 +1,4 @@
-"""Motions of the tool along a line or an arc, by the manual's S profile (3.5), as joint angles on the 1 ms grid."""
+"""Motions of the tool along lines, arcs and circles, and of the elbow alone, as joint angles on the 1 ms grid."""
 
 from __future__ import annotations
 
@@ -8,18 +8,23 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.arrays import Array, JointPath, JointVector, as_number, as_vector, described
+from rcilab.arrays import Array, JointVector, as_number, as_vector, described
 from rcilab.clock import CYCLE_TIME
-from rcilab.errors import InvalidValueError, PlanningError, SingularError, UnreachableError
+from rcilab.errors import InvalidValueError, PlanningError, SingularError
 from rcilab.model import RobotModel, require_model
+from rcilab.motion.along import plan_along
 from rcilab.motion.joint import MIN_SPEED
 from rcilab.motion.motion import Motion, standing
-from rcilab.motion.path import Path, build_arc, build_line
+from rcilab.motion.obstacle import examine, refusal
+from rcilab.motion.path import Path, build_arc, build_circle, build_line, circle_through
 from rcilab.motion.piecewise import join_pieces
 from rcilab.motion.s_curve import plan_s_curve
 from rcilab.spatial import Pose
 
-PathLaw = Literal["s_profile"]
+PathLaw = Literal["jerk_limited", "s_profile"]
+"""How a path is followed: as fast as all limits allow, or by the manual's S profile (3.5)."""
+
+_LAWS: tuple[PathLaw, ...] = ("jerk_limited", "s_profile")
 
 S_PROFILE_PATH_VELOCITY = 1.0
 """Speed of the vendor's path generator at speed 1, [m/s]; of a mere turn, [rad/s]."""
@@ -40,30 +45,32 @@ def plan_line(
     *,
     speed: float = 0.2,
     psi: float | None = None,
-    law: PathLaw = "s_profile",
+    law: PathLaw = "jerk_limited",
 ) -> Motion:
     """Returns the motion on which the tool goes straight from where it is at `start` to `goal`.
 
-    It is the vendor's MOVEL: position linear, orientation by slerp and arm angle linear, all in proportion to the way,
-    with at most `speed` times 1 m/s and 2.5 m/s^2. So a turn on a short way is fast, and the profile knows neither the
-    joints' limits nor the tool's: `rcilab.check` judges them. Unlike the vendor's, a line from a pose to itself is a
-    motion of no length, and a mere turn takes its angle for the way about every axis.
+    Position linear, orientation by slerp and arm angle linear, all in proportion to the way, from rest to rest.
 
     Args:
         model: The arm, with its tool.
         start: Joint angles at the start, shape (n,), [rad]. Plan from the commanded angles (`state.q_c`).
         goal: Pose of the tool in base at the end.
-        speed: Part of the generator's velocity and acceleration to use, from `MIN_SPEED` = 0.001 to 1.
+        speed: Part of the velocity and acceleration limits to use, or of the vendor's generator's, from `MIN_SPEED` =
+            0.001 to 1.
         psi: Arm angle of a 7-axis arm at the end, [rad]; None holds the one of the start.
-        law: "s_profile", the only one.
+        law: "jerk_limited": as fast as the limits on joints, tool and arm angle allow, with `LIMIT_MARGIN` to spare,
+            as the controller judges them; the jerk limits are used in full. "s_profile": the vendor's MOVEL, with at
+            most `speed` times 1 m/s and 2.5 m/s^2. So a turn on a short way is fast, and that profile knows neither the
+            joints' limits nor the tool's: `rcilab.check` judges them. Unlike the vendor's, a line from a pose to itself
+            is a motion of no length, and a mere turn takes its angle for the way about every axis.
 
     Raises:
-        PlanningError: A pose on the way is out of reach, a joint limit or a singularity is in the way; the message
+        PlanningError: A pose on the way is out of reach, or a joint limit or a singularity is in the way; the message
             says where and why.
         InvalidValueError: An argument is of the wrong shape or kind, not finite, or out of range.
     """
-    q = _require_start(model, start, psi, law)
-    return follow_path(model, q, build_line(model.forward(q), goal, *arm_angles(model, q, psi)), speed)
+    q = _require_start(model, start, law)
+    return _follow(model, q, build_line(model.forward(q), goal, *arm_angles(model, q, psi)), speed, law)
 
 
 def plan_arc(
@@ -74,29 +81,101 @@ def plan_arc(
     *,
     speed: float = 0.2,
     psi: float | None = None,
-    law: PathLaw = "s_profile",
+    law: PathLaw = "jerk_limited",
 ) -> Motion:
     """Returns the motion on which the tool goes on the arc from where it is at `start` over `via` to `goal`.
 
-    It is the vendor's MOVEC, with its habits: the way is the arc's length, the orientation turns by slerp from start to
-    goal, and that of `via` is ignored. What `plan_line` says of speed and limits holds here too.
+    As on the vendor's MOVEC the way is the arc's length, the orientation turns by slerp from start to goal, and that of
+    `via` is ignored.
 
     Args:
         model: The arm, with its tool.
         start: Joint angles at the start, shape (n,), [rad]. Plan from the commanded angles (`state.q_c`).
         via: A pose whose position lies on the arc.
         goal: Pose of the tool in base at the end.
-        speed: Part of the generator's velocity and acceleration to use, from `MIN_SPEED` = 0.001 to 1.
+        speed: Part of the velocity and acceleration limits to use, or of the vendor's generator's, from `MIN_SPEED` =
+            0.001 to 1.
         psi: Arm angle of a 7-axis arm at the end, [rad]; None holds the one of the start.
-        law: "s_profile", the only one.
+        law: "jerk_limited" or "s_profile", see `plan_line`.
 
     Raises:
-        PlanningError: The three positions make no circle, or a pose on the way is out of reach, a joint limit or a
+        PlanningError: The three positions make no circle, or a pose on the way is out of reach, or a joint limit or a
             singularity is in the way; the message says where and why.
         InvalidValueError: An argument is of the wrong shape or kind, not finite, or out of range.
     """
-    q = _require_start(model, start, psi, law)
-    return follow_path(model, q, build_arc(model.forward(q), via, goal, *arm_angles(model, q, psi)), speed)
+    q = _require_start(model, start, law)
+    return _follow(model, q, build_arc(model.forward(q), via, goal, *arm_angles(model, q, psi)), speed, law)
+
+
+def plan_circle(
+    model: RobotModel,
+    start: ArrayLike,
+    *,
+    through: tuple[Pose, Pose] | None = None,
+    center: ArrayLike | None = None,
+    axis: ArrayLike | None = None,
+    angle: float = math.tau,
+    speed: float = 0.2,
+    psi: float | None = None,
+    law: PathLaw = "jerk_limited",
+) -> Motion:
+    """Returns the motion on which the tool goes round a circle, its orientation held.
+
+    The circle is given either by two more poses on it (`through`; only their positions count), or by `center` and
+    `axis`.
+
+    Args:
+        model: The arm, with its tool.
+        start: Joint angles at the start, shape (n,), [rad]. Plan from the commanded angles (`state.q_c`).
+        through: The second and the third pose on the circle, in the order in which the tool shall pass them.
+        center: Centre of the circle in base, shape (3,), [m].
+        axis: Direction of its axis in base, shape (3,), of any length; the tool goes around it by the right-hand rule.
+        angle: How far, more than 0 and up to 2 pi (all around), [rad].
+        speed: Part of the velocity and acceleration limits to use, or of the vendor's generator's, from `MIN_SPEED` =
+            0.001 to 1.
+        psi: Arm angle of a 7-axis arm at the end, [rad]; None holds the one of the start.
+        law: "jerk_limited" or "s_profile", see `plan_line`.
+
+    Raises:
+        PlanningError: The positions make no circle, start is not on it, a pose on the way is out of reach, or a joint
+            limit or a singularity is in the way; the message says where and why.
+        InvalidValueError: An argument is missing, of the wrong shape or kind, not finite, or out of range.
+    """
+    q = _require_start(model, start, law)
+    T = model.forward(q)
+    if through is not None:
+        if center is not None or axis is not None:
+            raise InvalidValueError("center", described(center), "and axis say the same as through; give only one")
+        if not isinstance(through, tuple) or len(through) != 2:  # pyright: ignore[reportUnnecessaryIsInstance]
+            raise InvalidValueError("through", described(through), "must be a tuple of two poses on the circle")
+        center, axis = circle_through(T, *through)
+    elif center is None or axis is None:
+        raise InvalidValueError("center", described(center), "and axis are both needed, or two poses as through")
+    return _follow(model, q, build_circle(T, center, axis, angle, *arm_angles(model, q, psi)), speed, law)
+
+
+def plan_nullspace(
+    model: RobotModel, start: ArrayLike, psi: float, *, speed: float = 0.2, law: PathLaw = "jerk_limited"
+) -> Motion:
+    """Returns the motion on which the tool stays where it is at `start` and only the elbow moves, to arm angle `psi`.
+
+    Args:
+        model: A 7-axis arm, with its tool.
+        start: Joint angles at the start, shape (7,), [rad]. Plan from the commanded angles (`state.q_c`).
+        psi: Arm angle at the end, from -pi to pi, [rad]; the way there never leads across +-pi.
+        speed: Part of the velocity and acceleration limits to use, or of the vendor's generator's, from `MIN_SPEED` =
+            0.001 to 1.
+        law: "jerk_limited" or "s_profile", see `plan_line`.
+
+    Raises:
+        PlanningError: The arm angle has no meaning at the start, or a joint limit or a singularity is in the way; the
+            message says where and why.
+        InvalidValueError: The arm has 6 axes, or an argument is of the wrong shape or kind, not finite, or out of
+            range.
+    """
+    q = _require_start(model, start, law)
+    T = model.forward(q)
+    return _follow(model, q, build_line(T, T, *arm_angles(model, q, as_number(psi, "psi", "rad"))), speed, law)
 
 
 def arm_angles(model: RobotModel, q: JointVector, psi: float | None) -> tuple[float | None, float | None]:
@@ -165,34 +244,24 @@ def follow_path(model: RobotModel, q: JointVector, path: Path, speed: float) -> 
     shares = schedule(path, speed)
     if len(shares) == 1:
         return standing(q, law="s_profile", speed=speed)
-    rows: JointPath = np.empty((len(shares), model.n))
-    rows[0] = q
-    fastest = model.limits.joint.velocity * CYCLE_TIME
     whole_turn = path.turn + (path.distance / _LEVER if path.unit == "m" else path.distance)
-    for k in range(1, len(shares)):
-        share = float(shares[k])
-        pose, psi = path.at(share)
-        try:
-            rows[k] = model.inverse(pose, psi, rows[k - 1]).nearest(rows[k - 1])
-        except UnreachableError as error:
-            raise PlanningError(f"{_place(path, share, k, pose)}: {error}") from error
-        step = np.abs(rows[k] - rows[k - 1])
-        longest = _JUMP * (fastest + whole_turn * (share - float(shares[k - 1])))
-        if (step > longest).any():
-            joint = int((step - longest).argmax())
-            raise PlanningError(
-                f"{_place(path, share, k, pose)}: joint {joint + 1} would have to jump by "
-                f"{math.degrees(step[joint]):.1f} deg within one cycle, because a singularity is in the way; lead the "
-                "tool around it, go there in joint space" + (", or give another arm angle" if model.n == 7 else "")
-            )
+    longest = _JUMP * (model.limits.joint.velocity * CYCLE_TIME + whole_turn * np.diff(shares)[:, np.newaxis])
+    rows, obstacle = examine(model, q, path, shares, longest, "within one cycle")
+    if obstacle is not None:
+        when = f"t = {obstacle.row * CYCLE_TIME:.3f} s, "
+        raise refusal(path, float(shares[obstacle.row]), obstacle.reason, when)
     samples = Motion.from_samples(rows)
     return Motion(polynomial=samples.polynomial, goal=rows[-1], law="s_profile", speed=speed)
 
 
-def _require_start(model: RobotModel, start: ArrayLike, psi: float | None, law: str) -> JointVector:
+def _follow(model: RobotModel, q: JointVector, path: Path, speed: float, law: PathLaw) -> Motion:
+    return plan_along(model, q, path, speed) if law == "jerk_limited" else follow_path(model, q, path, speed)
+
+
+def _require_start(model: RobotModel, start: ArrayLike, law: str) -> JointVector:
     require_model(model)
-    if law != "s_profile":
-        raise InvalidValueError("law", described(law), "is unknown for a path; known: s_profile")
+    if law not in _LAWS:
+        raise InvalidValueError("law", described(law), f"is unknown for a path; known: {', '.join(_LAWS)}")
     q = as_vector(start, model.n, "start", "rad")
     limits = model.limits.joint
     outside = np.flatnonzero(~((limits.lower < q) & (q < limits.upper)))
@@ -203,12 +272,3 @@ def _require_start(model: RobotModel, start: ArrayLike, psi: float | None, law: 
             f"{math.degrees(limits.lower[i]):.2f} and {math.degrees(limits.upper[i]):.2f} deg"
         )
     return q
-
-
-def _place(path: Path, share: float, cycle: int, pose: Pose) -> str:
-    kind = "line" if path.circle is None else "arc"
-    x, y, z = pose.parts[1]
-    return (
-        f"the {kind} cannot be followed at {share * path.distance:.3f} of {path.distance:.3f} {path.unit} "
-        f"(t = {cycle * CYCLE_TIME:.3f} s, tool at {x:.3f}, {y:.3f}, {z:.3f} m)"
-    )

@@ -10,14 +10,20 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from rcilab.arrays import described
+from rcilab.arrays import Array, as_number, as_vector, described
 from rcilab.errors import InvalidValueError, PlanningError
 from rcilab.motion.s_curve import STANDSTILL_DISTANCE
 from rcilab.spatial import Pose, Rotation9, rotation_from_wxyz, wxyz_from_rotation
 
 _COLLINEAR = 1e-4
 """Sine of the angle between two chords below which three points make no circle: its radius would be 5 000 chords."""
+
+_LEAST_AXIS = 1e-12
+"""Length of a vector below which it has no direction."""
+_OUT_OF_PLANE = 1e-6
+"""How far out of the plane of its circle a start may be, in radii; the circle then lies in the plane of the start."""
 
 Point: TypeAlias = tuple[float, float, float]
 
@@ -33,7 +39,7 @@ class Circle:
     second: Point
     """As long as `first`, at right angles to it, towards the middle point, [m]."""
     angle: float
-    """From the first point over the middle one to the last, in (0, 2 pi), [rad]."""
+    """From the first point over the middle one to the last, in (0, 2 pi], [rad]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,6 +62,13 @@ class Path:
     turn: float
     """Angle between the orientations of start and goal, 0 to pi, [rad]."""
 
+    @property
+    def name(self) -> str:
+        """What people call it."""
+        if self.circle is not None:
+            return "circle" if self.circle.angle == math.tau else "arc"
+        return "line" if self.unit == "m" or self.turn > STANDSTILL_DISTANCE else "null-space motion"
+
     def at(self, share: float) -> tuple[Pose, float | None]:
         """Returns pose and arm angle, [rad], at a share of the way."""
         if share >= 1.0:
@@ -73,6 +86,25 @@ class Path:
         if self.psi_start is not None and self.psi_goal is not None:
             psi = self.psi_start + share * (self.psi_goal - self.psi_start)
         return Pose.from_parts(slerp(ra, rb, share), position), psi
+
+    def sample(self, shares: Array) -> tuple[Array, Array | None]:
+        """Returns poses, shape (N, 4, 4), and arm angles, shape (N,), [rad], at many shares of the way, (N,).
+
+        The formulas go on beyond start and goal, and so does this, for those who form differences there.
+        """
+        (ra, a), (rb, b) = self.start.parts, self.goal.parts
+        u = shares[:, np.newaxis]
+        T = np.zeros((len(shares), 4, 4))
+        T[:, 3, 3] = 1.0
+        T[:, :3, :3] = _slerp_many(ra, rb, shares)
+        if self.circle is None:
+            T[:, :3, 3] = np.array(a) + u * (np.array(b) - np.array(a))
+        else:
+            c, e, f = (np.array(point) for point in (self.circle.center, self.circle.first, self.circle.second))
+            T[:, :3, 3] = c + np.cos(u * self.circle.angle) * e + np.sin(u * self.circle.angle) * f
+        if self.psi_start is None or self.psi_goal is None:
+            return T, None
+        return T, self.psi_start + shares * (self.psi_goal - self.psi_start)
 
 
 def build_line(start: Pose, goal: Pose, psi_start: float | None = None, psi_goal: float | None = None) -> Path:
@@ -119,6 +151,67 @@ def build_arc(
     return _path(start, goal, psi_start, psi_goal, circle, distance, _angle_between(start, goal))
 
 
+def build_circle(
+    start: Pose,
+    center: ArrayLike,
+    axis: ArrayLike,
+    angle: float = math.tau,
+    psi_start: float | None = None,
+    psi_goal: float | None = None,
+) -> Path:
+    """Returns the circle, or a part of it, from start around a centre; the orientation is held.
+
+    Args:
+        start: Pose of the tool in base at the start.
+        center: Centre of the circle in base, shape (3,), [m].
+        axis: Direction of the circle's axis in base, shape (3,), of any length, at right angles to the way from the
+            centre to start; the tool goes around it by the right-hand rule.
+        angle: How far, more than 0 and up to 2 pi, [rad].
+        psi_start: Arm angle at the start, [rad]; None leaves it open.
+        psi_goal: Arm angle at the end, [rad].
+
+    Raises:
+        PlanningError: Start is the centre, or not in the plane through the centre at right angles to the axis.
+        InvalidValueError: `start` is no pose, or a number is not finite or out of range.
+    """
+    _require_poses(start=start)
+    middle, normal = as_vector(center, 3, "center", "m"), as_vector(axis, 3, "axis")
+    angle = as_number(angle, "angle", "rad")
+    if not 0.0 < angle <= math.tau:
+        raise InvalidValueError("angle", angle, "must be more than 0, up to 2 pi [rad]; turn the axis to go back")
+    length = float(np.linalg.norm(normal))
+    if length < _LEAST_AXIS:
+        raise InvalidValueError("axis", normal.tolist(), "has no direction: its length is zero")
+    normal = normal / length
+    first = start.position - middle
+    radius = float(np.linalg.norm(first))
+    height = float(first @ normal)
+    if radius <= STANDSTILL_DISTANCE:
+        raise PlanningError(f"the centre of the circle is where the tool is, at {_shown(middle)}; move it away")
+    if abs(height) > _OUT_OF_PLANE * radius:
+        raise PlanningError(
+            f"the tool at {_shown(start.position)} is {1e3 * abs(height):.2f} mm out of the plane of the circle; "
+            f"choose the centre at its height along the axis: {_shown(middle + height * normal)}"
+        )
+    first = start.position - (middle + height * normal)
+    circle = Circle(_point(middle + height * normal), _point(first), _point(np.cross(normal, first)), angle)
+    turned = middle + height * normal + math.cos(angle) * first + math.sin(angle) * np.cross(normal, first)
+    end = start if angle == math.tau else Pose.from_parts(start.parts[0], _point(turned))
+    return _path(start, end, psi_start, psi_goal, circle, angle * float(np.linalg.norm(first)), 0.0)
+
+
+def circle_through(start: Pose, second: Pose, third: Pose) -> tuple[Array, Array]:
+    """Returns centre and axis of the circle through three positions, each of shape (3,), [m]; it turns in their order.
+
+    Raises:
+        PlanningError: The three positions lie on a line, or two of them are the same.
+        InvalidValueError: A pose is none, or not finite.
+    """
+    _require_poses(start=start, second=second, third=third)
+    circle = _circle(start.position, second.position, third.position)
+    return np.array(circle.center), np.cross(circle.first, circle.second)
+
+
 def _path(
     start: Pose, goal: Pose, psi_start: float | None, psi_goal: float | None, circle: Circle | None, length: float,
     turn: float,
@@ -143,7 +236,7 @@ def _circle(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> Circle:
     if chords[0] <= STANDSTILL_DISTANCE:
         raise PlanningError(
             f"two of the three points of the arc are the same (start {_shown(a)}, via {_shown(b)}, goal {_shown(c)}); "
-            "an arc needs three different ones, a full circle two arcs"
+            "an arc needs three different ones; plan_circle makes a full circle"
         )
     if float(np.linalg.norm(normal)) <= _COLLINEAR * chords[1] * chords[2]:
         raise PlanningError(
@@ -174,6 +267,29 @@ def slerp(a: Rotation9, b: Rotation9, share: float) -> Rotation9:
         sine = math.sin(angle)
         wa, wb = math.sin((1.0 - share) * angle) / sine, math.sin(share * angle) / sine
     return rotation_from_wxyz([wa * x + wb * y for x, y in zip(qa, qb, strict=True)])
+
+
+def _slerp_many(a: Rotation9, b: Rotation9, shares: Array) -> Array:
+    """Returns `slerp` at many shares, shape (N, 3, 3)."""
+    qa, qb = np.array(wxyz_from_rotation(a)), np.array(wxyz_from_rotation(b))
+    qb = -qb if qa @ qb < 0.0 else qb
+    angle = 2.0 * math.atan2(float(np.linalg.norm(qb - qa)), float(np.linalg.norm(qb + qa)))
+    # The part of qb at right angles to qa: no difference of close sines where the turn is small.
+    aside = qb - (qa @ qb) * qa
+    length = float(np.linalg.norm(aside))
+    aside = aside / length if length > 0.0 else aside
+    w, x, y, z = (np.cos(shares * angle)[:, np.newaxis] * qa + np.sin(shares * angle)[:, np.newaxis] * aside).T
+    return np.moveaxis(
+        np.array(
+            [
+                [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+                [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+                [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
+            ]
+        ),
+        2,
+        0,
+    )
 
 
 def _angle_between(a: Pose, b: Pose) -> float:

@@ -11,7 +11,7 @@ import rcilab
 from rcilab.conformance import check
 from rcilab.errors import InvalidValueError, PlanningError
 from rcilab.model import load_model
-from rcilab.motion import plan_arc, plan_line
+from rcilab.motion import plan_arc, plan_circle, plan_line, plan_nullspace
 from rcilab.spatial import Pose
 
 SEVEN, SIX = load_model("xMatePro7"), load_model("xMate3")
@@ -28,7 +28,7 @@ def moved(model, step, rpy=(0.0, 0.0, 0.0)) -> Pose:
 def test_the_tool_runs_straight_at_the_s_profiles_time_and_the_motion_is_allowed(name):
     model = load_model(name)
     goal = moved(model, (0.05, 0.1, -0.05), (0.2, -0.1, 0.1))
-    motion = plan_line(model, model.home, goal, speed=0.2)
+    motion = plan_line(model, model.home, goal, speed=0.2, law="s_profile")
     assert check(motion, model).ok
     T = model.forward_path(motion.q)
     assert np.allclose(T[-1], goal.matrix, atol=1e-9)
@@ -47,7 +47,7 @@ def test_the_tool_runs_straight_at_the_s_profiles_time_and_the_motion_is_allowed
 def test_the_tool_runs_on_the_arc(name):
     model = load_model(name)
     via, goal = moved(model, (0.05, 0.05, 0.0)), moved(model, (0.0, 0.1, 0.0))
-    motion = plan_arc(model, model.home, via, goal, speed=0.2)
+    motion = plan_arc(model, model.home, via, goal, speed=0.2, law="s_profile")
     assert check(motion, model).ok
     position = model.forward_path(motion.q)[:, :3, 3]
     center = moved(model, (0.0, 0.05, 0.0)).position
@@ -82,8 +82,11 @@ def test_a_tool_is_what_moves():
 @pytest.mark.parametrize("model", [SEVEN, SIX], ids=["7", "6"])
 def test_a_pose_out_of_reach_is_told_with_its_place_and_reason(model):
     goal = moved(model, (2.0, 0.0, 0.0))
-    with pytest.raises(PlanningError, match=r"the line cannot be followed at 0\.\d+ of 2\.000 m \(t = .* s, tool"):
-        plan_line(model, model.home, goal)
+    with pytest.raises(
+        PlanningError,
+        match=r"the line cannot be followed at 0\.\d+ of 2\.000 m \(t = .* s, .* % of the way, tool .* out of reach by",
+    ):
+        plan_line(model, model.home, goal, law="s_profile")
 
 
 def test_a_wrist_flip_is_a_singularity_and_no_motion():
@@ -91,8 +94,10 @@ def test_a_wrist_flip_is_a_singularity_and_no_motion():
     T = SEVEN.forward(q)
     # The wrist passes q6 = 0 beside, so that joints 5 and 7 would have to turn half round at once.
     goal = T @ Pose.from_rpy((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)) @ Pose.from_rpy((0, 0, 0), (1e-4, -0.8, 0.0))
-    with pytest.raises(PlanningError, match=r"joint \d would have to jump by .* because a singularity is in the way"):
-        plan_line(SEVEN, q, Pose(T.position, goal.wxyz), speed=0.3)
+    with pytest.raises(
+        PlanningError, match=r"joints? \d.* would have to jump by .* because a singularity is in the way"
+    ):
+        plan_line(SEVEN, q, Pose(T.position, goal.wxyz), speed=0.3, law="s_profile")
 
 
 def test_a_stretched_arm_has_no_arm_angle_to_hold():
@@ -105,7 +110,7 @@ def test_a_stretched_arm_has_no_arm_angle_to_hold():
     [
         ({"speed": 0.0}, "speed: 0.0 must be from 0.001 to 1"),
         ({"speed": 1.5}, "speed: 1.5 must be from 0.001 to 1"),
-        ({"law": "jerk_limited"}, "is unknown for a path; known: s_profile"),
+        ({"law": "trapezoid"}, "is unknown for a path; known: jerk_limited, s_profile"),
         ({"psi": 4.0}, "psi: 4.0 must be from -pi to pi"),
         ({"psi": math.nan}, "psi: nan must be from -pi to pi"),
         ({"start": [0.0] * 6}, r"needs \(7,\)"),
@@ -124,3 +129,68 @@ def test_an_arm_angle_is_refused_for_six_axes_and_a_start_outside_the_limits_for
         plan_line(SIX, SIX.home, moved(SIX, (0.0, 0.1, 0.0)), psi=0.1)
     with pytest.raises(PlanningError, match=r"joint 2: start 130\.00 deg is not strictly between"):
         plan_line(SIX, [0.0, math.radians(130.0), 0.0, 0.0, 0.0, 0.0], SIX.forward(SIX.home))
+
+
+@ALL
+def test_a_full_circle_by_the_s_profile_comes_back(name):
+    model = load_model(name)
+    others = moved(model, (-0.05, 0.05, 0.0)), moved(model, (-0.1, 0.0, 0.0), (0.3, 0.0, 0.0))
+    motion = plan_circle(model, model.home, through=others, speed=0.1, law="s_profile")
+    assert motion.law == "s_profile"
+    T = model.forward_path(motion.q)
+    center = moved(model, (-0.05, 0.0, 0.0)).position
+    assert np.allclose(np.linalg.norm(T[:, :3, 3] - center, axis=1), 0.05, atol=1e-9)
+    assert np.allclose(T[:, :3, :3], T[0, :3, :3], atol=1e-9)
+    assert np.allclose(motion.q[-1], model.home, atol=1e-9)
+    for other in others:
+        assert np.linalg.norm(T[:, :3, 3] - other.position, axis=1).min() < 2e-4
+    # T = 1.5 V / a + D / V (manual 3.5).
+    assert motion.duration == pytest.approx(1.5 * 0.1 / 0.25 + math.tau * 0.05 / 0.1, abs=2e-3)
+
+
+def test_a_circle_through_poses_and_one_around_an_axis_are_the_same():
+    others = moved(SEVEN, (-0.05, 0.05, 0.0)), moved(SEVEN, (-0.1, 0.0, 0.0))
+    through = plan_circle(SEVEN, SEVEN.home, through=others, angle=2.0)
+    center = moved(SEVEN, (-0.05, 0.0, 0.0)).position
+    around = plan_circle(SEVEN, SEVEN.home, center=center, axis=(0.0, 0.0, 1.0), angle=2.0)
+    assert len(through) == len(around)
+    assert np.allclose(through.q, around.q, atol=1e-9)
+
+
+def test_the_elbow_alone_by_the_s_profile():
+    motion = rcilab.plan_nullspace(SEVEN, SEVEN.home, 0.4, law="s_profile")
+    assert motion.duration == pytest.approx(1.5 * 0.2 / 0.5 + 0.4 / 0.2, abs=2e-3)
+    assert np.allclose(SEVEN.forward_path(motion.q), SEVEN.forward(SEVEN.home).matrix, atol=1e-9)
+    assert SEVEN.arm_angle(motion.q[-1]) == pytest.approx(0.4, abs=1e-9)
+    assert plan_nullspace(SEVEN, SEVEN.home, SEVEN.arm_angle(SEVEN.home)).duration == 0.0
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "hint"),
+    [
+        ({}, InvalidValueError, "and axis are both needed, or two poses as through"),
+        ({"center": (0.5, 0.0, 0.5)}, InvalidValueError, "and axis are both needed"),
+        ({"through": SEVEN.forward(SEVEN.home)}, InvalidValueError, "must be a tuple of two poses"),
+        (
+            {"through": (moved(SEVEN, (0.1, 0.0, 0.0)), moved(SEVEN, (0.2, 0.0, 0.0)))},
+            PlanningError,
+            "lie on a line",
+        ),
+        ({"center": (0.5, 0.0, 0.5), "axis": (0.0, 0.0, 0.0)}, InvalidValueError, "axis: .* has no direction"),
+        ({"center": (0.5, 0.0, 0.4), "axis": (0.0, 0.0, 1.0)}, PlanningError, r"mm out of the plane .* choose the"),
+        ({"center": moved(SEVEN, (0, 0, 0)).position, "axis": (0, 0, 1.0)}, PlanningError, "where the tool is"),
+        (
+            {"center": moved(SEVEN, (-0.1, 0, 0)).position, "axis": (0, 0, 1.0), "angle": 7.0},
+            InvalidValueError,
+            "angle: 7.0 must be more than 0, up to 2 pi",
+        ),
+    ],
+)
+def test_what_makes_no_circle_is_named(options, error, hint):
+    with pytest.raises(error, match=hint):
+        plan_circle(SEVEN, SEVEN.home, **options)
+
+
+def test_six_axes_have_no_null_space():
+    with pytest.raises(InvalidValueError, match="a 6-axis arm has no arm angle"):
+        plan_nullspace(SIX, SIX.home, 0.1)

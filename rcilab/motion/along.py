@@ -1,0 +1,250 @@
+"""The jerk-limited motion along a path of the tool: as fast as joints, tool and arm angle allow.
+
+Paths are followed by the closed-form inverse at every cycle, so the tool is on the path to rounding; between the cycles
+the joints run as quintics with the path's own velocities and accelerations.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from rcilab.arrays import Array, JointPath, JointVector, as_number
+from rcilab.clock import CYCLE_TIME
+from rcilab.errors import InvalidValueError
+from rcilab.model import RobotModel
+from rcilab.motion.joint import MIN_SPEED
+from rcilab.motion.margin import LIMIT_MARGIN
+from rcilab.motion.motion import Motion, standing
+from rcilab.motion.obstacle import examine, refusal
+from rcilab.motion.path import Path
+from rcilab.motion.piecewise import PiecewisePolynomial
+from rcilab.motion.time_law import PathBounds, TimeLaw, fastest_squares, smooth_law
+
+_KNOTS = 500
+"""Steps of the path between which bounds are interpolated. A choice: two millimetres of a line of a metre."""
+_FINE_KNOTS = 4000
+"""The same close to a singularity, where joints turn fast on a short way. A choice: the law then takes 50 ms."""
+_STEP = 0.1
+"""Turn of a joint from knot to knot beyond which it does not follow the tool but a singularity is in the way, [rad]. A
+choice: 50 rad on the whole way; no arm has that."""
+_SIDES = 12
+"""Half-planes on each side in place of the round bound on the tool's acceleration on an arc; they lose 0.9 %."""
+_ROUNDS = 12
+"""How often to slow down a law that passes a limit between the knots. Seen: 1 to 3."""
+_SLOWEST = 4.0
+"""Beyond this a limit is not passed by what happens between the knots, but by a jump. A choice."""
+_INSTANTS = (0.0, 0.25, 0.5, 0.75)
+"""Where in a cycle the curve is looked at, in cycles."""
+_HASTE = 1.002
+"""How much more than found to slow down each time, so that it is done soon. A choice."""
+_NUDGE = 1e-4
+"""Share of the way over which derivatives by the way are formed. A choice: both their errors are below 1e-7."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class _Bounds:
+    """Bounds of n joints, the arm angle if there is one, and the tool's turn: one a column, shape (m,)."""
+
+    velocity: Array
+    acceleration: Array
+    jerk: Array
+    tool: tuple[float, float, float]
+    """Of the tool's translation: velocity, acceleration, jerk."""
+
+
+def plan_along(model: RobotModel, q: JointVector, path: Path, speed: float) -> Motion:
+    """Returns the fastest motion along a path from rest to rest, all bounds on joints, tool and arm angle kept.
+
+    Bounds are kept as the controller judges them, by backward differences at 1 ms, with `LIMIT_MARGIN`.
+
+    Args:
+        model: The arm, with its tool.
+        q: Joint angles at the start of the path, shape (n,), [rad]: they choose the branch.
+        path: The path.
+        speed: Part of the velocity and acceleration limits to use, from `MIN_SPEED` to 1; the jerk limit is used in
+            full.
+
+    Raises:
+        PlanningError: A pose on the way is out of reach, or a joint limit or a singularity is in the way.
+        InvalidValueError: The speed is out of range.
+    """
+    speed = as_number(speed, "speed")
+    if not MIN_SPEED <= speed <= 1.0:
+        raise InvalidValueError("speed", speed, f"must be from {MIN_SPEED:g} to 1: the part of the limits to use")
+    if path.distance == 0.0:
+        return standing(q, speed=speed)
+    bounds = _bounds(model, LIMIT_MARGIN * speed)
+    allowed = _path_bounds(path, require_path(model, q, path), bounds)
+    cycles = max(2, math.ceil(_longest_reversal(bounds) / CYCLE_TIME))
+    slowdown = np.ones(len(allowed.first))
+    worst = 0.0
+    for _ in range(_ROUNDS):
+        law = smooth_law(fastest_squares(allowed.slowed(slowdown)), cycles)
+        T, psi = path.sample(law.u)
+        rows = model.inverse_path(T, psi, q)[0]
+        rows[0] = q
+        excess = _excess(bounds, _columns(path, rows, law.u), T[:, :3, 3])
+        if excess.max() <= 1.0:
+            curve = _quintics(model, path, rows, law)
+            excess = _excess_between(bounds, curve)
+            if excess.max() <= 1.0:
+                return Motion(polynomial=curve, goal=rows[-1], law="jerk_limited", speed=speed)
+        worst = float(law.u[excess.argmax()])
+        slowdown *= _spread(excess, law.u, len(slowdown), cycles)
+        if slowdown.max() > _SLOWEST:
+            break
+    reason = "the joints would have to jump, because a singularity is close; lead the tool around it"
+    raise refusal(path, worst, reason)
+
+
+def require_path(model: RobotModel, q: JointVector, path: Path) -> JointPath:
+    """Returns the joint angles at evenly spaced knots of a path that can be followed, shape (M + 1, n), [rad].
+
+    Raises:
+        PlanningError: A pose on the way is out of reach, or a joint limit or a singularity is in the way.
+    """
+    for knots in (_KNOTS, _FINE_KNOTS):
+        shares = np.linspace(0.0, 1.0, knots + 1)
+        span = f"on {100.0 / knots:g} % of the way"
+        rows, obstacle = examine(model, q, path, shares, np.full(model.n, _STEP), span)
+        if obstacle is None:
+            return rows
+        if not obstacle.is_singular:
+            break
+    raise refusal(path, float(shares[obstacle.row]), obstacle.reason)
+
+
+def _bounds(model: RobotModel, part: float) -> _Bounds:
+    joint, tool, arm_angle = model.limits.joint, model.limits.cartesian, model.limits.arm_angle
+    elbow = [] if arm_angle is None else [(arm_angle.velocity, arm_angle.acceleration, arm_angle.jerk)]
+    extra = np.array([*elbow, (tool.rotation_velocity, tool.rotation_acceleration, tool.rotation_jerk)])
+    return _Bounds(
+        velocity=part * np.concatenate((joint.velocity, extra[:, 0])),
+        acceleration=part * np.concatenate((joint.acceleration, extra[:, 1])),
+        jerk=LIMIT_MARGIN * np.concatenate((joint.jerk, extra[:, 2])),
+        tool=(
+            part * tool.translation_velocity,
+            part * tool.translation_acceleration,
+            LIMIT_MARGIN * tool.translation_jerk,
+        ),
+    )
+
+
+def _longest_reversal(bounds: _Bounds) -> float:
+    """Returns the longest time from full deceleration to full acceleration, [s]."""
+    _, acceleration, jerk = bounds.tool
+    return 2.0 * max(float((bounds.acceleration / bounds.jerk).max()), acceleration / jerk)
+
+
+def _columns(path: Path, rows: JointPath, shares: Array) -> Array:
+    """Returns joint angles, the arm angle if there is one, and the tool's turn along a path, shape (N, m), [rad]."""
+    u = shares[:, np.newaxis]
+    if path.psi_start is None or path.psi_goal is None:
+        return np.hstack((rows, path.turn * u))
+    return np.hstack((rows, (path.psi_goal - path.psi_start) * u, path.turn * u))
+
+
+def _path_bounds(path: Path, knots: JointPath, bounds: _Bounds) -> PathBounds:
+    shares = np.linspace(0.0, 1.0, len(knots))
+    columns = _columns(path, knots, shares)
+    step = shares[1]
+    first = np.gradient(columns, step, axis=0, edge_order=2)
+    second = np.empty_like(columns)
+    second[1:-1] = (columns[2:] - 2.0 * columns[1:-1] + columns[:-2]) / step**2
+    second[0], second[-1] = second[1], second[-2]
+    along, toward = _tool_rows(path)
+    velocity, acceleration, _ = bounds.tool
+    round_ = 1.0 if path.circle is None else math.cos(math.pi / (2.0 * _SIDES))
+    count = len(knots)
+    return PathBounds(
+        first=np.hstack((first, np.tile(along, (count, 1)))),
+        second=np.hstack((second, np.tile(toward, (count, 1)))),
+        velocity=np.concatenate((bounds.velocity, np.full(len(along), velocity))),
+        acceleration=np.concatenate((bounds.acceleration, np.full(len(along), round_ * acceleration))),
+    )
+
+
+def _tool_rows(path: Path) -> tuple[Array, Array]:
+    """Returns the tool's path derivatives along the way and towards the centre, as rows that bound their norm, [m]."""
+    if path.circle is None:
+        return np.array([math.dist(path.start.parts[1], path.goal.parts[1])]), np.zeros(1)
+    angles = np.arange(_SIDES) * math.pi / _SIDES - math.pi / 2.0
+    return np.cos(angles) * path.distance, np.sin(angles) * path.distance * path.circle.angle
+
+
+def _excess(bounds: _Bounds, columns: Array, positions: Array) -> Array:
+    """Returns how much slower each row must be passed to keep every bound, shape (N,); 1 or less keeps them."""
+    count = len(columns)
+    excess = np.zeros(count)
+    column, position = _held(columns), _held(positions)
+    limits = (bounds.velocity, bounds.acceleration, bounds.jerk)
+    for order, (limit, tool_limit) in enumerate(zip(limits, bounds.tool, strict=True), start=1):
+        column, position = np.diff(column, axis=0) / CYCLE_TIME, np.diff(position, axis=0) / CYCLE_TIME
+        tool = np.sqrt((position * position).sum(axis=1)) / tool_limit
+        ratio = np.maximum((np.abs(column) / limit).max(axis=1), tool) ** (1.0 / order)
+        # The difference at a row looks back; behind the end it is the end's.
+        offset = 3 - order
+        np.maximum(excess, ratio[offset : offset + count], out=excess)
+        excess[-1] = max(excess[-1], float(ratio[offset + count :].max()))
+    return excess
+
+
+def _excess_between(bounds: _Bounds, curve: PiecewisePolynomial) -> Array:
+    """Returns how much slower each cycle must be to keep the joints' bounds and between, shape (N - 1,)."""
+    excess = np.zeros(len(curve.coefficients))
+    coefficients, n = curve.coefficients, curve.n
+    times = np.array(_INSTANTS) * CYCLE_TIME
+    for order, limit in enumerate((bounds.velocity, bounds.acceleration, bounds.jerk), start=1):
+        coefficients = coefficients[:, :, 1:] * np.arange(1.0, coefficients.shape[2])
+        powers = np.vander(times, coefficients.shape[2], increasing=True).T
+        values = (coefficients.reshape(-1, len(powers)) @ powers).reshape(len(excess), -1)
+        ratio = np.abs(values / np.repeat(limit[:n], len(times))).max(axis=1)
+        np.maximum(excess, ratio ** (1.0 / order), out=excess)
+    return excess
+
+
+def _spread(excess: Array, u: Array, knots: int, cycles: int) -> Array:
+    """Returns by how much to slow down at each knot, given by how much each row or cycle is too fast."""
+    factor = np.ones(len(u))
+    factor[: len(excess)] = np.where(excess > 1.0, excess * _HASTE, 1.0)
+    reach = cycles + 3
+    wide = np.pad(factor, reach, constant_values=1.0)
+    factor = np.lib.stride_tricks.sliding_window_view(wide, 2 * reach + 1).max(axis=1)
+    places = np.linspace(0.0, 1.0, knots)
+    result = np.interp(places, u, factor)
+    below = np.clip((u * (knots - 1)).astype(np.intp), 0, knots - 2)
+    np.maximum.at(result, below, factor)
+    np.maximum.at(result, below + 1, factor)
+    return result
+
+
+def _held(rows: Array) -> Array:
+    return np.concatenate((np.repeat(rows[:1], 3, axis=0), rows, np.repeat(rows[-1:], 3, axis=0)))
+
+
+def _quintics(model: RobotModel, path: Path, rows: JointPath, law: TimeLaw) -> PiecewisePolynomial:
+    """Returns the curve through the rows with the path's velocities and accelerations: continuous in both."""
+    before, after = (model.inverse_path(*path.sample(law.u + side), rows[0])[0] for side in (-_NUDGE, _NUDGE))
+    first, second = (after - before) / (2.0 * _NUDGE), (after - 2.0 * rows + before) / _NUDGE**2
+    du, ddu = law.du[:, np.newaxis], law.ddu[:, np.newaxis]
+    h = CYCLE_TIME
+    v = first * du * h
+    a = (second * du**2 + first * ddu) * (h * h / 2.0)
+    v[0] = v[-1] = a[0] = a[-1] = 0.0
+    # In powers of the part of the cycle: the quintic with given value, slope and bend on both ends.
+    rise, slope, bend = np.diff(rows, axis=0) - v[:-1] - a[:-1], np.diff(v, axis=0) - 2.0 * a[:-1], np.diff(a, axis=0)
+    pieces = np.stack(
+        (
+            rows[:-1],
+            v[:-1] / h,
+            a[:-1] / h**2,
+            (10.0 * rise - 4.0 * slope + bend) / h**3,
+            (-15.0 * rise + 7.0 * slope - 2.0 * bend) / h**4,
+            (6.0 * rise - 3.0 * slope + bend) / h**5,
+        ),
+        axis=2,
+    )
+    return PiecewisePolynomial(np.arange(len(rows), dtype=np.float64) * h, pieces)

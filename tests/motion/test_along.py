@@ -1,0 +1,180 @@
+"""Jerk-limited motions along paths: on the path, inside every limit, smooth, and hardly slower than without jerk."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from rcilab.conformance import check
+from rcilab.conformance.cartesian_monitor import CartesianMonitor
+from rcilab.errors import PlanningError
+from rcilab.model import load_model
+from rcilab.motion import along, plan_arc, plan_circle, plan_line, plan_nullspace
+from rcilab.motion.path import build_arc, build_line
+from rcilab.motion.time_law import duration_of, fastest_squares
+from rcilab.spatial import Pose
+
+MODELS = {
+    name: load_model(name, tool=Pose((0.0, 0.02, 0.1))) for name in ("xMatePro3", "xMatePro7", "xMate3", "xMate7")
+}
+SEVEN = MODELS["xMatePro7"]
+names, seeds, speeds = st.sampled_from(sorted(MODELS)), st.integers(0, 2**32), st.sampled_from([1.0, 0.5, 0.2])
+SOME = settings(max_examples=20)
+
+
+def ends(model, seed, size=0.5):
+    rng = np.random.default_rng(seed)
+    q = model.home + rng.uniform(-size, size, model.n)
+    goal = q + rng.uniform(-size, size, model.n)
+    via = (q + goal) / 2.0 + rng.uniform(-0.2, 0.2, model.n)
+    psi = model.arm_angle(goal) if model.n == 7 else None
+    return q, model.forward(via), model.forward(goal), psi
+
+
+def planned(plan, *arguments, **options):
+    """The motion, or no example where the path cannot be followed."""
+    try:
+        return plan(*arguments, **options)
+    except PlanningError:
+        assume(False)
+
+
+def angles(model, q):
+    return model.arm_angle(q) if model.n == 7 else None
+
+
+def require_allowed(model, motion, speed):
+    """Joints by `check`, tool and arm angle by the monitor, joints between the cycles by the curve."""
+    assert check(motion, model).ok
+    monitor = CartesianMonitor(model.limits)
+    monitor.reset(model.forward(motion.q[0]), angles(model, motion.q[0]))
+    for q in [*motion.q, *[motion.q[-1]] * 3]:
+        assert monitor.step(model.forward(q), angles(model, q)) == (), monitor.broken()
+    times = np.linspace(0.0, motion.duration, 7 * len(motion))
+    joint = model.limits.joint
+    for order, bound in ((1, speed * joint.velocity), (2, speed * joint.acceleration), (3, joint.jerk)):
+        assert (np.abs(motion.polynomial.sample(times, order)) < bound).all()
+    assert ((joint.lower < motion.q) & (motion.q < joint.upper)).all()
+
+
+def require_smooth(motion):
+    """Position, velocity and acceleration continuous, rest at both ends."""
+    coefficients = motion.polynomial.coefficients
+    powers = 1e-3 ** np.arange(6)
+    for order, tolerance in ((0, 1e-12), (1, 1e-9), (2, 1e-6)):
+        last = (coefficients * powers[: coefficients.shape[2]]).sum(axis=2)
+        assert np.abs(last[:-1] - coefficients[1:, :, 0]).max() < tolerance, order
+        coefficients = coefficients[:, :, 1:] * np.arange(1.0, coefficients.shape[2])
+    for sample in (motion.at(0.0), motion.end()):
+        assert np.abs(sample.dq).max() < 1e-9
+        assert np.abs(sample.ddq).max() < 1e-6
+
+
+@SOME
+@given(names, seeds, speeds)
+def test_a_line_is_straight_allowed_smooth_and_exact_at_its_ends(name, seed, speed):
+    model = MODELS[name]
+    q, _, goal, psi = ends(model, seed)
+    motion = planned(plan_line, model, q, goal, psi=psi, speed=speed)
+    require_allowed(model, motion, speed)
+    require_smooth(motion)
+    T = model.forward_path(motion.q)
+    assert np.array_equal(motion.q[0], q)
+    assert np.allclose(T[-1], goal.matrix, atol=1e-9)
+    way = goal.position - T[0, :3, 3]
+    length = float(np.linalg.norm(way))
+    shares = (T[:, :3, 3] - T[0, :3, 3]) @ way / length**2
+    expected, psis = build_line(model.forward(q), goal, angles(model, q), psi).sample(shares)
+    assert np.abs(T - expected).max() < 1e-9 / length
+    if psis is not None:
+        assert np.abs(np.array([model.arm_angle(row) for row in motion.q]) - psis).max() < 1e-8 / length
+
+
+@SOME
+@given(names, seeds, speeds)
+def test_an_arc_is_round_allowed_and_smooth(name, seed, speed):
+    model = MODELS[name]
+    q, via, goal, psi = ends(model, seed, 0.4)
+    try:
+        circle = build_arc(model.forward(q), via, goal).circle
+    except PlanningError:
+        assume(False)
+    motion = planned(plan_arc, model, q, via, goal, psi=psi, speed=speed)
+    require_allowed(model, motion, speed)
+    require_smooth(motion)
+    T = model.forward_path(motion.q)
+    offset = T[:, :3, 3] - circle.center
+    assert np.abs(np.linalg.norm(offset, axis=1) - math.hypot(*circle.first)).max() < 1e-9
+    assert np.abs(offset @ np.cross(circle.first, circle.second)).max() < 1e-9
+    assert np.allclose(T[-1], goal.matrix, atol=1e-9)
+
+
+@SOME
+@given(st.sampled_from(["xMatePro3", "xMatePro7"]), seeds, speeds, st.floats(-1.5, 1.5))
+def test_in_the_null_space_the_tool_stands_and_the_arm_angle_arrives(name, seed, speed, psi):
+    model = MODELS[name]
+    q = ends(model, seed)[0]
+    motion = planned(plan_nullspace, model, q, psi, speed=speed)
+    require_allowed(model, motion, speed)
+    require_smooth(motion)
+    assert np.abs(model.forward_path(motion.q) - model.forward(q).matrix).max() < 1e-9
+    assert model.arm_angle(motion.q[-1]) == pytest.approx(psi, abs=1e-9)
+
+
+@SOME
+@given(names, st.floats(0.3, math.tau), st.floats(0.03, 0.15), speeds)
+def test_a_circle_comes_back_or_goes_as_far_as_told(name, angle, radius, speed):
+    model = MODELS[name]
+    T = model.forward(model.home)
+    center = T.position - (radius, 0.0, 0.0)
+    motion = planned(plan_circle, model, model.home, center=center, axis=(0.0, 0.0, 2.0), angle=angle, speed=speed)
+    require_allowed(model, motion, speed)
+    poses = model.forward_path(motion.q)
+    assert np.abs(np.linalg.norm(poses[:, :3, 3] - center, axis=1) - radius).max() < 1e-9
+    assert np.abs(poses[:, :3, :3] - T.rotation).max() < 1e-9
+    end = center + radius * np.array([math.cos(angle), math.sin(angle), 0.0])
+    assert np.allclose(poses[-1, :3, 3], end, atol=1e-9)
+
+
+@SOME
+@given(names, seeds)
+def test_a_bounded_jerk_costs_little(name, seed):
+    model = MODELS[name]
+    q, _, goal, psi = ends(model, seed)
+    motion = planned(plan_line, model, q, goal, psi=psi, speed=1.0)
+    path = build_line(model.forward(q), goal, angles(model, q), psi)
+    bounds = along._bounds(model, 1.0)
+    without = duration_of(fastest_squares(along._path_bounds(path, along.require_path(model, q, path), bounds)))
+    assume(without > 0.2)
+    assert motion.duration <= 1.15 * without
+
+
+def test_a_path_through_a_singularity_in_the_arms_plane_is_a_motion():
+    q = np.array([0.0, 0.3, 0.0, 1.2, 0.0, 0.4, 0.0])
+    T = SEVEN.forward(q)
+    motion = plan_line(SEVEN, q, T @ Pose.from_rpy((0.0, 0.0, 0.0), (0.0, -0.8, 0.0)), speed=0.5)
+    require_allowed(SEVEN, motion, 0.5)
+    assert motion.q[:, 5].min() < -0.1
+
+
+@pytest.mark.parametrize("roll", [1e-7, 1e-5, 1e-4, 1e-3])
+def test_a_path_beside_a_singularity_is_refused_with_its_place(roll):
+    q = np.array([0.0, 0.3, 0.0, 1.2, 0.0, 0.4, 0.0])
+    goal = SEVEN.forward(q) @ Pose.from_rpy((0.0, 0.0, 0.0), (roll, -0.8, 0.0))
+    with pytest.raises(PlanningError, match=r"line cannot be followed at 0\.\d+ of .* rad \(.* singularity") as caught:
+        plan_line(SEVEN, q, goal, speed=0.5)
+    assert caught.value.share == pytest.approx(0.5, abs=0.25)
+
+
+@pytest.mark.parametrize(
+    ("step", "reason"),
+    [((2.0, 0.0, 0.0), "out of reach by"), ((0.0, 0.0, 0.5), r"joint \d would pass its limit at")],
+)
+def test_what_cannot_be_followed_is_told_with_its_place_and_reason(step, reason):
+    T = SEVEN.forward(SEVEN.home)
+    with pytest.raises(PlanningError, match=rf"line cannot be followed at \d.* % of the way, tool at .*{reason}"):
+        plan_line(SEVEN, SEVEN.home, Pose(T.position + step, T.wxyz))
