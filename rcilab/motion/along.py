@@ -36,8 +36,8 @@ _ROUNDS = 12
 """How often to slow down a law that passes a limit between the knots. Seen: 1 to 3."""
 _SLOWEST = 4.0
 """Beyond this a limit is not passed by what happens between the knots, but by a jump. A choice."""
-_INSTANTS = (0.0, 0.25, 0.5, 0.75)
-"""Where in a cycle the curve is looked at, in cycles."""
+_INSTANTS = (0.25, 0.5, 0.75)
+"""Where in a cycle the curve is looked at, besides its start, in cycles."""
 _HASTE = 1.002
 """How much more than found to slow down each time, so that it is done soon. A choice."""
 _NUDGE = 1e-4
@@ -88,9 +88,11 @@ def plan_along(model: RobotModel, q: JointVector, path: Path, speed: float) -> M
         rows[0] = q
         excess = _excess(bounds, _columns(path, rows, law.u), T[:, :3, 3])
         if excess.max() <= 1.0:
-            curve = _quintics(model, path, rows, law)
-            excess = _excess_between(bounds, curve)
+            powers = _quintics(model, path, rows, law)
+            excess = _excess_between(bounds, powers)
             if excess.max() <= 1.0:
+                breaks = np.arange(len(rows), dtype=np.float64) * CYCLE_TIME
+                curve = PiecewisePolynomial(breaks, np.stack(powers, axis=2))
                 return Motion(polynomial=curve, goal=rows[-1], law="jerk_limited", speed=speed)
         worst = float(law.u[excess.argmax()])
         slowdown *= _spread(excess, law.u, len(slowdown), cycles)
@@ -192,17 +194,18 @@ def _excess(bounds: _Bounds, columns: Array, positions: Array) -> Array:
     return excess
 
 
-def _excess_between(bounds: _Bounds, curve: PiecewisePolynomial) -> Array:
-    """Returns how much slower each cycle must be to keep the joints' bounds and between, shape (N - 1,)."""
-    excess = np.zeros(len(curve.coefficients))
-    coefficients, n = curve.coefficients, curve.n
-    times = np.array(_INSTANTS) * CYCLE_TIME
+def _excess_between(bounds: _Bounds, powers: list[Array]) -> Array:
+    """Returns how much slower each cycle must be to keep the joints' bounds at its start and in it, shape (N - 1,)."""
+    excess = np.zeros(len(powers[0]))
     for order, limit in enumerate((bounds.velocity, bounds.acceleration, bounds.jerk), start=1):
-        coefficients = coefficients[:, :, 1:] * np.arange(1.0, coefficients.shape[2])
-        powers = np.vander(times, coefficients.shape[2], increasing=True).T
-        values = (coefficients.reshape(-1, len(powers)) @ powers).reshape(len(excess), -1)
-        ratio = np.abs(values / np.repeat(limit[:n], len(times))).max(axis=1)
-        np.maximum(excess, ratio ** (1.0 / order), out=excess)
+        powers = [float(p) * powers[p] for p in range(1, len(powers))]
+        largest = np.abs(powers[0])
+        for part in _INSTANTS:
+            value = powers[-1]
+            for coefficient in reversed(powers[:-1]):
+                value = value * (part * CYCLE_TIME) + coefficient
+            np.maximum(largest, np.abs(value), out=largest)
+        np.maximum(excess, (largest / limit[: largest.shape[1]]).max(axis=1) ** (1.0 / order), out=excess)
     return excess
 
 
@@ -225,8 +228,12 @@ def _held(rows: Array) -> Array:
     return np.concatenate((np.repeat(rows[:1], 3, axis=0), rows, np.repeat(rows[-1:], 3, axis=0)))
 
 
-def _quintics(model: RobotModel, path: Path, rows: JointPath, law: TimeLaw) -> PiecewisePolynomial:
-    """Returns the curve through the rows with the path's velocities and accelerations: continuous in both."""
+def _quintics(model: RobotModel, path: Path, rows: JointPath, law: TimeLaw) -> list[Array]:
+    """Returns the curve through the rows with the path's velocities and accelerations: continuous in both.
+
+    Returns:
+        Its coefficients by ascending power, each of shape (N - 1, n).
+    """
     before, after = (model.inverse_path(*path.sample(law.u + side), rows[0])[0] for side in (-_NUDGE, _NUDGE))
     first, second = (after - before) / (2.0 * _NUDGE), (after - 2.0 * rows + before) / _NUDGE**2
     du, ddu = law.du[:, np.newaxis], law.ddu[:, np.newaxis]
@@ -236,15 +243,11 @@ def _quintics(model: RobotModel, path: Path, rows: JointPath, law: TimeLaw) -> P
     v[0] = v[-1] = a[0] = a[-1] = 0.0
     # In powers of the part of the cycle: the quintic with given value, slope and bend on both ends.
     rise, slope, bend = np.diff(rows, axis=0) - v[:-1] - a[:-1], np.diff(v, axis=0) - 2.0 * a[:-1], np.diff(a, axis=0)
-    pieces = np.stack(
-        (
-            rows[:-1],
-            v[:-1] / h,
-            a[:-1] / h**2,
-            (10.0 * rise - 4.0 * slope + bend) / h**3,
-            (-15.0 * rise + 7.0 * slope - 2.0 * bend) / h**4,
-            (6.0 * rise - 3.0 * slope + bend) / h**5,
-        ),
-        axis=2,
-    )
-    return PiecewisePolynomial(np.arange(len(rows), dtype=np.float64) * h, pieces)
+    return [
+        rows[:-1],
+        v[:-1] / h,
+        a[:-1] / h**2,
+        (10.0 * rise - 4.0 * slope + bend) / h**3,
+        (-15.0 * rise + 7.0 * slope - 2.0 * bend) / h**4,
+        (6.0 * rise - 3.0 * slope + bend) / h**5,
+    ]
