@@ -91,6 +91,7 @@ def plan_along(model: RobotModel, q: JointVector, path: Path, speed: float) -> M
             powers = _quintics(model, path, rows, law)
             excess = _excess_between(bounds, powers)
             if excess.max() <= 1.0:
+                _require_inside(model, path, rows, law.u)
                 breaks = np.arange(len(rows), dtype=np.float64) * CYCLE_TIME
                 curve = PiecewisePolynomial(breaks, np.stack(powers, axis=2))
                 return Motion(polynomial=curve, goal=rows[-1], law="jerk_limited", speed=speed)
@@ -119,6 +120,16 @@ def require_path(model: RobotModel, q: JointVector, path: Path) -> JointPath:
         if not obstacle.is_singular:
             break
     raise refusal(path, float(shares[obstacle.row]), obstacle.reason)
+
+
+def _require_inside(model: RobotModel, path: Path, rows: JointPath, shares: Array) -> None:
+    """Refuses rows that touch a joint limit between the knots."""
+    limits = model.limits.joint
+    outside = np.argwhere(~((limits.lower < rows) & (rows < limits.upper)))
+    if outside.size:
+        row, joint = outside[0].tolist()
+        angle = math.degrees(rows[row, joint])
+        raise refusal(path, float(shares[row]), f"joint {joint + 1} would touch its limit at {angle:.2f} deg")
 
 
 def _bounds(model: RobotModel, part: float) -> _Bounds:
