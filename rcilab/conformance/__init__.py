@@ -13,6 +13,7 @@ from rcilab.conformance.limit_tables import LimitTable, cartesian_limits
 from rcilab.conformance.measured_monitor import MeasuredMonitor
 from rcilab.conformance.monitor import JointMonitor
 from rcilab.conformance.report import ConditionResult, Report, Violation
+from rcilab.conformance.slow_down import SlowDown
 from rcilab.conformance.start import StartState
 from rcilab.conformance.torque_monitor import TorqueMonitor
 
@@ -29,6 +30,7 @@ __all__ = [
     "LimitTable",
     "MeasuredMonitor",
     "Report",
+    "SlowDown",
     "StartState",
     "TorqueMonitor",
     "Violation",

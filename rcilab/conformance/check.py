@@ -58,8 +58,15 @@ def check(
         raise InvalidValueError("box", described(box), "is no SafetyBox; SafetyBox(size=..., T_base_box=...) makes one")
     state = as_start(motion.start if start is None else start, model.n)
     box = box if box is not None and box.active else None
-    judge = _Judge(motion, model, state, box)
     rows = MOTION_CONDITIONS if box is None else (*MOTION_CONDITIONS, CARTESIAN_POSITION)
+    return _report(motion, rows, model=model, start=state, box=box)
+
+
+def _report(
+    motion: Motion, rows: tuple[Condition, ...], *, model: RobotModel, start: StartState, box: SafetyBox | None
+) -> Report:
+    """Returns the verdict of some of the conditions on a motion for this arm."""
+    judge = _Judge(motion, model, start, box)
     results = [judge.judge(row) for row in rows]
     found = sorted((v for _, violations in results for v in violations), key=lambda v: -v.ratio)
     return Report(
@@ -67,7 +74,10 @@ def check(
         rows=tuple(result for result, _ in results),
         violations=tuple(v for v in found if v.condition.necessity == "necessary"),
         warnings=tuple(v for v in found if v.condition.necessity == "recommended"),
-        issue=partial(issue_certificate, motion, model, state, box),
+        motion=motion,
+        start=start,
+        issue=partial(issue_certificate, motion, model, start, box),
+        judge=partial(_report, model=model, start=start, box=box),
     )
 
 

@@ -4,14 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
+from rcilab.conformance.catalogue import Language
 from rcilab.conformance.certificate import Certificate
 from rcilab.conformance.condition import Condition, Necessity
+from rcilab.conformance.start import StartState
 from rcilab.conformance.wording import amount, share, with_degrees
 from rcilab.errors import ConformanceError
 from rcilab.faults import Fault
+from rcilab.motion.motion import Motion
 
-_LISTED = 8  # Violations printed in full; a thousand sentences help nobody.
+if TYPE_CHECKING:
+    from rcilab.conformance.slow_down import SlowDown
+
+LISTED = 8  # Violations printed in full; a thousand sentences help nobody.
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -159,7 +166,10 @@ class Report:
         worst: The row of the necessary condition nearest to, or farthest past, its bound.
         violations: Necessary conditions that are broken, worst first: the robot would stop.
         warnings: Recommended conditions that are broken, worst first.
+        motion: What was judged.
+        start: The state of the arm that it was judged from.
         issue: Makes the certificate when somebody asks for it.
+        judge: Judges another motion by some of the rows, for the same arm, start and safety box.
     """
 
     title: str
@@ -170,8 +180,14 @@ class Report:
     """Necessary conditions that are broken, worst first: the robot would stop."""
     warnings: tuple[Violation, ...]
     """Recommended conditions that are broken, worst first."""
+    motion: Motion
+    """What was judged."""
+    start: StartState
+    """The state of the arm that it was judged from."""
     issue: Callable[[], Certificate] = field(repr=False)
     """Makes the certificate when somebody asks for it."""
+    judge: Callable[[Motion, tuple[Condition, ...]], Report] = field(repr=False)
+    """Judges another motion by some of the rows, for the same arm, start and safety box."""
 
     @property
     def ok(self) -> bool:
@@ -200,6 +216,41 @@ class Report:
         rest = f" (and {more} more)" if more else ""
         raise ConformanceError(f"{self.violations[0]}{rest}", self.violations)
 
+    def slow_down(self, *, recommended: bool = False, at_most: float | None = None) -> SlowDown:
+        """Returns the least slow-down of the motion that passes, or why none does.
+
+        The curve stays the same and runs slower as a whole. The factor is found to 0.1 % and checked: the motion comes
+        with its own report. A way that leaves its range or the box does not mend, nor does a start that is elsewhere.
+        Rows from elsewhere (`Motion.from_samples`) jump a little in acceleration from row to row, and that shows at one
+        factor and not at the next: with them a smaller factor may pass by chance.
+
+        Args:
+            recommended: Whether to meet the recommended conditions too, those that some slow-down meets.
+            at_most: Largest factor to try, 1 or more; None is 20, or less for a motion that would then last more than
+                ten minutes.
+
+        Raises:
+            InvalidValueError: `at_most` is no number of at least 1.
+        """
+        from rcilab.conformance.slow_down import find_slow_down
+
+        return find_slow_down(self, recommended=recommended, at_most=at_most)
+
+    def explain(self, language: Language = "en") -> str:
+        """Returns in whole sentences what is wrong, where, when and by how much, what it raises and what to do.
+
+        It ends with what `slow_down` finds, and so takes as long.
+
+        Args:
+            language: "en" is English, "zh" Chinese.
+
+        Raises:
+            InvalidValueError: There is no such language.
+        """
+        from rcilab.conformance.explain import explain_report
+
+        return explain_report(self, language)
+
     def __str__(self) -> str:
         lines = [self.title, self._verdict()]
         for row in self.rows:
@@ -208,9 +259,9 @@ class Report:
             size = f"{value:>9} of {bound:>10} {row.unit:7} {used:>7}"
             lines.append(f"  {row.verdict:8}  {row.id:18}  {size}  {place}  [{row.source}]")
         found = (*self.violations, *self.warnings)
-        lines += [f"- {violation}" for violation in found[:_LISTED]]
-        if len(found) > _LISTED:
-            lines.append(f"- ... and {len(found) - _LISTED} more")
+        lines += [f"- {violation}" for violation in found[:LISTED]]
+        if len(found) > LISTED:
+            lines.append(f"- ... and {len(found) - LISTED} more")
         return "\n".join(lines)
 
     def __repr__(self) -> str:

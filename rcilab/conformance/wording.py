@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from math import ceil, degrees, floor, isfinite
 
-from rcilab.conformance.condition import Condition
+from rcilab.conformance.catalogue import Phrase
+from rcilab.conformance.condition import Condition, Signal
 from rcilab.motion.motion import Motion
 
 
@@ -24,10 +25,12 @@ def share(ratio: float) -> str:
 
 def with_degrees(angle: float, text: str) -> str:
     """Returns an angle in both units; `text` is its number in [rad]."""
-    return f"{text} rad ({degrees(angle):.2f}°)"
+    angle_deg = degrees(angle)
+    shown = f"{angle_deg:.2f}" if abs(angle_deg) >= 0.005 or angle_deg == 0.0 else f"{angle_deg:.2g}"
+    return f"{text} rad ({shown}°)"
 
 
-def advise(condition: Condition, motion: Motion, *, row: int, count: int, ratio: float, off_start: bool) -> str:
+def advise(condition: Condition, motion: Motion, *, row: int, count: int, ratio: float, off_start: bool) -> Phrase:
     """Returns what to do about a violation.
 
     Args:
@@ -39,37 +42,47 @@ def advise(condition: Condition, motion: Motion, *, row: int, count: int, ratio:
         off_start: Whether the motion starts elsewhere than it was judged from.
     """
     if condition.stage == "start":
-        if condition.order == 0:
-            return "plan the motion from the arm's commanded position (state.q_c)"
-        return "let the motion start at rest"
+        return Phrase("advice.start.position" if condition.order == 0 else "advice.start.rest")
     if condition.stage == "end":
-        return "let the motion end at rest"
-    if condition.signal == "position":
-        return "choose a path inside the safety box"
+        return Phrase("advice.end.rest")
+    if condition.is_measured:
+        return Phrase("advice.measured")
     if condition.signal == "torque":
         return _softer(condition, motion)
     if condition.order == 0:
-        return "choose a path inside the joint's range"
+        return Phrase(_WAYS.get(condition.signal, "advice.range"))
     if row <= condition.order and off_start:
-        return "the motion does not start where the arm is: plan it from the arm's commanded position (state.q_c)"
+        return Phrase("advice.off_start")
     if row <= condition.order and motion.at(0.0).dq.any():
-        return "the motion starts moving: plan it from rest, or check it with the start state it was planned for"
+        return Phrase("advice.moving_start")
     if row >= len(motion):
-        return "the motion stops with a jerk at its end: let it end at rest"
+        return Phrase("advice.moving_end")
     # One displaced sample shows in two first differences, three second and four third ones.
     if not isfinite(ratio) or (count <= condition.order + 1 and motion.law == "samples"):
-        return "the samples around this time jump: smooth them"
+        return Phrase("advice.jump")
     if motion.law in ("jerk_limited", "s_profile"):
         lower = floor(100.0 * motion.speed / ratio) / 100.0
         if 0.0 < lower < motion.speed:
-            return f"lower speed to {lower:.2f} or less"
-        return "lower speed"
+            return Phrase("advice.speed_to", speed=f"{lower:.2f}")
+        return Phrase("advice.speed")
     slower = ceil(1000.0 * ratio ** (1.0 / condition.order)) / 1000.0
-    return f"run it {slower:.3f} times slower, or smooth it"
+    return Phrase("advice.slower", factor=f"{slower:.3f}")
 
 
-def _softer(condition: Condition, motion: Motion) -> str:
-    """Returns what to do about torques: only an arm that gives them exactly as asked feels it."""
+_WAYS: dict[Signal, str] = {
+    "position": "advice.box",
+    "arm_angle": "advice.arm_angle",
+    "frame": "advice.frame",
+    "external_torque": "advice.contact",
+    "lost_commands": "advice.network",
+}
+"""What to do about signals that are themselves out of bounds, not their derivatives; of joints it is the range."""
+
+
+def _softer(condition: Condition, motion: Motion) -> Phrase:
+    """Returns what to do about torques: those of a motion matter only to an arm that gives them exactly as asked."""
+    if condition.necessity == "necessary":
+        return Phrase("advice.torque.rate" if condition.order == 1 else "advice.torque.range")
     if condition.order == 1 and motion.law == "jerk_limited":
-        return 'law="s_profile" plans it with accelerations that rise more gently'
-    return "lower speed" if motion.law in ("jerk_limited", "s_profile") else "run it slower, or smooth it"
+        return Phrase("advice.gentler")
+    return Phrase("advice.speed" if motion.law in ("jerk_limited", "s_profile") else "advice.softer")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from os import PathLike
 from typing import BinaryIO, Literal, TypeAlias
 
@@ -167,6 +167,23 @@ class Motion:
     def end(self) -> MotionSample:
         """Returns how the curve arrives: the limits from the left at the end. A good motion arrives at rest."""
         return _sample(self.polynomial.at_end())
+
+    def slowed(self, factor: float) -> Motion:
+        """Returns the motion that runs the same way `factor` times slower: q(t / factor), on its own 1 ms grid.
+
+        Velocities shrink by the factor, accelerations by its square, jerks by its cube. Law and speed stay those it was
+        planned with.
+
+        Args:
+            factor: Times slower, 1 or more; the duration grows by it.
+
+        Raises:
+            InvalidValueError: The factor is no finite number of at least 1.
+        """
+        factor = as_number(factor, "factor")
+        if not 1.0 <= factor < math.inf:
+            raise InvalidValueError("factor", factor, "must be 1 or more, and finite: how many times slower")
+        return replace(self, polynomial=self.polynomial.slowed(factor))
 
     def save(self, file: str | PathLike[str] | BinaryIO) -> None:
         """Writes the motion to a file (.npz) that `Motion.load` reads back to the last bit.

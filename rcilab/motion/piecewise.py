@@ -129,6 +129,15 @@ class PiecewisePolynomial:
         """Returns the limits from the left at the end of the last piece: does it arrive at rest?"""
         return self._at_piece(-1, float(self.breaks[-1]) - self._starts[-1])
 
+    def slowed(self, factor: float) -> PiecewisePolynomial:
+        """Returns the same curve run through `factor` times slower: q(t / factor), exact but for rounding.
+
+        Args:
+            factor: Times slower, above 0; below 1 it is faster.
+        """
+        powers = np.arange(self.coefficients.shape[2])
+        return PiecewisePolynomial(self.breaks * factor, self.coefficients / factor**powers)
+
     def _at_piece(self, piece: int, tau: float) -> tuple[JointVector, JointVector, JointVector, JointVector]:
         results: list[JointVector] = []
         for table in self._tables:

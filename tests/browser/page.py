@@ -70,6 +70,8 @@ class BenchPage:
     def start_afresh(self) -> None:
         """Puts robot and settings into the state a test starts from, past the page."""
         ask = self.bench.conductor.ask
+        if self.status.phase == "fault":
+            self.bench.session.recover().wait(10.0)
         self.wait(lambda: self.status.phase == "idle" and bool(self.status.powered), "a powered, idle arm", 30.0)
         ask(requests.SetView(name="language", value="en"))
         ask(requests.SetSpeed(speed=0.5))

@@ -44,3 +44,28 @@ def test_bad_input_is_an_error_of_ours_which_the_command_line_turns_into_2(tmp_p
     np.savez(tmp_path / "c.npz", photo=np.zeros(3))
     with pytest.raises(InvalidValueError, match="holds no motion"):
         run(tmp_path / "c.npz", "--model", "xMate3")
+
+
+def test_a_motion_that_is_too_fast_is_written_slowed_down_and_the_new_one_passes(tmp_path, capsys):
+    fast = Motion(polynomial=MOTION.polynomial.slowed(1.0 / 3.0), goal=MOTION.goal, law=MOTION.law)
+    fast.save(tmp_path / "a.npz")
+    assert run(tmp_path / "a.npz", "--model", "xMate3") == 1
+    assert run(tmp_path / "a.npz", "--model", "xMate3", "--slow-down", tmp_path / "b.npz") == 0
+    said = capsys.readouterr().out
+    assert "slow-down: It passes" in said
+    assert f"written: {tmp_path / 'b.npz'}" in said
+    assert run(tmp_path / "b.npz", "--model", "xMate3") == 0
+    assert Motion.load(tmp_path / "b.npz").duration > 1.2 * fast.duration
+
+
+def test_a_motion_that_no_slow_down_mends_is_not_written(tmp_path, capsys):
+    Motion.from_samples(np.repeat([MODEL.limits.joint.upper], 3, axis=0)).save(tmp_path / "a.npz")
+    assert run(tmp_path / "a.npz", "--model", "xMate3", "--slow-down", tmp_path / "b.npz") == 1
+    assert "slow-down: No slow-down mends it" in capsys.readouterr().out
+    assert not (tmp_path / "b.npz").exists()
+
+
+def test_it_can_be_said_in_whole_sentences_in_chinese(tmp_path, capsys):
+    MOTION.save(tmp_path / "a.npz")
+    assert run(tmp_path / "a.npz", "--model", "xMate3", "--explain", "zh") == 0
+    assert capsys.readouterr().out.startswith("机器人会接受该运动")

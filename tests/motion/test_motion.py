@@ -2,7 +2,7 @@ import pickle
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rcilab.clock import CYCLE_TIME
@@ -161,3 +161,41 @@ def test_a_sample_that_is_not_finite_is_named_by_row_and_joint():
 def test_a_time_that_is_no_number_is_refused_in_words(t):
     with pytest.raises(InvalidValueError, match=r"t: .* is not a number"):
         Motion.from_samples(np.zeros((3, 6))).at(t)
+
+
+@settings(max_examples=40)
+@given(st.integers(0, 2**32), st.floats(1.0, 30.0), st.sampled_from(["jerk_limited", "s_profile", "samples"]))
+def test_a_slowed_motion_runs_the_same_way_with_smaller_derivatives(seed, factor, law):
+    rng = np.random.default_rng(seed)
+    goal = MODEL.home + rng.uniform(-0.5, 0.5, 7)
+    if law == "samples":
+        motion = Motion.from_samples(plan_joint(MODEL, MODEL.home, goal).q)
+    else:
+        motion = plan_joint(MODEL, MODEL.home, goal, law=law, speed=rng.uniform(0.1, 1.0))
+    slowed = motion.slowed(factor)
+    assert slowed.duration == pytest.approx(factor * motion.duration, rel=1e-15)
+    assert (slowed.law, slowed.speed) == (motion.law, motion.speed)
+    assert np.array_equal(slowed.goal, motion.goal)
+    assert np.array_equal(slowed.start, motion.start)
+    starts = motion.polynomial.breaks[:-1]
+    middles = starts + rng.uniform(0.1, 0.9, len(starts)) * np.diff(motion.polynomial.breaks)  # Clear of jumps.
+    for t in rng.choice(middles, 10):
+        fast, slow = motion.at(t), slowed.at(t * factor)
+        for order, name in enumerate(("q", "dq", "ddq", "jerk")):
+            expected = getattr(fast, name) / factor**order
+            # The time in a piece is off by rounding, and velocities change with it by up to 1e4 rad/s^2.
+            assert getattr(slow, name) == pytest.approx(expected, rel=1e-9, abs=1e-8)
+
+
+def test_a_motion_slowed_by_one_is_itself_and_two_slow_downs_multiply():
+    motion = plan_joint(MODEL, MODEL.home, GOAL)
+    assert motion.slowed(1.0).fingerprint == motion.fingerprint
+    twice, once = motion.slowed(2.0).slowed(4.0), motion.slowed(8.0)  # Powers of two do not round.
+    assert twice.fingerprint == once.fingerprint != motion.fingerprint
+    assert len(standing(GOAL).slowed(3.0)) == 1
+
+
+@pytest.mark.parametrize("factor", [0.999, 0.0, -2.0, np.inf, np.nan, "twice", None])
+def test_a_factor_that_is_no_slow_down_is_refused(factor):
+    with pytest.raises(InvalidValueError, match="factor"):
+        plan_joint(MODEL, MODEL.home, GOAL).slowed(factor)

@@ -30,6 +30,17 @@ def test_one_time_and_many_times_agree_to_the_last_bit():
         assert all(np.array_equal(row, curve.at(t)[derivative]) for t, row in zip(times, rows, strict=True))
 
 
+@pytest.mark.parametrize("factor", [0.3, 1.0, 7.7])
+def test_a_slowed_curve_has_the_same_values_later_and_smaller_derivatives(factor):
+    curve = random_curve(5)
+    slowed = curve.slowed(factor)
+    assert slowed.duration == pytest.approx(factor * curve.duration, rel=1e-15)
+    times = np.random.default_rng(6).uniform(0.0, curve.duration, 50)
+    for derivative in range(4):
+        expected = curve.sample(times, derivative) / factor**derivative
+        assert np.allclose(slowed.sample(factor * times, derivative), expected, rtol=1e-9, atol=1e-9)
+
+
 def test_at_a_break_the_later_piece_counts():
     curve = PiecewisePolynomial([0.0, 1.0, 2.0], [[[0.0, 1.0]], [[5.0, 0.0]]])
     assert curve.at(1.0)[0][0] == 5.0

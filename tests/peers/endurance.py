@@ -153,8 +153,15 @@ def _observer(controller: Process) -> Robot:
 
 
 def run_program(plant: str, name: str, seconds: float) -> None:
-    """Runs a program as slowly as the vendor's client does: at 1 kHz, a second of sleep after each StartMove."""
-    with Process("--plant", plant) as controller, Robot(controller.host, controller.port, **_vendor()) as robot:  # type: ignore[arg-type]
+    """Runs a program as slowly as the vendor's client does: at 1 kHz, a second of sleep after each StartMove.
+
+    The play-out is deep enough for a machine that pauses; a torque loop would ring then.
+    """
+    prefill = "10" if name == "torque" else "50"
+    with (
+        Process("--plant", plant, "--prefill", prefill) as controller,
+        Robot(controller.host, controller.port, **_vendor()) as robot,
+    ):  # type: ignore[arg-type]
         with realtime():
             programs.prepare(robot, factor=0.2)
             robot.states.clear()

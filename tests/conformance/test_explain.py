@@ -1,0 +1,191 @@
+"""Reports in words: complete in both languages, for every condition of the table."""
+
+from __future__ import annotations
+
+import json
+import re
+import string
+from dataclasses import replace
+from importlib.resources import files
+from typing import get_args
+
+import numpy as np
+import pytest
+
+from rcilab.conformance import CONDITIONS, Violation, check
+from rcilab.conformance.catalogue import Language, Phrase, load_catalogue, say
+from rcilab.conformance.condition import Condition
+from rcilab.conformance.explain import explain_violation
+from rcilab.conformance.wording import advise
+from rcilab.errors import InvalidValueError
+from rcilab.faults import Fault
+from rcilab.model import load_model
+from rcilab.motion import Motion, plan_joint
+from rcilab.safety_box import SafetyBox
+from rcilab.spatial import Pose
+
+MODEL = load_model("xMatePro7")
+MOTION = plan_joint(MODEL, MODEL.home, -MODEL.home, speed=0.4)
+LANGUAGES: tuple[Language, ...] = get_args(Language)
+
+
+def violation_of(row: Condition, count: int = 25) -> Violation:
+    """One that breaks a row in its first column by a tenth of the bound, or by a tenth of its unit."""
+    bound = float(row.bounds(MODEL.limits)[1][0])
+    value = bound + 0.1 * (abs(bound) or 1.0) if np.isfinite(bound) else float("nan")
+    return Violation(
+        condition=row,
+        joint=1 if row.is_per_joint else 0,
+        time=0.4,
+        count=count,
+        value=value,
+        worst_time=0.412,
+        bound=bound,
+        ratio=1.1,
+        advice=advise(row, MOTION, row=400, count=count, ratio=1.1, off_start=False),
+    )
+
+
+def fields(entry: str) -> set[str]:
+    return {name for _, name, _, _ in string.Formatter().parse(entry) if name}
+
+
+def test_every_language_has_the_same_keys_and_places_to_fill():
+    english = load_catalogue("en")
+    for language in LANGUAGES:
+        catalogue = load_catalogue(language)
+        assert set(catalogue) == set(english), language
+        for key, entry in catalogue.items():
+            assert fields(entry) == fields(english[key]), f"{language}: {key}"
+            assert entry.strip() or key == "gap"
+
+
+def test_no_key_stands_twice_in_a_catalogue():
+    for language in LANGUAGES:
+        text = (files("rcilab.conformance") / "catalogues" / f"{language}.json").read_text(encoding="utf-8")
+        pairs = json.loads(text, object_pairs_hook=list)
+        assert len(pairs) == len(dict(pairs)), language
+
+
+def test_english_words_are_those_of_the_table_and_of_the_faults():
+    words = load_catalogue("en")
+    assert {row.id: words[f"quantity.{row.id}"] for row in CONDITIONS} == {row.id: row.quantity for row in CONDITIONS}
+    assert {fault: words[f"fault.{fault.name}"] for fault in Fault} == {fault: fault.cause for fault in Fault}
+
+
+@pytest.mark.parametrize("row", CONDITIONS, ids=lambda row: row.id)
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_every_condition_is_explained_with_place_time_amount_fault_and_remedy(row, language):
+    violation = violation_of(row)
+    text = explain_violation(violation, language)
+    words = load_catalogue(language)
+    assert words[f"quantity.{row.id}"] in text
+    assert violation.advice.text(language) in text
+    assert text.endswith(say(language, "remedy", advice=violation.advice.text(language)))
+    assert "{" not in text
+    if row.fault is None:
+        assert words["raises.nothing"] in text
+    else:
+        assert row.fault.manual_name in text
+        assert words[f"fault.{row.fault.name}"] in text
+    if row.stage == "throughout":
+        assert re.search(r"t = 0\.412 s.*t = 0\.400 s.*25 ms", text)
+        assert "t = 0.400 s" in explain_violation(violation_of(row, count=1), language)
+    if row.is_per_joint:
+        assert {"en": "joint 1", "zh": "关节 1"}[language] in text
+    if row.signal != "frame":
+        unit = words.get(f"unit.{row.unit}", row.unit)
+        assert f"{violation.value:.4g} {unit}" in text
+        assert ("°)" in text) == (row.unit == "rad")
+    if language == "zh":  # Nothing is left in English but names, units and settings.
+        left = re.sub(r"\{|\}|k[A-Z]\w+|state\.q_c|speed|law|s_profile|rcilab doctor|[tsm]\b|rad|ms|N m", "", text)
+        assert not re.search(r"[A-Za-z]{2,}", left), left
+
+
+@pytest.mark.parametrize(
+    ("id_", "advice"),
+    [
+        ("joint.position", "choose a path inside the joint's range"),
+        ("joint.velocity", "lower speed to 0.36 or less"),
+        ("arm_angle.position", "keep the arm angle from -180° to 180°"),
+        ("cartesian.position", "choose a path inside the safety box"),
+        ("cartesian.frame", "command proper poses within reach"),
+        ("torque.rate", "let the commanded torque rise and fall over more cycles"),
+        ("torque.range", "command less torque"),
+        ("joint.torque_rate", 'law="s_profile" plans it'),
+        ("measured.joint.velocity", "leave more room to the bound"),
+        ("external.torque", "look for contact"),
+        ("lost.commands", "look at the network"),
+        ("start.position", "plan the motion from the arm's commanded position"),
+        ("end.velocity", "let the motion end at rest"),
+    ],
+)
+def test_the_remedy_suits_the_condition(id_, advice):
+    row = next(row for row in CONDITIONS if row.id == id_)
+    assert violation_of(row).advice.startswith(advice)
+
+
+def test_a_sentence_in_full_in_both_languages():
+    velocity = next(row for row in CONDITIONS if row.id == "joint.velocity")
+    violation = replace(violation_of(velocity, count=1), joint=4, value=-2.31, bound=-2.175, ratio=2.31 / 2.175)
+    assert explain_violation(violation) == (
+        "joint 4: commanded velocity -2.31 rad/s passes the bound of -2.175 rad/s by 0.135 rad/s, which is 106.2 % of "
+        "the bound, at t = 0.400 s. The controller would raise kCommandJointVelocityLimitsViolation: a commanded joint "
+        "velocity is too high. What to do: lower speed to 0.36 or less."
+    )
+    assert explain_violation(violation, "zh") == (
+        "关节 4：指令速度 -2.31 rad/s，超过限值 -2.175 rad/s，超出 0.135 rad/s，为限值的 106.2 %，t = 0.400 s。"
+        "控制器会报 kCommandJointVelocityLimitsViolation：关节指令速度过高。处理办法：将 speed 降到 0.36 或更低。"
+    )
+
+
+def test_an_accepted_motion_is_told_with_what_is_nearest_to_its_bound():
+    report = check(MOTION, MODEL)
+    worst = report.worst
+    assert report.explain().startswith(
+        "The robot would accept this motion: it keeps every necessary condition. Nearest"
+    )
+    assert f"joint {worst.joint}, {worst.condition.quantity}" in report.explain()
+    assert f"{100 * worst.ratio:.1f} % of the bound" in report.explain()
+    assert report.explain("zh").startswith("机器人会接受该运动")
+
+
+def test_a_tool_close_to_a_wall_is_told_with_its_distance():
+    T_base_box = MODEL.forward(MODEL.home) @ Pose((0.499, 0.0, 0.0))
+    still = plan_joint(MODEL, MODEL.home, MODEL.home)
+    report = check(still, MODEL, box=SafetyBox(size=(1.0, 1.0, 1.0), T_base_box=T_base_box))
+    assert "Nearest to a wall: the tool, 0.001 m inside the safety box" in report.explain()
+    assert "0.001 m" in report.explain("zh")
+
+
+def test_a_refused_motion_is_told_worst_first_and_ends_with_what_a_slow_down_does():
+    q = MOTION.q.copy()
+    q[400, 3] += 1e-5
+    report = check(Motion.from_samples(q), MODEL)
+    lines = report.explain().splitlines()
+    assert lines[0].startswith(
+        f"The robot would not accept this motion. Violations of necessary conditions: {len(report.violations)}."
+    )
+    assert lines[1].startswith("- joint 4: commanded jerk")
+    assert lines[-1] == str(report.slow_down())
+    assert "times slower" in lines[-1]
+    assert report.explain("zh").splitlines()[-1] == report.slow_down().explain("zh")
+
+
+def test_a_thousand_violations_do_not_make_a_thousand_lines():
+    rows = MODEL.home + 0.01 * np.random.default_rng(0).normal(size=(100, 7))
+    report = check(Motion.from_samples(rows), MODEL)
+    lines = report.explain().splitlines()
+    assert len(lines) < 12
+    assert lines[-2] == f"- ... and {len(report.violations) + len(report.warnings) - 8} more."
+
+
+def test_a_phrase_is_its_english_and_remembers_how_to_say_it_otherwise():
+    phrase = Phrase("advice.speed_to", speed="0.50")
+    assert phrase == "lower speed to 0.50 or less" == phrase.text("en")
+    assert phrase.text("zh") == "将 speed 降到 0.50 或更低"
+
+
+def test_a_language_that_nobody_speaks_here_is_refused():
+    with pytest.raises(InvalidValueError, match="'de' is unknown; known: en, zh"):
+        check(MOTION, MODEL).explain("de")  # type: ignore[arg-type]
