@@ -15,6 +15,7 @@ from rcilab.arrays import Array, JointPath, JointVector, as_number
 from rcilab.clock import CYCLE_TIME
 from rcilab.errors import InvalidValueError
 from rcilab.model import RobotModel
+from rcilab.motion.inverse_path import inverse_path
 from rcilab.motion.joint import MIN_SPEED
 from rcilab.motion.margin import LIMIT_MARGIN
 from rcilab.motion.motion import Motion, standing
@@ -84,7 +85,7 @@ def plan_along(model: RobotModel, q: JointVector, path: Path, speed: float) -> M
     for round_ in range(2 * _ROUNDS):
         law = smooth_law(fastest_squares(allowed.slowed(slowdown)), cycles)
         T, psi = path.sample(law.u)
-        rows = model.inverse_path(T, psi, q)[0]
+        rows = inverse_path(model, T, psi, q)[0]
         rows[0] = q
         excess = _excess(bounds, _columns(path, rows, law.u), T[:, :3, 3])
         if excess.max() <= 1.0:
@@ -247,7 +248,7 @@ def _quintics(model: RobotModel, path: Path, rows: JointPath, law: TimeLaw) -> l
     Returns:
         Its coefficients by ascending power, each of shape (N - 1, n).
     """
-    before, after = (model.inverse_path(*path.sample(law.u + side), rows[0])[0] for side in (-_NUDGE, _NUDGE))
+    before, after = (inverse_path(model, *path.sample(law.u + side), rows[0])[0] for side in (-_NUDGE, _NUDGE))
     first, second = (after - before) / (2.0 * _NUDGE), (after - 2.0 * rows + before) / _NUDGE**2
     du, ddu = law.du[:, np.newaxis], law.ddu[:, np.newaxis]
     h = CYCLE_TIME
