@@ -12,11 +12,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.arrays import Array, JointPath, JointVector, as_number, as_path, as_rows, as_vector, described
+from rcilab.arrays import JointVector, as_number, as_path, as_rows, as_vector, described
 from rcilab.dynamics.payload import NO_LOAD, Payload
 from rcilab.errors import InvalidValueError, KinematicsError, SingularError
 from rcilab.kinematics import arm_angle as arm_angles
-from rcilab.kinematics.branch import Loss, follow_branch
 from rcilab.kinematics.feasible_arcs import FeasibleArcs, feasible_arcs
 from rcilab.kinematics.frames import Frame
 from rcilab.kinematics.inverse import build_geometry, inverse_seven, inverse_six
@@ -173,29 +172,6 @@ class RobotModel(MovingArm):
         if not len(solutions):
             raise solutions.refusal()
         return solutions
-
-    def inverse_path(self, T: Array, psi: Array | None, start: ArrayLike) -> tuple[JointPath, Loss | None]:
-        """Returns the joint angles along a path of the tool on one branch, without a jump from row to row.
-
-        Joint limits are not looked at. About 2 us a row.
-
-        Args:
-            T: Poses of the tool in base, shape (N, 4, 4), close enough to each other to be followed.
-            psi: Arm angles of a 7-axis arm, shape (N,), [rad]; None for 6 axes.
-            start: Joint angles at row 0, shape (n,), [rad]: they choose the branch.
-
-        Returns:
-            Joint angles, shape (N, n), [rad], and the first row that is out of reach or singular, or None; from that
-            row on the angles mean nothing.
-
-        Raises:
-            InvalidValueError: start is not n finite numbers, or psi is missing for 7 axes or given for 6.
-        """
-        q = as_vector(start, self.n, "start", "rad")
-        if (psi is None) != (self.n != 7):
-            raise InvalidValueError("psi", described(psi), f"must be {'an array' if self.n == 7 else 'None'} here")
-        flange = T @ self._T_tool_flange.matrix if self._has_tool else T
-        return follow_branch(self._geometry, flange[:, :3, :3], flange[:, :3, 3], psi, q)
 
     def closest(self, T: Pose | ArrayLike, near: ArrayLike, psi: float | None = None) -> Reach:
         """Returns joint angles for a target, or for the closest pose to it that the arm can take.

@@ -35,7 +35,7 @@ class Payload:
         inertia = as_vector(np.ravel(self.inertia), 9, "load inertia", "kg m^2").reshape(3, 3)
         if np.abs(inertia - inertia.T).max() > 1e-9 * max(1.0, float(np.abs(inertia).max())):
             raise InvalidValueError("load inertia", inertia.tolist(), "must be symmetric")
-        _require_possible(inertia)
+        inertia = _nearest_possible((inertia + inertia.T) / 2.0)
         object.__setattr__(self, "mass", mass)
         object.__setattr__(self, "center_of_mass", as_vector(self.center_of_mass, 3, "load centre of mass", "m"))
         object.__setattr__(self, "inertia", frozen(inertia))
@@ -46,10 +46,14 @@ class Payload:
         return f"<Payload of {self.mass:.4g} kg, centre of mass at {centre} m, moments of inertia {moments} kg m^2>"
 
 
-def _require_possible(inertia: Matrix) -> None:
-    """Every body's principal moments are positive or zero, and none exceeds the sum of the other two."""
+def _nearest_possible(inertia: Matrix) -> Matrix:
+    """Returns an inertia without the moments below zero that rounding made.
+
+    Every body's principal moments are positive or zero, and none exceeds the sum of the other two.
+    """
     is_small = bool(np.abs(inertia).max() <= _LARGEST)
-    smallest, middle, largest = np.linalg.eigvalsh(inertia).tolist() if is_small else (-1.0, 0.0, 0.0)
+    moments, axes = np.linalg.eigh(inertia) if is_small else (np.array((-1.0, 0.0, 0.0)), np.eye(3))
+    smallest, middle, largest = moments.tolist()
     tolerance = 1e-9 * max(1.0, largest)
     if smallest < -tolerance or largest > smallest + middle + tolerance:
         raise InvalidValueError(
@@ -58,6 +62,10 @@ def _require_possible(inertia: Matrix) -> None:
             f"is no body's: its principal moments must be from 0 to {_LARGEST:g} kg m^2, "
             "and none larger than the sum of the other two",
         )
+    if smallest >= 0.0:
+        return inertia
+    possible = axes * np.maximum(moments, 0.0) @ axes.T
+    return (possible + possible.T) / 2.0
 
 
 NO_LOAD = Payload()

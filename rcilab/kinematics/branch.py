@@ -26,9 +26,7 @@ Vec: TypeAlias = tuple[Column, Column, Column]
 _REACH_TOLERANCE = 1e-9  # [m] As in `inverse.py`.
 _AXIS_LOST = 1e-12  # As in `inverse.py`: below it the azimuth is rounding, and the one before is kept.
 _VERTICAL = 1e-6  # sin of the angle to the vertical below which the arm angle's reference turns too fast to follow.
-_BESIDE = (
-    1e-5  # How near to the axis, as a sine, a path counts as through it. A choice: ten times the error of `_miss`.
-)
+_BESIDE = 1e-5  # sin of how far beside the axis a path still counts as through it: ten times the error of `_miss`.
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +99,10 @@ def _seven(
     horizontal = np.hypot(ux, uy)
     vertical = horizontal < _VERTICAL
     if vertical.any():
-        reason = "the wrist is straight above or below the shoulder, where the arm angle has no reference"
+        reason = (
+            "the wrist is straight above or below the shoulder, where the arm angle has no reference; lead the tool "
+            "around it, or go there in joint space"
+        )
         tracker.lose(int(vertical.argmax()), SingularError(reason))
     cx, cy = ux / np.maximum(horizontal, _VERTICAL), uy / np.maximum(horizontal, _VERTICAL)
     cp, sp = aside * np.cos(psi), aside * np.sin(psi)
@@ -152,7 +153,10 @@ class _Tracker:
         if swaps.size:
             beside = swaps[_miss(angle, tilt, swaps) > _BESIDE]
             if beside.size:
-                reason = SingularError(f"{axes} would have to jump by half a turn, because a singularity is in the way")
+                reason = SingularError(
+                    f"{axes} would have to jump by half a turn, because a singularity is in the way; "
+                    "lead the tool around it, or go there in joint space"
+                )
                 self.lose(int(beside[0]) + 1, reason)
         return angle, 1.0 - 2.0 * (halves % 2.0)
 

@@ -15,6 +15,7 @@ from rcilab.arrays import Array, JointPath, JointVector, as_number
 from rcilab.clock import CYCLE_TIME
 from rcilab.errors import InvalidValueError
 from rcilab.model import RobotModel
+from rcilab.motion.inverse_path import inverse_path
 from rcilab.motion.joint import MIN_SPEED
 from rcilab.motion.margin import LIMIT_MARGIN
 from rcilab.motion.motion import Motion, standing
@@ -32,14 +33,14 @@ _STEP = 0.1
 choice: 50 rad on the whole way; no arm has that."""
 _SIDES = 12
 """Half-planes on each side in place of the round bound on the tool's acceleration on an arc; they lose 0.9 %."""
-_ROUNDS = 12
-"""How often to slow down a law that passes a limit between the knots. Seen: 1 to 3."""
+_ROUNDS = 8
+"""How often to slow down a law in places where it passes a limit, and then as a whole. Seen: 1 to 5 in places."""
 _SLOWEST = 4.0
 """Beyond this a limit is not passed by what happens between the knots, but by a jump. A choice."""
-_INSTANTS = (0.0, 0.25, 0.5, 0.75)
-"""Where in a cycle the curve is looked at, in cycles."""
-_HASTE = 1.002
-"""How much more than found to slow down each time, so that it is done soon. A choice."""
+_INSTANTS = (0.25, 0.5, 0.75)
+"""Where in a cycle the curve is looked at, besides its start, in cycles."""
+_HASTE = 1.001
+"""To slow down by the square of what was found, and this much more, so that few rounds do. A choice."""
 _NUDGE = 1e-4
 """Share of the way over which derivatives by the way are formed. A choice: both their errors are below 1e-7."""
 
@@ -81,19 +82,24 @@ def plan_along(model: RobotModel, q: JointVector, path: Path, speed: float) -> M
     cycles = max(2, math.ceil(_longest_reversal(bounds) / CYCLE_TIME))
     slowdown = np.ones(len(allowed.first))
     worst = 0.0
-    for _ in range(_ROUNDS):
+    for round_ in range(2 * _ROUNDS):
         law = smooth_law(fastest_squares(allowed.slowed(slowdown)), cycles)
         T, psi = path.sample(law.u)
-        rows = model.inverse_path(T, psi, q)[0]
+        rows = inverse_path(model, T, psi, q)[0]
         rows[0] = q
         excess = _excess(bounds, _columns(path, rows, law.u), T[:, :3, 3])
         if excess.max() <= 1.0:
-            curve = _quintics(model, path, rows, law)
-            excess = _excess_between(bounds, curve)
+            powers = _quintics(model, path, rows, law)
+            excess = _excess_between(bounds, powers)
             if excess.max() <= 1.0:
+                _require_inside(model, path, rows, law.u)
+                breaks = np.arange(len(rows), dtype=np.float64) * CYCLE_TIME
+                curve = PiecewisePolynomial(breaks, np.stack(powers, axis=2))
                 return Motion(polynomial=curve, goal=rows[-1], law="jerk_limited", speed=speed)
         worst = float(law.u[excess.argmax()])
-        slowdown *= _spread(excess, law.u, len(slowdown), cycles)
+        # Where slowing down in places only shifts what is too fast, the whole way is slowed down.
+        somewhere = round_ < _ROUNDS
+        slowdown *= _spread(excess, law.u, len(slowdown), cycles) if somewhere else float(excess.max()) * _HASTE
         if slowdown.max() > _SLOWEST:
             break
     reason = "the joints would have to jump, because a singularity is close; lead the tool around it"
@@ -115,6 +121,16 @@ def require_path(model: RobotModel, q: JointVector, path: Path) -> JointPath:
         if not obstacle.is_singular:
             break
     raise refusal(path, float(shares[obstacle.row]), obstacle.reason)
+
+
+def _require_inside(model: RobotModel, path: Path, rows: JointPath, shares: Array) -> None:
+    """Refuses rows that touch a joint limit between the knots."""
+    limits = model.limits.joint
+    outside = np.argwhere(~((limits.lower < rows) & (rows < limits.upper)))
+    if outside.size:
+        row, joint = outside[0].tolist()
+        angle = math.degrees(rows[row, joint])
+        raise refusal(path, float(shares[row]), f"joint {joint + 1} would touch its limit at {angle:.2f} deg")
 
 
 def _bounds(model: RobotModel, part: float) -> _Bounds:
@@ -192,24 +208,25 @@ def _excess(bounds: _Bounds, columns: Array, positions: Array) -> Array:
     return excess
 
 
-def _excess_between(bounds: _Bounds, curve: PiecewisePolynomial) -> Array:
-    """Returns how much slower each cycle must be to keep the joints' bounds and between, shape (N - 1,)."""
-    excess = np.zeros(len(curve.coefficients))
-    coefficients, n = curve.coefficients, curve.n
-    times = np.array(_INSTANTS) * CYCLE_TIME
+def _excess_between(bounds: _Bounds, powers: list[Array]) -> Array:
+    """Returns how much slower each cycle must be to keep the joints' bounds at its start and in it, shape (N - 1,)."""
+    excess = np.zeros(len(powers[0]))
     for order, limit in enumerate((bounds.velocity, bounds.acceleration, bounds.jerk), start=1):
-        coefficients = coefficients[:, :, 1:] * np.arange(1.0, coefficients.shape[2])
-        powers = np.vander(times, coefficients.shape[2], increasing=True).T
-        values = (coefficients.reshape(-1, len(powers)) @ powers).reshape(len(excess), -1)
-        ratio = np.abs(values / np.repeat(limit[:n], len(times))).max(axis=1)
-        np.maximum(excess, ratio ** (1.0 / order), out=excess)
+        powers = [float(p) * powers[p] for p in range(1, len(powers))]
+        largest = np.abs(powers[0])
+        for part in _INSTANTS:
+            value = powers[-1]
+            for coefficient in reversed(powers[:-1]):
+                value = value * (part * CYCLE_TIME) + coefficient
+            np.maximum(largest, np.abs(value), out=largest)
+        np.maximum(excess, (largest / limit[: largest.shape[1]]).max(axis=1) ** (1.0 / order), out=excess)
     return excess
 
 
 def _spread(excess: Array, u: Array, knots: int, cycles: int) -> Array:
     """Returns by how much to slow down at each knot, given by how much each row or cycle is too fast."""
     factor = np.ones(len(u))
-    factor[: len(excess)] = np.where(excess > 1.0, excess * _HASTE, 1.0)
+    factor[: len(excess)] = np.where(excess > 1.0, excess * excess * _HASTE, 1.0)
     reach = cycles + 3
     wide = np.pad(factor, reach, constant_values=1.0)
     factor = np.lib.stride_tricks.sliding_window_view(wide, 2 * reach + 1).max(axis=1)
@@ -225,9 +242,13 @@ def _held(rows: Array) -> Array:
     return np.concatenate((np.repeat(rows[:1], 3, axis=0), rows, np.repeat(rows[-1:], 3, axis=0)))
 
 
-def _quintics(model: RobotModel, path: Path, rows: JointPath, law: TimeLaw) -> PiecewisePolynomial:
-    """Returns the curve through the rows with the path's velocities and accelerations: continuous in both."""
-    before, after = (model.inverse_path(*path.sample(law.u + side), rows[0])[0] for side in (-_NUDGE, _NUDGE))
+def _quintics(model: RobotModel, path: Path, rows: JointPath, law: TimeLaw) -> list[Array]:
+    """Returns the curve through the rows with the path's velocities and accelerations: continuous in both.
+
+    Returns:
+        Its coefficients by ascending power, each of shape (N - 1, n).
+    """
+    before, after = (inverse_path(model, *path.sample(law.u + side), rows[0])[0] for side in (-_NUDGE, _NUDGE))
     first, second = (after - before) / (2.0 * _NUDGE), (after - 2.0 * rows + before) / _NUDGE**2
     du, ddu = law.du[:, np.newaxis], law.ddu[:, np.newaxis]
     h = CYCLE_TIME
@@ -236,15 +257,11 @@ def _quintics(model: RobotModel, path: Path, rows: JointPath, law: TimeLaw) -> P
     v[0] = v[-1] = a[0] = a[-1] = 0.0
     # In powers of the part of the cycle: the quintic with given value, slope and bend on both ends.
     rise, slope, bend = np.diff(rows, axis=0) - v[:-1] - a[:-1], np.diff(v, axis=0) - 2.0 * a[:-1], np.diff(a, axis=0)
-    pieces = np.stack(
-        (
-            rows[:-1],
-            v[:-1] / h,
-            a[:-1] / h**2,
-            (10.0 * rise - 4.0 * slope + bend) / h**3,
-            (-15.0 * rise + 7.0 * slope - 2.0 * bend) / h**4,
-            (6.0 * rise - 3.0 * slope + bend) / h**5,
-        ),
-        axis=2,
-    )
-    return PiecewisePolynomial(np.arange(len(rows), dtype=np.float64) * h, pieces)
+    return [
+        rows[:-1],
+        v[:-1] / h,
+        a[:-1] / h**2,
+        (10.0 * rise - 4.0 * slope + bend) / h**3,
+        (-15.0 * rise + 7.0 * slope - 2.0 * bend) / h**4,
+        (6.0 * rise - 3.0 * slope + bend) / h**5,
+    ]

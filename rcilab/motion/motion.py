@@ -17,8 +17,8 @@ from rcilab.errors import InvalidValueError
 from rcilab.motion.piecewise import DERIVATIVES, PiecewisePolynomial
 
 Law: TypeAlias = Literal["jerk_limited", "s_profile", "stop", "samples"]
-"""How a motion runs along its path: ruckig's time-optimal law, the manual's S profile (3.5), the fastest stop, or rows
-that somebody else made."""
+"""How a motion runs along its path: as fast as all limits allow, by the manual's S profile (3.5), as the fastest stop,
+or through rows that somebody else made."""
 
 LAWS: tuple[Law, ...] = ("jerk_limited", "s_profile", "stop", "samples")
 

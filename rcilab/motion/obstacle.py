@@ -10,6 +10,7 @@ import numpy as np
 from rcilab.arrays import Array, JointPath, JointVector
 from rcilab.errors import PlanningError, SingularError, UnreachableError
 from rcilab.model import RobotModel
+from rcilab.motion.inverse_path import inverse_path
 from rcilab.motion.path import Path
 
 _STRETCHING = 5
@@ -40,7 +41,7 @@ def examine(
         span: What lies between two rows, for people.
     """
     T, psi = path.sample(shares)
-    rows, loss = model.inverse_path(T, psi, q)
+    rows, loss = inverse_path(model, T, psi, q)
     rows[0] = q
     limits = model.limits.joint
     excess = np.abs(np.diff(rows, axis=0)) - longest

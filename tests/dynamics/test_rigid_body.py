@@ -107,3 +107,17 @@ def test_the_motion_of_the_tool_is_that_of_forward_kinematics_and_jacobian(name,
         pose, twist = model.rigid_body.tool_motion(q, dq)
         assert pose.is_close(model.forward(q), 1e-14)
         assert np.allclose(twist, model.jacobian(q) @ dq, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("error", [1e-10, 3e-10])
+def test_an_inertia_that_rounding_bent_is_straightened(error):
+    inertia = np.diag((2e-10, 1e-10, 1e-10)) + [[0.0, error, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]
+    load = Payload(mass=0.5, inertia=inertia)
+    assert np.array_equal(load.inertia, load.inertia.T)
+    assert np.isfinite(load_model("xMatePro7", load=load).rigid_body.gravity(np.zeros(7))).all()
+
+
+def test_a_moment_that_rounding_brought_below_zero_is_zero():
+    load = Payload(mass=0.5, inertia=np.diag((-1e-10, 1e-3, 1e-3)))
+    assert np.linalg.eigvalsh(load.inertia).min() > -1e-18
+    assert np.isfinite(load_model("xMatePro7", load=load).rigid_body.gravity(np.zeros(7))).all()

@@ -153,6 +153,27 @@ def test_a_bounded_jerk_costs_little(name, seed):
     assert motion.duration <= 1.15 * without
 
 
+@pytest.mark.parametrize("name", sorted(MODELS))
+@pytest.mark.parametrize("length", [2e-6, 1e-4, 1e-2])
+@pytest.mark.parametrize("speed", [1.0, 0.01])
+def test_the_shortest_line_is_a_motion_too(name, length, speed):
+    model = MODELS[name]
+    T = model.forward(model.home)
+    motion = plan_line(model, model.home, Pose(T.position + (length, 0.0, 0.0), T.wxyz), speed=speed)
+    require_allowed(model, motion, speed)
+    assert model.forward(motion.q[-1]).position[0] == pytest.approx(T.position[0] + length, abs=1e-12)
+
+
+def test_a_joint_goes_up_to_its_limit_and_not_past_it():
+    model = load_model("xMatePro7")
+    q = model.home.copy()
+    q[6] = model.limits.joint.upper[6] - 0.1
+    near, past = (model.forward(q) @ Pose.from_rpy((0.0, 0.0, 0.0), (0.0, 0.0, turn)) for turn in (0.0999, 0.1001))
+    assert plan_line(model, q, near).q[-1, 6] == pytest.approx(q[6] + 0.0999, abs=1e-9)
+    with pytest.raises(PlanningError, match=r"joint 7 would pass its limit at 360\.0 deg \(-360 to 360 deg\)"):
+        plan_line(model, q, past)
+
+
 def test_a_path_through_a_singularity_in_the_arms_plane_is_a_motion():
     q = np.array([0.0, 0.3, 0.0, 1.2, 0.0, 0.4, 0.0])
     T = SEVEN.forward(q)
