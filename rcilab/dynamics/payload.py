@@ -35,7 +35,7 @@ class Payload:
         inertia = as_vector(np.ravel(self.inertia), 9, "load inertia", "kg m^2").reshape(3, 3)
         if np.abs(inertia - inertia.T).max() > 1e-9 * max(1.0, float(np.abs(inertia).max())):
             raise InvalidValueError("load inertia", inertia.tolist(), "must be symmetric")
-        inertia = _nearest_possible((inertia + inertia.T) / 2.0)
+        inertia = _nearest_possible(0.5 * inertia + 0.5 * inertia.T)
         object.__setattr__(self, "mass", mass)
         object.__setattr__(self, "center_of_mass", as_vector(self.center_of_mass, 3, "load centre of mass", "m"))
         object.__setattr__(self, "inertia", frozen(inertia))
