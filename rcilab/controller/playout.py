@@ -12,8 +12,8 @@
 * A command that was overtaken on its way is put back in its place.
 * A short gap in the ids is either a lost command, or a lost state whose cycle the client never saw; only the command
   itself can tell, so the caller is asked whether it continues the motion by one step or by the whole gap.
-* Clearly more commands than the prefill in stock for a long time mean a client that made more of them than there are cycles;
-  the loop is told to live through some more, or their delay would only ever grow.
+* Clearly more commands than the prefill in stock for a long time mean a client that made more of them than there are
+  cycles; the loop is told to live through some more, or their delay would only ever grow.
 * Commands that close a control loop (torques) must be fresh: more than the prefill in stock are skipped, oldest first.
 * A long gap, or ids that start again far behind, mean another numbering: the command is simply the next one.
 """
