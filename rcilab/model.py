@@ -31,6 +31,7 @@ from rcilab.safety_box import SafetyBox
 from rcilab.spatial import IDENTITY, Pose
 
 if TYPE_CHECKING:
+    from rcilab.dynamics.friction import JointFriction
     from rcilab.dynamics.rigid_body import RigidBody, TorqueTerms
 
 __all__ = ["RobotModel", "load_model", "require_model"]
@@ -278,7 +279,12 @@ class RobotModel(MovingArm):
         return self.dexterity(q).manipulability
 
     def torque(
-        self, q: ArrayLike, dq: ArrayLike | None = None, ddq: ArrayLike | None = None, *, friction: bool = False
+        self,
+        q: ArrayLike,
+        dq: ArrayLike | None = None,
+        ddq: ArrayLike | None = None,
+        *,
+        friction: bool | JointFriction = False,
     ) -> TorqueTerms:
         """Returns the joint torques of the rigid arm with its load, and their terms (GetTau, GetTauNoFriction).
 
@@ -288,21 +294,28 @@ class RobotModel(MovingArm):
             q: Joint angles, shape (n,) or (N, n), [rad].
             dq: Joint velocities, of q's shape, [rad/s]; at rest when absent.
             ddq: Joint accelerations, of q's shape, [rad/s^2]; none when absent.
-            friction: Whether `.full` holds the joints' friction, too; it is that of the MuJoCo plant.
+            friction: Whether `.full` holds the joints' friction, too. True takes that of the MuJoCo plant; figures
+                identified on a real arm go into a `rcilab.dynamics.friction.JointFriction`.
 
         Returns:
             Terms of q's shape, [N m].
+
+        Raises:
+            InvalidValueError: q, dq or ddq has another shape or is not finite, or the friction is none of this arm.
         """
         angles = as_rows(q, self.n, "q", "rad")
         zeros = np.zeros(angles.shape)
         speeds = zeros if dq is None else as_rows(dq, self.n, "dq", "rad/s", angles)
         rates = zeros if ddq is None else as_rows(ddq, self.n, "ddq", "rad/s^2", angles)
         terms = (self.rigid_body.torque if angles.ndim == 1 else self.rigid_body.torque_path)(angles, speeds, rates)
-        if not friction:
+        if friction is False:
             return terms
-        from rcilab.dynamics.friction import friction_torque
+        from rcilab.dynamics.friction import JointFriction, simulated_friction
 
-        return terms.with_friction(friction_torque(self.limits.joint, speeds))
+        law = simulated_friction(self.limits.joint) if friction is True else friction
+        if not isinstance(law, JointFriction):
+            raise InvalidValueError("friction", described(friction), "is neither True nor False nor a JointFriction")
+        return terms.with_friction(law.torque(speeds))
 
     @cached_property
     def rigid_body(self) -> RigidBody:
