@@ -31,7 +31,7 @@ class _Timed:
     """What was found on all lines."""
 
     ours: list[float] = field(default_factory=list)
-    """Computing times, [s]."""
+    """Processor times, [s]."""
     theirs: list[float] = field(default_factory=list)
     ratios: list[float] = field(default_factory=list)
     """Our duration over theirs."""
@@ -52,14 +52,14 @@ def compare_timing(model: RobotModel, count: int = 20) -> Iterator[Measurement |
         theirs = absent("line/toppra", error)
     found = _Timed()
     for q, path in _lines(model, count):
-        begin = time.perf_counter()
+        begin = time.process_time()
         motion = plan_line(model, q, path.goal, speed=1.0)
-        found.ours.append(time.perf_counter() - begin)
+        found.ours.append(time.process_time() - begin)
         if not isinstance(theirs, Absent):
             columns, limits = _columns(model, q, path)
-            begin = time.perf_counter()
+            begin = time.process_time()
             trajectory = theirs(columns, limits)
-            found.theirs.append(time.perf_counter() - begin)
+            found.theirs.append(time.process_time() - begin)
             found.ratios.append(motion.duration / trajectory.duration)
             found.jerks.append(_largest_jerk(model, trajectory))
     longer = ""
