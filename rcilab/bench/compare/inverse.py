@@ -161,5 +161,7 @@ def _batch(model: RobotModel, q: JointPath) -> Measurement:
         begin = time.process_time()
         model.inverse_batch(poses, psi)
         times.append(time.process_time() - begin)
-    note = f"the same of {count} poses at {angles} arm angles in one call, time a pose; none of the others takes batches"
+    note = (
+        f"the same of {count} poses at {angles} arm angles in one call, time a pose; none of the others takes batches"
+    )
     return summarise("branches/batch", np.array(times) / count, "us", None, note)
