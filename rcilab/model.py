@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -27,16 +27,17 @@ from rcilab.kinematics.solutions import Solutions, joint_limit_lists
 from rcilab.kinematics.workspace import Workspace, sample_workspace
 from rcilab.limits import Limits
 from rcilab.robots import RobotDescription, describe_robot
-from rcilab.safety_box import SafetyBox
+from rcilab.safety_box import SafetyBox, active_box
 from rcilab.spatial import IDENTITY, Pose
 
 if TYPE_CHECKING:
+    from rcilab.dynamics.friction import JointFriction
     from rcilab.dynamics.rigid_body import RigidBody, TorqueTerms
 
 __all__ = ["RobotModel", "load_model", "require_model"]
 
 _PSI_SEARCH = tuple(math.radians(sign * step) for step in range(10, 181, 10) for sign in (1, -1))
-"""Offsets tried, nearest first, when no arm angle was asked for and the natural one has no solution."""
+"""Offsets looked at, nearest first, to say what is in the way of a pose that no arm angle reaches."""
 
 
 def load_model(name: str, *, tool: Pose | None = None, load: Payload | None = None) -> RobotModel:
@@ -148,7 +149,7 @@ class RobotModel(MovingArm):
         Args:
             T: Pose of the tool in base: a `Pose` or a homogeneous matrix, shape (4, 4).
             psi: Arm angle of a 7-axis arm, [rad]. When absent: that of `near`, or 0; and if nothing is inside the
-                limits there, the closest arm angle (in steps of 10 degrees) that has a solution.
+                limits there, the closest arm angle that has a solution, a little inside its range.
             near: Joint angles, [rad], that decide what a singular pose leaves open.
 
         Raises:
@@ -228,12 +229,13 @@ class RobotModel(MovingArm):
 
         Raises:
             UnreachableError: The pose is out of reach at every arm angle.
-            InvalidValueError: T is not usable.
+            InvalidValueError: T or the box is not usable.
             KinematicsError: The arm has 6 axes.
         """
         self._require_arm_angle()
         pose = T if isinstance(T, Pose) else Pose.from_matrix(T)
-        is_outside = box is not None and box.active and box.excess(pose.parts[1]) > 0.0
+        bound = active_box(box)
+        is_outside = bound is not None and bound.excess(pose.parts[1]) > 0.0
         flange = pose @ self._T_tool_flange if self._has_tool else pose
         joint = self.limits.joint
         return feasible_arcs(self._geometry, flange, joint.lower, joint.upper, is_outside)
@@ -268,7 +270,7 @@ class RobotModel(MovingArm):
             `.q`, shape (N, n); `.position`, shape (N, 3), [m] in base; `.dexterity` there.
 
         Raises:
-            InvalidValueError: `count` is out of range.
+            InvalidValueError: `count` is out of range, or the box is none.
         """
         joint = self.limits.joint
         return sample_workspace(self, joint.lower, joint.upper, count, seed, box)
@@ -278,7 +280,12 @@ class RobotModel(MovingArm):
         return self.dexterity(q).manipulability
 
     def torque(
-        self, q: ArrayLike, dq: ArrayLike | None = None, ddq: ArrayLike | None = None, *, friction: bool = False
+        self,
+        q: ArrayLike,
+        dq: ArrayLike | None = None,
+        ddq: ArrayLike | None = None,
+        *,
+        friction: bool | JointFriction = False,
     ) -> TorqueTerms:
         """Returns the joint torques of the rigid arm with its load, and their terms (GetTau, GetTauNoFriction).
 
@@ -288,21 +295,28 @@ class RobotModel(MovingArm):
             q: Joint angles, shape (n,) or (N, n), [rad].
             dq: Joint velocities, of q's shape, [rad/s]; at rest when absent.
             ddq: Joint accelerations, of q's shape, [rad/s^2]; none when absent.
-            friction: Whether `.full` holds the joints' friction, too; it is that of the MuJoCo plant.
+            friction: Whether `.full` holds the joints' friction, too. True takes that of the MuJoCo plant; figures
+                identified on a real arm go into a `rcilab.dynamics.friction.JointFriction`.
 
         Returns:
             Terms of q's shape, [N m].
+
+        Raises:
+            InvalidValueError: q, dq or ddq has another shape or is not finite, or the friction is none of this arm.
         """
         angles = as_rows(q, self.n, "q", "rad")
         zeros = np.zeros(angles.shape)
         speeds = zeros if dq is None else as_rows(dq, self.n, "dq", "rad/s", angles)
         rates = zeros if ddq is None else as_rows(ddq, self.n, "ddq", "rad/s^2", angles)
         terms = (self.rigid_body.torque if angles.ndim == 1 else self.rigid_body.torque_path)(angles, speeds, rates)
-        if not friction:
+        if friction is False:
             return terms
-        from rcilab.dynamics.friction import friction_torque
+        from rcilab.dynamics.friction import JointFriction, simulated_friction
 
-        return terms.with_friction(friction_torque(self.limits.joint, speeds))
+        law = simulated_friction(self.limits.joint) if friction is True else friction
+        if not isinstance(law, JointFriction):
+            raise InvalidValueError("friction", described(friction), "is neither True nor False nor a JointFriction")
+        return terms.with_friction(law.torque(speeds))
 
     @cached_property
     def rigid_body(self) -> RigidBody:
@@ -348,14 +362,23 @@ class RobotModel(MovingArm):
         solutions = Solutions(inverse_seven(self._geometry, flange, start, near), *self._bounds, start)
         if len(solutions):
             return solutions
+        if psi is not None:
+            raise solutions.refusal()
         best = solutions
-        for offset in _PSI_SEARCH if psi is None else ():
-            angle = math.remainder(start + offset, math.tau)
+        for angle in self._other_arm_angles(flange, start):
             solutions = Solutions(inverse_seven(self._geometry, flange, angle, near), *self._bounds, angle)
             if len(solutions):
                 return solutions
             best = min(best, solutions, key=_least_excess)
-        raise best.refusal()
+        raise best.refusal(everywhere=True)
+
+    def _other_arm_angles(self, flange: Pose, start: float) -> Iterator[float]:
+        """Yields the closest arm angle that has a solution if one has; then steps all round, to see what is missing."""
+        joint = self.limits.joint
+        closest = feasible_arcs(self._geometry, flange, joint.lower, joint.upper).nearest(start)
+        if closest is not None:
+            yield closest
+        yield from (math.remainder(start + offset, math.tau) for offset in _PSI_SEARCH)
 
     def _require_arm_angle(self) -> None:
         if self.n != 7:

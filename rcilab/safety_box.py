@@ -9,7 +9,7 @@ from math import hypot, isfinite
 
 import numpy as np
 
-from rcilab.arrays import Array
+from rcilab.arrays import Array, described
 from rcilab.errors import InvalidValueError
 from rcilab.spatial import Pose
 
@@ -72,3 +72,16 @@ class SafetyBox:
         """Returns its corners in the base frame, shape (8, 3), [m]."""
         signs = np.array(list(product((-0.5, 0.5), repeat=3)))
         return signs * np.array(self.size) @ self.T_base_box.rotation.T + self.T_base_box.position
+
+
+def active_box(box: object) -> SafetyBox | None:
+    """Returns the safety box if it bounds anything; None when there is none, or when it is not active.
+
+    Raises:
+        InvalidValueError: It is something else.
+    """
+    if box is None:
+        return None
+    if not isinstance(box, SafetyBox):
+        raise InvalidValueError("box", described(box), "is no SafetyBox; SafetyBox(size=..., T_base_box=...) makes one")
+    return box if box.active else None

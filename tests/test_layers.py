@@ -18,6 +18,7 @@ LAYERS = [  # From the bottom. A part imports from lines below its own, and from
         "arrays",
         "clock",
         "faults",
+        "language",
         "limits",
         "command",
         "state",
@@ -45,7 +46,7 @@ LAYERS = [  # From the bottom. A part imports from lines below its own, and from
 HEIGHT = {part: height for height, parts in enumerate(LAYERS) for part in parts}
 
 FENCES = {
-    "pinocchio": ("kinematics/", "dynamics/", "model.py"),
+    "pinocchio": ("kinematics/", "dynamics/", "model.py", "bench/compare/"),  # There it is one of the compared.
     "eigenpy": ("dynamics/symmetric_solver.py",),
     "ruckig": ("motion/_ruckig.py",),
     "mujoco": ("controller/mujoco_plant.py",),
@@ -55,6 +56,9 @@ FENCES = {
     "matplotlib": ("views/", "notebook/"),
     "ipywidgets": ("notebook/",),
     "IPython": ("notebook/",),
+    "pink": ("bench/compare/",),
+    "ssik": ("bench/compare/",),
+    "toppra": ("bench/compare/",),
 }
 
 MODULES = sorted((ROOT / "rcilab").rglob("*.py"))

@@ -5,7 +5,7 @@ import pytest
 
 import rcilab
 from rcilab.errors import InvalidValueError, ModelError
-from rcilab.model import load_model, require_model
+from rcilab.model import RobotModel, load_model, require_model
 from rcilab.robots import ROBOT_NAMES
 from rcilab.spatial import Pose
 
@@ -136,3 +136,24 @@ def test_values_of_a_model_show_themselves_in_one_short_line():
         assert len(repr(value)) < 180
     assert "xMatePro7: 7 joints" in repr(model.description)
     assert "1.5 kg, centre of mass at 0 0.01 0.1 m" in repr(model.load)
+
+
+@pytest.mark.parametrize(
+    ("manual", "names"),
+    {
+        "GetCartPose": ("pose", "forward_path"),
+        "GetJointPos": ("inverse", "inverse_batch"),
+        "Jacobian": ("jacobian",),
+        "GetCartVel": ("velocity",),
+        "GetCartAcc": ("acceleration",),
+        "GetJointVel": ("joint_velocity",),
+        "GetJointAcc": ("joint_acceleration",),
+        "GetTau": ("torque",),
+        "GetTauNoFriction": ("torque",),
+        "SetLoad": ("with_load",),
+        "SetCoor": ("with_tool", "with_stiffness_frame"),
+    }.items(),
+)
+def test_who_knows_the_manuals_model_library_finds_its_names(manual, names):
+    for name in names:
+        assert f"({manual}" in getattr(RobotModel, name).__doc__ or f", {manual})" in getattr(RobotModel, name).__doc__

@@ -1,10 +1,13 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from rcilab.errors import InvalidValueError
-from rcilab.safety_box import SafetyBox
+from rcilab.model import load_model
+from rcilab.safety_box import SafetyBox, active_box
 from rcilab.spatial import Pose
 
 TURNED = SafetyBox(size=(0.4, 0.6, 1.0), T_base_box=Pose.from_rpy((0.5, -0.2, 0.4), (0.3, -0.7, 2.0)))
@@ -62,3 +65,16 @@ def test_a_size_that_is_none_is_refused(size):
 def test_a_pose_that_is_none_is_refused():
     with pytest.raises(InvalidValueError, match="is no Pose"):
         SafetyBox(size=(1.0, 1.0, 1.0), T_base_box=np.eye(4))
+
+
+def test_only_an_active_box_bounds_anything_and_what_is_no_box_is_refused_in_words():
+    assert active_box(None) is None
+    assert active_box(replace(TURNED, active=False)) is None
+    assert active_box(TURNED) is TURNED
+    model = load_model("xMatePro7")
+    for ask in (
+        lambda: model.feasible_arcs(model.forward(model.home), "box"),
+        lambda: model.sample_workspace(5, box=3),
+    ):
+        with pytest.raises(InvalidValueError, match="is no SafetyBox"):
+            ask()

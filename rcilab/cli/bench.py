@@ -13,6 +13,9 @@ from typing import TYPE_CHECKING, Any
 from rcilab.errors import UsageError
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from rcilab.bench.compare.peer import Absent
     from rcilab.bench.measure import Measurement
 
 BENCHES = (
@@ -22,6 +25,8 @@ BENCHES = (
     *("drag", "import", "start", "state_period", "control_loop"),
 )
 """In the order they run; the slow ones last."""
+COMPARE = "compare"
+"""Runs only when it is named: what it measures are others' packages."""
 
 _STREAMING = 30.0  # [s]
 
@@ -29,7 +34,8 @@ _STREAMING = 30.0  # [s]
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Adds `rcilab bench`."""
     parser = subparsers.add_parser("bench", help="measure this machine beside what we promise")
-    parser.add_argument("names", nargs="*", metavar="NAME", help=f"one or more of: {', '.join(BENCHES)} (default: all)")
+    known = f"one or more of: {', '.join(BENCHES)} (default: all of these); or {COMPARE}: us beside others' packages"
+    parser.add_argument("names", nargs="*", metavar="NAME", help=known)
     parser.add_argument("--json", action="store_true", help="print one JSON list instead of a table")
     parser.add_argument(
         "--seconds", type=float, default=_STREAMING, help="how long control_loop streams, [s] (default: %(default)s)"
@@ -51,24 +57,36 @@ def run(args: argparse.Namespace) -> int:
     machine = describe_machine()
     if not args.json:
         _print_machine(machine)
-    found: list[Measurement] = []
+    found: list[Measurement | Absent] = []
+    out = sys.stdout
     for name in names:
         if not args.json and sys.stderr.isatty():
             print(f"{name} ...", end="\r", file=sys.stderr, flush=True)
         with redirect_stdout(sys.stderr):  # What libraries have to say is no part of the list.
-            found.append(_bench(name, args.seconds)())
-        if not args.json:
-            print(_row(found[-1]), flush=True)
+            for measurement in _measured(name, args.seconds):
+                found.append(measurement)
+                if not args.json:
+                    print(_row(measurement), file=out, flush=True)
     if args.json:
         print(json.dumps([machine, *(measurement.as_json() for measurement in found)], indent=1))
     return 1 if any(measurement.ok is False for measurement in found) else 0
 
 
 def _chosen(names: list[str]) -> list[str]:
-    unknown = [name for name in names if name not in BENCHES]
+    known = (*BENCHES, COMPARE)
+    unknown = [name for name in names if name not in known]
     if unknown:
-        raise UsageError(f"unknown bench {unknown[0]!r}; known: {', '.join(BENCHES)}")
-    return [name for name in BENCHES if name in names or not names]
+        raise UsageError(f"unknown bench {unknown[0]!r}; known: {', '.join(known)}")
+    return [name for name in known if name in (names or BENCHES)]
+
+
+def _measured(name: str, seconds: float) -> Iterable[Measurement | Absent]:
+    """Returns the rows of one name; most have a single one."""
+    if name == COMPARE:
+        from rcilab.bench.compare.comparison import compare
+
+        return compare()
+    return (_bench(name, seconds)(),)
 
 
 def _bench(name: str, seconds: float) -> Callable[[], Measurement]:
@@ -116,8 +134,13 @@ def _print_machine(machine: dict[str, Any]) -> None:
     print(f"\n{'':4} {'bench':20} {'median':>10} {'p99':>10} {'target':>10}")
 
 
-def _row(found: Measurement) -> str:
+def _row(found: Measurement | Absent) -> str:
+    from rcilab.bench.compare.peer import Absent
+
     verdict = {True: "ok", False: "SLOW", None: "-"}[found.ok]
-    target = "-" if found.target is None else f"{found.target:g}"
-    numbers = f"{verdict:4} {found.name:20} {found.median:10.3g} {found.p99:10.3g} {target:>10} {found.unit}"
+    if isinstance(found, Absent):
+        numbers = f"{verdict:4} {found.name:20} {'-':>10} {'-':>10} {'-':>10}"
+    else:
+        target = "-" if found.target is None else f"{found.target:g}"
+        numbers = f"{verdict:4} {found.name:20} {found.median:10.3g} {found.p99:10.3g} {target:>10} {found.unit}"
     return numbers + "\n" + textwrap.fill(found.note, 110, initial_indent=" " * 7, subsequent_indent=" " * 7)

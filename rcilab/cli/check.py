@@ -6,6 +6,8 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import Any
 
+from rcilab.language import LANGUAGES
+
 
 def add_parser(subparsers: Any) -> None:
     """Adds the command to the `rcilab` parser."""
@@ -23,7 +25,7 @@ def add_parser(subparsers: Any) -> None:
         metavar="OUT",
         help="also write the motion (.npz), slowed down by the least factor that passes; nothing when none does",
     )
-    parser.add_argument("--explain", choices=("en", "zh"), help="say it in whole sentences, in English or Chinese")
+    parser.add_argument("--explain", choices=tuple(LANGUAGES), help="say it in whole sentences, in English or Chinese")
     parser.set_defaults(run=run)
 
 

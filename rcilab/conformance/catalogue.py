@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
-from functools import lru_cache
-from importlib.resources import files
 from types import MappingProxyType
-from typing import Literal, TypeAlias, get_args
 
-from rcilab.errors import InvalidValueError
+from rcilab.language import Language, load_words, require_language
 
-Language: TypeAlias = Literal["en", "zh"]
-"""English or Chinese."""
+__all__ = ["Language", "Phrase", "load_catalogue", "say"]
 
 
 class Phrase(str):
@@ -42,13 +37,9 @@ def say(language: Language, key: str, **values: str) -> str:
     Raises:
         InvalidValueError: There is no catalogue for this language; the message lists those that exist.
     """
-    if language not in get_args(Language):
-        raise InvalidValueError("language", language, f"is unknown; known: {', '.join(get_args(Language))}")
-    return load_catalogue(language)[key].format(**values)
+    return load_catalogue(require_language(language))[key].format(**values)
 
 
-@lru_cache
 def load_catalogue(language: Language) -> Mapping[str, str]:
     """Returns all sentences of one language, by key."""
-    path = files("rcilab.conformance") / "catalogues" / f"{language}.json"
-    return MappingProxyType(json.loads(path.read_text(encoding="utf-8")))
+    return load_words("rcilab.conformance", language)

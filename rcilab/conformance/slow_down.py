@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import sqrt
 from typing import Literal, TypeAlias
 
@@ -41,18 +41,18 @@ class SlowDown:
 
     before: Motion
     """The motion as it was."""
-    factor: float | None
+    factor: float | None = None
     """Times slower, 1 or more; None when no slow-down passes."""
-    motion: Motion | None
+    motion: Motion | None = None
     """The slowed motion; the one of the report when the factor is 1, None when no slow-down passes."""
-    report: Report | None
+    report: Report | None = None
     """Its own report, with the certificate; None when no slow-down passes."""
-    decisive: ConditionResult | None
+    decisive: ConditionResult | None = None
     """What decides the factor, as the slowed motion has it; or what stays broken at the largest factor tried. None when
     the motion passes as it is."""
-    obstacle: Obstacle | None
+    obstacle: Obstacle | None = None
     """Why no slow-down passes; None when one does."""
-    unmet: tuple[Condition, ...]
+    unmet: tuple[Condition, ...] = ()
     """Recommended conditions that were asked for and that no slow-down meets."""
     at_most: float
     """The largest factor tried."""
@@ -100,13 +100,14 @@ class _Search:
         self._report = report
         self._motion = report.motion
         self._at_most = at_most
+        self._nothing = SlowDown(before=report.motion, at_most=at_most)
 
     def run(self, recommended: bool) -> SlowDown:
         """Returns the least slow-down that keeps the necessary conditions, and on demand the recommended ones."""
         broken = _broken(self._report)
         for row in broken:
             if row.necessity == "necessary" and _power(row.condition) == 0:
-                return self._refused(row, "position")
+                return replace(self._nothing, decisive=row, obstacle="position")
         rows = tuple(row.condition for row in self._report.rows if _power(row.condition) > 0)
         necessary = tuple(row for row in rows if row.necessity == "necessary")
         if not recommended:
@@ -122,7 +123,7 @@ class _Search:
         wanted = {row.id for row in rows}
         broken = [row for row in _broken(self._report) if row.id in wanted]
         if not broken:
-            return self._passing(1.0, self._motion, self._report, None, unmet)
+            return replace(self._nothing, factor=1.0, motion=self._motion, report=self._report, unmet=unmet)
         low, spare = 1.0, PRECISION / 2.0
         need = max(row.ratio ** (1.0 / _power(row.condition)) for row in broken)
         while True:
@@ -131,7 +132,7 @@ class _Search:
             if not found:
                 break
             if high >= self._at_most:
-                return self._refused(found[0], self._obstacle(found[0]))
+                return replace(self._nothing, decisive=found[0], obstacle=self._obstacle(found[0]))
             # Not smooth, then: a step in velocity shrinks with the factor alone.
             low, broken, spare, need = high, found, 20.0 * spare, max(row.ratio for row in found)
         probe = max(low, high / (1.0 + PRECISION))
@@ -164,39 +165,9 @@ class _Search:
         motion = self._motion.slowed(factor)
         report = self._report.judge(motion, tuple(row.condition for row in self._report.rows))
         if not report.ok:  # More rows of the same way: one of them is past a bound that those before just kept.
-            return self._refused(_broken(report)[0], "position")
-        return self._passing(factor, motion, report, next(row for row in report.rows if row.id == name), unmet)
-
-    def _passing(
-        self,
-        factor: float,
-        motion: Motion,
-        report: Report,
-        decisive: ConditionResult | None,
-        unmet: tuple[Condition, ...],
-    ) -> SlowDown:
-        return SlowDown(
-            before=self._motion,
-            factor=factor,
-            motion=motion,
-            report=report,
-            decisive=decisive,
-            obstacle=None,
-            unmet=unmet,
-            at_most=self._at_most,
-        )
-
-    def _refused(self, decisive: ConditionResult, obstacle: Obstacle) -> SlowDown:
-        return SlowDown(
-            before=self._motion,
-            factor=None,
-            motion=None,
-            report=None,
-            decisive=decisive,
-            obstacle=obstacle,
-            unmet=(),
-            at_most=self._at_most,
-        )
+            return replace(self._nothing, decisive=_broken(report)[0], obstacle="position")
+        decisive = next(row for row in report.rows if row.id == name)
+        return replace(self._nothing, factor=factor, motion=motion, report=report, decisive=decisive, unmet=unmet)
 
 
 def _broken(report: Report) -> list[ConditionResult]:

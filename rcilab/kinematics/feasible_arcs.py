@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from math import acos, cos, pi, sin, sqrt, tau
+from math import acos, cos, degrees, pi, remainder, sin, sqrt, tau
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -24,6 +24,9 @@ from rcilab.kinematics.singularity import SINGULAR
 from rcilab.spatial import Pose
 
 Reason: TypeAlias = Literal["joint limits", "singularity", "safety box"]
+
+INSIDE = 0.1
+"""How far inside a range an arm angle is chosen, where one is chosen for others, [rad]. A choice: some six degrees."""
 
 _TINY = 1e-9  # Of a sine or a length in [m]: below it the elbow has no circle, or the circle no upper side.
 _SAME = 1e-12  # [rad] Arm angles that differ by rounding alone.
@@ -84,14 +87,30 @@ class FeasibleArcs:
         """Returns the ranges (start, end), [rad], in which one branch, 0 to 7, stays possible all along."""
         return _joined([(arc.start, arc.end) for arc in self.arcs if arc.ok and branch in arc.branches])
 
+    def nearest(self, psi: float) -> float | None:
+        """Returns the arm angle closest to one, [rad], at which a branch keeps every joint limit; None if none does.
+
+        It is `INSIDE` the range, or in the middle of a narrower one, unless the angle asked for is possible itself.
+        """
+        found: float | None = None
+        for start, end in _joined([(arc.start, arc.end) for arc in self.arcs if arc.branches]):
+            middle, half = 0.5 * (start + end), 0.5 * (end - start)
+            offset = remainder(psi - middle, tau)
+            inner = max(half - INSIDE, 0.0)
+            angle = psi if abs(offset) < half else middle + min(max(offset, -inner), inner)
+            if found is None or abs(remainder(angle - psi, tau)) < abs(remainder(found - psi, tau)):
+                found = angle
+        return None if found is None else remainder(found, tau)
+
     def at(self, psi: float) -> Arc:
         """Returns the arc that an arm angle, [rad], is in."""
         return next((arc for arc in self.arcs if arc.holds(psi)), self.arcs[0])
 
     def __repr__(self) -> str:
-        ranges = ", ".join(f"{np.degrees(start):.1f} to {np.degrees(end):.1f}" for start, end in self.feasible)
+        ranges = ", ".join(f"{degrees(start):.1f} to {degrees(end):.1f}" for start, end in self.feasible)
+        where = f"at {ranges} deg" if ranges else "at no arm angle"
         why = sorted({reason for arc in self.arcs for reason in arc.reasons})
-        return f"<FeasibleArcs at {ranges or 'no arm angle'} deg; forbidden by: {', '.join(why) or 'nothing'}>"
+        return f"<FeasibleArcs {where}; forbidden by: {', '.join(why) or 'nothing'}>"
 
 
 def feasible_arcs(

@@ -73,15 +73,24 @@ class Solutions(Sequence[JointVector]):
         candidates = np.where(inside, turned, self._feasible)
         return frozen(candidates[np.argmin(((candidates - here) ** 2).sum(axis=1))])
 
-    def refusal(self) -> UnreachableError:
-        """Returns the error that says which joint limit is in the way, for the branch that comes closest."""
+    def refusal(self, *, everywhere: bool = False) -> UnreachableError:
+        """Returns the error that says which joint limit is in the way, for the branch that comes closest.
+
+        Args:
+            everywhere: Whether no other arm angle does better either.
+        """
         best = min(self.all, key=lambda branch: branch.excess)
         joint = best.joint or 1
         angle, lower, upper = best.q[joint - 1], self._lower[joint - 1], self._upper[joint - 1]
+        place, advice = f"in the best of {len(self.all)} branches", "move the target"
+        if everywhere:
+            place += " at the best arm angle"
+        elif self.psi is not None:
+            place += f" at arm angle {degrees(self.psi):.1f} deg"
+            advice += " or change the arm angle"
         return UnreachableError(
             f"joint {joint} would have to be at {degrees(angle):.1f} deg, {degrees(best.excess):.1f} deg beyond its "
-            f"limit ({degrees(lower):.0f} to {degrees(upper):.0f} deg), in the best of {len(self.all)} branches; "
-            "move the target" + ("" if self.psi is None else " or change the arm angle"),
+            f"limit ({degrees(lower):.0f} to {degrees(upper):.0f} deg), {place}; {advice}",
             joint=joint,
             excess=best.excess,
         )

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rcilab.arrays import Array, JointPath, JointVector, frozen
+from rcilab.arrays import Array, JointPath, JointVector, described, frozen
 from rcilab.errors import InvalidValueError
 from rcilab.kinematics.moving_arm import MovingArm
 from rcilab.kinematics.singularity import DexterityPath, dexterity_path
-from rcilab.safety_box import SafetyBox
+from rcilab.safety_box import SafetyBox, active_box
 
 _MOST = 1_000_000  # Samples; a choice: some 200 MB while they are made.
 
@@ -51,14 +51,14 @@ def sample_workspace(
         box: Only samples with the tool in it are kept; all when absent or not active.
 
     Raises:
-        InvalidValueError: `count` is not from 1 to 1 000 000.
+        InvalidValueError: `count` is no whole number from 1 to 1 000 000, or the box is none.
     """
-    if not 1 <= count <= _MOST:
-        raise InvalidValueError("count", count, f"must be from 1 to {_MOST}")
+    if not isinstance(count, int | np.integer) or not 1 <= count <= _MOST:
+        raise InvalidValueError("count", described(count), f"must be a whole number from 1 to {_MOST}")
     q = np.random.default_rng(seed).uniform(lower, upper, (count, arm.n))
     position = arm.position_path(q)
-    if box is not None and box.active:
-        inside = box.excess_path(position) <= 0.0
+    if (bound := active_box(box)) is not None:
+        inside = bound.excess_path(position) <= 0.0
         q, position = q[inside], position[inside]
     J = arm.jacobian(q) if len(q) else np.empty((0, 6, arm.n))
     return Workspace(q=frozen(q), position=frozen(position), dexterity=dexterity_path(J))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from io import BytesIO
 from os import PathLike, fspath
 from pathlib import Path
 from typing import Literal, TypeAlias, get_args
@@ -13,6 +12,7 @@ import numpy as np
 
 from rcilab.arrays import Array, as_number, as_path, as_vector
 from rcilab.errors import InvalidValueError
+from rcilab.motion.archive import read_arrays
 from rcilab.motion.motion import Motion
 from rcilab.motion.spline import motion_through
 from rcilab.motion.storage import KIND
@@ -99,13 +99,8 @@ def _by_header(table: Table, header: list[str], name: str, unit: AngleUnit) -> t
 
 
 def _from_npz(content: bytes, name: str, has_rate: bool, unit: AngleUnit) -> tuple[Array | None, Array, list[str]]:
-    try:
-        with np.load(BytesIO(content), allow_pickle=False) as archive:
-            arrays = {key: archive[key] for key in archive.files}
-    # Foreign bytes make numpy, zipfile and zlib raise a dozen kinds of errors; a single array is no context manager.
-    except Exception as error:
-        problem = "cannot be read: it is damaged, or no archive of numpy's; numpy.savez(file, t=..., q=...) writes one"
-        raise InvalidValueError("samples", name, problem) from error
+    problem = "cannot be read: it is damaged, or no archive of numpy's; numpy.savez(file, t=..., q=...) writes one"
+    arrays = read_arrays(content, "samples", name, problem)
     if str(arrays.get("kind", "")) == KIND:
         raise InvalidValueError("samples", name, "is a saved motion; Motion.load reads it, to the last bit")
     if "q" not in arrays:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from io import BytesIO
 from os import PathLike, fspath
 from pathlib import Path
 from typing import BinaryIO
@@ -11,6 +10,7 @@ import numpy as np
 
 from rcilab.arrays import as_number
 from rcilab.errors import InvalidValueError, VersionMismatchError
+from rcilab.motion.archive import read_arrays
 from rcilab.motion.motion import Motion
 from rcilab.motion.piecewise import PiecewisePolynomial
 
@@ -97,16 +97,8 @@ def _read(file: str | PathLike[str] | BinaryIO, name: str) -> dict[str, np.ndarr
         raise InvalidValueError("motion file", name, "cannot be read as a motion: it is empty")
     if not content.startswith(_SIGNATURES):
         raise InvalidValueError("motion file", name, "cannot be read as a motion: Motion.save did not write it")
-    try:
-        archive = np.load(BytesIO(content), allow_pickle=False)
-        if isinstance(archive, np.ndarray):
-            return {"a single array": archive}
-        with archive:
-            return {key: archive[key] for key in archive.files}
-    # Foreign bytes make numpy, zipfile and zlib raise a dozen kinds of errors, NotImplementedError among them.
-    except Exception as error:
-        problem = "cannot be read as a motion: it is damaged, or holds something else; save the motion again"
-        raise InvalidValueError("motion file", name, problem) from error
+    problem = "cannot be read as a motion: it is damaged, or holds something else; save the motion again"
+    return read_arrays(content, "motion file", name, problem)
 
 
 def _require_stream(file: object, method: str) -> None:

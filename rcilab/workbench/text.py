@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import lru_cache
-from importlib.resources import files
 from types import MappingProxyType
 
-from rcilab.errors import InvalidValueError
+from rcilab.language import LANGUAGES, Language, load_words, require_language
 
-LANGUAGES: Mapping[str, str] = MappingProxyType({"en": "English", "zh": "中文"})
+__all__ = ["LANGUAGES", "Message", "Text", "load_catalogue", "message"]
 
 
 @dataclass(frozen=True)
@@ -37,10 +34,8 @@ class Text:
     """
 
     def __init__(self, language: str) -> None:
-        if language not in LANGUAGES:
-            raise InvalidValueError("language", language, f"is unknown; known: {', '.join(LANGUAGES)}")
-        self.language = language
-        self._entries = load_catalogue(language)
+        self.language = require_language(language)
+        self._entries = load_catalogue(self.language)
 
     def __call__(self, code: str, **values: object) -> str:
         """Returns the words for a key; the key itself when the catalogue lacks it (a test keeps it complete)."""
@@ -57,8 +52,6 @@ class Text:
         return self(said.code, **values)
 
 
-@lru_cache
-def load_catalogue(language: str) -> Mapping[str, str]:
+def load_catalogue(language: Language) -> Mapping[str, str]:
     """Returns all entries of one language."""
-    path = files("rcilab.workbench") / "catalogues" / f"{language}.json"
-    return MappingProxyType(json.loads(path.read_text(encoding="utf-8")))
+    return load_words("rcilab.workbench", language)

@@ -5,7 +5,10 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
+from rcilab.dynamics.friction import JointFriction
 from rcilab.dynamics.payload import Payload
 from rcilab.errors import InvalidValueError
 from rcilab.model import load_model
@@ -57,3 +60,41 @@ def test_a_table_of_another_length_is_refused():
     model = load_model("xMatePro7")
     with pytest.raises(InvalidValueError, match="dq"):
         model.torque(np.zeros((3, 7)), np.zeros((2, 7)))
+
+
+@settings(max_examples=30)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_identified_friction_is_a_line_for_each_direction_and_costs_power(seed):
+    random = np.random.default_rng(seed)
+    viscous, coulomb = random.uniform(0, 3, (2, 7))
+    model, (q, dq, ddq) = load_model("xMatePro7"), states(load_model("xMatePro7"))
+    law = JointFriction(viscous=viscous, coulomb=coulomb, offset=np.zeros(7))
+    whole, rigid = model.torque(q, dq, ddq, friction=law), model.torque(q, dq, ddq)
+    np.testing.assert_allclose(whole.full, rigid.full + whole.friction, atol=1e-12)
+    np.testing.assert_allclose(np.abs(whole.friction), viscous * np.abs(dq) + coulomb, atol=1e-12)
+    assert (whole.friction * dq >= 0.0).all()
+    shifted = JointFriction(viscous=viscous, coulomb=coulomb, offset=random.normal(size=7))
+    np.testing.assert_allclose(shifted.torque(-dq) + shifted.torque(dq), 2.0 * np.tile(shifted.offset, (len(dq), 1)))
+    assert not law.torque(np.zeros(7)).any()  # At rest it holds no joint in place, nor does it push one.
+
+
+@pytest.mark.parametrize(
+    ("friction", "words"),
+    [
+        (None, "friction: None is neither True nor False nor a JointFriction"),
+        ("much", "is neither True nor False"),
+        (JointFriction(viscous=[1.0] * 6, coulomb=[0.0] * 6, offset=[0.0] * 6), "is that of 6 joints, the arm has 7"),
+    ],
+)
+def test_what_is_no_friction_of_the_arm_is_refused_in_words(friction, words):
+    with pytest.raises(InvalidValueError, match=words):
+        load_model("xMatePro7").torque(np.zeros(7), friction=friction)
+
+
+def test_a_friction_that_drives_is_refused():
+    with pytest.raises(InvalidValueError, match=r"coulomb friction: .* must not be negative"):
+        JointFriction(viscous=[1.0] * 7, coulomb=[-1.0] * 7, offset=[0.0] * 7)
+    with pytest.raises(InvalidValueError, match=r"offset friction: .* needs \(7,\)"):
+        JointFriction(viscous=[1.0] * 7, coulomb=[1.0] * 7, offset=[0.0] * 6)
+    with pytest.raises(InvalidValueError, match=r"viscous friction: .*finite"):
+        JointFriction(viscous=[float("nan")] * 7, coulomb=[1.0] * 7, offset=[0.0] * 7)

@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rcilab.errors import KinematicsError, UnreachableError
+from rcilab.kinematics.feasible_arcs import INSIDE
 from rcilab.kinematics.inverse import build_geometry, inverse_seven
 from rcilab.kinematics.singularity import find_singularity
 from rcilab.model import RobotModel, load_model
@@ -160,3 +161,28 @@ def test_what_has_no_answer_is_a_named_error():
         model.feasible_arcs(Pose((2.0, 0, 0)))
     with pytest.raises(KinematicsError, match="6 axes"):
         load_model("xMate3").feasible_arcs(Pose((0.4, 0, 0.5)))
+
+
+@pytest.mark.parametrize("name", NAMES)
+@settings(max_examples=40)
+@given(seed=seeds, psi=st.floats(-math.pi, math.pi))
+def test_the_nearest_arm_angle_is_possible_and_no_possible_one_is_much_nearer(name, seed, psi):
+    model = load_model(name, tool=TOOL)
+    found = model.feasible_arcs(model.forward(random_q(model, seed)))
+    angle = found.nearest(psi)
+    assert angle is not None  # The pose was made from joint angles inside the limits.
+    assert found.at(angle).branches
+    samples = np.linspace(-math.pi, math.pi, 721)
+    possible = samples[[bool(found.at(sample).branches) for sample in samples]]
+    if possible.size:
+        away = np.abs(np.remainder(possible - psi + math.pi, math.tau) - math.pi).min()
+        assert abs(math.remainder(angle - psi, math.tau)) <= away + INSIDE + 1e-9
+    if found.at(psi).branches:
+        assert abs(math.remainder(angle - psi, math.tau)) < 1e-9
+
+
+def test_where_no_arm_angle_is_possible_there_is_no_nearest_one_and_the_words_say_so():
+    model = load_model("xMatePro7")
+    found = model.feasible_arcs(Pose((0.3, 0.0, -0.55), model.forward(model.home).wxyz))
+    assert found.nearest(0.0) is None
+    assert repr(found) == "<FeasibleArcs at no arm angle; forbidden by: joint limits>"

@@ -4,8 +4,11 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from rcilab.errors import InvalidValueError, UnreachableError
+from rcilab.kinematics.inverse import build_geometry, inverse_seven, inverse_six
 from rcilab.model import load_model
 from rcilab.robots import ROBOT_NAMES
 from rcilab.spatial import Pose
@@ -120,6 +123,55 @@ def test_without_an_arm_angle_a_feasible_one_is_found():
             assert model.forward(model.inverse(T)[0]).is_close(T, TOLERANCE)
             found += 1
     assert found > 5
+
+
+@pytest.mark.parametrize("name", ["xMatePro3", "xMatePro7"])
+def test_a_pose_is_found_even_where_the_arm_stands_close_to_its_limits(name):
+    """Ranges of possible arm angles are narrow there: a few degrees, or less."""
+    model, random = load_model(name), np.random.default_rng(5)
+    limits = model.limits.joint
+    narrow = 0
+    for share in random.beta(0.15, 0.15, (600, 7)):
+        T = model.forward(limits.lower + (0.002 + 0.996 * share) * (limits.upper - limits.lower))
+        assert model.forward(model.inverse(T)[0]).is_close(T, TOLERANCE)
+        narrow += all(end - start < math.radians(10.0) for start, end in model.feasible_arcs(T).feasible)
+    assert narrow > 0
+
+
+@settings(max_examples=40)
+@given(seed=st.integers(0, 2**32 - 1), name=st.sampled_from(ROBOT_NAMES))
+def test_a_refusal_names_the_joint_and_by_how_much_in_the_best_branch(seed, name):
+    """Poses the wrist reaches, asked for at one arm angle and at any."""
+    model, random = load_model(name), np.random.default_rng(seed)
+    limits = model.limits.joint
+    T = model.forward(random.uniform(1.3 * limits.lower, 1.3 * limits.upper))
+    psi = random.uniform(-math.pi, math.pi) if model.n == 7 else None
+    for asked in {psi, None}:
+        try:
+            found = model.inverse(T, psi=asked)
+        except UnreachableError as refusal:
+            error = refusal
+        else:
+            assert len(found) > 0
+            continue
+        assert error.distance == 0.0
+        everywhere = model.n == 7 and asked is None
+        branches = every_branch(model, T, np.radians(range(-180, 180, 10)) if everywhere else [asked])
+        excess = np.maximum(limits.lower - branches, branches - limits.upper).max(axis=-1)
+        assert error.excess == pytest.approx(excess.min(), abs=1e-9)
+        best = branches[np.unravel_index(excess.argmin(), excess.shape)]
+        assert error.joint == 1 + int(np.maximum(limits.lower - best, best - limits.upper).argmax())
+        assert f"joint {error.joint} would have to be at" in str(error)
+        assert f"{math.degrees(error.excess):.1f} deg beyond its limit" in str(error)
+        assert ("change the arm angle" in str(error)) == (asked is not None)
+        assert ("at the best arm angle" in str(error)) == everywhere
+
+
+def every_branch(model, T, psis):
+    """All branches, limits or not, shape (arm angles, 8, n)."""
+    geometry = build_geometry(model.description)
+    solve = inverse_six if model.n == 6 else inverse_seven
+    return np.array([solve(geometry, T, None) if model.n == 6 else solve(geometry, T, psi, None) for psi in psis])
 
 
 def test_an_arm_angle_for_six_axes_is_refused():

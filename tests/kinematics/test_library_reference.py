@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rcilab.errors import UnreachableError
 from rcilab.model import load_model
 from rcilab.spatial import Pose
 
@@ -88,3 +89,47 @@ def test_the_vendors_quirk_is_known_its_joint_velocity_is_not_always_the_smalles
     surplus = np.linalg.norm(theirs, axis=1) - np.linalg.norm(ours.rates, axis=1)
     assert (surplus > -1e-6).all()
     assert surplus.max() > 1e-2
+
+
+@pytest.mark.parametrize("name", REFERENCE)
+def test_the_vendors_quirk_is_known_its_joint_acceleration_is_no_number_and_ours_gives_the_acceleration_back(name):
+    model, (q, dq, wanted) = arm(name), (column(name, key) for key in ("q", "dq", "acceleration"))
+    ours = model.joint_acceleration(q, dq, wanted, frame="flange")
+    assert np.isfinite(ours.rates).all()
+    exact = ~ours.damped
+    assert exact.sum() >= 3
+    found = model.acceleration(q, dq, ours.rates, "flange")
+    np.testing.assert_allclose(found[exact], wanted[exact], atol=TOLERANCE, rtol=0)
+
+
+@pytest.mark.parametrize("name", REFERENCE)
+def test_the_vendors_quirk_is_known_it_refuses_what_a_full_turn_or_another_branch_brings_inside_the_limits(name):
+    """It keeps to the branch of the start, does not turn back, and writes the answer beyond its limits all the same."""
+    model, bounds = load_model(name), load_model(name).limits.joint
+    assert REFERENCE[name]["refused"]
+    for case in REFERENCE[name]["refused"]:
+        T, written = model.forward(case["q"]), np.array(case["q_written"])
+        assert model.forward(written).is_close(T, TOLERANCE)
+        beyond = np.flatnonzero((written < bounds.lower) | (written > bounds.upper)) + 1
+        assert beyond.size
+        found = refusal_or_solutions(model, T, case["psi"])
+        if isinstance(found, UnreachableError):
+            assert found.joint in beyond
+            assert found.excess > 0.0
+            continue
+        same = [branch for branch in found.all if np.abs(full_turns_off(branch.q - written)).max() < TOLERANCE]
+        assert len(same) == 1  # Theirs is among ours, and judged.
+        assert same[0].ok or same[0].joint in beyond
+        assert all(((q > bounds.lower) & (q < bounds.upper)).all() for q in found)
+        assert all(model.forward(q).is_close(T, TOLERANCE) for q in found)
+
+
+def refusal_or_solutions(model, T, psi):
+    try:
+        return model.inverse(T, psi=psi)
+    except UnreachableError as error:
+        return error
+
+
+def full_turns_off(angles):
+    return angles - 2 * np.pi * np.round(angles / (2 * np.pi))

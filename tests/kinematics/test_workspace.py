@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from rcilab.errors import InvalidValueError
 from rcilab.model import load_model
@@ -56,7 +58,24 @@ def test_a_box_keeps_the_samples_inside_it():
     assert "0 samples" in repr(model.sample_workspace(10, box=nowhere))
 
 
-@pytest.mark.parametrize("count", [0, -5, 10**7])
-def test_a_count_out_of_range_is_refused(count):
-    with pytest.raises(InvalidValueError, match="count"):
+@pytest.mark.parametrize("count", [0, -5, 10**7, 2.5, "many", None])
+def test_a_count_that_is_none_or_out_of_range_is_refused(count):
+    with pytest.raises(InvalidValueError, match=r"count: .* must be a whole number from 1 to 1000000"):
         load_model("xMatePro7").sample_workspace(count)
+
+
+@pytest.mark.parametrize("name", ROBOT_NAMES)
+@settings(max_examples=25)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_dexterity_says_how_fast_the_tool_moves_and_how_the_joints_pay_for_it(name, seed):
+    model, random = load_model(name, tool=TOOL), np.random.default_rng(seed)
+    limits = model.limits.joint
+    q = random.uniform(limits.lower, limits.upper)
+    found, J = model.dexterity(q), model.jacobian(q)
+    assert found.manipulability == pytest.approx(np.sqrt(np.linalg.det(J @ J.T)), rel=1e-5, abs=1e-9)
+    assert model.manipulability(q) == found.manipulability
+    twists = random.normal(size=(50, 6))
+    twists /= np.linalg.norm(twists, axis=1)[:, np.newaxis]
+    cheapest = np.linalg.norm(np.linalg.lstsq(J, twists.T, rcond=None)[0], axis=0)  # Least joint speeds of each.
+    assert (cheapest <= (1 + 1e-6) / found.smallest).all()  # No direction costs more than the worst one.
+    assert cheapest.max() / cheapest.min() <= found.condition * (1 + 1e-6)

@@ -1,4 +1,5 @@
 import io
+import warnings
 
 import numpy as np
 import pytest
@@ -99,6 +100,37 @@ def test_one_flipped_byte_never_gives_another_motion_silently(tmp_path):
             assert Motion.load(tmp_path / "x.npz").fingerprint == MOTION.fingerprint
         except RcilabError:
             pass
+
+
+@pytest.mark.parametrize("compressed", [False, True])
+def test_whatever_is_damaged_is_refused_in_our_words_and_nothing_else_escapes(compressed):
+    stream = io.BytesIO()
+    (np.savez_compressed if compressed else np.savez)(stream, **fields())
+    whole, rng = stream.getvalue(), np.random.default_rng(8)
+    for _ in range(200):
+        damaged = bytearray(whole)
+        places = rng.integers(0, len(whole), rng.integers(1, 4))
+        if rng.random() < 0.5:  # Where the headers and the table of contents are.
+            places = np.where(rng.random(len(places)) < 0.5, places % 200, len(whole) - 1 - places % 700)
+        for place in places:
+            damaged[place] = rng.integers(0, 256)
+        try:
+            with warnings.catch_warnings(action="ignore"):  # Of zipfile, on names that come twice.
+                assert Motion.load(io.BytesIO(bytes(damaged))).fingerprint == MOTION.fingerprint
+        except RcilabError:
+            pass
+
+
+def test_a_mistake_of_ours_is_not_taken_for_a_damaged_file(monkeypatch):
+    def slip(*_: object, **__: object) -> None:
+        raise AttributeError("a mistake in the code")
+
+    stream = io.BytesIO()
+    MOTION.save(stream)
+    stream.seek(0)
+    monkeypatch.setattr(np, "load", slip)
+    with pytest.raises(AttributeError, match="a mistake in the code"):
+        Motion.load(stream)
 
 
 def test_a_single_array_and_pickles_are_refused(tmp_path):

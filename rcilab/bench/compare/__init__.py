@@ -1,0 +1,1 @@
+"""What others offer for the same arm, measured beside our own in the same process: `rcilab bench compare`."""
