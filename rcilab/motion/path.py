@@ -104,15 +104,16 @@ class Path:
         The formulas go on beyond start and goal, and so does this, for those who form differences there.
         """
         (ra, a), (rb, b) = self.start.parts, self.goal.parts
-        T = np.zeros((len(shares), 4, 4))
+        # One element after the other in memory: those who follow a path compute with columns of these.
+        T = np.zeros((4, 4, len(shares))).transpose(2, 0, 1)
         T[:, 3, 3] = 1.0
         T[:, :3, :3] = (self.turning or turn_to(ra, rb)).sample(shares)
         if self.circle is None:
-            T[:, :3, 3] = np.array(a) + shares[:, np.newaxis] * (np.array(b) - np.array(a))
+            T[:, :3, 3] = np.array(a) + np.multiply.outer(shares, np.array(b) - np.array(a))
         else:
-            parts = np.array((self.circle.center, self.circle.first, self.circle.second))
+            c, e, f = (np.array(point) for point in (self.circle.center, self.circle.first, self.circle.second))
             angles = shares * self.circle.angle
-            T[:, :3, 3] = np.stack((np.ones_like(angles), np.cos(angles), np.sin(angles)), axis=1) @ parts
+            T[:, :3, 3] = c + np.multiply.outer(np.cos(angles), e) + np.multiply.outer(np.sin(angles), f)
         if self.psi_start is None or self.psi_goal is None:
             return T, None
         return T, self.psi_start + shares * (self.psi_goal - self.psi_start)

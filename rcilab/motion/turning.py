@@ -38,9 +38,12 @@ class SteadyTurn:
         R = np.array(self.start).reshape(3, 3)
         K = _crossing(np.array([self.turn]) / (angle or 1.0))[0]
         # Rodrigues: 1 + sin K + (1 - cos) K^2, its constant parts multiplied out once.
-        parts = np.stack((R @ (np.eye(3) + K @ K), R @ K, -R @ K @ K)).reshape(3, 9)
-        waves = np.stack((np.ones_like(shares), np.sin(shares * angle), np.cos(shares * angle)), axis=1)
-        return (waves @ parts).reshape(-1, 3, 3)
+        still, across, along = R @ (np.eye(3) + K @ K), R @ K, -R @ K @ K
+        # One element after the other in memory, as what follows along the path.
+        rows = np.multiply.outer(across, np.sin(shares * angle))
+        rows += np.multiply.outer(along, np.cos(shares * angle))
+        rows += still[:, :, np.newaxis]
+        return rows.transpose(2, 0, 1)
 
 
 @dataclass(frozen=True, slots=True)
