@@ -41,8 +41,9 @@ _SLOWEST = 4.0
 """Beyond this a limit is not passed by what happens between the knots, but by a jump. A choice."""
 _INSTANTS = (0.25, 0.5, 0.75)
 """Where in a cycle the curve is looked at, besides its start, in cycles."""
-_HASTE = 1.001
-"""To slow down by the square of what was found, and this much more, so that few rounds do. A choice."""
+_HASTE = 1.002
+"""To slow down by the square of what was found, and this much more, also where it was closely under a limit, so that
+few rounds do: 1 or 2 on nine of ten paths. A choice; it makes motions 0.06 % longer."""
 _NUDGE = 1e-4
 """Share of the way over which derivatives by the way are formed. A choice: both their errors are below 1e-7."""
 
@@ -175,11 +176,10 @@ def _columns(path: Path, rows: JointPath, shares: Array) -> Array:
 
     A turn that is not even has rows of its own (`_turn_rows`) and is left out here, as zeros.
     """
-    u = shares[:, np.newaxis]
     turn = 0.0 if _turns_unevenly(path) else path.turn
     if path.psi_start is None or path.psi_goal is None:
-        return np.hstack((rows, turn * u))
-    return np.hstack((rows, (path.psi_goal - path.psi_start) * u, turn * u))
+        return np.vstack((rows.T, turn * shares)).T
+    return np.vstack((rows.T, (path.psi_goal - path.psi_start) * shares, turn * shares)).T
 
 
 def _turns_unevenly(path: Path) -> bool:
@@ -244,34 +244,35 @@ def _directions() -> Array:
 
 def _excess(bounds: _Bounds, columns: Array, positions: Array) -> Array:
     """Returns how much slower each row must be passed to keep every bound, shape (N,); 1 or less keeps them."""
-    count = len(columns)
-    excess = np.zeros(count)
-    column, position = _held(columns), _held(positions)
+    excess = np.zeros(len(columns))
+    column, position = _held(columns.T), _held(positions.T)
     limits = (bounds.velocity, bounds.acceleration, bounds.jerk)
     for order, (limit, tool_limit) in enumerate(zip(limits, bounds.tool, strict=True), start=1):
-        column, position = np.diff(column, axis=0) / CYCLE_TIME, np.diff(position, axis=0) / CYCLE_TIME
-        tool = np.sqrt((position * position).sum(axis=1)) / tool_limit
-        ratio = np.maximum((np.abs(column) / limit).max(axis=1), tool) ** (1.0 / order)
-        # The difference at a row looks back; behind the end it is the end's.
-        offset = 3 - order
-        np.maximum(excess, ratio[offset : offset + count], out=excess)
-        excess[-1] = max(excess[-1], float(ratio[offset + count :].max()))
+        column, position = np.diff(column), np.diff(position)
+        span = CYCLE_TIME**order
+        joints = (np.abs(column) / (span * limit)[:, np.newaxis]).max(axis=0)
+        tool = np.sqrt((position * position).sum(axis=0)) / (span * tool_limit)
+        _raise(excess, np.maximum(joints, tool), order)
     return excess
 
 
 def _turn_excess(bounds: _Bounds, rotations: Array) -> Array:
     """Returns how much slower each row must be passed to keep the bounds of the tool's turn, shape (N,)."""
-    difference = turns_between(_held(rotations)) / CYCLE_TIME
-    count = len(rotations)
-    excess = np.zeros(count)
-    limits = (bounds.velocity[-1], bounds.acceleration[-1], bounds.jerk[-1])
-    for order, limit in enumerate(limits, start=1):
-        ratio = (np.sqrt((difference * difference).sum(axis=1)) / limit) ** (1.0 / order)
-        offset = 3 - order
-        np.maximum(excess, ratio[offset : offset + count], out=excess)
-        excess[-1] = max(excess[-1], float(ratio[offset + count :].max()))
-        difference = np.diff(difference, axis=0) / CYCLE_TIME
+    excess = np.zeros(len(rotations))
+    difference = turns_between(np.moveaxis(_held(np.moveaxis(rotations, 0, 2)), 2, 0)).T
+    for order, limit in enumerate((bounds.velocity[-1], bounds.acceleration[-1], bounds.jerk[-1]), start=1):
+        _raise(excess, np.sqrt((difference * difference).sum(axis=0)) / (CYCLE_TIME**order * limit), order)
+        difference = np.diff(difference)
     return excess
+
+
+def _raise(excess: Array, ratio: Array, order: int) -> None:
+    """Takes in how much too large differences of `_held` rows are; those of order n grow with the speed to the n."""
+    factor = ratio ** (1.0 / order)
+    # The difference at a row looks back; behind the end it is the end's.
+    count, offset = len(excess), 3 - order
+    np.maximum(excess, factor[offset : offset + count], out=excess)
+    excess[-1] = max(excess[-1], float(factor[offset + count :].max()))
 
 
 def _excess_between(bounds: _Bounds, powers: list[Array]) -> Array:
@@ -281,9 +282,10 @@ def _excess_between(bounds: _Bounds, powers: list[Array]) -> Array:
         powers = [float(p) * powers[p] for p in range(1, len(powers))]
         largest = np.abs(powers[0])
         for part in _INSTANTS:
-            value = powers[-1]
+            value = powers[-1].copy("K")
             for coefficient in reversed(powers[:-1]):
-                value = value * (part * CYCLE_TIME) + coefficient
+                value *= part * CYCLE_TIME
+                value += coefficient
             np.maximum(largest, np.abs(value), out=largest)
         np.maximum(excess, (largest / limit[: largest.shape[1]]).max(axis=1) ** (1.0 / order), out=excess)
     return excess
@@ -292,7 +294,7 @@ def _excess_between(bounds: _Bounds, powers: list[Array]) -> Array:
 def _spread(excess: Array, u: Array, knots: int, cycles: int) -> Array:
     """Returns by how much to slow down at each knot, given by how much each row or cycle is too fast."""
     factor = np.ones(len(u))
-    factor[: len(excess)] = np.where(excess > 1.0, excess * excess * _HASTE, 1.0)
+    factor[: len(excess)] = np.maximum(excess * excess * _HASTE, 1.0)
     reach = cycles + 3
     wide = np.pad(factor, reach, constant_values=1.0)
     factor = np.lib.stride_tricks.sliding_window_view(wide, 2 * reach + 1).max(axis=1)
@@ -305,7 +307,8 @@ def _spread(excess: Array, u: Array, knots: int, cycles: int) -> Array:
 
 
 def _held(rows: Array) -> Array:
-    return np.concatenate((np.repeat(rows[:1], 3, axis=0), rows, np.repeat(rows[-1:], 3, axis=0)))
+    """Returns what stands for three more cycles at both ends of the last axis."""
+    return np.concatenate((np.repeat(rows[..., :1], 3, axis=-1), rows, np.repeat(rows[..., -1:], 3, axis=-1)), axis=-1)
 
 
 def _quintics(model: RobotModel, path: Path, rows: JointPath, law: TimeLaw) -> list[Array]:
