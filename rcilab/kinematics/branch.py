@@ -211,8 +211,10 @@ def _turns(angles: Column, guess: float, period: float) -> Column:
 
 
 def _hypot(x: Column, y: Column) -> Column:
-    """Returns the root of the sum of squares; nothing here is so large or small that np.hypot, at five times the cost,
-    would be needed."""
+    """Returns the root of the sum of squares.
+
+    Nothing here is so large or small that `np.hypot` were needed, which costs five times as much.
+    """
     return np.sqrt(x * x + y * y)
 
 
