@@ -49,7 +49,7 @@ class MotionSignals:
         model: RobotModel,
         start: StartState,
         box: SafetyBox | None,
-        distance: SafetyDistance | None,
+        distance: SafetyDistance | None = None,
     ) -> None:
         self._motion = motion
         self._model = model
