@@ -73,7 +73,9 @@ class Certificate:
         require_motion(motion)
         require_model(model)
         start = as_start(start_q, len(self.start_q)) if motion.n == len(self.start_q) else None
-        now = dict(issue_certificate(motion, model, start, box, distance).entries) if start is not None else {"motion": ""}
+        now = {"motion": ""}
+        if start is not None:
+            now = dict(issue_certificate(motion, model, start, box, distance).entries)
         changed = [name for name, fingerprint in self.entries if now.get(name, fingerprint) != fingerprint]
         if start is not None and "start state" in changed and self._same_start(start):
             changed.remove("start state")

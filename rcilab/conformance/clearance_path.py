@@ -125,9 +125,7 @@ def _known(distance: Array, travel: Array, looked: NDArray[np.intp]) -> tuple[ND
     return between, low, high
 
 
-def _by_cycle(
-    distance: Array, links: NDArray[np.intp], cycles: NDArray[np.intp], looks: int
-) -> ClearancePath:
+def _by_cycle(distance: Array, links: NDArray[np.intp], cycles: NDArray[np.intp], looks: int) -> ClearancePath:
     """Returns the smallest of each cycle's rows."""
     if cycles[-1] + 1 == len(cycles):
         return ClearancePath(distance, links, looks)

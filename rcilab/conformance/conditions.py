@@ -152,7 +152,7 @@ MOTION_CONDITIONS: tuple[Condition, ...] = (
     _recommended("end", "velocity at the end", "dq_c = 0", 1, REST_VELOCITY_TOLERANCE),
     _recommended("end", "acceleration at the end", "ddq_c = 0", 2, REST_ACCELERATION_TOLERANCE),
 )
-"""What `check` judges of every joint motion by the manual, in its order; with a safety box also "cartesian.position"."""
+"""What `check` judges of every joint motion, in the manual's order; there may be the box and distances, too."""
 
 CYCLE_CONDITIONS = JOINT_CONDITIONS
 """What curves of joint angles are drawn against."""

@@ -14,8 +14,8 @@ from rcilab.kinematics.collision import FLOOR, TOOL, ClearanceQuery
 from rcilab.model import RobotModel, load_model
 from rcilab.robots import ROBOT_NAMES
 from rcilab.robots.shapes import build_shapes
-from rcilab.robots.urdf import build_urdf
 from rcilab.robots.upright import upright_joints
+from rcilab.robots.urdf import build_urdf
 from rcilab.safety_distance import SafetyDistance
 from rcilab.spatial import Pose
 
@@ -57,8 +57,9 @@ def test_pinocchio_finds_the_same_distances_in_the_urdf(name: str) -> None:
     model = load_model(name)
     tree, solids, floor = urdf_capsules(model)
     data, found = tree.createData(), solids.createData()
-    query = ClearanceQuery(model.collision_geometry())
-    assert len(solids.collisionPairs) == len(model.collision_geometry().link_pairs + model.collision_geometry().floor_pairs)
+    geometry = model.collision_geometry()
+    query = ClearanceQuery(geometry)
+    assert len(solids.collisionPairs) == len(geometry.link_pairs) + len(geometry.floor_pairs)
     closest = []
     for q in random_q(model, 300):
         pin.computeDistances(tree, data, solids, found, q)
