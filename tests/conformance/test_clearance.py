@@ -52,7 +52,7 @@ def cycles_of(report, id_: str, rows: int):
     return flags.tolist()
 
 
-@settings(max_examples=25)
+@settings(max_examples=10)
 @given(st.sampled_from(MODELS), st.integers(0, 2**32), st.floats(0.2, 1.0))
 def test_every_cycle_is_judged_by_its_own_distance_although_few_are_looked_at(model, seed, speed):
     q = low_motion(model, seed, speed).q
@@ -71,7 +71,7 @@ def test_every_cycle_is_judged_by_its_own_distance_although_few_are_looked_at(mo
         assert LinkPair(*found.links[worst].tolist()) == smallest[worst][1]
 
 
-@settings(max_examples=25)
+@settings(max_examples=10)
 @given(st.sampled_from(MODELS), st.integers(0, 2**32))
 def test_between_two_looks_no_point_moves_5_mm_or_as_far_as_the_room_that_was_found(model, seed):
     q = low_motion(model, seed, part=0.6).q
@@ -129,7 +129,7 @@ def test_a_cycle_that_goes_far_is_looked_at_on_the_way_and_one_that_no_arm_can_g
         assert levers @ model.limits.joint.velocity * CYCLE_TIME < LONGEST_STEP
 
 
-@settings(max_examples=25)
+@settings(max_examples=15)
 @given(st.sampled_from(MODELS), st.integers(0, 2**32), st.integers(0, 2))
 def test_check_and_monitors_give_the_same_verdict_in_every_cycle(model, seed, spoils):
     rng = np.random.default_rng(seed)
