@@ -48,6 +48,7 @@ HEIGHT = {part: height for height, parts in enumerate(LAYERS) for part in parts}
 FENCES = {
     "pinocchio": ("kinematics/", "dynamics/", "model.py"),
     "coal": ("kinematics/collision.py",),
+    "eigenpy": ("dynamics/symmetric_solver.py",),
     "ruckig": ("motion/_ruckig.py",),
     "mujoco": ("controller/mujoco_plant.py",),
     "viser": ("views/", "workbench/", "notebook/"),
