@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Literal
+from typing import Literal, TypeAlias
 
 import numpy as np
 
@@ -19,12 +19,18 @@ OWN = "rcilab's own, not the controller's; capsules of the URDF"
 FAR = 0.1  # [m]
 """How far beyond its bound a distance uses none of it. A choice: a hand's width."""
 
-_QUANTITIES = {"link_distance": "distance between links", "floor_distance": "distance from the floor"}
+Distance: TypeAlias = Literal["link_distance", "floor_distance"]
+"""The signals that are distances."""
+
+_QUANTITIES: dict[Distance, str] = {
+    "link_distance": "distance between links",
+    "floor_distance": "distance from the floor",
+}
 
 
 def clearance_conditions(distance: SafetyDistance) -> tuple[Condition, ...]:
     """Returns the rows that judge a safety distance: what is necessary first, then what is recommended beyond it."""
-    necessary = {"link_distance": distance.links, "floor_distance": distance.floor}
+    necessary: dict[Distance, float] = {"link_distance": distance.links, "floor_distance": distance.floor}
     if distance.floor_height is None:
         del necessary["floor_distance"]
     return (
@@ -37,7 +43,7 @@ def clearance_conditions(distance: SafetyDistance) -> tuple[Condition, ...]:
     )
 
 
-def _row(signal: Literal["link_distance", "floor_distance"], necessity: Necessity, least: float) -> Condition:
+def _row(signal: Distance, necessity: Necessity, least: float) -> Condition:
     name = {"link_distance": "links", "floor_distance": "floor"}[signal]
     return Condition(
         id=f"clearance.{name}" + ("" if necessity == "necessary" else ".advised"),

@@ -39,7 +39,7 @@ class ClearanceMonitor:
         self._rows = [(row, float(row.bounds(model.limits)[0][0])) for row in clearance_conditions(distance)]
         self.reset(model.home)
 
-    def reset(self, q: Sequence[float]) -> None:
+    def reset(self, q: Sequence[float] | JointVector) -> None:
         """Forgets the past: the arm stands at `q`.
 
         Args:
@@ -51,7 +51,7 @@ class ClearanceMonitor:
         self._q: JointVector = as_vector(q, self._n, "q", "rad")
         self._look()
 
-    def step(self, q_c: Sequence[float]) -> bool:
+    def step(self, q_c: Sequence[float] | JointVector) -> bool:
         """Takes the commanded angles of this cycle and returns whether every necessary distance is kept.
 
         Args:

@@ -116,7 +116,8 @@ def _advance(look: Callable[[int], float], travel: Array, bound: float) -> NDArr
 
 def _known(distance: Array, travel: Array, looked: NDArray[np.intp]) -> tuple[NDArray[np.intp], Array, Array]:
     """Returns which look comes before each row or is it, and the least and the largest distance it can have."""
-    between = np.searchsorted(looked, np.arange(len(travel)), side="right") - 1
+    every: NDArray[np.intp] = np.arange(len(travel))
+    between = np.searchsorted(looked, every, side="right") - 1
     a, b = looked[between], looked[np.minimum(between + 1, len(looked) - 1)]
     since, until = travel - travel[a] + _ROUNDING, np.maximum(travel[b] - travel, 0.0) + _ROUNDING
     low = np.maximum(distance[a] - since, distance[b] - until)
@@ -129,6 +130,6 @@ def _by_cycle(distance: Array, links: NDArray[np.intp], cycles: NDArray[np.intp]
     """Returns the smallest of each cycle's rows."""
     if cycles[-1] + 1 == len(cycles):
         return ClearancePath(distance, links, looks)
-    order = np.lexsort((distance, cycles))
-    smallest = order[np.searchsorted(cycles, np.arange(cycles[-1] + 1))]  # In order, cycles is as it was.
+    first = np.flatnonzero(np.diff(cycles, prepend=-1))
+    smallest = np.lexsort((distance, cycles))[first]  # Sorted within each cycle, which stay where they are.
     return ClearancePath(distance[smallest], links[smallest], looks)

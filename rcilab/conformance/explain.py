@@ -57,7 +57,7 @@ def explain_slow_down(result: SlowDown, language: Language = "en") -> str:
     if row is None:
         text = say(language, "slow_down.none")
     else:
-        place, what = _place(row, language), _quantity(row.condition, language)
+        place, what = explain_place(row, language), _quantity(row.condition, language)
         if result.obstacle is not None:
             time = f"{row.time / (1.0 if result.obstacle == 'position' else result.at_most):.3f}"
             key = f"slow_down.{result.obstacle}"
@@ -97,13 +97,13 @@ def _nearest(row: ConditionResult, language: Language) -> str:
     if row.condition.signal == "position":
         return say(language, "verdict.deepest", depth=f"{max(-row.value, 0.0):.4g}", time=time)
     if row.condition.is_clearance:
-        place = _place(row, language)
+        place = explain_place(row, language)
         return say(language, "verdict.clearest", place=place, distance=f"{row.value:.4g}", time=time)
     value, bound = _amounts(row.condition, row.value, row.bound, language)
     return say(
         language,
         "verdict.nearest",
-        place=_place(row, language),
+        place=explain_place(row, language),
         quantity=_quantity(row.condition, language),
         value=value,
         bound=bound,
@@ -115,7 +115,7 @@ def _nearest(row: ConditionResult, language: Language) -> str:
 def _fact(violation: Violation, language: Language) -> str:
     """Returns what is broken, where and by how much."""
     row = violation.condition
-    place, quantity = _place(violation, language), _quantity(row, language)
+    place, quantity = explain_place(violation, language), _quantity(row, language)
     if row.signal == "frame":
         return say(language, "fact.frame", place=place, quantity=quantity)
     value, bound = _amounts(row, violation.value, violation.bound, language)
@@ -151,7 +151,12 @@ def _fault(row: Condition, language: Language) -> str:
     return say(language, "raises.fault", fault=row.fault.manual_name, cause=cause)
 
 
-def _place(found: ConditionResult | Violation, language: Language) -> str:
+def explain_place(found: ConditionResult | Violation, language: Language = "en") -> str:
+    """Returns whose value it is: "joint 2", "tool", "base and link 5".
+
+    Raises:
+        InvalidValueError: There is no such language.
+    """
     row, axis = found.condition, str(found.joint)
     if found.links is not None:
         first, second = (_link(number, language) for number in found.links)
