@@ -77,7 +77,7 @@ class CheckPanel:
         if row.links is not None:
             from rcilab.conformance.explain import explain_place
 
-            facts.append(explain_place(row, text.language))
+            facts.append(explain_place(row, "zh" if text.language == "zh" else "en"))
         facts.append(f"t = {row.time:.3f} s")
         fault = "" if condition.fault is None else f"<br>{esc(text('check.raises', fault=condition.fault.manual_name))}"
         return (
