@@ -191,26 +191,26 @@ def _solid(capsule: Capsule, link: int) -> Any:
 def _first_rising(description: RobotDescription) -> int:
     """Returns the first link that a joint can move up or down: those below only turn about the vertical."""
     axes = [joint.axis for joint in upright_joints(description)]
-    return next(number for number, axis in enumerate(axes, start=1) if axis[2] < _SLANT)
+    return next(number for number, axis in enumerate(axes, start=1) if abs(axis[2]) < _SLANT)
 
 
 def _levers(description: RobotDescription, bodies: Sequence[Sequence[Capsule]]) -> list[float]:
     """Returns how far from each joint's axis the arm beyond it reaches at most, wherever the later joints are, [m].
 
-    Link by link from the flange: what follows is kept as circles about the link's z axis, on which every joint lies;
-    a y joint sweeps them all into a ball around itself.
+    Link by link from the flange. What follows is kept as level rings: centre in the link's frame, radius, and thickness
+    all around. A z joint turns a ring about its axis; any other sweeps it into a ball, which is all thickness.
     """
     levers: list[float] = []
-    carried: list[tuple[float, float, float]] = []  # Distance from the z axis, height, radius; in the link's frame.
+    rings: list[tuple[float, float, float, float, float]] = []
     for number, joint in reversed(list(enumerate(upright_joints(description), start=1))):
         own = bodies[number] if number < description.n else [c for body in bodies[number:] for c in body]
-        ends = [(*point.tolist(), capsule.radius) for capsule in own for point in (capsule.start, capsule.end)]
-        if joint.axis[2] > _SLANT:
-            carried += [(hypot(x, y), z, radius) for x, y, z, radius in ends]
-            levers.append(max(rho + radius for rho, _, radius in carried))
+        rings += [(*point.tolist(), 0.0, c.radius) for c in own for point in (c.start, c.end)]
+        if abs(joint.axis[2]) > _SLANT:
+            rings = [(0.0, 0.0, z, hypot(x, y) + ring, radius) for x, y, z, ring, radius in rings]
+            levers.append(max(ring + radius for *_, ring, radius in rings))
         else:
-            later = [hypot(rho, z) + radius for rho, z, radius in carried]
-            levers.append(max(*later, *(hypot(x, z) + radius for x, _, z, radius in ends)))
-            carried = [(0.0, 0.0, max(*later, *(hypot(x, y, z) + radius for x, y, z, radius in ends)))]
-        carried = [(rho, z + float(joint.origin[2]), radius) for rho, z, radius in carried]
+            levers.append(max(hypot(abs(x) + ring, z) + radius for x, _, z, ring, radius in rings))
+            rings = [(0.0, 0.0, 0.0, 0.0, max(hypot(hypot(x, y) + ring, z) + r for x, y, z, ring, r in rings))]
+        dx, dy, dz = joint.origin.tolist()
+        rings = [(x + dx, y + dy, z + dz, ring, radius) for x, y, z, ring, radius in rings]
     return levers[::-1]
