@@ -21,7 +21,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from rcilab.arrays import Array, JointPath, JointVector, frozen
+from rcilab.arrays import Array, JointPath, JointVector, Vector3, frozen
 from rcilab.robots.description import RobotDescription
 from rcilab.robots.shapes import Capsule, build_shapes
 from rcilab.robots.upright import upright_joints
@@ -174,9 +174,15 @@ def _tree(description: RobotDescription) -> pin.Model:
     """Returns the joints between the upright link frames, as pinocchio walks them."""
     tree = pin.Model()
     for number, joint in enumerate(upright_joints(description), start=1):
-        kind = pin.JointModelRZ() if joint.axis[2] > _SLANT else pin.JointModelRY()
-        tree.addJoint(number - 1, kind, pin.SE3(np.eye(3), joint.origin.copy()), f"joint{number}")
+        tree.addJoint(number - 1, _kind(joint.axis), pin.SE3(np.eye(3), joint.origin.copy()), f"joint{number}")
     return tree
+
+
+def _kind(axis: Vector3) -> Any:
+    """Returns the fastest kind of joint about an axis."""
+    if axis[2] > _SLANT:
+        return pin.JointModelRZ()
+    return pin.JointModelRY() if axis[1] > _SLANT else pin.JointModelRevoluteUnaligned(axis.copy())
 
 
 def _solid(capsule: Capsule, link: int) -> Any:
