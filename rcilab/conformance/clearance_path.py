@@ -80,8 +80,10 @@ def clearance_path(
         for row in chosen.tolist():
             look(row)
         looked = np.sort(np.concatenate((looked, chosen)))
-    straight = np.interp(np.arange(len(rows)), looked, distance[looked])
-    return _by_cycle(np.clip(straight, low, high), links[looked[between]], cycles, len(looked))
+    straight = np.clip(np.interp(np.arange(len(rows)), looked, distance[looked]), low, high)
+    known = np.maximum(straight, np.nextafter(distance[looked].min(), np.inf))  # The smallest one is that of a look.
+    known[looked] = distance[looked]
+    return _by_cycle(known, links[looked[between]], cycles, len(looked))
 
 
 def in_between(start: JointVector, end: JointVector, levers: Array) -> JointPath:
