@@ -31,10 +31,11 @@ def low_motion(model, seed: int, speed: float = 1.0, part: float = 0.3) -> Motio
     """A motion somewhere in the joints' ranges whose middle is close to a bound more often than not."""
     rng = np.random.default_rng(seed)
     limits = model.limits.joint
-    table = 0.95 * rng.uniform(limits.lower, limits.upper, (60, model.n))
+    rim = 0.02 * (limits.upper - limits.lower)
+    table = rng.uniform(limits.lower + rim, limits.upper - rim, (60, model.n))
     near = np.abs(model.clearance(table, ASKED).distance - 0.01).argmin()
-    way = part * (0.95 * rng.uniform(limits.lower, limits.upper) - table[near])
-    ends = np.clip([table[near] - way / 2.0, table[near] + way / 2.0], 0.98 * limits.lower, 0.98 * limits.upper)
+    way = part * (rng.uniform(limits.lower + rim, limits.upper - rim) - table[near])
+    ends = np.clip([table[near] - way / 2.0, table[near] + way / 2.0], limits.lower + rim, limits.upper - rim)
     return plan_joint(model, *ends, speed=speed)
 
 
