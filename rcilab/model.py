@@ -28,11 +28,13 @@ from rcilab.kinematics.workspace import Workspace, sample_workspace
 from rcilab.limits import Limits
 from rcilab.robots import RobotDescription, describe_robot
 from rcilab.safety_box import SafetyBox, active_box
+from rcilab.safety_distance import STANDARD_DISTANCE, SafetyDistance
 from rcilab.spatial import IDENTITY, Pose
 
 if TYPE_CHECKING:
     from rcilab.dynamics.friction import JointFriction
     from rcilab.dynamics.rigid_body import RigidBody, TorqueTerms
+    from rcilab.kinematics.collision import Clearance, CollisionGeometry
 
 __all__ = ["RobotModel", "load_model", "require_model"]
 
@@ -317,6 +319,35 @@ class RobotModel(MovingArm):
         if not isinstance(law, JointFriction):
             raise InvalidValueError("friction", described(friction), "is neither True nor False nor a JointFriction")
         return terms.with_friction(law.torque(speeds))
+
+    def clearance(self, q: ArrayLike, distance: SafetyDistance = STANDARD_DISTANCE) -> Clearance:
+        """Returns how near the links come to each other and to the floor, and which: distances between their capsules.
+
+        Neighbouring links always touch and are not compared, nor is the tool with the last two links. The capsules are
+        those of the URDF; rims of caps and collars stand out of them by 12 mm at most.
+
+        Args:
+            q: Joint angles, shape (n,) or (N, n), [rad]; limits are not looked at.
+            distance: Where the floor is, and whether the tool has a body; what it asks for is not looked at.
+
+        Returns:
+            `.distance`, shape () or (N,), [m], below 0 where they overlap; `.links`, the numbers of the two.
+
+        Raises:
+            InvalidValueError: q has another shape or is not finite.
+        """
+        from rcilab.kinematics.collision import Clearance, ClearanceQuery
+
+        angles = as_rows(q, self.n, "q", "rad")
+        found = ClearanceQuery(self.collision_geometry(distance)).path(np.atleast_2d(angles))
+        return found if angles.ndim > 1 else Clearance(found.distance[0], found.links[0])
+
+    def collision_geometry(self, distance: SafetyDistance = STANDARD_DISTANCE) -> CollisionGeometry:
+        """Returns what `clearance` compares, for a floor and a tool with or without a body."""
+        from rcilab.kinematics.collision import collision_geometry
+
+        tool = self.T_flange_tool.parts[1]
+        return collision_geometry(self.description, tool, distance.floor_height, distance.tool_radius)
 
     @cached_property
     def rigid_body(self) -> RigidBody:

@@ -26,6 +26,7 @@ LAYERS = [  # From the bottom. A part imports from lines below its own, and from
         "realtime",
         "awake",
         "safety_box",
+        "safety_distance",
         "closing",
         "cycle_file",
     },
@@ -47,6 +48,7 @@ HEIGHT = {part: height for height, parts in enumerate(LAYERS) for part in parts}
 
 FENCES = {
     "pinocchio": ("kinematics/", "dynamics/", "model.py", "bench/compare/"),  # There it is one of the compared.
+    "coal": ("kinematics/collision.py",),
     "eigenpy": ("dynamics/symmetric_solver.py",),
     "ruckig": ("motion/_ruckig.py",),
     "mujoco": ("controller/mujoco_plant.py",),
@@ -100,7 +102,7 @@ def test_no_module_is_outside_the_layers() -> None:
 
 
 def test_importing_the_package_loads_no_heavy_library() -> None:
-    heavy = ["pinocchio", "mujoco", "viser", "ruckig", "matplotlib", "meshcat", "yourdfpy", "IPython"]
+    heavy = ["pinocchio", "coal", "mujoco", "viser", "ruckig", "matplotlib", "meshcat", "yourdfpy", "IPython"]
     code = f"import sys, rcilab; print(*[name for name in {heavy} if name in sys.modules])"
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
     assert result.stdout.split() == []

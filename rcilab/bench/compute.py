@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,11 +12,15 @@ import numpy as np
 from rcilab.arrays import Array
 from rcilab.bench.measure import Measurement, summarise, time_calls
 from rcilab.conformance.check import check
+from rcilab.conformance.clearance_path import clearance_path
+from rcilab.conformance.conditions import MOTION_CONDITIONS
 from rcilab.errors import UnreachableError
+from rcilab.kinematics.collision import ClearanceQuery
 from rcilab.model import RobotModel, load_model
 from rcilab.motion.joint import plan_joint
 from rcilab.motion.motion import Motion
 from rcilab.motion.online import Jog
+from rcilab.safety_distance import ADVISED_DISTANCE
 
 _ROBOT = "xMatePro7"
 _SEED = 20
@@ -80,18 +85,42 @@ def bench_plan_joint() -> Measurement:
 
 
 def bench_check() -> Measurement:
-    """The judgement of a 7-joint motion of 10 s; each time of a fresh one, so that nothing is cached."""
+    """The judgement of a 7-joint motion of 10 s while somebody drags: all but collisions."""
     model = load_model(_ROBOT)
+    return _bench_check("check", lambda motion: check(motion, model, distance=None), model, 10.0)
+
+
+def bench_check_full() -> Measurement:
+    """The judgement of a 7-joint motion of 10 s by every condition, torques and collisions too."""
+    model = load_model(_ROBOT)
+    found = _bench_check("check_full", lambda motion: check(motion, model), model, 150.0)
+    geometry, motion = model.collision_geometry(), motion_of(model, 10.0)
+    query, looks = ClearanceQuery(geometry), 0
+    for ask in (query.links, query.floor):
+        looks += clearance_path(ask, motion.q, motion.start, geometry.levers, (0.0, ADVISED_DISTANCE)).looks
+    travel = float((np.abs(np.diff(motion.q, axis=0)) @ geometry.levers).sum())
+    return replace(found, note=f"{found.note}; {looks} looks for collisions on {travel:.1f} m of travel")
+
+
+def bench_check_joint_rows() -> Measurement:
+    """The judgement of a 7-joint motion of 10 s by the conditions on joint angles alone."""
+    model = load_model(_ROBOT)
+    judge = check(motion_of(model, 1.0), model, distance=None).judge
+    rows = tuple(row for row in MOTION_CONDITIONS if row.signal == "joint")
+    return _bench_check("check_joint_rows", lambda motion: judge(motion, rows), model, 5.0)
+
+
+def _bench_check(name: str, call: Callable[[Motion], object], model: RobotModel, target: float) -> Measurement:
+    """Measures a judgement, each time of a fresh motion, so that nothing is cached, and how it grows with length."""
     motions = [motion_of(model, 10.0) for _ in range(30)]
-    times = time_calls(lambda motion: check(motion, model), motions, warm_up=0)
-    costs = []
-    for duration in (1.0, 3.0, 10.0, 30.0):
-        motion = motion_of(model, duration)
-        costs.append(
-            f"{motion.duration:.0f} s {1e3 * time_calls(lambda m: check(m, model), [motion], warm_up=0)[0]:.1f} ms"
-        )
+    times = time_calls(call, motions, warm_up=0)
+    costs: list[str] = []
+    for duration in (1.0, 10.0, 100.0):
+        some = [motion_of(model, duration) for _ in range(5)]
+        median = 1e3 * float(np.median(time_calls(call, some, warm_up=0)))
+        costs.append(f"{some[0].duration:.0f} s {median:.1f} ms")
     note = f"{_ROBOT}, {len(motions[0].times)} samples; by length: {', '.join(costs)}"
-    return summarise("check", times, "ms", 10.0, note)
+    return summarise(name, times, "ms", target, note)
 
 
 def bench_jog() -> Measurement:

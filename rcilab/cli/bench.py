@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from rcilab.bench.measure import Measurement
 
 BENCHES = (
-    *("forward", "inverse", "inverse_batch", "feasible_arcs", "plan_joint", "check"),
+    *("forward", "inverse", "inverse_batch", "feasible_arcs", "plan_joint"),
+    *("check", "check_full", "check_joint_rows"),
     *("controller_ideal", "controller_mujoco", "controller_cartesian", "controller_impedance", "client_answer"),
     *("jog", "plan_line", "plan_arc", "replan"),
     *("drag", "import", "start", "state_period", "control_loop"),
@@ -130,6 +131,8 @@ def _bench(name: str, seconds: float) -> Callable[[], Measurement]:
         "feasible_arcs": compute.bench_feasible_arcs,
         "plan_joint": compute.bench_plan_joint,
         "check": compute.bench_check,
+        "check_full": compute.bench_check_full,
+        "check_joint_rows": compute.bench_check_joint_rows,
         "jog": compute.bench_jog,
     }[name]
 

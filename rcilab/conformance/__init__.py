@@ -7,6 +7,8 @@ from rcilab.conformance.breach import Breach, describe_breaches
 from rcilab.conformance.cartesian_monitor import CartesianMonitor
 from rcilab.conformance.certificate import Certificate, verify_certificate
 from rcilab.conformance.check import check
+from rcilab.conformance.clearance_conditions import clearance_conditions
+from rcilab.conformance.clearance_monitor import ClearanceMonitor
 from rcilab.conformance.condition import Condition
 from rcilab.conformance.conditions import CONDITIONS, CYCLE_CONDITIONS, explain_fault, find_condition
 from rcilab.conformance.limit_tables import LimitTable, cartesian_limits
@@ -24,6 +26,7 @@ __all__ = [
     "Breach",
     "CartesianMonitor",
     "Certificate",
+    "ClearanceMonitor",
     "Condition",
     "ConditionResult",
     "JointMonitor",
@@ -36,6 +39,7 @@ __all__ = [
     "Violation",
     "cartesian_limits",
     "check",
+    "clearance_conditions",
     "describe_breaches",
     "explain_fault",
     "find_condition",

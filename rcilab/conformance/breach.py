@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from rcilab.conformance.condition import Condition
 from rcilab.faults import Fault
+
+if TYPE_CHECKING:
+    from rcilab.kinematics.collision import LinkPair
 
 
 class Breach(NamedTuple):
@@ -19,11 +22,15 @@ class Breach(NamedTuple):
     """In the condition's unit."""
     bound: float
     """The bound that it passed."""
+    links: LinkPair | None = None
+    """Between whom, for a distance."""
 
     @property
     def text(self) -> str:
         """The fact in words: "joint 2: commanded velocity 2.3 rad/s passes 2.175 rad/s"."""
         row = self.condition
+        if row.is_clearance:
+            return f"{self.links}: {row.quantity} {self.value:.4g} m is not above {self.bound:g} m"
         if row.signal == "position":
             return f"{row.place(0)}: {row.quantity} is {self.value:.4g} m outside the safety box"
         if row.signal == "frame":

@@ -18,9 +18,12 @@ from rcilab.errors import CertificateError, InvalidValueError
 from rcilab.model import RobotModel, require_model
 from rcilab.motion.motion import Motion, require_motion
 from rcilab.safety_box import SafetyBox
+from rcilab.safety_distance import SafetyDistance
 
 NO_SAFETY_BOX = "none"
 """The part of a certificate that says that the motion was judged without a safety box."""
+NOT_JUDGED = "not judged"
+"""The part of a certificate that says that nobody looked for collisions: no hand-off takes it."""
 
 MODEL_PARTS = ("model", "limits", "tool", "load")
 
@@ -36,7 +39,7 @@ class Certificate:
 
     @property
     def parts(self) -> Mapping[str, str]:
-        """Fingerprints by name: motion, model, limits, tool, load, safety box, start state."""
+        """Fingerprints by name: motion, model, limits, tool, load, safety box, safety distance, start state."""
         return MappingProxyType(dict(self.entries))
 
     @property
@@ -45,7 +48,12 @@ class Certificate:
         return hashlib.sha256(repr(self.entries).encode()).hexdigest()
 
     def verify(
-        self, motion: Motion, model: RobotModel, start_q: ArrayLike | StartState, box: SafetyBox | None = None
+        self,
+        motion: Motion,
+        model: RobotModel,
+        start_q: ArrayLike | StartState,
+        box: SafetyBox | None = None,
+        distance: SafetyDistance | None = None,
     ) -> None:
         """Makes sure that this certificate is for this motion on this arm from this start.
 
@@ -55,6 +63,8 @@ class Certificate:
             start_q: Commanded joint angles now (`state.q_c`), shape (n,), [rad]; or a StartState for a moving arm.
             box: The safety box that is in force now. Where there is none, or it is not active, a motion that was
                 judged inside a box is as good as one that was not.
+            distance: How far the links must stay from each other and from the floor here; None takes whichever it was
+                judged with. One that was judged with none at all is refused.
 
         Raises:
             CertificateError: Something is not what was judged; `.changed` and the message name it.
@@ -63,12 +73,18 @@ class Certificate:
         require_motion(motion)
         require_model(model)
         start = as_start(start_q, len(self.start_q)) if motion.n == len(self.start_q) else None
-        now = dict(issue_certificate(motion, model, start, box).entries) if start is not None else {"motion": ""}
+        now = {"motion": ""}
+        if start is not None:
+            now = dict(issue_certificate(motion, model, start, box, distance).entries)
         changed = [name for name, fingerprint in self.entries if now.get(name, fingerprint) != fingerprint]
         if start is not None and "start state" in changed and self._same_start(start):
             changed.remove("start state")
         if "safety box" in changed and (box is None or not box.active):
             changed.remove("safety box")
+        if "safety distance" in changed and distance is None:
+            changed.remove("safety distance")
+        if self.parts.get("safety distance") == NOT_JUDGED and "safety distance" not in changed:
+            changed.append("safety distance")
         if changed:
             raise CertificateError(self._reason(changed, start), changed)
 
@@ -96,13 +112,24 @@ class Certificate:
                 "the certificate is stale: it does not cover the safety box that is in force; check the motion again "
                 "with box=..., the one that set_cartesian_limit was given"
             )
+        if changed == ["safety distance"]:
+            if self.parts["safety distance"] == NOT_JUDGED:
+                return "nobody looked for collisions: check the motion again, without distance=None"
+            return (
+                "the certificate is stale: it does not cover the safety distance that is asked for here; check the "
+                "motion again with that distance=..."
+            )
         what = " and ".join(filter(None, (", ".join(changed[:-1]), changed[-1])))
         verb = "has" if len(changed) == 1 else "have"
         return f"the certificate is stale: {what} {verb} changed since the motion was judged; check it again"
 
 
 def issue_certificate(
-    motion: Motion, model: RobotModel, start: StartState, box: SafetyBox | None = None
+    motion: Motion,
+    model: RobotModel,
+    start: StartState,
+    box: SafetyBox | None = None,
+    distance: SafetyDistance | None = None,
 ) -> Certificate:
     """Returns the certificate of a motion; only a report that is ok may hand it out."""
     prints = model.fingerprint
@@ -110,6 +137,7 @@ def issue_certificate(
         "motion": motion.fingerprint,
         **{name: prints[name] for name in MODEL_PARTS},
         "safety box": _box_fingerprint(box),
+        "safety distance": _distance_fingerprint(distance),
         "start state": _start_fingerprint(start),
     }
     return Certificate(tuple(parts.items()), tuple(start.q.tolist()))
@@ -121,6 +149,7 @@ def verify_certificate(
     model: RobotModel,
     start_q: ArrayLike | StartState,
     box: SafetyBox | None = None,
+    distance: SafetyDistance | None = None,
 ) -> None:
     """Makes sure that there is a certificate and that it is for this; the gate in front of every hand-off.
 
@@ -137,7 +166,7 @@ def verify_certificate(
             ("certificate",),
         )
     require_certificate(certificate)
-    certificate.verify(motion, model, start_q, box)
+    certificate.verify(motion, model, start_q, box, distance)
 
 
 def require_certificate(certificate: object) -> Certificate:
@@ -156,6 +185,10 @@ def require_certificate(certificate: object) -> Certificate:
 def _start_fingerprint(start: StartState) -> str:
     state = np.stack([start.q, start.dq, start.ddq]) + 0.0  # Makes -0.0 and 0.0 the same bytes.
     return hashlib.sha256(state.tobytes()).hexdigest()
+
+
+def _distance_fingerprint(distance: SafetyDistance | None) -> str:
+    return NOT_JUDGED if distance is None else hashlib.sha256(repr(distance).encode()).hexdigest()
 
 
 def _box_fingerprint(box: SafetyBox | None) -> str:

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from rcilab.arrays import Array, described
 from rcilab.clock import CYCLE_TIME
 from rcilab.conformance.certificate import issue_certificate
+from rcilab.conformance.clearance_conditions import FAR, clearance_conditions
 from rcilab.conformance.condition import Condition
 from rcilab.conformance.conditions import MOTION_CONDITIONS
 from rcilab.conformance.report import ConditionResult, Report, Violation
@@ -22,6 +23,7 @@ from rcilab.errors import InvalidValueError
 from rcilab.model import RobotModel, require_model
 from rcilab.motion.motion import Motion, require_motion
 from rcilab.safety_box import SafetyBox
+from rcilab.safety_distance import STANDARD_DISTANCE, SafetyDistance
 
 
 def check(
@@ -30,13 +32,18 @@ def check(
     *,
     start: ArrayLike | StartState | None = None,
     box: SafetyBox | None = None,
+    distance: SafetyDistance | None = STANDARD_DISTANCE,
 ) -> Report:
-    """Returns what the robot would say to this motion.
+    """Returns what the robot would say to this motion, and whether its links keep their distance.
 
     Every row of the 1 ms grid is judged by backward differences, as the controller does it: the arm comes from the
     start state, and after the last row the controller holds it. To an arm that moves, row 0 is the command it has
     already had, and row 1 the first new one. Torques, which the manual recommends to bound, are those of the model
     with its tool and load and without gravity, as the manual counts commanded torques (4.4).
+
+    No controller looks for collisions, so the rows on distances are ours: links that touch each other or the floor are
+    refused, 20 mm are recommended. Distances are those between capsules, looked at so often that no point of a link
+    moves more than 5 mm in between, and in every cycle where they come near a bound. They take most of the time.
 
     Args:
         motion: The motion.
@@ -45,6 +52,8 @@ def check(
             an arm that stands where the motion starts.
         box: Where the tool shall stay, as `set_cartesian_limit` tells the robot; None, or one that is not active, is
             not judged.
+        distance: How far links shall stay from each other and from the floor, and where that is. None does not judge
+            it: for planning while somebody drags, as no hand-off takes the certificate.
 
     Raises:
         InvalidValueError: The motion is for another number of joints, the start is no state of this arm,
@@ -56,17 +65,27 @@ def check(
         raise InvalidValueError("motion", motion, f"is for {motion.n} joints, {model.name} has {model.n}")
     if box is not None and not isinstance(box, SafetyBox):  # pyright: ignore[reportUnnecessaryIsInstance]
         raise InvalidValueError("box", described(box), "is no SafetyBox; SafetyBox(size=..., T_base_box=...) makes one")
+    if distance is not None and not isinstance(distance, SafetyDistance):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise InvalidValueError("distance", described(distance), "is no SafetyDistance; SafetyDistance(links=...) is")
     state = as_start(motion.start if start is None else start, model.n)
     box = box if box is not None and box.active else None
     rows = MOTION_CONDITIONS if box is None else (*MOTION_CONDITIONS, CARTESIAN_POSITION)
-    return _report(motion, rows, model=model, start=state, box=box)
+    if distance is not None:
+        rows = (*rows, *clearance_conditions(distance))
+    return _report(motion, rows, model=model, start=state, box=box, distance=distance)
 
 
 def _report(
-    motion: Motion, rows: tuple[Condition, ...], *, model: RobotModel, start: StartState, box: SafetyBox | None
+    motion: Motion,
+    rows: tuple[Condition, ...],
+    *,
+    model: RobotModel,
+    start: StartState,
+    box: SafetyBox | None,
+    distance: SafetyDistance | None,
 ) -> Report:
     """Returns the verdict of some of the conditions on a motion for this arm."""
-    judge = _Judge(motion, model, start, box)
+    judge = _Judge(motion, model, start, box, distance)
     results = [judge.judge(row) for row in rows]
     found = sorted((v for _, violations in results for v in violations), key=lambda v: -v.ratio)
     return Report(
@@ -76,18 +95,25 @@ def _report(
         warnings=tuple(v for v in found if v.condition.necessity == "recommended"),
         motion=motion,
         start=start,
-        issue=partial(issue_certificate, motion, model, start, box),
-        judge=partial(_report, model=model, start=start, box=box),
+        issue=partial(issue_certificate, motion, model, start, box, distance),
+        judge=partial(_report, model=model, start=start, box=box, distance=distance),
     )
 
 
 class _Judge:
     """Compares one motion's signals with the bounds."""
 
-    def __init__(self, motion: Motion, model: RobotModel, start: StartState, box: SafetyBox | None) -> None:
+    def __init__(
+        self,
+        motion: Motion,
+        model: RobotModel,
+        start: StartState,
+        box: SafetyBox | None,
+        distance: SafetyDistance | None,
+    ) -> None:
         self._motion = motion
         self._limits = model.limits
-        self._signals = MotionSignals(motion, model, start, box)
+        self._signals = MotionSignals(motion, model, start, box, distance)
         self._depth = min(box.size) / 2.0 if box is not None else 1.0
 
     def judge(self, condition: Condition) -> tuple[ConditionResult, list[Violation]]:
@@ -108,6 +134,7 @@ class _Judge:
             joint=_axis(condition, column),
             time=first_time + row * CYCLE_TIME,
             broken=0 if bad is None else int(np.count_nonzero(bad)),
+            links=self._signals.links(condition, row),
         )
         if bad is None:
             return result, []
@@ -121,6 +148,8 @@ class _Judge:
         """Returns how much of the way from the middle of the allowed range to the bound is used."""
         if not np.isfinite(lower).all():  # The box: 0 as deep inside as can be, 1 on its faces.
             return np.maximum(1.0 + (values - upper) / self._depth, 0.0)
+        if not np.isfinite(upper).all():  # A distance: 0 far away, 1 at its bound.
+            return np.maximum(1.0 + (lower - values) / FAR, 0.0)
         middle = (lower + upper) / 2.0
         ratio = np.abs(values - middle if middle.any() else values)
         ratio /= (upper - lower) / 2.0
@@ -144,6 +173,7 @@ class _Judge:
             bound=_passed(value, *condition.bounds(self._limits), column),
             ratio=worst,
             advice=advice,
+            links=self._signals.links(condition, row),
         )
 
 

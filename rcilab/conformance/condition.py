@@ -24,11 +24,14 @@ Signal: TypeAlias = Literal[
     "rotation",
     "arm_angle",
     "frame",
+    "link_distance",
+    "floor_distance",
     "external_torque",
     "lost_commands",
 ]
 """What is judged: every joint's angle or torque; the tool's position, the norms of its translation and rotation; the
-arm angle; the tool's pose as a whole; external torques; commands that did not come."""
+arm angle; the tool's pose as a whole; the smallest distance between links, or from the floor; external torques;
+commands that did not come."""
 
 Bounds: TypeAlias = tuple[Array, Array]
 """Lower and upper bound, each of shape (n,) for joints and (1,) for anything else."""
@@ -37,6 +40,14 @@ AnyLimits: TypeAlias = Limits | JointLimits
 """All limits of an arm; a condition on joints makes do with those of the joints."""
 
 MANUAL = "RCI manual V1.3.1"
+
+_PLACES: dict[Signal, str] = {
+    "arm_angle": "elbow",
+    "link_distance": "links",
+    "floor_distance": "links",
+    "lost_commands": "network",
+}
+"""Whose value it is; anything else is the tool's."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -55,7 +66,7 @@ class Condition:
     source: str
     """Where condition and bound come from."""
     fault: Fault | None
-    """What the controller raises; None for a recommended condition."""
+    """What the controller raises; None for a recommended condition, and for one that no controller knows of."""
     stage: Stage
     """When it is judged."""
     signal: Signal = "joint"
@@ -71,15 +82,20 @@ class Condition:
         return self.id.startswith("measured.")
 
     @property
+    def is_clearance(self) -> bool:
+        """Whether it judges distances, which no controller does: rcilab's own."""
+        return self.signal in ("link_distance", "floor_distance")
+
+    @property
     def is_per_joint(self) -> bool:
         """Whether every joint has a value and a bound of its own."""
         return self.signal in ("joint", "torque", "external_torque")
 
     def place(self, axis: int) -> str:
-        """Returns whose value it is, in words: "joint 2", "tool", "elbow", "network"."""
+        """Returns whose value it is, in words: "joint 2", "tool", "elbow", "links", "network"."""
         if self.is_per_joint:
             return f"joint {axis}"
-        return {"arm_angle": "elbow", "lost_commands": "network"}.get(self.signal, "tool")
+        return _PLACES.get(self.signal, "tool")
 
     def __repr__(self) -> str:
         return f"<Condition {self.id}: {self.formula} ({self.necessity})>"

@@ -1,4 +1,4 @@
-"""The manual's conditions as one table: check, monitors, report, plots and lessons read these rows.
+"""The manual's conditions, and our own on distances, as one table: check, monitors, report and lessons read these rows.
 
 A condition is a quantity between two bounds, strictly, as the manual prints it (4.1 to 4.3): `lower < value < upper`.
 The necessary ones are judged on backward differences at 1 ms, as the controller does it, and breaking one stops the
@@ -14,6 +14,7 @@ from typing import Literal
 import numpy as np
 
 from rcilab.arrays import JointVector
+from rcilab.conformance.clearance_conditions import CLEARANCE_CONDITIONS
 from rcilab.conformance.condition import MANUAL, AnyLimits, Bounds, Condition, joint_limits
 from rcilab.conformance.measured_conditions import EXTERNAL_TORQUE, LOST_COMMANDS, MEASURED_CONDITIONS
 from rcilab.conformance.tool_conditions import CARTESIAN_FRAME, TOOL_CONDITIONS, TORQUE_CONDITIONS
@@ -151,13 +152,14 @@ MOTION_CONDITIONS: tuple[Condition, ...] = (
     _recommended("end", "velocity at the end", "dq_c = 0", 1, REST_VELOCITY_TOLERANCE),
     _recommended("end", "acceleration at the end", "ddq_c = 0", 2, REST_ACCELERATION_TOLERANCE),
 )
-"""What `check` judges of every joint motion, in the manual's order; with a safety box also "cartesian.position"."""
+"""What `check` judges of every joint motion, in the manual's order; there may be the box and distances, too."""
 
 CYCLE_CONDITIONS = JOINT_CONDITIONS
 """What curves of joint angles are drawn against."""
 
 CONDITIONS: tuple[Condition, ...] = (
     *MOTION_CONDITIONS,
+    *CLEARANCE_CONDITIONS,
     *TOOL_CONDITIONS,
     CARTESIAN_FRAME,
     *TORQUE_CONDITIONS,
@@ -165,7 +167,8 @@ CONDITIONS: tuple[Condition, ...] = (
     EXTERNAL_TORQUE,
     LOST_COMMANDS,
 )
-"""Every condition: on joint motion (4.1), on tool poses (4.2), on torques (4.3), on what the arm does (4.6)."""
+"""Every condition: on joint motion (4.1), on distances (ours), on tool poses (4.2), on torques (4.3), on what the arm
+does (4.6)."""
 
 
 def find_condition(name: str) -> Condition:

@@ -57,7 +57,7 @@ def explain_slow_down(result: SlowDown, language: Language = "en") -> str:
     if row is None:
         text = say(language, "slow_down.none")
     else:
-        place, what = _place(row.condition, row.joint, language), _quantity(row.condition, language)
+        place, what = explain_place(row, language), _quantity(row.condition, language)
         if result.obstacle is not None:
             time = f"{row.time / (1.0 if result.obstacle == 'position' else result.at_most):.3f}"
             key = f"slow_down.{result.obstacle}"
@@ -81,7 +81,9 @@ def explain_slow_down(result: SlowDown, language: Language = "en") -> str:
 
 def _verdict(report: Report, language: Language) -> str:
     if not report.ok:
-        parts = [say(language, "verdict.broken", count=str(len(report.violations)))]
+        is_noticed = any(violation.fault is not None for violation in report.violations)
+        key = "verdict.broken" if is_noticed else "verdict.collides"
+        parts = [say(language, key, count=str(len(report.violations)))]
     else:
         parts = [say(language, "verdict.ok"), _nearest(report.worst, language)]
     if report.warnings:
@@ -94,11 +96,14 @@ def _nearest(row: ConditionResult, language: Language) -> str:
     time = f"{row.time:.3f}"
     if row.condition.signal == "position":
         return say(language, "verdict.deepest", depth=f"{max(-row.value, 0.0):.4g}", time=time)
+    if row.condition.is_clearance:
+        place = explain_place(row, language)
+        return say(language, "verdict.clearest", place=place, distance=f"{row.value:.4g}", time=time)
     value, bound = _amounts(row.condition, row.value, row.bound, language)
     return say(
         language,
         "verdict.nearest",
-        place=_place(row.condition, row.joint, language),
+        place=explain_place(row, language),
         quantity=_quantity(row.condition, language),
         value=value,
         bound=bound,
@@ -110,12 +115,16 @@ def _nearest(row: ConditionResult, language: Language) -> str:
 def _fact(violation: Violation, language: Language) -> str:
     """Returns what is broken, where and by how much."""
     row = violation.condition
-    place, quantity = _place(row, violation.joint, language), _quantity(row, language)
+    place, quantity = explain_place(violation, language), _quantity(row, language)
     if row.signal == "frame":
         return say(language, "fact.frame", place=place, quantity=quantity)
     value, bound = _amounts(row, violation.value, violation.bound, language)
     if row.signal == "position":
         return say(language, "fact.box", place=place, quantity=quantity, value=value)
+    if row.is_clearance:
+        key = "fact.overlap" if violation.value < 0.0 else "fact.clearance"
+        depth = _one(row, abs(violation.value), language)
+        return say(language, key, place=place, quantity=quantity, value=value, bound=bound, depth=depth)
     if row.stage != "throughout":
         limit = _one(row, abs(violation.bound), language)
         return say(language, "fact.rest", place=place, quantity=quantity, value=value, bound=limit)
@@ -137,13 +146,29 @@ def _when(violation: Violation, language: Language) -> str:
 
 def _fault(row: Condition, language: Language) -> str:
     if row.fault is None:
-        return say(language, "raises.nothing")
+        return say(language, "raises.nothing" if row.necessity == "recommended" else "raises.unnoticed")
     cause = say(language, f"fault.{row.fault.name}")
     return say(language, "raises.fault", fault=row.fault.manual_name, cause=cause)
 
 
-def _place(row: Condition, axis: int, language: Language) -> str:
-    return say(language, f"place.{'joint' if row.is_per_joint else row.place(axis)}", axis=str(axis))
+def explain_place(found: ConditionResult | Violation, language: Language = "en") -> str:
+    """Returns whose value it is: "joint 2", "tool", "base and link 5".
+
+    Raises:
+        InvalidValueError: There is no such language.
+    """
+    row, axis = found.condition, str(found.joint)
+    if found.links is not None:
+        first, second = (_link(number, language) for number in found.links)
+        return say(language, "place.pair", first=first, second=second)
+    return say(language, f"place.{'joint' if row.is_per_joint else row.place(found.joint)}", axis=axis)
+
+
+def _link(number: int, language: Language) -> str:
+    from rcilab.kinematics.collision import FLOOR, TOOL
+
+    key = {FLOOR: "floor", TOOL: "tool", 0: "base"}.get(number, "link")
+    return say(language, f"place.{key}", number=str(number))
 
 
 def _quantity(row: Condition, language: Language) -> str:

@@ -17,6 +17,7 @@ from rcilab.motion.motion import Motion
 
 if TYPE_CHECKING:
     from rcilab.conformance.slow_down import SlowDown
+    from rcilab.kinematics.collision import LinkPair
 
 LISTED = 8  # Violations printed in full; a thousand sentences help nobody.
 
@@ -39,6 +40,8 @@ class ConditionResult:
     """When, [s] since the start of the motion."""
     broken: int
     """Number of samples that break the condition, over all joints."""
+    links: LinkPair | None = None
+    """Between whom the worst distance is; None for anything that is no distance."""
 
     @property
     def ok(self) -> bool:
@@ -62,7 +65,7 @@ class ConditionResult:
 
     @property
     def fault(self) -> Fault | None:
-        """What the controller raises when it is broken; None for a recommended condition."""
+        """What the controller raises when it is broken; None for what it only recommends, or does not know of."""
         return self.condition.fault
 
     @property
@@ -72,8 +75,8 @@ class ConditionResult:
 
     @property
     def place(self) -> str:
-        """Whose value it is: "joint 2", or "tool"."""
-        return self.condition.place(self.joint)
+        """Whose value it is: "joint 2", "tool", or "base and link 5"."""
+        return str(self.links) if self.links else self.condition.place(self.joint)
 
     @property
     def texts(self) -> tuple[str, str, str]:
@@ -106,6 +109,7 @@ class Violation:
         bound: The bound it passes.
         ratio: As in ConditionResult; 1 is the bound.
         advice: What to do about it.
+        links: Between whom the worst distance is; None for anything that is no distance.
     """
 
     condition: Condition
@@ -126,11 +130,18 @@ class Violation:
     """As in ConditionResult; 1 is the bound."""
     advice: str
     """What to do about it."""
+    links: LinkPair | None = None
+    """Between whom the worst distance is; None for anything that is no distance."""
 
     @property
     def fault(self) -> Fault | None:
-        """What the controller raises; None for a recommended condition."""
+        """What the controller raises; None for what it only recommends, or does not know of."""
         return self.condition.fault
+
+    @property
+    def place(self) -> str:
+        """Whose value it is: "joint 2", "tool", or "base and link 5"."""
+        return str(self.links) if self.links else self.condition.place(self.joint)
 
     def __repr__(self) -> str:
         return f"<Violation: {self}>"
@@ -139,7 +150,7 @@ class Violation:
         row = self.condition
         lasting = f" and for {self.count} ms" if self.count > 1 else ""
         when = f" at t = {self.time:.3f} s{lasting}" if row.stage == "throughout" else ""
-        return f"{row.place(self.joint)}: {self._what()}{when} ({row.necessity} condition); {self.advice}"
+        return f"{self.place}: {self._what()}{when} ({row.necessity} condition); {self.advice}"
 
     def _what(self) -> str:
         """Returns quantity, value and bound in words."""
@@ -149,6 +160,9 @@ class Violation:
             return f"{row.quantity} is {value} {row.unit}, not 0"
         if row.signal == "position":
             return f"{row.quantity} is {self.value:.4g} m outside the safety box"
+        if row.is_clearance:
+            overlap = ", they overlap," if self.value < 0.0 else ""
+            return f"{row.quantity} {value} m{overlap} is not above {bound} m"
         if row.unit == "rad":
             return f"{row.quantity} {with_degrees(self.value, value)} passes {with_degrees(self.bound, bound)}"
         return f"{row.quantity} {value} {row.unit} exceeds {bound.lstrip('-')} {row.unit}"
@@ -164,7 +178,7 @@ class Report:
         title: Which motion on which arm, in words.
         rows: One ConditionResult a condition, in the manual's order: worst value, bound, joint and time.
         worst: The row of the necessary condition nearest to, or farthest past, its bound.
-        violations: Necessary conditions that are broken, worst first: the robot would stop.
+        violations: Necessary conditions that are broken, worst first: the robot would stop, or hit itself or the floor.
         warnings: Recommended conditions that are broken, worst first.
         motion: What was judged.
         start: The state of the arm that it was judged from.
@@ -177,7 +191,7 @@ class Report:
     rows: tuple[ConditionResult, ...]
     """One a condition, in the manual's order."""
     violations: tuple[Violation, ...]
-    """Necessary conditions that are broken, worst first: the robot would stop."""
+    """Necessary conditions that are broken, worst first: the robot would stop, or hit itself or the floor."""
     warnings: tuple[Violation, ...]
     """Recommended conditions that are broken, worst first."""
     motion: Motion
@@ -276,11 +290,14 @@ class Report:
         worst = self.worst
         if self.ok:
             near = f"{worst.condition.quantity} of {worst.place}, {share(worst.ratio)} of its bound"
+            if worst.condition.is_clearance:
+                near = f"{worst.place}, {worst.value:.4g} m apart"
             advice = f"; {_plural(len(self.warnings), 'recommendation')} not met" if self.warnings else ""
             return f"conforms{advice}; nearest: {near}"
         broken = [row for row in self.rows if not row.ok and row.necessity == "necessary"]
         names = ", ".join(row.fault.manual_name for row in broken if row.fault is not None)
-        return f"does not conform: {_plural(len(self.violations), 'violation')}; the robot would stop with {names}"
+        outcome = f"the robot would stop with {names}" if names else "the robot would not notice before it hits"
+        return f"does not conform: {_plural(len(self.violations), 'violation')}; {outcome}"
 
 
 def _plural(count: int, noun: str) -> str:

@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rcilab.arrays import Array
 from rcilab.clock import CYCLE_TIME
+from rcilab.conformance.clearance_conditions import clearance_conditions
 from rcilab.conformance.condition import Condition
 from rcilab.conformance.conditions import START_POSITION_TOLERANCE
 from rcilab.conformance.start import StartState
 from rcilab.model import RobotModel
 from rcilab.motion.motion import Motion, MotionSample
 from rcilab.safety_box import SafetyBox
+from rcilab.safety_distance import SafetyDistance
+
+if TYPE_CHECKING:
+    from rcilab.conformance.clearance_path import ClearancePath
+    from rcilab.kinematics.collision import LinkPair
 
 HOLD_SAMPLES = 3
 """Cycles judged after the last row, in which the controller repeats it: a third difference looks back that far."""
@@ -33,13 +40,22 @@ class MotionSignals:
         model: The arm, with its tool and load.
         start: Where the arm comes from.
         box: Where the tool shall stay, or None.
+        distance: How far links shall stay from each other and from the floor, or None.
     """
 
-    def __init__(self, motion: Motion, model: RobotModel, start: StartState, box: SafetyBox | None) -> None:
+    def __init__(
+        self,
+        motion: Motion,
+        model: RobotModel,
+        start: StartState,
+        box: SafetyBox | None,
+        distance: SafetyDistance | None = None,
+    ) -> None:
         self._motion = motion
         self._model = model
         self._start = start
         self._box = box
+        self._distance = distance
         self._differences = _backward_differences(motion.q, start)
         self.is_off_start = bool(np.abs(motion.start - start.q).max() > START_POSITION_TOLERANCE)
 
@@ -53,13 +69,41 @@ class MotionSignals:
             return (self._motion.start - self._start.q)[np.newaxis], 0.0
         return self._rest(condition, self._motion.at(0.0)), 0.0
 
+    def links(self, condition: Condition, row: int) -> LinkPair | None:
+        """Returns between whom the distance in a row of a table is; None for anything that is no distance."""
+        if not condition.is_clearance:
+            return None
+        from rcilab.kinematics.collision import LinkPair
+
+        return LinkPair(*self._clearance[condition.signal].links[row].tolist())
+
     def _throughout(self, condition: Condition) -> Array:
+        if condition.is_clearance:
+            return self._clearance[condition.signal].distance[:, np.newaxis]
         if condition.signal == "torque":
             return self._torques[condition.order]
         if condition.signal == "position":
             assert self._box is not None
             return self._box.excess_path(self._model.position_path(self._differences[0]))[:, np.newaxis]
         return self._differences[condition.order]
+
+    @cached_property
+    def _clearance(self) -> dict[str, ClearancePath]:
+        """The smallest distance between links, and that from the floor, by signal."""
+        from rcilab.conformance.clearance_path import clearance_path
+        from rcilab.kinematics.collision import ClearanceQuery
+
+        assert self._distance is not None
+        geometry = self._model.collision_geometry(self._distance)
+        query, path = ClearanceQuery(geometry), self._differences[0]
+        asks = {"link_distance": query.links, "floor_distance": query.floor}
+        bounds: dict[str, list[float]] = {}
+        for row in clearance_conditions(self._distance):
+            bounds.setdefault(row.signal, []).append(float(row.bounds(self._model.limits)[0][0]))
+        return {
+            signal: clearance_path(asks[signal], path, self._start.q, geometry.levers, wanted)
+            for signal, wanted in bounds.items()
+        }
 
     @cached_property
     def _torques(self) -> tuple[Array, Array]:

@@ -73,6 +73,8 @@ _WAYS: dict[Signal, str] = {
     "position": "advice.box",
     "arm_angle": "advice.arm_angle",
     "frame": "advice.frame",
+    "link_distance": "advice.clearance",
+    "floor_distance": "advice.clearance",
     "external_torque": "advice.contact",
     "lost_commands": "advice.network",
 }

@@ -84,13 +84,14 @@ class Conductor:
         self._guard(lambda: self._actions[type(request)](request))
 
     def tick(self, elapsed: float) -> None:
-        """Does what time asks for: the preview plays on, the robot is looked at."""
+        """Does what time asks for: the preview plays on, the robot is looked at, a plan completed."""
         self._view.advance(elapsed)
         event = self.robot.watch()
         if event == "placed":
             self._goal.plan()
         elif event == "rested":
             self._goal.catch_up()
+        self._goal.settle()
 
     def _run(self) -> None:
         last = time.monotonic()

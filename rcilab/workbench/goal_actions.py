@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from types import MappingProxyType
 
 import numpy as np
@@ -22,6 +23,7 @@ from rcilab.workbench.text import Message
 POSE_FIELDS = ("x", "y", "z", "roll", "pitch", "yaw")
 FURTHEST = 3.0  # [m] A choice: no arm of ours reaches half as far, and the gizmo should stay in sight.
 SLOWEST = 0.01
+SETTLED = 0.15  # [s] A choice: a goal that has not moved for so long is no longer dragged.
 
 
 class GoalActions:
@@ -30,6 +32,7 @@ class GoalActions:
     def __init__(self, store: Store, session: Session) -> None:
         self._store, self._session = store, session
         self._stale = False  # The goal has changed while the arm was moving.
+        self._planned = 0.0  # [s] When the last plan was made.
 
     def move_joint(self, request: requests.MoveJoint) -> None:
         """Poses one joint of the candidate arm."""
@@ -141,10 +144,18 @@ class GoalActions:
         self._stale = False
         start = state.goal.q if status.q_c is None else status.q_c
         made = make_plan(state.model, frozen(start), state.goal.q, state.speed, state.law)
+        self._planned = time.monotonic()
         if isinstance(made, Plan):
             self._store.update(plan=made, no_plan=None, recording=None, place=0.0, playing=False)
         else:
             self._store.update(plan=None, no_plan=made, recording=None, place=0.0, playing=False)
+
+    def settle(self) -> None:
+        """Looks for collisions, too, once the goal has stood still for a moment."""
+        state = self._store.state
+        if state.plan is None or state.plan.complete or time.monotonic() - self._planned < SETTLED:
+            return
+        self._store.update(plan=state.plan.completed(state.model))
 
     def catch_up(self) -> None:
         """Plans what was put off while the arm was moving."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -33,17 +33,25 @@ class Plan:
     """Positions of the tool, shape (N, 3), [m]."""
     effort: Array = field(repr=False)
     """How much of its velocity limit the busiest joint uses at each of these positions, 0 to 1, shape (N,)."""
+    complete: bool = False
+    """Whether collisions were looked for, too. While somebody drags they are not: it would halve the rate."""
 
     @property
     def starts_at(self) -> JointVector:
         """Joint angles it must be executed from, [rad]."""
         return self.motion.start
 
+    def completed(self, model: RobotModel) -> Plan:
+        """Returns this plan with a report on all conditions, collisions too: what may be executed."""
+        from rcilab.conformance import check
+
+        return self if self.complete else replace(self, report=check(self.motion, model), complete=True)
+
 
 def make_plan(
     model: RobotModel, start: JointVector, goal: JointVector, speed: float, law: PlannableLaw
 ) -> Plan | Message:
-    """Returns a judged motion from start to goal, or why there is none."""
+    """Returns a motion from start to goal that is judged but for collisions, or why there is none."""
     from rcilab.conformance import check
     from rcilab.motion import plan_joint
 
@@ -51,7 +59,7 @@ def make_plan(
         return message("plan.here")
     try:
         motion = plan_joint(model, start, goal, speed=speed, law=law)
-        report = check(motion, model, start=start)
+        report = check(motion, model, start=start, distance=None)
     except RcilabError as error:
         return message("plan.failed", error=str(error))
     times = np.linspace(0.0, motion.duration, PATH_POINTS)

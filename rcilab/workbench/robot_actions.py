@@ -111,6 +111,8 @@ class RobotActions:
 
     def _execute(self) -> None:
         state = self._store.state
+        if state.plan is not None and not state.plan.complete:
+            state = self._store.update(plan=state.plan.completed(state.model))
         reason = obstacle(state, self._session.status())
         if reason is not None:
             self._store.say("warn", reason)

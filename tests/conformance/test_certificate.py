@@ -9,6 +9,7 @@ from rcilab.errors import CertificateError, InvalidValueError
 from rcilab.model import load_model
 from rcilab.motion import Motion, plan_joint
 from rcilab.safety_box import SafetyBox
+from rcilab.safety_distance import STANDARD_DISTANCE, SafetyDistance
 from rcilab.spatial import Pose
 
 MODEL = load_model("xMatePro7")
@@ -28,7 +29,8 @@ def changed(motion=MOTION, model=MODEL, start=START) -> set[str]:
 def test_a_fresh_certificate_holds_for_what_was_judged():
     CERTIFICATE.verify(MOTION, MODEL, START)
     CERTIFICATE.verify(plan_joint(MODEL, START, -START), load_model("XMATEPRO7"), START.tolist())
-    assert set(CERTIFICATE.parts) == {"motion", "model", "limits", "tool", "load", "safety box", "start state"}
+    parts = {"motion", "model", "limits", "tool", "load", "safety box", "safety distance", "start state"}
+    assert set(CERTIFICATE.parts) == parts
 
 
 def test_it_names_what_changed():
@@ -74,6 +76,26 @@ def test_a_box_that_bounds_nothing_needs_no_cover():
         certificate.verify(MOTION, MODEL, START)
         certificate.verify(MOTION, MODEL, START, idle)
     assert check(MOTION, MODEL, box=idle).certificate == CERTIFICATE
+
+
+def test_a_certificate_covers_the_distances_it_was_judged_with():
+    low_table = SafetyDistance(floor_height=-0.4)
+    covered = check(MOTION, MODEL, distance=low_table).certificate
+    assert covered.digest != CERTIFICATE.digest
+    for certificate in (covered, CERTIFICATE):  # Nobody asks for one of his own: any will do.
+        certificate.verify(MOTION, MODEL, START)
+    covered.verify(MOTION, MODEL, START, distance=SafetyDistance(floor_height=-0.4))
+    with pytest.raises(CertificateError, match="does not cover the safety distance") as caught:
+        covered.verify(MOTION, MODEL, START, distance=STANDARD_DISTANCE)
+    assert caught.value.changed == ("safety distance",)
+
+
+@pytest.mark.parametrize("distance", [None, STANDARD_DISTANCE])
+def test_where_nobody_looked_for_collisions_no_hand_off_takes_the_certificate(distance):
+    quick = check(MOTION, MODEL, distance=None).certificate
+    with pytest.raises(CertificateError, match="nobody looked for collisions: check the motion again") as caught:
+        verify_certificate(quick, MOTION, MODEL, START, distance=distance)
+    assert caught.value.changed == ("safety distance",)
 
 
 def test_a_report_that_is_not_ok_has_no_certificate():

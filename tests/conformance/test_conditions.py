@@ -8,6 +8,7 @@ from rcilab.model import load_model
 
 ARM = load_model("xMatePro3").limits
 LIMITS = ARM.joint
+OWN_ROWS = [row for row in CONDITIONS if row.is_clearance]
 
 
 def test_the_necessary_conditions_on_joints_are_the_manuals_with_their_faults():
@@ -51,8 +52,8 @@ def test_all_twenty_faults_are_explained_by_the_rows_that_the_manual_names_them_
     }
 
 
-def test_a_condition_is_necessary_exactly_when_it_raises_a_fault():
-    assert all((row.fault is not None) == (row.necessity == "necessary") for row in CONDITIONS)
+def test_a_condition_of_the_manual_is_necessary_exactly_when_it_raises_a_fault():
+    assert all((row.fault is not None) == (row.necessity == "necessary") for row in CONDITIONS if row not in OWN_ROWS)
     assert len({row.id for row in CONDITIONS}) == len(CONDITIONS)
 
 
@@ -117,9 +118,20 @@ def test_the_bounds_come_from_the_limits_of_the_arm():
         assert lower.tolist() == (-upper).tolist()
 
 
+def test_what_no_controller_looks_at_raises_no_fault_and_says_that_it_is_ours():
+    assert [(row.id, row.necessity, row.fault) for row in OWN_ROWS] == [
+        ("clearance.links", "necessary", None),
+        ("clearance.floor", "necessary", None),
+        ("clearance.links.advised", "recommended", None),
+        ("clearance.floor.advised", "recommended", None),
+    ]
+    assert all("rcilab's own, not the controller's" in row.source for row in OWN_ROWS)
+    assert [row.bounds(ARM)[0].tolist() for row in OWN_ROWS] == [[0.0], [0.0], [0.02], [0.02]]
+
+
 def test_every_condition_names_its_source_and_the_manuals_section():
     sections = {"throughout": "4.4", "start": "4.1", "end": "4.1"}
-    assert all("manual V1.3.1, " in row.source for row in CONDITIONS)
+    assert all("manual V1.3.1, " in row.source for row in CONDITIONS if row not in OWN_ROWS)
     assert all(sections[row.stage] in row.source for row in MOTION_CONDITIONS)
 
 

@@ -19,6 +19,7 @@ from rcilab.conformance.explain import explain_violation
 from rcilab.conformance.wording import advise
 from rcilab.errors import InvalidValueError
 from rcilab.faults import Fault
+from rcilab.kinematics.collision import LinkPair
 from rcilab.model import load_model
 from rcilab.motion import Motion, plan_joint
 from rcilab.safety_box import SafetyBox
@@ -31,8 +32,9 @@ LANGUAGES: tuple[Language, ...] = get_args(Language)
 
 def violation_of(row: Condition, count: int = 25) -> Violation:
     """One that breaks a row in its first column by a tenth of the bound, or by a tenth of its unit."""
-    bound = float(row.bounds(MODEL.limits)[1][0])
-    value = bound + 0.1 * (abs(bound) or 1.0) if np.isfinite(bound) else float("nan")
+    lower, upper = (float(bound[0]) for bound in row.bounds(MODEL.limits))
+    bound, sign = (lower, -1.0) if row.is_clearance else (upper, 1.0)
+    value = bound + sign * 0.1 * (abs(bound) or 1.0) if np.isfinite(bound) else float("nan")
     return Violation(
         condition=row,
         joint=1 if row.is_per_joint else 0,
@@ -43,6 +45,7 @@ def violation_of(row: Condition, count: int = 25) -> Violation:
         bound=bound,
         ratio=1.1,
         advice=advise(row, MOTION, row=400, count=count, ratio=1.1, off_start=False),
+        links=LinkPair(0, 5) if row.is_clearance else None,
     )
 
 
@@ -84,7 +87,7 @@ def test_every_condition_is_explained_with_place_time_amount_fault_and_remedy(ro
     assert text.endswith(say(language, "remedy", advice=violation.advice.text(language)))
     assert "{" not in text
     if row.fault is None:
-        assert words["raises.nothing"] in text
+        assert words["raises.nothing" if row.necessity == "recommended" else "raises.unnoticed"] in text
     else:
         assert row.fault.manual_name in text
         assert words[f"fault.{row.fault.name}"] in text
@@ -93,12 +96,15 @@ def test_every_condition_is_explained_with_place_time_amount_fault_and_remedy(ro
         assert "t = 0.400 s" in explain_violation(violation_of(row, count=1), language)
     if row.is_per_joint:
         assert {"en": "joint 1", "zh": "关节 1"}[language] in text
-    if row.signal != "frame":
+    if row.is_clearance:
+        assert {"en": "base and link 5", "zh": "基座 与 连杆 5"}[language] in text
+        assert f"{abs(violation.value):.4g} m" in text  # How deep, where they overlap.
+    elif row.signal != "frame":
         unit = words.get(f"unit.{row.unit}", row.unit)
         assert f"{violation.value:.4g} {unit}" in text
         assert ("°)" in text) == (row.unit == "rad")
     if language == "zh":  # Nothing is left in English but names, units and settings.
-        left = re.sub(r"\{|\}|k[A-Z]\w+|state\.q_c|speed|law|s_profile|rcilab doctor|[tsm]\b|rad|ms|N m", "", text)
+        left = re.sub(r"\{|\}|k[A-Z]\w+|state\.q_c|speed|law|s_profile|rcilab( doctor)?|[tsm]\b|rad|ms|N m", "", text)
         assert not re.search(r"[A-Za-z]{2,}", left), left
 
 
@@ -109,6 +115,7 @@ def test_every_condition_is_explained_with_place_time_amount_fault_and_remedy(ro
         ("joint.velocity", "lower speed to 0.36 or less"),
         ("arm_angle.position", "keep the arm angle from -180° to 180°"),
         ("cartesian.position", "choose a path inside the safety box"),
+        ("clearance.links", "choose a way that keeps them farther apart"),
         ("cartesian.frame", "command proper poses within reach"),
         ("torque.rate", "let the commanded torque rise and fall over more cycles"),
         ("torque.range", "command less torque"),

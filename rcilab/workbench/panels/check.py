@@ -74,6 +74,10 @@ class CheckPanel:
         width = min(100.0, 100.0 * row.ratio)
         facts = [f"{_number(row.value)} / {_number(row.bound)} {pretty_unit(condition.unit)}"]
         facts += [text("check.joint", joint=row.joint)] if row.joint else []
+        if row.links is not None:
+            from rcilab.conformance.explain import explain_place
+
+            facts.append(explain_place(row, "zh" if text.language == "zh" else "en"))
         facts.append(f"t = {row.time:.3f} s")
         fault = "" if condition.fault is None else f"<br>{esc(text('check.raises', fault=condition.fault.manual_name))}"
         return (

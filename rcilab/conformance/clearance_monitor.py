@@ -1,0 +1,83 @@
+"""Distances between links and from the floor, cycle by cycle. For programs of one's own: no controller does this."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from rcilab.arrays import JointVector, as_vector
+from rcilab.conformance.breach import Breach
+from rcilab.conformance.clearance_conditions import clearance_conditions
+from rcilab.conformance.clearance_path import in_between
+from rcilab.safety_distance import STANDARD_DISTANCE, SafetyDistance
+
+if TYPE_CHECKING:
+    from rcilab.kinematics.collision import LinkPair
+    from rcilab.model import RobotModel
+
+
+class ClearanceMonitor:
+    """Judges one commanded position a cycle by the same rows as `check`, at the same places.
+
+    Owned by the thread that runs the cycle. A step takes some 20 us.
+
+    Attributes:
+        distance: The smallest one in the last step, [m].
+        links: Between whom it was.
+
+    Args:
+        model: The arm.
+        distance: What to keep. The monitor starts at `model.home`; `reset` places it.
+    """
+
+    def __init__(self, model: RobotModel, distance: SafetyDistance = STANDARD_DISTANCE) -> None:
+        from rcilab.kinematics.collision import ClearanceQuery
+
+        geometry = model.collision_geometry(distance)
+        self._n, self._levers = model.n, geometry.levers
+        self._query = ClearanceQuery(geometry)
+        self._rows = [(row, float(row.bounds(model.limits)[0][0])) for row in clearance_conditions(distance)]
+        self.reset(model.home)
+
+    def reset(self, q: Sequence[float] | JointVector) -> None:
+        """Forgets the past: the arm stands at `q`.
+
+        Args:
+            q: Joint angles, n numbers, [rad].
+
+        Raises:
+            InvalidValueError: Not n finite numbers.
+        """
+        self._q: JointVector = as_vector(q, self._n, "q", "rad")
+        self._look()
+
+    def step(self, q_c: Sequence[float] | JointVector) -> bool:
+        """Takes the commanded angles of this cycle and returns whether every necessary distance is kept.
+
+        Args:
+            q_c: Commanded joint angles, n numbers, [rad].
+
+        Raises:
+            InvalidValueError: Not n finite numbers.
+        """
+        before, self._q = self._q, as_vector(q_c, self._n, "q_c", "rad")
+        self._look(before)
+        return not any(row.necessity == "necessary" for row, *_ in self.broken())
+
+    def broken(self) -> list[Breach]:
+        """Returns what the last step broke, recommendations too."""
+        found: list[Breach] = []
+        for row, least in self._rows:
+            distance, links = self._found[row.signal]
+            if not least < distance:
+                found.append(Breach(row, 0, distance, least, links))
+        return found
+
+    def _look(self, before: JointVector | None = None) -> None:
+        start = self._q if before is None else before
+        places = in_between(start, self._q, self._levers)
+        self._found: dict[str, tuple[float, LinkPair]] = {
+            "link_distance": min(self._query.links(q) for q in places),
+            "floor_distance": min(self._query.floor(q) for q in places),
+        }
+        self.distance, self.links = min(self._found.values())
