@@ -44,5 +44,6 @@ def foot_plate(radius: float, segments: int) -> Mesh:
 
 def flange_plate(up: float, segments: int) -> Mesh:
     """Returns the disc that tools are screwed to, in the last link's frame; `up` is the side it looks to, +1 or -1."""
-    edge = [(0.0, -_FLANGE_HEIGHT), (_FLANGE_RADIUS, -_FLANGE_HEIGHT), (_FLANGE_RADIUS, 0.0), (0.0, 0.0)]
-    return revolve(edge if up > 0.0 else [(r, -h) for r, h in reversed(edge)], segments=segments)
+    r, bevel = _FLANGE_RADIUS, 0.4 * _FLANGE_HEIGHT  # Bevelled, so that the ball end of the link's capsule covers it.
+    edge = [(0.0, -_FLANGE_HEIGHT), (r, -_FLANGE_HEIGHT), (r, -bevel), (0.55 * r, 0.0), (0.0, 0.0)]
+    return revolve(edge if up > 0.0 else [(radius, -h) for radius, h in reversed(edge)], segments=segments)
