@@ -15,11 +15,10 @@ from numpy.typing import ArrayLike
 from rcilab.arrays import JointVector, as_number, as_path, as_rows, as_vector, described
 from rcilab.dynamics.payload import NO_LOAD, Payload
 from rcilab.errors import InvalidValueError, KinematicsError, SingularError
-from rcilab.kinematics import arm_angle as arm_angles
-from rcilab.kinematics.feasible_arcs import FeasibleArcs, feasible_arcs
+from rcilab.kinematics.closed_form import ClosedForm, build_closed_form
+from rcilab.kinematics.feasible_arcs import FeasibleArcs
 from rcilab.kinematics.frames import Frame
-from rcilab.kinematics.inverse import build_geometry, inverse_seven, inverse_six
-from rcilab.kinematics.inverse_batch import SolutionBatch, as_pose_batch, inverse_batch
+from rcilab.kinematics.inverse_batch import SolutionBatch, as_pose_batch
 from rcilab.kinematics.moving_arm import MovingArm
 from rcilab.kinematics.reach import Reach, closest_reachable
 from rcilab.kinematics.singularity import Dexterity, DexterityPath, dexterity, dexterity_path
@@ -168,7 +167,7 @@ class RobotModel(MovingArm):
             return self._inverse_seven(flange, psi, guess)
         if psi is not None:
             raise InvalidValueError("psi", psi, f"has no meaning for {self.name}: a 6-axis arm has no arm angle")
-        solutions = Solutions(inverse_six(self._geometry, flange, guess), *self._bounds, None)
+        solutions = Solutions(self._closed_form.at(flange, guess).branches(0.0), *self._bounds, None)
         if not len(solutions):
             raise solutions.refusal()
         return solutions
@@ -191,7 +190,7 @@ class RobotModel(MovingArm):
         def solve(pose: Pose, may_search: bool) -> Solutions:
             return self.inverse(pose, psi if may_search else held, q)
 
-        return closest_reachable(solve, self._geometry, self.T_flange_tool, self.forward(q), q, target)
+        return closest_reachable(solve, self._closed_form.envelope, self.T_flange_tool, self.forward(q), q, target)
 
     def inverse_batch(self, T: ArrayLike, psi: ArrayLike = 0.0) -> SolutionBatch:
         """Returns every analytic solution of many poses at once (GetJointPos), at one arm angle each.
@@ -214,7 +213,7 @@ class RobotModel(MovingArm):
             )
         flange = poses @ self._T_tool_flange.matrix if self._has_tool else poses
         joint = self.limits.joint
-        return SolutionBatch(inverse_batch(self._geometry, flange, angles), joint.lower, joint.upper)
+        return SolutionBatch(self._closed_form.batch(flange, angles), joint.lower, joint.upper)
 
     def feasible_arcs(self, T: Pose | ArrayLike, box: SafetyBox | None = None) -> FeasibleArcs:
         """Returns which arm angles a pose leaves to a 7-axis arm, and what forbids the others.
@@ -236,7 +235,7 @@ class RobotModel(MovingArm):
         is_outside = box is not None and box.active and box.excess(pose.parts[1]) > 0.0
         flange = pose @ self._T_tool_flange if self._has_tool else pose
         joint = self.limits.joint
-        return feasible_arcs(self._geometry, flange, joint.lower, joint.upper, is_outside)
+        return self._closed_form.arcs(flange, joint.lower, joint.upper, is_outside)
 
     def arm_angle(self, q: ArrayLike) -> float:
         """Returns the arm angle psi of a 7-axis arm, [rad] in (-pi, pi].
@@ -246,7 +245,7 @@ class RobotModel(MovingArm):
             KinematicsError: The arm has 6 axes.
         """
         self._require_arm_angle()
-        return arm_angles.arm_angle(self._geometry.upper, self._geometry.fore, self._floats(q))
+        return self._closed_form.arm_angle(self._floats(q))
 
     def dexterity(self, q: ArrayLike) -> Dexterity:
         """Returns how well the tool can be moved here: manipulability, smallest singular value, condition."""
@@ -336,8 +335,8 @@ class RobotModel(MovingArm):
         return f"RobotModel({self.name}, {self.n} axes{tool}{load})"
 
     @cached_property
-    def _geometry(self):  # type: ignore[no-untyped-def]  # ArmGeometry; cached_property hides it from no one.
-        return build_geometry(self.description)
+    def _closed_form(self) -> ClosedForm:
+        return build_closed_form(self.description)
 
     @cached_property
     def _bounds(self) -> tuple[list[float], list[float]]:
@@ -345,13 +344,14 @@ class RobotModel(MovingArm):
 
     def _inverse_seven(self, flange: Pose, psi: float | None, near: Sequence[float] | None) -> Solutions:
         start = self._natural_psi(near) if psi is None else psi
-        solutions = Solutions(inverse_seven(self._geometry, flange, start, near), *self._bounds, start)
+        pose = self._closed_form.at(flange, near)
+        solutions = Solutions(pose.branches(start), *self._bounds, start)
         if len(solutions):
             return solutions
         best = solutions
         for offset in _PSI_SEARCH if psi is None else ():
             angle = math.remainder(start + offset, math.tau)
-            solutions = Solutions(inverse_seven(self._geometry, flange, angle, near), *self._bounds, angle)
+            solutions = Solutions(pose.branches(angle), *self._bounds, angle)
             if len(solutions):
                 return solutions
             best = min(best, solutions, key=_least_excess)
@@ -365,13 +365,13 @@ class RobotModel(MovingArm):
         if near is None:
             return 0.0
         try:
-            return arm_angles.arm_angle(self._geometry.upper, self._geometry.fore, near)
+            return self._closed_form.arm_angle(near)
         except SingularError:
             return 0.0
 
 
 def _least_excess(solutions: Solutions) -> float:
-    return min(branch.excess for branch in solutions.all)
+    return min((branch.excess for branch in solutions.all), default=math.inf)
 
 
 def _digest(*parts: object) -> str:

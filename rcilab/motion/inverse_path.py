@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from rcilab.arrays import Array, JointPath, JointVector
-from rcilab.kinematics.branch import Loss, follow_branch
-from rcilab.kinematics.inverse import build_geometry
+from rcilab.kinematics.branch import Loss
+from rcilab.kinematics.closed_form import build_closed_form
 from rcilab.model import RobotModel
 
 
 def inverse_path(model: RobotModel, T: Array, psi: Array | None, start: JointVector) -> tuple[JointPath, Loss | None]:
     """Returns the joint angles along a path of the tool on one branch, without a jump from row to row.
 
-    Joint limits are not looked at. About 2 us a row.
+    Joint limits are not looked at. About 2 us a row; 20 us with offsets, where the inverse is no closed form.
 
     Args:
         model: The arm, with its tool.
@@ -27,5 +27,4 @@ def inverse_path(model: RobotModel, T: Array, psi: Array | None, start: JointVec
         ModelError: The arm has no closed-form inverse.
     """
     flange = T @ model.T_flange_tool.inverse().matrix
-    geometry = build_geometry(model.description)
-    return follow_branch(geometry, flange[:, :3, :3], flange[:, :3, 3], psi, start)
+    return build_closed_form(model.description).follow(flange[:, :3, :3], flange[:, :3, 3], psi, start)
