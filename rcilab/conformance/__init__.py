@@ -8,6 +8,7 @@ from rcilab.conformance.cartesian_monitor import CartesianMonitor
 from rcilab.conformance.certificate import Certificate, verify_certificate
 from rcilab.conformance.check import check
 from rcilab.conformance.condition import Condition
+from rcilab.conformance.condition_tables import CONDITION_TABLES, ConditionTable, condition_table
 from rcilab.conformance.conditions import CONDITIONS, CYCLE_CONDITIONS, explain_fault, find_condition
 from rcilab.conformance.limit_tables import LimitTable, cartesian_limits
 from rcilab.conformance.measured_monitor import MeasuredMonitor
@@ -19,6 +20,7 @@ from rcilab.conformance.torque_monitor import TorqueMonitor
 
 __all__ = [
     "CONDITIONS",
+    "CONDITION_TABLES",
     "CYCLE_CONDITIONS",
     "BoxMonitor",
     "Breach",
@@ -26,6 +28,7 @@ __all__ = [
     "Certificate",
     "Condition",
     "ConditionResult",
+    "ConditionTable",
     "JointMonitor",
     "LimitTable",
     "MeasuredMonitor",
@@ -36,6 +39,7 @@ __all__ = [
     "Violation",
     "cartesian_limits",
     "check",
+    "condition_table",
     "describe_breaches",
     "explain_fault",
     "find_condition",

@@ -11,12 +11,11 @@ from rcilab.arrays import Array, described
 from rcilab.clock import CYCLE_TIME
 from rcilab.conformance.certificate import issue_certificate
 from rcilab.conformance.condition import Condition
-from rcilab.conformance.conditions import MOTION_CONDITIONS
+from rcilab.conformance.condition_tables import condition_table
 from rcilab.conformance.report import ConditionResult, Report, Violation
 from rcilab.conformance.signals import HOLD_SAMPLES as HOLD_SAMPLES
 from rcilab.conformance.signals import MotionSignals
 from rcilab.conformance.start import StartState, as_start
-from rcilab.conformance.tool_conditions import CARTESIAN_POSITION
 from rcilab.conformance.wording import advise
 from rcilab.errors import InvalidValueError
 from rcilab.model import RobotModel, require_model
@@ -58,7 +57,8 @@ def check(
         raise InvalidValueError("box", described(box), "is no SafetyBox; SafetyBox(size=..., T_base_box=...) makes one")
     state = as_start(motion.start if start is None else start, model.n)
     box = box if box is not None and box.active else None
-    rows = MOTION_CONDITIONS if box is None else (*MOTION_CONDITIONS, CARTESIAN_POSITION)
+    table = condition_table(model.description)
+    rows = table.motion if box is None else (*table.motion, table.box)
     return _report(motion, rows, model=model, start=state, box=box)
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from rcilab.arrays import Array
 from rcilab.errors import InvalidValueError
 from rcilab.faults import Fault
+from rcilab.franka_errors import FrankaError
 from rcilab.limits import JointLimits, Limits
 
 Necessity: TypeAlias = Literal["necessary", "recommended"]
@@ -24,11 +25,16 @@ Signal: TypeAlias = Literal[
     "rotation",
     "arm_angle",
     "frame",
+    "elbow_sign",
     "external_torque",
+    "external_force",
     "lost_commands",
 ]
 """What is judged: every joint's angle or torque; the tool's position, the norms of its translation and rotation; the
-arm angle; the tool's pose as a whole; external torques; commands that did not come."""
+arm angle; the tool's pose as a whole; the side of the elbow; external torques and force; commands that did not come."""
+
+AnyFault: TypeAlias = Fault | FrankaError
+"""What a controller raises: a fault of the RCI, or an error of Franka's interface."""
 
 Bounds: TypeAlias = tuple[Array, Array]
 """Lower and upper bound, each of shape (n,) for joints and (1,) for anything else."""
@@ -48,13 +54,13 @@ class Condition:
     quantity: str
     """What is judged, in words, such as "commanded velocity"."""
     formula: str
-    """As the manual prints it."""
+    """As the manual, or the maker's page, prints it."""
     necessity: Necessity
     """The robot stops when a necessary condition is broken."""
     unit: str
     source: str
     """Where condition and bound come from."""
-    fault: Fault | None
+    fault: AnyFault | None
     """What the controller raises; None for a recommended condition."""
     stage: Stage
     """When it is judged."""
@@ -79,7 +85,7 @@ class Condition:
         """Returns whose value it is, in words: "joint 2", "tool", "elbow", "network"."""
         if self.is_per_joint:
             return f"joint {axis}"
-        return {"arm_angle": "elbow", "lost_commands": "network"}.get(self.signal, "tool")
+        return {"arm_angle": "elbow", "elbow_sign": "elbow", "lost_commands": "network"}.get(self.signal, "tool")
 
     def __repr__(self) -> str:
         return f"<Condition {self.id}: {self.formula} ({self.necessity})>"

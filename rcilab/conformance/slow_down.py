@@ -106,7 +106,7 @@ class _Search:
         broken = _broken(self._report)
         for row in broken:
             if row.necessity == "necessary" and _power(row.condition) == 0:
-                return self._refused(row, "position")
+                return self._refused(row, "elsewhere" if row.condition.stage == "start" else "position")
         rows = tuple(row.condition for row in self._report.rows if _power(row.condition) > 0)
         necessary = tuple(row for row in rows if row.necessity == "necessary")
         if not recommended:

@@ -73,7 +73,9 @@ _WAYS: dict[Signal, str] = {
     "position": "advice.box",
     "arm_angle": "advice.arm_angle",
     "frame": "advice.frame",
+    "elbow_sign": "advice.elbow_sign",
     "external_torque": "advice.contact",
+    "external_force": "advice.contact",
     "lost_commands": "advice.network",
 }
 """What to do about signals that are themselves out of bounds, not their derivatives; of joints it is the range."""
