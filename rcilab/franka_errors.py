@@ -78,7 +78,7 @@ _CAUSES = {
     FrankaError.MAX_GOAL_POSE_DEVIATION_VIOLATION: "the arm ended too far from its goal",
     FrankaError.MAX_PATH_POSE_DEVIATION_VIOLATION: "the arm strayed too far from its path",
     FrankaError.CARTESIAN_VELOCITY_PROFILE_SAFETY_VIOLATION: "a Cartesian velocity profile left its safe range",
-    FrankaError.JOINT_POSITION_MOTION_GENERATOR_START_POSE_INVALID: "the first commanded joint angles are not the arm's",
+    FrankaError.JOINT_POSITION_MOTION_GENERATOR_START_POSE_INVALID: "the first commanded angles are not the arm's",
     FrankaError.JOINT_MOTION_GENERATOR_POSITION_LIMITS_VIOLATION: "a commanded joint angle is outside its range",
     FrankaError.JOINT_MOTION_GENERATOR_VELOCITY_LIMITS_VIOLATION: "a commanded joint velocity is too high",
     FrankaError.JOINT_MOTION_GENERATOR_VELOCITY_DISCONTINUITY: (

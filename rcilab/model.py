@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from rcilab.arrays import JointVector, as_number, as_path, as_rows, as_vector, described
 from rcilab.dynamics.payload import NO_LOAD, Payload
-from rcilab.errors import InvalidValueError, KinematicsError, SingularError
+from rcilab.errors import InvalidValueError, KinematicsError, ModelError, SingularError
 from rcilab.kinematics.closed_form import ClosedForm, build_closed_form
 from rcilab.kinematics.feasible_arcs import FeasibleArcs
 from rcilab.kinematics.frames import Frame
@@ -25,21 +25,21 @@ from rcilab.kinematics.singularity import Dexterity, DexterityPath, dexterity, d
 from rcilab.kinematics.solutions import Solutions, joint_limit_lists
 from rcilab.kinematics.workspace import Workspace, sample_workspace
 from rcilab.limits import Limits
-from rcilab.robots import RobotDescription, describe_robot
+from rcilab.robots import RCI_ROBOT_NAMES, RobotDescription, describe_robot
 from rcilab.safety_box import SafetyBox
 from rcilab.spatial import IDENTITY, Pose
 
 if TYPE_CHECKING:
     from rcilab.dynamics.rigid_body import RigidBody, TorqueTerms
 
-__all__ = ["RobotModel", "load_model", "require_model"]
+__all__ = ["RobotModel", "load_model", "require_model", "require_rci"]
 
 _PSI_SEARCH = tuple(math.radians(sign * step) for step in range(10, 181, 10) for sign in (1, -1))
 """Offsets tried, nearest first, when no arm angle was asked for and the natural one has no solution."""
 
 
 def load_model(name: str, *, tool: Pose | None = None, load: Payload | None = None) -> RobotModel:
-    """Returns the model of a robot by name, in any case: xMatePro3, xMatePro7, xMate3 or xMate7.
+    """Returns the model of a robot by name, in any case: xMatePro3, xMatePro7, xMate3, xMate7 or Panda.
 
     Args:
         name: Name of the robot.
@@ -64,6 +64,20 @@ def require_model(model: object) -> RobotModel:
     if isinstance(model, str):
         raise InvalidValueError("model", model, f"is a name; use load_model({model!r})")
     raise InvalidValueError("model", described(model), "is no robot model; load_model makes one")
+
+
+def require_rci(model: RobotModel) -> RobotModel:
+    """Returns `model` if the arm speaks the RCI: for borders behind which it is driven or simulated.
+
+    Raises:
+        ModelError: It speaks another interface; the message says what can be done with it.
+    """
+    if model.description.interface == "RCI":
+        return model
+    raise ModelError(
+        f"{model.name} is driven by Franka's own interface, not by the RCI: plan for it, check and draw its motions, "
+        f"but simulate and drive one of {', '.join(RCI_ROBOT_NAMES)}"
+    )
 
 
 class RobotModel(MovingArm):

@@ -18,6 +18,7 @@ LAYERS = [  # From the bottom. A part imports from lines below its own, and from
         "arrays",
         "clock",
         "faults",
+        "franka_errors",
         "limits",
         "command",
         "state",
