@@ -158,10 +158,15 @@ class RobotModel(MovingArm):
     def inverse(self, T: Pose | ArrayLike, psi: float | None = None, near: ArrayLike | None = None) -> Solutions:
         """Returns every analytic solution inside the joint limits (GetJointPos); `.nearest(q)` is the vendor's answer.
 
+        The xMates have 8 solutions at an arm angle. The Panda has offsets, and up to 16 or none; they are found along
+        its self-motion at the pose and settled by Newton's method, which takes milliseconds. Where two of them are
+        about to meet, one may be taken for both; the one next to `near` is always found.
+
         Args:
             T: Pose of the tool in base: a `Pose` or a homogeneous matrix, shape (4, 4).
-            psi: Arm angle of a 7-axis arm, [rad]. When absent: that of `near`, or 0; and if nothing is inside the
-                limits there, the closest arm angle (in steps of 10 degrees) that has a solution.
+            psi: Arm angle of a 7-axis arm, [rad]; of the Panda the angle of joint 3. When absent: that of `near`, or 0;
+                and if nothing is inside the limits there, the closest arm angle (in steps of 10 degrees) that has a
+                solution.
             near: Joint angles, [rad], that decide what a singular pose leaves open.
 
         Raises:
@@ -252,7 +257,7 @@ class RobotModel(MovingArm):
         return self._closed_form.arcs(flange, joint.lower, joint.upper, is_outside)
 
     def arm_angle(self, q: ArrayLike) -> float:
-        """Returns the arm angle psi of a 7-axis arm, [rad] in (-pi, pi].
+        """Returns the arm angle psi of a 7-axis arm, [rad] in (-pi, pi]; of the Panda the angle of joint 3.
 
         Raises:
             SingularError: The shoulder-wrist line is vertical or the arm is stretched; psi has no meaning there.
@@ -260,6 +265,20 @@ class RobotModel(MovingArm):
         """
         self._require_arm_angle()
         return self._closed_form.arm_angle(self._floats(q))
+
+    def elbow(self, q: ArrayLike) -> tuple[float, int]:
+        """Returns the elbow as Franka counts it: the angle of joint 3, [rad], and on which side of its flip joint 4 is.
+
+        The side is +1 above the angle at which the arm is stretched, and -1 below.
+
+        Raises:
+            KinematicsError: The maker of this arm knows no such flip.
+        """
+        flip = self.description.elbow_flip
+        if flip is None:
+            raise KinematicsError(f"{self.name} has no elbow that flips; arm_angle(q) tells where its elbow is")
+        angles = self._floats(q)
+        return angles[2], 1 if angles[3] > flip else -1
 
     def dexterity(self, q: ArrayLike) -> Dexterity:
         """Returns how well the tool can be moved here: manipulability, smallest singular value, condition."""

@@ -29,8 +29,8 @@ def identify_robot(dh: Sequence[float]) -> str:
     name = _find_name(served)
     if name is None:
         raise ModelError(
-            f"the robot is none of those known ({', '.join(RCI_ROBOT_NAMES)}): its DH lengths d are {_in_mm(served)} mm; "
-            "say which model to use: connect(address, model=load_model(NAME))"
+            f"the robot is none of those known ({', '.join(RCI_ROBOT_NAMES)}): its DH lengths d are {_in_mm(served)} "
+            "mm; say which model to use: connect(address, model=load_model(NAME))"
         )
     return name
 

@@ -24,7 +24,6 @@ from rcilab.conformance.conditions import (
     MOTION_CONDITIONS,
     REST_ACCELERATION_TOLERANCE,
     REST_VELOCITY_TOLERANCE,
-    START_POSITION_TOLERANCE,
 )
 from rcilab.conformance.measured_conditions import EXTERNAL_TORQUE, LOST_COMMANDS, MEASURED_CONDITIONS
 from rcilab.conformance.tool_conditions import (
@@ -39,6 +38,9 @@ from rcilab.franka_errors import FrankaError
 _PAGE = "Franka's page Robot and interface specifications"
 _ERRORS = "Franka's page Errors"
 _ELBOW_JOINT = 2  # From 0: Franka's elbow is the angle of joint 3.
+
+START_TOLERANCE = 1e-6  # [rad] or [m]
+"""How far from the arm a motion may start. A choice, the page gives no figure: less is a jerk inside every bound."""
 
 _JOINT_ERRORS = {
     JOINT_POSITION.id: FrankaError.JOINT_MOTION_GENERATOR_POSITION_LIMITS_VIOLATION,
@@ -75,9 +77,15 @@ def _motion_row(row: Condition) -> Condition:
             necessity="necessary",
             fault=FrankaError.JOINT_POSITION_MOTION_GENERATOR_START_POSE_INVALID,
             source=f"{_PAGE}, necessary by its example; {_ERRORS} (tolerance: ours)",
+            bounds=_start_bounds,
         )
     ours = "" if row.signal == "torque" else "; tolerance: ours"
     return replace(row, source=f"{_PAGE}, recommended (printed for Cartesian trajectories{ours})")
+
+
+def _start_bounds(limits: AnyLimits) -> Bounds:
+    bound = np.full(len(joint_limits(limits).velocity), START_TOLERANCE)
+    return -bound, bound
 
 
 def _inverse_row(row: Condition) -> Condition:
@@ -179,7 +187,7 @@ FRANKA_TOOL_CONDITIONS: tuple[Condition, ...] = (
         stage="start",
         signal="translation",
         order=0,
-        bounds=lambda limits: same(START_POSITION_TOLERANCE),
+        bounds=lambda limits: same(START_TOLERANCE),
     ),
     Condition(
         id="start.elbow",
@@ -192,7 +200,7 @@ FRANKA_TOOL_CONDITIONS: tuple[Condition, ...] = (
         stage="start",
         signal="arm_angle",
         order=0,
-        bounds=lambda limits: same(START_POSITION_TOLERANCE),
+        bounds=lambda limits: same(START_TOLERANCE),
     ),
     *(
         _rest(stage, signal, order)

@@ -41,6 +41,8 @@ def advise(condition: Condition, motion: Motion, *, row: int, count: int, ratio:
         ratio: Worst value over bound.
         off_start: Whether the motion starts elsewhere than it was judged from.
     """
+    if condition.stage == "start" and condition.signal == "torque":
+        return Phrase("advice.torque.rate")
     if condition.stage == "start":
         return Phrase("advice.start.position" if condition.order == 0 else "advice.start.rest")
     if condition.stage == "end":

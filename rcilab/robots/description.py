@@ -126,6 +126,8 @@ class RobotDescription:
     rated_payload_source: str
     interface: Interface = "RCI"
     """Which real-time interface the arm is driven by."""
+    elbow_flip: float | None = None
+    """Angle of joint 4 on whose other side the elbow counts as flipped, [rad]; None where the maker knows no flip."""
     rods: tuple[tuple[Rod, ...], ...] | None = None
     """What base and links are drawn and collide as, base first; None for the xMates, whose housings are designed."""
 

@@ -151,6 +151,7 @@ _RODS = (
 DESCRIPTION = RobotDescription(
     name="Panda",
     interface="FCI",
+    elbow_flip=ELBOW_FLIP,
     dh=rows_from_craig(CRAIG),
     dh_source=f"{SPECIFICATION}, Denavit-Hartenberg parameters (Craig's convention), written as standard rows",
     base=_link(
