@@ -33,6 +33,8 @@ _TURNS = (-_QUARTER, _QUARTER, _QUARTER, -_QUARTER, _QUARTER, _QUARTER, 0.0)
 _EXACT = 1e-12  # [rad] and [m] In which the table must have the shape.
 _TRACE = 360
 """Angles of joint 7 at which the self-motion is looked at. A choice: a degree; smaller loops may be overlooked."""
+_PARTS, _HUNTS = 16, 4  # An end of a branch is looked for in 16 parts of a piece, four times over.
+_DENSE = 6  # Angles put next to it; a choice.
 _REACH_TOLERANCE = 1e-9  # [m] A pose that rounding put this far out of reach counts as on its end.
 _AROUND = 2.0  # Lengths of a piece, in which Newton's method is started around a crossing; a choice.
 _ROUNDS = 12  # Of Newton's method; from a crossing it takes 3 to 5.
@@ -123,6 +125,9 @@ class SelfMotion:
         exists = np.isfinite(table[..., 0])
         if not exists.any():
             raise _unreachable(arm, beyond)
+        angles = self._with_ends(angles, exists[:, 0])
+        table, beyond = trace(arm, self._rotation, self._position, angles)
+        exists = np.isfinite(table[..., 0])
         self.starts, self.ends = _segments(table, exists, beyond > 0.0)
         """Ends of short pieces of the self-motion, each of shape (m, 7), [rad]; each end within half a turn."""
 
@@ -149,6 +154,27 @@ class SelfMotion:
     def settle(self, guesses: Array) -> tuple[Array, NDArray[np.bool_]]:
         """Returns the solutions next to guesses of shape (m, 7), [rad], joint 3 held, and which there are."""
         return settle(self._arm, *self._targets(len(guesses)), guesses)
+
+    def _with_ends(self, angles: Array, exists: NDArray[np.bool_]) -> Array:
+        """Returns the angles of joint 7, and more of them where branches end, the closer to the end the denser.
+
+        There the others turn with the square root of the distance.
+        """
+        side, place = np.nonzero(exists != np.roll(exists, -1, axis=1))
+        if not len(place):
+            return angles
+        low, width = angles[place], tau / _TRACE
+        is_open = exists[side, place]
+        for _ in range(_HUNTS):
+            width /= _PARTS
+            points = low[:, None] + width * np.arange(1, _PARTS)
+            table, _ = trace(self._arm, self._rotation, self._position, points.ravel())
+            found = np.isfinite(table[:, 0, :, 0]).reshape(2, *points.shape)[side, np.arange(len(side))]
+            low = low + width * (found == is_open[:, None]).cumprod(axis=1).sum(axis=1)
+        last = np.where(is_open, low, low + width)
+        inward = np.where(is_open, -1.0, 1.0) * (tau / _TRACE)
+        more = last[:, None] + inward[:, None] * np.linspace(0.0, 1.0, _DENSE, endpoint=False) ** 2
+        return np.unique(np.concatenate((angles, wrapped(more.ravel()))))
 
     def _targets(self, count: int) -> tuple[Array, Array]:
         return np.broadcast_to(self._rotation, (count, 3, 3)), np.broadcast_to(self._position, (count, 3))
