@@ -9,6 +9,7 @@ from __future__ import annotations
 from math import pi, tau
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rcilab.arrays import Array
 from rcilab.kinematics.feasible_arcs import Arc, FeasibleArcs, Reason
@@ -63,17 +64,19 @@ def feasible_offset_arcs(
     return FeasibleArcs(arcs=tuple(arcs))
 
 
-def _pieces(arm: OffsetGeometry, motion: SelfMotion, lower: Array, upper: Array) -> tuple[Array, Array, Array]:
+def _pieces(
+    arm: OffsetGeometry, motion: SelfMotion, lower: Array, upper: Array
+) -> tuple[Array, Array, NDArray[np.int64]]:
     """Returns arm angles at the ends of pieces, and in each which joints are beyond their limits, as bits."""
     middles = np.array(arm.middles)
     bits = 1 << np.arange(7)
 
-    def broken(q: Array) -> Array:
+    def broken(q: Array) -> NDArray[np.int64]:
         angle = wrapped(q - middles) + middles
-        return ((angle <= lower) | (angle >= upper)) @ bits
+        return np.asarray(((angle <= lower) | (angle >= upper)) @ bits, dtype=np.int64)
 
     starts, ends = motion.starts, motion.ends
-    done: list[tuple[Array, Array, Array]] = []
+    done: list[tuple[Array, Array, NDArray[np.int64]]] = []
     for round_ in range(_ROUNDS):
         before, after = broken(starts), broken(ends)
         cut = before != after
@@ -88,8 +91,8 @@ def _pieces(arm: OffsetGeometry, motion: SelfMotion, lower: Array, upper: Array)
         both = good[:-1] & good[1:]
         starts, ends = whole[:-1][both], whole[1:][both]
     done.append((starts[:, ELBOW], ends[:, ELBOW], broken(starts) | broken(ends)))
-    first, last, codes = (np.concatenate(column) for column in zip(*done, strict=True))
-    return first, last, codes
+    first, last, codes = zip(*done, strict=True)
+    return np.concatenate(first), np.concatenate(last), np.concatenate(codes)
 
 
 def _arc(start: float, end: float, code: int, outside: bool) -> Arc:

@@ -120,7 +120,7 @@ class SelfMotion:
         self._arm = arm
         self._rotation, self._position = T_base_flange.rotation, T_base_flange.position
         self._near = near
-        angles = np.arange(_TRACE) * (tau / _TRACE) - pi
+        angles = np.linspace(-pi, pi, _TRACE, endpoint=False, dtype=np.float64)
         table, beyond = trace(arm, self._rotation, self._position, angles)
         exists = np.isfinite(table[..., 0])
         if not exists.any():
@@ -254,7 +254,7 @@ def settle(arm: OffsetGeometry, rotations: Array, positions: Array, q: Array) ->
         step = _solved(J[:, :, free], miss)
         step *= np.minimum(1.0, _LONGEST / np.maximum(np.abs(step).max(axis=1, keepdims=True), 1e-300))
         before = error[active]
-        q[np.ix_(active, free)] += step
+        q[active[:, None], free] += step
         active = active[before > _SETTLED**0.5]
         if not len(active):
             break
@@ -319,7 +319,8 @@ def _solved(J: Array, miss: Array) -> Array:
     try:
         return np.linalg.solve(J, miss[..., None])[..., 0]
     except np.linalg.LinAlgError:  # One of them is exactly singular.
-        return (np.linalg.pinv(J, rcond=1e-9) @ miss[..., None])[..., 0]
+        inverse = np.asarray(np.linalg.pinv(J, rcond=1e-9), dtype=np.float64)
+        return (inverse @ miss[..., None])[..., 0]
 
 
 def _cross(a: Array, b: Array) -> Array:
