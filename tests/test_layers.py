@@ -47,6 +47,7 @@ HEIGHT = {part: height for height, parts in enumerate(LAYERS) for part in parts}
 
 FENCES = {
     "pinocchio": ("kinematics/", "dynamics/", "model.py"),
+    "eigenpy": ("dynamics/symmetric_solver.py",),
     "ruckig": ("motion/_ruckig.py",),
     "mujoco": ("controller/mujoco_plant.py",),
     "viser": ("views/", "workbench/", "notebook/"),

@@ -129,16 +129,7 @@ class Run:
         wanted = self.command
         if self.plan is not None and not np.isfinite(wanted).any():  # Sent as poses: the plan says which angles.
             wanted = self._planned(0)
-        best, least = 1, math.inf
-        for delay in range(1, min(_LONGEST_DELAY, len(self.cycles) - 1) + 1):
-            difference = np.abs(self.q_c[delay:] - wanted[:-delay])
-            if np.isfinite(difference).any():
-                size = float(np.nanmax(difference))
-                if size < least:
-                    best, least = delay, size
-                if size == 0.0:
-                    break
-        return best
+        return find_delay(self.q_c, wanted)
 
     @property
     def error(self) -> JointPath:
@@ -238,6 +229,25 @@ class Run:
             rows.append(("timing", "lock-step: simulated milliseconds wait for each other"))
         cells = "".join(f"<tr><th style='text-align:left'>{name}</th><td>{value}</td></tr>" for name, value in rows)
         return f"<table><caption>Run</caption>{cells}</table>"
+
+
+def find_delay(q_c: JointPath, command: JointPath) -> int:
+    """Returns how many cycles after a command the controller reports it as commanded; found by comparison, usually 1.
+
+    Args:
+        q_c: Commanded joint angles as the controller reports them, shape (N, n), [rad].
+        command: Joint angles sent in answer, shape (N, n), [rad]; NaN where a cycle was not answered.
+    """
+    best, least = 1, math.inf
+    for delay in range(1, min(_LONGEST_DELAY, len(q_c) - 1) + 1):
+        difference = np.abs(q_c[delay:] - command[:-delay])
+        if np.isfinite(difference).any():
+            size = float(np.nanmax(difference))
+            if size < least:
+                best, least = delay, size
+            if size == 0.0:
+                break
+    return best
 
 
 def build_run(

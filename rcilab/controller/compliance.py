@@ -21,7 +21,6 @@ from typing import NamedTuple
 import numpy as np
 
 from rcilab.arrays import JointVector, Matrix
-from rcilab.dynamics.rigid_body import ArmTerms
 
 DAMPING_RATIO = 0.7  # of critical; a choice: some 5 % overshoot
 FASTEST_MODE = 600.0  # [rad/s] w times 1 ms stays at 0.6; computed torques become unstable at about 1.0; a choice
@@ -48,18 +47,18 @@ class Damping(NamedTuple):
         return tau if self.slowing is None else tau - self.slowing @ spring
 
 
-def design_damping(terms: ArmTerms, stiffness: Matrix, slowest: float = SLOWEST_DAMPING) -> Damping:
+def design_damping(mass_inverse: Matrix, stiffness: Matrix, slowest: float = SLOWEST_DAMPING) -> Damping:
     """Returns the dampers of springs.
 
     Args:
-        terms: The arm as it is now.
+        mass_inverse: M^-1 of the arm as it is now, shape (n, n), [1/(kg m^2)].
         stiffness: Of the springs, in joint space, symmetric, shape (n, n), [N m/rad].
         slowest: Least angular frequency that damping is computed with, [rad/s].
     """
-    F = np.linalg.cholesky(terms.mass_inverse)
+    F = np.linalg.cholesky(mass_inverse)
     eigenvalues, V = np.linalg.eigh(F.T @ stiffness @ F)
     U = F @ V
-    back = terms.mass_matrix @ U
+    back = np.linalg.solve(F.T, V)  # M U.
     squares = eigenvalues.tolist()
     gains = [2.0 * DAMPING_RATIO * math.sqrt(min(max(square, slowest**2), FASTEST_MODE**2)) for square in squares]
     slowing = None
@@ -75,18 +74,15 @@ class Damper:
         self._design: Damping | None = None
         self._age = 0
 
-    def torque(
-        self, terms: ArmTerms, stiffness: Callable[[], Matrix], spring: JointVector, speed_error: JointVector
-    ) -> JointVector:
+    def torque(self, design: Callable[[], Damping], spring: JointVector, speed_error: JointVector) -> JointVector:
         """Returns the torque of springs with their dampers, shape (n,), [N m].
 
         Args:
-            terms: The arm as it is now.
-            stiffness: Gives the stiffness of the springs when a design is due, see `design_damping`.
+            design: Designs the dampers for the arm as it is now, when that is due.
             spring: Torque of the springs alone, shape (n,), [N m].
             speed_error: Wanted minus measured joint velocities, shape (n,), [rad/s].
         """
         self._age += 1
         if self._design is None or self._age >= DESIGN_PERIOD:
-            self._design, self._age = design_damping(terms, stiffness()), 0
+            self._design, self._age = design(), 0
         return self._design.torque(spring, speed_error)

@@ -12,7 +12,7 @@ import numpy as np
 from rcilab.arrays import Array, JointVector
 from rcilab.controller.compliance import design_damping
 from rcilab.controller.plant import Measurement
-from rcilab.dynamics.rigid_body import ArmTerms
+from rcilab.dynamics.rigid_body import ToolTerms
 from rcilab.limits import JointLimits
 from rcilab.model import RobotModel
 from rcilab.protocols import rci
@@ -45,7 +45,7 @@ def guide_torque(
         q_held: Joint angles at the start of the drag, shape (n,), [rad].
         limits: Where the joints end; the arm's own limits when absent.
     """
-    terms = model.rigid_body.terms(measured.q, measured.dq)
+    terms = model.rigid_body.tool_terms(measured.q, measured.dq)
     stiffness, spring = _limit_springs(measured.q, model.limits.joint if limits is None else limits)
     if space is rci.DragSpace.CARTESIAN and kind is not rci.DragType.FREE:
         held = slice(3, 6) if kind is rci.DragType.TRANSLATION else slice(0, 3)
@@ -54,7 +54,8 @@ def guide_torque(
         stiffness = stiffness + hold * (J.T @ J)
         spring = spring + J.T @ (hold * error)
     spring = spring - JOINT_DAMPING * model.limits.joint.torque * measured.dq
-    return design_damping(terms, stiffness, GUIDE_DAMPING).torque(spring, -measured.dq) + terms.coriolis
+    coriolis = model.rigid_body.motion_torque(measured.q, measured.dq, np.zeros(model.n))
+    return design_damping(terms.mass_inverse, stiffness, GUIDE_DAMPING).torque(spring, -measured.dq) + coriolis
 
 
 def wall_torque(model: RobotModel, measured: Measurement, box: SafetyBox, stiffness6: tuple[float, ...]) -> JointVector:
@@ -66,7 +67,7 @@ def wall_torque(model: RobotModel, measured: Measurement, box: SafetyBox, stiffn
         box: The box that the tool shall stay in.
         stiffness6: Cartesian stiffness; the first three act along the axes of the box, [N/m].
     """
-    terms = model.rigid_body.terms(measured.q, measured.dq)
+    terms = model.rigid_body.tool_terms(measured.q, measured.dq)
     r, centre = box.T_base_box.parts
     x, y, z = (a - b for a, b in zip(terms.position, centre, strict=True))
     outside = [0.0, 0.0, 0.0]
@@ -80,10 +81,10 @@ def wall_torque(model: RobotModel, measured: Measurement, box: SafetyBox, stiffn
     J = directions.T @ terms.jacobian[:3]
     stiffness = np.array([stiffness6[axis] for axis in faces])
     spring = J.T @ (stiffness * [-outside[axis] for axis in faces])
-    return design_damping(terms, J.T * stiffness @ J, _DAMPED_OUTWARD).torque(spring, -measured.dq)
+    return design_damping(terms.mass_inverse, J.T * stiffness @ J, _DAMPED_OUTWARD).torque(spring, -measured.dq)
 
 
-def _held(model: RobotModel, terms: ArmTerms, kind: rci.DragType, T_held: Pose) -> tuple[float, Array]:
+def _held(model: RobotModel, terms: ToolTerms, kind: rci.DragType, T_held: Pose) -> tuple[float, Array]:
     """Returns stiffness and error of what a Cartesian drag holds, the error of shape (3,) in base axes."""
     cartesian = model.limits.cartesian
     if kind is rci.DragType.ROTATION:

@@ -112,13 +112,11 @@ class IdealPlant:
         Accelerations are those of the middle of the millisecond, so that a free swing keeps its energy; the step in q
         is the new velocity's, so that measured velocities are the backward differences of measured angles.
         """
-        h, body, gravity = CYCLE_TIME, self._body, self._model.rigid_body.gravity
+        h, gravity = CYCLE_TIME, self._model.rigid_body.gravity
         q, dq = self._measurement.q, self._measurement.dq
-        outside = self._push.torque(q) if self._push.is_active else self._zeros
-        ddq = body.acceleration(q, dq, tau_c + gravity(q) + outside)
-        dq_mid = dq + (h / 2.0) * ddq
-        q_mid = q + (h / 2.0) * dq
-        ddq = body.acceleration(q_mid, dq_mid, tau_c + gravity(q_mid) + outside)
+        outside = self._push.torque(q) if self._push.is_active else None
+        ddq = self._acceleration(q, dq, tau_c, outside)
+        ddq = self._acceleration(q + (h / 2.0) * dq, dq + (h / 2.0) * ddq, tau_c, outside)
         dq = dq + h * ddq
         q = q + h * dq
         tau = tau_c + gravity(q)
@@ -127,3 +125,11 @@ class IdealPlant:
         self._rests = False
         self._measurement = Measurement(q, dq, tau)
         return self._measurement
+
+    def _acceleration(
+        self, q: JointVector, dq: JointVector, tau_c: JointVector, outside: JointVector | None
+    ) -> JointVector:
+        tau = tau_c if outside is None else tau_c + outside
+        if self._mounted is None:  # Gravity is what the controller takes it for.
+            return self._body.weightless_acceleration(q, dq, tau)
+        return self._body.acceleration(q, dq, tau + self._model.rigid_body.gravity(q))

@@ -78,7 +78,7 @@ class Observer:
         if tau_ext is self._zeros:
             return self._none
         J = self._body.tool_jacobian(measured.q)
-        return tau_ext, frozen(np.linalg.solve(J @ J.T + _DAMPING, J @ tau_ext))
+        return tau_ext, _read_only(self._body.tool_solver.solve(J @ J.T + _DAMPING, J @ tau_ext))
 
 
 def _is_tiny(vector: Array, bound: float) -> bool:

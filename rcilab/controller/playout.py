@@ -12,8 +12,8 @@
 * A command that was overtaken on its way is put back in its place.
 * A short gap in the ids is either a lost command, or a lost state whose cycle the client never saw; only the command
   itself can tell, so the caller is asked whether it continues the motion by one step or by the whole gap.
-* More commands than the prefill in stock for a long time mean a client that made more of them than there are cycles;
-  the loop is told to live through some more, or their delay would only ever grow.
+* Clearly more commands than the prefill in stock for a long time mean a client that made more of them than there are
+  cycles; the loop is told to live through some more, or their delay would only ever grow.
 * Commands that close a control loop (torques) must be fresh: more than the prefill in stock are skipped, oldest first.
 * A long gap, or ids that start again far behind, mean another numbering: the command is simply the next one.
 """
@@ -29,6 +29,7 @@ from rcilab.protocols.rci import CommandPacket
 CAPACITY = 256  # Commands. Two and a half of the vendor client's worst bursts (about 92).
 WINDOW = 1000  # Cycles that the success rate looks back over, 1 s; a choice.
 STOCK_WINDOW = 100  # Cycles in which the lowest stock is looked for; longer than any jitter, a choice.
+SLACK = 5  # Cycles of delay more than wanted that are left alone: a client may be late with its first answer; a choice.
 LONGEST_GAP = 20  # Ids. The largest loss that the controller bridges at all (manual 4.6: 10 to 20).
 
 
@@ -122,7 +123,7 @@ class Playout:
         self._newest = packet
 
     def work_off(self) -> bool:
-        """Returns whether a cycle more is due now: more commands than the prefill waited all through the last window.
+        """Returns whether a cycle more is due now: many more commands than the prefill waited through the last window.
 
         That is no jitter; the client has made more commands than there were cycles.
         """
@@ -184,7 +185,8 @@ class Playout:
         self._lowest = min(self._lowest, len(self._queue) - 1)
         self._looked += 1
         if self._looked >= STOCK_WINDOW:
-            self._excess = max(0, self._lowest - self._prefill)
+            excess = self._lowest - self._prefill
+            self._excess = excess if excess > SLACK else 0
             self._looked, self._lowest = 0, self._capacity
 
     def _skip_old(self) -> int:

@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rcilab.arrays import Array, JointVector, Matrix
-from rcilab.controller.compliance import DAMPING_RATIO, Damper
+from rcilab.controller.compliance import DAMPING_RATIO, Damper, design_damping
 from rcilab.controller.plant import Measurement
-from rcilab.dynamics.rigid_body import ArmTerms
+from rcilab.dynamics.rigid_body import ToolTerms
 from rcilab.model import RobotModel
 from rcilab.spatial import Pose, turn_between
 
@@ -48,12 +48,13 @@ def joint_impedance(
         stiffness: n numbers, [N m/rad].
         damper: The one of the cycles before; None designs another.
     """
-    terms = model.rigid_body.terms(measured.q, measured.dq)
+    body, q, dq = model.rigid_body, measured.q, measured.dq
     K = np.array(stiffness)
-    spring, speed_error = K * (q_c - measured.q), dq_c - measured.dq
-    tau = (damper or Damper()).torque(terms, lambda: np.diag(K), spring, speed_error)
-    tau += terms.coriolis
-    return tau + terms.mass_matrix @ np.array(ddq_c) if any(ddq_c) else tau
+    tau = (damper or Damper()).torque(
+        lambda: design_damping(body.mass_inverse(q), np.diag(K)), K * (q_c - q), dq_c - dq
+    )
+    tau += body.motion_torque(q, dq, np.array(ddq_c))
+    return tau
 
 
 def cartesian_impedance(
@@ -86,21 +87,22 @@ def cartesian_impedance(
         axes: Rotation whose columns, in base, are the directions that both refer to, shape (3, 3).
         damper: The one of the cycles before; None designs another.
     """
-    terms = model.rigid_body.terms(measured.q, measured.dq)
-    M, J = terms.mass_matrix, terms.jacobian
+    body, q, dq = model.rigid_body, measured.q, measured.dq
+    terms = body.tool_terms(q, dq)
+    J = terms.jacobian
     # Rows of J, error and desired wrench in the axes of the springs, where the stiffness is diagonal.
     along = J if axes is None else _turned(J, axes)
     error = _pose_error(T_c, terms)
     wrench = np.array(stiffness6) * (error if axes is None else _turned(error, axes)) + desired_wrench6
     dq_c, ddq_c = _joint_reference(model, terms, twist_c, acc_c, q_null, measured)
-    speed_error = dq_c - measured.dq
-    tau = (damper or Damper()).torque(terms, lambda: along.T * stiffness6 @ along, wrench @ along, speed_error)
-    tau += terms.coriolis
-    tau += M @ ddq_c
+    tau = (damper or Damper()).torque(
+        lambda: design_damping(terms.mass_inverse, along.T * stiffness6 @ along), wrench @ along, dq_c - dq
+    )
+    tau += body.motion_torque(q, dq, ddq_c)
     return tau
 
 
-def _pose_error(T_c: Pose, terms: ArmTerms) -> Array:
+def _pose_error(T_c: Pose, terms: ToolTerms) -> Array:
     """Returns position and rotation vector from the measured to the commanded tool, base axes, shape (6,)."""
     r, (x, y, z) = T_c.parts
     px, py, pz = terms.position
@@ -113,27 +115,30 @@ def _turned(rows: Array, axes: Matrix) -> Array:
 
 
 def _joint_reference(
-    model: RobotModel, terms: ArmTerms, twist: ArrayLike, acc: ArrayLike, q_null: Sequence[float], measured: Measurement
+    model: RobotModel,
+    terms: ToolTerms,
+    twist: ArrayLike,
+    acc: ArrayLike,
+    q_null: Sequence[float],
+    measured: Measurement,
 ) -> tuple[JointVector, JointVector]:
     """Returns joint velocities and accelerations, each of shape (n,), that move the tool as commanded.
 
     Of all that do, they are those of least kinetic energy (Khatib's dynamically consistent inverse), and on a 7-axis
     arm the accelerations besides are those of a damped spring at `q_null`, as far as the tool does not feel it.
     """
-    twist, acc = np.asarray(twist), np.asarray(acc)
-    is_moved = bool(twist.any() or acc.any())
-    if not is_moved and model.n == 6:
+    wanted = np.array((twist, acc))
+    if wanted.any():
+        wanted[1] -= terms.drift
+    elif model.n == 6:
         return np.zeros(6), np.zeros(6)
     J = terms.jacobian
     back = terms.mass_inverse @ J.T
     compliance = J @ back
     compliance.flat[::7] += _DAMPED_INVERSE
-    wanted = np.zeros((6, 2))
-    if is_moved:
-        wanted[:, 0], wanted[:, 1] = twist, acc - terms.drift
     free: Array | float = 0.0
     if model.n == 7:
         free = NULL_FREQUENCY**2 * (q_null - measured.q) - NULL_DAMPING * measured.dq
-        wanted[:, 1] -= J @ free
-    both = back @ np.linalg.solve(compliance, wanted)
-    return both[:, 0], both[:, 1] + free
+        wanted[1] -= J @ free
+    dq_c, ddq_c = (back @ model.rigid_body.tool_solver.solve(compliance, wanted.T)).T
+    return dq_c, ddq_c + free

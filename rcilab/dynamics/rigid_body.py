@@ -13,6 +13,7 @@ import pinocchio as pin  # pyright: ignore[reportMissingImports]  # It lives beh
 
 from rcilab.arrays import Array, JointPath, JointVector, Matrix, Vector3
 from rcilab.dynamics.payload import Payload
+from rcilab.dynamics.symmetric_solver import SymmetricSolver
 from rcilab.robots.description import Link, RobotDescription
 from rcilab.robots.upright import upright_flange, upright_joints
 from rcilab.spatial import IDENTITY, Pose, Rotation9
@@ -50,17 +51,11 @@ class TorqueTerms:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ArmTerms:
-    """Everything a control law needs to know of the arm in one state. Arrays are views: do not write to them."""
+class ToolTerms:
+    """What a control law at the tool needs to know of the arm in one state. Arrays are not to be written to."""
 
-    mass_matrix: Matrix
-    """Joint-space inertia M, shape (n, n), [kg m^2]."""
     mass_inverse: Matrix
     """M^-1, shape (n, n), [1/(kg m^2)]."""
-    coriolis: JointVector
-    """C(q, dq) dq, shape (n,), [N m]."""
-    gravity: JointVector
-    """g(q), shape (n,), [N m]."""
     jacobian: Matrix
     """At the tool, linear rows first, base axes, shape (6, n)."""
     drift: Array
@@ -73,6 +68,9 @@ class ArmTerms:
 
 class RigidBody:
     """The rigid-body model of an arm with a load and a tool at the flange. One instance serves one thread at a time.
+
+    Attributes:
+        tool_solver: For equations in the six directions of the tool.
 
     Args:
         description: The arm.
@@ -97,8 +95,11 @@ class RigidBody:
         self._tool = model.addFrame(pin.Frame("tool", parent, 0, T, pin.FrameType.OP_FRAME))
         self._model = model
         self._data = model.createData()
+        self._weightless = pin.Model(model)
+        self._weightless.gravity.linear = np.zeros(3)
+        self.tool_solver = SymmetricSolver(6)
         self._zeros = np.zeros(description.n)
-        self._terms: tuple[JointVector, JointVector, ArmTerms] | None = None
+        self._tool_terms: tuple[JointVector, JointVector, ToolTerms] | None = None
 
     def torque(self, q: JointVector, dq: JointVector, ddq: JointVector) -> TorqueTerms:
         """Returns the torques and their terms; every argument of shape (n,), [rad], [rad/s], [rad/s^2]."""
@@ -118,22 +119,28 @@ class RigidBody:
         """Returns only the sum of all terms, shape (n,), [N m]."""
         return pin.rnea(self._model, self._data, q, dq, ddq).copy()
 
+    def motion_torque(self, q: JointVector, dq: JointVector, ddq: JointVector) -> JointVector:
+        """Returns what a motion takes beyond holding the arm still: M ddq + C dq, shape (n,), [N m]."""
+        return pin.rnea(self._weightless, self._data, q, dq, ddq).copy()
+
     def motion_torques(self, q: JointPath, dq: JointPath, ddq: JointPath) -> JointPath:
-        """Returns what a motion takes beyond holding the arm still: M ddq + C dq in every row, shape (N, n), [N m].
+        """Returns `motion_torque` of every row, shape (N, n), [N m].
 
         Args:
             q: Joint angles, shape (N, n), [rad].
             dq: Joint velocities, shape (N, n), [rad/s].
             ddq: Joint accelerations, shape (N, n), [rad/s^2].
         """
-        model = pin.Model(self._model)
-        model.gravity.linear = np.zeros(3)
-        return _newton_euler(model, q, dq, ddq)
+        return _newton_euler(self._weightless, q, dq, ddq)
 
     def mass_matrix(self, q: JointVector) -> Matrix:
         """Returns the joint-space inertia matrix, shape (n, n), [kg m^2]."""
         upper = np.triu(pin.crba(self._model, self._data, q))
         return upper + np.triu(upper, 1).T
+
+    def mass_inverse(self, q: JointVector) -> Matrix:
+        """Returns the inverse of the joint-space inertia matrix, shape (n, n), [1/(kg m^2)]."""
+        return pin.computeMinverse(self._model, self._data, q).copy()
 
     def gravity(self, q: JointVector) -> JointVector:
         """Returns g(q), shape (n,), [N m]."""
@@ -148,6 +155,10 @@ class RigidBody:
             tau: Joint torques, gravity included, shape (n,), [N m].
         """
         return pin.aba(self._model, self._data, q, dq, tau).copy()
+
+    def weightless_acceleration(self, q: JointVector, dq: JointVector, tau: JointVector) -> JointVector:
+        """Returns the joint accelerations that torques cause on top of those that hold the arm; as `acceleration`."""
+        return pin.aba(self._weightless, self._data, q, dq, tau).copy()
 
     def link_jacobian(self, q: JointVector, link: int, point: Vector3) -> Matrix:
         """Returns the Jacobian at a point of a link, linear rows first, base axes, shape (6, n).
@@ -182,8 +193,8 @@ class RigidBody:
         rotation = tuple(pose.rotation.ravel().tolist())
         return Pose.from_parts(rotation, tuple(pose.translation.tolist())), tuple(twist.vector.tolist())
 
-    def terms(self, q: JointVector, dq: JointVector) -> ArmTerms:
-        """Returns all terms of a state at once.
+    def tool_terms(self, q: JointVector, dq: JointVector) -> ToolTerms:
+        """Returns what a control law at the tool needs, all at once.
 
         The last answer is kept, and given again when the very same arrays come: laws that act in one cycle share it.
 
@@ -191,22 +202,18 @@ class RigidBody:
             q: Joint angles, shape (n,), [rad]; an array that nobody writes to any more.
             dq: Joint velocities, shape (n,), [rad/s]; likewise.
         """
-        last = self._terms
+        last = self._tool_terms
         if last is not None and last[0] is q and last[1] is dq:
             return last[2]
         model, data = self._model, self._data
-        pin.computeAllTerms(model, data, q, dq)
-        gravity, M = data.g.copy(), data.M.copy()
-        coriolis = data.nle - gravity
         inverse = pin.computeMinverse(model, data, q).copy()
+        J = pin.computeFrameJacobian(model, data, q, self._tool, pin.LOCAL_WORLD_ALIGNED)
         pin.forwardKinematics(model, data, q, dq, self._zeros)
-        pin.updateFramePlacement(model, data, self._tool)
-        J = pin.getFrameJacobian(model, data, self._tool, pin.LOCAL_WORLD_ALIGNED)
+        pose = pin.updateFramePlacement(model, data, self._tool)
         drift = pin.getFrameClassicalAcceleration(model, data, self._tool, pin.LOCAL_WORLD_ALIGNED).vector.copy()
-        pose = data.oMf[self._tool]
         rotation = tuple(pose.rotation.ravel().tolist())
-        terms = ArmTerms(M, inverse, coriolis, gravity, J, drift, rotation, tuple(pose.translation.tolist()))
-        self._terms = (q, dq, terms)
+        terms = ToolTerms(inverse, J, drift, rotation, tuple(pose.translation.tolist()))
+        self._tool_terms = (q, dq, terms)
         return terms
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from rcilab.arrays import JointVector
 from rcilab.client.start_check import describe_start_mismatch, require_motion
 from rcilab.errors import CertificateError, UsageError
 from rcilab.supervisor.layout import MOTION_ROWS, MOTION_TIME, OPERATOR_TIMEOUT
@@ -38,21 +39,35 @@ def require_admissible(
         UsageError: The arm is moving, no controller is connected, nobody is at the controls, or the motion is too long.
     """
     require_motion(motion, certificate)
-    if status.phase in ("moving", "stopping"):
-        raise UsageError("the arm is moving; stop it first, or wait until it has arrived")
-    if status.q_c is None or status.phase not in ("idle", "fault"):
-        raise UsageError(f"nothing can move now: {status.message}")
+    q_c = require_ready(status, is_operator_overdue=is_operator_overdue)
     if certificate is None:
         raise CertificateError("the motion has not been checked: check(motion, model) first", ["certificate"])
-    mismatch = describe_start_mismatch(motion.q[0], status.q_c)
+    mismatch = describe_start_mismatch(motion.q[0], q_c)
     if mismatch is not None:
         raise CertificateError(mismatch, ["start state"])
-    certificate.verify(motion, model, status.q_c)
-    if is_operator_overdue:
-        raise UsageError(
-            f"nobody is at the controls: the page that holds them has not been heard of for {OPERATOR_TIMEOUT:g} s"
-        )
+    certificate.verify(motion, model, q_c)
     if len(motion.q) > MOTION_ROWS:
         raise UsageError(
             f"the motion takes {motion.duration:.1f} s, {MOTION_TIME:g} s at most can be handed over; split it"
         )
+
+
+def require_ready(status: SupervisorStatus, *, is_operator_overdue: bool) -> JointVector:
+    """Returns the commanded joint angles, shape (n,), [rad], if the arm may be moved now.
+
+    Args:
+        status: Where the arm is and what it does.
+        is_operator_overdue: Whether somebody ought to be at the controls and is not.
+
+    Raises:
+        UsageError: The arm is moving, no controller is connected, or nobody is at the controls.
+    """
+    if status.phase in ("moving", "stopping"):
+        raise UsageError("the arm is moving; stop it first, or wait until it has arrived")
+    if status.q_c is None or status.phase not in ("idle", "fault"):
+        raise UsageError(f"nothing can move now: {status.message}")
+    if is_operator_overdue:
+        raise UsageError(
+            f"nobody is at the controls: the page that holds them has not been heard of for {OPERATOR_TIMEOUT:g} s"
+        )
+    return status.q_c

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WorkerSettings:
-    """The arm as far as the control process needs it: no kinematics, no dynamics."""
+    """The arm as far as the control process needs it."""
 
     name: str
     """Name of the arm, to compare with the controller's."""
@@ -25,8 +25,9 @@ class WorkerSettings:
     """Its Denavit-Hartenberg a and d, one row a joint, [m]; also to compare."""
     n: int
     limits: Limits
-    tool: Pose | None
-    """Pose in the flange frame, to be sent to the controller; None to send none."""
+    T_flange_tool: Pose
+    sends_tool: bool
+    """Whether to tell the controller of the tool."""
     load: tuple[float, list[float], list[list[float]]] | None
     """Mass [kg], centre [m] and inertia [kg m^2], to be sent to the controller; None to send none."""
 
@@ -49,14 +50,15 @@ def build_settings(model: RobotModel, *, is_virtual: bool) -> dict[str, Any]:
         "joint": {name: getattr(limits.joint, name).tolist() for name in JointLimits.__slots__},
         "cartesian": asdict(limits.cartesian),
         "arm_angle": asdict(limits.arm_angle) if limits.arm_angle else None,
-        "tool": model.T_flange_tool.as_row_major() if has_tool else None,
+        "tool": model.T_flange_tool.as_row_major(),
+        "sends_tool": has_tool,
         "load": [load.mass, load.center_of_mass.tolist(), load.inertia.tolist()] if has_load else None,
     }
 
 
 def parse_settings(settings: dict[str, Any]) -> WorkerSettings:
     """Returns what `build_settings` wrote."""
-    arm_angle, tool, load = settings["arm_angle"], settings["tool"], settings["load"]
+    arm_angle, load = settings["arm_angle"], settings["load"]
     return WorkerSettings(
         name=settings["name"],
         lengths=settings["lengths"],
@@ -66,6 +68,7 @@ def parse_settings(settings: dict[str, Any]) -> WorkerSettings:
             cartesian=CartesianLimits(**settings["cartesian"]),
             arm_angle=ArmAngleLimits(**arm_angle) if arm_angle else None,
         ),
-        tool=None if tool is None else Pose.from_row_major(tool),
+        T_flange_tool=Pose.from_row_major(settings["tool"]),
+        sends_tool=settings["sends_tool"],
         load=None if load is None else (load[0], load[1], load[2]),
     )

@@ -9,11 +9,13 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from rcilab.arrays import as_vector
 from rcilab.client.address import parse_address
 from rcilab.errors import ConnectionLostError, RcilabError, UsageError
-from rcilab.supervisor.admission import require_admissible
+from rcilab.supervisor.admission import require_admissible, require_ready
+from rcilab.supervisor.jog_command import JogCommand, JogKind, write_jog
 from rcilab.supervisor.keeper import ANSWER_TIMEOUT, ProcessKeeper
 from rcilab.supervisor.launch import require_plant
 from rcilab.supervisor.layout import OPERATOR_TIMEOUT, ControlBlock, Word
@@ -75,6 +77,7 @@ class Supervisor:
         self._lock = threading.RLock()  # Guards everything below; held for long only while our processes are ended.
         self._block: ControlBlock | None = None  # With it come and go the keeper, the desk and the readers.
         self._connecting: Ticket | None = None
+        self._jogging: Ticket | None = None
         self._crash: tuple[str, str] | None = None
         self._incident: Incident | None = None
         self._watcher: threading.Thread | None = None
@@ -184,10 +187,51 @@ class Supervisor:
             block.motion[: len(rows)] = rows
             return self._ask("execute", kind="execute", rows=len(rows), duration=motion.duration)
 
+    def jog(self, kind: JogKind, values: ArrayLike) -> Ticket:
+        """Moves the arm as long as it is held: call it at least five times a second, and `release_jog` at the end.
+
+        The first call begins a jog, the next ones go on with it, whatever direction they ask for: on-line re-planning
+        inside every limit of the joints. A jog that is not renewed for 0.3 s comes to rest. It is a motion like any
+        other, so the first movement comes when the controller shows its mode, 0.2 to 1 s after the first call; at rest
+        it listens for another second.
+
+        Args:
+            kind: "joint", or "base" or "tool" for a twist of the tool in these axes.
+            values: n joint velocities, [rad/s], or a twist of six numbers, linear first, [m/s, rad/s]; lowered to
+                what the limits allow.
+
+        Returns:
+            The ticket of the jog; it is done when the arm stands still and nobody jogs any more.
+
+        Raises:
+            InvalidValueError: The kind is unknown, or the values are not as many finite numbers as it needs.
+            UsageError: Another motion is under way, no controller is connected, or nobody is at the controls.
+        """
+        size, unit = (self.model.n, "rad/s") if kind == "joint" else (6, "m/s, rad/s")
+        command = JogCommand(kind, tuple(as_vector(values, size, "values", unit).tolist()))
+        with self._lock:
+            block = self._require_block()
+            if self._jogging is None or self._jogging.done:
+                require_ready(self.status(), is_operator_overdue=self._is_operator_overdue())
+                write_jog(block.jog, block.words, command)
+                block.words[Word.JOG_BEAT] = time.monotonic_ns()
+                self._jogging = self._ask("jog", kind="jog")
+            else:
+                write_jog(block.jog, block.words, command)
+                block.words[Word.JOG_BEAT] = time.monotonic_ns()
+            return self._jogging
+
+    def release_jog(self) -> None:
+        """Brings a jog to rest at once."""
+        with self._lock:
+            if self._block is not None:
+                self._block.words[Word.JOG_BEAT] = 0
+
     def stop(self) -> Ticket:
         """Brings a running motion to rest within the limits; done when it stands, at once when nothing moves."""
         with self._lock:
             block = self._require_block()
+            block.words[Word.JOG_BEAT] = 0
             block.words[Word.STOPS_ASKED] += 1
             return self._ask("stop", kind="stop", number=block.words[Word.STOPS_ASKED])
 

@@ -19,7 +19,7 @@ import numpy as np
 from rcilab.awake import awake_cores
 from rcilab.client.address import parse_address
 from rcilab.client.commands import RciCommands
-from rcilab.client.control_loop import ControlLoop
+from rcilab.client.control_loop import Callback, ControlLoop
 from rcilab.client.following import follow
 from rcilab.client.link import Link
 from rcilab.client.opening import await_first_state, require_arm_there
@@ -29,11 +29,13 @@ from rcilab.client.recovery import recover
 from rcilab.client.start_check import describe_start_mismatch
 from rcilab.client.transport import SocketTransport
 from rcilab.errors import ConnectionLostError, ControlError, RcilabError, UsageError
+from rcilab.model import load_model
 from rcilab.motion import plan_stop
 from rcilab.protocols.rci import STATE_SIZE
 from rcilab.realtime import enter_realtime
 from rcilab.state import ControllerMode, RobotState
 from rcilab.supervisor.failure import pack_failure
+from rcilab.supervisor.jogging import HeldJog
 from rcilab.supervisor.layout import OPERATOR_TIMEOUT, ControlBlock, Word
 from rcilab.supervisor.mailbox import Mailbox
 from rcilab.supervisor.publisher import Publisher
@@ -69,6 +71,8 @@ class Worker:
         self._address = ""
         self._is_ending = False
         self._deferred: list[dict[str, Any]] = []
+        self._model = load_model(self._settings.name, tool=self._settings.T_flange_tool)
+        self._jog: HeldJog | None = None
 
     def run(self) -> int:
         """Lives until asked to end or until the supervisor is gone; returns the exit code."""
@@ -161,8 +165,8 @@ class Worker:
         self._log.restart()
         self._publisher.restart()
         self._commands = RciCommands(link, self._settings.limits)
-        if self._settings.tool is not None:
-            self._commands.set_coor(self._settings.tool)
+        if self._settings.sends_tool:
+            self._commands.set_coor(self._settings.T_flange_tool)
         if self._settings.load is not None:
             self._commands.set_load(*self._settings.load)
         self._learn_power()
@@ -196,16 +200,32 @@ class Worker:
                 raise UsageError(mismatch)
         self._publisher.update(motion_time=0.0, motion_duration=request["duration"])
         self._say("moving", "moving")
+        self._move(link, follow(rows, self._publisher.on_cycle), "idle.arrived")
+
+    def _do_jog(self, request: dict[str, Any]) -> None:
+        link = self._require_link()
+        self._record(link.poll(_LOOK))
+        assert link.latest is not None  # A connection begins with a state.
+        self._jog = HeldJog(self._block, self._model, link.latest.q_c)
+        self._publisher.update(motion_time=None, motion_duration=None)
+        self._say("moving", "moving.jog")
+        try:
+            self._move(link, self._jog, "idle.jogged")
+        finally:
+            self._jog = None
+
+    def _move(self, link: Link, callback: Callback, arrived: str) -> None:
+        """Runs a motion; what it says at its end tells why it ended."""
         loop = ControlLoop(
             link, self._commands, self._settings.limits, ControllerMode.JOINT_POSITION, self._log, watch=self._watch
         )
         try:
             with awake_cores():
-                reason = loop.run(follow(rows, self._publisher.on_cycle))
+                reason = loop.run(callback)
         finally:
             gc.collect()
         if reason is None:
-            self._say("idle", "idle.arrived")
+            self._say("idle", arrived)
         elif reason == "idle.operator":
             self._say("idle", reason, seconds=OPERATOR_TIMEOUT)
         else:
@@ -235,6 +255,10 @@ class Worker:
         if request["kind"] in ("stop", "end"):
             self._deferred.append(request)
             return "idle.stopped"
+        if self._jog is not None:  # It comes to rest at once, and then has no reason to go on.
+            self._deferred.append(request)
+            self._jog.is_wanted = False
+            return None
         error = UsageError("the arm is moving; stop it first, or wait until it has arrived")
         self._outbox.post({"id": request["id"], "failure": pack_failure(error)})
         return None

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rcilab.client.run import find_delay
 from rcilab.errors import CertificateError, ControlError, RcilabError
 from rcilab.faults import Fault
 from rcilab.model import load_model
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from rcilab.supervisor import SupervisorStatus, Ticket
 
 _LONGEST_RECORDING = 600_000  # Rows: ten minutes of cycles.
+_DELAY_WINDOW = 1000  # Rows that the play-out delay is looked for in; longer than any, and every motion moves by then.
 
 
 class RobotActions:
@@ -159,8 +161,15 @@ class RobotActions:
             self._rows.append(rows)
             together = np.concatenate(self._rows)[-_LONGEST_RECORDING:]
             self._rows = [together]
+            first = together[:_DELAY_WINDOW]
             self._store.update(
-                recording=Recording(t=together["t"], q=together["q"], q_c=together["q_c"], dq=together["dq"])
+                recording=Recording(
+                    t=together["t"],
+                    q=together["q"],
+                    q_c=together["q_c"],
+                    dq=together["dq"],
+                    delay=find_delay(first["q_c"], first["command"]),
+                )
             )
         if not is_moving(status) and not any(what == "execute" for what, _ in self._tickets):
             self._recording = False

@@ -55,6 +55,8 @@ class Recording:
     """Commanded, [rad], shape (N, n)."""
     dq: np.ndarray
     """Measured, [rad/s], shape (N, n)."""
+    delay: int
+    """Cycles between a command and the state that shows it: the controller's play-out, and its answer."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -134,16 +134,16 @@ def test_a_cycle_that_nobody_sees_is_no_gap_for_the_client(make_hand) -> None:
     hand.start()
     rows = hand.swing(1, 1.0, 0.5)
     first = hand.state.message_id
-    for k in range(5):
-        hand.cycle.receive(rci.CommandPacket(first - 5 + k, tuple(rows[k])))
+    for k in range(8):
+        hand.cycle.receive(rci.CommandPacket(first - 8 + k, tuple(rows[k])))
     extra = 0
-    for row in rows[5:]:
+    for row in rows[8:]:
         hand.cycle.receive(rci.CommandPacket(hand.state.message_id, tuple(row)))
         if hand.cycle.playout.work_off():
             hand.cycle.step(is_seen=False)
             extra += 1
         assert hand.step().faults == ()
-    assert extra == 5  # The countdown of the prefill came on top of them.
+    assert extra == 8  # The countdown of the prefill came on top of them.
     assert np.diff([state.message_id for state in hand.states[-400:]]).max() == 1
     assert (hand.cycle.playout.lost, hand.state.success_rate) == (0, 1.0)
 

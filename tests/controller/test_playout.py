@@ -4,7 +4,7 @@ import itertools
 
 import pytest
 
-from rcilab.controller.playout import CAPACITY, Playback, Playout
+from rcilab.controller.playout import CAPACITY, SLACK, Playback, Playout
 from rcilab.protocols.rci import CommandPacket
 
 _numbers = itertools.count()
@@ -187,6 +187,8 @@ def test_more_commands_than_cycles_are_worked_off_but_jitter_is_not() -> None:
         return extra
 
     assert live([1] * 3 + [0, 0, 3] * 200) == 0
+    assert live([2] * SLACK + [1] * 400) == 0  # A first answer that was late, say: not worth a leap.
+    assert live([2] + [1] * 400) == SLACK + 1
     assert live([2] * 20 + [1] * 400) == 20
     assert len(playout) == 3
     assert playout.lost == 0

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from rcilab.supervisor import SupervisorStatus
     from rcilab.workbench.store import UiState
 
+_AMBER = {True: "check.exceeded", False: "check.tight"}
 _TIGHT = 0.95  # A choice: from this share of a bound on, a row is amber.
 
 
@@ -41,8 +42,10 @@ class CheckPanel:
         if report is self._drawn:
             return
         self._drawn = report
+        unheeded = sum(not row.ok for row in report.rows if row.condition.necessity == "recommended")
         if report.ok:
-            headline = ("good", "check.passed", text("check.passed_long"))
+            code = "check.passed_unheeded" if unheeded else "check.passed_long"
+            headline = ("good", "check.passed", text(code, count=unheeded))
         else:
             headline = ("bad", "check.failed", text("check.failed_long", count=len(report.violations)))
         tone, word, rest = headline
@@ -66,7 +69,7 @@ class CheckPanel:
             if row.ratio > _TIGHT
             else "good"
         )
-        word = text("check.broken" if broken else "check.tight" if tone == "warn" else "check.kept")
+        word = text("check.kept" if tone == "good" else "check.broken" if tone == "bad" else _AMBER[broken])
         name = text(f"condition.{condition.id}")
         width = min(100.0, 100.0 * row.ratio)
         facts = [f"{_number(row.value)} / {_number(row.bound)} {pretty_unit(condition.unit)}"]

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rcilab.clock import CYCLE_TIME
 from rcilab.views.plots import QUANTITIES, Frame, Quantity, build_frame, plan_curves, recorded_curves
 from rcilab.workbench import requests
 from rcilab.workbench.text import Text
@@ -87,10 +88,9 @@ class TimelinePanel:
             self._readout.show(f'<p class="rl-note">{esc(text("timeline.nothing"))}</p>')
         else:
             duration = state.plan.motion.duration
-            t, kinds = (
-                state.place * duration,
-                text("timeline.plan_only" if state.recording is None else "timeline.kinds"),
-            )
+            t, kinds = state.place * duration, text("timeline.plan_only")
+            if state.recording is not None:
+                kinds = text("timeline.kinds", delay=state.recording.delay)
             self._readout.show(f'<p class="rl-clock"><b>{t:.3f}</b> / {duration:.3f} s<span>{esc(kinds)}</span></p>')
         for plot in self._plots.values():
             plot.height = _plot_height(state)
@@ -106,7 +106,8 @@ class TimelinePanel:
         recording, joint = state.recording, state.plot_joint
         actual = None
         if recording is not None:
-            actual = recorded_curves(recording.t, recording.q, recording.q_c, recording.dq, quantity)
+            shown = recording.t - recording.delay * CYCLE_TIME  # So that plan and actual lie on each other.
+            actual = recorded_curves(shown, recording.q, recording.q_c, recording.dq, quantity)
         frame = build_frame(plan, actual, state.model.limits.joint, quantity, joint)
         self.end = frame.end
         unit = _UNITS[quantity] if joint else self._text("plot.percent")

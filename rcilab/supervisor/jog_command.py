@@ -1,0 +1,51 @@
+"""The jog that somebody holds: one small record in the shared block, renewed as long as it is held."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+from typing import Literal, TypeAlias, get_args
+
+from rcilab.errors import InvalidValueError
+from rcilab.supervisor.layout import Word
+
+JogKind: TypeAlias = Literal["joint", "base", "tool"]
+"""What the numbers are: joint velocities, or a twist of the tool in axes of the base or of the tool."""
+
+HOLD_TIMEOUT = 0.3  # [s] A jog that is not renewed for that long was let go; a page renews it ten times a second.
+
+_KINDS: tuple[JogKind, ...] = get_args(JogKind)
+_RECORD = struct.Struct("<qq7d")  # place of the kind, count of the numbers, the numbers
+_ATTEMPTS = 3  # The writer needs a microsecond; who meets it in mid-sentence goes on with the last jog.
+
+
+@dataclass(frozen=True, slots=True)
+class JogCommand:
+    """How the arm shall move while it is held."""
+
+    kind: JogKind
+    values: tuple[float, ...]
+    """n joint velocities, [rad/s], or six numbers of a twist, linear first, [m/s, rad/s]."""
+
+    def __post_init__(self) -> None:
+        if self.kind not in _KINDS:
+            raise InvalidValueError("kind", self.kind, f"is no way to jog; there are {', '.join(_KINDS)}")
+
+
+def write_jog(memory: memoryview, words: memoryview, command: JogCommand) -> None:
+    """Writes the jog; the sequence word is odd meanwhile."""
+    numbers = (*command.values, *(0.0,) * (7 - len(command.values)))
+    sequence = words[Word.JOG] | 1
+    words[Word.JOG] = sequence
+    _RECORD.pack_into(memory, 0, _KINDS.index(command.kind), len(command.values), *numbers)
+    words[Word.JOG] = sequence + 1
+
+
+def read_jog(memory: memoryview, words: memoryview) -> JogCommand | None:
+    """Returns the jog as a whole, or None when it is just being written."""
+    for _ in range(_ATTEMPTS):
+        before = words[Word.JOG]
+        kind, count, *numbers = _RECORD.unpack_from(memory, 0)
+        if before % 2 == 0 and words[Word.JOG] == before:
+            return JogCommand(_KINDS[kind], tuple(numbers[:count]))
+    return None
