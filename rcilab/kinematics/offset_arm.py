@@ -317,7 +317,7 @@ def _differential(chain: Chain, q: Array, rotations: Array, positions: Array) ->
 
 def _solved(J: Array, miss: Array) -> Array:
     try:
-        return np.linalg.solve(J, miss[..., None])[..., 0]
+        return np.asarray(np.linalg.solve(J, miss[..., None])[..., 0], dtype=np.float64)
     except np.linalg.LinAlgError:  # One of them is exactly singular.
         inverse = np.asarray(np.linalg.pinv(J, rcond=1e-9), dtype=np.float64)
         return (inverse @ miss[..., None])[..., 0]
