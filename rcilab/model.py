@@ -14,19 +14,18 @@ from numpy.typing import ArrayLike
 
 from rcilab.arrays import JointVector, as_number, as_path, as_rows, as_vector, described
 from rcilab.dynamics.payload import NO_LOAD, Payload
-from rcilab.errors import InvalidValueError, KinematicsError, SingularError
-from rcilab.kinematics import arm_angle as arm_angles
-from rcilab.kinematics.feasible_arcs import FeasibleArcs, feasible_arcs
+from rcilab.errors import InvalidValueError, KinematicsError, ModelError, SingularError
+from rcilab.kinematics.closed_form import ClosedForm, build_closed_form
+from rcilab.kinematics.feasible_arcs import FeasibleArcs
 from rcilab.kinematics.frames import Frame
-from rcilab.kinematics.inverse import build_geometry, inverse_seven, inverse_six
-from rcilab.kinematics.inverse_batch import SolutionBatch, as_pose_batch, inverse_batch
+from rcilab.kinematics.inverse_batch import SolutionBatch, as_pose_batch
 from rcilab.kinematics.moving_arm import MovingArm
 from rcilab.kinematics.reach import Reach, closest_reachable
 from rcilab.kinematics.singularity import Dexterity, DexterityPath, dexterity, dexterity_path
 from rcilab.kinematics.solutions import Solutions, joint_limit_lists
 from rcilab.kinematics.workspace import Workspace, sample_workspace
 from rcilab.limits import Limits
-from rcilab.robots import RobotDescription, describe_robot
+from rcilab.robots import RCI_ROBOT_NAMES, RobotDescription, describe_robot
 from rcilab.safety_box import SafetyBox, active_box
 from rcilab.safety_distance import STANDARD_DISTANCE, SafetyDistance
 from rcilab.spatial import IDENTITY, Pose
@@ -36,14 +35,14 @@ if TYPE_CHECKING:
     from rcilab.dynamics.rigid_body import RigidBody, TorqueTerms
     from rcilab.kinematics.collision import Clearance, CollisionGeometry
 
-__all__ = ["RobotModel", "load_model", "require_model"]
+__all__ = ["RobotModel", "load_model", "require_model", "require_rci"]
 
 _PSI_SEARCH = tuple(math.radians(sign * step) for step in range(10, 181, 10) for sign in (1, -1))
 """Offsets looked at, nearest first, to say what is in the way of a pose that no arm angle reaches."""
 
 
 def load_model(name: str, *, tool: Pose | None = None, load: Payload | None = None) -> RobotModel:
-    """Returns the model of a robot by name, in any case: xMatePro3, xMatePro7, xMate3 or xMate7.
+    """Returns the model of a robot by name, in any case: xMatePro3, xMatePro7, xMate3, xMate7 or Panda.
 
     Args:
         name: Name of the robot.
@@ -68,6 +67,20 @@ def require_model(model: object) -> RobotModel:
     if isinstance(model, str):
         raise InvalidValueError("model", model, f"is a name; use load_model({model!r})")
     raise InvalidValueError("model", described(model), "is no robot model; load_model makes one")
+
+
+def require_rci(model: RobotModel) -> RobotModel:
+    """Returns `model` if the arm speaks the RCI: for borders behind which it is driven or simulated.
+
+    Raises:
+        ModelError: It speaks another interface; the message says what can be done with it.
+    """
+    if model.description.interface == "RCI":
+        return model
+    raise ModelError(
+        f"{model.name} is driven by Franka's own interface, not by the RCI: plan for it, check and draw its motions, "
+        f"but simulate and drive one of {', '.join(RCI_ROBOT_NAMES)}"
+    )
 
 
 class RobotModel(MovingArm):
@@ -148,10 +161,15 @@ class RobotModel(MovingArm):
     def inverse(self, T: Pose | ArrayLike, psi: float | None = None, near: ArrayLike | None = None) -> Solutions:
         """Returns every analytic solution inside the joint limits (GetJointPos); `.nearest(q)` is the vendor's answer.
 
+        The xMates have 8 solutions at an arm angle. The Panda has offsets, and up to 16 or none; they are found along
+        its self-motion at the pose and settled by Newton's method, which takes milliseconds. Where two of them are
+        about to meet, one may be taken for both; the one next to `near` is always found.
+
         Args:
             T: Pose of the tool in base: a `Pose` or a homogeneous matrix, shape (4, 4).
-            psi: Arm angle of a 7-axis arm, [rad]. When absent: that of `near`, or 0; and if nothing is inside the
-                limits there, the closest arm angle that has a solution, a little inside its range.
+            psi: Arm angle of a 7-axis arm, [rad]; of the Panda the angle of joint 3. When absent: that of `near`, or 0;
+                and if nothing is inside the limits there, the closest arm angle that has a solution, a little inside
+                its range.
             near: Joint angles, [rad], that decide what a singular pose leaves open.
 
         Raises:
@@ -171,7 +189,7 @@ class RobotModel(MovingArm):
             return self._inverse_seven(flange, psi, guess)
         if psi is not None:
             raise InvalidValueError("psi", psi, f"has no meaning for {self.name}: a 6-axis arm has no arm angle")
-        solutions = Solutions(inverse_six(self._geometry, flange, guess), *self._bounds, None)
+        solutions = Solutions(self._closed_form.at(flange, guess).branches(0.0), *self._bounds, None)
         if not len(solutions):
             raise solutions.refusal()
         return solutions
@@ -194,7 +212,7 @@ class RobotModel(MovingArm):
         def solve(pose: Pose, may_search: bool) -> Solutions:
             return self.inverse(pose, psi if may_search else held, q)
 
-        return closest_reachable(solve, self._geometry, self.T_flange_tool, self.forward(q), q, target)
+        return closest_reachable(solve, self._closed_form.envelope, self.T_flange_tool, self.forward(q), q, target)
 
     def inverse_batch(self, T: ArrayLike, psi: ArrayLike = 0.0) -> SolutionBatch:
         """Returns every analytic solution of many poses at once (GetJointPos), at one arm angle each.
@@ -217,7 +235,7 @@ class RobotModel(MovingArm):
             )
         flange = poses @ self._T_tool_flange.matrix if self._has_tool else poses
         joint = self.limits.joint
-        return SolutionBatch(inverse_batch(self._geometry, flange, angles), joint.lower, joint.upper)
+        return SolutionBatch(self._closed_form.batch(flange, angles), joint.lower, joint.upper)
 
     def feasible_arcs(self, T: Pose | ArrayLike, box: SafetyBox | None = None) -> FeasibleArcs:
         """Returns which arm angles a pose leaves to a 7-axis arm, and what forbids the others.
@@ -240,17 +258,31 @@ class RobotModel(MovingArm):
         is_outside = bound is not None and bound.excess(pose.parts[1]) > 0.0
         flange = pose @ self._T_tool_flange if self._has_tool else pose
         joint = self.limits.joint
-        return feasible_arcs(self._geometry, flange, joint.lower, joint.upper, is_outside)
+        return self._closed_form.arcs(flange, joint.lower, joint.upper, is_outside)
 
     def arm_angle(self, q: ArrayLike) -> float:
-        """Returns the arm angle psi of a 7-axis arm, [rad] in (-pi, pi].
+        """Returns the arm angle psi of a 7-axis arm, [rad] in (-pi, pi]; of the Panda the angle of joint 3.
 
         Raises:
             SingularError: The shoulder-wrist line is vertical or the arm is stretched; psi has no meaning there.
             KinematicsError: The arm has 6 axes.
         """
         self._require_arm_angle()
-        return arm_angles.arm_angle(self._geometry.upper, self._geometry.fore, self._floats(q))
+        return self._closed_form.arm_angle(self._floats(q))
+
+    def elbow(self, q: ArrayLike) -> tuple[float, int]:
+        """Returns the elbow as Franka counts it: the angle of joint 3, [rad], and on which side of its flip joint 4 is.
+
+        The side is +1 above the angle at which the arm is stretched, and -1 below.
+
+        Raises:
+            KinematicsError: The maker of this arm knows no such flip.
+        """
+        flip = self.description.elbow_flip
+        if flip is None:
+            raise KinematicsError(f"{self.name} has no elbow that flips; arm_angle(q) tells where its elbow is")
+        angles = self._floats(q)
+        return angles[2], 1 if angles[3] > flip else -1
 
     def dexterity(self, q: ArrayLike) -> Dexterity:
         """Returns how well the tool can be moved here: manipulability, smallest singular value, condition."""
@@ -381,8 +413,8 @@ class RobotModel(MovingArm):
         return f"RobotModel({self.name}, {self.n} axes{tool}{load})"
 
     @cached_property
-    def _geometry(self):  # type: ignore[no-untyped-def]  # ArmGeometry; cached_property hides it from no one.
-        return build_geometry(self.description)
+    def _closed_form(self) -> ClosedForm:
+        return build_closed_form(self.description)
 
     @cached_property
     def _bounds(self) -> tuple[list[float], list[float]]:
@@ -390,14 +422,15 @@ class RobotModel(MovingArm):
 
     def _inverse_seven(self, flange: Pose, psi: float | None, near: Sequence[float] | None) -> Solutions:
         start = self._natural_psi(near) if psi is None else psi
-        solutions = Solutions(inverse_seven(self._geometry, flange, start, near), *self._bounds, start)
+        pose = self._closed_form.at(flange, near)
+        solutions = Solutions(pose.branches(start), *self._bounds, start)
         if len(solutions):
             return solutions
         if psi is not None:
             raise solutions.refusal()
         best = solutions
         for angle in self._other_arm_angles(flange, start):
-            solutions = Solutions(inverse_seven(self._geometry, flange, angle, near), *self._bounds, angle)
+            solutions = Solutions(pose.branches(angle), *self._bounds, angle)
             if len(solutions):
                 return solutions
             best = min(best, solutions, key=_least_excess)
@@ -406,7 +439,7 @@ class RobotModel(MovingArm):
     def _other_arm_angles(self, flange: Pose, start: float) -> Iterator[float]:
         """Yields the closest arm angle that has a solution if one has; then steps all round, to see what is missing."""
         joint = self.limits.joint
-        closest = feasible_arcs(self._geometry, flange, joint.lower, joint.upper).nearest(start)
+        closest = self._closed_form.arcs(flange, joint.lower, joint.upper, False).nearest(start)
         if closest is not None:
             yield closest
         yield from (math.remainder(start + offset, math.tau) for offset in _PSI_SEARCH)
@@ -419,13 +452,13 @@ class RobotModel(MovingArm):
         if near is None:
             return 0.0
         try:
-            return arm_angles.arm_angle(self._geometry.upper, self._geometry.fore, near)
+            return self._closed_form.arm_angle(near)
         except SingularError:
             return 0.0
 
 
 def _least_excess(solutions: Solutions) -> float:
-    return min(branch.excess for branch in solutions.all)
+    return min((branch.excess for branch in solutions.all), default=math.inf)
 
 
 def _digest(*parts: object) -> str:

@@ -10,7 +10,7 @@ from pathlib import Path
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Adds the command."""
     parser = subparsers.add_parser("mjcf", help="print an arm as MJCF for MuJoCo, or write it with its meshes")
-    parser.add_argument("name", metavar="NAME", help="xMatePro3, xMatePro7, xMate3 or xMate7, in any case")
+    parser.add_argument("name", metavar="NAME", help="xMatePro3, xMatePro7, xMate3, xMate7 or Panda, in any case")
     parser.add_argument("--output", metavar="DIR", type=Path, help="write DIR/NAME.xml and DIR/meshes/NAME/*.stl")
     parser.set_defaults(run=run)
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TypeAlias
 
 from rcilab.errors import ModelError
-from rcilab.robots import ROBOT_NAMES, DhRow, describe_robot
+from rcilab.robots import RCI_ROBOT_NAMES, DhRow, describe_robot
 
 Lengths: TypeAlias = Sequence[Sequence[float]]
 """a and d of every joint, [m]."""
@@ -29,8 +29,8 @@ def identify_robot(dh: Sequence[float]) -> str:
     name = _find_name(served)
     if name is None:
         raise ModelError(
-            f"the robot is none of those known ({', '.join(ROBOT_NAMES)}): its DH lengths d are {_in_mm(served)} mm; "
-            "say which model to use: connect(address, model=load_model(NAME))"
+            f"the robot is none of those known ({', '.join(RCI_ROBOT_NAMES)}): its DH lengths d are {_in_mm(served)} "
+            "mm; say which model to use: connect(address, model=load_model(NAME))"
         )
     return name
 
@@ -78,7 +78,7 @@ def _served_lengths(dh: Sequence[float]) -> list[tuple[float, float]]:
 
 
 def _find_name(served: Lengths) -> str | None:
-    names = (name for name in ROBOT_NAMES if _agree(served, dh_lengths(describe_robot(name).dh), _LENGTH_TOLERANCE))
+    names = (name for name in RCI_ROBOT_NAMES if _agree(served, dh_lengths(describe_robot(name).dh), _LENGTH_TOLERANCE))
     return next(names, None)
 
 

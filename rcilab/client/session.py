@@ -74,9 +74,9 @@ def open_session(
     place = parse_address(address)
     require_timeout(timeout)
     if model is not None:
-        from rcilab.model import require_model
+        from rcilab.model import require_model, require_rci
 
-        require_model(model)
+        require_rci(require_model(model))
     transport = SocketTransport(place, STATE_SIZE, timeout)
     try:
         link = Link(transport, 7 if model is None else model.n, str(place), timeout)

@@ -10,6 +10,7 @@ from rcilab.conformance.check import check
 from rcilab.conformance.clearance_conditions import clearance_conditions
 from rcilab.conformance.clearance_monitor import ClearanceMonitor
 from rcilab.conformance.condition import Condition
+from rcilab.conformance.condition_tables import CONDITION_TABLES, ConditionTable, condition_table
 from rcilab.conformance.conditions import CONDITIONS, CYCLE_CONDITIONS, explain_fault, find_condition
 from rcilab.conformance.limit_tables import LimitTable, cartesian_limits
 from rcilab.conformance.measured_monitor import MeasuredMonitor
@@ -21,6 +22,7 @@ from rcilab.conformance.torque_monitor import TorqueMonitor
 
 __all__ = [
     "CONDITIONS",
+    "CONDITION_TABLES",
     "CYCLE_CONDITIONS",
     "BoxMonitor",
     "Breach",
@@ -29,6 +31,7 @@ __all__ = [
     "ClearanceMonitor",
     "Condition",
     "ConditionResult",
+    "ConditionTable",
     "JointMonitor",
     "LimitTable",
     "MeasuredMonitor",
@@ -40,6 +43,7 @@ __all__ = [
     "cartesian_limits",
     "check",
     "clearance_conditions",
+    "condition_table",
     "describe_breaches",
     "explain_fault",
     "find_condition",

@@ -44,5 +44,5 @@ def describe_breaches(breaches: Iterable[Breach]) -> str:
 
 
 def faults_of(breaches: Iterable[Breach]) -> tuple[Fault, ...]:
-    """Returns the faults they raise, in wire order and once each."""
-    return tuple(sorted({fault for row, *_ in breaches if (fault := row.fault) is not None}))
+    """Returns the faults of the RCI that they raise, in wire order and once each."""
+    return tuple(sorted({fault for row, *_ in breaches if isinstance(fault := row.fault, Fault)}))

@@ -12,12 +12,11 @@ from rcilab.clock import CYCLE_TIME
 from rcilab.conformance.certificate import issue_certificate
 from rcilab.conformance.clearance_conditions import FAR, clearance_conditions
 from rcilab.conformance.condition import Condition
-from rcilab.conformance.conditions import MOTION_CONDITIONS
+from rcilab.conformance.condition_tables import condition_table
 from rcilab.conformance.report import ConditionResult, Report, Violation
 from rcilab.conformance.signals import HOLD_SAMPLES as HOLD_SAMPLES
 from rcilab.conformance.signals import MotionSignals
 from rcilab.conformance.start import StartState, as_start
-from rcilab.conformance.tool_conditions import CARTESIAN_POSITION
 from rcilab.conformance.wording import advise
 from rcilab.errors import InvalidValueError
 from rcilab.model import RobotModel, require_model
@@ -69,7 +68,8 @@ def check(
         raise InvalidValueError("distance", described(distance), "is no SafetyDistance; SafetyDistance(links=...) is")
     state = as_start(motion.start if start is None else start, model.n)
     box = box if box is not None and box.active else None
-    rows = MOTION_CONDITIONS if box is None else (*MOTION_CONDITIONS, CARTESIAN_POSITION)
+    table = condition_table(model.description)
+    rows = table.motion if box is None else (*table.motion, table.box)
     if distance is not None:
         rows = (*rows, *clearance_conditions(distance))
     return _report(motion, rows, model=model, start=state, box=box, distance=distance)

@@ -11,6 +11,7 @@ import numpy as np
 from rcilab.arrays import Array
 from rcilab.errors import InvalidValueError
 from rcilab.faults import Fault
+from rcilab.franka_errors import FrankaError
 from rcilab.limits import JointLimits, Limits
 
 Necessity: TypeAlias = Literal["necessary", "recommended"]
@@ -26,12 +27,17 @@ Signal: TypeAlias = Literal[
     "frame",
     "link_distance",
     "floor_distance",
+    "elbow_sign",
     "external_torque",
+    "external_force",
     "lost_commands",
 ]
 """What is judged: every joint's angle or torque; the tool's position, the norms of its translation and rotation; the
-arm angle; the tool's pose as a whole; the smallest distance between links, or from the floor; external torques;
-commands that did not come."""
+arm angle; the tool's pose as a whole; the smallest distance between links, or from the floor; the side of the elbow;
+external torques and force; commands that did not come."""
+
+AnyFault: TypeAlias = Fault | FrankaError
+"""What a controller raises: a fault of the RCI, or an error of Franka's interface."""
 
 Bounds: TypeAlias = tuple[Array, Array]
 """Lower and upper bound, each of shape (n,) for joints and (1,) for anything else."""
@@ -43,6 +49,7 @@ MANUAL = "RCI manual V1.3.1"
 
 _PLACES: dict[Signal, str] = {
     "arm_angle": "elbow",
+    "elbow_sign": "elbow",
     "link_distance": "links",
     "floor_distance": "links",
     "lost_commands": "network",
@@ -59,13 +66,13 @@ class Condition:
     quantity: str
     """What is judged, in words, such as "commanded velocity"."""
     formula: str
-    """As the manual prints it."""
+    """As the manual, or the maker's page, prints it."""
     necessity: Necessity
     """The robot stops when a necessary condition is broken."""
     unit: str
     source: str
     """Where condition and bound come from."""
-    fault: Fault | None
+    fault: AnyFault | None
     """What the controller raises; None for a recommended condition, and for one that no controller knows of."""
     stage: Stage
     """When it is judged."""

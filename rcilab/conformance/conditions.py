@@ -185,5 +185,5 @@ def find_condition(name: str) -> Condition:
 
 
 def explain_fault(fault: Fault) -> tuple[Condition, ...]:
-    """Returns the conditions that raise a fault, at least one for each of the twenty."""
+    """Returns the manual's conditions that raise a fault, at least one for each of the twenty."""
     return tuple(row for row in CONDITIONS if row.fault is fault)

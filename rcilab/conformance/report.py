@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING
 
 from rcilab.conformance.catalogue import Language
 from rcilab.conformance.certificate import Certificate
-from rcilab.conformance.condition import Condition, Necessity
+from rcilab.conformance.condition import AnyFault, Condition, Necessity
 from rcilab.conformance.start import StartState
 from rcilab.conformance.wording import amount, share, with_degrees
 from rcilab.errors import ConformanceError
-from rcilab.faults import Fault
 from rcilab.motion.motion import Motion
 
 if TYPE_CHECKING:
@@ -64,7 +63,7 @@ class ConditionResult:
         return self.condition.necessity
 
     @property
-    def fault(self) -> Fault | None:
+    def fault(self) -> AnyFault | None:
         """What the controller raises when it is broken; None for what it only recommends, or does not know of."""
         return self.condition.fault
 
@@ -134,7 +133,7 @@ class Violation:
     """Between whom the worst distance is; None for anything that is no distance."""
 
     @property
-    def fault(self) -> Fault | None:
+    def fault(self) -> AnyFault | None:
         """What the controller raises; None for what it only recommends, or does not know of."""
         return self.condition.fault
 

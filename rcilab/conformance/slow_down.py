@@ -107,7 +107,8 @@ class _Search:
         broken = _broken(self._report)
         for row in broken:
             if row.necessity == "necessary" and _power(row.condition) == 0:
-                return replace(self._nothing, decisive=row, obstacle="position")
+                obstacle = "elsewhere" if row.condition.stage == "start" else "position"
+                return replace(self._nothing, decisive=row, obstacle=obstacle)
         rows = tuple(row.condition for row in self._report.rows if _power(row.condition) > 0)
         necessary = tuple(row for row in rows if row.necessity == "necessary")
         if not recommended:

@@ -41,6 +41,8 @@ def advise(condition: Condition, motion: Motion, *, row: int, count: int, ratio:
         ratio: Worst value over bound.
         off_start: Whether the motion starts elsewhere than it was judged from.
     """
+    if condition.stage == "start" and condition.signal == "torque":
+        return Phrase("advice.torque.rate")
     if condition.stage == "start":
         return Phrase("advice.start.position" if condition.order == 0 else "advice.start.rest")
     if condition.stage == "end":
@@ -75,7 +77,9 @@ _WAYS: dict[Signal, str] = {
     "frame": "advice.frame",
     "link_distance": "advice.clearance",
     "floor_distance": "advice.clearance",
+    "elbow_sign": "advice.elbow_sign",
     "external_torque": "advice.contact",
+    "external_force": "advice.contact",
     "lost_commands": "advice.network",
 }
 """What to do about signals that are themselves out of bounds, not their derivatives; of joints it is the range."""

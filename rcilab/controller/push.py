@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 from rcilab.arrays import Array, JointVector, as_vector
 from rcilab.errors import InvalidValueError
 from rcilab.model import RobotModel
+from rcilab.robots.upright import upright_flange
 
 
 class Push:
@@ -33,8 +34,7 @@ class Push:
         if link is not None and (isinstance(link, bool) or link not in range(1, model.n + 1)):
             raise InvalidValueError("link", link, f"is no moving link of {model.name}; needs 1 to {model.n}")
         self._model = model
-        T = model.T_flange_tool
-        # The flange is the frame of the last link, see `upright_joints`.
+        T = upright_flange(model.description) @ model.T_flange_tool
         self._body = model.n if link is None else link
         self._point = T.rotation @ self._given + T.position if link is None else self._given
 

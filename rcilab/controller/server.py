@@ -41,7 +41,7 @@ from rcilab.controller.surroundings import Mishaps, Surroundings
 from rcilab.controller.world_port import WorldPort
 from rcilab.errors import DecodeError, UsageError
 from rcilab.faults import Fault
-from rcilab.model import RobotModel, load_model
+from rcilab.model import RobotModel, load_model, require_rci
 from rcilab.protocols.rci import (
     COMMAND_SIZE,
     Connect,
@@ -78,7 +78,7 @@ class ControllerServer:
         log: Takes one line about everything unusual.
 
     Raises:
-        ModelError: The configuration names no known arm.
+        ModelError: The configuration names no known arm, or one that does not speak the RCI.
         UsageError: An address or port cannot be used.
     """
 
@@ -90,7 +90,7 @@ class ControllerServer:
         log: Callable[[str], None] | None = None,
     ) -> None:
         self.config = config
-        model = load_model(config.model)
+        model = require_rci(load_model(config.model))
         self._plant = plant if plant is not None else build_plant(config.plant, model)
         self.cycle = ControlCycle(
             model,

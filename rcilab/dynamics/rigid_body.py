@@ -15,7 +15,7 @@ from rcilab.arrays import Array, JointPath, JointVector, Matrix, Vector3
 from rcilab.dynamics.payload import Payload
 from rcilab.dynamics.symmetric_solver import SymmetricSolver
 from rcilab.robots.description import Link, RobotDescription
-from rcilab.robots.upright import upright_joints
+from rcilab.robots.upright import upright_flange, upright_joints
 from rcilab.spatial import IDENTITY, Pose, Rotation9
 
 GRAVITY = 9.81  # [m/s^2] along -z of the base; the figure the vendor's dynamics library computes with.
@@ -83,13 +83,15 @@ class RigidBody:
         model.gravity.linear = np.array([0.0, 0.0, -GRAVITY])
         parent = 0
         for number, (joint, link) in enumerate(zip(upright_joints(description), description.links, strict=True), 1):
-            kind = pin.JointModelRZ() if joint.axis[2] > 0.5 else pin.JointModelRY()
+            kind = _kind(joint.axis)
             parent = model.addJoint(parent, kind, pin.SE3(np.eye(3), joint.origin.copy()), f"joint{number}")
             model.appendBodyToJoint(parent, _inertia(link), pin.SE3.Identity())
+        T_link_flange = upright_flange(description)
         if load.mass > 0.0:
             body = pin.Inertia(load.mass, load.center_of_mass.copy(), load.inertia.copy())
-            model.appendBodyToJoint(parent, body, pin.SE3.Identity())
-        T = pin.SE3(tool.rotation, tool.position)
+            model.appendBodyToJoint(parent, body, pin.SE3(T_link_flange.rotation, T_link_flange.position))
+        T_link_tool = T_link_flange @ tool
+        T = pin.SE3(T_link_tool.rotation, T_link_tool.position)
         self._tool = model.addFrame(pin.Frame("tool", parent, 0, T, pin.FrameType.OP_FRAME))
         self._model = model
         self._data = model.createData()
@@ -213,6 +215,13 @@ class RigidBody:
         terms = ToolTerms(inverse, J, drift, rotation, tuple(pose.translation.tolist()))
         self._tool_terms = (q, dq, terms)
         return terms
+
+
+def _kind(axis: Vector3) -> pin.JointModel:
+    """Returns the fastest kind of joint about an axis."""
+    if axis[2] > 0.5:
+        return pin.JointModelRZ()
+    return pin.JointModelRY() if axis[1] > 0.5 else pin.JointModelRevoluteUnaligned(axis.copy())
 
 
 def _inertia(link: Link) -> pin.Inertia:

@@ -24,7 +24,8 @@ from rcilab.kinematics.inverse import ALL_FLIPS, ArmGeometry, wrist_centre
 from rcilab.kinematics.singularity import SINGULAR
 from rcilab.spatial import Pose
 
-Reason: TypeAlias = Literal["joint limits", "singularity", "safety box"]
+Reason: TypeAlias = Literal["joint limits", "singularity", "safety box", "reach"]
+"""What forbids an arm angle; "reach" where no joint angles put the tool there, as an arm with offsets has it."""
 
 INSIDE = 0.1
 """How far inside a range an arm angle is chosen, where one is chosen for others, [rad]. A choice: some six degrees."""
@@ -69,7 +70,8 @@ class Arc:
     joints: tuple[int, ...]
     """Numbers (from 1) of the joints beyond their limits in the branch that breaks fewest; empty if one breaks none."""
     branches: tuple[int, ...]
-    """Which branches, counted from 0 as in `Solutions.all`, keep every joint limit."""
+    """Which branches, counted from 0 as in `Solutions.all`, keep every joint limit; empty for an arm with offsets,
+    whose branches begin and end within the circle."""
 
     @property
     def ok(self) -> bool:

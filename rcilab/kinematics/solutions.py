@@ -87,6 +87,9 @@ class Solutions(Sequence[JointVector]):
         Args:
             everywhere: Whether no other arm angle does better either.
         """
+        if not self.all:
+            where = "" if self.psi is None else f" at arm angle {degrees(self.psi):.1f} deg"
+            return UnreachableError(f"no joint angles put the tool there{where}; give another arm angle")
         best = min(self.all, key=lambda branch: branch.excess)
         joint = best.joint or 1
         angle, lower, upper = best.q[joint - 1], self._lower[joint - 1], self._upper[joint - 1]

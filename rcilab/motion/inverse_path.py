@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from rcilab.arrays import Array, JointPath, JointVector
-from rcilab.kinematics.branch import Loss, follow_branch
-from rcilab.kinematics.inverse import build_geometry
+from rcilab.kinematics.branch import Loss
+from rcilab.kinematics.closed_form import build_closed_form
 from rcilab.model import RobotModel
 from rcilab.spatial import IDENTITY
 
@@ -14,7 +14,7 @@ from rcilab.spatial import IDENTITY
 def inverse_path(model: RobotModel, T: Array, psi: Array | None, start: JointVector) -> tuple[JointPath, Loss | None]:
     """Returns the joint angles along a path of the tool on one branch, without a jump from row to row.
 
-    Joint limits are not looked at. About 2 us a row.
+    Joint limits are not looked at. About 2 us a row; 20 us with offsets, where the inverse is no closed form.
 
     Args:
         model: The arm, with its tool.
@@ -34,4 +34,4 @@ def inverse_path(model: RobotModel, T: Array, psi: Array | None, start: JointVec
         a, b, c = (R[:, :, i] for i in range(3))
         p = p + x * a + y * b + z * c
         R = np.stack([a * rotation[i] + b * rotation[3 + i] + c * rotation[6 + i] for i in range(3)], axis=2)
-    return follow_branch(build_geometry(model.description), R, p, psi, start)
+    return build_closed_form(model.description).follow(R, p, psi, start)

@@ -7,11 +7,15 @@ from importlib import import_module
 from rcilab.errors import ModelError
 from rcilab.robots.description import DhRow, Link, RobotDescription
 
-__all__ = ["ROBOT_NAMES", "DhRow", "Link", "RobotDescription", "describe_robot"]
+__all__ = ["RCI_ROBOT_NAMES", "ROBOT_NAMES", "DhRow", "Link", "RobotDescription", "describe_robot"]
 
-_MODULES = {"xMatePro3": "xmate_pro3", "xMatePro7": "xmate_pro7", "xMate3": "xmate3", "xMate7": "xmate7"}
+_XMATES = {"xMatePro3": "xmate_pro3", "xMatePro7": "xmate_pro7", "xMate3": "xmate3", "xMate7": "xmate7"}
+_MODULES = {**_XMATES, "Panda": "panda"}
 
 ROBOT_NAMES = tuple(_MODULES)
+"""Every arm that can be computed with."""
+RCI_ROBOT_NAMES = tuple(_XMATES)
+"""Those that speak the RCI, and so can be simulated and driven as well."""
 
 
 def describe_robot(name: str) -> RobotDescription:

@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
+from typing import Literal, TypeAlias
 
-from rcilab.arrays import JointVector, Matrix, Vector3
+from rcilab.arrays import JointVector, Matrix, Vector3, frozen
 from rcilab.limits import Limits
+
+Interface: TypeAlias = Literal["RCI", "FCI"]
+"""Which real-time interface an arm is driven by, and so whose conditions and error names its motions are judged by."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -22,11 +28,57 @@ class DhRow:
     """Added to the joint angle, [rad]."""
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CraigRow:
+    """One row of a Craig (proximal, modified) Denavit-Hartenberg table: RotX(alpha) TransX(a) RotZ(theta) TransZ(d)."""
+
+    a: float
+    """[m]."""
+    alpha: float
+    """[rad]."""
+    d: float
+    """[m]."""
+
+
+def rows_from_craig(table: Sequence[CraigRow]) -> tuple[DhRow, ...]:
+    """Returns the standard rows of the chain that a Craig table describes.
+
+    Both are the same product with the brackets set elsewhere: turn and shift about z of one row go together with shift
+    and turn about x of the next. So the pose of the flange is the same at all joint angles; the frames between are
+    those of the standard convention, which lie on the next joint's axis, not on their own.
+
+    Args:
+        table: One row a joint and one for the flange; the first joint turns about the base z axis.
+
+    Raises:
+        ValueError: The first row has a shift or turn about x, or the flange one.
+    """
+    first, *_, flange = table
+    if first.a or first.alpha or flange.a or flange.alpha:
+        raise ValueError("a Craig table needs joint 1 on the base z axis and the flange on the last joint's axis")
+    rows = [DhRow(a=after.a, alpha=after.alpha, d=row.d) for row, after in pairwise(table)]
+    rows[-1] = DhRow(a=0.0, alpha=0.0, d=table[-2].d + flange.d)
+    return tuple(rows)
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Rod:
+    """A round rod with ball ends, in the link's frame: what a link without a drawing looks like, and its capsule."""
+
+    start: tuple[float, float, float]
+    """[m]."""
+    end: tuple[float, float, float]
+    """[m]."""
+    radius: float
+    """[m]."""
+
+
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Link:
     """A rigid body of the arm.
 
-    Its frame is parallel to the base frame when all joint angles are zero, and its origin is then on the base z axis.
+    Its frame is parallel to the base frame when all joint angles are zero, and its origin is then in the base's xz
+    plane.
     """
 
     mass: float
@@ -39,6 +91,13 @@ class Link:
     """Height of the link frame's origin above the base when all joint angles are zero, [m]."""
     source: str
     """Where mass, centre and tensor were taken from."""
+    origin_ahead: float = 0.0
+    """How far in front of the base z axis, along base x, that origin is then, [m]."""
+
+    @property
+    def origin(self) -> Vector3:
+        """Origin of the link's frame in base when all joint angles are zero, shape (3,), [m]."""
+        return frozen([self.origin_ahead, 0.0, self.origin_height])
 
     def __repr__(self) -> str:
         centre = " ".join(f"{x:.4g}" for x in self.center_of_mass.tolist())
@@ -65,6 +124,12 @@ class RobotDescription:
     rated_payload: float
     """Largest load, [kg]."""
     rated_payload_source: str
+    interface: Interface = "RCI"
+    """Which real-time interface the arm is driven by."""
+    elbow_flip: float | None = None
+    """Angle of joint 4 on whose other side the elbow counts as flipped, [rad]; None where the maker knows no flip."""
+    rods: tuple[tuple[Rod, ...], ...] | None = None
+    """What base and links are drawn and collide as, base first; None for the xMates, whose housings are designed."""
 
     @property
     def n(self) -> int:

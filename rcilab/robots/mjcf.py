@@ -14,7 +14,7 @@ import numpy as np
 from rcilab.arrays import Matrix, Vector3
 from rcilab.robots.description import Link, RobotDescription
 from rcilab.robots.shapes import ROLE_COLORS, Capsule, LinkShape, build_shapes
-from rcilab.robots.upright import upright_joints
+from rcilab.robots.upright import upright_flange, upright_joints
 from rcilab.robots.urdf import mesh_file, number_text, vector_text
 from rcilab.spatial import IDENTITY, Pose
 
@@ -90,14 +90,25 @@ def build_mjcf(
     for number, (link, solid) in enumerate(zip(description.links, shape.links, strict=True), start=1):
         lines += _joint_body(description, number) + _body(f"link{number}", link, solid, meshes, number + 3)
     pad = "  " * (description.n + 3)
-    lines.append(f'{pad}<site name="flange"/>')
-    pose = f'pos="{vector_text(T_flange_tool.position)}" quat="{vector_text(T_flange_tool.wxyz)}"'
+    T_link_flange = upright_flange(description)
+    place = _place(T_link_flange)
+    lines.append(f'{pad}<site name="flange"{place}/>')
+    T_link_tool = T_link_flange @ T_flange_tool
+    pose = f'pos="{vector_text(T_link_tool.position)}" quat="{vector_text(T_link_tool.wxyz)}"'
     lines.append(f'{pad}<site name="tool" {pose}/>')
     if load is not None and load.mass > 0.0:
-        lines += [f'{pad}<body name="load">', f"{pad}  {_inertial(load.mass, load.center_of_mass, load.inertia)}"]
+        lines += [
+            f'{pad}<body name="load"{place}>',
+            f"{pad}  {_inertial(load.mass, load.center_of_mass, load.inertia)}",
+        ]
         lines.append(f"{pad}</body>")
     lines += ["  " * depth + "</body>" for depth in range(description.n + 2, 1, -1)]
     return "\n".join([*lines, "  </worldbody>", *_contacts(description), *_motors(description), "</mujoco>", ""])
+
+
+def _place(T: Pose) -> str:
+    """Returns the attribute that turns an element into place; nothing where it need not be turned."""
+    return "" if T.is_close(IDENTITY, 0.0) else f' quat="{vector_text(T.wxyz)}"'
 
 
 def _assets(base: LinkShape, links: Iterable[LinkShape]) -> list[str]:

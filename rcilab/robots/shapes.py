@@ -19,10 +19,11 @@ from typing import Literal
 import numpy as np
 
 from rcilab.arrays import Array, Vector3, frozen
-from rcilab.robots.description import RobotDescription
+from rcilab.robots.description import RobotDescription, Rod
 from rcilab.robots.mesh import Mesh, merge_meshes, mirror_y, revolve
+from rcilab.robots.rod_shapes import cast, flange_plate, foot_plate
 from rcilab.robots.surface import box, cut, cylinder, join, mesh_surface, rod, vase
-from rcilab.robots.upright import upright_joints
+from rcilab.robots.upright import upright_flange, upright_joints
 
 ColorRole = Literal["shell", "cap", "dark"]
 
@@ -39,6 +40,7 @@ _SEAM = 0.0006  # [m] how much a collar stands proud of the cast housing
 _SWEEP = 0.006  # [m] free space around a joint cylinder for the neighbour's housing
 
 
+_ROD_CELL = 1.45  # how much larger the cells of rods may be, which have no edges
 _STRENGTH = 1.15  # how much thicker the 7 kg arms are
 
 
@@ -110,10 +112,13 @@ def build_shapes(description: RobotDescription, quality: Literal["fine", "coarse
     """Returns the shapes of an arm.
 
     Args:
-        description: The arm; must be one of the xMate family's build, with axes z y z y z y z or z y y z y z.
+        description: The arm: one that is given as rods, or one of the xMate family's build, with axes z y z y z y z or
+            z y y z y z.
         quality: "fine" for the screen, "coarse" for files and for ghosts.
     """
     fine = _FINENESS[quality]
+    if description.rods is not None:
+        return _rod_arm(description, description.rods, fine)
     if description.rated_payload >= 5.0:  # as many triangles on a larger arm
         fine = _Fineness(cell=_STRENGTH * fine.cell, segments=fine.segments)
     joints = _design_joints(description)
@@ -123,6 +128,23 @@ def build_shapes(description: RobotDescription, quality: Literal["fine", "coarse
     bodies = [*housings, _wrist_plate(joints[-1], flange, fine)]
     links = tuple(_in_frame(body, link.origin_height) for body, link in zip(bodies, description.links, strict=True))
     return ArmShape(base=pedestal, links=links)
+
+
+def _rod_arm(description: RobotDescription, rods: tuple[tuple[Rod, ...], ...], fine: _Fineness) -> ArmShape:
+    """Returns the shapes of an arm that is given as rods."""
+    base, *links = (
+        LinkShape(
+            (Part(cast(of_link, _ROD_CELL * fine.cell), "shell"),),
+            tuple(_capsule(rod.start, rod.end, rod.radius) for rod in of_link),
+        )
+        for of_link in rods
+    )
+    foot = Part(foot_plate(1.3 * rods[0][-1].radius, fine.segments), "cap")
+    up = float(upright_flange(description).rotation[2, 2])
+    flange = Part(flange_plate(up, fine.segments), "dark")
+    base = LinkShape((foot, *base.parts), base.capsules)
+    links[-1] = LinkShape((flange, *links[-1].parts), links[-1].capsules)
+    return ArmShape(base=base, links=tuple(links))
 
 
 def _in_frame(shape: LinkShape, height: float) -> LinkShape:

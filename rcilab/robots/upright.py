@@ -1,7 +1,8 @@
 """The arm standing up: link frames that are parallel to the base at zero pose.
 
 Denavit-Hartenberg frames are for computing. For drawing, URDF, MJCF and rigid-body dynamics each link gets the frame
-its mass data are given in: parallel to the base when all joint angles are zero, origin on the base z axis.
+its mass data are given in: parallel to the base when all joint angles are zero, origin in the base's xz plane (that of
+the xMates on the base z axis).
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import numpy as np
 from rcilab.arrays import Vector3, frozen
 from rcilab.errors import ModelError
 from rcilab.robots.description import RobotDescription
+from rcilab.spatial import Pose
 
 _TOLERANCE = 1e-12  # [m] and axis components: the tables put axes and origins on the base z axis exactly.
 
@@ -28,28 +30,44 @@ class UprightJoint:
 
 
 def upright_joints(description: RobotDescription) -> tuple[UprightJoint, ...]:
-    """Returns the joints between upright link frames, base to flange; the last frame is the flange.
+    """Returns the joints between upright link frames, base to flange; the last origin is the flange's.
 
     Raises:
         ModelError: The arm does not stand upright at zero, as with the manual's 6-axis table taken literally.
     """
     T = np.eye(4)
     joints: list[UprightJoint] = []
-    below = 0.0
+    below = np.zeros(3)
     for number, (row, link) in enumerate(zip(description.dh, description.links, strict=True), start=1):
-        axis, foot = T[:3, 2].copy(), T[:3, 3].copy()
-        on_axis = foot + axis * (axis @ (np.array([0.0, 0.0, link.origin_height]) - foot))
-        if np.abs(on_axis - [0.0, 0.0, link.origin_height]).max() > _TOLERANCE:
+        axis, foot, origin = T[:3, 2].copy(), T[:3, 3].copy(), link.origin
+        on_axis = foot + axis * (axis @ (origin - foot))
+        if np.abs(on_axis - origin).max() > _TOLERANCE:
+            ahead = f"{link.origin_ahead} m ahead of " if link.origin_ahead else ""
             raise ModelError(
-                f"{description.name}: joint {number} does not pass through the base axis at {link.origin_height} m "
-                "at zero pose; the theta offsets must make the arm stand upright"
+                f"{description.name}: joint {number} does not pass through {ahead}the base axis at "
+                f"{link.origin_height} m at zero pose; the theta offsets must make the arm stand upright"
             )
-        joints.append(UprightJoint(frozen([0.0, 0.0, link.origin_height - below]), frozen(np.round(axis, 12) + 0.0)))
-        below = link.origin_height
+        joints.append(UprightJoint(frozen(origin - below), frozen(np.round(axis, 12) + 0.0)))
+        below = origin
         T = T @ _dh_matrix(row.a, row.alpha, row.d, row.theta_offset)
-    if np.abs(T - [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, below], [0, 0, 0, 1]]).max() > _TOLERANCE:
+    if np.abs(T[:3, 3] - below).max() > _TOLERANCE or not _is_square(T[:3, :3]):
         raise ModelError(f"{description.name}: the flange is not upright above the base at zero pose")
     return tuple(joints)
+
+
+def upright_flange(description: RobotDescription) -> Pose:
+    """Returns the pose of the flange in the last link's frame: turned where it does not look up at zero pose."""
+    T = np.eye(4)
+    for row in description.dh:
+        T = T @ _dh_matrix(row.a, row.alpha, row.d, row.theta_offset)
+    turned = np.eye(4)
+    turned[:3, :3] = np.round(T[:3, :3]) + 0.0
+    return Pose.from_matrix(turned)
+
+
+def _is_square(R: np.ndarray) -> bool:
+    """Returns whether a rotation only swaps and reverses axes, up to rounding."""
+    return bool(np.abs(R - np.round(R)).max() < _TOLERANCE)
 
 
 def _dh_matrix(a: float, alpha: float, d: float, theta: float) -> np.ndarray:

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Sequence
 from rcilab.robots.description import Link, RobotDescription
 from rcilab.robots.mesh import encode_stl
 from rcilab.robots.shapes import ROLE_COLORS, Capsule, LinkShape, build_shapes
-from rcilab.robots.upright import upright_joints
+from rcilab.robots.upright import upright_flange, upright_joints
 from rcilab.spatial import IDENTITY, Pose
 
 
@@ -44,7 +44,7 @@ def build_urdf(description: RobotDescription, *, mesh_dir: str | None = None, T_
         lines += _link(f"link{number}", link, solid, directory)
         lines += _joint(description, number)
     last = f"link{description.n}"
-    lines += ['  <link name="flange"/>', *_fixed("flange_joint", last, "flange", IDENTITY)]
+    lines += ['  <link name="flange"/>', *_fixed("flange_joint", last, "flange", upright_flange(description))]
     lines += ['  <link name="tool"/>', *_fixed("tool_joint", "flange", "tool", T_flange_tool)]
     return "\n".join([*lines, "</robot>", ""])
 

@@ -28,11 +28,12 @@ def simulate(model: RobotModel, *, plant: str = "ideal", lockstep: bool = True) 
 
     Raises:
         InvalidValueError: The model is none, or the plant is unknown.
+        ModelError: The arm does not speak the RCI.
         ConnectionLostError: The virtual controller did not start; the message carries what it said.
     """
-    from rcilab.model import require_model
+    from rcilab.model import require_model, require_rci
 
-    require_model(model)
+    require_rci(require_model(model))
     require_plant(plant)
     controller = start_controller(model.name, plant, lockstep)
     try:

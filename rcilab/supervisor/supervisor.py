@@ -66,9 +66,9 @@ class Supervisor:
         stop_without_operator: bool = True,
         auto_restart: bool = True,
     ) -> None:
-        from rcilab.model import require_model
+        from rcilab.model import require_model, require_rci
 
-        self.model = require_model(model)
+        self.model = require_rci(require_model(model))
         require_plant(plant)
         self._target = VIRTUAL if target == VIRTUAL else str(parse_address(target))
         self._plant = plant

@@ -24,7 +24,7 @@ from rcilab.errors import UsageError
 from rcilab.robots.description import RobotDescription
 from rcilab.robots.mesh import shrink
 from rcilab.robots.shapes import ROLE_COLORS, ColorRole, LinkShape, build_shapes
-from rcilab.robots.upright import upright_joints
+from rcilab.robots.upright import upright_flange, upright_joints
 from rcilab.spatial import Pose
 from rcilab.views.scene import Color, Scene
 
@@ -115,7 +115,7 @@ class ArmView:
                 scene.add_frame(path, position=joint.origin.tolist())
                 self._frames.append(path)
                 self._add_link(path + "/", link)
-            scene.add_frame(path + "/flange")
+            scene.add_frame(path + "/flange", wxyz=upright_flange(model.description).wxyz.tolist())
             self.tool_node = path + "/flange/tool"
             tool = model.T_flange_tool
             scene.add_frame(

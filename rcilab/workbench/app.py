@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import TYPE_CHECKING
 
-from rcilab.model import load_model
+from rcilab.model import load_model, require_rci
 from rcilab.views.gate import Gate
 from rcilab.views.guarded_server import GuardedServer
 from rcilab.workbench import requests, security
@@ -49,7 +49,7 @@ class Workbench:
         config: How to start.
 
     Raises:
-        ModelError: No robot has this name.
+        ModelError: No robot has this name, or it does not speak the RCI.
         UsageError: The port is in use, or the address needs a token.
     """
 
@@ -59,7 +59,7 @@ class Workbench:
             from rcilab.client.address import parse_address
 
             parse_address(config.target)
-        model = load_model(config.model)
+        model = require_rci(load_model(config.model))
         self._config = config
         self._bound = security.bind(config.host, config.port)
         self.port: int = self._bound.getsockname()[1]

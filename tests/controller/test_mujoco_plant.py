@@ -13,12 +13,12 @@ from rcilab.dynamics.payload import Payload
 from rcilab.errors import InvalidValueError
 from rcilab.model import RobotModel, load_model
 from rcilab.motion import plan_joint
-from rcilab.robots import ROBOT_NAMES
+from rcilab.robots import RCI_ROBOT_NAMES
 from rcilab.safety_box import SafetyBox
 from rcilab.spatial import Pose
 
 CYCLE = 0.001  # [s]
-arms = pytest.mark.parametrize("name", ROBOT_NAMES)
+arms = pytest.mark.parametrize("name", RCI_ROBOT_NAMES)
 
 
 def hold(drive: Drive, q: Array) -> Setpoint:

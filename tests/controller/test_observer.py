@@ -15,13 +15,13 @@ from rcilab.dynamics.payload import Payload
 from rcilab.dynamics.rigid_body import RigidBody
 from rcilab.model import RobotModel, load_model
 from rcilab.motion import plan_joint
-from rcilab.robots import ROBOT_NAMES
+from rcilab.robots import RCI_ROBOT_NAMES
 from rcilab.spatial import Pose
 
 CYCLE = 0.001  # [s]
 Maker = Callable[[RobotModel], Plant]
 both = pytest.mark.parametrize("make", [IdealPlant, MuJoCoPlant], ids=["ideal", "mujoco"])
-arms = pytest.mark.parametrize("name", ROBOT_NAMES)
+arms = pytest.mark.parametrize("name", RCI_ROBOT_NAMES)
 LOAD = Payload(mass=2.0, center_of_mass=np.array([0.0, 0.0, 0.05]))
 
 

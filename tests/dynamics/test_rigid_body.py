@@ -7,6 +7,7 @@ from rcilab.dynamics.payload import Payload
 from rcilab.errors import InvalidValueError
 from rcilab.model import load_model
 from rcilab.robots import ROBOT_NAMES
+from rcilab.robots.upright import upright_flange
 from rcilab.spatial import Pose
 
 
@@ -41,7 +42,7 @@ def potential_energy(model, q):
     zero, now = model.joint_frames(np.zeros(model.n)), model.joint_frames(q)
     energy = 0.0
     for frame_zero, frame, link in zip(zero, now, model.description.links, strict=True):
-        center_at_zero = link.center_of_mass + [0, 0, link.origin_height]
+        center_at_zero = link.center_of_mass + link.origin
         local = frame_zero.rotation.T @ (center_at_zero - frame_zero.position)
         energy += 9.81 * link.mass * (frame.position + frame.rotation @ local)[2]
     load = model.load
@@ -88,7 +89,11 @@ def test_all_terms_at_once_are_those_of_the_single_questions(name):
     np.testing.assert_allclose(body.gravity(q), torque.gravity, atol=1e-11)
     np.testing.assert_allclose(terms.jacobian, model.jacobian(q), atol=1e-12)
     np.testing.assert_allclose(body.tool_jacobian(q), model.jacobian(q), atol=1e-12)
-    np.testing.assert_allclose(body.link_jacobian(q, model.n, tool.position), model.jacobian(q), atol=1e-12)
+    np.testing.assert_allclose(
+        body.link_jacobian(q, model.n, (upright_flange(model.description) @ tool).position),
+        model.jacobian(q),
+        atol=1e-12,
+    )
     np.testing.assert_allclose(terms.position, model.forward(q).position, atol=1e-12)
     np.testing.assert_allclose(terms.rotation, model.forward(q).rotation.ravel(), atol=1e-12)
     slope = (model.jacobian(q + step * dq) - model.jacobian(q - step * dq)) / (2.0 * step)

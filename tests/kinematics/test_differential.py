@@ -104,7 +104,7 @@ def test_the_inverse_acceleration_gives_the_acceleration_back(name, seed):
 def test_near_a_singularity_rates_stay_bounded_and_the_answer_says_so(name):
     model = load_model(name)
     stretched = np.zeros(model.n)
-    twist = [0.3, 0.2, 0.5, 0.1, 0.2, 0.3]
+    twist = [0.3, 0.2, 0.5, 0.15, 0.2, 0.3]
     found = model.joint_velocity(stretched, twist)
     assert found.damped
     assert np.abs(found.missed).max() > 0.1

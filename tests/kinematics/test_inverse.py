@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from rcilab.errors import InvalidValueError, UnreachableError
 from rcilab.kinematics.inverse import build_geometry, inverse_seven, inverse_six
 from rcilab.model import load_model
-from rcilab.robots import ROBOT_NAMES
+from rcilab.robots import RCI_ROBOT_NAMES, ROBOT_NAMES
 from rcilab.spatial import Pose
 
 POSES_PER_ARM = 2500  # 10 000 over the four arms.
@@ -22,7 +22,7 @@ def random_configurations(model, count, seed):
     return np.random.default_rng(seed).uniform(limits.lower, limits.upper, (count, model.n))
 
 
-@pytest.mark.parametrize("name", ROBOT_NAMES)
+@pytest.mark.parametrize("name", RCI_ROBOT_NAMES)
 def test_every_one_of_eight_branches_gives_the_pose_back(name):
     model = load_model(name)
     for q in random_configurations(model, POSES_PER_ARM, seed=1):
@@ -69,7 +69,7 @@ SINGULAR = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", ROBOT_NAMES)
+@pytest.mark.parametrize("name", RCI_ROBOT_NAMES)
 def test_a_singular_pose_gives_the_solution_nearest_to_where_the_arm_is(name):
     model = load_model(name)
     for q in SINGULAR[model.n]:

@@ -16,11 +16,10 @@ from rcilab.model import load_model
 from rcilab.motion import along, plan_arc, plan_circle, plan_line, plan_nullspace
 from rcilab.motion.path import build_arc, build_line
 from rcilab.motion.time_law import duration_of, fastest_squares
+from rcilab.robots import ROBOT_NAMES
 from rcilab.spatial import Pose
 
-MODELS = {
-    name: load_model(name, tool=Pose((0.0, 0.02, 0.1))) for name in ("xMatePro3", "xMatePro7", "xMate3", "xMate7")
-}
+MODELS = {name: load_model(name, tool=Pose((0.0, 0.02, 0.1))) for name in ROBOT_NAMES}
 SEVEN = MODELS["xMatePro7"]
 names, seeds, speeds = st.sampled_from(sorted(MODELS)), st.integers(0, 2**32), st.sampled_from([1.0, 0.5, 0.2])
 SOME = settings(max_examples=20)

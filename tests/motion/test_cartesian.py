@@ -12,10 +12,11 @@ from rcilab.conformance import check
 from rcilab.errors import InvalidValueError, PlanningError
 from rcilab.model import load_model
 from rcilab.motion import plan_arc, plan_circle, plan_line, plan_nullspace
+from rcilab.robots import ROBOT_NAMES
 from rcilab.spatial import Pose
 
 SEVEN, SIX = load_model("xMatePro7"), load_model("xMate3")
-ALL = pytest.mark.parametrize("name", ["xMatePro3", "xMatePro7", "xMate3", "xMate7"])
+ALL = pytest.mark.parametrize("name", ROBOT_NAMES)
 
 
 def moved(model, step, rpy=(0.0, 0.0, 0.0)) -> Pose:

@@ -10,9 +10,10 @@ from hypothesis import strategies as st
 from rcilab.errors import SingularError, UnreachableError
 from rcilab.model import load_model
 from rcilab.motion.inverse_path import inverse_path
+from rcilab.robots import ROBOT_NAMES
 from rcilab.spatial import Pose
 
-ALL = pytest.mark.parametrize("name", ["xMatePro3", "xMatePro7", "xMate3", "xMate7"])
+ALL = pytest.mark.parametrize("name", ROBOT_NAMES)
 TOOL = Pose.from_rpy((0.02, -0.01, 0.1), (0.1, 0.2, 0.3))
 SEVEN = load_model("xMatePro7")
 

@@ -9,13 +9,15 @@ from rcilab.model import load_model
 from rcilab.motion import LIMIT_MARGIN, _ruckig, plan_joint
 from rcilab.motion.joint import MIN_SPEED
 
-MODELS = [load_model(name) for name in ("xMatePro7", "xMate3")]
+MODELS = [load_model(name) for name in ("xMatePro7", "xMate3", "Panda")]
 MODEL = MODELS[0]
 LIMITS = MODEL.limits.joint
 
 
 def random_angles(rng: np.random.Generator, model=MODEL) -> np.ndarray:
-    return rng.uniform(0.98, 0.99) * rng.uniform(model.limits.joint.lower, model.limits.joint.upper)
+    joint = model.limits.joint
+    rim = rng.uniform(0.005, 0.01) * (joint.upper - joint.lower)
+    return rng.uniform(joint.lower + rim, joint.upper - rim)
 
 
 @settings(max_examples=120)

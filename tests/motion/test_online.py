@@ -10,9 +10,10 @@ from rcilab.model import load_model
 from rcilab.motion import Jog, Motion, plan_joint, plan_stop
 from rcilab.motion.online import POSITION_MARGIN
 from rcilab.motion.twist import DAMPED_BELOW, damped_inverse
+from rcilab.robots import ROBOT_NAMES
 from rcilab.spatial import Pose
 
-MODELS = {name: load_model(name) for name in ("xMatePro3", "xMatePro7", "xMate3", "xMate7")}
+MODELS = {name: load_model(name) for name in ROBOT_NAMES}
 MODEL = MODELS["xMatePro7"]
 LIMITS = MODEL.limits.joint
 LONG = 20_000  # Cycles that every motion to rest is shorter than.

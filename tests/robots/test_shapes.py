@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from rcilab.arrays import Array
-from rcilab.robots import ROBOT_NAMES, describe_robot
+from rcilab.robots import RCI_ROBOT_NAMES, ROBOT_NAMES, describe_robot
 from rcilab.robots.mesh import Mesh
 from rcilab.robots.shapes import LinkShape, build_shapes
 from rcilab.robots.upright import upright_joints
 from rcilab.spatial import Pose
 
 arms = pytest.mark.parametrize("name", ROBOT_NAMES)
+xmates = pytest.mark.parametrize("name", RCI_ROBOT_NAMES)
 
 
 def shell(shape: LinkShape) -> Mesh:
@@ -40,7 +41,7 @@ def outside_capsules(points: Array, shape: LinkShape) -> Array:
     return np.min(distances, axis=0)
 
 
-@arms
+@xmates
 def test_an_arm_stands_on_the_floor_and_ends_at_its_flange(name: str) -> None:
     description = describe_robot(name)
     shape = build_shapes(description)
@@ -57,7 +58,7 @@ def test_an_arm_stands_on_the_floor_and_ends_at_its_flange(name: str) -> None:
     assert np.abs(points[:, :2]).max() < 0.14  # slim: a hand wide on either side
 
 
-@arms
+@xmates
 def test_the_arm_fits_its_triangle_budget_and_has_every_colour(name: str) -> None:
     fine, coarse = (build_shapes(describe_robot(name), quality) for quality in ("fine", "coarse"))
     assert 20_000 < fine.triangles < 40_000
@@ -80,7 +81,7 @@ def test_every_mesh_is_finite_well_indexed_and_faces_outward(name: str) -> None:
         assert np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0 > 2e-4  # [m^3] positive: not inside out
 
 
-@arms
+@xmates
 def test_neighbouring_housings_stay_out_of_each_other_while_the_joint_bends(name: str) -> None:
     description = describe_robot(name)
     shape = build_shapes(description, "coarse")
@@ -101,6 +102,17 @@ def test_capsules_cover_the_housings(name: str) -> None:
         outside = outside_capsules(points, shape)
         assert outside.max() < 0.012  # [m] rims of caps and collars
         assert np.percentile(outside, 85) < 0.004
+
+
+def test_the_panda_stands_on_the_floor_ends_at_its_flange_and_needs_few_triangles() -> None:
+    description = describe_robot("Panda")
+    fine, coarse = (build_shapes(description, quality) for quality in ("fine", "coarse"))
+    base = np.concatenate([part.mesh.vertices for part in fine.base.parts])
+    assert base[:, 2].min() == pytest.approx(0.0, abs=1e-3)
+    hand = np.concatenate([part.mesh.vertices for part in fine.links[-1].parts])
+    assert hand[:, 2].min() == pytest.approx(0.0, abs=1e-3)  # its flange looks down
+    assert 2_000 < coarse.triangles < 4_000
+    assert coarse.triangles < 0.5 * fine.triangles
 
 
 def test_shapes_are_built_once() -> None:

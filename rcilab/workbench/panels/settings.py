@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.robots import ROBOT_NAMES
+from rcilab.robots import RCI_ROBOT_NAMES
 from rcilab.workbench import requests
 from rcilab.workbench.text import LANGUAGES, Text
 from rcilab.workbench.view_actions import QUALITIES
@@ -25,7 +25,7 @@ class SettingsPanel:
         """Adds the controls."""
         text, ask = self._text, self._ask
         model = gui.add_dropdown(
-            text("settings.model"), ROBOT_NAMES, initial_value=state.model.name, hint=text("settings.model_hint")
+            text("settings.model"), RCI_ROBOT_NAMES, initial_value=state.model.name, hint=text("settings.model_hint")
         )
         self._model = Linked(model, ask, lambda v, p: requests.ChooseRobot(page=p, model=v))
         codes = {label: code for code, label in LANGUAGES.items()}

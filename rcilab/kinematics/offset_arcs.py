@@ -1,0 +1,107 @@
+"""Which arm angles a pose leaves to an arm with offsets: read off its self-motion, piece by piece.
+
+There is no closed form for where a joint passes its limit here. Pieces of the self-motion in which that happens, and
+those between two branches, are cut into shorter ones until the place is known well enough.
+"""
+
+from __future__ import annotations
+
+from math import pi, tau
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rcilab.arrays import Array
+from rcilab.kinematics.feasible_arcs import Arc, FeasibleArcs, Reason
+from rcilab.kinematics.offset_arm import ELBOW, OffsetGeometry, SelfMotion, wrapped
+from rcilab.spatial import Pose
+
+_CUTS = 8  # Into how many a piece is cut at once; a choice.
+_ROUNDS = 4  # How often: a piece of 0.1 rad then is 2e-5 rad long.
+_LONG = 0.1  # [rad] Between two branches a piece is not straight: cut it once in any case.
+_GRID = 1e-9  # [rad] Ends of pieces that differ by less meet.
+_NOWHERE = 255
+"""In place of a set of joints: no branch is there."""
+
+
+def feasible_offset_arcs(
+    arm: OffsetGeometry, T_base_flange: Pose, lower: Array, upper: Array, outside_box: bool = False
+) -> FeasibleArcs:
+    """Returns the feasible arm angles of a pose; the ends of its arcs are known to about 1e-4 rad, on the safe side.
+
+    Args:
+        arm: From `build_offset_geometry`.
+        T_base_flange: Pose of the flange in base.
+        lower: Smallest joint angles, shape (7,), [rad].
+        upper: Largest joint angles, shape (7,), [rad].
+        outside_box: Whether the tool is outside the safety box. It is so at every arm angle or at none.
+
+    Raises:
+        UnreachableError: The pose is out of reach at every arm angle.
+    """
+    starts, ends, codes = _pieces(arm, SelfMotion(arm, T_base_flange, None), lower, upper)
+    low = np.round(np.minimum(starts, ends) / _GRID) * _GRID
+    high = np.round(np.maximum(starts, ends) / _GRID) * _GRID
+    turns = tau * np.floor((low + pi) / tau)
+    low, high = low - turns, high - turns
+    over = high > pi  # Across pi: the rest begins at -pi.
+    low = np.concatenate((low, np.full(int(over.sum()), -pi)))
+    high, codes = np.concatenate((np.minimum(high, pi), high[over] - tau)), np.concatenate((codes, codes[over]))
+    breaks = np.unique(np.concatenate((low, high, (-pi, pi))))
+    best = np.full(len(breaks) - 1, _NOWHERE)
+    for code in sorted(set(codes.tolist()), key=lambda code: (-code.bit_count(), -code)):
+        change = np.zeros(len(breaks))
+        chosen = codes == code
+        np.add.at(change, np.searchsorted(breaks, low[chosen]), 1.0)
+        np.add.at(change, np.searchsorted(breaks, high[chosen]), -1.0)
+        best[np.cumsum(change)[:-1] > 0.5] = code
+    first = np.flatnonzero(np.concatenate(([True], best[1:] != best[:-1])))
+    begins = breaks[first].tolist()
+    arcs = [
+        _arc(start, end, int(best[i]), outside_box)
+        for start, end, i in zip(begins, [*begins[1:], pi], first.tolist(), strict=True)
+    ]
+    return FeasibleArcs(arcs=tuple(arcs))
+
+
+def _pieces(
+    arm: OffsetGeometry, motion: SelfMotion, lower: Array, upper: Array
+) -> tuple[Array, Array, NDArray[np.int64]]:
+    """Returns arm angles at the ends of pieces, and in each which joints are beyond their limits, as bits."""
+    middles = np.array(arm.middles)
+    bits = 1 << np.arange(7)
+
+    def broken(q: Array) -> NDArray[np.int64]:
+        angle = wrapped(q - middles) + middles
+        return np.asarray(((angle <= lower) | (angle >= upper)) @ bits, dtype=np.int64)
+
+    starts, ends = motion.starts, motion.ends
+    done: list[tuple[Array, Array, NDArray[np.int64]]] = []
+    for round_ in range(_ROUNDS):
+        before, after = broken(starts), broken(ends)
+        cut = before != after
+        if round_ == 0:
+            cut |= np.abs(ends - starts).max(axis=1) > _LONG
+        done.append((starts[~cut, ELBOW], ends[~cut, ELBOW], before[~cut]))
+        shares = np.linspace(0.0, 1.0, _CUTS + 1)[:, None, None]
+        between = (starts[cut] + shares * (ends - starts)[cut]).reshape(-1, 7)
+        found, settled = motion.settle(between)
+        whole = found.reshape(_CUTS + 1, -1, 7)
+        good = (settled & (np.abs(found - between).max(axis=1) < 2.0 * _LONG)).reshape(_CUTS + 1, -1)
+        both = good[:-1] & good[1:]
+        starts, ends = whole[:-1][both], whole[1:][both]
+    done.append((starts[:, ELBOW], ends[:, ELBOW], broken(starts) | broken(ends)))
+    first, last, codes = zip(*done, strict=True)
+    return np.concatenate(first), np.concatenate(last), np.concatenate(codes)
+
+
+def _arc(start: float, end: float, code: int, outside: bool) -> Arc:
+    reasons: list[Reason] = []
+    joints = () if code == _NOWHERE else tuple(joint + 1 for joint in range(7) if code >> joint & 1)
+    if code == _NOWHERE:
+        reasons.append("reach")
+    if joints:
+        reasons.append("joint limits")
+    if outside:
+        reasons.append("safety box")
+    return Arc(start=start, end=end, reasons=tuple(reasons), joints=joints, branches=())
