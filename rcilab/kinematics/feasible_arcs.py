@@ -44,7 +44,7 @@ _TURNED = np.stack(  # Shape (7, 8): which branches turn or mirror each joint, s
 ).astype(np.intp)
 _JOINTS, _BRANCHES = range(1, 8), range(8)
 _WHY: tuple[Reason, ...] = ("joint limits", "singularity", "safety box")
-_REASONS = {
+_REASONS: dict[tuple[bool, ...], tuple[Reason, ...]] = {
     found: tuple(itertools.compress(_WHY, found)) for found in itertools.product((False, True), repeat=len(_WHY))
 }
 """By whether a joint limit, a singularity and the safety box forbid an arc."""
