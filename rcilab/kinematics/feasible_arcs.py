@@ -43,7 +43,7 @@ _TURNED = np.stack(  # Shape (7, 8): which branches turn or mirror each joint, s
     )
 ).astype(np.intp)
 _JOINTS, _BRANCHES = range(1, 8), range(8)
-_WHY: tuple[Reason, ...] = ("joint limits", "singularity", "safety box")
+_WHY: list[Reason] = ["joint limits", "singularity", "safety box"]
 _REASONS: dict[tuple[bool, ...], tuple[Reason, ...]] = {
     found: tuple(itertools.compress(_WHY, found)) for found in itertools.product((False, True), repeat=len(_WHY))
 }
