@@ -45,7 +45,8 @@ _TURNED = np.stack(  # Shape (7, 8): which branches turn or mirror each joint, s
 _JOINTS, _BRANCHES = range(1, 8), range(8)
 _WHY: list[Reason] = ["joint limits", "singularity", "safety box"]
 _REASONS: dict[tuple[bool, ...], tuple[Reason, ...]] = {
-    found: tuple(itertools.compress(_WHY, found)) for found in itertools.product((False, True), repeat=len(_WHY))
+    found: tuple(why for why, is_so in zip(_WHY, found, strict=True) if is_so)
+    for found in itertools.product((False, True), repeat=len(_WHY))
 }
 """By whether a joint limit, a singularity and the safety box forbid an arc."""
 
