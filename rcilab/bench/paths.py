@@ -38,7 +38,8 @@ def bench_replan() -> Measurement:
     start = model.home
     T = model.forward(start)
     phases = np.linspace(0.0, 2.0 * np.pi, 60, endpoint=False)
-    poses = [Pose(T.position + 0.1 * np.array((np.sin(2.0 * a), np.cos(a), np.sin(a))), T.wxyz) for a in phases]
+    center = T.position - (0.15, 0.0, 0.1)
+    poses = [Pose(center + 0.1 * np.array((np.sin(2.0 * a), np.cos(a), np.sin(a))), T.wxyz) for a in phases]
 
     def joint(goal: Pose) -> bool:
         return check(plan_joint(model, start, model.inverse(goal, near=start).nearest(start)), model).ok

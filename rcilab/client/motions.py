@@ -178,7 +178,7 @@ class Motions(RciCommands):
         with self._turn("move_c"):
             state = self.receive_state()
             angles = arm_angles(self.model, state.q_c, psi)
-            path = build_arc(self.model.forward(state.q_c), via, goal, *angles, orientation="start_to_goal")
+            path = build_arc(self.model.forward(state.q_c), via, goal, *angles)
             return self._move_along(path, state, speed, psi is not None, progress)
 
     @property

@@ -98,22 +98,26 @@ class Path:
             return Pose.from_parts(slerp(ra, rb, share), position), psi
         return Pose.from_parts(_rotation(self.turning.sample(np.array([share]))[0]), position), psi
 
+    def positions(self, shares: Array) -> Array:
+        """Returns where the tool is, shape (N, 3), [m], at many shares of the way, (N,); beyond its ends, too."""
+        u = shares[:, np.newaxis]
+        if self.circle is None:
+            a, b = np.array(self.start.parts[1]), np.array(self.goal.parts[1])
+            return a + u * (b - a)
+        c, e, f = (np.array(point) for point in (self.circle.center, self.circle.first, self.circle.second))
+        return c + np.cos(u * self.circle.angle) * e + np.sin(u * self.circle.angle) * f
+
     def sample(self, shares: Array) -> tuple[Array, Array | None]:
         """Returns poses, shape (N, 4, 4), and arm angles, shape (N,), [rad], at many shares of the way, (N,).
 
         The formulas go on beyond start and goal, and so does this, for those who form differences there.
         """
-        (ra, a), (rb, b) = self.start.parts, self.goal.parts
+        ra, rb = self.start.parts[0], self.goal.parts[0]
         # One element after the other in memory: those who follow a path compute with columns of these.
         T = np.zeros((4, 4, len(shares))).transpose(2, 0, 1)
         T[:, 3, 3] = 1.0
         T[:, :3, :3] = (self.turning or turn_to(ra, rb)).sample(shares)
-        if self.circle is None:
-            T[:, :3, 3] = np.array(a) + np.multiply.outer(shares, np.array(b) - np.array(a))
-        else:
-            c, e, f = (np.array(point) for point in (self.circle.center, self.circle.first, self.circle.second))
-            angles = shares * self.circle.angle
-            T[:, :3, 3] = c + np.multiply.outer(np.cos(angles), e) + np.multiply.outer(np.sin(angles), f)
+        T[:, :3, 3] = self.positions(shares)
         if self.psi_start is None or self.psi_goal is None:
             return T, None
         return T, self.psi_start + shares * (self.psi_goal - self.psi_start)
@@ -146,7 +150,7 @@ def build_arc(
     psi_start: float | None = None,
     psi_goal: float | None = None,
     *,
-    orientation: ArcOrientation = "through_via",
+    orientation: ArcOrientation = "start_to_goal",
 ) -> Path:
     """Returns the arc from start over via to goal.
 
@@ -156,9 +160,9 @@ def build_arc(
         goal: Pose of the tool in base at the end.
         psi_start: Arm angle at the start, [rad]; None leaves it open.
         psi_goal: Arm angle at the end, [rad].
-        orientation: "through_via": exactly through that of `via` at its place, the shorter way to it and on from it,
-            with continuous angular velocity and acceleration (`TurnThrough`). "start_to_goal": by slerp from start to
-            goal, that of `via` is ignored, as the vendor's helper does it.
+        orientation: "start_to_goal": by slerp from start to goal; that of `via` is ignored, as the vendor's helper does
+            it. "through_via": exactly through that of `via` at its place, the shorter way to it and on from it, with
+            continuous angular velocity and acceleration (`TurnThrough`).
 
     Raises:
         PlanningError: The three positions lie on a line, or two of them are the same.

@@ -61,7 +61,7 @@ def test_a_line_is_the_vendors():
 
 
 def test_an_arc_is_the_vendors():
-    path = build_arc(pose(ARC_START), Pose((0.6, 0.0, 0.4)), pose(ARC_GOAL), orientation="start_to_goal")
+    path = build_arc(pose(ARC_START), Pose((0.6, 0.0, 0.4)), pose(ARC_GOAL))
     shares = schedule(path, 0.2)
     assert len(shares) - 1 == 2219 + 1
     for cycle, numbers in ARC:
