@@ -27,8 +27,6 @@ _STANDS = 1e-6
 """A tool that moves less than this turns on the spot, [m]."""
 _INSIDE = 0.999
 """Part of the radius to stay in, so that what happens between the looks is inside, too."""
-_ATTEMPTS = 30
-"""How often to come closer to the corner. Seen: up to 3."""
 
 LENGTH = 1.0
 """Length of every blend in the chain's own measure: the corner is in the middle."""
@@ -47,7 +45,7 @@ class Blend:
     corner: Pose | None
     """Pose of the tool at the corner; None where the curve runs in joint space."""
     powers: tuple[Array, ...]
-    """Of the quintic over the whole blend: joint angles, shape (n,), or position, rotation vector and arm angle, (7,)."""
+    """Of the quintic over the whole blend: joint angles, (n,), or position, rotation vector and arm angle, (7,)."""
 
     def poses(self, parts: Array) -> tuple[Array, Array]:
         """Returns poses, shape (N, 4, 4), and arm angles, shape (N,), at parts of the blend."""
@@ -72,14 +70,13 @@ def build_blend(model: RobotModel, before: Segment, after: Segment) -> Blend:
     moving = [float(half.max()) for half in halves if half.max() > _STANDS]
     radius = min([radius, *moving])
     back, ahead = _cut(halves[0], radius), _cut(halves[1], radius)
-    for _ in range(_ATTEMPTS):
+    while True:
         blend = _blend(model, before, after, 1.0 - back, ahead, radius)
         excess = _farthest(model, blend, corner) / (_INSIDE * radius)
         if excess <= 1.0:
-            break
+            return blend
         closer = max(0.5, 0.99 / excess)
         back, ahead = closer * back, closer * ahead
-    return blend
 
 
 def rotations(vectors: Array) -> Array:

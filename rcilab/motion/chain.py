@@ -8,12 +8,13 @@ each other, with their first two derivatives; in between, quintics are exact to 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rcilab.arrays import Array, JointVector
+from rcilab.arrays import Array
 from rcilab.errors import PlanningError
 from rcilab.model import RobotModel
 from rcilab.motion.blend import LENGTH, Blend
@@ -33,6 +34,10 @@ _NUDGE = 3e-4
 """Part of a segment or blend over which derivatives are formed. A choice: both their errors are below 1e-7."""
 
 
+Rows: TypeAlias = NDArray[np.intp]
+"""One index a row, shape (N,)."""
+
+
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Chain:
     """A curve in s through C columns: joint angles, arm angle, the tool's position and its turn summed up.
@@ -47,8 +52,8 @@ class Chain:
     """Coefficients by ascending power of s since the knot, each of shape (K, C)."""
     n: int
     """Number of joints."""
-    leads_tool: NDArray[np.bool_]
-    """Whether the tool's and the arm angle's limits count, for each interval, shape (K,)."""
+    leads_tool: Array
+    """Whether the tool's and the arm angle's limits count, 1 or 0, for each interval, shape (K,)."""
     speed: Array
     """Part of the limits to use, for each interval, shape (K,)."""
     middles: Array
@@ -65,7 +70,7 @@ class Chain:
         second = 2.0 * c[2] + tau * (6.0 * c[3] + tau * (12.0 * c[4] + tau * (20.0 * c[5])))
         return value, first, second
 
-    def interval(self, s: Array) -> NDArray[np.intp]:
+    def interval(self, s: Array) -> Rows:
         """Returns in which interval each s is, shape (N,)."""
         return np.clip(np.searchsorted(self.knots, s, side="right") - 1, 0, len(self.knots) - 2)
 
@@ -144,7 +149,7 @@ def build_chain(model: RobotModel, segments: list[Segment], blends: list[Blend],
         knots=knots,
         powers=tuple(power / steps**order for order, power in enumerate(powers)),
         n=model.n,
-        leads_tool=np.repeat([piece.leads_tool for piece in pieces], counts),
+        leads_tool=np.repeat([float(piece.leads_tool) for piece in pieces], counts),
         speed=np.repeat([piece.speed for piece in pieces], counts),
         middles=np.array(middles),
         segments=tuple(segments),
@@ -224,7 +229,7 @@ def _turn_joints(piece: _Piece, states: tuple[Array, ...], row: int) -> None:
 def _lead_tool(model: RobotModel, pieces: list[_Piece], states: tuple[Array, ...], row: int) -> None:
     """Writes consecutive paths and blends of the tool, followed on one branch."""
     owners: list[_Piece] = []
-    T_parts, psi_parts, rates, changes, nudges = [], [], [], [], []
+    T_parts, psi_parts, rates, changes = [], [], [], []
     for number, piece in enumerate(pieces):
         local = piece.local[1:] if number else piece.local
         T, psi = piece.poses((local[:, np.newaxis] + _NUDGE * np.array([-1.0, 0.0, 1.0])).ravel())
@@ -280,13 +285,13 @@ def _refusal(piece: _Piece, T: Array, reason: str) -> PlanningError:
     )
 
 
-def states_at_knots(chain: Chain) -> tuple[JointVector, Array, Array, Array]:
-    """Returns the first three derivatives by s at the knots, (K + 1, C), the third as the larger of both sides."""
+def derivatives_at_knots(chain: Chain) -> tuple[Array, Array, Array]:
+    """Returns the derivatives by s at the knots, each of shape (K + 1, C); of the third the size, the larger one's."""
     steps = np.diff(chain.knots)[:, np.newaxis]
-    value, first, second = chain.sample(chain.knots)
+    _, first, second = chain.sample(chain.knots)
     start = np.abs(6.0 * chain.powers[3])
     end = np.abs(6.0 * chain.powers[3] + steps * (24.0 * chain.powers[4] + steps * (60.0 * chain.powers[5])))
-    third = np.zeros_like(value)
+    third = np.zeros_like(first)
     third[:-1] = start
     np.maximum(third[1:], end, out=third[1:])
-    return value, first, second, third
+    return first, second, third

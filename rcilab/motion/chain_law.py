@@ -14,7 +14,7 @@ import numpy as np
 from rcilab.arrays import Array
 from rcilab.clock import CYCLE_TIME
 from rcilab.limits import Limits
-from rcilab.motion.chain import Chain, states_at_knots
+from rcilab.motion.chain import Chain, derivatives_at_knots
 from rcilab.motion.margin import LIMIT_MARGIN
 
 _LEAST = 1e-12
@@ -77,29 +77,28 @@ def column_limits(limits: Limits) -> ColumnLimits:
 
 def chain_bounds(chain: Chain, limits: ColumnLimits) -> ChainBounds:
     """Returns what a chain allows."""
-    _, first, second, third = states_at_knots(chain)
+    first, second, third = derivatives_at_knots(chain)
     n = chain.n
     speed = np.minimum(_at_knots(chain.speed, 1.0, np.minimum), 1.0)[:, np.newaxis]
-    leads = _at_knots(chain.leads_tool, False, np.logical_or)
+    leads = _at_knots(chain.leads_tool, 0.0, np.maximum)
     lengths = _norms(first, n)
     thirds = _norms(third, n)
     velocity = limits.velocity * speed
     for table in (lengths, thirds):
-        table[~leads, n:] = 0.0
+        table[:, n:] *= leads[:, np.newaxis]
     with np.errstate(divide="ignore"):
         most = np.minimum((velocity / lengths).min(axis=1) ** 2, (limits.jerk / thirds).min(axis=1) ** (2.0 / 3.0))
-    translation = _half_planes(first[:, n + 1 : n + 4], second[:, n + 1 : n + 4], leads)
-    rotation = _half_planes(first[:, n + 4 :], second[:, n + 4 :], leads)
-    arm_angle = np.where(leads[:, np.newaxis], first[:, n : n + 1], 0.0), np.where(
-        leads[:, np.newaxis], second[:, n : n + 1], 0.0
-    )
+    first[:, n:] *= leads[:, np.newaxis]
+    second[:, n:] *= leads[:, np.newaxis]
+    translation = _half_planes(first[:, n + 1 : n + 4], second[:, n + 1 : n + 4])
+    rotation = _half_planes(first[:, n + 4 :], second[:, n + 4 :])
     most_flat = math.cos(math.pi / (2.0 * _SIDES))
     sides = (most_flat * limits.acceleration[n + 1], most_flat * limits.acceleration[n + 2])
     acceleration = np.concatenate((limits.acceleration[: n + 1], np.repeat(sides, _SIDES)))
     return ChainBounds(
         knots=chain.knots,
-        first=np.hstack((first[:, :n], arm_angle[0], translation[0], rotation[0])),
-        second=np.hstack((second[:, :n], arm_angle[1], translation[1], rotation[1])),
+        first=np.hstack((first[:, : n + 1], translation[0], rotation[0])),
+        second=np.hstack((second[:, : n + 1], translation[1], rotation[1])),
         acceleration=acceleration * speed,
         most=most,
     )
@@ -168,15 +167,13 @@ def _ceiling(reserve: Array, tilt: Array) -> Array:
     return 1.0 / most
 
 
-def _half_planes(first: Array, second: Array, leads: Array) -> tuple[Array, Array]:
+def _half_planes(first: Array, second: Array) -> tuple[Array, Array]:
     """Returns rows whose bounds stand for a round one on first s'' + second x, each of shape (K + 1, _SIDES)."""
     length = np.sqrt((first * first).sum(axis=1))
     along = first / np.maximum(length, _LEAST)[:, np.newaxis]
     forward = (along * second).sum(axis=1)
     aside = second - forward[:, np.newaxis] * along
     across = np.sqrt((aside * aside).sum(axis=1))
-    for table in (length, forward, across):
-        table[~leads] = 0.0
     angles = np.arange(_SIDES) * math.pi / _SIDES - math.pi / 2.0
     c, s = np.cos(angles), np.sin(angles)
     return np.outer(length, c), np.outer(forward, c) + np.outer(across, s)
@@ -188,6 +185,6 @@ def _norms(table: Array, n: int) -> Array:
     return np.column_stack((np.abs(table[:, : n + 1]), *tool))
 
 
-def _at_knots(intervals: Array, outside: float | bool, join: np.ufunc) -> Array:
+def _at_knots(intervals: Array, outside: float, join: np.ufunc) -> Array:
     """Returns what both intervals beside each knot say, joined, shape (K + 1,)."""
     return join(np.concatenate(([outside], intervals)), np.concatenate((intervals, [outside])))

@@ -10,7 +10,7 @@ from rcilab.arrays import Array
 from rcilab.clock import CYCLE_TIME
 from rcilab.errors import PlanningError
 from rcilab.limits import JointLimits, Limits
-from rcilab.motion.chain import Chain
+from rcilab.motion.chain import Chain, Rows
 from rcilab.motion.chain_law import ChainLaw, ColumnLimits, chain_bounds, column_limits, fastest_law
 from rcilab.motion.hermite import quintic
 from rcilab.motion.piecewise import PiecewisePolynomial
@@ -26,7 +26,9 @@ _HASTE = 1.001
 
 
 def plan_chain(chain: Chain, limits: Limits) -> tuple[PiecewisePolynomial, list[float]]:
-    """Returns the fastest curve along a chain from rest to rest, a quintic a cycle, and when it passes each corner, [s].
+    """Returns the fastest curve along a chain from rest to rest, and when it passes each corner, [s].
+
+    A quintic a cycle, through the chain at every cycle with its velocity and acceleration there.
 
     Args:
         chain: The chain.
@@ -78,7 +80,7 @@ def _curve(chain: Chain, law: ChainLaw) -> tuple[Array, list[Array]]:
     return value, [part / h**power for power, part in enumerate(parts)]
 
 
-def _joint_excess(chain: Chain, limits: ColumnLimits, powers: list[Array], interval: Array) -> Array:
+def _joint_excess(chain: Chain, limits: ColumnLimits, powers: list[Array], interval: Rows) -> Array:
     """Returns how much slower each cycle must be to keep the joints' bounds in it, shape (N,)."""
     n = chain.n
     speed = np.maximum(chain.speed[interval[:-1]], chain.speed[interval[1:]])
@@ -97,14 +99,14 @@ def _joint_excess(chain: Chain, limits: ColumnLimits, powers: list[Array], inter
     return excess
 
 
-def _tool_excess(chain: Chain, limits: ColumnLimits, columns: Array, interval: Array) -> Array:
+def _tool_excess(chain: Chain, limits: ColumnLimits, columns: Array, interval: Rows) -> Array:
     """Returns how much slower each row must be passed to keep the bounds on tool and arm angle, shape (N,).
 
     By backward differences at 1 ms, as the controller judges them, with rest before and after.
     """
     n, count = chain.n, len(columns)
     speed = _looking_back(chain.speed[interval], np.maximum)
-    leads = _looking_back(chain.leads_tool[interval], np.logical_and)
+    leads = _looking_back(chain.leads_tool[interval], np.minimum) > 0.0
     excess = np.zeros(count)
     if not leads.any():
         return excess

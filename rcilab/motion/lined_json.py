@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from bisect import bisect_right
 from dataclasses import dataclass
-from json.decoder import JSONDecodeError, scanstring
+from json import JSONDecodeError, JSONDecoder
 from typing import TypeAlias
 
 from rcilab.arrays import Words
@@ -22,6 +22,7 @@ DEEPEST = 8
 _BLANK = re.compile(r"[ \t\r\n]*")
 _NUMBER = re.compile(r"-?(?:0|[1-9]\d*)(?:\.\d+)?(?:[eE][+-]?\d+)?(?![\w.])", re.ASCII)
 _WORD = re.compile(r"[^\s,:\[\]{}\"]+")
+_DECODER = JSONDecoder()  # For text, with its escapes.
 _CONSTANTS = {"true": True, "false": False, "null": None}
 
 Content: TypeAlias = "dict[str, Node] | list[Node] | str | float | bool | None"
@@ -97,7 +98,7 @@ class _Reader:
             return Node(value, line)
         word = _WORD.match(self._text, self._at)
         if word is None or word[0] not in _CONSTANTS:
-            raise self._error("is no value; JSON has numbers with a point, \"text\", true, false, null, [...] and {...}")
+            raise self._error('is no value; JSON has numbers with a point, "text", true, false, null, [...] and {...}')
         self._at = word.end()
         return Node(_CONSTANTS[word[0]], line)
 
@@ -134,7 +135,7 @@ class _Reader:
 
     def _string(self) -> str:
         try:
-            value, self._at = scanstring(self._text, self._at + 1, True)
+            value, self._at = _DECODER.raw_decode(self._text, self._at)
         except JSONDecodeError as error:
             raise self._error(f"is no text: {error.msg.lower()}") from error
         return value

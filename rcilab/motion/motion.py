@@ -61,7 +61,7 @@ class Motion:
     speed: float = 1.0
     """The speed it was planned with, as a part of the limits, in (0, 1]."""
     segment_starts: Array = field(default_factory=lambda: np.zeros(1))
-    """When each segment of a program begins, shape (S,), not decreasing, first 0, [s]; any other motion is one segment."""
+    """When each segment of a program begins, shape (S,), first 0, [s]; any other motion is one."""
     notes: tuple[str, ...] = ()
     """What whoever planned it has to say about it, a sentence each: such as a blend that had to be shortened."""
     _cache: dict[str, Array] = field(init=False, repr=False, default_factory=dict[str, Array])

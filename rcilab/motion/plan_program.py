@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 
@@ -84,7 +85,7 @@ def _plan_run(model: RobotModel, run: list[Segment], scale: float, track: _Track
     segment = run[0]
     speed = scale * segment.waypoint.speed
     if len(run) > 1:
-        blends = [build_blend(model, before, after) for before, after in zip(run[:-1], run[1:], strict=True)]
+        blends = [build_blend(model, before, after) for before, after in pairwise(run)]
         for before, blend in zip(run[:-1], blends, strict=True):
             asked = before.waypoint.blend
             if blend.radius < asked - _SHORTENED:

@@ -1,11 +1,11 @@
-"""Programs: waypoints in a row, each with how to get there, as values that can be planned, saved and written as a script."""
+"""Programs: waypoints in a row, each with how to get there, as values that can be planned, saved and made a script."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
 from os import PathLike
-from typing import Literal, TypeAlias, get_args
+from typing import Any, Literal, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -80,7 +80,7 @@ class Waypoint:
     angle: float | None = None
     """How far around the circle, more than 0 up to 2 pi, [rad]; None is all around."""
     psi: float | None = None
-    """Arm angle of a 7-axis arm at the target, -pi to pi, [rad]; None holds the one before (joint: takes a close one)."""
+    """Arm angle of a 7-axis arm at the target, -pi to pi, [rad]; None holds the one before, or in a joint move any."""
     speed: float = 0.2
     """Part of the velocity and acceleration limits to use on the way here, 0.001 to 1; jerk limits are used in full."""
     blend: float = 0.0
@@ -97,7 +97,9 @@ class Waypoint:
         for name in _OPTIONAL:
             value = getattr(self, name)
             if value is not None and name not in allowed:
-                raise InvalidValueError(name, described(value), f"has no meaning here; {self.type} takes: {', '.join(allowed)}")
+                raise InvalidValueError(
+                    name, described(value), f"has no meaning here; {self.type} takes: {', '.join(allowed)}"
+                )
             if value is None and name in NEEDED[self.type]:
                 raise InvalidValueError(name, None, f"is missing: {self.type} needs {', '.join(NEEDED[self.type])}")
             if value is not None and name not in ("q", "angle", "psi"):
@@ -137,7 +139,7 @@ class Waypoint:
         cls, via: Pose | ArrayLike, target: Pose | ArrayLike, *, psi: float | None = None, speed: float = 0.2,
         blend: float = 0.0, dwell: float = 0.0,
     ) -> Waypoint:  # fmt: skip
-        """Returns an arc of the tool over `via`, a pose of which the position counts, or a position, shape (3,), [m]."""
+        """Returns an arc of the tool over `via`, a position, shape (3,), [m], or a pose of which that counts."""
         point = via.position if isinstance(via, Pose) else via
         return cls(
             type="arc", via=_vector("via", point), **_target(target), psi=psi, speed=speed, blend=blend, dwell=dwell
@@ -148,7 +150,7 @@ class Waypoint:
         cls, center: ArrayLike, axis: ArrayLike, angle: float | None = None, *, psi: float | None = None,
         speed: float = 0.2, blend: float = 0.0, dwell: float = 0.0,
     ) -> Waypoint:  # fmt: skip
-        """Returns a circle, or a part of it, around a centre, shape (3,), [m], and an axis; `circle_through` finds both."""
+        """Returns a circle, or a part of it, around a centre, shape (3,), [m], and an axis, shape (3,)."""
         return cls(
             type="circle", center=_vector("center", center), axis=_vector("axis", axis), angle=angle, psi=psi,
             speed=speed, blend=blend, dwell=dwell,
@@ -226,7 +228,9 @@ class Program:
             try:
                 require_fit(waypoint, n, robot.name)
             except InvalidValueError as error:
-                raise InvalidValueError(f"{label(number, waypoint)}, {error.name}", error.value, error.requirement) from error
+                raise InvalidValueError(
+                    f"{label(number, waypoint)}, {error.name}", error.value, error.requirement
+                ) from error
         if self.tool is not None:
             tool = as_vector(self.tool, 7, "tool", "position m, wxyz").tolist()
             object.__setattr__(self, "tool", (*_vector("tool", tool[:3]), *_vector("wxyz", tool[3:])))
@@ -237,7 +241,7 @@ class Program:
         return None if self.tool is None else Pose(self.tool[:3], self.tool[3:])
 
     def to_json(self) -> str:
-        """Returns the program as JSON, which `from_json` reads back to the last bit; `program.schema.json` describes it."""
+        """Returns the program as JSON, which `from_json` reads back to the last bit."""
         from rcilab.motion.program_file import program_text
 
         return program_text(self)
@@ -322,14 +326,16 @@ def angles_of(value: ArrayLike, name: str, n: int | None = None, robot: str = ""
     return angles
 
 
-def _target(target: Pose | ArrayLike) -> dict[str, Floats]:
+def _target(target: Pose | ArrayLike) -> dict[str, Any]:
     if isinstance(target, Pose):
         return {"position": tuple(target.position.tolist()), "wxyz": tuple(target.wxyz.tolist())}
     return {"q": angles_of(target, "q")}
 
 
 def _vector(name: str, value: ArrayLike) -> Floats:
-    numbers: Floats = tuple(as_vector(value, 4 if name == "wxyz" else 3, name, "" if name in ("wxyz", "axis") else "m").tolist())
+    numbers: Floats = tuple(
+        as_vector(value, 4 if name == "wxyz" else 3, name, "" if name in ("wxyz", "axis") else "m").tolist()
+    )
     if name == "wxyz":
         if abs(math.hypot(*numbers) - 1.0) > _UNIT:
             problem = f"has length {math.hypot(*numbers):.4g}, must be 1 within {_UNIT:g}: a unit quaternion, w first"

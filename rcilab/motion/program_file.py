@@ -83,7 +83,9 @@ def read_program(content: bytes, name: str) -> Program:
     found = _object(root, name, "a program", _PROGRAM_KEYS)
     for key, expected in (("format", FORMAT), ("version", float(VERSION))):
         if key not in found:
-            raise InvalidValueError(f"{name}, {key}", None, f"is missing; a program has {json.dumps(_written(expected))}")
+            raise InvalidValueError(
+                f"{name}, {key}", None, f"is missing; a program has {json.dumps(_written(expected))}"
+            )
         value = found[key].value
         if key == "version" and value != expected:
             what = f"{name}, line {found[key].line}, version"
@@ -114,7 +116,9 @@ def _waypoint(node: Node, number: int, name: str, robot: RobotDescription) -> Wa
     keys = tuple(field.name for field in fields(Waypoint))
     found = _object(node, name, kind, keys)
     if "type" not in found:
-        raise InvalidValueError(f"{name}, line {node.line}, {kind}, type", None, f"is missing; known: {', '.join(ALLOWED)}")
+        raise InvalidValueError(
+            f"{name}, line {node.line}, {kind}, type", None, f"is missing; known: {', '.join(ALLOWED)}"
+        )
     values: dict[str, Any] = {"type": _text(name, found["type"], f"{kind}, type")}
     for key, value in found.items():
         if key == "type" or (value.value is None and key not in ALWAYS):
@@ -139,7 +143,9 @@ def _object(node: Node, name: str, kind: str, keys: tuple[str, ...]) -> dict[str
         raise InvalidValueError(f"{name}, line {node.line}", node.plain(), f"must be {kind}: an object {{...}}")
     for key, value in node.value.items():
         if key not in keys:
-            raise InvalidValueError(f"{name}, line {value.line}, {kind}, {key}", value.plain(), f"is unknown; known: {', '.join(keys)}")
+            raise InvalidValueError(
+                f"{name}, line {value.line}, {kind}, {key}", value.plain(), f"is unknown; known: {', '.join(keys)}"
+            )
     return node.value
 
 

@@ -34,7 +34,7 @@ if __name__ == "__main__":
 def program_script(program: Program) -> str:
     """Returns the script; every number stands in it to the last bit, and text only as a literal."""
     head = [("name", program.name), ("model", program.model), ("tool", program.tool), ("start", program.start)]
-    lines = [f"    {key}={ascii(value)},\n" for key, value in head if value not in (None, "")]
+    lines = [f"    {key}={value!a},\n" for key, value in head if value not in (None, "")]
     waypoints = "".join(f"        {_call(waypoint)},\n" for waypoint in program.waypoints)
     return _HEAD + "".join(lines) + f"    waypoints=(\n{waypoints}    ),\n)\n" + _TAIL
 

@@ -1,4 +1,4 @@
-"""The segments of a program: each waypoint's way as geometry, from joint angles to joint angles, known to be passable."""
+"""The segments of a program: each waypoint's way as geometry, from joint angles to joint angles."""
 
 from __future__ import annotations
 
@@ -123,7 +123,12 @@ def _segment(model: RobotModel, q: JointVector, number: int, waypoint: Waypoint)
     if path.distance == 0.0:
         return Segment(number=number, waypoint=waypoint, start=q, goal=q, path=path, knots=np.stack((q, q)))
     knots, obstacle = examine(
-        model, q, path, np.linspace(0.0, 1.0, _KNOTS + 1), np.full(model.n, _STEP), f"on {100.0 / _KNOTS:g} % of the way"
+        model,
+        q,
+        path,
+        np.linspace(0.0, 1.0, _KNOTS + 1),
+        np.full(model.n, _STEP),
+        f"on {100.0 / _KNOTS:g} % of the way",
     )
     if obstacle is not None:
         knots = require_path(model, q, path)
@@ -172,5 +177,5 @@ def _require_inside(model: RobotModel, q: JointVector) -> None:
         i = int(outside[0])
         raise PlanningError(
             f"joint {i + 1} at {math.degrees(q[i]):.2f} deg is not strictly between "
-            f"{math.degrees(limits.lower[i]):.2f} and {math.degrees(limits.upper[i]):.2f} deg; choose an angle between them"
+            f"{math.degrees(limits.lower[i]):.2f} and {math.degrees(limits.upper[i]):.2f} deg; choose one between them"
         )
