@@ -139,6 +139,8 @@ def build_chain(model: RobotModel, segments: list[Segment], blends: list[Blend],
         else:
             _turn_joints(pieces[first], states, int(ends[first]))
         first = last
+    # The inverse gives both ends to rounding.
+    states[0][0, : model.n], states[0][-1, : model.n] = segments[0].start, segments[-1].goal
     starts = np.concatenate(([0.0], np.cumsum([piece.length for piece in pieces])))
     knots = np.concatenate([[0.0], *(start + piece.s[1:] for start, piece in zip(starts, pieces, strict=False))])
     steps = np.diff(knots)[:, np.newaxis]

@@ -120,18 +120,7 @@ def _segment(model: RobotModel, q: JointVector, number: int, waypoint: Waypoint)
             number=number, waypoint=waypoint, start=q, goal=goal, path=None, knots=np.stack((q, goal))
         )  # fmt: skip
     path = _path(model, q, waypoint)
-    if path.distance == 0.0:
-        return Segment(number=number, waypoint=waypoint, start=q, goal=q, path=path, knots=np.stack((q, q)))
-    knots, obstacle = examine(
-        model,
-        q,
-        path,
-        np.linspace(0.0, 1.0, _KNOTS + 1),
-        np.full(model.n, _STEP),
-        f"on {100.0 / _KNOTS:g} % of the way",
-    )
-    if obstacle is not None:
-        knots = require_path(model, q, path)
+    knots = np.stack((q, q)) if path.distance == 0.0 else _followed(model, q, path)
     goal = knots[-1]
     if waypoint.q is not None and (excess := np.abs(goal - waypoint.q)).max() > _OTHER_BRANCH:
         joint = int(excess.argmax())
@@ -141,6 +130,13 @@ def _segment(model: RobotModel, q: JointVector, number: int, waypoint: Waypoint)
             share=1.0,
         )
     return Segment(number=number, waypoint=waypoint, start=q, goal=goal, path=path, knots=knots)
+
+
+def _followed(model: RobotModel, q: JointVector, path: Path) -> JointPath:
+    """Returns the joint angles at evenly spaced shares of a path that can be followed, shape (M + 1, n), [rad]."""
+    shares, span = np.linspace(0.0, 1.0, _KNOTS + 1), f"on {100.0 / _KNOTS:g} % of the way"
+    knots, obstacle = examine(model, q, path, shares, np.full(model.n, _STEP), span)
+    return knots if obstacle is None else require_path(model, q, path)
 
 
 def _joint_goal(model: RobotModel, q: JointVector, waypoint: Waypoint) -> JointVector:

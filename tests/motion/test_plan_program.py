@@ -122,7 +122,7 @@ def distance_to_way(points, way):
     return best
 
 
-@settings(max_examples=12)
+@settings(max_examples=10)
 @given(names, seeds)
 def test_a_random_program_keeps_every_joint_limit_is_smooth_and_arrives(name, seed):
     model = MODELS[name]
@@ -134,7 +134,7 @@ def test_a_random_program_keeps_every_joint_limit_is_smooth_and_arrives(name, se
     assert np.allclose(motion.q[-1], build_segments(model, steps)[-1].goal, atol=1e-9)
 
 
-@settings(max_examples=6)
+@settings(max_examples=4)
 @given(names, seeds)
 def test_between_paths_of_the_tool_its_limits_and_the_arm_angles_are_kept_too(name, seed):
     model = MODELS[name]
@@ -145,13 +145,13 @@ def test_between_paths_of_the_tool_its_limits_and_the_arm_angles_are_kept_too(na
         assert monitor.step(model.forward(q), angle_of(model, q)) == (), monitor.broken()
 
 
-@settings(max_examples=10)
+@settings(max_examples=8)
 @given(names, seeds)
 def test_the_tool_leaves_its_way_only_inside_the_blend_radius(name, seed):
     model = MODELS[name]
     steps = drawn(model, seed, 4)
     motion = planned(model, steps)
-    times = np.arange(0.0, motion.duration, 0.0093)
+    times = np.arange(0.0, motion.duration, 0.0193)
     points = model.position_path(motion.polynomial.sample(times))
     segments = build_segments(model, steps)
     index = np.clip(np.searchsorted(motion.segment_starts, times, side="right") - 1, 0, len(segments) - 1)
@@ -159,7 +159,7 @@ def test_the_tool_leaves_its_way_only_inside_the_blend_radius(name, seed):
         mine = points[index == i]
         if not len(mine):
             continue
-        off = distance_to_way(mine, segment.positions(model, np.linspace(0.0, 1.0, 2001)))
+        off = distance_to_way(mine, segment.positions(model, np.linspace(0.0, 1.0, 1001)))
         for corner in segments[max(i - 1, 0) : i + 1]:
             radius = corner.waypoint.blend if corner.waypoint.dwell == 0.0 and corner is not segments[-1] else 0.0
             to_corner = np.sqrt(((mine - corner.positions(model, np.ones(1))) ** 2).sum(axis=1))
@@ -167,7 +167,7 @@ def test_the_tool_leaves_its_way_only_inside_the_blend_radius(name, seed):
         assert off.max() < 1e-6
 
 
-@settings(max_examples=15)
+@settings(max_examples=20)
 @given(names, seeds, st.sampled_from(TYPES), st.sampled_from(TYPES), st.floats(0.001, 0.3))
 def test_every_pair_of_types_blends_inside_the_radius(name, seed, first, second, radius):
     model = MODELS[name]
@@ -184,24 +184,21 @@ def test_every_pair_of_types_blends_inside_the_radius(name, seed, first, second,
     assert 0.5 <= blend.leave <= 1.0
     assert 0.0 <= blend.join <= 0.5
     chain = build_chain(model, [before, after], [blend], 1.0)
-    s = np.linspace(0.0, chain.knots[-1], 3000)
-    value, slope, bend = chain.sample(s)
-    q = value[:, : model.n]
-    step = s[1]
-    assert np.abs(np.gradient(q, step, axis=0)[2:-2] - slope[2:-2, : model.n]).max() < 1e-3 * (
-        1.0 + np.abs(slope).max()
-    )
-    assert np.abs(np.diff(bend[:, : model.n], axis=0)).max() < 0.2 * (1e-6 + np.abs(bend[:, : model.n]).max())
-    positions = model.position_path(q)
-    corner = after.positions(model, np.zeros(1))[0]
-    ways = [segment.positions(model, np.linspace(0.0, 1.0, 1001)) for segment in (before, after)]
-    some = positions[::10]
-    off = np.minimum(*(distance_to_way(some, way) for way in ways))
-    away = np.sqrt(((some - corner) ** 2).sum(axis=1))
+    steps = np.diff(chain.knots)[:, np.newaxis]
+    powers = [power[:, : model.n] for power in chain.powers]
+    for _ in range(3):
+        end = sum(power * steps**order for order, power in enumerate(powers))
+        assert np.abs(end[:-1] - powers[0][1:]).max() < 1e-9
+        powers = [float(order) * power for order, power in enumerate(powers)][1:]
+    s = np.concatenate((np.linspace(0.0, chain.knots[-1], 150), np.linspace(-0.5, 0.5, 150) + chain.middles[0]))
+    points = model.position_path(chain.sample(s)[0][:, : model.n])
+    ways = [segment.positions(model, np.linspace(0.0, 1.0, 2001)) for segment in (before, after)]
+    off = np.minimum(*(distance_to_way(points, way) for way in ways))
+    away = np.sqrt(((points - after.positions(model, np.zeros(1))[0]) ** 2).sum(axis=1))
     assert np.where(away <= blend.radius, 0.0, off).max() < 2e-6
 
 
-@settings(max_examples=8)
+@settings(max_examples=5)
 @given(names, seeds)
 def test_segments_are_told_in_order_and_reach_their_waypoints(name, seed):
     model = MODELS[name]
@@ -350,8 +347,7 @@ def test_segments_and_notes_survive_saving_and_slowing_down(tmp_path):
             r"waypoint 2 \(arc\): the arc .*at 0\.\d+ of",
         ),
         (Waypoint.circle((0.5, 0.0, 0.1), (0.0, 0.0, 1.0)), r"waypoint 2 \(circle\): .*out of the plane"),
-        (Waypoint.line([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]), r"waypoint 2 \(line\): .*(stretched|singular)"),
-        (Waypoint.line(SEVEN.home * [-1, -1, 1, 1, 1, 1, 1] + [np.pi, 0, -np.pi, 0, 0, 0, 0]), r"waypoint 2 \(line\)"),
+        (Waypoint.line([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]), r"waypoint 2 \(line\): arm angle: shoulder and wrist are"),
     ],
 )
 def test_what_cannot_be_followed_is_told_with_waypoint_place_and_reason(waypoint, hint):
@@ -360,9 +356,12 @@ def test_what_cannot_be_followed_is_told_with_waypoint_place_and_reason(waypoint
 
 
 def test_a_line_to_angles_on_another_branch_is_refused():
-    q = next(q for q in SEVEN.inverse(SEVEN.forward(SEVEN.home), psi=0.0) if np.abs(q - SEVEN.home).max() > 0.5)
+    q = np.array([0.3, -0.3, 0.2, 1.2, 0.1, 0.9, 0.0])
+    other = next(
+        other for other in SEVEN.inverse(SEVEN.forward(q), psi=SEVEN.arm_angle(q)) if np.abs(other - q).max() > 0.5
+    )
     with pytest.raises(PlanningError, match=r"waypoint 2 \(line\): the line ends with joint .* is on another branch"):
-        plan_program(SEVEN, program(SEVEN, Waypoint.line(at(SEVEN, (0.0, 0.05, 0.0))), Waypoint.line(q)))
+        plan_program(SEVEN, program(SEVEN, Waypoint.joint(q), Waypoint.line(other)))
 
 
 @pytest.mark.parametrize(
