@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from rcilab.bench.measure import Measurement
 
 BENCHES = (
-    *("forward", "inverse", "inverse_batch", "feasible_arcs", "plan_joint", "check"),
+    *("forward", "inverse", "inverse_batch", "feasible_arcs", "plan_joint", "program", "check"),
     *("controller_ideal", "controller_mujoco", "controller_cartesian", "controller_impedance", "client_answer"),
     *("jog",),
     *("drag", "import", "start", "state_period", "control_loop"),
@@ -103,6 +103,7 @@ def _bench(name: str, seconds: float) -> Callable[[], Measurement]:
         "inverse_batch": compute.bench_inverse_batch,
         "feasible_arcs": compute.bench_feasible_arcs,
         "plan_joint": compute.bench_plan_joint,
+        "program": compute.bench_program,
         "check": compute.bench_check,
         "jog": compute.bench_jog,
     }[name]

@@ -125,7 +125,7 @@ def _segment(model: RobotModel, q: JointVector, number: int, waypoint: Waypoint)
     if waypoint.q is not None and (excess := np.abs(goal - waypoint.q)).max() > _OTHER_BRANCH:
         joint = int(excess.argmax())
         raise PlanningError(
-            f"the {path.name} ends with joint {joint + 1} at {math.degrees(goal[joint]):.2f} deg and not at "
+            f"the {waypoint.type} ends with joint {joint + 1} at {math.degrees(goal[joint]):.2f} deg and not at "
             f"{math.degrees(waypoint.q[joint]):.2f} deg: q is on another branch; go there with a joint move",
             share=1.0,
         )

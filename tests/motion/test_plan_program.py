@@ -343,7 +343,7 @@ def test_segments_and_notes_survive_saving_and_slowing_down(tmp_path):
         (Waypoint.joint(at(SEVEN, (2.0, 0.0, 0.0))), r"waypoint 2 \(joint\): .*out of reach by"),
         (Waypoint.joint([0.0, 3.0, 0.0, 0.0, 0.0, 0.0, 0.0]), r"waypoint 2 \(joint\): joint 2 at 171.89 deg is not"),
         (
-            Waypoint.arc((0.5, 0.0, 0.5), (0.0, 0.6, 0.0, 1.0, 0.0, 1.5, 3.0)),
+            Waypoint.arc(at(SEVEN, (0.6, 0.15, 0.0)), at(SEVEN, (0.0, 0.3, 0.0))),
             r"waypoint 2 \(arc\): the arc .*at 0\.\d+ of",
         ),
         (Waypoint.circle((0.5, 0.0, 0.1), (0.0, 0.0, 1.0)), r"waypoint 2 \(circle\): .*out of the plane"),
