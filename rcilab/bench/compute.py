@@ -91,7 +91,7 @@ def bench_program() -> Measurement:
     lengths = {count: program_of(model, count) for count in (2, 5, 10, 40)}
     growth = _growth(lambda steps: plan_program(model, steps), lengths)
     note = (
-        f"{_ROBOT}, 14 lines, 3 arcs and 3 joint moves at speed 0.5, every corner blended by 20 mm, "
+        f"{_ROBOT}, 15 lines, 3 arcs and 2 joint moves at speed 0.5, every corner blended by 20 mm, "
         f"{motion.duration:.1f} s; 10 % quantile {1e3 * np.percentile(times, 10):.0f} ms; by waypoints: {growth}"
     )
     return summarise("program", times, "ms", 200.0, note)
@@ -149,7 +149,7 @@ def program_of(model: RobotModel, count: int) -> Program:
 
     Args:
         model: The arm.
-        count: Number of waypoints; of 20, 14 are lines, 3 arcs and 3 joint moves.
+        count: Number of waypoints; of 20, 15 are lines, 3 arcs and 2 joint moves.
     """
     T = model.forward(model.home)
 

@@ -60,15 +60,20 @@ class Chain:
     """Values of s at the corners, where one segment counts as ended, shape (segments - 1,)."""
     segments: tuple[Segment, ...]
 
-    def sample(self, s: Array) -> State:
-        """Returns values and first two derivatives, each of shape (N, C)."""
-        interval = self.interval(s)
-        tau = (s - self.knots[interval])[:, np.newaxis]
-        c = [power[interval] for power in self.powers]
-        value = c[0] + tau * (c[1] + tau * (c[2] + tau * (c[3] + tau * (c[4] + tau * c[5]))))
+    def sample(self, s: Array, columns: slice = slice(None)) -> State:
+        """Returns values and first two derivatives of some columns, or all, each of shape (N, number of columns)."""
+        c, tau = self._at(s, columns)
         first = c[1] + tau * (2.0 * c[2] + tau * (3.0 * c[3] + tau * (4.0 * c[4] + tau * (5.0 * c[5]))))
         second = 2.0 * c[2] + tau * (6.0 * c[3] + tau * (12.0 * c[4] + tau * (20.0 * c[5])))
-        return value, first, second
+        return _horner(c, tau), first, second
+
+    def values(self, s: Array, columns: slice) -> Array:
+        """Returns the values of some columns, shape (N, number of columns)."""
+        return _horner(*self._at(s, columns))
+
+    def _at(self, s: Array, columns: slice) -> tuple[list[Array], Array]:
+        interval = self.interval(s)
+        return [power[:, columns][interval] for power in self.powers], (s - self.knots[interval])[:, np.newaxis]
 
     def interval(self, s: Array) -> Rows:
         """Returns in which interval each s is, shape (N,)."""
@@ -79,6 +84,10 @@ class Chain:
         segment = self.segments[int(np.searchsorted(self.middles, s, side="right"))]
         x, y, z = self.sample(np.array([s]))[0][0, self.n + 1 : self.n + 4].tolist()
         return segment.label if segment.path is None else f"{segment.label}, tool at {x:.3f}, {y:.3f}, {z:.3f} m"
+
+
+def _horner(c: list[Array], tau: Array) -> Array:
+    return c[0] + tau * (c[1] + tau * (c[2] + tau * (c[3] + tau * (c[4] + tau * c[5]))))
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

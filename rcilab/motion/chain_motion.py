@@ -13,7 +13,6 @@ from rcilab.limits import JointLimits, Limits
 from rcilab.motion.chain import Chain, Rows
 from rcilab.motion.chain_law import ChainLaw, ColumnLimits, chain_bounds, column_limits, fastest_law
 from rcilab.motion.hermite import quintic
-from rcilab.motion.piecewise import PiecewisePolynomial
 
 _ROUNDS = 12
 """How often to slow down in places, and then as often as a whole. Seen: 1 to 4 in places."""
@@ -25,10 +24,11 @@ _HASTE = 1.001
 """To slow down by the square of what was found, and this much more, so that few rounds do. A choice."""
 
 
-def plan_chain(chain: Chain, limits: Limits) -> tuple[PiecewisePolynomial, list[float]]:
+def plan_chain(chain: Chain, limits: Limits) -> tuple[Array, list[float]]:
     """Returns the fastest curve along a chain from rest to rest, and when it passes each corner, [s].
 
-    A quintic a cycle, through the chain at every cycle with its velocity and acceleration there.
+    A quintic a cycle, through the chain at every cycle with its velocity and acceleration there: its coefficients,
+    shape (N - 1, n, 6), ascending powers of the time since the cycle began.
 
     Args:
         chain: The chain.
@@ -48,15 +48,12 @@ def plan_chain(chain: Chain, limits: Limits) -> tuple[PiecewisePolynomial, list[
     for round_ in range(2 * _ROUNDS):
         law = fastest_law(allowed, slowdown, cycles)
         interval = chain.interval(law.s)
-        columns, powers = _curve(chain, law)
-        excess = np.maximum(
-            _tool_excess(chain, bounds, columns, interval), _joint_excess(chain, bounds, powers, interval)
-        )
+        q, powers = _curve(chain, law)
+        excess = np.maximum(_tool_excess(chain, bounds, law, interval), _joint_excess(chain, bounds, powers, interval))
         if excess.max() <= 1.0:
-            _require_inside(chain, columns[:, : chain.n], law, limits.joint)
-            breaks = np.arange(len(law.s), dtype=np.float64) * CYCLE_TIME
-            corners = [float(breaks[np.searchsorted(law.s, middle)]) for middle in chain.middles]
-            return PiecewisePolynomial(breaks, np.stack(powers, axis=2)), corners
+            _require_inside(chain, q, law, limits.joint)
+            corners = [int(np.searchsorted(law.s, middle)) * CYCLE_TIME for middle in chain.middles]
+            return np.stack(powers, axis=2), corners
         worst = float(law.s[excess.argmax()])
         somewhere = round_ < _ROUNDS
         slowdown *= _spread(excess, law.s, chain.knots, cycles) if somewhere else float(excess.max()) * _HASTE
@@ -68,16 +65,15 @@ def plan_chain(chain: Chain, limits: Limits) -> tuple[PiecewisePolynomial, list[
 
 
 def _curve(chain: Chain, law: ChainLaw) -> tuple[Array, list[Array]]:
-    """Returns the columns at every cycle, shape (N, C), and the joints' coefficients by power, each (N - 1, n)."""
-    n, h = chain.n, CYCLE_TIME
-    value, first, second = chain.sample(law.s)
+    """Returns the joint angles at every cycle, shape (N, n), and their coefficients by power, each (N - 1, n)."""
+    h = CYCLE_TIME
+    q, first, second = chain.sample(law.s, slice(chain.n))
     ds, dds = law.ds[:, np.newaxis], law.dds[:, np.newaxis]
-    v = first[:, :n] * ds
-    a = second[:, :n] * ds**2 + first[:, :n] * dds
+    v = first * ds
+    a = second * ds**2 + first * dds
     v[0] = v[-1] = a[0] = a[-1] = 0.0
-    q = value[:, :n]
     parts = quintic((q[:-1], v[:-1], a[:-1]), (q[1:], v[1:], a[1:]), h)
-    return value, [part / h**power for power, part in enumerate(parts)]
+    return q, [part / h**power for power, part in enumerate(parts)]
 
 
 def _joint_excess(chain: Chain, limits: ColumnLimits, powers: list[Array], interval: Rows) -> Array:
@@ -99,18 +95,18 @@ def _joint_excess(chain: Chain, limits: ColumnLimits, powers: list[Array], inter
     return excess
 
 
-def _tool_excess(chain: Chain, limits: ColumnLimits, columns: Array, interval: Rows) -> Array:
+def _tool_excess(chain: Chain, limits: ColumnLimits, law: ChainLaw, interval: Rows) -> Array:
     """Returns how much slower each row must be passed to keep the bounds on tool and arm angle, shape (N,).
 
     By backward differences at 1 ms, as the controller judges them, with rest before and after.
     """
-    n, count = chain.n, len(columns)
+    n, count = chain.n, len(law.s)
     speed = _looking_back(chain.speed[interval], np.maximum)
     leads = _looking_back(chain.leads_tool[interval], np.minimum) > 0.0
     excess = np.zeros(count)
     if not leads.any():
         return excess
-    table = columns[:, n:]
+    table = chain.values(law.s, slice(n, None))
     table = np.concatenate((np.repeat(table[:1], 3, axis=0), table, np.repeat(table[-1:], 3, axis=0)))
     for order, limit in enumerate(_tables(limits, slice(n, None)), start=1):
         table = np.diff(table, axis=0) / CYCLE_TIME

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -93,17 +94,19 @@ def _plan_run(model: RobotModel, run: list[Segment], scale: float, track: _Track
                     f"{before.label}: blend radius {1e3 * asked:.1f} mm shortened to {1e3 * blend.radius:.1f} mm: a "
                     "blend takes at most half of the ways before and after it"
                 )
-        curve, corners = plan_chain(build_chain(model, run, blends, scale), model.limits)
-        track.add(curve, corners, run[-1].waypoint.dwell)
+        coefficients, corners = plan_chain(build_chain(model, run, blends, scale), model.limits)
+        breaks = np.arange(len(coefficients) + 1, dtype=np.float64) * CYCLE_TIME
+        track.add(breaks, coefficients, run[-1].goal, run[-1].waypoint.dwell, corners)
     elif segment.stands:
-        track.add(None, [], segment.waypoint.dwell, segment.start)
+        track.add(np.zeros(1), np.zeros((0, model.n, 1)), segment.goal, segment.waypoint.dwell)
     else:
         with naming(segment.label):
             if segment.path is None:
                 motion = plan_joint(model, segment.start, segment.goal, speed=speed)
             else:
                 motion = plan_along(model, segment.start, segment.path, speed)
-        track.add(motion.polynomial, [], segment.waypoint.dwell)
+        curve = motion.polynomial
+        track.add(curve.breaks, curve.coefficients, motion.goal, segment.waypoint.dwell)
 
 
 class _Track:
@@ -114,37 +117,33 @@ class _Track:
         self._starts: list[float] = []
         self._breaks: list[Array] = []
         self._pieces: list[Array] = []
-        self._goal: Array | None = None
+        self._goal = np.zeros(0)
         self._end = 0.0
 
     def add(
-        self, curve: PiecewisePolynomial | None, corners: list[float], dwell: float, q: Array | None = None
-    ) -> None:
+        self, breaks: Array, coefficients: Array, goal: Array, dwell: float, corners: Sequence[float] = ()
+    ) -> None:  # fmt: skip
         """Adds a run, from the next whole cycle on, and its dwell.
 
         Args:
-            curve: The run; None where nothing moves.
+            breaks: Where its pieces begin, and where the last one ends, shape (S + 1,), [s].
+            coefficients: Of its pieces, shape (S, n, k), ascending powers of the time since each began.
+            goal: Where it ends, shape (n,), [rad].
+            dwell: How long it stays there, [s].
             corners: When it passes from one of its segments to the next, since its start, [s].
-            dwell: How long it stays at the end, [s].
-            q: Where it stands when nothing moves, shape (n,), [rad].
         """
         begin = _cycles(self._end) * CYCLE_TIME
         self._stand(begin)
         self._starts += [begin, *(begin + corner for corner in corners)]
-        if curve is not None:
-            self._breaks.append(curve.breaks[:-1] + begin)
-            self._pieces.append(curve.coefficients)
-            self._goal = curve.at_end()[0]
-            self._end = begin + curve.duration
-        elif self._goal is None:
-            self._goal = q
+        self._breaks.append(breaks[:-1] + begin)
+        self._pieces.append(coefficients)
+        self._end, self._goal = begin + float(breaks[-1]), goal
         if dwell > 0.0:
             self._stand((_cycles(self._end) + round(dwell / CYCLE_TIME)) * CYCLE_TIME)
 
     def motion(self, speed: float) -> Motion:
         """Returns the whole motion."""
-        assert self._goal is not None
-        if not self._pieces:
+        if not any(map(len, self._pieces)):
             self._breaks, self._pieces = [np.zeros(1)], [self._goal.reshape(1, -1, 1)]
         powers = max(piece.shape[2] for piece in self._pieces)
         widened = [np.pad(piece, ((0, 0), (0, 0), (0, powers - piece.shape[2]))) for piece in self._pieces]
@@ -156,7 +155,6 @@ class _Track:
 
     def _stand(self, until: float) -> None:
         if until > self._end:
-            assert self._goal is not None
             self._breaks.append(np.array([self._end]))
             self._pieces.append(self._goal.reshape(1, -1, 1))
             self._end = until

@@ -65,7 +65,7 @@ class Segment:
     def positions(self, model: RobotModel, shares: Array) -> Array:
         """Returns where the tool is, shape (N, 3), [m]."""
         if self.path is not None:
-            return self.path.sample(shares)[0][:, :3, 3]
+            return self.path.positions(shares)
         return model.position_path(self.start + shares[:, np.newaxis] * (self.goal - self.start))
 
     def state(self, model: RobotModel, share: float) -> tuple[JointVector, JointVector, JointVector]:

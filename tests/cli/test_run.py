@@ -53,8 +53,10 @@ def test_without_a_yes_nothing_is_sent_and_with_one_the_arm_arrives(address, mot
 
 
 def test_a_program_is_planned_for_the_robot_s_arm_and_runs(address, tmp_path, capsys):
-    steps = Waypoint.joint(MODEL.home + 0.05, speed=1.0, blend=0.01), Waypoint.joint(MODEL.home, speed=1.0)
-    Program(model="xMatePro7", start=MODEL.home, waypoints=steps).save(tmp_path / "program.json")
+    with connect(address) as robot:
+        start = robot.state.q_c
+    steps = Waypoint.joint(start + 0.05, speed=1.0, blend=0.01), Waypoint.joint(start, speed=1.0)
+    Program(model="xMatePro7", start=start, waypoints=steps).save(tmp_path / "program.json")
     assert main(["run", str(tmp_path / "program.json"), "--robot", address, "--yes"]) == 0
     assert "<Run" in capsys.readouterr().out
 
