@@ -25,6 +25,8 @@ _LOOKS = 33
 """Places at which a segment's half, or a blend, is looked at; a choice."""
 _STANDS = 1e-6
 """A tool that moves less than this turns on the spot, [m]."""
+_NUDGE = 3e-4
+"""Share of the way over which derivatives are formed. A choice: both their errors are below 1e-7."""
 _INSIDE = 0.999
 """Part of the radius to stay in, so that what happens between the looks is inside, too."""
 
@@ -93,16 +95,6 @@ def rotations(vectors: Array) -> Array:
     return np.eye(3) + a[:, None, None] * K + b[:, None, None] * (K @ K)
 
 
-def turn_of(a: Pose, b: Pose) -> Array:
-    """Returns the rotation vector from a to b in the axes of both, shape (3,), [rad]."""
-    w, x, y, z = wxyz_from_rotation((a.inverse() @ b).parts[0])
-    if w < 0.0:
-        w, x, y, z = -w, -x, -y, -z
-    sine = math.hypot(x, y, z)
-    factor = 2.0 * math.atan2(sine, w) / sine if sine > 1e-12 else 2.0
-    return np.array([factor * x, factor * y, factor * z])
-
-
 def _distances(model: RobotModel, segment: Segment, corner: Array, side: float) -> Array:
     """Returns how far the tool is from the corner, from there to the middle of a segment, shape (N,), [m]."""
     shares = np.linspace(0.0, 0.5, _LOOKS) if side > 0.0 else np.linspace(1.0, 0.5, _LOOKS)
@@ -123,8 +115,8 @@ def _blend(model: RobotModel, before: Segment, after: Segment, leave: float, joi
     rates = 2.0 * (1.0 - leave) / LENGTH, 2.0 * join / LENGTH
     if before.path is not None and after.path is not None:
         corner = before.path.goal
-        left = _scaled(_tool_state(before.path, corner, leave, 1.0), rates[0])
-        right = _scaled(_tool_state(after.path, corner, join, 0.0), rates[1])
+        left = _scaled(_tool_state(before.path, corner, leave), rates[0])
+        right = _scaled(_tool_state(after.path, corner, join), rates[1])
     else:
         corner = None
         left, right = _scaled(before.state(model, leave), rates[0]), _scaled(after.state(model, join), rates[1])
@@ -136,25 +128,26 @@ def _scaled(state: State, rate: float) -> State:
     return state[0], state[1] * rate, state[2] * rate**2
 
 
-def _tool_state(path: Path, corner: Pose, share: float, share_of_corner: float) -> State:
+def _tool_state(path: Path, corner: Pose, share: float) -> State:
     """Returns position, rotation vector from the corner and arm angle with two derivatives by the share, shape (7,)."""
-    value, first, second = np.zeros((3, 7))
-    if path.circle is None:
-        start, goal = path.start.position, path.goal.position
-        value[:3], first[:3] = start + share * (goal - start), goal - start
-    else:
-        center, a, b = (np.array(point) for point in (path.circle.center, path.circle.first, path.circle.second))
-        angle = path.circle.angle
-        c, s = math.cos(share * angle), math.sin(share * angle)
-        value[:3] = center + c * a + s * b
-        first[:3] = angle * (c * b - s * a)
-        second[:3] = -(angle**2) * (c * a + s * b)
-    turn = turn_of(path.start, path.goal)
-    value[3:6], first[3:6] = (share - share_of_corner) * turn, turn
-    if path.psi_start is not None and path.psi_goal is not None:
-        first[6] = path.psi_goal - path.psi_start
-        value[6] = path.psi_start + share * first[6]
-    return value, first, second
+    T, psi = path.sample(share + _NUDGE * np.array([-1.0, 0.0, 1.0]))
+    rows = np.zeros((3, 7))
+    rows[:, :3] = T[:, :3, 3]
+    rows[:, 3:6] = [_rotation_vector(R) for R in corner.rotation.T @ T[:, :3, :3]]
+    if psi is not None:
+        rows[:, 6] = psi
+    before, here, after = rows
+    return here, (after - before) / (2.0 * _NUDGE), (after - 2.0 * here + before) / _NUDGE**2
+
+
+def _rotation_vector(R: Array) -> Array:
+    """Returns the rotation vector of a rotation, shape (3,), [rad], of at most half a turn."""
+    a, b, c, d, e, f, g, h, i = R.ravel().tolist()
+    w, x, y, z = wxyz_from_rotation((a, b, c, d, e, f, g, h, i))
+    w, x, y, z = (-w, -x, -y, -z) if w < 0.0 else (w, x, y, z)
+    sine = math.hypot(x, y, z)
+    factor = 2.0 * math.atan2(sine, w) / sine if sine > 1e-12 else 2.0
+    return np.array([factor * x, factor * y, factor * z])
 
 
 def _farthest(model: RobotModel, blend: Blend, corner: Array) -> float:

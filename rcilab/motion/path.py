@@ -87,25 +87,21 @@ class Path:
             psi = self.psi_start + share * (self.psi_goal - self.psi_start)
         return Pose.from_parts(slerp(ra, rb, share), position), psi
 
-    def positions(self, shares: Array) -> Array:
-        """Returns where the tool is, shape (N, 3), [m], at many shares of the way, (N,); beyond its ends, too."""
-        u = shares[:, np.newaxis]
-        if self.circle is None:
-            a, b = np.array(self.start.parts[1]), np.array(self.goal.parts[1])
-            return a + u * (b - a)
-        c, e, f = (np.array(point) for point in (self.circle.center, self.circle.first, self.circle.second))
-        return c + np.cos(u * self.circle.angle) * e + np.sin(u * self.circle.angle) * f
-
     def sample(self, shares: Array) -> tuple[Array, Array | None]:
         """Returns poses, shape (N, 4, 4), and arm angles, shape (N,), [rad], at many shares of the way, (N,).
 
         The formulas go on beyond start and goal, and so does this, for those who form differences there.
         """
-        ra, rb = self.start.parts[0], self.goal.parts[0]
+        (ra, a), (rb, b) = self.start.parts, self.goal.parts
+        u = shares[:, np.newaxis]
         T = np.zeros((len(shares), 4, 4))
         T[:, 3, 3] = 1.0
         T[:, :3, :3] = _slerp_many(ra, rb, shares)
-        T[:, :3, 3] = self.positions(shares)
+        if self.circle is None:
+            T[:, :3, 3] = np.array(a) + u * (np.array(b) - np.array(a))
+        else:
+            c, e, f = (np.array(point) for point in (self.circle.center, self.circle.first, self.circle.second))
+            T[:, :3, 3] = c + np.cos(u * self.circle.angle) * e + np.sin(u * self.circle.angle) * f
         if self.psi_start is None or self.psi_goal is None:
             return T, None
         return T, self.psi_start + shares * (self.psi_goal - self.psi_start)

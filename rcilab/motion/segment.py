@@ -65,7 +65,7 @@ class Segment:
     def positions(self, model: RobotModel, shares: Array) -> Array:
         """Returns where the tool is, shape (N, 3), [m]."""
         if self.path is not None:
-            return self.path.positions(shares)
+            return _positions(self.path, shares)
         return model.position_path(self.start + shares[:, np.newaxis] * (self.goal - self.start))
 
     def state(self, model: RobotModel, share: float) -> tuple[JointVector, JointVector, JointVector]:
@@ -110,6 +110,16 @@ def naming(what: str) -> Iterator[None]:
         raise PlanningError(f"{what}: {error}", share=error.share) from error
     except KinematicsError as error:
         raise PlanningError(f"{what}: {error}") from error
+
+
+def _positions(path: Path, shares: Array) -> Array:
+    """Returns where the tool is on a path, shape (N, 3), [m], without its orientation."""
+    u = shares[:, np.newaxis]
+    if path.circle is None:
+        start = path.start.position
+        return start + u * (path.goal.position - start)
+    center, first, second = (np.array(point) for point in (path.circle.center, path.circle.first, path.circle.second))
+    return center + np.cos(u * path.circle.angle) * first + np.sin(u * path.circle.angle) * second
 
 
 def _segment(model: RobotModel, q: JointVector, number: int, waypoint: Waypoint) -> Segment:
