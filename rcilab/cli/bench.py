@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 BENCHES = (
     *("forward", "inverse", "inverse_batch", "feasible_arcs", "plan_joint", "program", "check"),
     *("controller_ideal", "controller_mujoco", "controller_cartesian", "controller_impedance", "client_answer"),
-    *("jog",),
+    *("jog", "plan_line", "plan_arc", "replan"),
     *("drag", "import", "start", "state_period", "control_loop"),
 )
 """In the order they run; the slow ones last."""
@@ -95,6 +95,14 @@ def _bench(name: str, seconds: float) -> Callable[[], Measurement]:
         from rcilab.bench import page
 
         return page.bench_drag if name == "drag" else lambda: page.bench_control_loop(seconds)
+    if name in ("plan_line", "plan_arc", "replan"):
+        from rcilab.bench import paths
+
+        return {
+            "plan_line": paths.bench_plan_line,
+            "plan_arc": paths.bench_plan_arc,
+            "replan": paths.bench_replan,
+        }[name]
     from rcilab.bench import compute
 
     return {

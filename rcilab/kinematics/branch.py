@@ -56,7 +56,10 @@ def follow_branch(
     tracker = _Tracker()
     offsets = np.array(arm.offsets)
     guess = (start - offsets).tolist()
-    x, y, z = (positions - arm.hand * rotations[:, :, 2] - (0.0, 0.0, arm.shoulder)).T
+    # Contiguous columns: every step below walks along them.
+    r = [[np.ascontiguousarray(rotations[:, i, j]) for j in range(3)] for i in range(3)]
+    x, y, z = (positions[:, i] - arm.hand * r[i][2] for i in range(3))
+    z -= arm.shoulder
     length = np.sqrt(x * x + y * y + z * z)
     upper, fore = arm.upper, arm.fore
     unreachable = (length > upper + fore + _REACH_TOLERANCE) | (length < abs(upper - fore) - _REACH_TOLERANCE)
@@ -67,36 +70,34 @@ def follow_branch(
     half = np.clip((length - (upper - fore)) * (length + (upper - fore)) / (4.0 * upper * fore), 0.0, 1.0)
     elbow = 2.0 * np.arctan2(np.sqrt(1.0 - half), np.sqrt(half))
     if psi is None:
-        head, last = _six(arm, tracker, (x, y, z), elbow, guess), 3
+        (head, forearm), last = _six(arm, tracker, (x, y, z), elbow, guess), 3
     else:
-        head, last = _seven(arm, tracker, (x, y, z), length, elbow, psi, guess), 4
-    (ax, ay, az), (bx, by, bz), (cx, cy, cz) = _forearm(head)
-    r = [[np.ascontiguousarray(rotations[:, i, j]) for j in range(3)] for i in range(3)]
+        (head, forearm), last = _seven(arm, tracker, (x, y, z), length, elbow, psi, guess), 4
+    (ax, ay, az), (bx, by, bz), (cx, cy, cz) = forearm
     zx = ax * r[0][2] + ay * r[1][2] + az * r[2][2]
     zy = bx * r[0][2] + by * r[1][2] + bz * r[2][2]
     zz = cx * r[0][2] + cy * r[1][2] + cz * r[2][2]
     axes = "joints 5 and 7" if last == 4 else "joints 4 and 6"
-    first, sign = tracker.azimuth(zx, zy, guess[last], axes)
-    tilt = sign * np.arctan2(np.hypot(zx, zy), zz)
-    c, s = np.cos(first), np.sin(first)
+    first, tilt, c, s = tracker.azimuth(zx, zy, guess[last], axes)
     # Second row of Rz(-first) A^T B is (sin third, cos third, 0).
     mx, my, mz = c * bx - s * ax, c * by - s * ay, c * bz - s * az
     sine, cosine = (mx * r[0][j] + my * r[1][j] + mz * r[2][j] for j in (0, 1))
     third = _continued(np.arctan2(sine, cosine), guess[-1])
-    return np.stack((*head, first, tilt, third), axis=1) + offsets, tracker.loss
+    # One joint after the other in memory, since what follows goes along the path.
+    return (np.stack((*head, first, np.arctan2(tilt, zz), third)) + offsets[:, np.newaxis]).T, tracker.loss
 
 
 def _seven(
     arm: ArmGeometry, tracker: _Tracker, wrist: Vec, length: Column, elbow: Column,
     psi: Column, guess: list[float],
-) -> tuple[Column, ...]:  # fmt: skip
-    """Returns joints 1 to 4."""
+) -> tuple[tuple[Column, ...], tuple[Vec, Vec, Vec]]:  # fmt: skip
+    """Returns joints 1 to 4, and the axes x, y and z of the forearm in base."""
     x, y, z = wrist
     safe = np.maximum(length, _REACH_TOLERANCE)
     ux, uy, uz = x / safe, y / safe, z / safe
     along = arm.upper * (arm.upper + arm.fore * np.cos(elbow)) / safe
     aside = arm.upper * arm.fore * np.sin(elbow) / safe
-    horizontal = np.hypot(ux, uy)
+    horizontal = _hypot(ux, uy)
     vertical = horizontal < _VERTICAL
     if vertical.any():
         reason = (
@@ -106,31 +107,34 @@ def _seven(
         tracker.lose(int(vertical.argmax()), SingularError(reason))
     cx, cy = ux / np.maximum(horizontal, _VERTICAL), uy / np.maximum(horizontal, _VERTICAL)
     cp, sp = aside * np.cos(psi), aside * np.sin(psi)
-    ex = along * ux - cp * uz * cx + sp * cy
-    ey = along * uy - cp * uz * cy - sp * cx
-    ez = along * uz + cp * horizontal
-    q1, sign = tracker.azimuth(ex / arm.upper, ey / arm.upper, guess[0], "joints 1 and 3")
-    q2 = sign * np.arctan2(np.hypot(ex, ey), ez)
-    fx, fy, fz = x - ex, y - ey, z - ez
-    c1, s1, c2, s2 = np.cos(q1), np.sin(q1), np.cos(q2), np.sin(q2)
-    # Elbow to wrist in the frame of link 2, Rz(q1) Ry(q2).
-    vx = c2 * (c1 * fx + s1 * fy) - s2 * fz
-    vy = c1 * fy - s1 * fx
-    vz = s2 * (c1 * fx + s1 * fy) + c2 * fz
-    q3, sign = tracker.azimuth(vx / arm.fore, vy / arm.fore, guess[2], "joints 3 and 5")
-    return q1, q2, q3, sign * np.arctan2(np.hypot(vx, vy), vz)
+    # Shoulder to elbow as a direction; from there on sines and cosines of the joints need no angles.
+    ex = (along * ux - cp * uz * cx + sp * cy) / arm.upper
+    ey = (along * uy - cp * uz * cy - sp * cx) / arm.upper
+    c2 = (along * uz + cp * horizontal) / arm.upper
+    q1, s2, c1, s1 = tracker.azimuth(ex, ey, guess[0], "joints 1 and 3")
+    # Elbow to wrist as a direction, in base and in the frame of link 2, Rz(q1) Ry(q2).
+    fx, fy, fz = ((w - arm.upper * e) / arm.fore for w, e in ((x, ex), (y, ey), (z, c2)))
+    out = c1 * fx + s1 * fy
+    vx, vy, c4 = c2 * out - s2 * fz, c1 * fy - s1 * fx, s2 * out + c2 * fz
+    q3, s4, c3, s3 = tracker.azimuth(vx, vy, guess[2], "joints 3 and 5")
+    ahead, across, up = _turned_zy(c1, s1, c2, s2)
+    ahead, across = _mixed(ahead, across, c3, s3), _mixed(ahead, across, -s3, c3)
+    forearm = _mixed(ahead, up, c4, -s4), across, _mixed(ahead, up, s4, c4)
+    return (q1, np.arctan2(s2, c2), q3, np.arctan2(s4, c4)), forearm
 
 
-def _six(arm: ArmGeometry, tracker: _Tracker, wrist: Vec, elbow: Column, guess: list[float]) -> tuple[Column, ...]:
-    """Returns joints 1 to 3."""
+def _six(
+    arm: ArmGeometry, tracker: _Tracker, wrist: Vec, elbow: Column, guess: list[float]
+) -> tuple[tuple[Column, ...], tuple[Vec, Vec, Vec]]:
+    """Returns joints 1 to 3, and the axes x, y and z of the forearm in base."""
     x, y, z = wrist
     reach = arm.upper + arm.fore
-    q1, sign = tracker.azimuth(x / reach, y / reach, guess[0], "joint 1")
+    q1, radius, c1, s1 = tracker.azimuth(x / reach, y / reach, guess[0], "joint 1")
     q3 = np.copysign(elbow, guess[2])
     fore_x, fore_z = arm.fore * np.sin(q3), arm.upper + arm.fore * np.cos(q3)
     # Planar two-link arm in the (radius, height) plane, angles counted from the vertical.
-    q2 = _continued(np.arctan2(sign * np.hypot(x, y), z) - np.arctan2(fore_x, fore_z), guess[1])
-    return q1, q2, q3
+    q2 = _continued(np.arctan2(reach * radius, z) - np.arctan2(fore_x, fore_z), guess[1])
+    return (q1, q2, q3), _turned_zy(c1, s1, np.cos(q2 + q3), np.sin(q2 + q3))
 
 
 class _Tracker:
@@ -143,13 +147,22 @@ class _Tracker:
         if self.loss is None or row < self.loss.row:
             self.loss = Loss(row, reason)
 
-    def azimuth(self, x: Column, y: Column, guess: float, axes: str) -> tuple[Column, Column]:
-        """Returns the angle about z, continuous, and the sign, +1 or -1, of the tilt that goes with it."""
-        tilt = np.hypot(x, y)
-        raw = _filled(np.arctan2(y, x), tilt > _AXIS_LOST, guess)
+    def azimuth(self, x: Column, y: Column, guess: float, axes: str) -> tuple[Column, Column, Column, Column]:
+        """Returns the angle about z, continuous, the tilt with the sign that goes with it, and the angle's cos and sin.
+
+        Args:
+            x: Of a direction.
+            y: Of the same direction; the root of the sum of squares is the sine of its tilt.
+            guess: Angle before the first row, [rad].
+            axes: The joints that are lost where there is no tilt.
+        """
+        tilt = _hypot(x, y)
+        known = tilt > _AXIS_LOST
+        raw = _filled(np.arctan2(y, x), known, guess)
         halves = _turns(raw, guess, pi)
         angle = raw + pi * halves
-        swaps = np.flatnonzero(np.diff(halves % 2.0))
+        odd = halves - 2.0 * np.floor(0.5 * halves)
+        swaps = np.flatnonzero(odd[1:] != odd[:-1])
         if swaps.size:
             beside = swaps[_miss(angle, tilt, swaps) > _BESIDE]
             if beside.size:
@@ -158,7 +171,10 @@ class _Tracker:
                     "lead the tool around it, or go there in joint space"
                 )
                 self.lose(int(beside[0]) + 1, reason)
-        return angle, 1.0 - 2.0 * (halves % 2.0)
+        tilt *= 1.0 - 2.0 * odd
+        if known.all():
+            return angle, tilt, x / tilt, y / tilt
+        return angle, tilt, np.cos(angle), np.sin(angle)
 
 
 def _miss(angle: Column, tilt: Column, swaps: np.ndarray) -> Column:
@@ -194,16 +210,17 @@ def _turns(angles: Column, guess: float, period: float) -> Column:
     return -np.cumsum(np.round(steps / period))
 
 
-def _forearm(head: tuple[Column, ...]) -> tuple[Vec, Vec, Vec]:
-    """Returns the axes x, y and z of the forearm in base."""
-    q1, q2 = head[0], head[1] + head[2] if len(head) == 3 else head[1]
-    c1, s1, c2, s2 = np.cos(q1), np.sin(q1), np.cos(q2), np.sin(q2)
-    x, y, z = (c1 * c2, s1 * c2, -s2), (-s1, c1, np.zeros_like(q1)), (c1 * s2, s1 * s2, c2)
-    if len(head) == 3:
-        return x, y, z
-    c3, s3, c4, s4 = np.cos(head[2]), np.sin(head[2]), np.cos(head[3]), np.sin(head[3])
-    aside, across = _mixed(x, y, c3, s3), _mixed(x, y, -s3, c3)
-    return _mixed(aside, z, c4, -s4), across, _mixed(aside, z, s4, c4)
+def _hypot(x: Column, y: Column) -> Column:
+    """Returns the root of the sum of squares.
+
+    Nothing here is so large or small that `np.hypot` were needed, which costs five times as much.
+    """
+    return np.sqrt(x * x + y * y)
+
+
+def _turned_zy(c1: Column, s1: Column, c2: Column, s2: Column) -> tuple[Vec, Vec, Vec]:
+    """Returns the axes x, y and z of Rz Ry, given the cosines and sines of both angles."""
+    return (c1 * c2, s1 * c2, -s2), (-s1, c1, np.zeros_like(c1)), (c1 * s2, s1 * s2, c2)
 
 
 def _mixed(a: Vec, b: Vec, of_a: Column, of_b: Column) -> Vec:

@@ -11,8 +11,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import compress
 from math import acos, cos, pi, sin, sqrt, tau
-from typing import Literal, TypeAlias
+from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,15 @@ from rcilab.spatial import Pose
 
 Reason: TypeAlias = Literal["joint limits", "singularity", "safety box"]
 
+_NO_YES = (False, True)
+_REASONS: dict[tuple[bool, bool, bool], tuple[Reason, ...]] = {
+    (limit, lost, outside): tuple(compress(get_args(Reason), (limit, lost, outside)))
+    for limit in _NO_YES
+    for lost in _NO_YES
+    for outside in _NO_YES
+}
+"""By whether a joint limit, a singularity and the safety box forbid an arc."""
+_JOINTS, _BRANCHES = range(1, 8), range(8)
 _TINY = 1e-9  # Of a sine or a length in [m]: below it the elbow has no circle, or the circle no upper side.
 _SAME = 1e-12  # [rad] Arm angles that differ by rounding alone.
 _TURNS = {0: 0, 2: 3, 4: 5, 6: 8}  # Joints that turn about z, counted from 0: which form is their X; Y is the next.
@@ -115,7 +125,7 @@ def feasible_arcs(
     s4 = sqrt(max(0.0, 1.0 - c4 * c4))
     horizontal = sqrt(x * x + y * y)
     if s4 < _TINY or horizontal < _TINY:
-        nowhere = Arc(start=-pi, end=pi, reasons=_reasons(False, True, outside_box), joints=(), branches=())
+        nowhere = Arc(start=-pi, end=pi, reasons=_REASONS[False, True, outside_box], joints=(), branches=())
         return FeasibleArcs(arcs=(nowhere,))
     forms = _linear_forms(arm, r, (x, y, z), length, c4, s4)
     starts = _breaks(forms, _crossings(tuple(lower.tolist()), tuple(upper.tolist()), arm.offsets))
@@ -240,22 +250,10 @@ def _arcs(starts: Array, broken: NDArray[np.bool_], lost: NDArray[np.bool_], out
     begins = starts[first].tolist()
     arcs: list[Arc] = []
     for start, end, look in zip(begins, [*begins[1:], begins[0] + tau], looks[:, first].T.tolist(), strict=True):
-        joints = tuple([number for number, is_beyond in enumerate(look[:7], start=1) if is_beyond])
-        branches = tuple([number for number, is_kept in enumerate(look[7:15]) if is_kept])
-        reasons = _reasons(bool(joints), look[15], outside)
+        joints, branches = tuple(compress(_JOINTS, look)), tuple(compress(_BRANCHES, look[7:]))
+        reasons = _REASONS[bool(joints), look[15], outside]
         arcs.append(Arc(start=start, end=end, reasons=reasons, joints=joints, branches=branches))
     return arcs
-
-
-def _reasons(is_limited: bool, is_lost: bool, outside: bool) -> tuple[Reason, ...]:
-    reasons: list[Reason] = []
-    if is_limited:
-        reasons.append("joint limits")
-    if is_lost:
-        reasons.append("singularity")
-    if outside:
-        reasons.append("safety box")
-    return tuple(reasons)
 
 
 def _joined(ranges: list[tuple[float, float]]) -> tuple[tuple[float, float], ...]:

@@ -122,19 +122,14 @@ def inverse_seven(
     q4 = atan2(side, vz)
     rotation = _turn_zy(_turn_zy((1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), q1, q2), q3, q4)
     q5, q6, q7 = _wrist(rotation, r, guess[4])
+    # Each angle and its twin; two half turns are none.
+    twins_1, twins_3 = (_wrap(q1), _wrap(q1 + pi)), (_wrap(q3), _wrap(q3 + pi))
+    twins_5, twins_7 = (_wrap(q5), _wrap(q5 + pi)), (_wrap(q7), _wrap(q7 + pi))
+    twins_2, twins_4, twins_6 = (q2, -q2), (q4, -q4), (q6, -q6)
     branches: list[Angles] = []
     for flip_2, flip_4, flip_6 in flips:
-        branches.append(
-            (
-                _wrap(q1 + flip_2),
-                -q2 if flip_2 else q2,
-                _wrap(q3 + flip_2 + flip_4),
-                -q4 if flip_4 else q4,
-                _wrap(q5 + flip_4 + flip_6),
-                -q6 if flip_6 else q6,
-                _wrap(q7 + flip_6),
-            )
-        )
+        i, j, k = flip_2 > 0.0, flip_4 > 0.0, flip_6 > 0.0
+        branches.append((twins_1[i], twins_2[i], twins_3[i ^ j], twins_4[j], twins_5[j ^ k], twins_6[k], twins_7[k]))
     return branches if not any(arm.offsets) else [_shift(q, arm.offsets) for q in branches]
 
 

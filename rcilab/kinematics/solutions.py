@@ -37,15 +37,23 @@ class Solutions(Sequence[JointVector]):
     Iterating gives arrays of shape (n,), [rad]. `all` also holds the branches that a limit forbids.
     """
 
-    __slots__ = ("_feasible", "_lower", "_upper", "all", "psi")
+    __slots__ = ("_all", "_branches", "_feasible", "_lower", "_upper", "psi")
 
     def __init__(
         self, branches: Sequence[tuple[float, ...]], lower: list[float], upper: list[float], psi: float | None
     ) -> None:
-        self.all = tuple(_judge(q, lower, upper) for q in branches)
         self.psi = psi
-        self._lower, self._upper = lower, upper
-        self._feasible = frozen([branch.q for branch in self.all if branch.joint is None]).reshape(-1, len(lower))
+        self._branches, self._lower, self._upper = branches, lower, upper
+        self._all: tuple[Branch, ...] | None = None
+        inside = [q for q in branches if _is_inside(q, lower, upper)]
+        self._feasible = frozen(inside) if inside else frozen(np.empty((0, len(lower))))
+
+    @property
+    def all(self) -> tuple[Branch, ...]:
+        """Every analytic branch, with what forbids it; judged at the first look."""
+        if self._all is None:
+            self._all = tuple(_judge(q, self._lower, self._upper) for q in self._branches)
+        return self._all
 
     def __len__(self) -> int:
         return len(self._feasible)
@@ -89,12 +97,19 @@ class Solutions(Sequence[JointVector]):
     def __repr__(self) -> str:
         rows = "\n".join("  " + " ".join(f"{degrees(angle):8.2f}" for angle in q) for q in self._feasible)
         psi = "" if self.psi is None else f" at arm angle {degrees(self.psi):.2f} deg"
-        return f"{len(self)} of {len(self.all)} branches inside the limits{psi}, [deg]:\n{rows}"
+        return f"{len(self)} of {len(self._branches)} branches inside the limits{psi}, [deg]:\n{rows}"
 
 
 def joint_limit_lists(limits: JointLimits) -> tuple[list[float], list[float]]:
     """Returns lower and upper joint limits as plain floats, [rad]."""
     return limits.lower.tolist(), limits.upper.tolist()
+
+
+def _is_inside(q: tuple[float, ...], lower: list[float], upper: list[float]) -> bool:
+    for low, angle, high in zip(lower, q, upper, strict=True):
+        if not low < angle < high:
+            return False
+    return True
 
 
 def _judge(q: tuple[float, ...], lower: list[float], upper: list[float]) -> Branch:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Literal
+from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,19 +12,33 @@ from rcilab.arrays import Array, JointVector, as_number, as_vector, described
 from rcilab.clock import CYCLE_TIME
 from rcilab.errors import InvalidValueError, PlanningError, SingularError
 from rcilab.model import RobotModel, require_model
-from rcilab.motion.along import plan_along
+from rcilab.motion.along import curve_through, plan_along, require_path
 from rcilab.motion.joint import MIN_SPEED
 from rcilab.motion.motion import Motion, standing
 from rcilab.motion.obstacle import examine, refusal
-from rcilab.motion.path import Path, build_arc, build_circle, build_line, circle_through
+from rcilab.motion.path import (
+    ArcOrientation,
+    CircleOrientation,
+    Path,
+    build_arc,
+    build_circle,
+    build_line,
+    circle_through,
+)
 from rcilab.motion.piecewise import join_pieces
 from rcilab.motion.s_curve import plan_s_curve
+from rcilab.motion.time_law import TimeLaw
 from rcilab.spatial import Pose
 
 PathLaw = Literal["jerk_limited", "s_profile"]
 """How a path is followed: as fast as all limits allow, or by the manual's S profile (3.5)."""
 
 _LAWS: tuple[PathLaw, ...] = ("jerk_limited", "s_profile")
+
+Way: TypeAlias = Literal["shorter", "longer"]
+"""Which way round the arm angle goes: on the circle there are two, and one of them may lead across +-pi."""
+
+_WAYS: tuple[Way, ...] = get_args(Way)
 
 S_PROFILE_PATH_VELOCITY = 1.0
 """Speed of the vendor's path generator at speed 1, [m/s]; of a mere turn, [rad/s]."""
@@ -57,7 +71,8 @@ def plan_line(
         goal: Pose of the tool in base at the end.
         speed: Part of the velocity and acceleration limits to use, or of the vendor's generator's, from `MIN_SPEED` =
             0.001 to 1.
-        psi: Arm angle of a 7-axis arm at the end, [rad]; None holds the one of the start.
+        psi: Arm angle of a 7-axis arm at the end, from -pi to pi, [rad]; it goes there the shorter way round, across
+            +-pi too. None holds the one of the start.
         law: "jerk_limited": as fast as the limits on joints, tool and arm angle allow, with `LIMIT_MARGIN` to spare,
             as the controller judges them; the jerk limits are used in full. "s_profile": the vendor's MOVEL, with at
             most `speed` times 1 m/s and 2.5 m/s^2. So a turn on a short way is fast, and that profile knows neither the
@@ -70,7 +85,7 @@ def plan_line(
         InvalidValueError: An argument is of the wrong shape or kind, not finite, or out of range.
     """
     q = _require_start(model, start, law)
-    return _follow(model, q, build_line(model.forward(q), goal, *arm_angles(model, q, psi)), speed, law)
+    return _follow(model, q, build_line(model.forward(q), goal, *arm_angles(model, q, psi, "shorter")), speed, law)
 
 
 def plan_arc(
@@ -82,21 +97,26 @@ def plan_arc(
     speed: float = 0.2,
     psi: float | None = None,
     law: PathLaw = "jerk_limited",
+    orientation: ArcOrientation = "through_via",
 ) -> Motion:
     """Returns the motion on which the tool goes on the arc from where it is at `start` over `via` to `goal`.
 
-    As on the vendor's MOVEC the way is the arc's length, the orientation turns by slerp from start to goal, and that of
-    `via` is ignored.
+    As on the vendor's MOVEC the way is the arc's length.
 
     Args:
         model: The arm, with its tool.
         start: Joint angles at the start, shape (n,), [rad]. Plan from the commanded angles (`state.q_c`).
-        via: A pose whose position lies on the arc.
+        via: A pose on the arc.
         goal: Pose of the tool in base at the end.
         speed: Part of the velocity and acceleration limits to use, or of the vendor's generator's, from `MIN_SPEED` =
             0.001 to 1.
-        psi: Arm angle of a 7-axis arm at the end, [rad]; None holds the one of the start.
+        psi: Arm angle of a 7-axis arm at the end, from -pi to pi, [rad]; it goes there the shorter way round, across
+            +-pi too. None holds the one of the start.
         law: "jerk_limited" or "s_profile", see `plan_line`.
+        orientation: "through_via": the tool passes exactly the orientation of `via` where it passes its position, and
+            turns there and back the shorter way each, with continuous angular velocity and acceleration.
+            "start_to_goal": it turns by slerp from start to goal, and the orientation of `via` is ignored, as on the
+            vendor's MOVEC.
 
     Raises:
         PlanningError: The three positions make no circle, or a pose on the way is out of reach, or a joint limit or a
@@ -104,7 +124,8 @@ def plan_arc(
         InvalidValueError: An argument is of the wrong shape or kind, not finite, or out of range.
     """
     q = _require_start(model, start, law)
-    return _follow(model, q, build_arc(model.forward(q), via, goal, *arm_angles(model, q, psi)), speed, law)
+    angles = arm_angles(model, q, psi, "shorter")
+    return _follow(model, q, build_arc(model.forward(q), via, goal, *angles, orientation=orientation), speed, law)
 
 
 def plan_circle(
@@ -118,8 +139,9 @@ def plan_circle(
     speed: float = 0.2,
     psi: float | None = None,
     law: PathLaw = "jerk_limited",
+    orientation: CircleOrientation = "held",
 ) -> Motion:
-    """Returns the motion on which the tool goes round a circle, its orientation held.
+    """Returns the motion on which the tool goes round a circle.
 
     The circle is given either by two more poses on it (`through`; only their positions count), or by `center` and
     `axis`.
@@ -133,8 +155,11 @@ def plan_circle(
         angle: How far, more than 0 and up to 2 pi (all around), [rad].
         speed: Part of the velocity and acceleration limits to use, or of the vendor's generator's, from `MIN_SPEED` =
             0.001 to 1.
-        psi: Arm angle of a 7-axis arm at the end, [rad]; None holds the one of the start.
+        psi: Arm angle of a 7-axis arm at the end, from -pi to pi, [rad]; it goes there the shorter way round, across
+            +-pi too. None holds the one of the start.
         law: "jerk_limited" or "s_profile", see `plan_line`.
+        orientation: "held": that of the start all the way. "turning": the tool turns with the circle, about its axis
+            and by the same angle, so that it shows the centre always the same side.
 
     Raises:
         PlanningError: The positions make no circle, start is not on it, a pose on the way is out of reach, or a joint
@@ -151,40 +176,67 @@ def plan_circle(
         center, axis = circle_through(T, *through)
     elif center is None or axis is None:
         raise InvalidValueError("center", described(center), "and axis are both needed, or two poses as through")
-    return _follow(model, q, build_circle(T, center, axis, angle, *arm_angles(model, q, psi)), speed, law)
+    angles = arm_angles(model, q, psi, "shorter")
+    return _follow(model, q, build_circle(T, center, axis, angle, *angles, orientation=orientation), speed, law)
 
 
 def plan_nullspace(
-    model: RobotModel, start: ArrayLike, psi: float, *, speed: float = 0.2, law: PathLaw = "jerk_limited"
+    model: RobotModel,
+    start: ArrayLike,
+    psi: float,
+    *,
+    speed: float = 0.2,
+    law: PathLaw = "jerk_limited",
+    way: Way = "shorter",
 ) -> Motion:
     """Returns the motion on which the tool stays where it is at `start` and only the elbow moves, to arm angle `psi`.
 
     Args:
         model: A 7-axis arm, with its tool.
         start: Joint angles at the start, shape (7,), [rad]. Plan from the commanded angles (`state.q_c`).
-        psi: Arm angle at the end, from -pi to pi, [rad]; the way there never leads across +-pi.
+        psi: Arm angle at the end, from -pi to pi, [rad].
         speed: Part of the velocity and acceleration limits to use, or of the vendor's generator's, from `MIN_SPEED` =
             0.001 to 1.
         law: "jerk_limited" or "s_profile", see `plan_line`.
+        way: Which way round the elbow goes, "shorter" or "longer"; both may lead across +-pi, where the arm angle
+            begins anew and the elbow just goes on. The longer way to the arm angle of the start is a full turn.
 
     Raises:
         PlanningError: The arm angle has no meaning at the start, or a joint limit or a singularity is in the way; the
-            message says where and why.
+            message says where and why, and whether the other way is free.
         InvalidValueError: The arm has 6 axes, or an argument is of the wrong shape or kind, not finite, or out of
             range.
     """
     q = _require_start(model, start, law)
-    T = model.forward(q)
-    return _follow(model, q, build_line(T, T, *arm_angles(model, q, as_number(psi, "psi", "rad"))), speed, law)
+    if way not in _WAYS:
+        raise InvalidValueError("way", described(way), f"is unknown; known: {', '.join(_WAYS)}")
+    T, psi = model.forward(q), as_number(psi, "psi", "rad")
+    try:
+        return _follow(model, q, build_line(T, T, *arm_angles(model, q, psi, way)), speed, law)
+    except PlanningError as error:
+        if error.share is None:
+            raise
+        other: Way = "longer" if way == "shorter" else "shorter"
+        try:
+            require_path(model, q, build_line(T, T, *arm_angles(model, q, psi, other)))
+        except PlanningError:
+            advice = f"the {other} way round is not free either; model.feasible_arcs tells which arm angles are"
+        else:
+            advice = f'the {other} way round is free: way="{other}"'
+        raise PlanningError(f"{error}; {advice}", share=error.share) from error
 
 
-def arm_angles(model: RobotModel, q: JointVector, psi: float | None) -> tuple[float | None, float | None]:
+def arm_angles(
+    model: RobotModel, q: JointVector, psi: float | None, way: Way | None = None
+) -> tuple[float | None, float | None]:
     """Returns the arm angles at the start and at the end of a path from q, [rad]; None twice for a 6-axis arm.
 
     Args:
         model: The arm.
         q: Joint angles at the start, shape (n,), [rad].
-        psi: Arm angle wanted at the end, [rad]; None holds the one of the start.
+        psi: Arm angle wanted at the end, from -pi to pi, [rad]; None holds the one of the start.
+        way: Which way round; the angle at the end is then beyond +-pi where the way leads across it. None is the way
+            that never does, as the vendor's generator takes it.
 
     Raises:
         PlanningError: The arm angle has no meaning at the start.
@@ -201,7 +253,11 @@ def arm_angles(model: RobotModel, q: JointVector, psi: float | None) -> tuple[fl
     wanted = here if psi is None else as_number(psi, "psi", "rad")
     if not abs(wanted) <= math.pi:
         raise InvalidValueError("psi", psi, "must be from -pi to pi [rad]")
-    return here, wanted
+    if way is None or psi is None:
+        return here, wanted
+    shorter = math.remainder(wanted - here, math.tau)
+    turn = shorter if way == "shorter" else shorter - math.copysign(math.tau, shorter)
+    return here, wanted + math.tau * round((here + turn - wanted) / math.tau)
 
 
 def schedule(path: Path, speed: float) -> Array:
@@ -214,18 +270,7 @@ def schedule(path: Path, speed: float) -> Array:
     Raises:
         InvalidValueError: The speed is out of range.
     """
-    speed = as_number(speed, "speed")
-    if not MIN_SPEED <= speed <= 1.0:
-        raise InvalidValueError("speed", speed, f"must be from {MIN_SPEED:g} to 1: the part of the generator's speed")
-    if path.distance == 0.0:
-        return np.array([1.0])
-    curve = plan_s_curve(path.distance, S_PROFILE_PATH_VELOCITY * speed, S_PROFILE_PATH_ACCELERATION * speed)
-    starts, coefficients = curve.pieces()
-    profile = join_pieces(starts[np.newaxis], coefficients[np.newaxis], curve.duration)
-    count = math.ceil(curve.duration / CYCLE_TIME - 1e-9) + 1
-    shares = profile.sample(np.arange(count) * CYCLE_TIME)[:, 0] / path.distance
-    shares[-1] = 1.0
-    return np.clip(shares, 0.0, 1.0)
+    return _s_law(path, speed).u
 
 
 def follow_path(model: RobotModel, q: JointVector, path: Path, speed: float) -> Motion:
@@ -241,7 +286,8 @@ def follow_path(model: RobotModel, q: JointVector, path: Path, speed: float) -> 
         PlanningError: A pose on the way is out of reach, a joint limit or a singularity is in the way.
         InvalidValueError: The speed is out of range.
     """
-    shares = schedule(path, speed)
+    law = _s_law(path, speed)
+    shares = law.u
     if len(shares) == 1:
         return standing(q, law="s_profile", speed=speed)
     whole_turn = path.turn + (path.distance / _LEVER if path.unit == "m" else path.distance)
@@ -250,8 +296,22 @@ def follow_path(model: RobotModel, q: JointVector, path: Path, speed: float) -> 
     if obstacle is not None:
         when = f"t = {obstacle.row * CYCLE_TIME:.3f} s, "
         raise refusal(path, float(shares[obstacle.row]), obstacle.reason, when)
-    samples = Motion.from_samples(rows)
-    return Motion(polynomial=samples.polynomial, goal=rows[-1], law="s_profile", speed=speed)
+    return Motion(polynomial=curve_through(model, path, rows, law), goal=rows[-1], law="s_profile", speed=speed)
+
+
+def _s_law(path: Path, speed: float) -> TimeLaw:
+    speed = as_number(speed, "speed")
+    if not MIN_SPEED <= speed <= 1.0:
+        raise InvalidValueError("speed", speed, f"must be from {MIN_SPEED:g} to 1: the part of the generator's speed")
+    if path.distance == 0.0:
+        return TimeLaw(np.ones(1), np.zeros(1), np.zeros(1))
+    curve = plan_s_curve(path.distance, S_PROFILE_PATH_VELOCITY * speed, S_PROFILE_PATH_ACCELERATION * speed)
+    starts, coefficients = curve.pieces()
+    profile = join_pieces(starts[np.newaxis], coefficients[np.newaxis], curve.duration)
+    times = np.arange(math.ceil(curve.duration / CYCLE_TIME - 1e-9) + 1) * CYCLE_TIME
+    shares, du, ddu = (profile.sample(times, order)[:, 0] / path.distance for order in range(3))
+    shares[-1], du[-1], ddu[-1] = 1.0, 0.0, 0.0
+    return TimeLaw(np.clip(shares, 0.0, 1.0), du, ddu)
 
 
 def _follow(model: RobotModel, q: JointVector, path: Path, speed: float, law: PathLaw) -> Motion:

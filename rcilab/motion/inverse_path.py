@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from rcilab.arrays import Array, JointPath, JointVector
 from rcilab.kinematics.branch import Loss, follow_branch
 from rcilab.kinematics.inverse import build_geometry
 from rcilab.model import RobotModel
+from rcilab.spatial import IDENTITY
 
 
 def inverse_path(model: RobotModel, T: Array, psi: Array | None, start: JointVector) -> tuple[JointPath, Loss | None]:
@@ -26,6 +29,9 @@ def inverse_path(model: RobotModel, T: Array, psi: Array | None, start: JointVec
     Raises:
         ModelError: The arm has no closed-form inverse.
     """
-    flange = T @ model.T_flange_tool.inverse().matrix
-    geometry = build_geometry(model.description)
-    return follow_branch(geometry, flange[:, :3, :3], flange[:, :3, 3], psi, start)
+    (rotation, (x, y, z)), R, p = model.T_flange_tool.inverse().parts, T[:, :3, :3], T[:, :3, 3]
+    if not model.T_flange_tool.is_close(IDENTITY, 0.0):
+        a, b, c = (R[:, :, i] for i in range(3))
+        p = p + x * a + y * b + z * c
+        R = np.stack([a * rotation[i] + b * rotation[3 + i] + c * rotation[6 + i] for i in range(3)], axis=2)
+    return follow_branch(build_geometry(model.description), R, p, psi, start)

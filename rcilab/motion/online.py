@@ -74,6 +74,9 @@ class Jog:
         j: list[float] = (LIMIT_MARGIN * limits.jerk).tolist()
         let_go = [3.0 * a_max / j_max for a_max, j_max in zip(a, j, strict=True)]  # [s] To build up and take back a.
         self._joints = list(zip(self._lower, self._upper, a, let_go, j, strict=True))
+        self._ranges = list(zip(self._lower, self._upper, strict=True))
+        # Of all joints: the smallest acceleration, the longest time to let go, the largest change of speed by that.
+        self._slowest = min(a), max(let_go), float((limits.acceleration**2 / (2.0 * LIMIT_MARGIN * limits.jerk)).max())
         self._tool = TwistFollower(model, self._lower, self._upper, self._speeds, a, j, speed)
         self._axes = _ruckig.Stepper(start.tolist(), velocity.tolist(), acceleration.tolist(), a, j)
         self._rest = [0.0] * n
@@ -211,6 +214,9 @@ class Jog:
         the fastest stop from every state stays inside: it does at the start, and each kind of step keeps it so.
         """
         axes = self._axes
+        if self._is_far_inside(wanted):
+            axes.towards_velocity(wanted)
+            return
         ends: list[float | None] = []
         velocities: list[float] = []
         by_velocity = True
@@ -235,3 +241,18 @@ class Jog:
             axes.towards_velocity(velocities)
         else:
             axes.towards_ends(ends, velocities)
+
+    def _is_far_inside(self, wanted: Sequence[float]) -> bool:
+        """Returns whether every joint has more room than any may need to get to its wanted velocity and to stop.
+
+        Then each is led by velocity alone: what `_lead` finds joint by joint, at a fifth of the cost.
+        """
+        axes = self._axes
+        a_max, let_go, more = self._slowest
+        speed = max(max(wanted), -min(wanted), max(axes.dq), -min(axes.dq))
+        peak = speed + more
+        room = peak * ((2.0 * speed + peak) / a_max + let_go)
+        for q, (low, high) in zip(axes.q, self._ranges, strict=True):
+            if not low + room < q < high - room:
+                return False
+        return True

@@ -1,13 +1,14 @@
 """Paths of the tool as geometry, without time: the straight line and the arc of the manual's blocking moves (3.5).
 
-On both the orientation turns from start to goal by slerp, in proportion to the way, and so does the arm angle.
+Where nothing else is asked for, the orientation turns from start to goal by slerp, in proportion to the way; the arm
+angle always changes in proportion.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,6 +16,7 @@ from numpy.typing import ArrayLike
 from rcilab.arrays import Array, as_number, as_vector, described
 from rcilab.errors import InvalidValueError, PlanningError
 from rcilab.motion.s_curve import STANDSTILL_DISTANCE
+from rcilab.motion.turning import SteadyTurn, Turning, turn_through, turn_to
 from rcilab.spatial import Pose, Rotation9, rotation_from_wxyz, wxyz_from_rotation
 
 _COLLINEAR = 1e-4
@@ -26,6 +28,11 @@ _OUT_OF_PLANE = 1e-6
 """How far out of the plane of its circle a start may be, in radii; the circle then lies in the plane of the start."""
 
 Point: TypeAlias = tuple[float, float, float]
+
+ArcOrientation = Literal["through_via", "start_to_goal"]
+"""How the tool turns on an arc: through the orientation of via, or by one slerp that ignores it, as the vendor's."""
+CircleOrientation = Literal["held", "turning"]
+"""What the tool does on a circle: it keeps its orientation, or turns with the circle, about its axis."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +67,9 @@ class Path:
     unit: str
     """m or rad."""
     turn: float
-    """Angle between the orientations of start and goal, 0 to pi, [rad]."""
+    """Fastest rate of the tool's turn by the share of the way; where it turns evenly, the whole angle, [rad]."""
+    turning: Turning | None = None
+    """How the tool turns; None is the slerp from start to goal."""
 
     @property
     def name(self) -> str:
@@ -85,23 +94,30 @@ class Path:
         psi = None
         if self.psi_start is not None and self.psi_goal is not None:
             psi = self.psi_start + share * (self.psi_goal - self.psi_start)
-        return Pose.from_parts(slerp(ra, rb, share), position), psi
+        if self.turning is None:
+            return Pose.from_parts(slerp(ra, rb, share), position), psi
+        return Pose.from_parts(_rotation(self.turning.sample(np.array([share]))[0]), position), psi
+
+    def positions(self, shares: Array) -> Array:
+        """Returns where the tool is, shape (N, 3), [m], at many shares of the way, (N,); beyond its ends, too."""
+        u = shares[:, np.newaxis]
+        if self.circle is None:
+            a, b = np.array(self.start.parts[1]), np.array(self.goal.parts[1])
+            return a + u * (b - a)
+        c, e, f = (np.array(point) for point in (self.circle.center, self.circle.first, self.circle.second))
+        return c + np.cos(u * self.circle.angle) * e + np.sin(u * self.circle.angle) * f
 
     def sample(self, shares: Array) -> tuple[Array, Array | None]:
         """Returns poses, shape (N, 4, 4), and arm angles, shape (N,), [rad], at many shares of the way, (N,).
 
         The formulas go on beyond start and goal, and so does this, for those who form differences there.
         """
-        (ra, a), (rb, b) = self.start.parts, self.goal.parts
-        u = shares[:, np.newaxis]
-        T = np.zeros((len(shares), 4, 4))
+        ra, rb = self.start.parts[0], self.goal.parts[0]
+        # One element after the other in memory: those who follow a path compute with columns of these.
+        T = np.zeros((4, 4, len(shares))).transpose(2, 0, 1)
         T[:, 3, 3] = 1.0
-        T[:, :3, :3] = _slerp_many(ra, rb, shares)
-        if self.circle is None:
-            T[:, :3, 3] = np.array(a) + u * (np.array(b) - np.array(a))
-        else:
-            c, e, f = (np.array(point) for point in (self.circle.center, self.circle.first, self.circle.second))
-            T[:, :3, 3] = c + np.cos(u * self.circle.angle) * e + np.sin(u * self.circle.angle) * f
+        T[:, :3, :3] = (self.turning or turn_to(ra, rb)).sample(shares)
+        T[:, :3, 3] = self.positions(shares)
         if self.psi_start is None or self.psi_goal is None:
             return T, None
         return T, self.psi_start + shares * (self.psi_goal - self.psi_start)
@@ -128,11 +144,15 @@ def build_line(start: Pose, goal: Pose, psi_start: float | None = None, psi_goal
 
 
 def build_arc(
-    start: Pose, via: Pose, goal: Pose, psi_start: float | None = None, psi_goal: float | None = None
+    start: Pose,
+    via: Pose,
+    goal: Pose,
+    psi_start: float | None = None,
+    psi_goal: float | None = None,
+    *,
+    orientation: ArcOrientation = "start_to_goal",
 ) -> Path:
     """Returns the arc from start over via to goal.
-
-    As the vendor's helper does it, the orientation of `via` is ignored: it turns from start to goal by slerp.
 
     Args:
         start: Pose of the tool in base at the start.
@@ -140,15 +160,24 @@ def build_arc(
         goal: Pose of the tool in base at the end.
         psi_start: Arm angle at the start, [rad]; None leaves it open.
         psi_goal: Arm angle at the end, [rad].
+        orientation: "start_to_goal": by slerp from start to goal; that of `via` is ignored, as the vendor's helper does
+            it. "through_via": exactly through that of `via` at its place, the shorter way to it and on from it, with
+            continuous angular velocity and acceleration (`TurnThrough`).
 
     Raises:
         PlanningError: The three positions lie on a line, or two of them are the same.
-        InvalidValueError: A pose is none, or not finite.
+        InvalidValueError: A pose is none, or not finite, or the orientation is unknown.
     """
     _require_poses(start=start, via=via, goal=goal)
+    _require_word("orientation", orientation, get_args(ArcOrientation))
     circle = _circle(start.position, via.position, goal.position)
     distance = circle.angle * math.hypot(*circle.first)
-    return _path(start, goal, psi_start, psi_goal, circle, distance, _angle_between(start, goal))
+    if orientation == "start_to_goal":
+        return _path(start, goal, psi_start, psi_goal, circle, distance, _angle_between(start, goal))
+    to_via = via.position - circle.center
+    place = math.atan2(float(to_via @ circle.second), float(to_via @ circle.first)) % math.tau / circle.angle
+    turning = turn_through(start.parts[0], via.parts[0], goal.parts[0], place)
+    return _path(start, goal, psi_start, psi_goal, circle, distance, turning.fastest, turning)
 
 
 def build_circle(
@@ -158,8 +187,10 @@ def build_circle(
     angle: float = math.tau,
     psi_start: float | None = None,
     psi_goal: float | None = None,
+    *,
+    orientation: CircleOrientation = "held",
 ) -> Path:
-    """Returns the circle, or a part of it, from start around a centre; the orientation is held.
+    """Returns the circle, or a part of it, from start around a centre.
 
     Args:
         start: Pose of the tool in base at the start.
@@ -169,12 +200,15 @@ def build_circle(
         angle: How far, more than 0 and up to 2 pi, [rad].
         psi_start: Arm angle at the start, [rad]; None leaves it open.
         psi_goal: Arm angle at the end, [rad].
+        orientation: "held": that of the start all the way. "turning": the tool turns with the circle, about its axis
+            and by the same angle, so that it shows the centre always the same side.
 
     Raises:
         PlanningError: Start is the centre, or not in the plane through the centre at right angles to the axis.
-        InvalidValueError: `start` is no pose, or a number is not finite or out of range.
+        InvalidValueError: `start` is no pose, a number is not finite or out of range, or the orientation is unknown.
     """
     _require_poses(start=start)
+    _require_word("orientation", orientation, get_args(CircleOrientation))
     middle, normal = as_vector(center, 3, "center", "m"), as_vector(axis, 3, "axis")
     angle = as_number(angle, "angle", "rad")
     if not 0.0 < angle <= math.tau:
@@ -196,8 +230,15 @@ def build_circle(
     first = start.position - (middle + height * normal)
     circle = Circle(_point(middle + height * normal), _point(first), _point(np.cross(normal, first)), angle)
     turned = middle + height * normal + math.cos(angle) * first + math.sin(angle) * np.cross(normal, first)
-    end = start if angle == math.tau else Pose.from_parts(start.parts[0], _point(turned))
-    return _path(start, end, psi_start, psi_goal, circle, angle * float(np.linalg.norm(first)), 0.0)
+    rotation = start.parts[0]
+    turning = None
+    if orientation == "turning":
+        # The axis in the axes of the tool, where its own turn does not move it.
+        turning = SteadyTurn(rotation, _point(angle * (normal @ start.rotation)))
+        rotation = _rotation(turning.sample(np.ones(1))[0])
+    end = start if angle == math.tau else Pose.from_parts(rotation, _point(turned))
+    turn = 0.0 if turning is None else turning.fastest
+    return _path(start, end, psi_start, psi_goal, circle, angle * float(np.linalg.norm(first)), turn, turning)
 
 
 def circle_through(start: Pose, second: Pose, third: Pose) -> tuple[Array, Array]:
@@ -214,7 +255,7 @@ def circle_through(start: Pose, second: Pose, third: Pose) -> tuple[Array, Array
 
 def _path(
     start: Pose, goal: Pose, psi_start: float | None, psi_goal: float | None, circle: Circle | None, length: float,
-    turn: float,
+    turn: float, turning: Turning | None = None,
 ) -> Path:  # fmt: skip
     distance, unit = length, "m"
     if length <= STANDSTILL_DISTANCE:
@@ -224,7 +265,7 @@ def _path(
             distance = 0.0
     return Path(
         start=start, goal=goal, psi_start=psi_start, psi_goal=psi_goal, circle=circle, distance=distance, unit=unit,
-        turn=turn,
+        turn=turn, turning=turning,
     )  # fmt: skip
 
 
@@ -269,27 +310,9 @@ def slerp(a: Rotation9, b: Rotation9, share: float) -> Rotation9:
     return rotation_from_wxyz([wa * x + wb * y for x, y in zip(qa, qb, strict=True)])
 
 
-def _slerp_many(a: Rotation9, b: Rotation9, shares: Array) -> Array:
-    """Returns `slerp` at many shares, shape (N, 3, 3)."""
-    qa, qb = np.array(wxyz_from_rotation(a)), np.array(wxyz_from_rotation(b))
-    qb = -qb if qa @ qb < 0.0 else qb
-    angle = 2.0 * math.atan2(float(np.linalg.norm(qb - qa)), float(np.linalg.norm(qb + qa)))
-    # The part of qb at right angles to qa: no difference of close sines where the turn is small.
-    aside = qb - (qa @ qb) * qa
-    length = float(np.linalg.norm(aside))
-    aside = aside / length if length > 0.0 else aside
-    w, x, y, z = (np.cos(shares * angle)[:, np.newaxis] * qa + np.sin(shares * angle)[:, np.newaxis] * aside).T
-    return np.moveaxis(
-        np.array(
-            [
-                [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-                [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
-                [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
-            ]
-        ),
-        2,
-        0,
-    )
+def _rotation(matrix: Array) -> Rotation9:
+    a, b, c, d, e, f, g, h, i = matrix.ravel().tolist()
+    return a, b, c, d, e, f, g, h, i
 
 
 def _angle_between(a: Pose, b: Pose) -> float:
@@ -305,6 +328,11 @@ def _require_poses(**poses: object) -> None:
         rotation, position = pose.parts
         if not math.isfinite(sum(rotation) + sum(position)):
             raise InvalidValueError(name, repr(pose), "must be finite in every element")
+
+
+def _require_word(name: str, value: object, known: tuple[str, ...]) -> None:
+    if value not in known:
+        raise InvalidValueError(name, described(value), f"is unknown; known: {', '.join(known)}")
 
 
 def _point(values: np.ndarray) -> Point:

@@ -6,7 +6,7 @@ from bisect import bisect_right
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from rcilab.arrays import Array, JointPath, JointVector, frozen
 from rcilab.errors import InvalidValueError
@@ -29,8 +29,12 @@ class PiecewisePolynomial:
     """Where the pieces begin, and where the last one ends, shape (S + 1,), not decreasing, first 0, [s]."""
     coefficients: Array
     """Shape (S, n, k), ascending powers, [rad, rad/s, ...]."""
-    _tables: tuple[tuple[Array, ...], ...] = field(init=False, repr=False)
-    """For each derivative its coefficients by ascending power, each of shape (S, n)."""
+    _factors: tuple[Array, ...] = field(init=False, repr=False)
+    """For each derivative what each coefficient is multiplied by, those of lower powers left out; one at least."""
+    _table_powers: NDArray[np.intp] = field(init=False, repr=False)
+    """The same side by side, for one piece: which coefficient, shape (k, DERIVATIVES)."""
+    _table_factors: Array = field(init=False, repr=False)
+    """Likewise: times what, shape (k, DERIVATIVES, 1)."""
     _starts: list[float] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -46,7 +50,14 @@ class PiecewisePolynomial:
             raise InvalidValueError("breaks", breaks.tolist(), "must begin at 0 and never decrease [s]")
         object.__setattr__(self, "breaks", breaks)
         object.__setattr__(self, "coefficients", coefficients)
-        object.__setattr__(self, "_tables", _derivative_tables(coefficients))
+        powers = coefficients.shape[2]
+        factors = _derivative_factors(powers)
+        table = np.zeros((powers, DERIVATIVES, 1))
+        for derivative, column in enumerate(factors):
+            table[: len(column), derivative, 0] = column
+        object.__setattr__(self, "_factors", factors)
+        object.__setattr__(self, "_table_factors", table)
+        object.__setattr__(self, "_table_powers", np.add.outer(np.arange(powers), np.arange(DERIVATIVES)) % powers)
         object.__setattr__(self, "_starts", breaks[:-1].tolist())
 
     def __repr__(self) -> str:
@@ -78,12 +89,13 @@ class PiecewisePolynomial:
         """
         t = np.clip(np.asarray(times, dtype=np.float64), 0.0, self.breaks[-1])
         piece = np.searchsorted(self.breaks[:-1], t, side="right") - 1
-        table = self._tables[derivative]
+        factors = self._factors[derivative]
+        lowest = self.coefficients.shape[2] - len(factors)
         tau = (t - self.breaks[piece])[:, np.newaxis]
-        value = table[-1][piece]
-        for coefficient in reversed(table[:-1]):
+        value = factors[-1] * self.coefficients[:, :, -1][piece]
+        for power in range(len(factors) - 2, -1, -1):
             value *= tau
-            value += coefficient[piece]
+            value += factors[power] * self.coefficients[:, :, lowest + power][piece]
         return value
 
     def at(self, t: float) -> tuple[JointVector, JointVector, JointVector, JointVector]:
@@ -107,7 +119,10 @@ class PiecewisePolynomial:
             ((lowest, times), (highest, times)), each of shape (n,), [rad] and [s].
         """
         assert self.coefficients.shape[2] <= 4
-        q, dq = self._tables[0], self._tables[1]
+        q, dq = (
+            [factor * self.coefficients[:, :, p - len(factors)] for p, factor in enumerate(factors)]
+            for factors in self._factors[:2]
+        )
         c, b, a = (dq[p] if p < len(dq) else np.zeros_like(q[0]) for p in range(3))
         length = np.broadcast_to(np.diff(self.breaks)[:, np.newaxis], c.shape)
         root = np.sqrt(np.maximum(b * b - 4.0 * a * c, 0.0))
@@ -139,14 +154,13 @@ class PiecewisePolynomial:
         return PiecewisePolynomial(self.breaks * factor, self.coefficients / factor**powers)
 
     def _at_piece(self, piece: int, tau: float) -> tuple[JointVector, JointVector, JointVector, JointVector]:
-        results: list[JointVector] = []
-        for table in self._tables:
-            value = table[-1][piece].copy()
-            for coefficient in reversed(table[:-1]):
-                value *= tau
-                value += coefficient[piece]
-            results.append(value)
-        return results[0], results[1], results[2], results[3]
+        # All derivatives together: where a derivative has fewer powers than the others its highest ones are zeros.
+        table = self._table_factors * self.coefficients[piece].T[self._table_powers]
+        value = table[-1]
+        for coefficient in table[-2::-1]:
+            value *= tau
+            value += coefficient
+        return value[0], value[1], value[2], value[3]
 
 
 def join_pieces(starts: Array, coefficients: Array, duration: float) -> PiecewisePolynomial:
@@ -180,10 +194,9 @@ def _union(starts: Array, duration: float) -> Array:
     return np.concatenate(([0.0], inner, [duration]))
 
 
-def _derivative_tables(coefficients: Array) -> tuple[tuple[Array, ...], ...]:
-    powers = [np.ascontiguousarray(coefficients[:, :, p]) for p in range(coefficients.shape[2])]
-    tables = [tuple(powers)]
+def _derivative_factors(powers: int) -> tuple[Array, ...]:
+    factors = [np.ones(powers)]
     for _ in range(DERIVATIVES - 1):
-        powers = [float(p) * powers[p] for p in range(1, len(powers))] or [np.zeros_like(powers[0])]
-        tables.append(tuple(powers))
-    return tuple(tables)
+        last = factors[-1]
+        factors.append(np.arange(1, len(last)) * last[1:] if len(last) > 1 else np.zeros(1))
+    return tuple(factors)

@@ -12,6 +12,7 @@ mean over a few cycles, which neither moves the ends nor the distance, and makes
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 
@@ -20,6 +21,13 @@ from rcilab.clock import CYCLE_TIME
 
 _LEAST = 1e-12
 """A slope below which a row does not bound u'', and the least x."""
+_STEEPEST = 1.0 / _LEAST
+"""The slope of a row that, a share of the way back, does not bound x any more."""
+_CLEARLY = 1.0 - 1e-12
+"""A line that is lower only by less than this part of the value is not: rounding."""
+
+_Line: TypeAlias = tuple[float, float]
+"""Value at 0, and slope."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -71,19 +79,20 @@ def fastest_squares(bounds: PathBounds) -> Array:
     # A share of the way on, x has grown by step * u'', and each row bounds u'' by tilt * x -+ reserve.
     gain = step * reserve
     factor = 1.0 + step * tilt
-    inverse = np.where(factor > _LEAST, 1.0 / np.maximum(factor, _LEAST), np.inf)
-    gains, inverses, factors = gain.tolist(), inverse.tolist(), factor.tolist()
+    inverse = np.where(factor > _LEAST, 1.0 / np.maximum(factor, _LEAST), _STEEPEST)
     last = len(most) - 1
     highest = [0.0] * (last + 1)
     x = 0.0
+    lines = _least_lines(gain * inverse, inverse, [*most[1:], 0.0])
     for k in range(last - 1, -1, -1):
-        x = highest[k] = min(most[k], min([(x + g) * f for g, f in zip(gains[k], inverses[k], strict=True)]))
+        (a, f), (b, g), more = lines[k]
+        x = highest[k] = min(most[k], a + x * f, b + x * g, *[c + x * h for c, h in more])
     x = 0.0
     squares = [0.0] * (last + 1)
+    lines = _least_lines(gain, factor, most)
     for k in range(last):
-        x = squares[k + 1] = max(
-            min(highest[k + 1], min([g + x * f for g, f in zip(gains[k], factors[k], strict=True)])), _LEAST
-        )
+        (a, f), (b, g), more = lines[k]
+        x = squares[k + 1] = max(min(highest[k + 1], a + x * f, b + x * g, *[c + x * h for c, h in more]), _LEAST)
     squares[last] = 0.0
     return np.array(squares)
 
@@ -116,6 +125,32 @@ def smooth_law(squares: Array, cycles: int) -> TimeLaw:
     u = np.concatenate(([0.0], np.cumsum(way)))
     total = u[-1]
     return TimeLaw(u / total, speed / total, ddu / total)
+
+
+def _least_lines(at_zero: Array, slope: Array, longest: list[float]) -> list[tuple[_Line, _Line, list[_Line]]]:
+    """Returns the lines at_zero + slope x that are ever the least ones at each knot, for x from 0 to `longest`.
+
+    That is the one at 0, the one at `longest`, and at the few knots where yet another is below both between them, all.
+
+    Args:
+        at_zero: Of m lines a knot, shape (M + 1, m).
+        slope: Shape (M + 1, m).
+        longest: Of M + 1 knots.
+    """
+    knots = np.arange(len(longest))
+    first, last = at_zero.argmin(axis=1), (at_zero + slope * np.array(longest)[:, np.newaxis]).argmin(axis=1)
+    low, high, steep, flat = at_zero[knots, first], at_zero[knots, last], slope[knots, first], slope[knots, last]
+    # Where both cross, is another one below?
+    is_two = steep > flat
+    cross = np.where(is_two, (high - low) / np.where(is_two, steep - flat, 1.0), 0.0)
+    least = low + steep * cross
+    is_more = (at_zero + slope * cross[:, np.newaxis] < (least * _CLEARLY)[:, np.newaxis]).any(axis=1)
+    more: list[list[_Line]] = [[]] * len(longest)
+    for k in np.flatnonzero(is_more).tolist():
+        more[k] = list(zip(at_zero[k].tolist(), slope[k].tolist(), strict=True))
+    ones = zip(low.tolist(), steep.tolist(), strict=True)
+    others = zip(high.tolist(), flat.tolist(), strict=True)
+    return list(zip(ones, others, more, strict=True))
 
 
 def _ceiling(velocity: Array, reserve: Array, tilt: Array) -> Array:

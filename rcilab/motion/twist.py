@@ -68,9 +68,12 @@ class TwistFollower:
         self._joints = list(zip(lower, upper, velocity, acceleration, jerk, strict=True))
         self._speeds = (TOOL_MARGIN * speed * tool.translation_velocity, TOOL_MARGIN * speed * tool.rotation_velocity)
         self._bounds = [
-            *zip(acceleration, jerk, strict=True),
-            (tool.translation_acceleration, tool.translation_jerk),
-            (tool.rotation_acceleration, tool.rotation_jerk),
+            (RAMP_PART * a_max, RAMP_PART * j_max)
+            for a_max, j_max in (
+                *zip(acceleration, jerk, strict=True),
+                (tool.translation_acceleration, tool.translation_jerk),
+                (tool.rotation_acceleration, tool.rotation_jerk),
+            )
         ]
         self._in_tool = False
         self._start = self._goal = self._change = np.zeros(6)
@@ -119,8 +122,8 @@ class TwistFollower:
         J, rotation = tool_jacobian(self._chain, q, self._T_flange_tool)
         if self._in_tool:
             # Rows are the same vectors in other axes, so that everything below holds in those, too.
-            R = np.array(rotation).reshape(3, 3).T
-            J = np.concatenate((R.dot(J[:3]), R.dot(J[3:])))
+            R = np.array(rotation).reshape(3, 3)
+            J = J.T.reshape(-1, 3).dot(R).reshape(-1, 6).T
         inverse, self.is_damped = damped_inverse(J)
         twist = self._goal if self._weight == 1.0 else self._blended(J, inverse, dq, ddq)
         wanted: list[float] = inverse.dot(twist).tolist()
@@ -144,8 +147,8 @@ class TwistFollower:
         rate = rate_change = math.inf  # [1/s], [1/s^2]
         for stride, (a_max, j_max) in zip([*inverse.dot(change).tolist(), *norms], self._bounds, strict=True):
             if stride := abs(stride):
-                rate = min(rate, RAMP_PART * a_max / stride)
-                rate_change = min(rate_change, RAMP_PART * j_max / stride)
+                rate = a_max / stride if rate * stride > a_max else rate
+                rate_change = j_max / stride if rate_change * stride > j_max else rate_change
         blend = self._blend
         if self._begins:
             # What the tool accelerates along the line already goes on; the rest is for the joints to lose.

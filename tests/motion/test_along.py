@@ -126,18 +126,50 @@ def test_in_the_null_space_the_tool_stands_and_the_arm_angle_arrives(name, seed,
 
 
 @SOME
-@given(names, st.floats(0.3, math.tau), st.floats(0.03, 0.15), speeds)
-def test_a_circle_comes_back_or_goes_as_far_as_told(name, angle, radius, speed):
+@given(names, st.floats(0.3, math.tau), st.floats(0.03, 0.15), speeds, st.sampled_from(["held", "turning"]))
+def test_a_circle_comes_back_or_goes_as_far_as_told(name, angle, radius, speed, orientation):
     model = MODELS[name]
     T = model.forward(model.home)
     center = T.position - (radius, 0.0, 0.0)
-    motion = planned(plan_circle, model, model.home, center=center, axis=(0.0, 0.0, 2.0), angle=angle, speed=speed)
+    around = {"center": center, "axis": (0.0, 0.0, 2.0), "angle": angle, "orientation": orientation}
+    motion = planned(plan_circle, model, model.home, **around, speed=speed)
     require_allowed(model, motion, speed)
+    require_smooth(motion)
     poses = model.forward_path(motion.q)
     assert np.abs(np.linalg.norm(poses[:, :3, 3] - center, axis=1) - radius).max() < 1e-9
-    assert np.abs(poses[:, :3, :3] - T.rotation).max() < 1e-9
+    if orientation == "held":
+        assert np.abs(poses[:, :3, :3] - T.rotation).max() < 1e-9
+    else:
+        seen = np.einsum("nji,nj->ni", poses[:, :3, :3], center - poses[:, :3, 3])
+        assert np.abs(seen - seen[0]).max() < 1e-9
     end = center + radius * np.array([math.cos(angle), math.sin(angle), 0.0])
     assert np.allclose(poses[-1, :3, 3], end, atol=1e-9)
+
+
+@SOME
+@given(names, seeds, st.sampled_from([0.3, 0.1]), st.sampled_from(["line", "arc", "circle", "elbow"]))
+def test_the_s_profile_is_as_smooth_and_between_the_cycles_not_faster_than_at_them(name, seed, speed, kind):
+    model = MODELS[name]
+    q, via, goal, psi = ends(model, seed, 0.4)
+    options = {"speed": speed, "law": "s_profile"}
+    if kind == "line":
+        motion = planned(plan_line, model, q, goal, psi=psi, **options)
+    elif kind == "arc":
+        motion = planned(plan_arc, model, q, via, goal, psi=psi, **options)
+    elif kind == "circle":
+        center = model.forward(q).position - (0.05, 0.0, 0.0)
+        motion = planned(plan_circle, model, q, center=center, axis=(0.0, 0.0, 1.0), **options)
+    else:
+        model, q = SEVEN, ends(SEVEN, seed)[0]
+        motion = planned(plan_nullspace, model, q, model.arm_angle(q) + 0.3, **options)
+    require_smooth(motion)
+    times = np.linspace(0.0, motion.duration, 7 * len(motion))
+    joint = model.limits.joint
+    for order, rows, limit in ((1, motion.dq, joint.velocity), (2, motion.ddq, joint.acceleration)):
+        between = np.abs(motion.polynomial.sample(times, order)) / limit
+        assert (between.max(axis=0) <= 1.001 * (np.abs(rows) / limit).max(axis=0) + 1e-4).all()
+    assume(check(motion, model).ok)
+    assert (np.abs(motion.polynomial.sample(times, 3)) < joint.jerk).all()
 
 
 @SOME

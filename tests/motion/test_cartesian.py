@@ -194,3 +194,114 @@ def test_what_makes_no_circle_is_named(options, error, hint):
 def test_six_axes_have_no_null_space():
     with pytest.raises(InvalidValueError, match="a 6-axis arm has no arm angle"):
         plan_nullspace(SIX, SIX.home, 0.1)
+
+
+@ALL
+@pytest.mark.parametrize("law", ["jerk_limited", "s_profile"])
+def test_an_arc_turns_through_the_orientation_of_its_middle_pose(name, law):
+    model = load_model(name)
+    via = moved(model, (0.03, 0.03, 0.0), (0.3, 0.2, -0.1))
+    goal = moved(model, (0.0, 0.1, 0.0), (-0.2, 0.1, 0.2))
+    motion = plan_arc(model, model.home, via, goal, speed=0.1, law=law)
+    assert check(motion, model).ok
+    T = model.forward_path(motion.q)
+    assert np.allclose(T[-1], goal.matrix, atol=1e-9)
+    nearest = int(np.linalg.norm(T[:, :3, 3] - via.position, axis=1).argmin())
+    off = np.linalg.norm(T[nearest, :3, 3] - via.position)
+    # Between two rows, so off by as much in orientation as in place.
+    assert np.abs(T[nearest, :3, :3] - via.rotation).max() < 10.0 * off + 1e-9
+    times = np.linspace(0.0, motion.duration, 20 * len(motion))
+    T = model.forward_path(motion.polynomial.sample(times))
+    nearest = int(np.linalg.norm(T[:, :3, 3] - via.position, axis=1).argmin())
+    assert np.abs(T[nearest, :3, :3] - via.rotation).max() < 1e-4
+
+
+def test_the_vendors_arc_ignores_the_orientation_of_its_middle_pose():
+    goal = moved(SEVEN, (0.0, 0.1, 0.0), (0.2, 0.0, 0.0))
+    options = {"orientation": "start_to_goal", "law": "s_profile"}
+    q = [
+        plan_arc(SEVEN, SEVEN.home, moved(SEVEN, (0.05, 0.05, 0.0), rpy), goal, **options).q
+        for rpy in ((0.0, 0.0, 0.0), (0.5, -0.4, 0.3))
+    ]
+    assert np.array_equal(*q)
+
+
+@ALL
+def test_a_circle_may_turn_the_tool_with_it(name):
+    model = load_model(name)
+    center = moved(model, (-0.05, 0.0, 0.0)).position
+    around = {"center": center, "axis": (0.0, 0.0, 1.0), "angle": 2.0, "orientation": "turning"}
+    motion = plan_circle(model, model.home, **around)
+    assert check(motion, model).ok
+    T = model.forward_path(motion.q)
+    # Seen from the tool, the centre stays where it is.
+    seen = np.einsum("nji,nj->ni", T[:, :3, :3], center - T[:, :3, 3])
+    assert np.abs(seen - seen[0]).max() < 1e-9
+    x, y = (T[-1, :3, :3] @ T[0, :3, :3].T)[:2, 0]
+    assert math.atan2(y, x) == pytest.approx(2.0, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("plan", "options"),
+    [
+        (plan_arc, {"via": moved(SEVEN, (0.05, 0.05, 0)), "goal": moved(SEVEN, (0, 0.1, 0))}),
+        (plan_circle, {"center": moved(SEVEN, (-0.05, 0, 0)).position, "axis": (0, 0, 1.0)}),
+    ],
+)
+def test_an_unknown_orientation_is_named(plan, options):
+    with pytest.raises(InvalidValueError, match=r"orientation: 'free' is unknown; known: \w+, \w+"):
+        plan(SEVEN, SEVEN.home, **options, orientation="free")
+
+
+def elbow_below(model, psi) -> np.ndarray:
+    """Joint angles on a branch that leaves the elbow from about 0 over +-pi to about 0 again, but not across 0."""
+    T = model.forward([-0.528, 0.204, -2.747, 1.041, 0.222, -0.699, 3.552])
+    ((low, high),) = model.feasible_arcs(T).of_branch(5)
+    assert (low, high) == pytest.approx((0.1, math.tau - 0.1), abs=0.1)
+    return np.array(model.inverse(T, psi=psi).all[5].q)
+
+
+@pytest.mark.parametrize("name", ["xMatePro3", "xMatePro7"])
+@pytest.mark.parametrize("law", ["jerk_limited", "s_profile"])
+@pytest.mark.parametrize(("first", "last"), [(2.5, -2.5), (-2.0, 1.5)])
+def test_the_elbow_takes_the_shorter_way_round_across_pi_without_a_jump(name, law, first, last):
+    model = load_model(name)
+    q = elbow_below(model, first)
+    motion = plan_nullspace(model, q, last, law=law, speed=0.1)
+    assert check(motion, model).ok
+    psi = np.unwrap([model.arm_angle(row) for row in motion.q])
+    assert psi[0] == pytest.approx(first, abs=1e-9)
+    assert psi[-1] == pytest.approx(first + math.remainder(last - first, math.tau), abs=1e-9)
+    assert (np.diff(psi) * math.copysign(1.0, first) > -1e-9).all()
+    assert np.allclose(model.forward_path(motion.q), model.forward(q).matrix, atol=1e-9)
+    assert np.abs(np.diff(motion.q, axis=0)).max() < 1e-2
+
+
+@pytest.mark.parametrize("law", ["jerk_limited", "s_profile"])
+def test_where_the_shorter_way_round_is_blocked_the_longer_is_named_and_goes(law):
+    q = elbow_below(SEVEN, 1.0)
+    with pytest.raises(
+        PlanningError, match=r'null-space motion .* the longer way round is free: way="longer"'
+    ) as caught:
+        plan_nullspace(SEVEN, q, -1.0, law=law)
+    assert caught.value.share == pytest.approx(0.45, abs=0.1)
+    motion = plan_nullspace(SEVEN, q, -1.0, law=law, way="longer", speed=0.1)
+    assert SEVEN.arm_angle(motion.q[-1]) == pytest.approx(-1.0, abs=1e-9)
+    assert check(motion, SEVEN).ok
+    with pytest.raises(PlanningError, match='the shorter way round is free: way="shorter"'):
+        plan_nullspace(SEVEN, q, 1.5, law=law, way="longer")
+    with pytest.raises(PlanningError, match=r"the longer way round is not free either; model\.feasible_arcs tells"):
+        plan_nullspace(SEVEN, q, 0.0, law=law)
+
+
+def test_a_line_too_leads_the_elbow_the_shorter_way_round():
+    q = elbow_below(SEVEN, 2.9)
+    T = SEVEN.forward(q)
+    motion = plan_line(SEVEN, q, Pose(T.position + (0.02, 0.0, 0.0), T.wxyz), psi=-2.9, speed=0.1)
+    psi = np.unwrap([SEVEN.arm_angle(row) for row in motion.q])
+    assert psi[-1] == pytest.approx(math.tau - 2.9, abs=1e-9)
+
+
+def test_an_unknown_way_round_is_named():
+    with pytest.raises(InvalidValueError, match="way: 'left' is unknown; known: shorter, longer"):
+        plan_nullspace(SEVEN, SEVEN.home, 0.3, way="left")

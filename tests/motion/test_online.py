@@ -359,3 +359,17 @@ def test_what_was_jogged_from_rest_to_rest_conforms(model):
     jog.stop()
     rows += until_rest(jog)
     assert check(Motion.from_samples(rows), model).ok
+
+
+def test_far_inside_the_ranges_looking_at_all_joints_at_once_changes_nothing(monkeypatch):
+    def path():
+        jog, rows = Jog(MODEL, MODEL.home), []
+        for k in range(400):
+            if k % 50 == 0:
+                jog.set_joint_velocity(1.5 * np.sin(k + np.arange(7)))
+            rows.append(jog.step())
+        return np.array(rows)
+
+    shortcut = path()
+    monkeypatch.setattr(Jog, "_is_far_inside", lambda *_: False)
+    assert np.array_equal(path(), shortcut)

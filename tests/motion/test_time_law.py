@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rcilab.motion.time_law import PathBounds, duration_of, fastest_squares, smooth_law
+from rcilab.motion.time_law import PathBounds, _least_lines, duration_of, fastest_squares, smooth_law
 
 KNOTS = 400
 
@@ -84,3 +84,17 @@ def test_a_knot_that_is_slowed_is_passed_slower_and_the_rest_as_fast():
     x = fastest_squares(bounds.slowed(factor))
     assert math.sqrt(x[200]) == pytest.approx(0.5, rel=1e-6)
     assert math.sqrt(x[100]) == pytest.approx(1.0, rel=1e-6)
+
+
+@given(st.integers(0, 2**32), st.integers(1, 9))
+def test_the_lines_that_are_kept_are_the_least_ones_of_all(seed, count):
+    rng = np.random.default_rng(seed)
+    at_zero, slope, longest = rng.uniform(0, 2, (30, count)), rng.uniform(-2, 3, (30, count)), rng.uniform(0, 3, 30)
+    for part in (0.0, 0.3, 0.8, 1.0):
+        x = part * longest
+        least = (at_zero + slope * x[:, np.newaxis]).min(axis=1)
+        kept = [
+            min(c + h * x[k] for c, h in (first, last, *more))
+            for k, (first, last, more) in enumerate(_least_lines(at_zero, slope, longest.tolist()))
+        ]
+        assert np.allclose(kept, least, rtol=0.0, atol=1e-11)
