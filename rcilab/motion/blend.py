@@ -117,6 +117,7 @@ def _blend(model: RobotModel, before: Segment, after: Segment, leave: float, joi
         corner = before.path.goal
         left = _scaled(_tool_state(before.path, corner, leave), rates[0])
         right = _scaled(_tool_state(after.path, corner, join), rates[1])
+        right[0][6] += math.tau * round((left[0][6] - right[0][6]) / math.tau)  # The same arm angle, next to the other.
     else:
         corner = None
         left, right = _scaled(before.state(model, leave), rates[0]), _scaled(after.state(model, join), rates[1])
