@@ -35,7 +35,7 @@ ALWAYS = ("speed", "blend", "dwell")
 ALLOWED: dict[WaypointType, tuple[str, ...]] = {
     "joint": ("q", "position", "wxyz", "psi"),
     "line": ("q", "position", "wxyz", "psi"),
-    "arc": ("via", "q", "position", "wxyz", "psi"),
+    "arc": ("via", "via_wxyz", "q", "position", "wxyz", "psi"),
     "circle": ("center", "axis", "angle", "psi"),
     "nullspace": ("psi",),
 }
@@ -72,7 +72,9 @@ class Waypoint:
     wxyz: Floats | None = None
     """Target: orientation of the tool in base, 4 numbers, a unit quaternion."""
     via: Floats | None = None
-    """A point on the arc, in base, 3 numbers, [m]; orientation turns evenly from start to target."""
+    """A point on the arc, in base, 3 numbers, [m]."""
+    via_wxyz: Floats | None = None
+    """Orientation of the tool there, 4 numbers, a unit quaternion; None turns evenly from start to target."""
     center: Floats | None = None
     """Centre of the circle in base, 3 numbers, [m]."""
     axis: Floats | None = None
@@ -139,11 +141,11 @@ class Waypoint:
         cls, via: Pose | ArrayLike, target: Pose | ArrayLike, *, psi: float | None = None, speed: float = 0.2,
         blend: float = 0.0, dwell: float = 0.0,
     ) -> Waypoint:  # fmt: skip
-        """Returns an arc of the tool over `via`, a position, shape (3,), [m], or a pose of which that counts."""
-        point = via.position if isinstance(via, Pose) else via
-        return cls(
-            type="arc", via=_vector("via", point), **_target(target), psi=psi, speed=speed, blend=blend, dwell=dwell
-        )
+        """Returns an arc of the tool over `via`: through that pose, or only that position, shape (3,), [m]."""
+        places: dict[str, Any] = {"via": via}
+        if isinstance(via, Pose):
+            places = {"via": via.position, "via_wxyz": via.wxyz}
+        return cls(type="arc", **places, **_target(target), psi=psi, speed=speed, blend=blend, dwell=dwell)
 
     @classmethod
     def circle(
@@ -334,9 +336,11 @@ def _target(target: Pose | ArrayLike) -> dict[str, Any]:
 
 def _vector(name: str, value: ArrayLike) -> Floats:
     numbers: Floats = tuple(
-        as_vector(value, 4 if name == "wxyz" else 3, name, "" if name in ("wxyz", "axis") else "m").tolist()
+        as_vector(
+            value, 4 if name.endswith("wxyz") else 3, name, "" if name.endswith(("wxyz", "axis")) else "m"
+        ).tolist()
     )
-    if name == "wxyz":
+    if name.endswith("wxyz"):
         if abs(math.hypot(*numbers) - 1.0) > _UNIT:
             problem = f"has length {math.hypot(*numbers):.4g}, must be 1 within {_UNIT:g}: a unit quaternion, w first"
             raise InvalidValueError(name, numbers, problem)

@@ -162,7 +162,7 @@ def _path(model: RobotModel, q: JointVector, waypoint: Waypoint) -> Path:
     if waypoint.q is not None:
         goal = model.forward(waypoint.q)
         psi = model.arm_angle(waypoint.q) if model.n == 7 else None
-    psis = arm_angles(model, q, psi)
+    psis = arm_angles(model, q, psi, "shorter")
     if waypoint.type == "circle":
         assert waypoint.center is not None
         assert waypoint.axis is not None
@@ -172,7 +172,9 @@ def _path(model: RobotModel, q: JointVector, waypoint: Waypoint) -> Path:
         return build_line(T, T, *psis)
     assert goal is not None
     if waypoint.via is not None:
-        return build_arc(T, Pose(waypoint.via), goal, *psis)
+        if waypoint.via_wxyz is None:
+            return build_arc(T, Pose(waypoint.via), goal, *psis, orientation="start_to_goal")
+        return build_arc(T, Pose(waypoint.via, waypoint.via_wxyz), goal, *psis, orientation="through_via")
     return build_line(T, goal, *psis)
 
 

@@ -252,6 +252,16 @@ def test_a_straight_way_through_a_blend_stays_straight_and_at_speed():
     assert motion.duration < 1.02 * plan_line(SEVEN, SEVEN.home, end).duration
 
 
+def test_an_arc_turns_through_the_orientation_of_its_via_or_evenly_without_one():
+    via, goal = at(SEVEN, (-0.05, 0.05, 0.0), (0.2, 0.1, 0.0)), at(SEVEN, (-0.1, 0.0, 0.0), (0.0, 0.0, 0.2))
+    for point, passes in ((via, True), (via.position, False)):
+        end = Waypoint.line(at(SEVEN, (-0.1, -0.1, 0.0)))
+        motion = plan_program(SEVEN, program(SEVEN, Waypoint.arc(point, goal, blend=0.01), end))
+        T = SEVEN.forward_path(motion.q)
+        nearest = T[np.linalg.norm(T[:, :3, 3] - via.position, axis=1).argmin()]
+        assert (np.abs(nearest[:3, :3] - via.rotation).max() < 0.01) == passes
+
+
 def test_there_and_back_turns_inside_the_radius():
     away = at(SIX, (0.0, 0.15, 0.0))
     motion = plan_program(SIX, program(SIX, Waypoint.line(away, blend=0.04), Waypoint.line(at(SIX, (0, 0, 0)))))

@@ -61,7 +61,7 @@ poses = st.builds(Pose, places, turns)
 waypoints = st.one_of(
     st.builds(Waypoint.joint, st.tuples(*[angles] * 7), **rests),
     st.builds(Waypoint.line, poses, psi=psis, **rests),
-    st.builds(Waypoint.arc, places, poses, psi=psis, **rests),
+    st.builds(Waypoint.arc, places | poses, poses, psi=psis, **rests),
     st.builds(Waypoint.circle, places, places.filter(lambda x: math.hypot(*x) > 0.01), st.floats(0.1, 6.2), **rests),
     st.builds(Waypoint.nullspace, st.floats(-math.pi, math.pi), **rests),
 )
