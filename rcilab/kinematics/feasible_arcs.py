@@ -9,11 +9,11 @@ each, in closed form. Between neighbours of all of these nothing changes, and on
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import compress
 from math import acos, cos, pi, sin, sqrt, tau
-from typing import Literal, TypeAlias, get_args
+from typing import Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,15 +26,6 @@ from rcilab.spatial import Pose
 
 Reason: TypeAlias = Literal["joint limits", "singularity", "safety box"]
 
-_NO_YES = (False, True)
-_REASONS: dict[tuple[bool, bool, bool], tuple[Reason, ...]] = {
-    (limit, lost, outside): tuple(compress(get_args(Reason), (limit, lost, outside)))
-    for limit in _NO_YES
-    for lost in _NO_YES
-    for outside in _NO_YES
-}
-"""By whether a joint limit, a singularity and the safety box forbid an arc."""
-_JOINTS, _BRANCHES = range(1, 8), range(8)
 _TINY = 1e-9  # Of a sine or a length in [m]: below it the elbow has no circle, or the circle no upper side.
 _SAME = 1e-12  # [rad] Arm angles that differ by rounding alone.
 _TURNS = {0: 0, 2: 3, 4: 5, 6: 8}  # Joints that turn about z, counted from 0: which form is their X; Y is the next.
@@ -51,6 +42,12 @@ _TURNED = np.stack(  # Shape (7, 8): which branches turn or mirror each joint, s
         _FLIPS[:, 2],
     )
 ).astype(np.intp)
+_JOINTS, _BRANCHES = range(1, 8), range(8)
+_WHY: tuple[Reason, ...] = ("joint limits", "singularity", "safety box")
+_REASONS = {
+    found: tuple(itertools.compress(_WHY, found)) for found in itertools.product((False, True), repeat=len(_WHY))
+}
+"""By whether a joint limit, a singularity and the safety box forbid an arc."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -250,7 +247,7 @@ def _arcs(starts: Array, broken: NDArray[np.bool_], lost: NDArray[np.bool_], out
     begins = starts[first].tolist()
     arcs: list[Arc] = []
     for start, end, look in zip(begins, [*begins[1:], begins[0] + tau], looks[:, first].T.tolist(), strict=True):
-        joints, branches = tuple(compress(_JOINTS, look)), tuple(compress(_BRANCHES, look[7:]))
+        joints, branches = tuple(itertools.compress(_JOINTS, look)), tuple(itertools.compress(_BRANCHES, look[7:]))
         reasons = _REASONS[bool(joints), look[15], outside]
         arcs.append(Arc(start=start, end=end, reasons=reasons, joints=joints, branches=branches))
     return arcs
