@@ -249,7 +249,7 @@ def _lead_tool(model: RobotModel, pieces: list[_Piece], states: tuple[Array, ...
         rates.append(piece.rate[-len(local) :])
         changes.append(piece.change[-len(local) :])
         owners += [piece] * len(local)
-    T, psi = np.concatenate(T_parts), np.unwrap(np.concatenate(psi_parts))
+    T, psi = np.concatenate(T_parts), np.asarray(np.unwrap(np.concatenate(psi_parts)), np.float64)
     first_share = pieces[0].local[0] if pieces[0].blend is None else pieces[0].blend.leave
     near = pieces[0].segment.near(float(first_share))
     q, loss = inverse_path(model, T, psi if model.n == 7 else None, near)

@@ -64,7 +64,8 @@ def drawn(model, seed, count, types=TYPES) -> Program:
             goal = Pose(center + 0.04 * np.array([math.cos(angle), math.sin(angle), 0.0]), T.wxyz)
         elif kind == "arc":
             via = (T.position + goal.position) / 2.0 + rng.uniform(-0.05, 0.05, 3)
-            waypoints.append(Waypoint.arc(via, goal, psi=psi, **how))
+            over = via if rng.random() < 0.5 else Pose(via, T.wxyz)
+            waypoints.append(Waypoint.arc(over, goal, psi=psi, **how))
         elif kind == "joint":
             waypoints.append(Waypoint.joint(q if rng.random() < 0.5 else goal, **how))
         else:
