@@ -158,7 +158,9 @@ def test_the_tool_leaves_its_way_only_inside_the_blend_radius(name, seed):
     index = np.clip(np.searchsorted(motion.segment_starts, times, side="right") - 1, 0, len(segments) - 1)
     for i, segment in enumerate(segments):
         mine = points[index == i]
-        if not len(mine):
+        is_blended = any(one.waypoint.blend > 0.0 for one in segments[max(i - 1, 0) : i + 1])
+        # A joint move from stop to stop is plan_joint's, which is not always straight in joint space.
+        if not len(mine) or (segment.path is None and not is_blended):
             continue
         off = distance_to_way(mine, segment.positions(model, np.linspace(0.0, 1.0, 1001)))
         for corner in segments[max(i - 1, 0) : i + 1]:
