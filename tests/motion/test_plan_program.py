@@ -109,6 +109,13 @@ def require_joint_limits(model, motion):
     assert ((joint.lower < q) & (q < joint.upper)).all()
 
 
+def radius_at(segments, i):
+    """The radius that the tool may leave its way within at the end of a segment; 0 where it stops."""
+    waypoint, ahead = segments[i].waypoint, segments[i + 1 : i + 2]
+    is_stop = waypoint.dwell > 0.0 or not ahead or segments[i].stands or ahead[0].stands
+    return 0.0 if is_stop else waypoint.blend
+
+
 def distance_to_way(points, way):
     """How far points are from the way through the rows of another table, each of shape (N,)."""
     d = np.sqrt(((points[:, np.newaxis, :] - way) ** 2).sum(axis=2))
@@ -158,13 +165,12 @@ def test_the_tool_leaves_its_way_only_inside_the_blend_radius(name, seed):
     index = np.clip(np.searchsorted(motion.segment_starts, times, side="right") - 1, 0, len(segments) - 1)
     for i, segment in enumerate(segments):
         mine = points[index == i]
-        is_blended = any(one.waypoint.blend > 0.0 for one in segments[max(i - 1, 0) : i + 1])
+        corners = [(segments[j], radius_at(segments, j)) for j in (i - 1, i) if j >= 0]
         # A joint move from stop to stop is plan_joint's, which is not always straight in joint space.
-        if not len(mine) or (segment.path is None and not is_blended):
+        if not len(mine) or (segment.path is None and not any(radius for _, radius in corners)):
             continue
         off = distance_to_way(mine, segment.positions(model, np.linspace(0.0, 1.0, 1001)))
-        for corner in segments[max(i - 1, 0) : i + 1]:
-            radius = corner.waypoint.blend if corner.waypoint.dwell == 0.0 and corner is not segments[-1] else 0.0
+        for corner, radius in corners:
             to_corner = np.sqrt(((mine - corner.positions(model, np.ones(1))) ** 2).sum(axis=1))
             off = np.where(to_corner <= radius, 0.0, off)
         assert off.max() < 1e-6
