@@ -28,6 +28,9 @@ if TYPE_CHECKING:
     from rcilab.motion.cartesian import plan_nullspace as plan_nullspace
     from rcilab.motion.joint import plan_joint as plan_joint
     from rcilab.motion.motion import Motion as Motion
+    from rcilab.motion.plan_program import plan_program as plan_program
+    from rcilab.motion.program import Program as Program
+    from rcilab.motion.program import Waypoint as Waypoint
     from rcilab.notebook.plot import plot as plot
     from rcilab.notebook.preview import preview as preview
     from rcilab.safety_box import SafetyBox as SafetyBox
@@ -44,12 +47,14 @@ _HOMES = {
     "Motion": "rcilab.motion.motion",
     "Payload": "rcilab.dynamics.payload",
     "Pose": "rcilab.spatial",
+    "Program": "rcilab.motion.program",
     "RcilabError": "rcilab.errors",
     "Report": "rcilab.conformance.report",
     "RobotModel": "rcilab.model",
     "RobotSession": "rcilab.client.session",
     "Run": "rcilab.client.run",
     "SafetyBox": "rcilab.safety_box",
+    "Waypoint": "rcilab.motion.program",
     "check": "rcilab.conformance.check",
     "connect": "rcilab.client.session",
     "load_model": "rcilab.model",
@@ -58,6 +63,7 @@ _HOMES = {
     "plan_joint": "rcilab.motion.joint",
     "plan_line": "rcilab.motion.cartesian",
     "plan_nullspace": "rcilab.motion.cartesian",
+    "plan_program": "rcilab.motion.plan_program",
     "plot": "rcilab.notebook.plot",
     "preview": "rcilab.notebook.preview",
     "simulate": "rcilab.supervisor.simulate",

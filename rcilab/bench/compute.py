@@ -20,7 +20,10 @@ from rcilab.model import RobotModel, load_model
 from rcilab.motion.joint import plan_joint
 from rcilab.motion.motion import Motion
 from rcilab.motion.online import Jog
+from rcilab.motion.plan_program import plan_program
+from rcilab.motion.program import Program, Waypoint
 from rcilab.safety_distance import ADVISED_DISTANCE
+from rcilab.spatial import Pose
 
 _ROBOT = "xMatePro7"
 _SEED = 20
@@ -82,6 +85,21 @@ def bench_plan_joint() -> Measurement:
     sampled = time_calls(lambda pair: plan_joint(model, pair[0], pair[1]).q, list(ends[:50]))
     note = f"{_ROBOT}, 200 random pairs; with every 1 ms sample of q: {1e3 * np.median(sampled):.2f} ms"
     return summarise("plan_joint", times, "ms", 1.0, note)
+
+
+def bench_program() -> Measurement:
+    """A program of 20 waypoints with blends, planned as one motion; other lengths in the note."""
+    model = load_model(_ROBOT)
+    program = program_of(model, 20)
+    times = time_calls(lambda steps: plan_program(model, steps), [program] * 10, warm_up=1)
+    motion = plan_program(model, program)
+    lengths = {count: program_of(model, count) for count in (2, 5, 10, 40)}
+    growth = _growth(lambda steps: plan_program(model, steps), lengths)
+    note = (
+        f"{_ROBOT}, 15 lines, 3 arcs and 2 joint moves at speed 0.5, every corner blended by 20 mm, "
+        f"{motion.duration:.1f} s; 10 % quantile {1e3 * np.percentile(times, 10):.0f} ms; by waypoints: {growth}"
+    )
+    return summarise("program", times, "ms", 200.0, note)
 
 
 def bench_check() -> Measurement:
@@ -153,6 +171,40 @@ def bench_jog() -> Measurement:
     )
     note = f"{_ROBOT}, tool frame, another twist every 100 cycles; {others}"
     return summarise("jog", steps(turn, 100), "us", 50.0, note)
+
+
+def program_of(model: RobotModel, count: int) -> Program:
+    """Returns a program around home: the tool along a rising square, some corners by arcs, some ways in joint space.
+
+    Args:
+        model: The arm.
+        count: Number of waypoints; of 20, 15 are lines, 3 arcs and 2 joint moves.
+    """
+    T = model.forward(model.home)
+
+    def place(x: float, y: float, z: float, turn: float) -> Pose:
+        return Pose(T.position + (x, y, z), (T @ Pose.from_rpy((0.0, 0.0, 0.0), (0.0, turn, 0.0))).wxyz)
+
+    corners = ((0.0, 0.12), (-0.12, 0.12), (-0.12, -0.12), (0.0, -0.12))
+    waypoints: list[Waypoint] = []
+    for i in range(count):
+        x, y = corners[i % 4]
+        height, turn = -0.02 * (i % 3), 0.15 * (i % 2)
+        if i % 7 == 6:
+            q = model.home + 0.15 * np.sin(np.arange(model.n) + i)
+            waypoints.append(Waypoint.joint(q, speed=0.5, blend=0.02))
+        elif i % 6 == 3:
+            waypoints.append(
+                Waypoint.arc(
+                    (*(T.position[:2] + (x - 0.08, y / 2.0)), T.position[2]),
+                    place(x, y, height, turn),
+                    speed=0.5,
+                    blend=0.02,
+                )
+            )
+        else:
+            waypoints.append(Waypoint.line(place(x, y, height, turn), speed=0.5, blend=0.02))
+    return Program(model=model.name, start=tuple(model.home.tolist()), waypoints=tuple(waypoints))
 
 
 def motion_of(model: RobotModel, duration: float, start: Array | None = None) -> Motion:

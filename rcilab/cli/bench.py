@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from rcilab.bench.measure import Measurement
 
 BENCHES = (
-    *("forward", "inverse", "inverse_batch", "feasible_arcs", "plan_joint"),
+    *("forward", "inverse", "inverse_batch", "feasible_arcs", "plan_joint", "program"),
     *("check", "check_full", "check_joint_rows"),
     *("controller_ideal", "controller_mujoco", "controller_cartesian", "controller_impedance", "client_answer"),
     *("jog", "plan_line", "plan_arc", "replan"),
@@ -130,6 +130,7 @@ def _bench(name: str, seconds: float) -> Callable[[], Measurement]:
         "inverse_batch": compute.bench_inverse_batch,
         "feasible_arcs": compute.bench_feasible_arcs,
         "plan_joint": compute.bench_plan_joint,
+        "program": compute.bench_program,
         "check": compute.bench_check,
         "check_full": compute.bench_check_full,
         "check_joint_rows": compute.bench_check_joint_rows,

@@ -1,4 +1,4 @@
-"""`rcilab check FILE --model NAME`: the report on a motion in a file, and the motion slowed down until it passes."""
+"""`rcilab check FILE --model NAME`: the report on a motion or program in a file, and a slowed motion that passes."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import Any
 
+from rcilab.cli.motion_file import HELP, as_motion, read_file
+from rcilab.errors import UsageError
 from rcilab.language import LANGUAGES
 
 
@@ -13,12 +15,15 @@ def add_parser(subparsers: Any) -> None:
     """Adds the command to the `rcilab` parser."""
     parser: ArgumentParser = subparsers.add_parser(
         "check",
-        help="judge a saved motion by the robot's conditions",
-        description="Prints the report on a motion saved with Motion.save. Exit code: 0 it conforms, or what was "
-        "written does; 1 it does not; 2 the file or the model name is no good.",
+        help="judge a saved motion or program by the robot's conditions",
+        description="Prints the report on a motion saved with Motion.save, or on that of a program saved with "
+        "Program.save. Exit code: 0 it conforms, or what was written does; 1 it does not; 2 the file or the model name "
+        "is no good, or the program cannot be planned.",
     )
-    parser.add_argument("file", type=Path, metavar="FILE", help="motion file (.npz)")
-    parser.add_argument("--model", required=True, metavar="NAME", help="arm, such as xMatePro7 (any case)")
+    parser.add_argument("file", type=Path, metavar="FILE", help=HELP)
+    parser.add_argument(
+        "--model", metavar="NAME", help="arm, such as xMatePro7 (any case); a program names its own when left out"
+    )
     parser.add_argument(
         "--slow-down",
         type=Path,
@@ -37,10 +42,14 @@ def run(args: Namespace) -> int:
     """
     from rcilab.conformance import check
     from rcilab.model import load_model
-    from rcilab.motion import Motion
+    from rcilab.motion import Program
 
-    model = load_model(args.model)
-    report = check(Motion.load(args.file), model)
+    found = read_file(args.file)
+    name = found.model if args.model is None and isinstance(found, Program) else args.model
+    if name is None:
+        raise UsageError("a motion does not say for which arm it is: add --model NAME, such as --model xMatePro7")
+    model = load_model(name, tool=found.T_flange_tool if isinstance(found, Program) else None)
+    report = check(as_motion(found, model), model)
     print(report if args.explain is None else report.explain(args.explain))
     if args.slow_down is None:
         return 0 if report.ok else 1

@@ -1,4 +1,4 @@
-"""`rcilab run FILE --robot rci://...`: a saved motion on a robot, after its report and an explicit yes."""
+"""`rcilab run FILE --robot rci://...`: a saved motion or program on a robot, after its report and a yes."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rcilab.cli.motion_file import HELP, as_motion, read_file
 from rcilab.errors import UsageError
 
 if TYPE_CHECKING:
@@ -27,12 +28,13 @@ def add_parser(subparsers: Any) -> None:
     """Adds the command to the `rcilab` parser."""
     parser: ArgumentParser = subparsers.add_parser(
         "run",
-        help="run a saved motion on a robot",
-        description="Judges a motion saved with Motion.save, shows the report, asks for a yes, runs it. Exit code: "
+        help="run a saved motion or program on a robot",
+        description="Judges a motion saved with Motion.save, or that of a program saved with Program.save, shows the "
+        "report, asks for a yes, runs it. Exit code: "
         "0 it ran to its end, 1 it does not conform, nobody said yes or it was stopped, 2 bad input, no robot or a "
         "fault of the robot.",
     )
-    parser.add_argument("file", type=Path, metavar="FILE", help="motion file (.npz)")
+    parser.add_argument("file", type=Path, metavar="FILE", help=HELP)
     parser.add_argument("--robot", required=True, metavar="ADDRESS", help="rci://HOST:PORT")
     parser.add_argument("--model", metavar="NAME", help="arm, such as xMatePro7; asked of the robot when left out")
     parser.add_argument("--yes", action="store_true", help="do not ask; for scripts that have asked already")
@@ -98,11 +100,11 @@ def _run(args: Namespace, stopper: _Stopper) -> int:
     from rcilab.client.start_check import describe_start_mismatch
     from rcilab.conformance import check
     from rcilab.model import load_model
-    from rcilab.motion import Motion
 
-    motion = Motion.load(args.file)
+    found = read_file(args.file)
     model = load_model(args.model) if args.model else None
     with connect(args.robot, model, args.timeout) as robot:
+        motion = as_motion(found, robot.model)
         start = robot.state.q_c
         mismatch = describe_start_mismatch(motion.q[0], start)
         if mismatch is not None:  # Before the report: every one of its violations would only say this again.

@@ -9,6 +9,8 @@ from rcilab.motion.margin import LIMIT_MARGIN
 from rcilab.motion.motion import Law, Motion, MotionSample, require_motion
 from rcilab.motion.online import Jog
 from rcilab.motion.piecewise import PiecewisePolynomial
+from rcilab.motion.plan_program import plan_program
+from rcilab.motion.program import Program, Waypoint
 from rcilab.motion.spline import motion_through
 from rcilab.motion.stop import plan_stop
 
@@ -19,6 +21,8 @@ __all__ = [
     "Motion",
     "MotionSample",
     "PiecewisePolynomial",
+    "Program",
+    "Waypoint",
     "derivatives_from_differences",
     "differences_from_derivatives",
     "motion_through",
@@ -27,6 +31,7 @@ __all__ = [
     "plan_joint",
     "plan_line",
     "plan_nullspace",
+    "plan_program",
     "plan_stop",
     "require_motion",
 ]

@@ -9,7 +9,7 @@ from os import PathLike
 from typing import BinaryIO, Literal, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from rcilab.arrays import Array, JointPath, JointVector, as_number, as_path, as_vector, described, frozen
 from rcilab.clock import CYCLE_TIME
@@ -60,6 +60,10 @@ class Motion:
     law: Law
     speed: float = 1.0
     """The speed it was planned with, as a part of the limits, in (0, 1]."""
+    segment_starts: Array = field(default_factory=lambda: np.zeros(1))
+    """When each segment of a program begins, shape (S,), first 0, [s]; any other motion is one."""
+    notes: tuple[str, ...] = ()
+    """What whoever planned it has to say about it, a sentence each: such as a blend that had to be shortened."""
     _cache: dict[str, Array] = field(init=False, repr=False, default_factory=dict[str, Array])
 
     def __post_init__(self) -> None:
@@ -68,6 +72,11 @@ class Motion:
             raise InvalidValueError("law", self.law, f"is unknown; known: {', '.join(LAWS)}")
         if not 0.0 < self.speed <= 1.0:
             raise InvalidValueError("speed", self.speed, "must be in (0, 1]")
+        starts = frozen(self.segment_starts)
+        if starts.ndim != 1 or not starts.size or starts[0] != 0.0 or not (np.diff(starts, append=np.inf) >= 0.0).all():
+            raise InvalidValueError("segment_starts", self.segment_starts, "must begin at 0 and never decrease [s]")
+        object.__setattr__(self, "segment_starts", starts)
+        object.__setattr__(self, "notes", tuple(str(note) for note in self.notes))
 
     @classmethod
     def from_samples(cls, q: ArrayLike) -> Motion:
@@ -135,8 +144,17 @@ class Motion:
         return self._kept("jerk")
 
     @property
+    def segment(self) -> NDArray[np.intp]:
+        """Index of the segment that each row belongs to, counted from 0, shape (N,): that of the waypoint of a program.
+
+        A segment without length has no row, but where it is the last.
+        """
+        late = self.times + _ROUNDING * CYCLE_TIME
+        return np.searchsorted(self.segment_starts, late, side="right") - 1
+
+    @property
     def fingerprint(self) -> str:
-        """SHA-256 over everything that defines this motion, hexadecimal."""
+        """SHA-256 over everything that defines how this motion runs, hexadecimal; its segments and notes do not."""
         digest = hashlib.sha256(f"rcilab motion {self.law} {self.speed!r}".encode())
         for array in (self.polynomial.breaks, self.polynomial.coefficients, self.goal):
             digest.update(repr(array.shape).encode())
@@ -183,7 +201,8 @@ class Motion:
         factor = as_number(factor, "factor")
         if not 1.0 <= factor < math.inf:
             raise InvalidValueError("factor", factor, "must be 1 or more, and finite: how many times slower")
-        return replace(self, polynomial=self.polynomial.slowed(factor))
+        starts = factor * self.segment_starts
+        return replace(self, polynomial=self.polynomial.slowed(factor), segment_starts=starts)
 
     def save(self, file: str | PathLike[str] | BinaryIO) -> None:
         """Writes the motion to a file (.npz) that `Motion.load` reads back to the last bit.
@@ -234,7 +253,7 @@ class Motion:
         return load_samples(file, rate_hz=rate_hz, unit=unit)
 
     def __reduce__(self) -> tuple[object, ...]:
-        return _rebuild, (self.polynomial, self.goal, self.law, self.speed)
+        return _rebuild, (self.polynomial, self.goal, self.law, self.speed, self.segment_starts, self.notes)
 
     def __repr__(self) -> str:
         return f"<Motion {self.law}, {self.n} joints, {self.duration:.3f} s, speed {self.speed:g}>"
@@ -293,5 +312,7 @@ def _sample(arrays: tuple[JointVector, JointVector, JointVector, JointVector]) -
     return MotionSample(*arrays)
 
 
-def _rebuild(polynomial: PiecewisePolynomial, goal: JointVector, law: Law, speed: float) -> Motion:
-    return Motion(polynomial=polynomial, goal=goal, law=law, speed=speed)
+def _rebuild(
+    polynomial: PiecewisePolynomial, goal: JointVector, law: Law, speed: float, starts: Array, notes: tuple[str, ...]
+) -> Motion:
+    return Motion(polynomial=polynomial, goal=goal, law=law, speed=speed, segment_starts=starts, notes=notes)

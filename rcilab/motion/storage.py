@@ -35,6 +35,8 @@ def save_motion(motion: Motion, file: str | PathLike[str] | BinaryIO) -> None:
         "breaks": motion.polynomial.breaks,
         "coefficients": motion.polynomial.coefficients,
         "goal": motion.goal,
+        "segment_starts": motion.segment_starts,
+        "notes": np.array(motion.notes, dtype=np.str_),
     }
     if not isinstance(file, str | PathLike):
         _require_stream(file, "write")
@@ -73,6 +75,9 @@ def load_motion(file: str | PathLike[str] | BinaryIO) -> Motion:
             goal=content["goal"],
             law=str(content["law"]),  # type: ignore[arg-type]  # Motion checks it.
             speed=as_number(content["speed"], "speed"),
+            # Files from before there were programs have neither.
+            segment_starts=content.get("segment_starts", np.zeros(1)),
+            notes=tuple(content["notes"].tolist()) if "notes" in content else (),
         )
     except KeyError as error:
         raise InvalidValueError("motion file", name, f"is incomplete: no {error}") from error

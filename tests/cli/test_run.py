@@ -13,7 +13,7 @@ import pytest
 from rcilab.cli import main
 from rcilab.client import connect
 from rcilab.model import load_model
-from rcilab.motion import Motion, plan_joint
+from rcilab.motion import Motion, Program, Waypoint, plan_joint
 from rcilab.supervisor.launch import start_controller
 
 MODEL = load_model("xMatePro7")
@@ -50,6 +50,15 @@ def test_without_a_yes_nothing_is_sent_and_with_one_the_arm_arrives(address, mot
     (line,) = captured.err.splitlines()
     assert line.startswith("rcilab: the motion starts elsewhere than the arm is: joint ")
     assert "plan_joint(robot.model, robot.state.q_c, motion.q[0])" in line
+
+
+def test_a_program_is_planned_for_the_robot_s_arm_and_runs(address, tmp_path, capsys):
+    with connect(address) as robot:
+        start = robot.state.q_c
+    steps = Waypoint.joint(start + 0.05, speed=1.0, blend=0.01), Waypoint.joint(start, speed=1.0)
+    Program(model="xMatePro7", start=start, waypoints=steps).save(tmp_path / "program.json")
+    assert main(["run", str(tmp_path / "program.json"), "--robot", address, "--yes"]) == 0
+    assert "<Run" in capsys.readouterr().out
 
 
 def test_another_arm_than_the_robot_s_is_refused_and_both_are_named(address, motion_file, capsys):

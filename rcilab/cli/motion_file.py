@@ -1,0 +1,41 @@
+"""The files that commands take for a motion: one saved with `Motion.save`, or a program in JSON that is planned."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rcilab.model import RobotModel
+    from rcilab.motion import Motion, Program
+
+HELP = "motion (.npz, from Motion.save) or program (.json, from Program.save)"
+
+
+def read_file(file: Path) -> Motion | Program:
+    """Returns the motion or, where the name ends in .json, the program in a file.
+
+    Raises:
+        InvalidValueError: There is no such file, or it holds neither.
+        VersionMismatchError: It was written by another version of its format.
+    """
+    from rcilab.motion import Motion, Program
+
+    return Program.load(file) if file.suffix.lower() == ".json" else Motion.load(file)
+
+
+def as_motion(found: Motion | Program, model: RobotModel) -> Motion:
+    """Returns the motion; a program is planned, and what its planner has to say is printed.
+
+    Raises:
+        PlanningError: The program cannot be planned.
+        InvalidValueError: It is for another arm.
+    """
+    from rcilab.motion import Program, plan_program
+
+    if not isinstance(found, Program):
+        return found
+    motion = plan_program(model, found)
+    for note in motion.notes:
+        print(f"note: {note}")
+    return motion

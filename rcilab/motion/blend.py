@@ -1,0 +1,157 @@
+"""Blends: the smooth curves that round the corners of a program.
+
+A corner is cut where the tool is a radius away from it, on either side, and a quintic leads from cut to cut with the
+segments' own direction and curvature there. Between paths of the tool it runs in position, orientation (as rotation
+vector from that of the corner, in which both slerps are straight) and arm angle: in the plane of two lines, inside
+their triangle. Beside a joint move it runs in joint space. Either way it stays inside the sphere around the corner,
+which is looked at, and the cuts come closer where it would not.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from rcilab.arrays import Array
+from rcilab.model import RobotModel
+from rcilab.motion.hermite import State, evaluate, quintic
+from rcilab.motion.path import Path
+from rcilab.motion.segment import Segment
+from rcilab.spatial import Pose, wxyz_from_rotation
+
+_LOOKS = 33
+"""Places at which a segment's half, or a blend, is looked at; a choice."""
+_STANDS = 1e-6
+"""A tool that moves less than this turns on the spot, [m]."""
+_NUDGE = 3e-4
+"""Share of the way over which derivatives are formed. A choice: both their errors are below 1e-7."""
+_INSIDE = 0.999
+"""Part of the radius to stay in, so that what happens between the looks is inside, too."""
+
+LENGTH = 1.0
+"""Length of every blend in the chain's own measure: the corner is in the middle."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Blend:
+    """The curve from a share of one segment to a share of the next."""
+
+    leave: float
+    """Share of the segment before, from 1/2 to 1."""
+    join: float
+    """Share of the segment after, from 0 to 1/2."""
+    radius: float
+    """How far from the corner the tool is at the cuts, at most, [m]."""
+    corner: Pose | None
+    """Pose of the tool at the corner; None where the curve runs in joint space."""
+    powers: tuple[Array, ...]
+    """Of the quintic over the whole blend: joint angles, (n,), or position, rotation vector and arm angle, (7,)."""
+
+    def poses(self, parts: Array) -> tuple[Array, Array]:
+        """Returns poses, shape (N, 4, 4), and arm angles, shape (N,), at parts of the blend."""
+        assert self.corner is not None
+        values = evaluate(self.powers, parts)
+        T = np.zeros((len(parts), 4, 4))
+        T[:, 3, 3] = 1.0
+        T[:, :3, :3] = self.corner.rotation @ rotations(values[:, 3:6])
+        T[:, :3, 3] = values[:, :3]
+        return T, values[:, 6]
+
+
+def build_blend(model: RobotModel, before: Segment, after: Segment) -> Blend:
+    """Returns the blend at the waypoint of `before`, with the radius that it asks for or the longest that fits.
+
+    Half of either segment is the most that a blend takes, as on an industrial controller; the radius is then the same
+    on both sides of the corner, unless the tool stands on one.
+    """
+    radius = before.waypoint.blend
+    corner = after.positions(model, np.zeros(1))[0]
+    halves = _distances(model, before, corner, -1.0), _distances(model, after, corner, 1.0)
+    moving = [float(half.max()) for half in halves if half.max() > _STANDS]
+    radius = min([radius, *moving])
+    back, ahead = _cut(halves[0], radius), _cut(halves[1], radius)
+    while True:
+        blend = _blend(model, before, after, 1.0 - back, ahead, radius)
+        excess = _farthest(model, blend, corner) / (_INSIDE * radius)
+        if excess <= 1.0:
+            return blend
+        closer = max(0.5, 0.99 / excess)
+        back, ahead = closer * back, closer * ahead
+
+
+def rotations(vectors: Array) -> Array:
+    """Returns the rotations of rotation vectors, shape (N, 3) to (N, 3, 3): Rodrigues' formula."""
+    square = (vectors * vectors).sum(axis=1)
+    angle = np.sqrt(square)
+    safe = np.where(angle > 1e-8, angle, 1.0)
+    a = np.where(angle > 1e-8, np.sin(safe) / safe, 1.0 - square / 6.0)
+    half = np.sin(safe / 2.0) / safe
+    b = np.where(angle > 1e-8, 2.0 * half * half, 0.5 - square / 24.0)
+    x, y, z = vectors.T
+    zero = np.zeros_like(x)
+    K = np.moveaxis(np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]), 2, 0)
+    return np.eye(3) + a[:, None, None] * K + b[:, None, None] * (K @ K)
+
+
+def _distances(model: RobotModel, segment: Segment, corner: Array, side: float) -> Array:
+    """Returns how far the tool is from the corner, from there to the middle of a segment, shape (N,), [m]."""
+    shares = np.linspace(0.0, 0.5, _LOOKS) if side > 0.0 else np.linspace(1.0, 0.5, _LOOKS)
+    return np.sqrt(((segment.positions(model, shares) - corner) ** 2).sum(axis=1))
+
+
+def _cut(distances: Array, radius: float) -> float:
+    """Returns the share, from the corner, at which the tool is first a radius away; 1/2 where it never is."""
+    beyond = np.flatnonzero(distances > radius)
+    if not beyond.size:
+        return 0.5
+    i = int(beyond[0])
+    part = (radius - distances[i - 1]) / (distances[i] - distances[i - 1])
+    return float(i - 1 + part) * 0.5 / (len(distances) - 1)
+
+
+def _blend(model: RobotModel, before: Segment, after: Segment, leave: float, join: float, radius: float) -> Blend:
+    rates = 2.0 * (1.0 - leave) / LENGTH, 2.0 * join / LENGTH
+    if before.path is not None and after.path is not None:
+        corner = before.path.goal
+        left = _scaled(_tool_state(before.path, corner, leave), rates[0])
+        right = _scaled(_tool_state(after.path, corner, join), rates[1])
+        right[0][6] += math.tau * round((left[0][6] - right[0][6]) / math.tau)  # The same arm angle, next to the other.
+    else:
+        corner = None
+        left, right = _scaled(before.state(model, leave), rates[0]), _scaled(after.state(model, join), rates[1])
+    powers = quintic(left, right, LENGTH)
+    return Blend(leave=leave, join=join, radius=radius, corner=corner, powers=powers)
+
+
+def _scaled(state: State, rate: float) -> State:
+    return state[0], state[1] * rate, state[2] * rate**2
+
+
+def _tool_state(path: Path, corner: Pose, share: float) -> State:
+    """Returns position, rotation vector from the corner and arm angle with two derivatives by the share, shape (7,)."""
+    T, psi = path.sample(share + _NUDGE * np.array([-1.0, 0.0, 1.0]))
+    rows = np.zeros((3, 7))
+    rows[:, :3] = T[:, :3, 3]
+    rows[:, 3:6] = [_rotation_vector(R) for R in corner.rotation.T @ T[:, :3, :3]]
+    if psi is not None:
+        rows[:, 6] = psi
+    before, here, after = rows
+    return here, (after - before) / (2.0 * _NUDGE), (after - 2.0 * here + before) / _NUDGE**2
+
+
+def _rotation_vector(R: Array) -> Array:
+    """Returns the rotation vector of a rotation, shape (3,), [rad], of at most half a turn."""
+    a, b, c, d, e, f, g, h, i = R.ravel().tolist()
+    w, x, y, z = wxyz_from_rotation((a, b, c, d, e, f, g, h, i))
+    w, x, y, z = (-w, -x, -y, -z) if w < 0.0 else (w, x, y, z)
+    sine = math.hypot(x, y, z)
+    factor = 2.0 * math.atan2(sine, w) / sine if sine > 1e-12 else 2.0
+    return np.array([factor * x, factor * y, factor * z])
+
+
+def _farthest(model: RobotModel, blend: Blend, corner: Array) -> float:
+    values = evaluate(blend.powers, np.linspace(0.0, 1.0, _LOOKS))
+    positions = values[:, :3] if blend.corner is not None else model.position_path(values)
+    return float(np.sqrt(((positions - corner) ** 2).sum(axis=1).max()))

@@ -1,0 +1,156 @@
+"""A chain run through as fast as the limits allow: the law is slowed down where its motion passes a limit."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from rcilab.arrays import Array
+from rcilab.clock import CYCLE_TIME
+from rcilab.errors import PlanningError
+from rcilab.limits import JointLimits, Limits
+from rcilab.motion.chain import Chain, Rows
+from rcilab.motion.chain_law import ChainLaw, ColumnLimits, chain_bounds, column_limits, fastest_law
+from rcilab.motion.hermite import quintic
+
+_ROUNDS = 12
+"""How often to slow down in places, and then as often as a whole. Seen: 1 to 4 in places."""
+_SLOWEST = 50.0
+"""Beyond this a limit is passed by a jump. A choice."""
+_INSTANTS = (0.25, 0.5, 0.75)
+"""Where in a cycle the curve is looked at, besides its start, in cycles."""
+_HASTE = 1.001
+"""To slow down by the square of what was found, and this much more, so that few rounds do. A choice."""
+
+
+def plan_chain(chain: Chain, limits: Limits) -> tuple[Array, list[float]]:
+    """Returns the fastest curve along a chain from rest to rest, and when it passes each corner, [s].
+
+    A quintic a cycle, through the chain at every cycle with its velocity and acceleration there: its coefficients,
+    shape (N - 1, n, 6), ascending powers of the time since the cycle began.
+
+    Args:
+        chain: The chain.
+        limits: Of the arm.
+
+    Raises:
+        PlanningError: A joint limit or a singularity is in the way.
+    """
+    bounds = column_limits(limits)
+    allowed = chain_bounds(chain, bounds)
+    finite = np.isfinite(bounds.acceleration)
+    # From full deceleration to full acceleration.
+    reversal = 2.0 * float(chain.speed.max()) * float((bounds.acceleration[finite] / bounds.jerk[finite]).max())
+    cycles = max(2, math.ceil(reversal / CYCLE_TIME))
+    slowdown = np.ones(len(chain.knots))
+    worst = 0.0
+    for round_ in range(2 * _ROUNDS):
+        law = fastest_law(allowed, slowdown, cycles)
+        interval = chain.interval(law.s)
+        q, powers = _curve(chain, law)
+        excess = np.maximum(_tool_excess(chain, bounds, law, interval), _joint_excess(chain, bounds, powers, interval))
+        if excess.max() <= 1.0:
+            _require_inside(chain, q, law, limits.joint)
+            corners = [int(np.searchsorted(law.s, middle)) * CYCLE_TIME for middle in chain.middles]
+            return np.stack(powers, axis=2), corners
+        worst = float(law.s[excess.argmax()])
+        somewhere = round_ < _ROUNDS
+        slowdown *= _spread(excess, law.s, chain.knots, cycles) if somewhere else float(excess.max()) * _HASTE
+        if slowdown.max() > _SLOWEST:
+            break
+    raise PlanningError(
+        f"{chain.place(worst)}: the joints would have to jump, because a singularity is close; lead the tool around it"
+    )
+
+
+def _curve(chain: Chain, law: ChainLaw) -> tuple[Array, list[Array]]:
+    """Returns the joint angles at every cycle, shape (N, n), and their coefficients by power, each (N - 1, n)."""
+    h = CYCLE_TIME
+    q, first, second = chain.sample(law.s, slice(chain.n))
+    ds, dds = law.ds[:, np.newaxis], law.dds[:, np.newaxis]
+    v = first * ds
+    a = second * ds**2 + first * dds
+    v[0] = v[-1] = a[0] = a[-1] = 0.0
+    parts = quintic((q[:-1], v[:-1], a[:-1]), (q[1:], v[1:], a[1:]), h)
+    return q, [part / h**power for power, part in enumerate(parts)]
+
+
+def _joint_excess(chain: Chain, limits: ColumnLimits, powers: list[Array], interval: Rows) -> Array:
+    """Returns how much slower each cycle must be to keep the joints' bounds in it, shape (N,)."""
+    n = chain.n
+    speed = np.maximum(chain.speed[interval[:-1]], chain.speed[interval[1:]])
+    scales = speed, speed, np.ones_like(speed)
+    excess = np.zeros(len(interval))
+    for order, (limit, scale) in enumerate(zip(_tables(limits, slice(n)), scales, strict=True), start=1):
+        powers = [float(p) * powers[p] for p in range(1, len(powers))]
+        largest = np.abs(powers[0])
+        for part in _INSTANTS:
+            value = powers[-1]
+            for coefficient in reversed(powers[:-1]):
+                value = value * (part * CYCLE_TIME) + coefficient
+            np.maximum(largest, np.abs(value), out=largest)
+        ratio = ((largest / limit).max(axis=1) / scale) ** (1.0 / order)
+        np.maximum(excess[:-1], ratio, out=excess[:-1])
+    return excess
+
+
+def _tool_excess(chain: Chain, limits: ColumnLimits, law: ChainLaw, interval: Rows) -> Array:
+    """Returns how much slower each row must be passed to keep the bounds on tool and arm angle, shape (N,).
+
+    By backward differences at 1 ms, as the controller judges them, with rest before and after.
+    """
+    n, count = chain.n, len(law.s)
+    speed = _looking_back(chain.speed[interval], np.maximum)
+    leads = _looking_back(chain.leads_tool[interval], np.minimum) > 0.0
+    excess = np.zeros(count)
+    if not leads.any():
+        return excess
+    table = chain.values(law.s, slice(n, None))
+    table = np.concatenate((np.repeat(table[:1], 3, axis=0), table, np.repeat(table[-1:], 3, axis=0)))
+    for order, limit in enumerate(_tables(limits, slice(n, None)), start=1):
+        table = np.diff(table, axis=0) / CYCLE_TIME
+        squares = table * table
+        ratio = np.abs(table[:, 0]) / limit[0]
+        np.maximum(ratio, np.sqrt(squares[:, 1:4].sum(axis=1)) / limit[1], out=ratio)
+        np.maximum(ratio, np.sqrt(squares[:, 4:7].sum(axis=1)) / limit[2], out=ratio)
+        # The difference at a row looks back; behind the end it is the end's.
+        offset = 3 - order
+        seen = ratio[offset : offset + count]
+        seen[-1] = max(seen[-1], float(ratio[offset + count :].max()))
+        seen = np.where(leads, seen if order == 3 else seen / speed, 0.0)
+        np.maximum(excess, seen ** (1.0 / order), out=excess)
+    return excess
+
+
+def _tables(limits: ColumnLimits, columns: slice) -> tuple[Array, Array, Array]:
+    return limits.velocity[columns], limits.acceleration[columns], limits.jerk[columns]
+
+
+def _looking_back(values: Array, join: np.ufunc) -> Array:
+    """Returns what a row and the three before it say, joined, shape (N,)."""
+    wide = np.concatenate((np.repeat(values[:1], 3), values))
+    return join(join(wide[3:], wide[2:-1]), join(wide[1:-2], wide[:-3]))
+
+
+def _spread(excess: Array, s: Array, knots: Array, cycles: int) -> Array:
+    """Returns by how much to slow down at each knot, given by how much each row is too fast."""
+    reach = cycles + 3
+    wide = np.pad(np.where(excess > 1.0, excess * excess * _HASTE, 1.0), reach, constant_values=1.0)
+    factor = np.lib.stride_tricks.sliding_window_view(wide, 2 * reach + 1).max(axis=1)
+    result = np.interp(knots, s, factor)
+    below = np.clip(np.searchsorted(knots, s, side="right") - 1, 0, len(knots) - 2)
+    np.maximum.at(result, below, factor)
+    np.maximum.at(result, below + 1, factor)
+    return result
+
+
+def _require_inside(chain: Chain, q: Array, law: ChainLaw, limits: JointLimits) -> None:
+    outside = np.argwhere(~((limits.lower < q) & (q < limits.upper)))
+    if outside.size:
+        row, joint = outside[0].tolist()
+        raise PlanningError(
+            f"{chain.place(float(law.s[row]))}: joint {joint + 1} would touch its limit at "
+            f"{math.degrees(q[row, joint]):.2f} deg ({math.degrees(limits.lower[joint]):.0f} to "
+            f"{math.degrees(limits.upper[joint]):.0f} deg); a smaller blend radius stays closer to the waypoints"
+        )

@@ -1,0 +1,163 @@
+"""JSON with the line of every value, for files that people write by hand and that others may have spoiled.
+
+Stricter than `json`: no NaN or infinity, no number beyond a double, no key twice, and only so much size and depth.
+"""
+
+from __future__ import annotations
+
+import re
+from bisect import bisect_right
+from dataclasses import dataclass
+from json import JSONDecodeError, JSONDecoder
+from typing import TypeAlias
+
+from rcilab.arrays import Words
+from rcilab.errors import InvalidValueError
+
+LONGEST = 8_000_000
+"""Largest text, [bytes]; a choice: a program of 10 000 waypoints has 4 million."""
+DEEPEST = 8
+"""How deep lists and objects may be in each other; a choice: a program needs 4."""
+
+_BLANK = re.compile(r"[ \t\r\n]*")
+_NUMBER = re.compile(r"-?(?:0|[1-9]\d*)(?:\.\d+)?(?:[eE][+-]?\d+)?(?![\w.])", re.ASCII)
+_WORD = re.compile(r"[^\s,:\[\]{}\"]+")
+_DECODER = JSONDecoder()  # For text, with its escapes.
+_CONSTANTS = {"true": True, "false": False, "null": None}
+
+Content: TypeAlias = "dict[str, Node] | list[Node] | str | float | bool | None"
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    """A value and where it stands."""
+
+    value: Content
+    """Every number is a float."""
+    line: int
+    """From 1."""
+
+    def plain(self) -> object:
+        """Returns the value without the lines."""
+        if isinstance(self.value, dict):
+            return {key: node.plain() for key, node in self.value.items()}
+        return [node.plain() for node in self.value] if isinstance(self.value, list) else self.value
+
+
+def read_json(content: bytes, name: str) -> Node:
+    """Returns what a text holds, with lines.
+
+    Args:
+        content: JSON in UTF-8.
+        name: What to call it in an error.
+
+    Raises:
+        InvalidValueError: It is no JSON, or not what this reader takes; the message names the line.
+    """
+    if len(content) > LONGEST:
+        raise InvalidValueError(name, Words(f"{len(content) / 1e6:.1f} MB"), f"is above {LONGEST / 1e6:g} MB")
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        problem = "is no text in UTF-8; save it as JSON"
+        raise InvalidValueError(f"{name}, line {line}", content[error.start : error.end], problem) from error
+    return _Reader(text, name).read()
+
+
+class _Reader:
+    """Walks through one text. Owned by the call of `read_json` that made it."""
+
+    def __init__(self, text: str, name: str) -> None:
+        self._text, self._name = text, name
+        self._at = 0
+        self._breaks = [match.start() for match in re.finditer("\n", text)]
+
+    def read(self) -> Node:
+        node = self._value(0)
+        if self._next():
+            raise self._error("follows after the end of the first value; a file holds one object")
+        return node
+
+    def _value(self, depth: int) -> Node:
+        mark = self._next()
+        line = self._line()
+        if mark and mark in "{[":
+            if depth == DEEPEST:
+                raise self._error(f"opens more than {DEEPEST} levels; a program needs 4")
+            self._at += 1
+            return Node(self._object(depth) if mark == "{" else self._list(depth), line)
+        if mark == '"':
+            return Node(self._string(), line)
+        number = _NUMBER.match(self._text, self._at)
+        if number is not None:
+            value = float(number[0])
+            if value in (float("inf"), -float("inf")):
+                raise self._error("is beyond the largest number, 1.8e308")
+            self._at = number.end()
+            return Node(value, line)
+        word = _WORD.match(self._text, self._at)
+        if word is None or word[0] not in _CONSTANTS:
+            raise self._error('is no value; JSON has numbers with a point, "text", true, false, null, [...] and {...}')
+        self._at = word.end()
+        return Node(_CONSTANTS[word[0]], line)
+
+    def _object(self, depth: int) -> dict[str, Node]:
+        found: dict[str, Node] = {}
+        if self._takes("}"):
+            return found
+        while True:
+            if self._next() != '"':
+                raise self._error('is no key; a key is text in double quotes, such as "speed"')
+            start = self._at
+            key = self._string()
+            if key in found:
+                self._at = start
+                raise self._error(f"is there already, in line {found[key].line}; keep one")
+            if not self._takes(":"):
+                raise self._error(f"is no colon; one must follow the key {key!r}")
+            found[key] = self._value(depth + 1)
+            if self._takes("}"):
+                return found
+            if not self._takes(","):
+                raise self._error("is neither a comma nor the end of the object }")
+
+    def _list(self, depth: int) -> list[Node]:
+        found: list[Node] = []
+        if self._takes("]"):
+            return found
+        while True:
+            found.append(self._value(depth + 1))
+            if self._takes("]"):
+                return found
+            if not self._takes(","):
+                raise self._error("is neither a comma nor the end of the list ]")
+
+    def _string(self) -> str:
+        try:
+            value, self._at = _DECODER.raw_decode(self._text, self._at)
+        except JSONDecodeError as error:
+            raise self._error(f"is no text: {error.msg.lower()}") from error
+        return value
+
+    def _next(self) -> str:
+        """Returns the next character that is no blank, or nothing at the end."""
+        match = _BLANK.match(self._text, self._at)
+        assert match is not None
+        self._at = match.end()
+        return self._text[self._at : self._at + 1]
+
+    def _takes(self, mark: str) -> bool:
+        if self._next() != mark:
+            return False
+        self._at += 1
+        return True
+
+    def _line(self) -> int:
+        return bisect_right(self._breaks, self._at - 1) + 1
+
+    def _error(self, problem: str) -> InvalidValueError:
+        word = _WORD.match(self._text, self._at)
+        shown = word[0] if word else self._text[self._at : self._at + 20].split("\n")[0]
+        found = Words(shown[:60]) if shown else Words("the end of the text")
+        return InvalidValueError(f"{self._name}, line {self._line()}", found, problem)

@@ -1,0 +1,164 @@
+"""Programs planned: one motion through all waypoints, as fast as the limits allow, corners rounded as asked for."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from rcilab.arrays import Array, as_number, described
+from rcilab.clock import CYCLE_TIME
+from rcilab.errors import InvalidValueError
+from rcilab.model import RobotModel, require_model
+from rcilab.motion.along import plan_along
+from rcilab.motion.blend import build_blend
+from rcilab.motion.chain import build_chain
+from rcilab.motion.chain_motion import plan_chain
+from rcilab.motion.joint import MIN_SPEED, plan_joint
+from rcilab.motion.motion import Motion
+from rcilab.motion.piecewise import PiecewisePolynomial
+from rcilab.motion.program import Program, label
+from rcilab.motion.segment import Segment, build_segments, naming
+
+_SHORTENED = 1e-6
+"""How much shorter than asked a radius must be to be mentioned, [m]."""
+
+
+def plan_program(model: RobotModel, program: Program, *, speed: float = 1.0) -> Motion:
+    """Returns the motion through the waypoints of a program, from rest to rest.
+
+    On lines, arcs, circles and null-space moves, and on blends between them, the limits on joints, tool and arm angle
+    are kept; on joint moves and on the blends beside them those on the joints, as by `plan_joint`. A blend uses the
+    lower speed of its neighbours. Without blends the motion is that of `plan_joint`, `plan_line` and so on, one after
+    the other, each from a whole cycle on.
+
+    Which segment a row belongs to is in `motion.segment`, counted from 0: a segment ends in the middle of its blend,
+    or, where the tool stops, with its dwell. A blend takes no more than half of a neighbouring segment; where the
+    radius is longer, it is shortened to what fits, and `motion.notes` says so.
+
+    Args:
+        model: The arm; with its own tool, unless the program has one.
+        program: The waypoints.
+        speed: What to multiply the speed of every waypoint by, above 0 to 1.
+
+    Raises:
+        PlanningError: A target is out of reach, or a joint limit or a singularity is in the way; the message names the
+            waypoint, the place and the reason.
+        InvalidValueError: The program is for another arm, or an argument is out of range.
+    """
+    require_model(model)
+    if not isinstance(program, Program):
+        raise InvalidValueError("program", described(program), "is no Program; Program.load reads one")
+    if program.model != model.name:
+        raise InvalidValueError("program", program.model, f"is the arm it is for, not {model.name}; load that model")
+    speed = as_number(speed, "speed")
+    if not 0.0 < speed <= 1.0:
+        raise InvalidValueError("speed", speed, "must be above 0, to 1: a part of the waypoints' speeds")
+    for number, waypoint in enumerate(program.waypoints, 1):
+        if speed * waypoint.speed < MIN_SPEED:
+            what = f"{label(number, waypoint)}, speed times {speed:g}"
+            raise InvalidValueError(what, speed * waypoint.speed, f"must be at least {MIN_SPEED:g}")
+    if program.T_flange_tool is not None:
+        model = model.with_tool(program.T_flange_tool)
+    track = _Track()
+    for run in _runs(build_segments(model, program)):
+        _plan_run(model, run, speed, track)
+    return track.motion(speed * max(waypoint.speed for waypoint in program.waypoints))
+
+
+def _runs(segments: list[Segment]) -> list[list[Segment]]:
+    """Returns the segments between full stops."""
+    runs: list[list[Segment]] = []
+    goes_on = False
+    for segment in segments:
+        if goes_on and not segment.stands:
+            runs[-1].append(segment)
+        else:
+            runs.append([segment])
+        waypoint = segment.waypoint
+        goes_on = waypoint.blend > 0.0 and waypoint.dwell == 0.0 and not segment.stands
+    return runs
+
+
+def _plan_run(model: RobotModel, run: list[Segment], scale: float, track: _Track) -> None:
+    segment = run[0]
+    speed = scale * segment.waypoint.speed
+    if len(run) > 1:
+        blends = [build_blend(model, before, after) for before, after in pairwise(run)]
+        for before, blend in zip(run[:-1], blends, strict=True):
+            asked = before.waypoint.blend
+            if blend.radius < asked - _SHORTENED:
+                track.notes.append(
+                    f"{before.label}: blend radius {1e3 * asked:.1f} mm shortened to {1e3 * blend.radius:.1f} mm: a "
+                    "blend takes at most half of the ways before and after it"
+                )
+        coefficients, corners = plan_chain(build_chain(model, run, blends, scale), model.limits)
+        breaks = np.arange(len(coefficients) + 1, dtype=np.float64) * CYCLE_TIME
+        track.add(breaks, coefficients, run[-1].goal, run[-1].waypoint.dwell, corners)
+    elif segment.stands:
+        track.add(np.zeros(1), np.zeros((0, model.n, 1)), segment.goal, segment.waypoint.dwell)
+    else:
+        with naming(segment.label):
+            if segment.path is None:
+                motion = plan_joint(model, segment.start, segment.goal, speed=speed)
+            else:
+                motion = plan_along(model, segment.start, segment.path, speed)
+        curve = motion.polynomial
+        track.add(curve.breaks, curve.coefficients, motion.goal, segment.waypoint.dwell)
+
+
+class _Track:
+    """The motion as far as it is planned. Owned by the call of `plan_program` that made it."""
+
+    def __init__(self) -> None:
+        self.notes: list[str] = []
+        self._starts: list[float] = []
+        self._breaks: list[Array] = []
+        self._pieces: list[Array] = []
+        self._goal = np.zeros(0)
+        self._end = 0.0
+
+    def add(
+        self, breaks: Array, coefficients: Array, goal: Array, dwell: float, corners: Sequence[float] = ()
+    ) -> None:  # fmt: skip
+        """Adds a run, from the next whole cycle on, and its dwell.
+
+        Args:
+            breaks: Where its pieces begin, and where the last one ends, shape (S + 1,), [s].
+            coefficients: Of its pieces, shape (S, n, k), ascending powers of the time since each began.
+            goal: Where it ends, shape (n,), [rad].
+            dwell: How long it stays there, [s].
+            corners: When it passes from one of its segments to the next, since its start, [s].
+        """
+        begin = _cycles(self._end) * CYCLE_TIME
+        self._stand(begin)
+        self._starts += [begin, *(begin + corner for corner in corners)]
+        self._breaks.append(breaks[:-1] + begin)
+        self._pieces.append(coefficients)
+        self._end, self._goal = begin + float(breaks[-1]), goal
+        if dwell > 0.0:
+            self._stand((_cycles(self._end) + round(dwell / CYCLE_TIME)) * CYCLE_TIME)
+
+    def motion(self, speed: float) -> Motion:
+        """Returns the whole motion."""
+        if not any(map(len, self._pieces)):
+            self._breaks, self._pieces = [np.zeros(1)], [self._goal.reshape(1, -1, 1)]
+        powers = max(piece.shape[2] for piece in self._pieces)
+        widened = [np.pad(piece, ((0, 0), (0, 0), (0, powers - piece.shape[2]))) for piece in self._pieces]
+        curve = PiecewisePolynomial(np.concatenate((*self._breaks, [self._end])), np.concatenate(widened))
+        return Motion(
+            polynomial=curve, goal=self._goal, law="jerk_limited", speed=speed,
+            segment_starts=np.array(self._starts), notes=tuple(self.notes),
+        )  # fmt: skip
+
+    def _stand(self, until: float) -> None:
+        if until > self._end:
+            self._breaks.append(np.array([self._end]))
+            self._pieces.append(self._goal.reshape(1, -1, 1))
+            self._end = until
+
+
+def _cycles(time: float) -> int:
+    return math.ceil(time / CYCLE_TIME - 1e-9)

@@ -1,0 +1,352 @@
+"""Programs: waypoints in a row, each with how to get there, as values that can be planned, saved and made a script."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+from os import PathLike
+from typing import Any, Literal, TypeAlias, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rcilab.arrays import Words, as_number, as_vector, described
+from rcilab.errors import InvalidValueError
+from rcilab.motion.joint import MIN_SPEED
+from rcilab.motion.samples import MOST
+from rcilab.robots import describe_robot
+from rcilab.spatial import Pose
+
+WaypointType: TypeAlias = Literal["joint", "line", "arc", "circle", "nullspace"]
+
+FARTHEST = 10.0
+"""Beyond this a coordinate is no place that an arm reaches, [m]; a choice: whoever writes more, writes millimetres."""
+LARGEST_BLEND = 1.0
+"""Largest blend radius, [m]; a choice: an arm's reach."""
+LONGEST_DWELL = 3600.0
+"""Longest stay at a waypoint, [s]; a choice."""
+MOST_WAYPOINTS = 10_000
+"""A choice; a motion through them has a gigabyte."""
+_UNIT = 1e-3
+"""How far the length of a quaternion may be from 1; it is normalised."""
+
+ALWAYS = ("speed", "blend", "dwell")
+"""What every waypoint may have."""
+ALLOWED: dict[WaypointType, tuple[str, ...]] = {
+    "joint": ("q", "position", "wxyz", "psi"),
+    "line": ("q", "position", "wxyz", "psi"),
+    "arc": ("via", "via_wxyz", "q", "position", "wxyz", "psi"),
+    "circle": ("center", "axis", "angle", "psi"),
+    "nullspace": ("psi",),
+}
+"""What else a waypoint of each type may have."""
+NEEDED: dict[WaypointType, tuple[str, ...]] = {
+    "joint": (),
+    "line": (),
+    "arc": ("via",),
+    "circle": ("center", "axis"),
+    "nullspace": ("psi",),
+}
+"""What it must have, besides a target: a joint move, a line and an arc go to q, or to position and wxyz."""
+
+Floats: TypeAlias = tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Waypoint:
+    """One step of a program: where to, and how. Plain numbers, so that equal waypoints are equal and files exact.
+
+    `Waypoint.joint`, `.line`, `.arc`, `.circle` and `.nullspace` make them of poses and arrays.
+
+    Raises:
+        InvalidValueError: A number is missing, out of range or of no meaning for this type.
+    """
+
+    type: WaypointType
+    """joint: straight in joint space. line, arc: the tool straight, or over `via`. circle: around `center`, orientation
+    held. nullspace: the elbow alone."""
+    q: Floats | None = None
+    """Target as joint angles, n of them, [rad]; of a line or an arc the pose and the arm angle there."""
+    position: Floats | None = None
+    """Target: position of the tool in base, 3 numbers, [m]; with `wxyz`."""
+    wxyz: Floats | None = None
+    """Target: orientation of the tool in base, 4 numbers, a unit quaternion."""
+    via: Floats | None = None
+    """A point on the arc, in base, 3 numbers, [m]."""
+    via_wxyz: Floats | None = None
+    """Orientation of the tool there, 4 numbers, a unit quaternion; None turns evenly from start to target."""
+    center: Floats | None = None
+    """Centre of the circle in base, 3 numbers, [m]."""
+    axis: Floats | None = None
+    """Axis of the circle in base, 3 numbers of any length; the tool goes around it by the right-hand rule."""
+    angle: float | None = None
+    """How far around the circle, more than 0 up to 2 pi, [rad]; None is all around."""
+    psi: float | None = None
+    """Arm angle of a 7-axis arm at the target, -pi to pi, [rad]; None holds the one before, or in a joint move any."""
+    speed: float = 0.2
+    """Part of the velocity and acceleration limits to use on the way here, 0.001 to 1; jerk limits are used in full."""
+    blend: float = 0.0
+    """How far from this waypoint the tool may leave its way to round the corner, up to 1, [m]. 0 is a stop. So are the
+    last waypoint, one with a dwell, and one at which nothing moves."""
+    dwell: float = 0.0
+    """How long to stay here, up to 3600, [s]; in whole cycles."""
+
+    def __post_init__(self) -> None:
+        if self.type not in get_args(WaypointType):
+            known = ", ".join(get_args(WaypointType))
+            raise InvalidValueError("type", described(self.type), f"is unknown; known: {known}")
+        allowed = (*ALLOWED[self.type], *ALWAYS)
+        for name in _OPTIONAL:
+            value = getattr(self, name)
+            if value is not None and name not in allowed:
+                raise InvalidValueError(
+                    name, described(value), f"has no meaning here; {self.type} takes: {', '.join(allowed)}"
+                )
+            if value is None and name in NEEDED[self.type]:
+                raise InvalidValueError(name, None, f"is missing: {self.type} needs {', '.join(NEEDED[self.type])}")
+            if value is not None and name not in ("q", "angle", "psi"):
+                object.__setattr__(self, name, _vector(name, value))
+        self._require_target()
+        for name, lowest, highest, unit in _RANGES:
+            value = getattr(self, name)
+            if value is None:
+                continue
+            number = as_number(value, name, unit)
+            if not lowest <= number <= highest or (name == "angle" and number == 0.0):
+                span = f"{'more than 0' if name == 'angle' else f'{lowest:.5g}'} to {highest:.5g} [{unit}]"
+                raise InvalidValueError(name, number, f"must be from {span}")
+            object.__setattr__(self, name, number)
+
+    @classmethod
+    def joint(
+        cls, target: Pose | ArrayLike, *, psi: float | None = None, speed: float = 0.2, blend: float = 0.0,
+        dwell: float = 0.0,
+    ) -> Waypoint:  # fmt: skip
+        """Returns a move straight in joint space, to joint angles, shape (n,), [rad], or to a pose of the tool.
+
+        A pose is reached on the branch closest to where the arm comes from.
+        """
+        return cls(type="joint", **_target(target), psi=psi, speed=speed, blend=blend, dwell=dwell)
+
+    @classmethod
+    def line(
+        cls, target: Pose | ArrayLike, *, psi: float | None = None, speed: float = 0.2, blend: float = 0.0,
+        dwell: float = 0.0,
+    ) -> Waypoint:  # fmt: skip
+        """Returns a straight line of the tool to a pose, or to where it is at joint angles, shape (n,), [rad]."""
+        return cls(type="line", **_target(target), psi=psi, speed=speed, blend=blend, dwell=dwell)
+
+    @classmethod
+    def arc(
+        cls, via: Pose | ArrayLike, target: Pose | ArrayLike, *, psi: float | None = None, speed: float = 0.2,
+        blend: float = 0.0, dwell: float = 0.0,
+    ) -> Waypoint:  # fmt: skip
+        """Returns an arc of the tool over `via`: through that pose, or only that position, shape (3,), [m]."""
+        places: dict[str, Any] = {"via": via}
+        if isinstance(via, Pose):
+            places = {"via": via.position, "via_wxyz": via.wxyz}
+        return cls(type="arc", **places, **_target(target), psi=psi, speed=speed, blend=blend, dwell=dwell)
+
+    @classmethod
+    def circle(
+        cls, center: ArrayLike, axis: ArrayLike, angle: float | None = None, *, psi: float | None = None,
+        speed: float = 0.2, blend: float = 0.0, dwell: float = 0.0,
+    ) -> Waypoint:  # fmt: skip
+        """Returns a circle, or a part of it, around a centre, shape (3,), [m], and an axis, shape (3,)."""
+        return cls(
+            type="circle", center=_vector("center", center), axis=_vector("axis", axis), angle=angle, psi=psi,
+            speed=speed, blend=blend, dwell=dwell,
+        )  # fmt: skip
+
+    @classmethod
+    def nullspace(cls, psi: float, *, speed: float = 0.2, blend: float = 0.0, dwell: float = 0.0) -> Waypoint:
+        """Returns a move of the elbow alone, to an arm angle, [rad]."""
+        return cls(type="nullspace", psi=psi, speed=speed, blend=blend, dwell=dwell)
+
+    @property
+    def pose(self) -> Pose | None:
+        """The target as a pose, if that is how it was given."""
+        return None if self.position is None or self.wxyz is None else Pose(self.position, self.wxyz)
+
+    def _require_target(self) -> None:
+        if "q" not in ALLOWED[self.type]:
+            return
+        has_pose = self.position is not None or self.wxyz is not None
+        if self.q is None and not has_pose:
+            raise InvalidValueError("target", None, f"is missing: {self.type} needs q, or position and wxyz")
+        if self.q is not None:
+            if has_pose:
+                raise InvalidValueError("q", self.q, "is a second target, beside position and wxyz; keep one")
+            if self.psi is not None:
+                raise InvalidValueError("psi", self.psi, "is a second arm angle: q has one; leave it out")
+            object.__setattr__(self, "q", angles_of(self.q, "q"))
+        for name, other in (("position", "wxyz"), ("wxyz", "position")):
+            if has_pose and getattr(self, name) is None:
+                raise InvalidValueError(name, None, f"is missing beside {other}: a pose has both")
+
+
+_OPTIONAL = tuple(field.name for field in fields(Waypoint) if field.default is None)
+_RANGES = (
+    ("angle", 0.0, math.tau, "rad"),
+    ("psi", -math.pi, math.pi, "rad"),
+    ("speed", MIN_SPEED, 1.0, "part of the limits"),
+    ("blend", 0.0, LARGEST_BLEND, "m"),
+    ("dwell", 0.0, LONGEST_DWELL, "s"),
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Program:
+    """Waypoints in a row, for one model, from one start. `plan_program` makes the motion.
+
+    Raises:
+        InvalidValueError: A number is out of range, or the angles are not as many as the arm has axes.
+        ModelError: No robot has this name.
+    """
+
+    model: str
+    """Name of the arm, as the manual spells it."""
+    start: Floats
+    """Joint angles at the start, n of them, [rad]."""
+    waypoints: tuple[Waypoint, ...]
+    name: str = ""
+    """What people call it."""
+    tool: Floats | None = None
+    """Pose of the tool in the flange frame, position [m] and wxyz, 7 numbers; None is the tool of whoever plans."""
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.name, str) or not self.name.isprintable():
+            raise InvalidValueError("name", described(self.name), "must be text in one line")
+        robot = describe_robot(self.model)
+        object.__setattr__(self, "model", robot.name)
+        n = len(robot.home)
+        object.__setattr__(self, "start", angles_of(self.start, "start", n, robot.name))
+        object.__setattr__(self, "waypoints", tuple(self.waypoints))
+        if not 1 <= len(self.waypoints) <= MOST_WAYPOINTS:
+            raise InvalidValueError("waypoints", Words(str(len(self.waypoints))), f"must be 1 to {MOST_WAYPOINTS}")
+        for number, waypoint in enumerate(self.waypoints, 1):
+            if not isinstance(waypoint, Waypoint):
+                raise InvalidValueError(f"waypoint {number}", described(waypoint), "is none; Waypoint.line makes one")
+            try:
+                require_fit(waypoint, n, robot.name)
+            except InvalidValueError as error:
+                raise InvalidValueError(
+                    f"{label(number, waypoint)}, {error.name}", error.value, error.requirement
+                ) from error
+        if self.tool is not None:
+            tool = as_vector(self.tool, 7, "tool", "position m, wxyz").tolist()
+            object.__setattr__(self, "tool", (*_vector("tool", tool[:3]), *_vector("wxyz", tool[3:])))
+
+    @property
+    def T_flange_tool(self) -> Pose | None:
+        """The tool as a pose."""
+        return None if self.tool is None else Pose(self.tool[:3], self.tool[3:])
+
+    def to_json(self) -> str:
+        """Returns the program as JSON, which `from_json` reads back to the last bit."""
+        from rcilab.motion.program_file import program_text
+
+        return program_text(self)
+
+    @classmethod
+    def from_json(cls, text: str) -> Program:
+        """Returns the program in a JSON text.
+
+        Raises:
+            InvalidValueError: It holds no sound program; the message names the line, the key and what to do.
+            VersionMismatchError: It was written for another version of this format.
+        """
+        from rcilab.motion.program_file import read_program
+
+        return read_program(text.encode(errors="surrogatepass"), "program")
+
+    def save(self, file: str | PathLike[str]) -> None:
+        """Writes the program to a file as JSON.
+
+        Raises:
+            InvalidValueError: The file cannot be written.
+        """
+        from rcilab.motion.program_file import save_program
+
+        save_program(self, file)
+
+    @classmethod
+    def load(cls, file: str | PathLike[str]) -> Program:
+        """Returns the program in a file.
+
+        Raises:
+            InvalidValueError: There is no such file, or it holds no sound program; the message names the line.
+            VersionMismatchError: It was written for another version of this format.
+        """
+        from rcilab.motion.program_file import load_program
+
+        return load_program(file)
+
+    def to_python(self) -> str:
+        """Returns a script that plans the same motion; run as `python SCRIPT [OUT.npz]` it prints the report."""
+        from rcilab.motion.program_script import program_script
+
+        return program_script(self)
+
+    def __repr__(self) -> str:
+        types = [waypoint.type for waypoint in self.waypoints]
+        counts = ", ".join(f"{types.count(kind)} {kind}" for kind in dict.fromkeys(types))
+        return f"<Program{f' {self.name!r}' if self.name else ''} for {self.model}: {counts}>"
+
+
+def label(number: int, waypoint: Waypoint) -> str:
+    """Returns what errors call a waypoint, counted from 1."""
+    return f"waypoint {number} ({waypoint.type})"
+
+
+def require_fit(waypoint: Waypoint, n: int, robot: str) -> None:
+    """Refuses a waypoint that is none for this arm.
+
+    Raises:
+        InvalidValueError: Its q has not n angles, or it has an arm angle and the arm has none.
+    """
+    if waypoint.q is not None:
+        angles_of(waypoint.q, "q", n, robot)
+    if n != 7 and (waypoint.psi is not None or waypoint.type == "nullspace"):
+        raise InvalidValueError("psi", waypoint.psi, f"has no meaning for {robot}: a 6-axis arm has no arm angle")
+
+
+def angles_of(value: ArrayLike, name: str, n: int | None = None, robot: str = "") -> Floats:
+    """Returns checked joint angles, [rad].
+
+    Raises:
+        InvalidValueError: Not 6 or 7 finite numbers, or not as many as the arm has axes, or more than two turns.
+    """
+    size = n or (np.size(value) if np.size(value) in (6, 7) else 7)
+    if n is not None and np.shape(value) != (n,):
+        raise InvalidValueError(name, described(value), f"must be {n} joint angles [rad]: {robot} has {n} axes")
+    angles: Floats = tuple(as_vector(value, size, name, "rad").tolist())
+    for joint, angle in enumerate(angles, 1):
+        if abs(angle) > MOST:
+            problem = f"rad of joint {joint} is more than two turns, {MOST:.4g} rad; degrees times pi / 180 are radians"
+            raise InvalidValueError(name, angle, problem)
+    return angles
+
+
+def _target(target: Pose | ArrayLike) -> dict[str, Any]:
+    if isinstance(target, Pose):
+        return {"position": tuple(target.position.tolist()), "wxyz": tuple(target.wxyz.tolist())}
+    return {"q": angles_of(target, "q")}
+
+
+def _vector(name: str, value: ArrayLike) -> Floats:
+    numbers: Floats = tuple(
+        as_vector(
+            value, 4 if name.endswith("wxyz") else 3, name, "" if name.endswith(("wxyz", "axis")) else "m"
+        ).tolist()
+    )
+    if name.endswith("wxyz"):
+        if abs(math.hypot(*numbers) - 1.0) > _UNIT:
+            problem = f"has length {math.hypot(*numbers):.4g}, must be 1 within {_UNIT:g}: a unit quaternion, w first"
+            raise InvalidValueError(name, numbers, problem)
+    elif name == "axis":
+        if math.hypot(*numbers) < 1e-12:
+            raise InvalidValueError(name, numbers, "has no direction: its length is zero")
+    elif max(map(abs, numbers)) > FARTHEST:
+        raise InvalidValueError(name, numbers, f"is beyond {FARTHEST:g} m; millimetres divided by 1000 are metres")
+    return numbers

@@ -1,0 +1,180 @@
+"""Programs in JSON: exact there and back, and for every file that holds none a sentence with its line."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import fields
+from os import PathLike, fspath
+from pathlib import Path
+from typing import Any
+
+from rcilab.arrays import Words, described
+from rcilab.errors import InvalidValueError, ModelError, VersionMismatchError
+from rcilab.motion.lined_json import LONGEST, Node, read_json
+from rcilab.motion.program import ALLOWED, ALWAYS, Program, Waypoint, require_fit
+from rcilab.robots import RobotDescription, describe_robot
+
+FORMAT = "rcilab program"
+VERSION = 1
+
+SCHEMA = Path(__file__).with_name("program.schema.json")
+"""The JSON schema (draft 2020-12) of a program."""
+
+_SCALARS = ("angle", "psi", "speed", "blend", "dwell")
+_PROGRAM_KEYS = ("format", "version", "name", "model", "tool", "start", "waypoints")
+
+
+def program_text(program: Program) -> str:
+    """Returns a program as JSON, a waypoint a line."""
+    head = {"format": FORMAT, "version": VERSION, "name": program.name, "model": program.model}
+    lines = [f"  {json.dumps(key)}: {json.dumps(value, ensure_ascii=False)}" for key, value in head.items()]
+    if program.tool is not None:
+        lines.append(f'  "tool": {json.dumps(program.tool)}')
+    lines.append(f'  "start": {json.dumps(program.start)}')
+    waypoints = ",\n".join(f"    {json.dumps(_as_written(waypoint))}" for waypoint in program.waypoints)
+    lines.append(f'  "waypoints": [\n{waypoints}\n  ]')
+    return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def save_program(program: Program, file: str | PathLike[str]) -> None:
+    """Writes a program as JSON.
+
+    Raises:
+        InvalidValueError: The file cannot be written.
+    """
+    try:
+        Path(file).write_text(program_text(program), encoding="utf-8")
+    except OSError as error:
+        raise InvalidValueError("program file", fspath(file), f"cannot be written: {error.strerror}") from error
+
+
+def load_program(file: str | PathLike[str]) -> Program:
+    """Returns the program in a file.
+
+    Raises:
+        InvalidValueError: There is no such file, or it holds no sound program.
+        VersionMismatchError: It was written for another version of this format.
+    """
+    if not isinstance(file, str | PathLike):
+        raise InvalidValueError("program file", described(file), "is no file name")
+    path = Path(fspath(file))
+    try:
+        with path.open("rb") as stream:
+            content = stream.read(LONGEST + 1)
+    except FileNotFoundError as error:
+        raise InvalidValueError("program file", str(path), "does not exist") from error
+    except OSError as error:
+        raise InvalidValueError("program file", str(path), f"cannot be read: {error.strerror}") from error
+    return read_program(content, path.name)
+
+
+def read_program(content: bytes, name: str) -> Program:
+    """Returns the program in a JSON text.
+
+    Args:
+        content: JSON in UTF-8.
+        name: What to call it in an error.
+
+    Raises:
+        InvalidValueError: It holds no sound program; one sentence with line, key, value, bound and what to do.
+        VersionMismatchError: It was written for another version of this format.
+    """
+    root = read_json(content, name)
+    found = _object(root, name, "a program", _PROGRAM_KEYS)
+    for key, expected in (("format", FORMAT), ("version", float(VERSION))):
+        if key not in found:
+            raise InvalidValueError(
+                f"{name}, {key}", None, f"is missing; a program has {json.dumps(_written(expected))}"
+            )
+        value = found[key].value
+        if key == "version" and value != expected:
+            what = f"{name}, line {found[key].line}, version"
+            raise VersionMismatchError(what, value, VERSION, "write it anew with the rcilab that reads it")
+        if value != expected:
+            raise InvalidValueError(_at(name, found[key], key), found[key].plain(), f"must be {expected!r}")
+    for key in ("model", "start", "waypoints"):
+        if key not in found:
+            raise InvalidValueError(f"{name}, {key}", None, "is missing; a program has model, start and waypoints")
+    texts = {key: _text(name, found[key], key) for key in ("name", "model") if key in found}
+    vectors = {key: _vector(name, found[key], key) for key in ("start", "tool") if key in found}
+    listed = found["waypoints"]
+    if not isinstance(listed.value, list):
+        raise InvalidValueError(_at(name, listed, "waypoints"), listed.plain(), "must be a list [{...}, {...}]")
+    try:
+        robot = describe_robot(str(texts["model"]))
+    except ModelError as error:
+        raise InvalidValueError(_at(name, found["model"], "model"), texts["model"], f"is no robot: {error}") from error
+    waypoints = tuple(_waypoint(node, number, name, robot) for number, node in enumerate(listed.value, 1))
+    try:
+        return Program(waypoints=waypoints, **texts, **vectors)  # type: ignore[arg-type]  # Program checks them.
+    except InvalidValueError as error:
+        raise _placed(error, name, found.get("tool" if error.name == "wxyz" else error.name, root)) from error
+
+
+def _waypoint(node: Node, number: int, name: str, robot: RobotDescription) -> Waypoint:
+    kind = f"waypoint {number}"
+    keys = tuple(field.name for field in fields(Waypoint))
+    found = _object(node, name, kind, keys)
+    if "type" not in found:
+        raise InvalidValueError(
+            f"{name}, line {node.line}, {kind}, type", None, f"is missing; known: {', '.join(ALLOWED)}"
+        )
+    values: dict[str, Any] = {"type": _text(name, found["type"], f"{kind}, type")}
+    for key, value in found.items():
+        if key == "type" or (value.value is None and key not in ALWAYS):
+            continue
+        what = f"{kind}, {key}"
+        values[key] = _number(name, value, what) if key in _SCALARS else _vector(name, value, what)
+    try:
+        waypoint = Waypoint(**values)
+        require_fit(waypoint, len(robot.home), robot.name)
+        return waypoint
+    except InvalidValueError as error:
+        raise _placed(error, name, found.get(error.name, node), f"waypoint {number} ({values['type']}), ") from error
+
+
+def _placed(error: InvalidValueError, name: str, node: Node, prefix: str = "") -> InvalidValueError:
+    value = Words("nothing") if error.value is None else error.value
+    return InvalidValueError(f"{name}, line {node.line}, {prefix}{error.name}", value, error.requirement)
+
+
+def _object(node: Node, name: str, kind: str, keys: tuple[str, ...]) -> dict[str, Node]:
+    if not isinstance(node.value, dict):
+        raise InvalidValueError(f"{name}, line {node.line}", node.plain(), f"must be {kind}: an object {{...}}")
+    for key, value in node.value.items():
+        if key not in keys:
+            raise InvalidValueError(
+                f"{name}, line {value.line}, {kind}, {key}", value.plain(), f"is unknown; known: {', '.join(keys)}"
+            )
+    return node.value
+
+
+def _text(name: str, node: Node, key: str) -> str:
+    if not isinstance(node.value, str):
+        raise InvalidValueError(_at(name, node, key), node.plain(), "must be text in double quotes")
+    return node.value
+
+
+def _number(name: str, node: Node, key: str) -> float:
+    if not isinstance(node.value, float):
+        raise InvalidValueError(_at(name, node, key), node.plain(), "must be a number")
+    return node.value
+
+
+def _vector(name: str, node: Node, key: str) -> tuple[float, ...]:
+    if not isinstance(node.value, list):
+        raise InvalidValueError(_at(name, node, key), node.plain(), "must be a list of numbers [...]")
+    return tuple(_number(name, item, f"{key}, number {i}") for i, item in enumerate(node.value, 1))
+
+
+def _at(name: str, node: Node, key: str) -> str:
+    return f"{name}, line {node.line}, {key}"
+
+
+def _written(value: object) -> object:
+    return int(value) if isinstance(value, float) else value
+
+
+def _as_written(waypoint: Waypoint) -> dict[str, object]:
+    values = {field.name: getattr(waypoint, field.name) for field in fields(Waypoint)}
+    return {key: value for key, value in values.items() if value is not None}

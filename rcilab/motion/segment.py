@@ -1,0 +1,189 @@
+"""The segments of a program: each waypoint's way as geometry, from joint angles to joint angles."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import numpy as np
+
+from rcilab.arrays import Array, JointPath, JointVector
+from rcilab.errors import InvalidValueError, KinematicsError, PlanningError
+from rcilab.model import RobotModel
+from rcilab.motion.along import require_path
+from rcilab.motion.cartesian import arm_angles
+from rcilab.motion.inverse_path import inverse_path
+from rcilab.motion.obstacle import examine
+from rcilab.motion.path import Path, build_arc, build_circle, build_line
+from rcilab.motion.program import Program, Waypoint, label
+from rcilab.motion.s_curve import STANDSTILL_DISTANCE
+from rcilab.spatial import Pose
+
+_KNOTS = 100
+"""Steps in which a path is first looked at. A choice."""
+_STEP = 0.1
+"""Turn of a joint from knot to knot beyond which it is looked at more closely, [rad]. A choice."""
+_OTHER_BRANCH = 1e-6
+"""How far a line may end from the q it was to go to, [rad]; beyond it is another branch."""
+_NUDGE = 3e-4
+"""Share of the way over which derivatives by the way are formed. A choice: both their errors are below 1e-7."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Segment:
+    """The way to one waypoint, as a function of its share u, 0 to 1."""
+
+    number: int
+    """Of the waypoint, from 1."""
+    waypoint: Waypoint
+    start: JointVector
+    """Shape (n,), [rad]."""
+    goal: JointVector
+    path: Path | None
+    """Of the tool; None is a straight line in joint space."""
+    knots: JointPath
+    """Joint angles at evenly spaced shares, shape (M + 1, n), [rad]; two rows for a straight line in joint space."""
+
+    @property
+    def label(self) -> str:
+        """What errors call it."""
+        return label(self.number, self.waypoint)
+
+    @property
+    def stands(self) -> bool:
+        """Whether nothing moves on it."""
+        if self.path is not None:
+            return self.path.distance == 0.0
+        return float(np.abs(self.goal - self.start).max()) <= STANDSTILL_DISTANCE
+
+    def near(self, share: float) -> JointVector:
+        """Returns joint angles close to those at a share, to choose the branch."""
+        return self.knots[round(min(max(share, 0.0), 1.0) * (len(self.knots) - 1))]
+
+    def positions(self, model: RobotModel, shares: Array) -> Array:
+        """Returns where the tool is, shape (N, 3), [m]."""
+        if self.path is not None:
+            return _positions(self.path, shares)
+        return model.position_path(self.start + shares[:, np.newaxis] * (self.goal - self.start))
+
+    def state(self, model: RobotModel, share: float) -> tuple[JointVector, JointVector, JointVector]:
+        """Returns joint angles and their first two derivatives by the share, each of shape (n,)."""
+        if self.path is None:
+            way = self.goal - self.start
+            return self.start + share * way, way, np.zeros_like(way)
+        T, psi = self.path.sample(share + _NUDGE * np.array([-1.0, 0.0, 1.0]))
+        before, here, after = inverse_path(model, T, psi, self.near(share))[0]
+        return here, (after - before) / (2.0 * _NUDGE), (after - 2.0 * here + before) / _NUDGE**2
+
+
+def build_segments(model: RobotModel, program: Program) -> list[Segment]:
+    """Returns the segments of a program, each from where the one before ends.
+
+    Raises:
+        PlanningError: A target is out of reach, or a joint limit or a singularity is in the way; the message names the
+            waypoint, the place and the reason.
+        InvalidValueError: A waypoint has what this arm has not.
+    """
+    q = np.array(program.start)
+    try:
+        _require_inside(model, q)
+    except PlanningError as error:
+        raise PlanningError(f"the start: {error}") from error
+    segments: list[Segment] = []
+    for number, waypoint in enumerate(program.waypoints, 1):
+        with naming(label(number, waypoint)):
+            segments.append(_segment(model, q, number, waypoint))
+        q = segments[-1].goal
+    return segments
+
+
+@contextmanager
+def naming(what: str) -> Iterator[None]:
+    """Puts the name of a waypoint in front of whatever goes wrong."""
+    try:
+        yield
+    except InvalidValueError as error:
+        raise InvalidValueError(f"{what}, {error.name}", error.value, error.requirement) from error
+    except PlanningError as error:
+        raise PlanningError(f"{what}: {error}", share=error.share) from error
+    except KinematicsError as error:
+        raise PlanningError(f"{what}: {error}") from error
+
+
+def _positions(path: Path, shares: Array) -> Array:
+    """Returns where the tool is on a path, shape (N, 3), [m], without its orientation."""
+    u = shares[:, np.newaxis]
+    if path.circle is None:
+        start = path.start.position
+        return start + u * (path.goal.position - start)
+    center, first, second = (np.array(point) for point in (path.circle.center, path.circle.first, path.circle.second))
+    return center + np.cos(u * path.circle.angle) * first + np.sin(u * path.circle.angle) * second
+
+
+def _segment(model: RobotModel, q: JointVector, number: int, waypoint: Waypoint) -> Segment:
+    if waypoint.type == "joint":
+        goal = _joint_goal(model, q, waypoint)
+        _require_inside(model, goal)
+        return Segment(
+            number=number, waypoint=waypoint, start=q, goal=goal, path=None, knots=np.stack((q, goal))
+        )  # fmt: skip
+    path = _path(model, q, waypoint)
+    knots = np.stack((q, q)) if path.distance == 0.0 else _followed(model, q, path)
+    goal = knots[-1]
+    if waypoint.q is not None and (excess := np.abs(goal - waypoint.q)).max() > _OTHER_BRANCH:
+        joint = int(excess.argmax())
+        raise PlanningError(
+            f"the {waypoint.type} ends with joint {joint + 1} at {math.degrees(goal[joint]):.2f} deg and not at "
+            f"{math.degrees(waypoint.q[joint]):.2f} deg: q is on another branch; go there with a joint move",
+            share=1.0,
+        )
+    return Segment(number=number, waypoint=waypoint, start=q, goal=goal, path=path, knots=knots)
+
+
+def _followed(model: RobotModel, q: JointVector, path: Path) -> JointPath:
+    """Returns the joint angles at evenly spaced shares of a path that can be followed, shape (M + 1, n), [rad]."""
+    shares, span = np.linspace(0.0, 1.0, _KNOTS + 1), f"on {100.0 / _KNOTS:g} % of the way"
+    knots, obstacle = examine(model, q, path, shares, np.full(model.n, _STEP), span)
+    return knots if obstacle is None else require_path(model, q, path)
+
+
+def _joint_goal(model: RobotModel, q: JointVector, waypoint: Waypoint) -> JointVector:
+    pose = waypoint.pose
+    if waypoint.q is not None or pose is None:
+        return np.array(waypoint.q)
+    return np.array(model.inverse(pose, waypoint.psi, q).nearest(q))
+
+
+def _path(model: RobotModel, q: JointVector, waypoint: Waypoint) -> Path:
+    T = model.forward(q)
+    goal, psi = waypoint.pose, waypoint.psi
+    if waypoint.q is not None:
+        goal = model.forward(waypoint.q)
+        psi = model.arm_angle(waypoint.q) if model.n == 7 else None
+    psis = arm_angles(model, q, psi, "shorter")
+    if waypoint.type == "circle":
+        assert waypoint.center is not None
+        assert waypoint.axis is not None
+        angle = math.tau if waypoint.angle is None else waypoint.angle
+        return build_circle(T, waypoint.center, waypoint.axis, angle, *psis)
+    if waypoint.type == "nullspace":
+        return build_line(T, T, *psis)
+    assert goal is not None
+    if waypoint.via is not None:
+        if waypoint.via_wxyz is None:
+            return build_arc(T, Pose(waypoint.via), goal, *psis, orientation="start_to_goal")
+        return build_arc(T, Pose(waypoint.via, waypoint.via_wxyz), goal, *psis, orientation="through_via")
+    return build_line(T, goal, *psis)
+
+
+def _require_inside(model: RobotModel, q: JointVector) -> None:
+    limits = model.limits.joint
+    outside = np.flatnonzero(~((limits.lower < q) & (q < limits.upper)))
+    if outside.size:
+        i = int(outside[0])
+        raise PlanningError(
+            f"joint {i + 1} at {math.degrees(q[i]):.2f} deg is not strictly between "
+            f"{math.degrees(limits.lower[i]):.2f} and {math.degrees(limits.upper[i]):.2f} deg; choose one between them"
+        )

@@ -1,0 +1,54 @@
+"""Programs on the command line: checked like motions, with what their planner and their reader have to say."""
+
+from __future__ import annotations
+
+import pytest
+
+from rcilab.cli import main
+from rcilab.model import load_model
+from rcilab.motion import Motion, Program, Waypoint, plan_joint, plan_program
+from rcilab.spatial import Pose
+
+MODEL = load_model("xMatePro7")
+HOME = MODEL.forward(MODEL.home)
+PROGRAM = Program(
+    model="xMatePro7",
+    start=MODEL.home,
+    waypoints=(
+        Waypoint.line(Pose(HOME.position + (0.0, 0.05, 0.0), HOME.wxyz), speed=1.0, blend=0.2),
+        Waypoint.joint(MODEL.home + 0.1, speed=1.0),
+    ),
+)
+
+
+@pytest.fixture
+def file(tmp_path):
+    PROGRAM.save(tmp_path / "program.json")
+    return tmp_path / "program.json"
+
+
+def test_check_plans_a_program_for_its_own_arm_and_says_what_was_shortened(file, tmp_path, capsys):
+    assert main(["check", str(file), "--slow-down", str(tmp_path / "out.npz")]) == 0
+    said = capsys.readouterr().out
+    assert said.startswith("note: waypoint 1 (line): blend radius 200.0 mm shortened to 25.0 mm")
+    assert "conforms" in said
+    written = Motion.load(tmp_path / "out.npz")
+    assert written.fingerprint == plan_program(MODEL, PROGRAM).fingerprint
+    assert set(written.segment) == {0, 1}
+
+
+def test_check_refuses_another_arm_and_a_spoiled_file_in_one_line(file, capsys):
+    assert main(["check", str(file), "--model", "xMate3"]) == 2
+    assert "program: 'xMatePro7' is the arm it is for, not xMate3" in capsys.readouterr().err
+    file.write_text(file.read_text().replace('"speed": 1.0', '"speed": 7', 1))
+    assert main(["check", str(file)]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert "program.json, line 8, waypoint 1 (line), speed: 7.0 must be from 0.001 to 1" in said
+
+
+def test_a_motion_needs_the_name_of_an_arm(tmp_path, capsys):
+    plan_joint(MODEL, MODEL.home, MODEL.home + 0.1).save(tmp_path / "motion.npz")
+    assert main(["check", str(tmp_path / "motion.npz")]) == 2
+    assert "add --model NAME" in capsys.readouterr().err
+    assert main(["check", str(tmp_path / "motion.npz"), "--model", "xMatePro7"]) == 0

@@ -1,0 +1,304 @@
+"""Programs as values, files and scripts: exact there and back, and kind to whoever wrote something else."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import rcilab
+from rcilab.errors import InvalidValueError, ModelError, VersionMismatchError
+from rcilab.model import load_model
+from rcilab.motion import Motion, Program, Waypoint, plan_program
+from rcilab.motion.program import ALLOWED, ALWAYS
+from rcilab.motion.program_file import SCHEMA
+from rcilab.spatial import Pose
+
+MODEL = load_model("xMatePro7")
+HOME = MODEL.forward(MODEL.home)
+ROOT = Path(rcilab.__file__).parents[1]
+
+
+def moved(*step) -> Pose:
+    return Pose(HOME.position + step, HOME.wxyz)
+
+
+PROGRAM = Program(
+    name="pick 'n' place \"1\" 件",
+    model="XMATEPRO7",
+    start=MODEL.home,
+    tool=(0.0, 0.0, 0.1, 1.0, 0.0, 0.0, 0.0),
+    waypoints=(
+        Waypoint.joint(MODEL.home + 0.1, blend=0.02, speed=0.9),
+        Waypoint.line(moved(0.0, 0.1, 0.0), blend=0.03, psi=0.1, speed=0.9),
+        Waypoint.arc(moved(-0.05, 0.12, 0.0), moved(-0.1, 0.1, 0.0), blend=0.01, speed=0.9),
+        Waypoint.circle(moved(-0.13, 0.1, 0.0).position, (0.0, 0.0, 2.0), 2.0, dwell=0.02, speed=0.9),
+        Waypoint.nullspace(0.3, speed=0.9),
+    ),
+)
+TEXT = PROGRAM.to_json()
+
+angles = st.floats(-12.0, 12.0)
+places = st.tuples(*[st.floats(-10.0, 10.0)] * 3)
+rests = {
+    "speed": st.floats(0.001, 1.0),
+    "blend": st.floats(0.0, 1.0),
+    "dwell": st.floats(0.0, 3600.0),
+}
+psis = st.none() | st.floats(-math.pi, math.pi)
+turns = st.tuples(*[st.floats(-1.0, 1.0)] * 4).filter(lambda x: math.hypot(*x) > 0.1)
+poses = st.builds(Pose, places, turns)
+waypoints = st.one_of(
+    st.builds(Waypoint.joint, st.tuples(*[angles] * 7), **rests),
+    st.builds(Waypoint.line, poses, psi=psis, **rests),
+    st.builds(Waypoint.arc, places | poses, poses, psi=psis, **rests),
+    st.builds(Waypoint.circle, places, places.filter(lambda x: math.hypot(*x) > 0.01), st.floats(0.1, 6.2), **rests),
+    st.builds(Waypoint.nullspace, st.floats(-math.pi, math.pi), **rests),
+)
+printable = st.text(st.characters(exclude_categories=("C", "Z")))
+
+
+@settings(max_examples=40)
+@given(st.tuples(*[angles] * 7), st.lists(waypoints, min_size=1, max_size=5), printable)
+def test_json_and_script_give_back_the_same_program_to_the_last_bit(start, steps, name):
+    program = Program(model="xMatePro7", start=start, waypoints=tuple(steps), name=name)
+    text = program.to_json()
+    assert Program.from_json(text) == program
+    assert Program.from_json(text).to_json() == text
+    jsonschema.validate(json.loads(text), json.loads(SCHEMA.read_text()))
+    scope = {}
+    exec(program.to_python().split("model = ")[0], scope)
+    assert scope["program"] == program
+
+
+def test_a_file_comes_back(tmp_path):
+    PROGRAM.save(tmp_path / "a.json")
+    assert Program.load(tmp_path / "a.json") == PROGRAM
+    assert PROGRAM.model == "xMatePro7"
+    assert repr(PROGRAM).endswith("for xMatePro7: 1 joint, 1 line, 1 arc, 1 circle, 1 nullspace>")
+    with pytest.raises(InvalidValueError, match="does not exist"):
+        Program.load(tmp_path / "b.json")
+    with pytest.raises(InvalidValueError, match="cannot be read"):
+        Program.load(tmp_path)
+    with pytest.raises(InvalidValueError, match="cannot be written"):
+        PROGRAM.save(tmp_path)
+    with pytest.raises(InvalidValueError, match="is no file name"):
+        Program.load(7)
+
+
+def test_the_script_runs_without_a_screen_and_gives_the_same_motion_to_the_last_sample(tmp_path):
+    script, out = tmp_path / "program.py", tmp_path / "motion.npz"
+    script.write_text(PROGRAM.to_python(), encoding="utf-8")
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "DISPLAY": ""}
+    done = subprocess.run(
+        [sys.executable, str(script), str(out)], capture_output=True, text=True, env=environment, cwd=tmp_path
+    )
+    assert done.returncode == 0, done.stderr
+    assert "conforms" in done.stdout
+    motion = plan_program(MODEL.with_tool(Pose((0.0, 0.0, 0.1))), PROGRAM)
+    again = Motion.load(out)
+    assert np.array_equal(again.q, motion.q)
+    assert np.array_equal(again.segment, motion.segment)
+    assert again.fingerprint == motion.fingerprint
+
+
+def test_the_schema_knows_what_the_class_knows():
+    schema = json.loads(SCHEMA.read_text())
+    jsonschema.Draft202012Validator.check_schema(schema)
+    properties = schema["$defs"]["waypoint"]["properties"]
+    assert set(properties) == {"type", *ALWAYS, *(name for names in ALLOWED.values() for name in names)}
+    assert properties["type"]["enum"] == list(ALLOWED)
+    for key, default in (("speed", 0.2), ("blend", 0.0), ("dwell", 0.0)):
+        assert properties[key]["default"] == default
+    for kind, allowed in ALLOWED.items():
+        for key in set(properties) - {"type", *ALWAYS, *allowed}:
+            wrong = {"type": kind, **_least(kind), key: [1.0, 0.0, 0.0] if key != "angle" else 1.0}
+            with pytest.raises(jsonschema.ValidationError):
+                jsonschema.validate(
+                    wrong,
+                    {
+                        **schema,
+                        "$ref": "#/$defs/waypoint",
+                        "type": "object",
+                        "required": [],
+                        "properties": {},
+                        "additionalProperties": True,
+                    },
+                )
+
+
+def _least(kind):
+    return {
+        "joint": {"q": [0.0] * 7},
+        "line": {"q": [0.0] * 7},
+        "arc": {"q": [0.0] * 7, "via": [0.0] * 3},
+        "circle": {"center": [0.0] * 3, "axis": [0.0, 0.0, 1.0]},
+        "nullspace": {"psi": 0.0},
+    }[kind]
+
+
+def lines(*waypoints, head='"format": "rcilab program", "version": 1', model="xMatePro7", start=None) -> str:
+    """A program with its head in line 2 and its waypoints from line 5 on."""
+    angles = json.dumps(list(MODEL.home) if start is None else start)
+    return (
+        f'{{\n  {head},\n  "model": "{model}", "start": {angles},\n  "waypoints": [\n    '
+        + ",\n    ".join(waypoints)
+        + "\n  ]\n}\n"
+    )
+
+
+GOOD = '{"type": "nullspace", "psi": 0.1}'
+
+
+@pytest.mark.parametrize(
+    ("waypoint", "hint"),
+    [
+        ('{"type": "nullspace", "psi": NaN}', "line 6: NaN is no value"),
+        ('{"type": "nullspace", "psi": 1e400}', "line 6: 1e400 is beyond the largest number, 1.8e308"),
+        ('{"type": "nullspace", "psi": -Infinity}', "line 6: -Infinity is no value"),
+        ('{"type": "nullspace", "psi": 0x10}', "line 6: 0x10 is no value"),
+        ('{"type": "nullspace", "psi": "0.1"}', "line 6, waypoint 2, psi: '0.1' must be a number"),
+        ('{"type": "nullspace", "psi": true}', "line 6, waypoint 2, psi: True must be a number"),
+        (
+            '{"type": "nullspace", "psi": 4}',
+            r"line 6, waypoint 2 \(nullspace\), psi: 4.0 must be from -3.1416 to 3.1416 \[rad\]",
+        ),
+        ('{"type": "nullspace"}', r"waypoint 2 \(nullspace\), psi: nothing is missing: nullspace needs psi"),
+        (
+            '{"type": "nullspace",\n"psi": 0.1,\n"speed": 2}',
+            r"line 8, waypoint 2 \(nullspace\), speed: 2.0 must be from 0.001 to 1 ",
+        ),
+        ('{"type": "nullspace", "psi": 0.1, "blend": -1}', r"blend: -1.0 must be from 0 to 1 \[m\]"),
+        ('{"type": "nullspace", "psi": 0.1, "dwell": 1e9}', r"dwell: 1000000000.0 must be from 0 to 3600 \[s\]"),
+        ('{"type": "nullspace", "psi": 0.1, "speed": null}', "speed: None must be a number"),
+        ('{"type": "nullspace", "psi": 0.1, "sped": 1}', "line 6, waypoint 2, sped: 1.0 is unknown; known: type, q,"),
+        (
+            '{"type": "nullspace", "psi": 0.1, "psi": 0.1}',
+            'line 6: "psi" is there already, in line 6; keep one|is there already',
+        ),
+        ('{"type": "nullspace", "psi": 0.1, "q": [1]}', "q: .* has no meaning here; nullspace takes: psi, speed"),
+        ('{"psi": 0.1}', "line 6, waypoint 2, type: None is missing; known: joint, line"),
+        ('{"type": "spline"}', r"waypoint 2 \(spline\), type: 'spline' is unknown; known: joint, line"),
+        ('{"type": 3}', "waypoint 2, type: 3.0 must be text"),
+        ("[1, 2]", r"line 6: \[1.0, 2.0\] must be waypoint 2: an object"),
+        ('{"type": "line", "position": [0.5, 0, 0.5]}', r"wxyz: nothing is missing beside position"),
+        (
+            '{"type": "line", "position": [500, 0, 500], "wxyz": [1,0,0,0]}',
+            "position: .* is beyond 10 m; millimetres divided",
+        ),
+        ('{"type": "line", "position": [0.5, 0], "wxyz": [1,0,0,0]}', r"position: .* has shape \(2,\), needs \(3,\)"),
+        ('{"type": "line", "position": [0.5, 0, [1]], "wxyz": [1,0,0,0]}', "position, number 3: .* must be a number"),
+        ('{"type": "line", "position": 0.5, "wxyz": [1,0,0,0]}', "position: 0.5 must be a list of numbers"),
+        (
+            '{"type": "line", "position": [0.5, 0, 0.5], "wxyz": [2,0,0,0]}',
+            "wxyz: .* has length 2, must be 1 within 0.001",
+        ),
+        ('{"type": "line"}', "target: nothing is missing: line needs q, or position and wxyz"),
+        ('{"type": "line", "q": [0,0,0,0,0,0,0], "psi": 0.1}', "psi: 0.1 is a second arm angle"),
+        ('{"type": "line", "q": [0,0,0,0,0,0,0], "wxyz": [1,0,0,0]}', "q: .* is a second target"),
+        (
+            '{"type": "joint", "q": [0,0,0,0,0,0]}',
+            r"line 6, waypoint 2 \(joint\), q: .* must be 7 joint angles \[rad\]",
+        ),
+        (
+            '{"type": "joint", "q": [0,90,0,0,0,0,0]}',
+            "q: 90.0 rad of joint 2 is more than two turns, 12.57 rad; degrees",
+        ),
+        ('{"type": "circle", "center": [0.5, 0, 0.5], "axis": [0,0,0]}', "axis: .* has no direction"),
+        (
+            '{"type": "circle", "center": [0.5, 0, 0.5], "axis": [0,0,1], "angle": 0}',
+            "angle: 0.0 must be from more than 0 to 6.2832",
+        ),
+        ('{"type": "arc", "q": [0,0,0,0,0,0,0]}', "via: nothing is missing: arc needs via"),
+        ('{"type": "line" "q": 1}', 'line 6: "q" is neither a comma|is neither a comma nor the end of the object'),
+        ('{"type": "line", q: 1}', "line 6: q is no key; a key is text in double quotes"),
+        ('{"type" "line"}', "is no colon; one must follow the key 'type'"),
+        ('{"type": "li\nne"}', "line 6: .* is no text: invalid control character"),
+        ('{"type": "line", "q": [1 2]}', "line 6: 2 is neither a comma nor the end of the list"),
+        ('{"type": "line", "q": [[[[[[[[1]]]]]]]]}', "line 6: .* opens more than 8 levels"),
+    ],
+)
+def test_what_is_wrong_with_a_waypoint_is_told_with_its_line_key_value_and_bound(waypoint, hint):
+    with pytest.raises(InvalidValueError, match=hint) as caught:
+        Program.from_json(lines(GOOD, waypoint))
+    assert str(caught.value).startswith("program, line ")
+
+
+@pytest.mark.parametrize(
+    ("text", "hint"),
+    [
+        ("", "line 1: the end of the text is no value"),
+        ("[]", r"line 1: \[\] must be a program: an object"),
+        ('{"waypoints"', "line 1: the end of the text is no colon"),
+        (lines(GOOD) + "{}", "line 8: { follows after the end|follows after the end of the first value"),
+        (lines(GOOD, head='"format": "x", "version": 1'), "line 2, format: 'x' must be 'rcilab program'"),
+        (lines(GOOD, head='"version": 1'), 'format: None is missing; a program has "rcilab program"'),
+        (lines(GOOD, model="kuka"), "line 3, model: 'kuka' is no robot: .*known robots: xMatePro3"),
+        (
+            lines(GOOD, model="xMate3", start=[0.1] * 6),
+            r"line 5, waypoint 1 \(nullspace\), psi: 0.1 has no meaning for xMate3",
+        ),
+        (lines(GOOD, start=[0.1] * 6), r"line 3, start: .* must be 7 joint angles \[rad\]: xMatePro7 has 7 axes"),
+        (
+            lines(GOOD, head='"format": "rcilab program", "version": 1, "speed": 1'),
+            "a program, speed: 1.0 is unknown; known: format",
+        ),
+        (lines(GOOD, head='"format": "rcilab program", "version": 1, "tool": [1]'), "line 2, tool: .* needs "),
+        (
+            lines(GOOD, head='"format": "rcilab program", "version": 1, "name": "a\\nb"'),
+            "line 2, name: .* must be text in one line",
+        ),
+        ('{"format": "rcilab program", "version": 1, "start": [], "waypoints": []}', "model: None is missing"),
+        (lines(GOOD).replace(f"[\n    {GOOD}\n  ]", "[]"), "line 4, waypoints: 0 must be 1 to 10000"),
+        (lines(GOOD).replace(f"[\n    {GOOD}\n  ]", "{}"), "line 4, waypoints: {} must be a list"),
+        ("[" * 100_000, "opens more than 8 levels"),
+        (" " * 8_000_001, "8.0 MB is above 8 MB"),
+        ("\ud800", "line 1: .* is no text in UTF-8"),
+    ],
+)
+def test_what_is_wrong_with_a_file_is_told(text, hint):
+    with pytest.raises(InvalidValueError, match=hint):
+        Program.from_json(text)
+
+
+def test_another_version_is_told_apart():
+    with pytest.raises(VersionMismatchError, match=r"line 2, version: found version 2\.0, need 1"):
+        Program.from_json(lines(GOOD, head='"format": "rcilab program", "version": 2'))
+
+
+@settings(max_examples=100)
+@given(st.data())
+def test_a_spoiled_file_is_a_program_or_one_kind_error(data):
+    at, size = data.draw(st.integers(0, len(TEXT))), data.draw(st.integers(0, 30))
+    spoiled = TEXT[:at] + data.draw(st.text('0123456789eE+-.,:{}[]"\\ntrufalsNI\n', max_size=5)) + TEXT[at + size :]
+    message = None
+    try:
+        found = Program.from_json(spoiled)
+    except (InvalidValueError, VersionMismatchError) as error:
+        message = str(error)
+    else:
+        assert Program.from_json(found.to_json()) == found
+    assert message is None or re.match(r"program(, line \d+|, \w+|:)", message)
+
+
+def test_values_from_python_are_checked_as_well():
+    with pytest.raises(ModelError, match="known robots"):
+        Program(model="kuka", start=(0.0,) * 7, waypoints=(Waypoint.nullspace(0.1),))
+    with pytest.raises(InvalidValueError, match=r"waypoint 1 \(joint\), q: .* must be 7 joint angles"):
+        Program(model="xMatePro7", start=MODEL.home, waypoints=(Waypoint.joint([0.0] * 6),))
+    with pytest.raises(InvalidValueError, match=r"waypoint 1: 3 is none; Waypoint\.line makes one"):
+        Program(model="xMatePro7", start=MODEL.home, waypoints=(3,))
+    with pytest.raises(InvalidValueError, match=r"via: .* must be finite"):
+        Waypoint.arc((math.nan, 0.0, 0.0), HOME)
+    assert Waypoint.line(HOME).pose.is_close(HOME, 1e-12)
+    assert Waypoint.nullspace(0.1).pose is None
