@@ -123,7 +123,32 @@ class VersionMismatchError(ProtocolError):
         self.expected = expected
 
 
-class ConnectionLostError(RcilabError):
+class RecordedError(RcilabError):
+    """Something ended a motion, and this is what the last cycles were.
+
+    Attributes:
+        record: The last cycles before the end, as recorded: a structured array, one row a cycle; or None.
+    """
+
+    def __init__(self, message: str, record: Any = None) -> None:
+        super().__init__(message)
+        self.record = record
+
+    def save(self, file: str | PathLike[str]) -> None:
+        """Writes the last cycles to a file; its ending chooses the format: .csv or .npz.
+
+        Raises:
+            UsageError: There is no record.
+            InvalidValueError: The ending is unknown, or the file cannot be written.
+        """
+        from rcilab.cycle_file import save_cycles
+
+        if self.record is None:
+            raise UsageError("this error carries no record: nothing was recorded before it")
+        save_cycles(self.record, file)
+
+
+class ConnectionLostError(RecordedError):
     """The robot, the controller or a process of ours is not there, or is there no longer."""
 
 
@@ -142,31 +167,16 @@ class CommandRejectedError(RcilabError):
         self.status = status
 
 
-class ControlError(RcilabError):
+class ControlError(RecordedError):
     """The controller reported faults and stopped the motion.
 
     Attributes:
         faults: The faults that were set, in wire order.
-        record: The last cycles before the stop, as recorded: a structured array, one row a cycle; or None.
     """
 
     def __init__(self, message: str, faults: Sequence[object] = (), record: Any = None) -> None:
-        super().__init__(message)
+        super().__init__(message, record)
         self.faults = tuple(faults)
-        self.record = record
-
-    def save(self, file: str | PathLike[str]) -> None:
-        """Writes the last cycles to a file; its ending chooses the format: .csv or .npz.
-
-        Raises:
-            UsageError: There is no record.
-            InvalidValueError: The ending is unknown, or the file cannot be written.
-        """
-        from rcilab.cycle_file import save_cycles
-
-        if self.record is None:
-            raise UsageError("this error carries no record: nothing was recorded before it")
-        save_cycles(self.record, file)
 
 
 class DeadlineError(RcilabError, TimeoutError):

@@ -20,8 +20,16 @@ from rcilab.errors import InvalidValueError
 Rotation9: TypeAlias = tuple[float, float, float, float, float, float, float, float, float]
 """A rotation matrix as nine floats, row-major: what scalar code on the 1 kHz path computes with."""
 
-_ORTHONORMAL_TOLERANCE = 1e-5
-"""How far rows may be from unit length and from each other's perpendicular; the vendor's client uses the same."""
+UNIT_TOLERANCE = 1e-5
+"""How far rows and columns of a rotation may be from unit length; the vendor's client uses the same."""
+
+PERPENDICULAR_TOLERANCE = 1e-4
+"""How large the cosine of the angle between two rows may be. The vendor's client does not look at it; a choice: a
+rotation that was written down with five decimals passes."""
+
+_SHORTEST, _LONGEST = (1.0 - UNIT_TOLERANCE) ** 2, (1.0 + UNIT_TOLERANCE) ** 2  # Of lengths squared.
+_EXACT = 1e-12
+"""A rotation that is off by no more is taken as it is; one that is off by more is made one."""
 
 
 class Pose:
@@ -73,14 +81,15 @@ class Pose:
             raise InvalidValueError(f"pose[{row}, {column}]", float(m[row, column]), "must be finite")
         if not np.array_equal(m[3], (0.0, 0.0, 0.0, 1.0)):
             raise InvalidValueError("pose", m[3].tolist(), "must have 0 0 0 1 as its last row")
-        rotation = m[:3, :3]
-        if np.abs(rotation @ rotation.T - np.eye(3)).max() > _ORTHONORMAL_TOLERANCE:
-            raise InvalidValueError("pose", rotation.tolist(), "must hold an orthonormal rotation")
-        if np.linalg.det(rotation) < 0.0:
-            raise InvalidValueError("pose", rotation.tolist(), "is a reflection, not a rotation")
+        a, b, c, d, e, f, g, h, i = m[:3, :3].ravel().tolist()
+        rotation: Rotation9 = (a, b, c, d, e, f, g, h, i)
+        error = find_rotation_error(rotation)
+        if error is not None:
+            raise InvalidValueError("pose", m[:3, :3].tolist(), error)
+        if np.abs(m[:3, :3] @ m[:3, :3].T - np.eye(3)).max() > _EXACT:
+            rotation = rotation_from_wxyz(wxyz_from_rotation(rotation))
         x, y, z = m[:3, 3].tolist()
-        a, b, c, d, e, f, g, h, i = rotation.ravel().tolist()
-        return cls.from_parts((a, b, c, d, e, f, g, h, i), (x, y, z))
+        return cls.from_parts(rotation, (x, y, z))
 
     @classmethod
     def from_row_major(cls, numbers: Sequence[float]) -> Pose:
@@ -199,6 +208,26 @@ def _no_pose(value: object) -> InvalidValueError:
 
 
 IDENTITY = Pose.from_parts((1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
+
+
+def find_rotation_error(r: Rotation9) -> str | None:
+    """Returns why nine finite numbers, row-major, are no rotation, or None when they are one but for rounding."""
+    a, b, c, d, e, f, g, h, i = r
+    squares = (
+        a * a + b * b + c * c, d * d + e * e + f * f, g * g + h * h + i * i,
+        a * a + d * d + g * g, b * b + e * e + h * h, c * c + f * f + i * i,
+    )  # fmt: skip
+    least, most = min(squares), max(squares)
+    if least < _SHORTEST or most > _LONGEST:
+        off = max(1.0 - math.sqrt(least), math.sqrt(most) - 1.0)
+        return f"holds no rotation: a row or column is {off:.3g} off unit length, {UNIT_TOLERANCE:g} is allowed"
+    cosine = max(abs(a * d + b * e + c * f), abs(a * g + b * h + c * i), abs(d * g + e * h + f * i))
+    if cosine > PERPENDICULAR_TOLERANCE:
+        allowed = f"{PERPENDICULAR_TOLERANCE:g} is allowed"
+        return f"holds no rotation: the cosine between two rows is {cosine:.3g}, {allowed}"
+    if a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) < 0.0:
+        return "holds a reflection, not a rotation"
+    return None
 
 
 def rotation_from_wxyz(wxyz: Sequence[float]) -> Rotation9:

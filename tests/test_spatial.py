@@ -41,7 +41,7 @@ def test_half_turns_survive_the_quaternion(wxyz):
 def test_what_is_no_pose_is_refused_in_words():
     mirror, scaled, shifted, unknown = (np.eye(4) for _ in range(4))
     mirror[0, 0], scaled[0, 0], shifted[3, 0], unknown[0, 3] = -1.0, 1.1, 1.0, np.nan
-    for matrix, word in ((mirror, "reflection"), (scaled, "orthonormal"), (shifted, "last row"), (unknown, "finite")):
+    for matrix, word in ((mirror, "reflection"), (scaled, "no rotation"), (shifted, "last row"), (unknown, "finite")):
         with pytest.raises(InvalidValueError, match=word):
             Pose.from_matrix(matrix)
     with pytest.raises(InvalidValueError, match="norm is zero"):

@@ -19,6 +19,8 @@ client library. It prints one line when it is ready, a second one with the addre
 Ctrl-C.
 """
 
+MODE_DELAY = 1.05  # [s] The vendor's client sleeps for 1 s after StartMove, and answers whatever it finds then.
+
 _OPTIONS = {"limit_table": "--limits", "client_host": "--client", "client_port": "--client"}
 """Where an option is not called as what it sets."""
 
@@ -36,6 +38,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--plant", default="ideal", metavar="KIND", help="what moves: ideal or mujoco (%(default)s)")
     parser.add_argument("--lockstep", action="store_true", help="advance a motion only as its commands come")
     parser.add_argument(
+        "--mode-delay",
+        type=float,
+        metavar="S",
+        help="from StartMove to the new mode (1.05, for any client; lock-step: 0.02; 0.2 is enough for most)",
+    )
+    parser.add_argument(
         "--prefill",
         type=int,
         metavar="N",
@@ -45,7 +53,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--patience",
         type=float,
         metavar="S",
-        help="lock-step: how long to wait for a command (as long as the connection lives; 1 with a bad network)",
+        help="lock-step: how long to wait for a command (60; 0.05 with a bad network)",
     )
     parser.add_argument(
         "--lost-limit",
@@ -122,9 +130,12 @@ def run(args: argparse.Namespace) -> int:
         )
     # In one piece, so that whoever waits for the first line has the second one, too.
     world = "" if server.world_address is None else f"\nworld {server.world_address}"
-    sys.stdout.write(f"{server.description}{world}\n")
-    sys.stdout.flush()
-    server.run()
+
+    def say_ready() -> None:
+        sys.stdout.write(f"{server.description}{world}\n")
+        sys.stdout.flush()
+
+    server.run(say_ready)
     return 0
 
 
@@ -142,6 +153,7 @@ def _config(args: argparse.Namespace) -> ControllerConfig:
         client_port=client_port,
         plant=args.plant,
         lockstep=args.lockstep,
+        mode_delay=MODE_DELAY if args.mode_delay is None and not args.lockstep else args.mode_delay,
         prefill=args.prefill,
         patience=args.patience,
         lost_limit=args.lost_limit or None,  # 0 switches it off.

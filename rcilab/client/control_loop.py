@@ -135,6 +135,8 @@ class ControlLoop:
             state = self._await_modes()
             reason = self._stream(state, callback) if isinstance(state, RobotState) else state
         except BaseException as error:
+            if isinstance(error, ConnectionLostError) and error.record is None:
+                error.record = self._log.recorder.last(RECORD_CYCLES)
             self._end(error)
             raise
         self._end(None, brake=reason is not None)

@@ -79,8 +79,10 @@ class SocketTransport:
         except BaseException:
             self._udp.close()
             raise
+        self._udp_number = self._udp.fileno()
         self._states_ready = select.poll()
         self._states_ready.register(self._udp, select.POLLIN)
+        self._states_ready.register(self._tcp, select.POLLRDHUP)
         self._anything_ready = select.poll()
         self._anything_ready.register(self._udp, select.POLLIN)
         self._anything_ready.register(self._tcp, select.POLLIN)
@@ -141,11 +143,19 @@ class SocketTransport:
             raise self._lost(error) from error
 
     def wait(self, timeout: float, *, frames: bool = False) -> bool:
-        """Returns once a state (or with `frames` a piece of a TCP frame) is there, or False after `timeout`, [s]."""
+        """Returns once a state (or with `frames` a piece of a TCP frame) is there, or False after `timeout`, [s].
+
+        Raises:
+            ConnectionLostError: No state is there, and the other side has closed the connection.
+        """
         if frames and self._frames:
             return True
-        ready = self._anything_ready if frames else self._states_ready
-        return bool(ready.poll(max(0.0, timeout) * _MS))
+        if frames:
+            return bool(self._anything_ready.poll(max(0.0, timeout) * _MS))
+        events = self._states_ready.poll(max(0.0, timeout) * _MS)
+        if len(events) == 1 and events[0][0] != self._udp_number:
+            raise self._lost(None)
+        return bool(events)
 
     def close(self) -> None:
         """Ends both channels. May be called twice."""

@@ -41,6 +41,7 @@ from rcilab.protocols.world import (
     SafetyButton,
     SetInput,
     StallClock,
+    Walls,
     WorldAnswer,
     WorldRequest,
     WorldStatus,
@@ -85,31 +86,31 @@ class World(Closing):
             duration: For how long, in the robot's own time, [s]; None: until `release`.
         """
         place = None if point is None else _numbers(point, 3, "point", "m")
-        self._ask(Push(_numbers(wrench, 6, "wrench", "N, N m"), link, place, duration))
+        self.ask(Push(_numbers(wrench, 6, "wrench", "N, N m"), link, place, duration))
 
     def release(self) -> None:
         """Takes away whatever presses on the arm."""
-        self._ask(Release())
+        self.ask(Release())
 
     def press(self, button: SafetyButton) -> None:
         """Presses the emergency stop ("estop") or opens the safety gate ("gstop"); "none" puts both right again."""
-        self._ask(Press(button))
+        self.ask(Press(button))
 
     def set_input(self, signal: int, level: bool) -> None:
         """Sets a digital input: 0 to 3 are DI0_0 to DI0_3, 4 and 5 are DI1_0 and DI1_1."""
-        self._ask(SetInput(signal, level))
+        self.ask(SetInput(signal, level))
 
     def set_loop_back(self, on: bool = True) -> None:
         """Wires every digital output to the input of the same number, or cuts these wires."""
-        self._ask(LoopBack(on))
+        self.ask(LoopBack(on))
 
     def set_auto_limit(self, on: bool = True) -> None:
         """Has commands led to rest inside the soft joint limits instead of raising a fault beyond them, or not."""
-        self._ask(AutoLimit(on))
+        self.ask(AutoLimit(on))
 
     def set_limits(self, table: LimitTable) -> None:
         """Chooses the Cartesian limits that commands are judged by: "manual", or "sdk" for the vendor's SDK."""
-        self._ask(Limits(table))
+        self.ask(Limits(table))
 
     def set_network(self, faults: NetworkFaults | None = None, direction: Direction = "both") -> None:
         """Makes the network bad.
@@ -118,7 +119,7 @@ class World(Closing):
             faults: What is wrong with it; None: nothing.
             direction: "commands", "states" (and answers over TCP), or "both".
         """
-        self._ask(Network(NetworkFaults() if faults is None else faults, direction))
+        self.ask(Network(NetworkFaults() if faults is None else faults, direction))
 
     def stall(self, duration: float, after: float = 0.0, period: float | None = None) -> None:
         """Has the controller's clock stand still; a new call replaces what was asked for before.
@@ -128,7 +129,7 @@ class World(Closing):
             after: When, [s] from now.
             period: And again so long after, [s]; None: once.
         """
-        self._ask(StallClock(duration, after, period))
+        self.ask(StallClock(duration, after, period))
 
     def place_box(self, name: str, size: ArrayLike, pose: Pose) -> None:
         """Puts a box that cannot move beside the arm, or moves the one of that name; MuJoCo only.
@@ -139,27 +140,31 @@ class World(Closing):
             pose: Its centre and orientation in base.
         """
         position, wxyz = tuple(pose.position.tolist()), tuple(pose.wxyz.tolist())
-        self._ask(PlaceBox(name, _numbers(size, 3, "size", "m"), position, wxyz))
+        self.ask(PlaceBox(name, _numbers(size, 3, "size", "m"), position, wxyz))
 
     def remove_box(self, name: str) -> None:
         """Takes a box away."""
-        self._ask(RemoveBox(name))
+        self.ask(RemoveBox(name))
 
     def set_floor(self, on: bool = True) -> None:
         """Puts a floor under the base that the arm can hit, or takes it away; MuJoCo only."""
-        self._ask(Floor(on))
+        self.ask(Floor(on))
+
+    def set_walls(self, on: bool = True) -> None:
+        """Makes the faces of the active safety box solid for the links, wherever it is set, or not; MuJoCo only."""
+        self.ask(Walls(on))
 
     def mount(self, load: Payload | None) -> None:
         """Fixes a real load to the flange, whatever set_load says of it; None: again the one of set_load."""
         if load is None:
-            self._ask(Mount())
+            self.ask(Mount())
             return
         inertia = tuple(load.inertia.ravel().tolist())
-        self._ask(Mount(load.mass, tuple(load.center_of_mass.tolist()), inertia))
+        self.ask(Mount(load.mass, tuple(load.center_of_mass.tolist()), inertia))
 
     def status(self) -> WorldStatus:
         """Returns how the controller is: what its state does not say."""
-        answer = self._ask(GetStatus())
+        answer = self.ask(GetStatus())
         if not isinstance(answer, WorldStatus):
             raise ProtocolError(f"{self}: asked for the status, it answered {answer}")
         return answer
@@ -172,7 +177,7 @@ class World(Closing):
     def __repr__(self) -> str:
         return "<World at {}:{}>".format(*self._address)
 
-    def _ask(self, request: WorldRequest) -> WorldAnswer:
+    def ask(self, request: WorldRequest) -> WorldAnswer:
         """Returns the answer to a request.
 
         Raises:

@@ -46,13 +46,13 @@ class ControllerConfig:
     lockstep: bool = False
     """Whether a motion advances only when the command for the current state has come, instead of at 1 kHz."""
     mode_delay: float | None = None
-    """From StartMove to the requested modes, [s]; None: 0.2, or 0.02 in lock-step. The vendor's client wants 0.1 at
-    least, or it answers old states."""
+    """From StartMove to the requested modes, [s]; None: 0.2, or 0.02 in lock-step. The vendor's client sleeps for 1 s
+    after StartMove and then reads what its socket has kept: 0.2 is enough for a usual buffer, 1.05 for any."""
     prefill: int | None = None
     """Cycles by which commands are played late, to absorb jitter; None: 10, and 2 for torques, or 0 in lock-step."""
     patience: float | None = None
-    """How long lock-step waits for a command before it counts as lost, [s]; None: as long as the connection lives, so
-    that a client may stand still in a debugger, or 1 s while the network is bad on purpose."""
+    """How long lock-step waits for a command before it counts as lost, [s]; None: 60, so that a client may stand still
+    for a while, or 0.05 while the network is bad on purpose."""
     lost_limit: int | None = MOST_LOST
     """Lost cycles in a row that are an instability, 10 to 20; None: any number is bridged."""
     auto_limit: bool = False
@@ -96,7 +96,7 @@ class ControllerConfig:
             raise InvalidValueError("prefill", self.prefill, "needs 0 to 100 cycles")
         if self.lost_limit is not None and not FEWEST_LOST <= self.lost_limit <= MOST_LOST:
             raise InvalidValueError(
-                "lost_limit", self.lost_limit, f"needs {FEWEST_LOST} to {MOST_LOST} cycles, or none for no limit"
+                "lost_limit", self.lost_limit, f"needs {FEWEST_LOST} to {MOST_LOST} cycles, or None (--lost-limit 0) for no limit"
             )
 
     @property

@@ -45,7 +45,9 @@ _COMMAND, _MEASUREMENT = Offender.COMMAND, Offender.MEASUREMENT
 FAULT_STOP: Final = {
     Fault.ACTUAL_JOINT_POSITION_LIMITS_VIOLATION: FaultStop(_MEASUREMENT, _ALL, _BACK),
     Fault.ACTUAL_CARTESIAN_POSITION_LIMITS_VIOLATION: FaultStop(
-        _MEASUREMENT, "all; not with the virtual guide in an impedance mode", _BACK_BOX
+        _MEASUREMENT,
+        "all but hand guiding, which leads it back; not with the virtual guide in an impedance mode",
+        _BACK_BOX,
     ),
     Fault.ACTUAL_CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION: FaultStop(_MEASUREMENT, _TOOL, _ANYTIME),
     Fault.ACTUAL_JOINT_VELOCITY_LIMITS_VIOLATION: FaultStop(_MEASUREMENT, _ALL, _ANYTIME),

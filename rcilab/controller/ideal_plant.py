@@ -21,6 +21,7 @@ from rcilab.dynamics.payload import Payload
 from rcilab.dynamics.rigid_body import RigidBody
 from rcilab.errors import UsageError
 from rcilab.model import RobotModel
+from rcilab.safety_box import SafetyBox
 from rcilab.spatial import Pose
 
 
@@ -75,6 +76,11 @@ class IdealPlant:
         """Refuses a floor; to have none is granted."""
         if on:
             raise UsageError("floor: the ideal plant knows no contact; use plant='mujoco'")
+
+    def set_walls(self, box: SafetyBox | None) -> None:
+        """Refuses walls; to have none is granted."""
+        if box is not None:
+            raise UsageError("walls: the ideal plant knows no contact; use plant='mujoco'")
 
     def step(self, setpoint: Setpoint) -> Measurement:
         """Lives through one millisecond."""

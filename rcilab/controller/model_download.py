@@ -3,7 +3,9 @@
 Geometry is the DH table in millimetres. Dynamics are base parameters: as few numbers as the torques of a 7-axis arm
 can tell apart. They are found from the arm's own rigid-body model by least squares over random states, which is exact
 because they span it (Khalil and Dombre, Modeling, Identification and Control of Robots, 2002, chapter 9); so a vendor
-program that compensates gravity agrees with the arm it drives. Friction is zero: the model has none.
+program that compensates gravity agrees with the arm it drives, but for one thing: in its calls without friction the
+vendor's library ignores the last two numbers, the first moments of link 7, for constants of its own. Friction is
+served as zero: the library's misplaced single call would take viscous friction for an offset.
 
 The vendor's library does not support the 6-axis arms; they get their geometry, and zeros for dynamics.
 """

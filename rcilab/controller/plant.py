@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 from rcilab.arrays import Array, JointVector
 from rcilab.dynamics.payload import Payload
 from rcilab.model import RobotModel
+from rcilab.safety_box import SafetyBox
 from rcilab.spatial import Pose
 
 
@@ -129,6 +130,14 @@ class Plant(Protocol):
 
     def set_floor(self, on: bool) -> None:
         """Lets the floor, the plane z = 0 of the base frame, be solid or not.
+
+        Raises:
+            UsageError: This plant knows no contact.
+        """
+        ...
+
+    def set_walls(self, box: SafetyBox | None) -> None:
+        """Lets the faces of a safety box be solid walls for the links; None takes them away.
 
         Raises:
             UsageError: This plant knows no contact.

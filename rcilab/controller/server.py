@@ -56,8 +56,8 @@ from rcilab.realtime import enter_realtime, leave_realtime
 PRIORITY = 80  # Under SCHED_FIFO; above the client's process, whose clock this is.
 LEAD_TIME = 0.0005  # [s] Before its state is due a cycle begins: longer than nearly all of them take; a choice.
 RESEND_TIME = 0.02  # [s] In lock-step a state is sent again after this time until the first command has come.
-PATIENCE = 1.0  # [s] In lock-step over a bad network, for the next command; then its cycle is lost, and each following
-# one at 1 kHz.
+PATIENCE = 60.0  # [s] In lock-step, for the next command; then its cycle is lost, and each following one at 1 kHz.
+BAD_NETWORK_PATIENCE = 0.05  # [s] The same where the network loses datagrams on purpose: below any client's own.
 FAREWELL = 20  # [cycles] In which a client learns of the end from the error bit of its states.
 SLIP = 20  # [cycles] A motion that took so much longer than it should is worth a line.
 GRACE = 2.0  # [s] For the arm to come to rest when the controller shall end.
@@ -138,15 +138,19 @@ class ControllerServer:
         """Where the world port is, as ADDR:PORT; None: there is none."""
         return None if self._world is None else "{}:{}".format(*self._world.address)
 
-    def run(self) -> None:
-        """Runs until `request_stop`, then brings the arm to rest and closes every socket."""
+    def run(self, on_ready: Callable[[], None] = lambda: None) -> None:
+        """Runs until `request_stop`, then brings the arm to rest and closes every socket.
+
+        Args:
+            on_ready: Called once, when the first state is out.
+        """
         use_realtime = self.config.realtime and not self.config.lockstep
         if use_realtime:
             warning = enter_realtime(PRIORITY).warning
             if warning is not None:
                 self._log(warning)
         try:
-            self._loop()
+            self._loop(on_ready)
         finally:
             self._cores.switch(False)
             if use_realtime:
@@ -172,11 +176,12 @@ class ControllerServer:
             self._endpoint.close()
             raise
 
-    def _loop(self) -> None:
+    def _loop(self, on_ready: Callable[[], None]) -> None:
         deadline = self._clock.now()
         self._stalls.replace(self.config.stalls, deadline)
         last_moment: float | None = None
         farewell = 0
+        is_ready = False
         while True:
             self._stand_still(self._stalls.take(self._clock.now()))
             if self._is_ending and last_moment is None:
@@ -194,6 +199,9 @@ class ControllerServer:
                 deadline = self._next_deadline(deadline)
                 self._await(deadline - LEAD_TIME)
                 self._step(deadline)
+            if not is_ready:
+                is_ready = True
+                on_ready()
 
     def _say_farewell(self) -> int:
         """Ends what is under way; returns for how many cycles states shall still tell a client that moved of it."""
@@ -255,7 +263,7 @@ class ControllerServer:
             return CYCLE_TIME
         if self.config.patience is not None:
             return self.config.patience
-        return float("inf") if self._network.is_clean else PATIENCE
+        return PATIENCE if self._network.is_clean else BAD_NETWORK_PATIENCE
 
     def _step(self, due: float) -> None:
         """Lives through a cycle and sends its state when it is due, or at once when that is over."""

@@ -5,8 +5,9 @@ compensated already, so M ddq + C dq = tau + J^T w. They give
 
     tau = springs + dampers + M ddq_c + C dq
 
-so that an arm that nothing touches follows without an error, and one that something presses on yields by force over
-stiffness. Every mode is damped with `DAMPING_RATIO` of critical, see `compliance`.
+so that an arm that nothing touches follows, but for what steps of 1 ms and the soft spring of the elbow leave, and one
+that something presses on yields by force over stiffness. Every mode is damped with `DAMPING_RATIO` of critical, see
+`compliance`.
 """
 
 from __future__ import annotations

@@ -36,10 +36,12 @@ from rcilab.protocols.world import (
     RemoveBox,
     SetInput,
     StallClock,
+    Walls,
     WorldAnswer,
     WorldRequest,
     WorldStatus,
 )
+from rcilab.safety_box import SafetyBox, active_box
 from rcilab.spatial import Pose
 
 _NOTHING = Push((0.0,) * 6)
@@ -79,6 +81,8 @@ class Surroundings:
         self._clock = clock
         self._mishaps = mishaps
         self._is_pushed = False
+        self._has_walls = False
+        self._walls: SafetyBox | None = None
         self._end_of_push = math.inf  # Number of the cycle that ends it.
 
     def handle(self, request: WorldRequest) -> WorldAnswer:
@@ -92,9 +96,15 @@ class Surroundings:
         return Done()
 
     def step(self) -> None:
-        """Takes away what has pressed on the arm for long enough; called after every cycle."""
+        """Takes away what has pressed on the arm for long enough, and moves walls; called after every cycle."""
         if self._cycle.state.message_id >= self._end_of_push:
             self._push(_NOTHING)
+        if self._has_walls and self._active_box() is not self._walls:
+            self._walls = self._active_box()
+            self._plant.set_walls(self._walls)
+
+    def _active_box(self) -> SafetyBox | None:
+        return active_box(self._cycle.settings.safety_box)
 
     def _change(self, request: WorldRequest) -> None:
         match request:
@@ -122,6 +132,9 @@ class Surroundings:
                 self._plant.remove_box(box)
             case Floor(on):
                 self._plant.set_floor(on)
+            case Walls(on):
+                self._plant.set_walls(self._active_box() if on else None)
+                self._has_walls, self._walls = on, self._active_box()
             case Mount():
                 self._plant.mount(_payload(request))
             case GetStatus():

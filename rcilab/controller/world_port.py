@@ -91,7 +91,8 @@ class WorldPort:
         try:
             for line in self._guests[guest].feed(data):
                 request_id, request = decode_world_request(line)
-                if not self._answer(guest, self._handle(request), request_id):
+                answer = request if isinstance(request, Refused) else self._handle(request)
+                if not self._answer(guest, answer, request_id):
                     return
         except DecodeError as error:
             if self._answer(guest, Refused(str(error)), 0):

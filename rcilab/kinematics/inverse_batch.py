@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from rcilab.arrays import Array
 from rcilab.errors import InvalidValueError
 from rcilab.kinematics.inverse import ArmGeometry, inverse_seven, inverse_six
-from rcilab.spatial import Pose
+from rcilab.spatial import PERPENDICULAR_TOLERANCE, UNIT_TOLERANCE, Pose
 
 Columns: TypeAlias = tuple[Array, Array, Array]
 """Three components of one vector a pose, each of shape (N,)."""
@@ -24,7 +24,6 @@ Columns: TypeAlias = tuple[Array, Array, Array]
 _BLOCK = 2048  # Poses worked on together, so that intermediate arrays stay in the cache; a choice.
 _OPEN = 1e-7  # Sine of an angle, or length in [m], below which the scalar form decides what a singularity leaves open.
 _REACH_TOLERANCE = 1e-9  # [m] As in the scalar form.
-_ORTHONORMAL_TOLERANCE = 1e-5  # As for a single pose.
 
 
 class SolutionBatch:
@@ -99,9 +98,9 @@ def as_pose_batch(value: ArrayLike) -> Array:
         raise InvalidValueError("T", f"an array of shape {T.shape}", "needs shape (N, 4, 4)")
     x, y, z = ((T[:, 0, i], T[:, 1, i], T[:, 2, i]) for i in range(3))
     with np.errstate(invalid="ignore", over="ignore"):
-        skew = abs(_dot(x, y)) + abs(_dot(y, z)) + abs(_dot(z, x))
-        skew += abs(_dot(x, x) - 1.0) + abs(_dot(y, y) - 1.0) + abs(_dot(z, z) - 1.0)
-        good = (skew <= _ORTHONORMAL_TOLERANCE) & (_dot(_cross(x, y), z) > 0.0)
+        good = _dot(_cross(x, y), z) > 0.0
+        for a, b in ((x, y), (y, z), (z, x)):
+            good &= (abs(_dot(a, b)) <= PERPENDICULAR_TOLERANCE) & (abs(_dot(a, a) - 1.0) <= 2.0 * UNIT_TOLERANCE)
         good &= np.isfinite(T[:, 0, 3] + T[:, 1, 3] + T[:, 2, 3])
     for column, value in enumerate((0.0, 0.0, 0.0, 1.0)):
         good &= T[:, 3, column] == value

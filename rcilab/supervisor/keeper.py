@@ -18,6 +18,7 @@ ANSWER_TIMEOUT = 3.0  # [s] for the connection and for every answer of the contr
 LOAD_TIMEOUT = START_TIMEOUT  # [s] for the control process to load; as long as the virtual controller may take.
 FROZEN_AFTER = 1.0  # [s] without a sign of life of the control process; a choice above every wait of its own.
 END_TIMEOUT = 3.0  # [s] for the control process to bring the arm to rest and go; the longest stop takes 0.4 s.
+MODE_DELAY = 0.2  # [s] Of our own controller: our client wants none of it.
 PREFILL = 40  # [cycles] Play-out of our own controller: beside a browser pauses of tens of ms are common. A choice.
 _RESTARTS, _RESTART_WINDOW = 3, 60.0  # Restarts by itself, in so many seconds.
 
@@ -109,7 +110,9 @@ class ProcessKeeper:
         self.address = None
 
     def _start_controller(self) -> None:
-        self._controller = VirtualController(self._model_name, self._plant, options=["--prefill", str(PREFILL)])
+        self._controller = VirtualController(
+            self._model_name, self._plant, options=["--prefill", str(PREFILL), "--mode-delay", str(MODE_DELAY)]
+        )
 
     def _start_worker(self) -> None:
         words = self._block.words

@@ -23,6 +23,7 @@ from rcilab.model import load_model
 from rcilab.motion import plan_joint
 from rcilab.protocols.rci import SafetyStop
 from rcilab.protocols.world import NetworkFaults
+from rcilab.safety_box import SafetyBox
 from rcilab.spatial import IDENTITY, Pose
 from rcilab.supervisor.launch import start_controller
 from rcilab.supervisor.simulate import simulate
@@ -191,6 +192,27 @@ def test_a_mujoco_world_has_boxes_and_a_floor():
         with pytest.raises(UsageError, match="chair"):
             robot.world.remove_box("chair")
         robot.world.place_box("table", [0.1, 0.1, 0.1], IDENTITY @ Pose((0.9, 0.0, 0.05)))
+
+
+def test_the_walls_of_a_safety_box_hold_an_arm_that_is_led_against_them():
+    with simulate(MODEL, plant="mujoco") as robot:
+        robot.power_on()
+        tool = robot.state.T_base_tool[:3, 3]
+        robot.set_cartesian_limit(SafetyBox(size=(0.3, 0.3, 0.3), T_base_box=Pose(tool)))
+
+        def pull(newtons):
+            robot.start_drag("cartesian", "free")
+            robot.world.push([0.0, newtons, 0.0, 0.0, 0.0, 0.0])
+            for _ in range(1500):
+                robot.receive_state()
+            robot.world.release()
+            robot.stop_drag()
+            return abs(robot.state.T_base_tool[1, 3] - tool[1])
+
+        robot.world.set_walls()
+        assert pull(20.0) < 0.16
+        robot.world.set_walls(False)
+        assert pull(20.0) > 0.2
 
 
 def test_connect_is_told_where_the_world_is():

@@ -15,6 +15,7 @@ from rcilab.dynamics.payload import Payload
 from rcilab.dynamics.rigid_body import RigidBody
 from rcilab.errors import InvalidValueError, UsageError
 from rcilab.model import RobotModel, load_model
+from rcilab.safety_box import SafetyBox
 from rcilab.spatial import Pose
 
 CYCLE = 0.001  # [s]
@@ -220,4 +221,7 @@ def test_nothing_is_solid_around_the_ideal_plant(model: RobotModel) -> None:
         plant.remove_box("table")
     with pytest.raises(UsageError, match="mujoco"):
         plant.set_floor(True)
+    with pytest.raises(UsageError, match="mujoco"):
+        plant.set_walls(SafetyBox(size=(1.0, 1.0, 1.0), T_base_box=Pose()))
     plant.set_floor(False)
+    plant.set_walls(None)

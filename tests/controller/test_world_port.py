@@ -72,12 +72,21 @@ def test_a_web_page_gets_nowhere(lockstep: Running) -> None:
         assert guest.ask(request="status")["status"]["button"] == "none"
 
 
-@pytest.mark.parametrize("line", [b"\n", b"{}\n", b'{"request":"explode"}\n', b"\x00" * 20000])
+@pytest.mark.parametrize("line", [b"\n", b"[]\n", b'{"id":-1}\n', b"\x00" * 20000])
 def test_a_line_that_is_no_request_ends_the_connection_after_one_answer(lockstep: Running, line: bytes) -> None:
     with Guest(lockstep) as guest:
         guest.socket.sendall(line)
         assert json.loads(guest.stream.readline())["ok"] is False
         assert guest.is_cut_off()
+
+
+def test_a_wrong_request_is_refused_by_its_id_and_the_next_one_is_heard(lockstep: Running) -> None:
+    with Guest(lockstep) as guest:
+        guest.socket.sendall(b'{"id":5,"request":"explode"}\n{"id":6,"request":"release"}\n')
+        refused, done = (json.loads(guest.stream.readline()) for _ in range(2))
+    assert (refused["id"], refused["ok"]) == (5, False)
+    assert "unknown request 'explode'" in refused["error"]
+    assert done == {"id": 6, "ok": True}
 
 
 def test_requests_in_pieces_and_several_at_once_are_answered_in_order(lockstep: Running) -> None:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 import threading
+import time
 
 import numpy as np
 import pytest
 
 from rcilab.client import connect
 from rcilab.client.identify import identify_robot
+from rcilab.client.session import open_session
 from rcilab.command import JointPosition
 from rcilab.conformance import check
 from rcilab.errors import (
@@ -25,6 +27,7 @@ from rcilab.faults import Fault
 from rcilab.model import load_model
 from rcilab.motion import Motion, plan_joint
 from rcilab.spatial import Pose
+from rcilab.supervisor.launch import start_controller
 from rcilab.supervisor.simulate import simulate
 
 MODEL = load_model("xMatePro7")
@@ -199,3 +202,26 @@ def test_closing_ends_the_private_controller():
         connect(address, MODEL, timeout=0.5)
     with pytest.raises(UsageError, match="connect again"):
         robot.execute(plan_joint(MODEL, MODEL.home, GOAL))
+
+
+def test_a_controller_that_is_killed_in_mid_motion_is_noticed_although_it_keeps_no_time():
+    killed: list[float] = []
+
+    def callback(state, t):
+        if t >= 0.1 and not killed:
+            killed.append(time.monotonic())
+            controller.kill()
+        return JointPosition(state.q_c)
+
+    controller = start_controller(MODEL.name, lockstep=True)
+    try:
+        assert controller.address is not None
+        with open_session(controller.address, MODEL, 10.0, realtime=False, silence=60.0) as robot:
+            robot.power_on()
+            with pytest.raises(ConnectionLostError) as lost:
+                robot.control(callback)
+        assert killed
+        assert "closed the connection" in str(lost.value)
+        assert len(lost.value.record) > 0
+    finally:
+        controller.end()

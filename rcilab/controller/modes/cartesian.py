@@ -25,9 +25,8 @@ from rcilab.controller.stream import Stream
 from rcilab.errors import InvalidValueError, KinematicsError
 from rcilab.faults import Fault
 from rcilab.protocols.rci import CommandPacket
-from rcilab.spatial import Pose, rotation_from_wxyz, wxyz_from_rotation
+from rcilab.spatial import Pose, find_rotation_error, rotation_from_wxyz, wxyz_from_rotation
 
-FRAME_TOLERANCE = 1e-5  # How far rows may be from unit length and perpendicular; the vendor's client uses the same.
 _INVALID = (Fault.CARTESIAN_POSITION_MOTION_GENERATOR_INVALID_FRAME,)
 _ELBOW = (Fault.COMMAND_CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION,)
 
@@ -128,16 +127,5 @@ def find_frame_error(numbers: Sequence[float]) -> str | None:
         return "commanded pose is not all finite numbers"
     if last_row != [0.0, 0.0, 0.0, 1.0]:
         return f"commanded pose has {last_row} as its last row; needs 0 0 0 1"
-    off = max(
-        abs(a * a + b * b + c * c - 1.0),
-        abs(d * d + e * e + f * f - 1.0),
-        abs(g * g + h * h + i * i - 1.0),
-        abs(a * d + b * e + c * f),
-        abs(a * g + b * h + c * i),
-        abs(d * g + e * h + f * i),
-    )
-    if off > FRAME_TOLERANCE:
-        return f"commanded pose holds no rotation: its rows are off by {off:.3g}, {FRAME_TOLERANCE:g} is allowed"
-    if a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) < 0.0:
-        return "commanded pose holds a reflection, not a rotation"
-    return None
+    error = find_rotation_error((a, b, c, d, e, f, g, h, i))
+    return None if error is None else f"commanded pose {error}"

@@ -1,6 +1,6 @@
 """The world port of a virtual controller: what happens to its robot from outside, as values and as lines of JSON."""
 
-from rcilab.protocols.world.answers import Done, Refused, WorldAnswer, WorldStatus
+from rcilab.protocols.world.answers import Done, Refused, WorldAnswer, WorldStatus, status_as_dict
 from rcilab.protocols.world.faults import DIRECTIONS, LONGEST_STALL, Direction, NetworkFaults, Stall
 from rcilab.protocols.world.lines import (
     LONGEST_LINE,
@@ -29,6 +29,7 @@ from rcilab.protocols.world.requests import (
     SafetyButton,
     SetInput,
     StallClock,
+    Walls,
     WorldRequest,
 )
 
@@ -60,6 +61,7 @@ __all__ = [
     "SetInput",
     "Stall",
     "StallClock",
+    "Walls",
     "WorldAnswer",
     "WorldRequest",
     "WorldStatus",
@@ -67,4 +69,5 @@ __all__ = [
     "decode_world_request",
     "encode_world_answer",
     "encode_world_request",
+    "status_as_dict",
 ]

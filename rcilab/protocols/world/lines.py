@@ -62,14 +62,21 @@ def encode_world_request(request: WorldRequest, request_id: int) -> bytes:
     return _encode(content)
 
 
-def decode_world_request(line: bytes) -> tuple[int, WorldRequest]:
-    """Returns the id and the request in a line.
+def decode_world_request(line: bytes) -> tuple[int, WorldRequest | Refused]:
+    """Returns the id and the request in a line; why it is none, where the line can be read so far.
 
     Raises:
-        DecodeError: It is no request; the message says why.
+        DecodeError: It is no JSON object, or its id is no number; the message says why.
     """
     content = _decode(line)
     request_id = _pop_id(content)
+    try:
+        return request_id, _request(content)
+    except DecodeError as error:
+        return request_id, Refused(str(error))
+
+
+def _request(content: dict[str, Any]) -> WorldRequest:
     name = content.pop("request", None)
     kind = REQUESTS.get(name) if isinstance(name, str) else None
     if kind is None:
@@ -82,7 +89,7 @@ def decode_world_request(line: bytes) -> tuple[int, WorldRequest]:
         if item.name not in content and item.default is MISSING:
             raise DecodeError(f"{name} needs {item.name}")
     try:
-        return request_id, kind(**content)
+        return kind(**content)
     except InvalidValueError as error:
         raise DecodeError(f"{name}: {error}") from error
 

@@ -218,6 +218,18 @@ class Floor:
 
 
 @dataclass(frozen=True, slots=True)
+class Walls:
+    """Makes the faces of the active safety box solid, so that the links run into them, or not."""
+
+    name: ClassVar[str] = "walls"
+    on: bool
+
+    def __post_init__(self) -> None:
+        """Checks it."""
+        _put(self, "on", as_flag(self.on, "on"))
+
+
+@dataclass(frozen=True, slots=True)
 class Mount:
     """Fixes a real load to the flange, whatever SetLoad says of it; without a mass again the one of SetLoad."""
 
@@ -257,6 +269,7 @@ WorldRequest: TypeAlias = (
     | PlaceBox
     | RemoveBox
     | Floor
+    | Walls
     | Mount
     | GetStatus
 )

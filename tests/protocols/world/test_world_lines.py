@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import fields
 from typing import Any
 
@@ -56,6 +57,7 @@ REQUESTS = st.one_of(
     st.builds(world.PlaceBox, names, row(st.floats(0.001, 1), 3), row(length, 3), row(st.floats(0.1, 1), 4)),
     st.builds(world.RemoveBox, names),
     st.builds(world.Floor, st.booleans()),
+    st.builds(world.Walls, st.booleans()),
     st.builds(world.Mount, st.none() | st.floats(0, 10), row(length, 3), row(length, 9)),
     st.just(world.GetStatus()),
 )
@@ -157,8 +159,20 @@ def test_any_bytes_are_a_value_or_a_decode_error(line: bytes) -> None:
     ],
 )
 def test_what_is_no_request_says_why(line: bytes, message: str) -> None:
-    with pytest.raises(DecodeError, match=message):
-        world.decode_world_request(line)
+    try:
+        _, request = world.decode_world_request(line)
+    except DecodeError as error:
+        said = str(error)
+    else:
+        assert isinstance(request, world.Refused)
+        said = request.reason
+    assert re.search(message, said)
+
+
+def test_a_wrong_request_is_refused_by_its_own_id() -> None:
+    request_id, answer = world.decode_world_request(b'{"id":7,"request":"press","button":"red"}')
+    assert request_id == 7
+    assert isinstance(answer, world.Refused)
 
 
 def test_values_of_numpy_are_values() -> None:

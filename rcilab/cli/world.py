@@ -1,0 +1,67 @@
+"""`rcilab world ADDRESS REQUEST [FIELD=VALUE ...]`: something happens to a virtual robot, from the command line."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rcilab.protocols.world import WorldRequest
+
+EPILOG = """examples, for a controller that has printed "world 127.0.0.2:40123":
+  rcilab world 127.0.0.2:40123 push wrench=[0,0,-20,0,0,0] link=4 duration=1
+  rcilab world 127.0.0.2:40123 place_box box=wall size=[0.1,1,1] position=[0.6,0,0.5]
+  rcilab world 127.0.0.2:40123 press button=estop
+  rcilab world 127.0.0.2:40123 status
+Contact (place_box, floor, walls) needs a controller with --plant mujoco."""
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Adds the command."""
+    parser = subparsers.add_parser(
+        "world",
+        help="push a virtual robot, put a box in its way, press its emergency stop",
+        description="Something happens to a virtual robot, through its world port.",
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("address", metavar="ADDRESS", help="world port, HOST:PORT, as the controller prints it")
+    parser.add_argument("request", metavar="REQUEST", help="what happens, such as push, place_box, press or status")
+    parser.add_argument("fields", nargs="*", metavar="FIELD=VALUE", help="what it needs; values are JSON, or a word")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Asks for it and prints what the answer says, as JSON when that is more than that it was done."""
+    from rcilab.client.world import World
+    from rcilab.errors import InvalidValueError
+    from rcilab.protocols.world import WorldStatus, status_as_dict
+
+    host, colon, port = args.address.rpartition(":")
+    if not colon or not host or not (port.isascii() and port.isdigit() and 0 < int(port) < 65536):
+        raise InvalidValueError("address", args.address, "needs HOST:PORT, such as 127.0.0.2:40123")
+    request = _request(args.request, args.fields)
+    with World(host, int(port)) as world:
+        answer = world.ask(request)
+    print(json.dumps(status_as_dict(answer), indent=1) if isinstance(answer, WorldStatus) else "done")
+    return 0
+
+
+def _request(name: str, texts: list[str]) -> WorldRequest:
+    from rcilab.errors import InvalidValueError
+    from rcilab.protocols.world import Refused, decode_world_request
+
+    content: dict[str, Any] = {"request": name}
+    for text in texts:
+        field, equals, value = text.partition("=")
+        if not equals or not field:
+            raise InvalidValueError("field", text, "needs FIELD=VALUE, such as duration=1")
+        try:
+            content[field] = json.loads(value)
+        except ValueError:
+            content[field] = value
+    _, request = decode_world_request(json.dumps(content).encode())
+    if isinstance(request, Refused):
+        raise InvalidValueError("request", name, request.reason)
+    return request

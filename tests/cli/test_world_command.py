@@ -1,0 +1,54 @@
+"""Things happen to a virtual robot from the command line."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from rcilab.cli import main
+from rcilab.supervisor.launch import start_controller
+
+
+@pytest.fixture(scope="module")
+def address():
+    controller = start_controller("xMatePro7", lockstep=True, plant="mujoco")
+    assert controller.world_address is not None
+    yield controller.world_address
+    controller.end()
+
+
+def test_a_box_is_placed_the_arm_is_pushed_and_the_status_is_printed(address, capsys):
+    for words in (
+        ["place_box", "box=wall", "size=[0.1,1,1]", "position=[0.9,0,0.5]"],
+        ["push", "wrench=[0,0,-20,0,0,0]", "link=4", "duration=0.1"],
+        ["press", "button=estop"],
+    ):
+        assert main(["world", address, *words]) == 0
+        assert capsys.readouterr().out == "done\n"
+    assert main(["world", address, "status"]) == 0
+    assert json.loads(capsys.readouterr().out)["button"] == "estop"
+    assert main(["world", address, "press", "button=none"]) == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["explode"], "unknown request 'explode'; known: push"),
+        (["push"], "push needs wrench"),
+        (["press", "button=red"], "button: 'red' is unknown"),
+        (["press", "estop"], "needs FIELD=VALUE"),
+        (["remove_box", "box=chair"], "chair"),
+    ],
+)
+def test_what_cannot_happen_is_refused_in_one_sentence(address, capsys, words, said):
+    assert main(["world", address, *words]) == 2
+    shown = capsys.readouterr().err
+    assert said in shown
+    assert shown.count("\n") == 1
+
+
+@pytest.mark.parametrize("address", ["", "here", "127.0.0.2", "127.0.0.2:x", "127.0.0.2:0", ":1"])
+def test_an_address_that_is_none_is_refused(capsys, address):
+    assert main(["world", address, "status"]) == 2
+    assert "needs HOST:PORT" in capsys.readouterr().err
