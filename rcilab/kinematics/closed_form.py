@@ -11,7 +11,7 @@ import numpy as np
 
 from rcilab.arrays import Array, JointPath, JointVector
 from rcilab.errors import KinematicsError
-from rcilab.kinematics.arm_angle import arm_angle
+from rcilab.kinematics.arm_angle import arm_angle, arm_angle_path
 from rcilab.kinematics.branch import Loss, follow_branch
 from rcilab.kinematics.feasible_arcs import FeasibleArcs, feasible_arcs
 from rcilab.kinematics.inverse import Angles, ArmGeometry, build_geometry, inverse_seven, inverse_six
@@ -20,6 +20,7 @@ from rcilab.kinematics.offset_arcs import feasible_offset_arcs
 from rcilab.kinematics.offset_arm import ELBOW, OffsetGeometry, SelfMotion, build_offset_geometry
 from rcilab.kinematics.offset_batch import inverse_offset_batch
 from rcilab.kinematics.offset_branch import follow_offset_branch
+from rcilab.kinematics.singularity import singularity_path
 from rcilab.robots.description import RobotDescription
 from rcilab.spatial import Pose
 
@@ -55,6 +56,18 @@ class ClosedForm(Protocol):
             SingularError: It has no meaning there.
             KinematicsError: The arm has none.
         """
+        ...
+
+    def arm_angle_path(self, q: JointPath) -> Array:
+        """Returns the arm angles of N configurations, shape (N,), [rad]; any number where they have no meaning.
+
+        Raises:
+            KinematicsError: The arm has none.
+        """
+        ...
+
+    def singularity_path(self, q: JointPath) -> Array:
+        """Returns how near N configurations are to a singularity, shape (N,): from 1 on they count as at one."""
         ...
 
     def batch(self, T_base_flange: Array, psi: Array) -> Array:
@@ -99,6 +112,14 @@ class SphericalSeven:
         """Returns where the elbow is on its circle, [rad]."""
         return arm_angle(self.envelope.upper, self.envelope.fore, q)
 
+    def arm_angle_path(self, q: JointPath) -> Array:
+        """Returns where the elbow is on its circle along a path, [rad]."""
+        return arm_angle_path(self.envelope.upper, self.envelope.fore, q)
+
+    def singularity_path(self, q: JointPath) -> Array:
+        """Returns how near the arm is to a singularity along a path."""
+        return singularity_path(self.envelope, q)
+
     def batch(self, T_base_flange: Array, psi: Array) -> Array:
         """Returns the solutions at N poses, shape (N, 8, 7)."""
         return inverse_batch(self.envelope, T_base_flange, psi)
@@ -123,6 +144,10 @@ class SphericalSix(SphericalSeven):
 
     def arm_angle(self, q: Sequence[float]) -> float:
         """Raises KinematicsError: there is none."""
+        raise KinematicsError("an arm with 6 axes has no arm angle")
+
+    def arm_angle_path(self, q: JointPath) -> Array:
+        """Raises KinematicsError: there are none."""
         raise KinematicsError("an arm with 6 axes has no arm angle")
 
     def arcs(self, T_base_flange: Pose, lower: Array, upper: Array, outside_box: bool) -> FeasibleArcs:
@@ -151,6 +176,14 @@ class OffsetSeven:
     def arm_angle(self, q: Sequence[float]) -> float:
         """Returns the angle of joint 3, [rad]."""
         return remainder(q[ELBOW], tau)
+
+    def arm_angle_path(self, q: JointPath) -> Array:
+        """Returns the angles of joint 3, [rad], as they are: this joint makes no whole turn."""
+        return q[:, ELBOW]
+
+    def singularity_path(self, q: JointPath) -> Array:
+        """Returns zeros: at a given angle of joint 3 its maker refuses no pose for being singular."""
+        return np.zeros(len(q))
 
     def batch(self, T_base_flange: Array, psi: Array) -> Array:
         """Returns the solutions at N poses, shape (N, M, 7)."""
