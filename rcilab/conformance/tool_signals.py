@@ -97,9 +97,7 @@ class ToolSignals:
         return psi[self._first :, np.newaxis], first, second, third
 
     def _norms(self, steps: Array) -> Differences:
-        first, second, third = (
-            np.sqrt((values * values).sum(axis=1))[:, np.newaxis] for values in self._judged(steps)
-        )
+        first, second, third = (np.sqrt((values * values).sum(axis=1))[:, np.newaxis] for values in self._judged(steps))
         return np.zeros_like(first), first, second, third
 
     def _judged(self, steps: Array) -> tuple[Array, Array, Array]:

@@ -10,12 +10,12 @@ as "not valid"); so on its way through zero an arm angle that is not valid is ze
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from math import isfinite, pi, remainder, tau
+from math import pi, remainder, tau
 
 from rcilab.clock import CYCLE_TIME
 from rcilab.conformance.breach import describe_breaches
 from rcilab.conformance.cartesian_monitor import CartesianMonitor
+from rcilab.conformance.frame import find_frame_error as find_frame_error
 from rcilab.conformance.tool_conditions import ARM_ANGLE_TOLERANCE
 from rcilab.controller.filters import PoseLowPass
 from rcilab.controller.modes.generator import Gap, JointReference, Step, Terms, lost_motion
@@ -27,7 +27,6 @@ from rcilab.faults import Fault
 from rcilab.protocols.rci import CommandPacket
 from rcilab.spatial import Pose, rotation_from_wxyz, wxyz_from_rotation
 
-FRAME_TOLERANCE = 1e-5  # How far rows may be from unit length and perpendicular; the vendor's client uses the same.
 _INVALID = (Fault.CARTESIAN_POSITION_MOTION_GENERATOR_INVALID_FRAME,)
 _ELBOW = (Fault.COMMAND_CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION,)
 
@@ -119,25 +118,3 @@ class CartesianGenerator:
             return packet.psi_c
         passes_zero = packet.psi_c == 0.0 and abs(self._psi) <= self._smallest_psi
         return 0.0 if passes_zero else self._psi
-
-
-def find_frame_error(numbers: Sequence[float]) -> str | None:
-    """Returns why 16 numbers, row-major, are no pose of a tool, or None when they are one."""
-    a, b, c, x, d, e, f, y, g, h, i, z, *last_row = numbers
-    if not isfinite(a + b + c + d + e + f + g + h + i + x + y + z):
-        return "commanded pose is not all finite numbers"
-    if last_row != [0.0, 0.0, 0.0, 1.0]:
-        return f"commanded pose has {last_row} as its last row; needs 0 0 0 1"
-    off = max(
-        abs(a * a + b * b + c * c - 1.0),
-        abs(d * d + e * e + f * f - 1.0),
-        abs(g * g + h * h + i * i - 1.0),
-        abs(a * d + b * e + c * f),
-        abs(a * g + b * h + c * i),
-        abs(d * g + e * h + f * i),
-    )
-    if off > FRAME_TOLERANCE:
-        return f"commanded pose holds no rotation: its rows are off by {off:.3g}, {FRAME_TOLERANCE:g} is allowed"
-    if a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) < 0.0:
-        return "commanded pose holds a reflection, not a rotation"
-    return None
