@@ -92,7 +92,7 @@ class Monitor:
         model = self._model
         state = as_start(start, model.n)
         self._start, self._is_first = state, not state.moving
-        self._q: Array = state.q
+        self._q = state.q.tolist()
         self._measured.reset(state.q.tolist())
         if self._joints is not None:
             self._joints.reset(state.q.tolist(), state.dq.tolist(), state.ddq.tolist())
@@ -176,14 +176,15 @@ class Monitor:
         turn = 0.0 if self._psi is None else self._psi - (self._start_psi or 0.0)
         found = self._at_start({"translation": [way], "arm_angle": [math.remainder(turn, math.tau)]})
         found += monitor.broken()
-        q = self._solve(pose)
+        flange = pose @ self._T_tool_flange if self._has_tool else pose
+        q = self._inverse.beside(flange, self._psi or 0.0, self._q)
         if q is None:
             return [*found, self._improper(math.inf)]
         self._q = q
-        nearness = float(self._inverse.singularity_path(q[np.newaxis])[0])
+        nearness = float(self._inverse.singularity_path(np.array([q]))[0])
         if not nearness < 1.0:
             found.append(self._improper(nearness))
-        return found + self._judge_elbow(q) + self._judge_joints(q.tolist(), cycles)
+        return found + self._judge_elbow(q) + self._judge_joints(q, cycles)
 
     def _judge_joints(self, q: list[float], cycles: int) -> list[Breach]:
         assert self._joints is not None
@@ -196,7 +197,7 @@ class Monitor:
             found += self._box.broken()
         return found + self._distances(q)
 
-    def _judge_elbow(self, q: Array) -> list[Breach]:
+    def _judge_elbow(self, q: list[float]) -> list[Breach]:
         row = self._pose_rows.get("elbow_sign")
         if row is None or self._model.elbow(q)[1] == self._model.elbow(self._start.q)[1]:
             return []
@@ -219,13 +220,6 @@ class Monitor:
             return []
         self._clearance.step(q)
         return self._clearance.broken()
-
-    def _solve(self, pose: Pose) -> Array | None:
-        """Returns the joint angles of a pose next to the last ones, or None where there are none."""
-        flange = pose @ self._T_tool_flange if self._has_tool else pose
-        psi = None if self._psi is None else np.array([self._psi])
-        rows, loss = self._inverse.follow(flange.rotation[np.newaxis], flange.position[np.newaxis], psi, self._q)
-        return None if loss is not None or not np.isfinite(rows).all() else rows[0]
 
     def _own(self, breaches: list[Breach]) -> list[Breach]:
         """Returns breaches of the manual's rows as those of the arm's own table; what it has no row for is none."""

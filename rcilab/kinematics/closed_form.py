@@ -19,7 +19,7 @@ from rcilab.kinematics.inverse_batch import inverse_batch
 from rcilab.kinematics.offset_arcs import feasible_offset_arcs
 from rcilab.kinematics.offset_arm import ELBOW, OffsetGeometry, SelfMotion, build_offset_geometry
 from rcilab.kinematics.offset_batch import inverse_offset_batch
-from rcilab.kinematics.offset_branch import follow_offset_branch
+from rcilab.kinematics.offset_branch import follow_offset_branch, settle_beside
 from rcilab.kinematics.singularity import singularity_path
 from rcilab.robots.description import RobotDescription
 from rcilab.spatial import Pose
@@ -80,6 +80,18 @@ class ClosedForm(Protocol):
         """Returns the joint angles along a path, as `follow_branch` does."""
         ...
 
+    def beside(self, T_base_flange: Pose, psi: float, near: Sequence[float]) -> list[float] | None:
+        """Returns the joint angles of a pose closest to those before, [rad], or None where there are none.
+
+        Joint limits are not looked at; full turns are counted.
+
+        Args:
+            T_base_flange: Pose of the flange.
+            psi: Arm angle, [rad]; of no meaning for 6 axes.
+            near: Joint angles of the cycle before, n plain floats, [rad].
+        """
+        ...
+
     def arcs(self, T_base_flange: Pose, lower: Array, upper: Array, outside_box: bool) -> FeasibleArcs:
         """Returns the feasible arm angles of a pose, as `feasible_arcs` does."""
         ...
@@ -129,6 +141,18 @@ class SphericalSeven:
     ) -> tuple[JointPath, Loss | None]:
         """Returns the joint angles along a path."""
         return follow_branch(self.envelope, rotations, positions, psi, start)
+
+    def beside(self, T_base_flange: Pose, psi: float, near: Sequence[float]) -> list[float] | None:
+        """Returns the joint angles of a pose closest to those before, [rad]."""
+        try:
+            branches = self.at(T_base_flange, near).branches(psi)
+        except KinematicsError:
+            return None
+        if not branches:
+            return None
+        turns = [[remainder(a - b, tau) for a, b in zip(branch, near, strict=True)] for branch in branches]
+        least = min(turns, key=lambda turn: sum([angle * angle for angle in turn]))
+        return [angle + turn for angle, turn in zip(near, least, strict=True)]
 
     def arcs(self, T_base_flange: Pose, lower: Array, upper: Array, outside_box: bool) -> FeasibleArcs:
         """Returns the feasible arm angles, in closed form."""
@@ -195,6 +219,10 @@ class OffsetSeven:
         """Returns the joint angles along a path."""
         angles = np.full(len(positions), start[ELBOW]) if psi is None else psi
         return follow_offset_branch(self.geometry, rotations, positions, angles, start)
+
+    def beside(self, T_base_flange: Pose, psi: float, near: Sequence[float]) -> list[float] | None:
+        """Returns the joint angles of a pose closest to those before, [rad]."""
+        return settle_beside(self.geometry, T_base_flange.rotation, T_base_flange.position, psi, near)
 
     def arcs(self, T_base_flange: Pose, lower: Array, upper: Array, outside_box: bool) -> FeasibleArcs:
         """Returns the feasible arm angles, found along the self-motion."""
