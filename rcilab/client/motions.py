@@ -201,10 +201,10 @@ class Motions(RciCommands):
     def _run(self, callback: Callback, mode: Mode, plan: Motion | None, filters: Sequence[CommandFilter] = ()) -> Run:
         """Runs a motion and returns what became of it."""
 
-    def _require_allowed(self, motion: Motion, state: RobotState) -> None:
+    def _require_allowed(self, motion: Motion, state: RobotState, mode: Mode = "joint_position") -> None:
         from rcilab.conformance import check
 
-        check(motion, self.model, start=state.q_c, box=self.safety_box).require()
+        check(motion, self.model, start=state.q_c, box=self.safety_box, mode=mode).require()
 
     def _move_along(
         self, path: Path, state: RobotState, speed: float, with_psi: bool, progress: Progress | None
@@ -213,6 +213,6 @@ class Motions(RciCommands):
         from rcilab.motion.cartesian import follow_path, schedule
 
         motion = follow_path(self.model, state.q_c, path, speed)
-        self._require_allowed(motion, state)
+        self._require_allowed(motion, state, "cartesian_position")
         callback = follow_poses(path, schedule(path, speed), with_psi, report_progress(motion, progress))
         return self._run(callback, "cartesian_position", motion)
