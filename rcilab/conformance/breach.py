@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, NamedTuple
 
-from rcilab.conformance.condition import AnyFault, Condition
+from rcilab.conformance.condition import Condition
 from rcilab.faults import Fault
 
 if TYPE_CHECKING:
@@ -48,8 +48,3 @@ def describe_breaches(breaches: Iterable[Breach]) -> str:
 def faults_of(breaches: Iterable[Breach]) -> tuple[Fault, ...]:
     """Returns the faults of the RCI that they raise, in wire order and once each."""
     return tuple(sorted({fault for row, *_ in breaches if isinstance(fault := row.fault, Fault)}))
-
-
-def errors_of(breaches: Iterable[Breach]) -> tuple[AnyFault, ...]:
-    """Returns what a controller raises for them, a maker's own errors too, in the order of their numbers, once each."""
-    return tuple(sorted({row.fault for row, *_ in breaches if row.fault is not None}))

@@ -58,7 +58,8 @@ class Monitor:
     ) -> None:
         self._model, self.mode = require_model(model), require_mode(mode)
         table, box = condition_table(model.description), box if box is not None and box.active else None
-        self._table, limits = table, model.limits
+        limits = model.limits
+        self._own_rows = {row.id: row for row in table.conditions}
         rows = table.rows(self.mode, has_elbow=model.n == 7)
         self._start_rows = [row for row in rows if row.stage == "start" and row.order == 0]
         self._clearance = None if distance is None else ClearanceMonitor(model, distance)
@@ -108,6 +109,8 @@ class Monitor:
                 self._tool.step(pose, psi)
             self._start_pose, self._psi = poses[-1]
             self._start_psi = self._psi
+        if "elbow_sign" in self._pose_rows:
+            self._start_side = model.elbow(state.q)[1]
 
     def step(self, command: Command, cycles: int = 1) -> tuple[Breach, ...]:
         """Takes the command of this cycle and returns what it breaks, recommendations too; nothing when all is well.
@@ -181,9 +184,8 @@ class Monitor:
         if q is None:
             return [*found, self._improper(math.inf)]
         self._q = q
-        nearness = float(self._inverse.singularity_path(np.array([q]))[0])
-        if not nearness < 1.0:
-            found.append(self._improper(nearness))
+        if self._inverse.is_singular(q):
+            found.append(self._improper(float(self._inverse.singularity_path(np.array([q]))[0])))
         return found + self._judge_elbow(q) + self._judge_joints(q, cycles)
 
     def _judge_joints(self, q: list[float], cycles: int) -> list[Breach]:
@@ -199,7 +201,7 @@ class Monitor:
 
     def _judge_elbow(self, q: list[float]) -> list[Breach]:
         row = self._pose_rows.get("elbow_sign")
-        if row is None or self._model.elbow(q)[1] == self._model.elbow(self._start.q)[1]:
+        if row is None or self._model.elbow(q)[1] == self._start_side:
             return []
         return [Breach(row, 0, -1.0, 0.0)]
 
@@ -223,7 +225,7 @@ class Monitor:
 
     def _own(self, breaches: list[Breach]) -> list[Breach]:
         """Returns breaches of the manual's rows as those of the arm's own table; what it has no row for is none."""
-        own = {row.id: row for row in self._table.conditions}
+        own = self._own_rows
         return [breach._replace(condition=own[row.id]) for breach in breaches if (row := breach.condition).id in own]
 
     def _improper(self, nearness: float) -> Breach:

@@ -20,7 +20,7 @@ from rcilab.kinematics.offset_arcs import feasible_offset_arcs
 from rcilab.kinematics.offset_arm import ELBOW, OffsetGeometry, SelfMotion, build_offset_geometry
 from rcilab.kinematics.offset_batch import inverse_offset_batch
 from rcilab.kinematics.offset_branch import follow_offset_branch, settle_beside
-from rcilab.kinematics.singularity import singularity_path
+from rcilab.kinematics.singularity import find_singularity, singularity_path
 from rcilab.robots.description import RobotDescription
 from rcilab.spatial import Pose
 
@@ -68,6 +68,10 @@ class ClosedForm(Protocol):
 
     def singularity_path(self, q: JointPath) -> Array:
         """Returns how near N configurations are to a singularity, shape (N,): from 1 on they count as at one."""
+        ...
+
+    def is_singular(self, q: Sequence[float]) -> bool:
+        """Returns whether a configuration counts as at a singularity; `singularity_path` for one, in plain floats."""
         ...
 
     def batch(self, T_base_flange: Array, psi: Array) -> Array:
@@ -131,6 +135,10 @@ class SphericalSeven:
     def singularity_path(self, q: JointPath) -> Array:
         """Returns how near the arm is to a singularity along a path."""
         return singularity_path(self.envelope, q)
+
+    def is_singular(self, q: Sequence[float]) -> bool:
+        """Returns whether the arm counts as at a singularity."""
+        return find_singularity(self.envelope, q) is not None
 
     def batch(self, T_base_flange: Array, psi: Array) -> Array:
         """Returns the solutions at N poses, shape (N, 8, 7)."""
@@ -208,6 +216,10 @@ class OffsetSeven:
     def singularity_path(self, q: JointPath) -> Array:
         """Returns zeros: at a given angle of joint 3 its maker refuses no pose for being singular."""
         return np.zeros(len(q))
+
+    def is_singular(self, q: Sequence[float]) -> bool:
+        """Returns False, as above."""
+        return False
 
     def batch(self, T_base_flange: Array, psi: Array) -> Array:
         """Returns the solutions at N poses, shape (N, M, 7)."""
