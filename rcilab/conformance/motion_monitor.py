@@ -112,7 +112,7 @@ class Monitor:
         if "elbow_sign" in self._pose_rows:
             self._start_side = model.elbow(state.q)[1]
 
-    def step(self, command: Command, cycles: int = 1) -> tuple[Breach, ...]:
+    def step(self, command: Command, cycles: int = 1, side: int | None = None) -> tuple[Breach, ...]:
         """Takes the command of this cycle and returns what it breaks, recommendations too; nothing when all is well.
 
         A number that is none breaks every condition on it. After a breach of a necessary condition a controller stops;
@@ -122,6 +122,8 @@ class Monitor:
         Args:
             command: As the mode asks for; without an arm angle the elbow stays.
             cycles: Cycles since the last command, 1 or more.
+            side: Side of the elbow, +1 or -1 as `model.elbow` counts it, which Franka commands with every pose; None
+                keeps the last. Other arms have none.
 
         Raises:
             InvalidValueError: The command is of another kind than the mode's, or for another number of joints.
@@ -129,7 +131,7 @@ class Monitor:
         if self._torques is not None:
             found = self._step_torques(self._torques, command, cycles)
         elif self._tool is not None:
-            found = self._step_pose(self._tool, command, cycles)
+            found = self._step_pose(self._tool, command, cycles, side)
         else:
             found = self._step_joints(command, cycles)
         self._is_first = False
@@ -165,7 +167,7 @@ class Monitor:
         away = [new - old for new, old in zip(q, self._start.q.tolist(), strict=True)]
         return self._at_start({"joint": away}) + self._judge_joints(q, cycles)
 
-    def _step_pose(self, monitor: CartesianMonitor, command: Command, cycles: int) -> list[Breach]:
+    def _step_pose(self, monitor: CartesianMonitor, command: Command, cycles: int, side: int | None) -> list[Breach]:
         if not isinstance(command, CartesianPosition):
             raise self._wrong(command)
         numbers = np.asarray(command.T_base_tool, dtype=np.float64).ravel().tolist()
@@ -180,7 +182,7 @@ class Monitor:
         found = self._at_start({"translation": [way], "arm_angle": [math.remainder(turn, math.tau)]})
         found += monitor.broken()
         flange = pose @ self._T_tool_flange if self._has_tool else pose
-        q = self._inverse.beside(flange, self._psi or 0.0, self._q)
+        q = self._inverse.beside(flange, self._psi or 0.0, self._on_side(side))
         if q is None:
             return [*found, self._improper(math.inf)]
         self._q = q
@@ -198,6 +200,13 @@ class Monitor:
             self._box.step(self._model.forward(q).parts[1])
             found += self._box.broken()
         return found + self._distances(q)
+
+    def _on_side(self, side: int | None) -> list[float]:
+        """Returns the last joint angles, mirrored at the elbow's flip where the other side is asked for."""
+        flip = self._model.description.elbow_flip
+        if flip is None or side is None or self._model.elbow(self._q)[1] == side:
+            return self._q
+        return [*self._q[:3], 2.0 * flip - self._q[3], *self._q[4:]]
 
     def _judge_elbow(self, q: list[float]) -> list[Breach]:
         row = self._pose_rows.get("elbow_sign")

@@ -20,9 +20,9 @@ from rcilab.spatial import Pose
 
 _KNOTS = 48  # Rows that are settled one by one; a choice: a few ms, and guesses good to a hundredth of a radian.
 _TURN = 0.15  # [rad] Of a joint from knot to knot, beyond which rows between them are settled first.
-_ROUNDS = 8
+_ROUNDS = 12  # Beside the stretched arm two solutions meet, and the first steps only halve what is missing.
 _SETTLED = 1e-12  # [m] and [rad]
-_CLOSE = 1e-8  # [m] and [rad] From where one more step settles, as each squares what is missing.
+_CLOSE = 1e-7  # [rad] A step that leaves nothing to settle, as each squares what is missing.
 _JUMP = 0.6  # [rad] From row to row: beyond it the arm does not follow but changes branches.
 _FREE = [joint for joint in range(7) if joint != ELBOW]
 
@@ -131,7 +131,7 @@ def settle_beside(
             return None
         for joint, turn in zip(_FREE, step.tolist(), strict=True):
             q[joint] += turn
-        if np.abs(miss).max() < _CLOSE:
+        if np.abs(step).max() < _CLOSE:
             break
     missing = np.abs(_miss(forward(arm.chain, q), rotation, position)).max()
     return q if missing < _SETTLED else None

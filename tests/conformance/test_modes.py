@@ -111,8 +111,11 @@ def spoiled(model: RobotModel, seed: int) -> Array:
     rng = np.random.default_rng(seed)
     rows = line(model, int(rng.integers(3)), 0.02).q[: rng.integers(20, 90)].copy()
     for _ in range(rng.integers(1, 4)):
-        row, joint = int(rng.integers(0, len(rows))), int(rng.integers(0, model.n))
-        size = rng.choice((-1.0, 1.0)) * 10.0 ** rng.uniform(-8.0, -1.5)
+        row = int(rng.integers(0, len(rows)))
+        joint = (
+            2 if rng.random() < 0.3 else int(rng.integers(0, model.n))
+        )  # At home the elbow moves with joint 3 alone.
+        size = rng.choice((-1.0, 1.0)) * 10.0 ** rng.uniform(-7.0, -1.2)
         if rng.random() < 0.5:
             rows[row, joint] += size
         else:
@@ -157,6 +160,35 @@ def test_they_agree_from_a_moving_start_and_from_one_elsewhere(name, mode, seed)
     moving = StartState(rows[0], rng.uniform(-0.2, 0.2, model.n), rng.uniform(-3.0, 3.0, model.n))
     require_same(model, mode, rows, moving, None)
     require_same(model, mode, rows, rows[0] + 10.0 ** rng.uniform(-10.0, -4.0) * rng.normal(size=model.n), None)
+
+
+@pytest.mark.parametrize("name", sorted(MODELS))
+@pytest.mark.parametrize("way", [-1.0, 1.0])
+@pytest.mark.parametrize("joint", range(7))
+def test_they_agree_where_a_joint_leaves_its_range_turns_the_elbow_or_meets_a_singularity(name, joint, way):
+    model = MODELS[name]
+    if joint == model.n:
+        return
+    limits = model.limits.joint
+    far = (limits.upper if way > 0.0 else limits.lower)[joint] - model.home[joint]
+    count = 20 + int(abs(far) / 0.03)  # Steps that do not leap over what counts as singular.
+    rows = np.repeat(model.home[np.newaxis], count, axis=0)
+    rows[:, joint] += np.linspace(0.0, far + way * 0.04, count)
+    broken, near = expected(model, rows, "cartesian_position", rows[0])
+    frame = sorted(cycle for cycle, _ in broken["cartesian.frame"])
+    lost = frame[0] if frame else len(rows) + HOLD_SAMPLES
+    monitor = Monitor(model, "cartesian_position")
+    for cycle, command in enumerate(commands(model, rows[: lost + 1], "cartesian_position", as_state(rows[0]))):
+        if cycle > lost:
+            break
+        q = rows[min(cycle, len(rows) - 1)]
+        side = model.elbow(q)[1] if name == "Panda" else None
+        found = {(breach.condition.id, breach.axis) for breach in monitor.step(command, side=side)}
+        wanted = {(row, axis) for row, places in broken.items() for at, axis in places if at == cycle}
+        close = {(row, axis) for row, places in near.items() for at, axis in places if at == cycle}
+        assert found - close == wanted - close, cycle
+    if not frame:
+        assert broken["inverse.joint.position" if name == "Panda" else "joint.position"]
 
 
 SPOILS = {  # What is displaced, by how much; the highest difference that must notice, and its name.
