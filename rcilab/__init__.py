@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from rcilab.command import JointPosition as JointPosition
     from rcilab.command import JointTorque as JointTorque
     from rcilab.conformance.check import check as check
+    from rcilab.conformance.motion_monitor import Monitor as Monitor
     from rcilab.conformance.report import Report as Report
     from rcilab.dynamics.payload import Payload as Payload
     from rcilab.errors import RcilabError as RcilabError
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from rcilab.notebook.plot import plot as plot
     from rcilab.notebook.preview import preview as preview
     from rcilab.safety_box import SafetyBox as SafetyBox
+    from rcilab.safety_distance import SafetyDistance as SafetyDistance
     from rcilab.spatial import Pose as Pose
     from rcilab.supervisor.simulate import simulate as simulate
 
@@ -44,6 +46,7 @@ _HOMES = {
     "Fault": "rcilab.faults",
     "JointPosition": "rcilab.command",
     "JointTorque": "rcilab.command",
+    "Monitor": "rcilab.conformance.motion_monitor",
     "Motion": "rcilab.motion.motion",
     "Payload": "rcilab.dynamics.payload",
     "Pose": "rcilab.spatial",
@@ -54,6 +57,7 @@ _HOMES = {
     "RobotSession": "rcilab.client.session",
     "Run": "rcilab.client.run",
     "SafetyBox": "rcilab.safety_box",
+    "SafetyDistance": "rcilab.safety_distance",
     "Waypoint": "rcilab.motion.program",
     "check": "rcilab.conformance.check",
     "connect": "rcilab.client.session",

@@ -9,9 +9,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import IntEnum
 from math import degrees
+from typing import Literal, TypeAlias, get_args
 
-from rcilab.arrays import Array, JointVector, Matrix
+from rcilab.arrays import Array, JointVector, Matrix, described
+from rcilab.errors import InvalidValueError
 from rcilab.faults import Fault
+
+Mode: TypeAlias = Literal["joint_position", "joint_impedance", "cartesian_position", "cartesian_impedance", "torque"]
+"""How a motion is commanded: the members of `ControllerMode` that move the arm, in small letters."""
+MODES: tuple[Mode, ...] = get_args(Mode)
 
 
 class ControllerMode(IntEnum):
@@ -112,3 +118,15 @@ class RobotState:
         faults = ", ".join(fault.name for fault in self.faults) or "none"
         modes = f"{self.robot_mode.name}, {self.controller_mode.name}"
         return f"<RobotState {self.message_id}: q = {angles} deg; {modes}; faults: {faults}>"
+
+
+def require_mode(mode: object) -> Mode:
+    """Returns `mode` if it is one to move in.
+
+    Raises:
+        InvalidValueError: It is not; the message lists those that exist.
+    """
+    for known in MODES:
+        if mode == known:
+            return known
+    raise InvalidValueError("mode", described(mode), f"is unknown; known: {', '.join(MODES)}")

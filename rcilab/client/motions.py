@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
-from typing import TYPE_CHECKING, Literal, TypeAlias, get_args
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from numpy.typing import ArrayLike
 
@@ -15,9 +15,9 @@ from rcilab.client.filters import CommandFilter, LowPass, RateLimiter
 from rcilab.client.following import Progress, follow, follow_poses, report_progress
 from rcilab.client.run import Run
 from rcilab.client.start_check import describe_start_mismatch, require_motion
-from rcilab.errors import InvalidValueError, UsageError
+from rcilab.errors import UsageError
 from rcilab.spatial import Pose
-from rcilab.state import RobotState
+from rcilab.state import Mode, RobotState, require_mode
 
 if TYPE_CHECKING:
     from rcilab.conformance import Certificate
@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from rcilab.motion.path import Path
     from rcilab.safety_box import SafetyBox
 
-Mode: TypeAlias = Literal["joint_position", "joint_impedance", "cartesian_position", "cartesian_impedance", "torque"]
-MODES: tuple[Mode, ...] = get_args(Mode)
 RateLimit: TypeAlias = Literal["manual", "sdk"]
 
 
@@ -203,10 +201,10 @@ class Motions(RciCommands):
     def _run(self, callback: Callback, mode: Mode, plan: Motion | None, filters: Sequence[CommandFilter] = ()) -> Run:
         """Runs a motion and returns what became of it."""
 
-    def _require_allowed(self, motion: Motion, state: RobotState) -> None:
+    def _require_allowed(self, motion: Motion, state: RobotState, mode: Mode = "joint_position") -> None:
         from rcilab.conformance import check
 
-        check(motion, self.model, start=state.q_c, box=self.safety_box).require()
+        check(motion, self.model, start=state.q_c, box=self.safety_box, mode=mode).require()
 
     def _move_along(
         self, path: Path, state: RobotState, speed: float, with_psi: bool, progress: Progress | None
@@ -215,16 +213,6 @@ class Motions(RciCommands):
         from rcilab.motion.cartesian import follow_path, schedule
 
         motion = follow_path(self.model, state.q_c, path, speed)
-        self._require_allowed(motion, state)
+        self._require_allowed(motion, state, "cartesian_position")
         callback = follow_poses(path, schedule(path, speed), with_psi, report_progress(motion, progress))
         return self._run(callback, "cartesian_position", motion)
-
-
-def require_mode(mode: object) -> None:
-    """Makes sure that a mode is one to move in.
-
-    Raises:
-        InvalidValueError: It is not; the message lists those that exist.
-    """
-    if mode not in MODES:
-        raise InvalidValueError("mode", mode, f"is unknown; known: {', '.join(MODES)}")

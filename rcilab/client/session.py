@@ -17,7 +17,7 @@ from rcilab.client.control_loop import SILENCE, Callback, ControlLoop
 from rcilab.client.filters import CommandFilter
 from rcilab.client.identify import dh_lengths, identify_robot
 from rcilab.client.link import Link
-from rcilab.client.motions import Mode, Motions
+from rcilab.client.motions import Motions
 from rcilab.client.opening import await_first_state, require_arm_there, require_timeout
 from rcilab.client.punctual import punctual
 from rcilab.client.recorder import RECORD_TIME, CycleLog, Recorder
@@ -31,7 +31,7 @@ from rcilab.errors import ConnectionLostError, InvalidValueError, UsageError
 from rcilab.protocols.rci import STATE_SIZE, Request
 from rcilab.safety_box import SafetyBox
 from rcilab.spatial import Pose
-from rcilab.state import ControllerMode, RobotState
+from rcilab.state import ControllerMode, Mode, RobotState
 
 if TYPE_CHECKING:
     from rcilab.model import RobotModel

@@ -15,6 +15,7 @@ from rcilab.conformance.conditions import CONDITIONS, CYCLE_CONDITIONS, explain_
 from rcilab.conformance.limit_tables import LimitTable, cartesian_limits
 from rcilab.conformance.measured_monitor import MeasuredMonitor
 from rcilab.conformance.monitor import JointMonitor
+from rcilab.conformance.motion_monitor import Monitor
 from rcilab.conformance.report import ConditionResult, Report, Violation
 from rcilab.conformance.slow_down import SlowDown
 from rcilab.conformance.start import StartState
@@ -35,6 +36,7 @@ __all__ = [
     "JointMonitor",
     "LimitTable",
     "MeasuredMonitor",
+    "Monitor",
     "Report",
     "SlowDown",
     "StartState",

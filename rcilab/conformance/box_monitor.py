@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rcilab.conformance.breach import Breach
+from rcilab.conformance.condition import Condition
 from rcilab.conformance.tool_conditions import BOX_TOLERANCE, CARTESIAN_POSITION
 from rcilab.faults import Fault
 from rcilab.safety_box import SafetyBox
@@ -20,9 +21,11 @@ class BoxMonitor:
 
     Args:
         box: Where the tool shall stay; None, or one that is not active, bounds nothing.
+        row: What to judge by: that of the manual, or another maker's, see `JointMonitor`.
     """
 
-    def __init__(self, box: SafetyBox | None) -> None:
+    def __init__(self, box: SafetyBox | None, row: Condition = CARTESIAN_POSITION) -> None:
+        self._row = row
         self._box = box if box is not None and box.active else None
         self.excess = -1.0
 
@@ -46,4 +49,4 @@ class BoxMonitor:
         """Returns what the last step broke."""
         if self.excess < BOX_TOLERANCE:
             return []
-        return [Breach(CARTESIAN_POSITION, 0, self.excess, BOX_TOLERANCE)]
+        return [Breach(self._row, 0, self.excess, BOX_TOLERANCE)]

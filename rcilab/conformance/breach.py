@@ -35,6 +35,8 @@ class Breach(NamedTuple):
             return f"{row.place(0)}: {row.quantity} is {self.value:.4g} m outside the safety box"
         if row.signal == "frame":
             return f"{row.place(0)}: {row.quantity} is improper, out of reach or singular"
+        if row.signal == "elbow_sign":
+            return f"{row.place(0)}: it is flipped to the other side than at the start"
         return f"{row.place(self.axis)}: {row.quantity} {self.value:.6g} {row.unit} passes {self.bound:.6g} {row.unit}"
 
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TypeAlias
 
 from rcilab.conformance.breach import Breach, faults_of
+from rcilab.conformance.condition import Condition
 from rcilab.conformance.spans import spans
 from rcilab.conformance.tool_conditions import TOOL_CONDITIONS
 from rcilab.faults import Fault
@@ -39,11 +41,14 @@ class CartesianMonitor:
         limits: Bounds of the tool and the arm angle.
         box: Where the tool shall stay; None, or one that is not active, bounds nothing. The monitor starts at rest at
             the base; `reset` places it.
+        rows: What to judge by: those of the manual, or another maker's on the same signals, see `JointMonitor`.
     """
 
-    def __init__(self, limits: Limits, box: SafetyBox | None = None) -> None:
+    def __init__(
+        self, limits: Limits, box: SafetyBox | None = None, rows: Sequence[Condition] = TOOL_CONDITIONS
+    ) -> None:
         self._box = box if box is not None and box.active else None
-        self._rows = [(row, *(float(bound[0]) for bound in row.bounds(limits))) for row in TOOL_CONDITIONS]
+        self._rows = [(row, *(float(bound[0]) for bound in row.bounds(limits))) for row in rows]
         self.reset(IDENTITY)
 
     def reset(self, pose: Pose, psi: float | None = None) -> None:
@@ -98,7 +103,7 @@ class CartesianMonitor:
         ]
 
     def _signals(self) -> tuple[float, ...]:
-        """Returns the value of every row of TOOL_CONDITIONS."""
+        """Returns the value of every row."""
         outside = _NO_BOX if self._box is None else self._box.excess(self._pose.parts[1])
         angle = self.arm_angle or (0.0, 0.0, 0.0, 0.0)
         return (

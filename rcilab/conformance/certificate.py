@@ -19,6 +19,7 @@ from rcilab.model import RobotModel, require_model
 from rcilab.motion.motion import Motion, require_motion
 from rcilab.safety_box import SafetyBox
 from rcilab.safety_distance import SafetyDistance
+from rcilab.state import Mode
 
 NO_SAFETY_BOX = "none"
 """The part of a certificate that says that the motion was judged without a safety box."""
@@ -39,7 +40,7 @@ class Certificate:
 
     @property
     def parts(self) -> Mapping[str, str]:
-        """Fingerprints by name: motion, model, limits, tool, load, safety box, safety distance, start state."""
+        """Fingerprints by name: motion, model, limits, tool, load, safety box, safety distance, mode, start state."""
         return MappingProxyType(dict(self.entries))
 
     @property
@@ -54,6 +55,7 @@ class Certificate:
         start_q: ArrayLike | StartState,
         box: SafetyBox | None = None,
         distance: SafetyDistance | None = None,
+        mode: Mode = "joint_position",
     ) -> None:
         """Makes sure that this certificate is for this motion on this arm from this start.
 
@@ -65,6 +67,7 @@ class Certificate:
                 judged inside a box is as good as one that was not.
             distance: How far the links must stay from each other and from the floor here; None takes whichever it was
                 judged with. One that was judged with none at all is refused.
+            mode: How the motion is about to be commanded; each mode has its own conditions.
 
         Raises:
             CertificateError: Something is not what was judged; `.changed` and the message name it.
@@ -75,7 +78,7 @@ class Certificate:
         start = as_start(start_q, len(self.start_q)) if motion.n == len(self.start_q) else None
         now = {"motion": ""}
         if start is not None:
-            now = dict(issue_certificate(motion, model, start, box, distance).entries)
+            now = dict(issue_certificate(motion, model, start, box, distance, mode).entries)
         changed = [name for name, fingerprint in self.entries if now.get(name, fingerprint) != fingerprint]
         if start is not None and "start state" in changed and self._same_start(start):
             changed.remove("start state")
@@ -86,7 +89,7 @@ class Certificate:
         if self.parts.get("safety distance") == NOT_JUDGED and "safety distance" not in changed:
             changed.append("safety distance")
         if changed:
-            raise CertificateError(self._reason(changed, start), changed)
+            raise CertificateError(self._reason(changed, start, mode), changed)
 
     def __repr__(self) -> str:
         return f"<Certificate {self.digest[:8]} for motion {self.parts['motion'][:8]}>"
@@ -96,7 +99,7 @@ class Certificate:
         still = StartState(np.array(self.start_q), start.dq, start.ddq)
         return bool(near) and self.parts["start state"] == _start_fingerprint(still)
 
-    def _reason(self, changed: list[str], start: StartState | None) -> str:
+    def _reason(self, changed: list[str], start: StartState | None, mode: Mode) -> str:
         if changed == ["start state"] and start is not None:
             off = start.q - np.array(self.start_q)
             i = int(np.abs(off).argmax())
@@ -107,6 +110,11 @@ class Certificate:
                     f"plan it again from where the arm is (state.q_c)"
                 )
             return "the motion was judged from another start: the arm moves differently now; plan it again"
+        if changed == ["mode"]:
+            return (
+                f"the motion was judged for the mode {self.parts['mode']}, and is about to run in the mode {mode}, "
+                f"which has other conditions; check it again with mode={mode!r}"
+            )
         if changed == ["safety box"]:
             return (
                 "the certificate is stale: it does not cover the safety box that is in force; check the motion again "
@@ -130,6 +138,7 @@ def issue_certificate(
     start: StartState,
     box: SafetyBox | None = None,
     distance: SafetyDistance | None = None,
+    mode: Mode = "joint_position",
 ) -> Certificate:
     """Returns the certificate of a motion; only a report that is ok may hand it out."""
     prints = model.fingerprint
@@ -138,6 +147,7 @@ def issue_certificate(
         **{name: prints[name] for name in MODEL_PARTS},
         "safety box": _box_fingerprint(box),
         "safety distance": _distance_fingerprint(distance),
+        "mode": mode,
         "start state": _start_fingerprint(start),
     }
     return Certificate(tuple(parts.items()), tuple(start.q.tolist()))
@@ -150,6 +160,7 @@ def verify_certificate(
     start_q: ArrayLike | StartState,
     box: SafetyBox | None = None,
     distance: SafetyDistance | None = None,
+    mode: Mode = "joint_position",
 ) -> None:
     """Makes sure that there is a certificate and that it is for this; the gate in front of every hand-off.
 
@@ -166,7 +177,7 @@ def verify_certificate(
             ("certificate",),
         )
     require_certificate(certificate)
-    certificate.verify(motion, model, start_q, box, distance)
+    certificate.verify(motion, model, start_q, box, distance, mode)
 
 
 def require_certificate(certificate: object) -> Certificate:

@@ -23,6 +23,7 @@ from rcilab.model import RobotModel, require_model
 from rcilab.motion.motion import Motion, require_motion
 from rcilab.safety_box import SafetyBox
 from rcilab.safety_distance import STANDARD_DISTANCE, SafetyDistance
+from rcilab.state import Mode, require_mode
 
 
 def check(
@@ -32,6 +33,7 @@ def check(
     start: ArrayLike | StartState | None = None,
     box: SafetyBox | None = None,
     distance: SafetyDistance | None = STANDARD_DISTANCE,
+    mode: Mode = "joint_position",
 ) -> Report:
     """Returns what the robot would say to this motion, and whether its links keep their distance.
 
@@ -44,6 +46,10 @@ def check(
     refused, 20 mm are recommended. Distances are those between capsules, looked at so often that no point of a link
     moves more than 5 mm in between, and in every cycle where they come near a bound. They take most of the time.
 
+    By default the angles themselves are commanded. In Cartesian modes it is the tool's poses and arm angles that they
+    lead to: tool and arm angle are judged, whether a pose is singular, and the joints that follow from the poses. In
+    torque mode it is the torques that make the arm follow: they have to keep their bounds, and the arm its range.
+
     Args:
         motion: The motion.
         model: The arm.
@@ -53,10 +59,11 @@ def check(
             not judged.
         distance: How far links shall stay from each other and from the floor, and where that is. None does not judge
             it: for planning while somebody drags, as no hand-off takes the certificate.
+        mode: How it will be commanded, as in `control`; the certificate is for this mode.
 
     Raises:
-        InvalidValueError: The motion is for another number of joints, the start is no state of this arm,
-            or one of them is something else altogether.
+        InvalidValueError: The motion is for another number of joints, the start is no state of this arm, there is no
+            such mode, or one of them is something else altogether.
     """
     require_motion(motion)
     require_model(model)
@@ -68,11 +75,11 @@ def check(
         raise InvalidValueError("distance", described(distance), "is no SafetyDistance; SafetyDistance(links=...) is")
     state = as_start(motion.start if start is None else start, model.n)
     box = box if box is not None and box.active else None
-    table = condition_table(model.description)
-    rows = table.motion if box is None else (*table.motion, table.box)
+    mode = require_mode(mode)
+    rows = condition_table(model.description).rows(mode, has_elbow=model.n == 7, has_box=box is not None)
     if distance is not None:
         rows = (*rows, *clearance_conditions(distance))
-    return _report(motion, rows, model=model, start=state, box=box, distance=distance)
+    return _report(motion, rows, model=model, start=state, box=box, distance=distance, mode=mode)
 
 
 def _report(
@@ -83,20 +90,22 @@ def _report(
     start: StartState,
     box: SafetyBox | None,
     distance: SafetyDistance | None,
+    mode: Mode,
 ) -> Report:
     """Returns the verdict of some of the conditions on a motion for this arm."""
-    judge = _Judge(motion, model, start, box, distance)
+    judge = _Judge(motion, model, start, box, distance, mode)
     results = [judge.judge(row) for row in rows]
     found = sorted((v for _, violations in results for v in violations), key=lambda v: -v.ratio)
+    words = "" if mode == "joint_position" else f", in mode {mode}"
     return Report(
-        title=f"{model.name}, motion {motion.law} of {motion.duration:.3f} s at speed {motion.speed:g}",
+        title=f"{model.name}, motion {motion.law} of {motion.duration:.3f} s at speed {motion.speed:g}{words}",
         rows=tuple(result for result, _ in results),
         violations=tuple(v for v in found if v.condition.necessity == "necessary"),
         warnings=tuple(v for v in found if v.condition.necessity == "recommended"),
         motion=motion,
         start=start,
-        issue=partial(issue_certificate, motion, model, start, box, distance),
-        judge=partial(_report, model=model, start=start, box=box, distance=distance),
+        issue=partial(issue_certificate, motion, model, start, box, distance, mode),
+        judge=partial(_report, model=model, start=start, box=box, distance=distance, mode=mode),
     )
 
 
@@ -110,10 +119,11 @@ class _Judge:
         start: StartState,
         box: SafetyBox | None,
         distance: SafetyDistance | None,
+        mode: Mode,
     ) -> None:
         self._motion = motion
         self._limits = model.limits
-        self._signals = MotionSignals(motion, model, start, box, distance)
+        self._signals = MotionSignals(motion, model, start, box, distance, mode)
         self._depth = min(box.size) / 2.0 if box is not None else 1.0
 
     def judge(self, condition: Condition) -> tuple[ConditionResult, list[Violation]]:

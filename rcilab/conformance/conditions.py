@@ -17,16 +17,24 @@ from rcilab.arrays import JointVector
 from rcilab.conformance.clearance_conditions import CLEARANCE_CONDITIONS
 from rcilab.conformance.condition import MANUAL, AnyLimits, Bounds, Condition, joint_limits
 from rcilab.conformance.measured_conditions import EXTERNAL_TORQUE, LOST_COMMANDS, MEASURED_CONDITIONS
-from rcilab.conformance.tool_conditions import CARTESIAN_FRAME, TOOL_CONDITIONS, TORQUE_CONDITIONS
+from rcilab.conformance.tool_conditions import (
+    CARTESIAN_FRAME,
+    CARTESIAN_POSITION,
+    TOOL_CONDITIONS,
+    TORQUE_CONDITIONS,
+)
+from rcilab.conformance.tool_ends import (
+    REST_ACCELERATION_TOLERANCE,
+    REST_VELOCITY_TOLERANCE,
+    start_pose,
+    tool_rest,
+)
 from rcilab.errors import InvalidValueError
 from rcilab.faults import Fault
 
 START_POSITION_TOLERANCE = 1e-9  # [rad]
-"""How far from the arm a motion may start. A step of 1 nrad is a jerk of 2 rad/s^3: inside the planner's margin."""
-REST_VELOCITY_TOLERANCE = 1e-4  # [rad/s]
-"""What counts as zero velocity. A choice: it changes nothing that a joint can feel, and covers rounding."""
-REST_ACCELERATION_TOLERANCE = 1e-2  # [rad/s^2]
-"""What counts as zero acceleration. A choice, as above: a thousandth of the smallest acceleration limit."""
+"""How far from the arm a motion may start, in [m] too. A step of 1 nrad is a jerk of 2 rad/s^3: inside the planner's
+margin."""
 
 
 def _symmetric(name: str) -> Callable[[AnyLimits], Bounds]:
@@ -154,6 +162,28 @@ MOTION_CONDITIONS: tuple[Condition, ...] = (
 )
 """What `check` judges of every joint motion, in the manual's order; there may be the box and distances, too."""
 
+TOOL_END_CONDITIONS: tuple[Condition, ...] = (
+    start_pose(START_POSITION_TOLERANCE, f"{MANUAL}, 4.2 (tolerance: ours)"),
+    *tool_rest(f"{MANUAL}, 4.2 (tolerance: ours)"),
+)
+"""What the manual recommends for the start and the end of a motion of the tool."""
+
+CARTESIAN_MOTION_CONDITIONS: tuple[Condition, ...] = (
+    CARTESIAN_FRAME,
+    *(row for row in TOOL_CONDITIONS if row is not CARTESIAN_POSITION),
+    *JOINT_CONDITIONS,
+    JOINT_TORQUE,
+    JOINT_TORQUE_RATE,
+    *TOOL_END_CONDITIONS,
+)
+"""What `check` judges of a motion that is sent as tool poses; those on joints hold for what follows from the poses."""
+
+TORQUE_MOTION_CONDITIONS: tuple[Condition, ...] = (
+    *TORQUE_CONDITIONS,
+    *(row for row in MEASURED_CONDITIONS if row.signal == "joint" and row.order < 2),
+)
+"""What `check` judges of a motion that is sent as torques: these, and range and speed of the arm that follows them."""
+
 CYCLE_CONDITIONS = JOINT_CONDITIONS
 """What curves of joint angles are drawn against."""
 
@@ -162,6 +192,7 @@ CONDITIONS: tuple[Condition, ...] = (
     *CLEARANCE_CONDITIONS,
     *TOOL_CONDITIONS,
     CARTESIAN_FRAME,
+    *TOOL_END_CONDITIONS,
     *TORQUE_CONDITIONS,
     *MEASURED_CONDITIONS,
     EXTERNAL_TORQUE,

@@ -96,6 +96,8 @@ def _nearest(row: ConditionResult, language: Language) -> str:
     time = f"{row.time:.3f}"
     if row.condition.signal == "position":
         return say(language, "verdict.deepest", depth=f"{max(-row.value, 0.0):.4g}", time=time)
+    if row.condition.signal == "frame":
+        return say(language, "verdict.singular", share=_share(row.ratio, language), time=time)
     if row.condition.is_clearance:
         place = explain_place(row, language)
         return say(language, "verdict.clearest", place=place, distance=f"{row.value:.4g}", time=time)
@@ -119,6 +121,8 @@ def _fact(violation: Violation, language: Language) -> str:
     if row.signal == "frame":
         return say(language, "fact.frame", place=place, quantity=quantity)
     value, bound = _amounts(row, violation.value, violation.bound, language)
+    if row.signal == "elbow_sign":
+        return say(language, "fact.elbow_sign", place=place, quantity=quantity, value=value)
     if row.signal == "position":
         return say(language, "fact.box", place=place, quantity=quantity, value=value)
     if row.is_clearance:

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Literal
 
 import numpy as np
 
@@ -22,8 +21,6 @@ from rcilab.conformance.conditions import (
     JOINT_POSITION,
     JOINT_VELOCITY,
     MOTION_CONDITIONS,
-    REST_ACCELERATION_TOLERANCE,
-    REST_VELOCITY_TOLERANCE,
 )
 from rcilab.conformance.measured_conditions import EXTERNAL_TORQUE, LOST_COMMANDS, MEASURED_CONDITIONS
 from rcilab.conformance.tool_conditions import (
@@ -33,6 +30,7 @@ from rcilab.conformance.tool_conditions import (
     TORQUE_RANGE,
     TORQUE_RATE,
 )
+from rcilab.conformance.tool_ends import start_pose, tool_rest
 from rcilab.franka_errors import FrankaError
 
 _PAGE = "Franka's page Robot and interface specifications"
@@ -61,6 +59,7 @@ _TOOL_ERRORS = {
 }
 _MEASURED_ERRORS = {
     ("joint", 0): FrankaError.JOINT_POSITION_LIMITS_VIOLATION,
+    ("position", 0): FrankaError.CARTESIAN_POSITION_LIMITS_VIOLATION,
     ("joint", 1): FrankaError.JOINT_VELOCITY_VIOLATION,
     ("translation", 1): FrankaError.CARTESIAN_VELOCITY_VIOLATION,
     ("rotation", 1): FrankaError.CARTESIAN_VELOCITY_VIOLATION,
@@ -122,26 +121,6 @@ def _elbow_range(limits: AnyLimits) -> Bounds:
     return joint.lower[one], joint.upper[one]
 
 
-def _rest(stage: Literal["start", "end"], signal: Literal["translation", "rotation"], order: int) -> Condition:
-    kind = {"translation": "translational", "rotation": "rotational"}[signal]
-    name = ("", "velocity", "acceleration")[order]
-    unit = {"translation": "m", "rotation": "rad"}[signal] + ("/s" if order == 1 else "/s^2")
-    tolerance = REST_VELOCITY_TOLERANCE if order == 1 else REST_ACCELERATION_TOLERANCE
-    return Condition(
-        id=f"{stage}.cartesian.{name}.{signal}",
-        quantity=f"{kind} {name} at the {stage}",
-        formula="dp_c = 0" if order == 1 else "ddp_c = 0",
-        necessity="recommended",
-        unit=unit,
-        source=f"{_PAGE}, Cartesian trajectory, recommended (tolerance: ours)",
-        fault=None,
-        stage=stage,
-        signal=signal,
-        order=order,
-        bounds=lambda limits: same(tolerance),
-    )
-
-
 FRANKA_MOTION_CONDITIONS: tuple[Condition, ...] = tuple(_motion_row(row) for row in MOTION_CONDITIONS)
 """What `check` judges of every joint motion of a Panda, in the order of the manual's."""
 
@@ -176,18 +155,10 @@ FRANKA_TOOL_CONDITIONS: tuple[Condition, ...] = (
     *(_tool_row(row) for row in TOOL_CONDITIONS if row is not CARTESIAN_POSITION),
     FRANKA_ELBOW_SIGN,
     *(_inverse_row(row) for row in JOINT_CONDITIONS),
-    Condition(
-        id="start.cartesian.position",
-        quantity="distance of the first pose from the arm's",
-        formula="T_c = T",
+    replace(
+        start_pose(START_TOLERANCE, f"{_ERRORS} ({_PAGE}: recommended; tolerance: ours)"),
         necessity="necessary",
-        unit="m",
-        source=f"{_ERRORS} ({_PAGE}: recommended; tolerance: ours)",
         fault=FrankaError.CARTESIAN_POSITION_MOTION_GENERATOR_START_POSE_INVALID,
-        stage="start",
-        signal="translation",
-        order=0,
-        bounds=lambda limits: same(START_TOLERANCE),
     ),
     Condition(
         id="start.elbow",
@@ -202,12 +173,7 @@ FRANKA_TOOL_CONDITIONS: tuple[Condition, ...] = (
         order=0,
         bounds=lambda limits: same(START_TOLERANCE),
     ),
-    *(
-        _rest(stage, signal, order)
-        for stage in ("start", "end")
-        for order in (1, 2)
-        for signal in ("translation", "rotation")
-    ),
+    *tool_rest(f"{_PAGE}, Cartesian trajectory, recommended (tolerance: ours)"),
 )
 """What a commanded tool pose has to keep, and the joints that follow from it."""
 
@@ -269,6 +235,18 @@ FRANKA_BEHAVIOUR_CONDITIONS: tuple[Condition, ...] = (
     ),
 )
 """What the arm itself has to keep, and the network."""
+
+FRANKA_CARTESIAN_MOTION_CONDITIONS: tuple[Condition, ...] = (
+    *FRANKA_TOOL_CONDITIONS,
+    *(row for row in FRANKA_MOTION_CONDITIONS if row.signal == "torque"),
+)
+"""What `check` judges of a motion that is sent as tool poses."""
+
+FRANKA_TORQUE_MOTION_CONDITIONS: tuple[Condition, ...] = (
+    *FRANKA_TORQUE_CONDITIONS,
+    *(row for row in FRANKA_BEHAVIOUR_CONDITIONS if row.is_measured and row.signal == "joint"),
+)
+"""What `check` judges of a motion that is sent as torques: these, and range and speed of the arm that follows them."""
 
 FRANKA_CONDITIONS: tuple[Condition, ...] = (
     *FRANKA_MOTION_CONDITIONS,

@@ -30,14 +30,16 @@ class JointMonitor:
 
     Args:
         limits: Bounds of the joints. The monitor starts at rest at zero; `reset` places it.
+        rows: What to judge by: those of the manual, or another maker's on the same four signals. Errors of other makers
+            are found in `broken`; `step` returns faults of the RCI.
     """
 
-    def __init__(self, limits: JointLimits) -> None:
+    def __init__(self, limits: JointLimits, rows: Sequence[Condition] = JOINT_CONDITIONS) -> None:
         self._n = len(limits.velocity)
         self._rows: list[tuple[Condition, int]] = []
         self._lower: list[float] = []
         self._upper: list[float] = []
-        for row in JOINT_CONDITIONS:
+        for row in rows:
             lower, upper = row.bounds(limits)
             self._rows += [(row, joint) for joint in range(1, self._n + 1)]
             self._lower += lower.tolist()

@@ -159,6 +159,10 @@ class Violation:
             return f"{row.quantity} is {value} {row.unit}, not 0"
         if row.signal == "position":
             return f"{row.quantity} is {self.value:.4g} m outside the safety box"
+        if row.signal == "frame":
+            return f"{row.quantity} is improper, out of reach or singular"
+        if row.signal == "elbow_sign":
+            return "it is flipped to the other side than at the start"
         if row.is_clearance:
             overlap = ", they overlap," if self.value < 0.0 else ""
             return f"{row.quantity} {value} m{overlap} is not above {bound} m"
@@ -182,7 +186,7 @@ class Report:
         motion: What was judged.
         start: The state of the arm that it was judged from.
         issue: Makes the certificate when somebody asks for it.
-        judge: Judges another motion by some of the rows, for the same arm, start and safety box.
+        judge: Judges another motion by some of the rows, for the same arm, start, safety box and mode.
     """
 
     title: str
@@ -200,7 +204,7 @@ class Report:
     issue: Callable[[], Certificate] = field(repr=False)
     """Makes the certificate when somebody asks for it."""
     judge: Callable[[Motion, tuple[Condition, ...]], Report] = field(repr=False)
-    """Judges another motion by some of the rows, for the same arm, start and safety box."""
+    """Judges another motion by some of the rows, for the same arm, start, safety box and mode."""
 
     @property
     def ok(self) -> bool:
@@ -266,11 +270,12 @@ class Report:
 
     def __str__(self) -> str:
         lines = [self.title, self._verdict()]
+        width = max(len(row.id) for row in self.rows)
         for row in self.rows:
             value, bound, used = row.texts
             place = f"{row.place}, t = {row.time:.3f} s"
             size = f"{value:>9} of {bound:>10} {row.unit:7} {used:>7}"
-            lines.append(f"  {row.verdict:8}  {row.id:18}  {size}  {place}  [{row.source}]")
+            lines.append(f"  {row.verdict:8}  {row.id:{width}}  {size}  {place}  [{row.source}]")
         found = (*self.violations, *self.warnings)
         lines += [f"- {violation}" for violation in found[:LISTED]]
         if len(found) > LISTED:
@@ -294,7 +299,7 @@ class Report:
             advice = f"; {_plural(len(self.warnings), 'recommendation')} not met" if self.warnings else ""
             return f"conforms{advice}; nearest: {near}"
         broken = [row for row in self.rows if not row.ok and row.necessity == "necessary"]
-        names = ", ".join(row.fault.manual_name for row in broken if row.fault is not None)
+        names = ", ".join(dict.fromkeys(row.fault.manual_name for row in broken if row.fault is not None))
         outcome = f"the robot would stop with {names}" if names else "the robot would not notice before it hits"
         return f"does not conform: {_plural(len(self.violations), 'violation')}; {outcome}"
 

@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+import math
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rcilab.arrays import Array
+from rcilab.arrays import Array, JointVector
 from rcilab.clock import CYCLE_TIME
 from rcilab.conformance.clearance_conditions import clearance_conditions
 from rcilab.conformance.condition import Condition
 from rcilab.conformance.conditions import START_POSITION_TOLERANCE
 from rcilab.conformance.start import StartState
+from rcilab.conformance.tool_signals import ToolSignals
 from rcilab.model import RobotModel
 from rcilab.motion.motion import Motion, MotionSample
 from rcilab.safety_box import SafetyBox
 from rcilab.safety_distance import SafetyDistance
+from rcilab.state import Mode
 
 if TYPE_CHECKING:
     from rcilab.conformance.clearance_path import ClearancePath
@@ -41,6 +44,7 @@ class MotionSignals:
         start: Where the arm comes from.
         box: Where the tool shall stay, or None.
         distance: How far links shall stay from each other and from the floor, or None.
+        mode: How it is commanded. Told in torques, these are exact in every row, as the controller judges each.
     """
 
     def __init__(
@@ -50,12 +54,14 @@ class MotionSignals:
         start: StartState,
         box: SafetyBox | None,
         distance: SafetyDistance | None = None,
+        mode: Mode = "joint_position",
     ) -> None:
         self._motion = motion
         self._model = model
         self._start = start
         self._box = box
         self._distance = distance
+        self._mode: Mode = mode
         self._differences = _backward_differences(motion.q, start)
         self.is_off_start = bool(np.abs(motion.start - start.q).max() > START_POSITION_TOLERANCE)
 
@@ -66,7 +72,7 @@ class MotionSignals:
         if condition.stage == "end":
             return self._rest(condition, self._motion.end()), self._motion.duration
         if condition.order == 0:
-            return (self._motion.start - self._start.q)[np.newaxis], 0.0
+            return self._at_start(condition)[np.newaxis], 0.0
         return self._rest(condition, self._motion.at(0.0)), 0.0
 
     def links(self, condition: Condition, row: int) -> LinkPair | None:
@@ -82,10 +88,30 @@ class MotionSignals:
             return self._clearance[condition.signal].distance[:, np.newaxis]
         if condition.signal == "torque":
             return self._torques[condition.order]
+        if condition.signal in ("translation", "rotation", "arm_angle"):
+            return self._tool.differences(condition.signal)[condition.order]
+        if condition.signal == "frame":
+            return self._tool.singularity
+        if condition.signal == "elbow_sign":
+            return self._tool.elbow_side
         if condition.signal == "position":
             assert self._box is not None
             return self._box.excess_path(self._model.position_path(self._differences[0]))[:, np.newaxis]
         return self._differences[condition.order]
+
+    def _at_start(self, condition: Condition) -> Array:
+        """Returns how far the first command is from what the arm has, shape (n,) or (1,)."""
+        if condition.signal == "translation":
+            return np.array([self._tool.start_distance])
+        if condition.signal == "arm_angle":
+            return np.array([self._tool.start_turn])
+        if condition.signal == "torque":
+            return self._torques[0][0]
+        return self._motion.start - self._start.q
+
+    @cached_property
+    def _tool(self) -> ToolSignals:
+        return ToolSignals(self._model, self._start, self._differences[0])
 
     @cached_property
     def _clearance(self) -> dict[str, ClearancePath]:
@@ -109,7 +135,8 @@ class MotionSignals:
     def _torques(self) -> tuple[Array, Array]:
         """Torques without gravity and their backward differences over a cycle, each of shape (N + 3, n)."""
         q, dq, ddq, jerk = self._differences
-        rows = _eventful_rows(jerk, _SMOOTH_JERK * self._model.limits.joint.jerk)
+        smooth = 0.0 if self._mode == "torque" else _SMOOTH_JERK
+        rows = _eventful_rows(jerk, smooth * self._model.limits.joint.jerk)
         known = np.ascontiguousarray(self._model.rigid_body.motion_torques(q[rows], dq[rows], ddq[rows]).T)
         every = np.arange(len(q))
         tau = np.empty(q.T.shape)
@@ -119,15 +146,23 @@ class MotionSignals:
         return tau.T, (np.diff(np.concatenate((before, tau), axis=1)) / CYCLE_TIME).T
 
     def _rest(self, condition: Condition, sample: MotionSample) -> Array:
-        """Returns velocity or acceleration at an end of the motion, shape (1, n).
+        """Returns velocity or acceleration at an end of the motion, shape (1, n), or its norm for the tool, (1, 1).
 
         Rows that somebody else made tell rest from motion only as far as one cycle at the jerk limit goes.
         """
-        value = sample.dq if condition.order == 1 else sample.ddq
-        if self._motion.law == "samples":
-            unresolved = self._model.limits.joint.jerk * CYCLE_TIME ** (3 - condition.order)
-            value = np.sign(value) * np.maximum(np.abs(value) - unresolved, 0.0)
-        return value[np.newaxis]
+        dq, ddq = self._resolved(sample.dq, 1), self._resolved(sample.ddq, 2)
+        if condition.is_per_joint:
+            return (dq if condition.order == 1 else ddq)[np.newaxis]
+        model, q = self._model, sample.q
+        moved = model.velocity(q, dq) if condition.order == 1 else model.acceleration(q, dq, ddq)
+        part = moved[:3] if condition.signal == "translation" else moved[3:]
+        return np.array([[math.sqrt(float(part @ part))]])
+
+    def _resolved(self, value: JointVector, order: int) -> JointVector:
+        if self._motion.law != "samples":
+            return value
+        unresolved = self._model.limits.joint.jerk * CYCLE_TIME ** (3 - order)
+        return np.sign(value) * np.maximum(np.abs(value) - unresolved, 0.0)
 
 
 def _eventful_rows(jerk: Array, smooth: Array) -> NDArray[np.intp]:

@@ -119,9 +119,9 @@ CARTESIAN_FRAME = Condition(
     stage="throughout",
     signal="frame",
     order=0,
-    bounds=lambda limits: same(math.inf),
+    bounds=lambda limits: same(1.0),
 )
-"""It has no number but one: whoever cannot find joint angles for a pose has none to compare."""
+"""How near the arm is to a singularity: 1 is what counts as on it. Infinite for what is no pose or out of reach."""
 
 TORQUE_RATE = Condition(
     id="torque.rate",

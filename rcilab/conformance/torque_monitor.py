@@ -25,14 +25,15 @@ class TorqueMonitor:
 
     Args:
         limits: Bounds of the joints. The monitor starts from no torque.
+        rows: What to judge by, rate before range: those of the manual, or another maker's, see `JointMonitor`.
     """
 
-    def __init__(self, limits: JointLimits) -> None:
+    def __init__(self, limits: JointLimits, rows: Sequence[Condition] = TORQUE_CONDITIONS) -> None:
         self._n = len(limits.torque)
         self._rows: list[tuple[Condition, int]] = []
         self._lower: list[float] = []
         self._upper: list[float] = []
-        for row in TORQUE_CONDITIONS:
+        for row in rows:
             lower, upper = row.bounds(limits)
             self._rows += [(row, joint) for joint in range(1, self._n + 1)]
             self._lower += lower.tolist()

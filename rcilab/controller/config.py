@@ -96,7 +96,9 @@ class ControllerConfig:
             raise InvalidValueError("prefill", self.prefill, "needs 0 to 100 cycles")
         if self.lost_limit is not None and not FEWEST_LOST <= self.lost_limit <= MOST_LOST:
             raise InvalidValueError(
-                "lost_limit", self.lost_limit, f"needs {FEWEST_LOST} to {MOST_LOST} cycles, or None (--lost-limit 0) for no limit"
+                "lost_limit",
+                self.lost_limit,
+                f"needs {FEWEST_LOST} to {MOST_LOST} cycles, or None (--lost-limit 0) for no limit",
             )
 
     @property

@@ -11,6 +11,9 @@ from collections.abc import Sequence
 from math import atan2, cos, hypot, sin, sqrt
 from typing import TypeAlias
 
+import numpy as np
+
+from rcilab.arrays import Array, JointPath
 from rcilab.errors import SingularError
 
 Vec: TypeAlias = tuple[float, float, float]
@@ -47,6 +50,27 @@ def arm_angle(upper: float, fore: float, q: Sequence[float]) -> float:
     if hypot(along, side) < _STRETCHED * (upper + fore):
         raise SingularError("arm angle: the arm is stretched (q4 = 0), the elbow is on the shoulder-wrist line")
     return atan2(side, along)
+
+
+def arm_angle_path(upper: float, fore: float, q: JointPath) -> Array:
+    """Returns the arm angle of many configurations, shape (N,), [rad]; where it has no meaning, any number.
+
+    Args:
+        upper: d3, shoulder to elbow, [m].
+        fore: d5, elbow to wrist, [m].
+        q: Joint angles, shape (N, 7), [rad]; only the first four matter.
+    """
+    (c1, s1), (c2, s2), (c3, s3), (c4, s4) = ((np.cos(q[:, i]), np.sin(q[:, i])) for i in range(4))
+    ex, ey, ez = upper * c1 * s2, upper * s1 * s2, upper * c2
+    fx, fy, fz = fore * c3 * s4, fore * s3 * s4, fore * c4
+    ahead = c2 * fx + s2 * fz
+    wx, wy, wz = ex + c1 * ahead - s1 * fy, ey + s1 * ahead + c1 * fy, ez - s2 * fx + c2 * fz
+    horizontal = np.sqrt(wx * wx + wy * wy)
+    length = np.sqrt(horizontal * horizontal + wz * wz)
+    safe = np.where(horizontal > 0.0, horizontal, 1.0)
+    cx, cy = wx / safe, wy / safe
+    along = (horizontal * ez - wz * (cx * ex + cy * ey)) / np.where(length > 0.0, length, 1.0)
+    return np.arctan2(cy * ex - cx * ey, along)
 
 
 def reference_frame(u: Vec) -> tuple[Vec, Vec]:

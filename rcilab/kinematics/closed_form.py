@@ -11,7 +11,7 @@ import numpy as np
 
 from rcilab.arrays import Array, JointPath, JointVector
 from rcilab.errors import KinematicsError
-from rcilab.kinematics.arm_angle import arm_angle
+from rcilab.kinematics.arm_angle import arm_angle, arm_angle_path
 from rcilab.kinematics.branch import Loss, follow_branch
 from rcilab.kinematics.feasible_arcs import FeasibleArcs, feasible_arcs
 from rcilab.kinematics.inverse import Angles, ArmGeometry, build_geometry, inverse_seven, inverse_six
@@ -19,7 +19,8 @@ from rcilab.kinematics.inverse_batch import inverse_batch
 from rcilab.kinematics.offset_arcs import feasible_offset_arcs
 from rcilab.kinematics.offset_arm import ELBOW, OffsetGeometry, SelfMotion, build_offset_geometry
 from rcilab.kinematics.offset_batch import inverse_offset_batch
-from rcilab.kinematics.offset_branch import follow_offset_branch
+from rcilab.kinematics.offset_branch import follow_offset_branch, settle_beside
+from rcilab.kinematics.singularity import find_singularity, singularity_path
 from rcilab.robots.description import RobotDescription
 from rcilab.spatial import Pose
 
@@ -57,6 +58,22 @@ class ClosedForm(Protocol):
         """
         ...
 
+    def arm_angle_path(self, q: JointPath) -> Array:
+        """Returns the arm angles of N configurations, shape (N,), [rad]; any number where they have no meaning.
+
+        Raises:
+            KinematicsError: The arm has none.
+        """
+        ...
+
+    def singularity_path(self, q: JointPath) -> Array:
+        """Returns how near N configurations are to a singularity, shape (N,): from 1 on they count as at one."""
+        ...
+
+    def is_singular(self, q: Sequence[float]) -> bool:
+        """Returns whether a configuration counts as at a singularity; `singularity_path` for one, in plain floats."""
+        ...
+
     def batch(self, T_base_flange: Array, psi: Array) -> Array:
         """Returns the solutions at N poses, shape (N, branches, n), [rad]; not a number where there are none."""
         ...
@@ -65,6 +82,18 @@ class ClosedForm(Protocol):
         self, rotations: Array, positions: Array, psi: Array | None, start: JointVector
     ) -> tuple[JointPath, Loss | None]:
         """Returns the joint angles along a path, as `follow_branch` does."""
+        ...
+
+    def beside(self, T_base_flange: Pose, psi: float, near: Sequence[float]) -> list[float] | None:
+        """Returns the joint angles of a pose closest to those before, [rad], or None where there are none.
+
+        Joint limits are not looked at; full turns are counted.
+
+        Args:
+            T_base_flange: Pose of the flange.
+            psi: Arm angle, [rad]; of no meaning for 6 axes.
+            near: Joint angles of the cycle before, n plain floats, [rad].
+        """
         ...
 
     def arcs(self, T_base_flange: Pose, lower: Array, upper: Array, outside_box: bool) -> FeasibleArcs:
@@ -99,6 +128,18 @@ class SphericalSeven:
         """Returns where the elbow is on its circle, [rad]."""
         return arm_angle(self.envelope.upper, self.envelope.fore, q)
 
+    def arm_angle_path(self, q: JointPath) -> Array:
+        """Returns where the elbow is on its circle along a path, [rad]."""
+        return arm_angle_path(self.envelope.upper, self.envelope.fore, q)
+
+    def singularity_path(self, q: JointPath) -> Array:
+        """Returns how near the arm is to a singularity along a path."""
+        return singularity_path(self.envelope, q)
+
+    def is_singular(self, q: Sequence[float]) -> bool:
+        """Returns whether the arm counts as at a singularity."""
+        return find_singularity(self.envelope, q) is not None
+
     def batch(self, T_base_flange: Array, psi: Array) -> Array:
         """Returns the solutions at N poses, shape (N, 8, 7)."""
         return inverse_batch(self.envelope, T_base_flange, psi)
@@ -108,6 +149,18 @@ class SphericalSeven:
     ) -> tuple[JointPath, Loss | None]:
         """Returns the joint angles along a path."""
         return follow_branch(self.envelope, rotations, positions, psi, start)
+
+    def beside(self, T_base_flange: Pose, psi: float, near: Sequence[float]) -> list[float] | None:
+        """Returns the joint angles of a pose closest to those before, [rad]."""
+        try:
+            branches = self.at(T_base_flange, near).branches(psi)
+        except KinematicsError:
+            return None
+        if not branches:
+            return None
+        turns = [[remainder(a - b, tau) for a, b in zip(branch, near, strict=True)] for branch in branches]
+        least = min(turns, key=lambda turn: sum([angle * angle for angle in turn]))
+        return [angle + turn for angle, turn in zip(near, least, strict=True)]
 
     def arcs(self, T_base_flange: Pose, lower: Array, upper: Array, outside_box: bool) -> FeasibleArcs:
         """Returns the feasible arm angles, in closed form."""
@@ -123,6 +176,10 @@ class SphericalSix(SphericalSeven):
 
     def arm_angle(self, q: Sequence[float]) -> float:
         """Raises KinematicsError: there is none."""
+        raise KinematicsError("an arm with 6 axes has no arm angle")
+
+    def arm_angle_path(self, q: JointPath) -> Array:
+        """Raises KinematicsError: there are none."""
         raise KinematicsError("an arm with 6 axes has no arm angle")
 
     def arcs(self, T_base_flange: Pose, lower: Array, upper: Array, outside_box: bool) -> FeasibleArcs:
@@ -152,6 +209,18 @@ class OffsetSeven:
         """Returns the angle of joint 3, [rad]."""
         return remainder(q[ELBOW], tau)
 
+    def arm_angle_path(self, q: JointPath) -> Array:
+        """Returns the angles of joint 3, [rad], as they are: this joint makes no whole turn."""
+        return q[:, ELBOW]
+
+    def singularity_path(self, q: JointPath) -> Array:
+        """Returns zeros: at a given angle of joint 3 its maker refuses no pose for being singular."""
+        return np.zeros(len(q))
+
+    def is_singular(self, q: Sequence[float]) -> bool:
+        """Returns False, as above."""
+        return False
+
     def batch(self, T_base_flange: Array, psi: Array) -> Array:
         """Returns the solutions at N poses, shape (N, M, 7)."""
         return inverse_offset_batch(self.geometry, T_base_flange, np.broadcast_to(psi, (len(T_base_flange),)))
@@ -162,6 +231,10 @@ class OffsetSeven:
         """Returns the joint angles along a path."""
         angles = np.full(len(positions), start[ELBOW]) if psi is None else psi
         return follow_offset_branch(self.geometry, rotations, positions, angles, start)
+
+    def beside(self, T_base_flange: Pose, psi: float, near: Sequence[float]) -> list[float] | None:
+        """Returns the joint angles of a pose closest to those before, [rad]."""
+        return settle_beside(self.geometry, T_base_flange.rotation, T_base_flange.position, psi, near)
 
     def arcs(self, T_base_flange: Pose, lower: Array, upper: Array, outside_box: bool) -> FeasibleArcs:
         """Returns the feasible arm angles, found along the self-motion."""

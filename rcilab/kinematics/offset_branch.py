@@ -6,6 +6,8 @@ before; between them the joint angles are guessed by straight lines, and Newton'
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from rcilab.arrays import Array, JointPath, JointVector
@@ -18,8 +20,9 @@ from rcilab.spatial import Pose
 
 _KNOTS = 48  # Rows that are settled one by one; a choice: a few ms, and guesses good to a hundredth of a radian.
 _TURN = 0.15  # [rad] Of a joint from knot to knot, beyond which rows between them are settled first.
-_ROUNDS = 8
+_ROUNDS = 12  # Beside the stretched arm two solutions meet, and the first steps only halve what is missing.
 _SETTLED = 1e-12  # [m] and [rad]
+_CLOSE = 1e-7  # [rad] A step that leaves nothing to settle, as each squares what is missing.
 _JUMP = 0.6  # [rad] From row to row: beyond it the arm does not follow but changes branches.
 _FREE = [joint for joint in range(7) if joint != ELBOW]
 
@@ -99,24 +102,39 @@ class _March:
 
     def _settled(self, row: int, guess: list[float]) -> list[float] | None:
         """Returns the solution at a row next to a guess, or None, in plain floats."""
-        q = [*guess]
-        q[ELBOW] = float(self._psi[row])
-        rotation, position = self._rotations[row], self._positions[row]
-        for _ in range(_ROUNDS):
-            J, _ = tool_jacobian(self._arm.chain, q)
-            miss = _miss(forward(self._arm.chain, q), rotation, position)
-            try:
-                step = np.linalg.solve(J[:, _FREE], miss)
-            except np.linalg.LinAlgError:
-                return None
-            if np.abs(step).max() > 2.0 * _JUMP:
-                return None
-            for joint, turn in zip(_FREE, step.tolist(), strict=True):
-                q[joint] += turn
-            if np.abs(miss).max() < _SETTLED**0.5:
-                break
-        missing = np.abs(_miss(forward(self._arm.chain, q), rotation, position)).max()
-        return q if missing < _SETTLED else None
+        psi = float(self._psi[row])
+        return settle_beside(self._arm, self._rotations[row], self._positions[row], psi, guess)
+
+
+def settle_beside(
+    arm: OffsetGeometry, rotation: Array, position: Array, psi: float, guess: Sequence[float]
+) -> list[float] | None:
+    """Returns the joint angles of one pose next to a guess, 7 plain floats, [rad], or None where there are none.
+
+    Args:
+        arm: From `build_offset_geometry`.
+        rotation: Flange in base, shape (3, 3).
+        position: Flange in base, shape (3,), [m].
+        psi: Arm angle, [rad].
+        guess: Joint angles close by, 7 plain floats, [rad].
+    """
+    q = [*guess]
+    q[ELBOW] = psi
+    for _ in range(_ROUNDS):
+        J, _ = tool_jacobian(arm.chain, q)
+        miss = _miss(forward(arm.chain, q), rotation, position)
+        try:
+            step = np.linalg.solve(J[:, _FREE], miss)
+        except np.linalg.LinAlgError:
+            return None
+        if np.abs(step).max() > 2.0 * _JUMP:
+            return None
+        for joint, turn in zip(_FREE, step.tolist(), strict=True):
+            q[joint] += turn
+        if np.abs(step).max() < _CLOSE:
+            break
+    missing = np.abs(_miss(forward(arm.chain, q), rotation, position)).max()
+    return q if missing < _SETTLED else None
 
 
 def _miss(now: Pose, rotation: Array, position: Array) -> Array:

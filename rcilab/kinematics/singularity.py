@@ -8,7 +8,7 @@ from math import cos, degrees, hypot, sin, sqrt
 
 import numpy as np
 
-from rcilab.arrays import Array, Matrix
+from rcilab.arrays import Array, JointPath, Matrix
 from rcilab.kinematics.inverse import ArmGeometry
 
 SINGULAR = (
@@ -71,6 +71,44 @@ def find_singularity(arm: ArmGeometry, q: Sequence[float]) -> str | None:
     if arm.n == 7:
         return _singular_seven(arm, upright)
     return _singular_six(arm, upright)
+
+
+def singularity_path(arm: ArmGeometry, q: JointPath) -> Array:
+    """Returns how near an arm is to a singularity along a path, shape (N,): from 1 on `find_singularity` finds one.
+
+    It is `SINGULAR` over the sine, or the share of the reach, that the nearest singularity is away.
+
+    Args:
+        arm: From `rcilab.kinematics.inverse.build_geometry`.
+        q: Joint angles, shape (N, n), [rad].
+    """
+    upright = q - np.array(arm.offsets)
+    away = _away_seven(arm, upright) if arm.n == 7 else _away_six(arm, upright)
+    with np.errstate(divide="ignore"):
+        return SINGULAR / away
+
+
+def _away_seven(arm: ArmGeometry, q: JointPath) -> Array:
+    c2, c3, c4, c5 = (np.cos(q[:, i]) for i in (1, 2, 3, 4))
+    s2, s3, s4, s6 = (np.sin(q[:, i]) for i in (1, 2, 3, 5))
+    side, along = arm.fore * s4, arm.upper + arm.fore * c4
+    horizontal = np.hypot(s2 * along + c2 * c3 * side, s3 * side)
+    s2, s6 = np.abs(s2), np.abs(s6)
+    return np.minimum.reduce(
+        (
+            np.abs(s4),
+            np.maximum(s2, np.abs(c3)),
+            np.maximum(s6, np.abs(c5)),
+            np.maximum(s2, s6),
+            horizontal / np.sqrt(side * side + along * along),
+        )
+    )
+
+
+def _away_six(arm: ArmGeometry, q: JointPath) -> Array:
+    radius = arm.upper * np.sin(q[:, 1]) + arm.fore * np.sin(q[:, 1] + q[:, 2])
+    off_axis = np.abs(radius) / (arm.upper + arm.fore)
+    return np.minimum.reduce((np.abs(np.sin(q[:, 2])), np.abs(np.sin(q[:, 4])), off_axis))
 
 
 def _singular_seven(arm: ArmGeometry, q: Sequence[float]) -> str | None:

@@ -198,6 +198,16 @@ def test_a_move_that_cannot_be_is_refused_before_anything_moves(robot):
     assert np.array_equal(robot.state.q_c, HOME)
 
 
+def test_a_motion_that_was_judged_for_another_mode_is_refused(robot):
+    away = plan_joint(MODEL, HOME, HOME + [0.2, 0, 0, 0, 0, 0, 0], speed=0.1)
+    certificate = check(away, MODEL, mode="cartesian_position").require().certificate
+    with pytest.raises(
+        CertificateError, match="judged for the mode cartesian_position, and is about to run in the mode j"
+    ):
+        robot.execute(away, certificate)
+    assert np.array_equal(robot.state.q_c, HOME)
+
+
 def test_motions_are_checked_with_the_safety_box_that_was_set(robot):
     away = plan_joint(MODEL, HOME, HOME + [0.6, 0, 0, 0, 0, 0, 0])
     certificate = check(away, MODEL).certificate

@@ -10,12 +10,12 @@ as "not valid"); so on its way through zero an arm angle that is not valid is ze
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from math import isfinite, pi, remainder, tau
+from math import pi, remainder, tau
 
 from rcilab.clock import CYCLE_TIME
 from rcilab.conformance.breach import describe_breaches
 from rcilab.conformance.cartesian_monitor import CartesianMonitor
+from rcilab.conformance.frame import find_frame_error
 from rcilab.conformance.tool_conditions import ARM_ANGLE_TOLERANCE
 from rcilab.controller.filters import PoseLowPass
 from rcilab.controller.modes.generator import Gap, JointReference, Step, Terms, lost_motion
@@ -25,7 +25,7 @@ from rcilab.controller.stream import Stream
 from rcilab.errors import InvalidValueError, KinematicsError
 from rcilab.faults import Fault
 from rcilab.protocols.rci import CommandPacket
-from rcilab.spatial import Pose, find_rotation_error, rotation_from_wxyz, wxyz_from_rotation
+from rcilab.spatial import Pose, rotation_from_wxyz, wxyz_from_rotation
 
 _INVALID = (Fault.CARTESIAN_POSITION_MOTION_GENERATOR_INVALID_FRAME,)
 _ELBOW = (Fault.COMMAND_CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION,)
@@ -118,14 +118,3 @@ class CartesianGenerator:
             return packet.psi_c
         passes_zero = packet.psi_c == 0.0 and abs(self._psi) <= self._smallest_psi
         return 0.0 if passes_zero else self._psi
-
-
-def find_frame_error(numbers: Sequence[float]) -> str | None:
-    """Returns why 16 numbers, row-major, are no pose of a tool, or None when they are one."""
-    a, b, c, x, d, e, f, y, g, h, i, z, *last_row = numbers
-    if not isfinite(a + b + c + d + e + f + g + h + i + x + y + z):
-        return "commanded pose is not all finite numbers"
-    if last_row != [0.0, 0.0, 0.0, 1.0]:
-        return f"commanded pose has {last_row} as its last row; needs 0 0 0 1"
-    error = find_rotation_error((a, b, c, d, e, f, g, h, i))
-    return None if error is None else f"commanded pose {error}"

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from rcilab.controller.modes.cartesian import find_frame_error
+from rcilab.conformance.frame import find_frame_error
 from rcilab.faults import Fault
 from rcilab.protocols import rci
 from rcilab.spatial import Pose

@@ -1,0 +1,260 @@
+"""One cycle judged in any mode, for any arm: the per-cycle monitors put together by the arm's own table."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rcilab.arrays import Array, as_vector, described
+from rcilab.command import CartesianPosition, Command, JointPosition, JointTorque
+from rcilab.conformance.box_monitor import BoxMonitor
+from rcilab.conformance.breach import Breach
+from rcilab.conformance.cartesian_monitor import CartesianMonitor
+from rcilab.conformance.clearance_monitor import ClearanceMonitor
+from rcilab.conformance.condition import Condition
+from rcilab.conformance.condition_tables import condition_table
+from rcilab.conformance.frame import find_frame_error
+from rcilab.conformance.measured_monitor import MeasuredMonitor
+from rcilab.conformance.monitor import JointMonitor
+from rcilab.conformance.start import StartState, as_start
+from rcilab.conformance.tool_signals import commands_before
+from rcilab.conformance.torque_monitor import TorqueMonitor
+from rcilab.errors import InvalidValueError
+from rcilab.kinematics.closed_form import build_closed_form
+from rcilab.model import RobotModel, require_model
+from rcilab.safety_box import SafetyBox
+from rcilab.safety_distance import SafetyDistance
+from rcilab.spatial import IDENTITY, Pose
+from rcilab.state import Mode, require_mode
+
+
+class Monitor:
+    """Judges one command a cycle by the rows that `check` judges a whole motion by, in the same mode.
+
+    Owned by the thread that runs the cycle. It is used alike for every arm: an xMate is judged by the manual's table,
+    a Panda by Franka's. What only a whole motion has, its rest at both ends and the torques that the manual
+    recommends to bound, is left to `check`.
+
+    Args:
+        model: The arm with its tool and load.
+        mode: How it is commanded, as in `control`.
+        box: Where the tool shall stay; None, or one that is not active, is not judged.
+        distance: How far links shall stay from each other and from the floor; None is not judged.
+
+    Raises:
+        InvalidValueError: The model is none, or there is no such mode.
+    """
+
+    def __init__(
+        self,
+        model: RobotModel,
+        mode: Mode = "joint_position",
+        *,
+        box: SafetyBox | None = None,
+        distance: SafetyDistance | None = None,
+    ) -> None:
+        self._model, self.mode = require_model(model), require_mode(mode)
+        table, box = condition_table(model.description), box if box is not None and box.active else None
+        limits = model.limits
+        self._own_rows = {row.id: row for row in table.conditions}
+        rows = table.rows(self.mode, has_elbow=model.n == 7)
+        self._start_rows = [row for row in rows if row.stage == "start" and row.order == 0]
+        self._clearance = None if distance is None else ClearanceMonitor(model, distance)
+        self._measured = MeasuredMonitor(limits, box)
+        self._torques = self._tool = self._joints = None
+        if self.mode == "torque":
+            self._torques = TorqueMonitor(limits.joint, _throughout(rows, "torque"))
+        else:
+            self._joints = JointMonitor(limits.joint, _throughout(rows, "joint"))
+        self._is_cartesian = self.mode.startswith("cartesian")
+        if self._is_cartesian:
+            tool_rows = _throughout(table.cartesian, "arm_angle", "translation", "rotation")
+            self._tool = CartesianMonitor(limits, box, (table.box, *tool_rows))
+        self._box = BoxMonitor(None if self._is_cartesian or self.mode == "torque" else box, table.box)
+        self._pose_rows = {row.signal: row for row in rows if row.signal in ("frame", "elbow_sign")}
+        self._inverse = build_closed_form(model.description)
+        self._T_tool_flange = model.T_flange_tool.inverse()
+        self._has_tool = not model.T_flange_tool.is_close(IDENTITY, 0.0)
+        self.reset(model.home)
+
+    def reset(self, start: ArrayLike | StartState) -> None:
+        """Forgets the past: the arm stands somewhere, or comes along.
+
+        Args:
+            start: Commanded joint angles of the standing arm, shape (n,), [rad]; a StartState for a moving one.
+
+        Raises:
+            InvalidValueError: It is no state of this arm.
+            SingularError: The arm angle, which tool poses come with, has no meaning there.
+        """
+        model = self._model
+        state = as_start(start, model.n)
+        self._start, self._is_first = state, not state.moving
+        self._q = state.q.tolist()
+        self._measured.reset(state.q.tolist())
+        if self._joints is not None:
+            self._joints.reset(state.q.tolist(), state.dq.tolist(), state.ddq.tolist())
+        if self._torques is not None:
+            tau = model.rigid_body.motion_torque(state.q, state.dq, state.ddq)
+            self._torques.reset(tau.tolist() if state.moving else [0.0] * model.n)
+        if self._clearance is not None:
+            self._clearance.reset(state.q)
+        if self._tool is not None:
+            poses = [(model.forward(q), self._arm_angle(q)) for q in commands_before(state)]
+            self._tool.reset(*poses[0])
+            for pose, psi in poses[1:]:
+                self._tool.step(pose, psi)
+            self._start_pose, self._psi = poses[-1]
+            self._start_psi = self._psi
+        if "elbow_sign" in self._pose_rows:
+            self._start_side = model.elbow(state.q)[1]
+
+    def step(self, command: Command, cycles: int = 1, side: int | None = None) -> tuple[Breach, ...]:
+        """Takes the command of this cycle and returns what it breaks, recommendations too; nothing when all is well.
+
+        A number that is none breaks every condition on it. After a breach of a necessary condition a controller stops;
+        here the history moves on, and it is for the caller to `reset`. A pose for which there are no joint angles
+        leaves the joints where they were.
+
+        Args:
+            command: As the mode asks for; without an arm angle the elbow stays.
+            cycles: Cycles since the last command, 1 or more.
+            side: Side of the elbow, +1 or -1 as `model.elbow` counts it, which Franka commands with every pose; None
+                keeps the last. Other arms have none.
+
+        Raises:
+            InvalidValueError: The command is of another kind than the mode's, or for another number of joints.
+        """
+        if self._torques is not None:
+            found = self._step_torques(self._torques, command, cycles)
+        elif self._tool is not None:
+            found = self._step_pose(self._tool, command, cycles, side)
+        else:
+            found = self._step_joints(command, cycles)
+        self._is_first = False
+        return tuple(found)
+
+    def observe(self, q: Sequence[float] | Array, dq: Sequence[float] | Array) -> tuple[Breach, ...]:
+        """Takes what the sensors say in this cycle and returns what the arm itself breaks.
+
+        Args:
+            q: Joint angles, shape (n,), [rad].
+            dq: Joint velocities, shape (n,), [rad/s].
+
+        Raises:
+            InvalidValueError: Not n finite numbers each.
+        """
+        model = self._model
+        angles, speeds = as_vector(q, model.n, "q", "rad"), as_vector(dq, model.n, "dq", "rad/s")
+        twist = model.velocity(angles, speeds).tolist() if self._is_cartesian else None
+        psi = self._arm_angle(angles) if self._is_cartesian else None
+        self._measured.step(angles.tolist(), speeds.tolist(), model.forward(angles).parts[1], twist, psi)
+        found = self._own(self._measured.broken())
+        if self._torques is not None:
+            found += self._distances(angles)
+        return tuple(found)
+
+    def _step_torques(self, monitor: TorqueMonitor, command: Command, cycles: int) -> list[Breach]:
+        tau = self._numbers(command.tau if isinstance(command, JointTorque) else None, "tau", command)
+        monitor.step(tau, cycles)
+        return self._at_start({"torque": tau}) + monitor.broken()
+
+    def _step_joints(self, command: Command, cycles: int) -> list[Breach]:
+        q = self._numbers(command.q if isinstance(command, JointPosition) else None, "q", command)
+        away = [new - old for new, old in zip(q, self._start.q.tolist(), strict=True)]
+        return self._at_start({"joint": away}) + self._judge_joints(q, cycles)
+
+    def _step_pose(self, monitor: CartesianMonitor, command: Command, cycles: int, side: int | None) -> list[Breach]:
+        if not isinstance(command, CartesianPosition):
+            raise self._wrong(command)
+        numbers = np.asarray(command.T_base_tool, dtype=np.float64).ravel().tolist()
+        if len(numbers) != 16 or find_frame_error(numbers) is not None:
+            return [self._improper(math.inf)]
+        pose = Pose.from_row_major(numbers)
+        if self._model.n == 7 and command.psi is not None:
+            self._psi = float(command.psi)
+        monitor.step(pose, self._psi, cycles)
+        way = math.dist(pose.parts[1], self._start_pose.parts[1])
+        turn = 0.0 if self._psi is None else self._psi - (self._start_psi or 0.0)
+        found = self._at_start({"translation": [way], "arm_angle": [math.remainder(turn, math.tau)]})
+        found += monitor.broken()
+        flange = pose @ self._T_tool_flange if self._has_tool else pose
+        q = self._inverse.beside(flange, self._psi or 0.0, self._on_side(side))
+        if q is None:
+            return [*found, self._improper(math.inf)]
+        self._q = q
+        if self._inverse.is_singular(q):
+            found.append(self._improper(float(self._inverse.singularity_path(np.array([q]))[0])))
+        return found + self._judge_elbow(q) + self._judge_joints(q, cycles)
+
+    def _judge_joints(self, q: list[float], cycles: int) -> list[Breach]:
+        assert self._joints is not None
+        self._joints.step(q, cycles)
+        found = self._joints.broken()
+        if not math.isfinite(sum(q)):
+            return found
+        if self._box.is_active:
+            self._box.step(self._model.forward(q).parts[1])
+            found += self._box.broken()
+        return found + self._distances(q)
+
+    def _on_side(self, side: int | None) -> list[float]:
+        """Returns the last joint angles, mirrored at the elbow's flip where the other side is asked for."""
+        flip = self._model.description.elbow_flip
+        if flip is None or side is None or self._model.elbow(self._q)[1] == side:
+            return self._q
+        return [*self._q[:3], 2.0 * flip - self._q[3], *self._q[4:]]
+
+    def _judge_elbow(self, q: list[float]) -> list[Breach]:
+        row = self._pose_rows.get("elbow_sign")
+        if row is None or self._model.elbow(q)[1] == self._start_side:
+            return []
+        return [Breach(row, 0, -1.0, 0.0)]
+
+    def _at_start(self, values: dict[str, list[float]]) -> list[Breach]:
+        """Returns what the first command of a standing arm breaks for being elsewhere than the arm is."""
+        if not self._is_first:
+            return []
+        found: list[Breach] = []
+        for row in self._start_rows:
+            lower, upper = (bound.tolist() for bound in row.bounds(self._model.limits))
+            for axis, (value, low, high) in enumerate(zip(values[row.signal], lower, upper, strict=True), 1):
+                if not low < value < high:
+                    found.append(Breach(row, axis if row.is_per_joint else 0, value, low if value <= low else high))
+        return found
+
+    def _distances(self, q: Sequence[float] | Array) -> list[Breach]:
+        if self._clearance is None:
+            return []
+        self._clearance.step(q)
+        return self._clearance.broken()
+
+    def _own(self, breaches: list[Breach]) -> list[Breach]:
+        """Returns breaches of the manual's rows as those of the arm's own table; what it has no row for is none."""
+        own = self._own_rows
+        return [breach._replace(condition=own[row.id]) for breach in breaches if (row := breach.condition).id in own]
+
+    def _improper(self, nearness: float) -> Breach:
+        return Breach(self._pose_rows["frame"], 0, nearness, 1.0)
+
+    def _arm_angle(self, q: Array) -> float | None:
+        return self._model.arm_angle(q) if self._model.n == 7 else None
+
+    def _numbers(self, values: Array | None, name: str, command: Command) -> list[float]:
+        if values is None:
+            raise self._wrong(command)
+        numbers = np.asarray(values, dtype=np.float64).ravel().tolist()
+        if len(numbers) != self._model.n:
+            raise InvalidValueError(name, values, f"needs {self._model.n} numbers")
+        return numbers
+
+    def _wrong(self, command: object) -> InvalidValueError:
+        kind = "JointTorque" if self._torques is not None else "CartesianPosition" if self._tool else "JointPosition"
+        return InvalidValueError("command", described(command), f"is no {kind}, which the mode {self.mode} asks for")
+
+
+def _throughout(rows: Sequence[Condition], *signals: str) -> list[Condition]:
+    return [row for row in rows if row.stage == "throughout" and row.signal in signals and not row.is_measured]
