@@ -98,7 +98,7 @@ class ControllerConfig:
             raise InvalidValueError(
                 "lost_limit",
                 self.lost_limit,
-                f"needs {FEWEST_LOST} to {MOST_LOST} cycles, or None (--lost-limit 0) for no limit",
+                f"needs {FEWEST_LOST} to {MOST_LOST} cycles; None, or 0 on the command line, is no limit",
             )
 
     @property
