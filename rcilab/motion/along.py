@@ -93,9 +93,7 @@ def plan_along(model: RobotModel, q: JointVector, path: Path, speed: float) -> M
     for round_ in range(2 * _ROUNDS):
         law = smooth_law(fastest_squares(allowed.slowed(slowdown)), cycles)
         rows = _rows_along(model, q, path, law.u)
-        excess = _excess(bounds, _columns(path, rows, law.u), path.positions(law.u))
-        if _turns_unevenly(path):
-            np.maximum(excess, _turn_excess(bounds, path.sample(law.u)[0][:, :3, :3]), out=excess)
+        excess = _excess(bounds, path, rows, law.u)
         if excess.max() <= 1.0:
             coefficients, excess = np.empty((len(rows) - 1, model.n, 6)), np.zeros(len(rows) - 1)
             for block, powers in _quintics(model, path, rows, law):
@@ -262,37 +260,34 @@ def _directions() -> Array:
     return np.arange(_SIDES) * math.pi / _SIDES - math.pi / 2.0
 
 
-def _excess(bounds: _Bounds, columns: Array, positions: Array) -> Array:
+def _excess(bounds: _Bounds, path: Path, rows: JointPath, shares: Array) -> Array:
     """Returns how much slower each row must be passed to keep every bound, shape (N,); 1 or less keeps them."""
-    excess = np.zeros(len(columns))
-    column, position = _held(columns.T), _held(positions.T)
+    last = len(rows) - 1
+    excess = np.zeros(len(rows) + 3)
     limits = (bounds.velocity, bounds.acceleration, bounds.jerk)
-    for order, (limit, tool_limit) in enumerate(zip(limits, bounds.tool, strict=True), start=1):
-        column, position = np.diff(column), np.diff(position)
-        span = CYCLE_TIME**order
-        joints = (np.abs(column) / (span * limit)[:, np.newaxis]).max(axis=0)
-        tool = np.sqrt((position * position).sum(axis=0)) / (span * tool_limit)
-        _raise(excess, np.maximum(joints, tool), order)
-    return excess
-
-
-def _turn_excess(bounds: _Bounds, rotations: Array) -> Array:
-    """Returns how much slower each row must be passed to keep the bounds of the tool's turn, shape (N,)."""
-    excess = np.zeros(len(rotations))
-    difference = turns_between(np.moveaxis(_held(np.moveaxis(rotations, 0, 2)), 2, 0)).T
-    for order, limit in enumerate((bounds.velocity[-1], bounds.acceleration[-1], bounds.jerk[-1]), start=1):
-        _raise(excess, np.sqrt((difference * difference).sum(axis=0)) / (CYCLE_TIME**order * limit), order)
-        difference = np.diff(difference)
-    return excess
+    for block in _blocks(len(excess)):
+        # With the three rows before; the first one has stood, and the last one stands, for three more cycles.
+        held = np.clip(np.arange(block.start - 3, block.stop), 0, last)
+        u = shares[held]
+        column, position = _columns(path, rows[held], u).T, path.positions(u).T
+        for order, (limit, tool_limit) in enumerate(zip(limits, bounds.tool, strict=True), start=1):
+            column, position = np.diff(column), np.diff(position)
+            span = CYCLE_TIME**order
+            joints = (np.abs(column) / (span * limit)[:, np.newaxis]).max(axis=0)
+            tool = np.sqrt((position * position).sum(axis=0)) / (span * tool_limit)
+            _raise(excess[block], np.maximum(joints, tool), order)
+        if _turns_unevenly(path):
+            turn = turns_between(path.sample(u)[0][:, :3, :3]).T
+            for order, limit in enumerate(limits, start=1):
+                _raise(excess[block], np.sqrt((turn * turn).sum(axis=0)) / (CYCLE_TIME**order * limit[-1]), order)
+                turn = np.diff(turn)
+    excess[last] = excess[last:].max()
+    return excess[: last + 1]
 
 
 def _raise(excess: Array, ratio: Array, order: int) -> None:
-    """Takes in how much too large differences of `_held` rows are; those of order n grow with the speed to the n."""
-    factor = ratio ** (1.0 / order)
-    # The difference at a row looks back; behind the end it is the end's.
-    count, offset = len(excess), 3 - order
-    np.maximum(excess, factor[offset : offset + count], out=excess)
-    excess[-1] = max(excess[-1], float(factor[offset + count :].max()))
+    """Takes in how much too large differences are that look back; those of order n grow with the speed to the n."""
+    np.maximum(excess, ratio[3 - order :] ** (1.0 / order), out=excess)
 
 
 def _excess_between(bounds: _Bounds, powers: list[Array]) -> Array:
@@ -324,11 +319,6 @@ def _spread(excess: Array, u: Array, knots: int, cycles: int) -> Array:
     np.maximum.at(result, below, factor)
     np.maximum.at(result, below + 1, factor)
     return result
-
-
-def _held(rows: Array) -> Array:
-    """Returns what stands for three more cycles at both ends of the last axis."""
-    return np.concatenate((np.repeat(rows[..., :1], 3, axis=-1), rows, np.repeat(rows[..., -1:], 3, axis=-1)), axis=-1)
 
 
 def _quintics(model: RobotModel, path: Path, rows: JointPath, law: TimeLaw) -> Iterator[tuple[slice, list[Array]]]:
