@@ -60,9 +60,9 @@ def plan_profile(
     states = np.stack((start_velocity, start_acceleration))
     if way[longest] != 0.0 and np.allclose(states, np.outer(states[:, longest], parts), rtol=0.0, atol=_ASIDE):
         with np.errstate(divide="ignore"):
-            bounds = [(bound / np.abs(parts)).min(keepdims=True) for bound in (velocity, acceleration, jerk)]
+            v, a, j = [(bound / np.abs(parts)).min(keepdims=True) for bound in (velocity, acceleration, jerk)]
         one = slice(longest, longest + 1)
-        line = _timed(np.zeros(1), way[one], *bounds, start_velocity[one], start_acceleration[one])
+        line = _timed(np.zeros(1), way[one], v, a, j, start_velocity[one], start_acceleration[one])
         coefficients = parts[:, np.newaxis] * line.coefficients
         coefficients[:, :, 0] += start
         return _arriving_at(goal, PiecewisePolynomial(line.breaks, coefficients))

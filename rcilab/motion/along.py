@@ -16,6 +16,7 @@ from rcilab.arrays import Array, JointPath, JointVector, as_number
 from rcilab.clock import CYCLE_TIME
 from rcilab.errors import InvalidValueError
 from rcilab.model import RobotModel
+from rcilab.motion.blocks import blocks
 from rcilab.motion.hermite import quintic
 from rcilab.motion.inverse_path import inverse_path
 from rcilab.motion.joint import MIN_SPEED
@@ -46,9 +47,6 @@ _INSTANTS = (0.25, 0.5, 0.75)
 _HASTE = 1.002
 """To slow down by the square of what was found, and this much more, also where it was closely under a limit, so that
 few rounds do: 1 or 2 on nine of ten paths. A choice; it makes motions 0.06 % longer."""
-_BLOCK = 4096
-"""Rows that are computed together. A choice: a table of them, of 7 joints, has 230 kB and is neither given back to the
-system nor fetched from memory again and again, which made motions of 100 s cost half as much again for each second."""
 _NUDGE = 1e-4
 """Share of the way over which derivatives by the way are formed. A choice: both their errors are below 1e-7."""
 
@@ -149,7 +147,7 @@ def _rows_along(model: RobotModel, q: JointVector, path: Path, shares: Array) ->
     """Returns the joint angles along a path that can be followed, the first ones q, shape (N, n), [rad]."""
     rows = np.empty((model.n, len(shares))).T
     rows[0] = q
-    for block in _blocks(len(shares)):
+    for block in blocks(len(shares)):
         # From the row before on, so that none of a path's steps is overlooked.
         block = slice(max(block.start - 1, 0), block.stop)
         rows[block] = inverse_path(model, *path.sample(shares[block]), rows[block.start])[0]
@@ -265,7 +263,7 @@ def _excess(bounds: _Bounds, path: Path, rows: JointPath, shares: Array) -> Arra
     last = len(rows) - 1
     excess = np.zeros(len(rows) + 3)
     limits = (bounds.velocity, bounds.acceleration, bounds.jerk)
-    for block in _blocks(len(excess)):
+    for block in blocks(len(excess)):
         # With the three rows before; the first one has stood, and the last one stands, for three more cycles.
         held = np.clip(np.arange(block.start - 3, block.stop), 0, last)
         u = shares[held]
@@ -329,7 +327,7 @@ def _quintics(model: RobotModel, path: Path, rows: JointPath, law: TimeLaw) -> I
     """
     last = len(rows) - 1
     h = CYCLE_TIME
-    for block in _blocks(last):
+    for block in blocks(last):
         ends = slice(block.start, block.stop + 1)
         here, u = rows[ends], law.u[ends]
         before, after = (inverse_path(model, *path.sample(u + side), here[0])[0] for side in (-_NUDGE, _NUDGE))
@@ -343,12 +341,6 @@ def _quintics(model: RobotModel, path: Path, rows: JointPath, law: TimeLaw) -> I
             v[-1] = a[-1] = 0.0
         parts = quintic((here[:-1], v[:-1], a[:-1]), (here[1:], v[1:], a[1:]), h)
         yield block, [part / h**power for power, part in enumerate(parts)]
-
-
-def _blocks(count: int) -> Iterator[slice]:
-    """Yields the rows of a long motion, some after the other, so that what is computed of them stays in the cache."""
-    for first in range(0, count, _BLOCK):
-        yield slice(first, min(first + _BLOCK, count))
 
 
 def _joined(coefficients: Array) -> PiecewisePolynomial:
