@@ -59,7 +59,7 @@ def plan_profile(
     parts = way / (way[longest] or 1.0)
     states = np.stack((start_velocity, start_acceleration))
     if way[longest] != 0.0 and np.allclose(states, np.outer(states[:, longest], parts), rtol=0.0, atol=_ASIDE):
-        with np.errstate(divide="ignore"):
+        with np.errstate(divide="ignore", over="ignore"):
             v, a, j = [(bound / np.abs(parts)).min(keepdims=True) for bound in (velocity, acceleration, jerk)]
         one = slice(longest, longest + 1)
         line = _timed(np.zeros(1), way[one], v, a, j, start_velocity[one], start_acceleration[one])
