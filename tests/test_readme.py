@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
+import json
 import re
 import subprocess
 import sys
 from pathlib import Path
+
+import jsonschema
+
+from rcilab.cli import main
+from rcilab.motion.program_file import SCHEMA
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 
 def test_the_ten_lines_run_as_printed() -> None:
-    (code,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+    code = re.findall(r"```python\n(.*?)```", README, re.DOTALL)[0]
     result = subprocess.run(
         [sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, timeout=60, cwd=ROOT
     )
@@ -21,6 +29,18 @@ def test_the_ten_lines_run_as_printed() -> None:
     assert said, result.stdout
     assert 0.1 < float(said[1]) < 3.0
     assert float(said[2]) < 1e-9  # The ideal plant is where it is told to be.
+
+
+def test_the_program_written_by_hand_is_sound_and_the_one_from_python_runs(tmp_path) -> None:
+    (text,) = re.findall(r"```json\n(.*?)```", README, re.DOTALL)
+    jsonschema.validate(json.loads(text), json.loads(SCHEMA.read_text(encoding="utf-8")))
+    (tmp_path / "program.json").write_text(text, encoding="utf-8")
+    assert main(["check", str(tmp_path / "program.json")]) == 0
+    said = io.StringIO()
+    with contextlib.redirect_stdout(said):
+        exec(re.findall(r"```python\n(.*?)```", README, re.DOTALL)[1], {})
+    assert "conforms" in said.getvalue()
+    assert said.getvalue().endswith(" 2\n")
 
 
 def test_both_set_up_commands_stand_on_a_line_of_their_own() -> None:

@@ -16,7 +16,7 @@ import numpy as np
 import ruckig
 from ruckig import Result
 
-from rcilab.arrays import JointVector
+from rcilab.arrays import Array, JointVector
 from rcilab.clock import CYCLE_TIME
 from rcilab.errors import PlanningError
 from rcilab.motion.piecewise import PiecewisePolynomial, join_pieces
@@ -24,6 +24,7 @@ from rcilab.motion.piecewise import PiecewisePolynomial, join_pieces
 _FACTORIALS = (1.0, 1.0, 2.0, 6.0)
 _POSITION, _VELOCITY = ruckig.ControlInterface.Position, ruckig.ControlInterface.Velocity
 _NO_MISS = 1e-13  # [rad] Rounding of the angles themselves.
+_ASIDE = 1e-12  # [rad/s, rad/s^2] Rounding of the derivatives of a motion that is on its straight way.
 
 
 def plan_profile(
@@ -37,7 +38,9 @@ def plan_profile(
 ) -> PiecewisePolynomial:
     """Returns the fastest curve from a moving start to rest at the goal with all joints arriving together.
 
-    In phase (a straight line in joint space) where that is possible, which it is from rest.
+    Where the joints start at rest, or on the straight way to the goal, they stay on it: the curve is then the fastest
+    one of the way as a single coordinate, bounded by whichever joint allows least. ruckig's own phase synchronisation
+    gives up the straight line where one joint bounds the velocity and another one the acceleration or the jerk.
 
     Args:
         start: Joint angles at t = 0, shape (n,), [rad].
@@ -51,16 +54,19 @@ def plan_profile(
     Raises:
         PlanningError: ruckig found no curve; the message says why.
     """
-    problem = ruckig.InputParameter(len(start))
-    problem.synchronization = ruckig.Synchronization.Phase
-    problem.current_position = start.tolist()
-    problem.current_velocity = start_velocity.tolist()
-    problem.current_acceleration = start_acceleration.tolist()
-    problem.target_position = goal.tolist()
-    problem.max_velocity = velocity.tolist()
-    problem.max_acceleration = acceleration.tolist()
-    problem.max_jerk = jerk.tolist()
-    return _arriving_at(goal, _polynomial(_solve(problem)))
+    way = goal - start
+    longest = int(np.abs(way).argmax())
+    parts = way / (way[longest] or 1.0)
+    states = np.stack((start_velocity, start_acceleration))
+    if way[longest] != 0.0 and np.allclose(states, np.outer(states[:, longest], parts), rtol=0.0, atol=_ASIDE):
+        with np.errstate(divide="ignore", over="ignore"):
+            v, a, j = [(bound / np.abs(parts)).min(keepdims=True) for bound in (velocity, acceleration, jerk)]
+        one = slice(longest, longest + 1)
+        line = _timed(np.zeros(1), way[one], v, a, j, start_velocity[one], start_acceleration[one])
+        coefficients = parts[:, np.newaxis] * line.coefficients
+        coefficients[:, :, 0] += start
+        return _arriving_at(goal, PiecewisePolynomial(line.breaks, coefficients))
+    return _arriving_at(goal, _timed(start, goal, velocity, acceleration, jerk, start_velocity, start_acceleration))
 
 
 def plan_standstill(
@@ -189,6 +195,23 @@ _REASONS: dict[Any, str] = {
     Result.ErrorExecutionTimeCalculation: "no profile reaches this goal from this start state",
     Result.ErrorSynchronizationCalculation: "the joints cannot be brought into step",
 }
+
+
+def _timed(
+    start: Array, goal: Array, velocity: Array, acceleration: Array, jerk: Array, start_velocity: Array,
+    start_acceleration: Array,
+) -> PiecewisePolynomial:  # fmt: skip
+    """Returns ruckig's curve to rest at the goal, all coordinates in phase where it can."""
+    problem = ruckig.InputParameter(len(start))
+    problem.synchronization = ruckig.Synchronization.Phase
+    problem.current_position = start.tolist()
+    problem.current_velocity = start_velocity.tolist()
+    problem.current_acceleration = start_acceleration.tolist()
+    problem.target_position = goal.tolist()
+    problem.max_velocity = velocity.tolist()
+    problem.max_acceleration = acceleration.tolist()
+    problem.max_jerk = jerk.tolist()
+    return _polynomial(_solve(problem))
 
 
 def _solve(problem: Any) -> Any:

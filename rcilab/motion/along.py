@@ -7,6 +7,7 @@ the joints run as quintics with the path's own velocities and accelerations.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +16,8 @@ from rcilab.arrays import Array, JointPath, JointVector, as_number
 from rcilab.clock import CYCLE_TIME
 from rcilab.errors import InvalidValueError
 from rcilab.model import RobotModel
+from rcilab.motion.blocks import blocks
+from rcilab.motion.hermite import quintic
 from rcilab.motion.inverse_path import inverse_path
 from rcilab.motion.joint import MIN_SPEED
 from rcilab.motion.margin import LIMIT_MARGIN
@@ -87,18 +90,16 @@ def plan_along(model: RobotModel, q: JointVector, path: Path, speed: float) -> M
     worst = 0.0
     for round_ in range(2 * _ROUNDS):
         law = smooth_law(fastest_squares(allowed.slowed(slowdown)), cycles)
-        T, psi = path.sample(law.u)
-        rows = inverse_path(model, T, psi, q)[0]
-        rows[0] = q
-        excess = _excess(bounds, _columns(path, rows, law.u), T[:, :3, 3])
-        if _turns_unevenly(path):
-            np.maximum(excess, _turn_excess(bounds, T[:, :3, :3]), out=excess)
+        rows = _rows_along(model, q, path, law.u)
+        excess = _excess(bounds, path, rows, law.u)
         if excess.max() <= 1.0:
-            powers = _quintics(model, path, rows, law)
-            excess = _excess_between(bounds, powers)
+            coefficients, excess = np.empty((len(rows) - 1, model.n, 6)), np.zeros(len(rows) - 1)
+            for block, powers in _quintics(model, path, rows, law):
+                coefficients[block] = np.stack(powers, axis=2)
+                excess[block] = _excess_between(bounds, powers)
             if excess.max() <= 1.0:
                 _require_inside(model, path, rows, law.u)
-                curve = _joined(powers)
+                curve = _joined(coefficients)
                 return Motion(polynomial=curve, goal=rows[-1], law="jerk_limited", speed=speed)
         worst = float(law.u[excess.argmax()])
         # Where slowing down in places only shifts what is too fast, the whole way is slowed down.
@@ -119,7 +120,10 @@ def curve_through(model: RobotModel, path: Path, rows: JointPath, law: TimeLaw) 
         rows: Joint angles at every cycle of the law, shape (N, n), N >= 2, [rad].
         law: Where on the path each row is, and how fast.
     """
-    return _joined(_quintics(model, path, rows, law))
+    coefficients = np.empty((len(rows) - 1, model.n, 6))
+    for block, powers in _quintics(model, path, rows, law):
+        coefficients[block] = np.stack(powers, axis=2)
+    return _joined(coefficients)
 
 
 def require_path(model: RobotModel, q: JointVector, path: Path) -> JointPath:
@@ -137,6 +141,18 @@ def require_path(model: RobotModel, q: JointVector, path: Path) -> JointPath:
         if not obstacle.is_singular:
             break
     raise refusal(path, float(shares[obstacle.row]), obstacle.reason)
+
+
+def _rows_along(model: RobotModel, q: JointVector, path: Path, shares: Array) -> JointPath:
+    """Returns the joint angles along a path that can be followed, the first ones q, shape (N, n), [rad]."""
+    rows = np.empty((model.n, len(shares))).T
+    rows[0] = q
+    for block in blocks(len(shares)):
+        # From the row before on, so that none of a path's steps is overlooked.
+        block = slice(max(block.start - 1, 0), block.stop)
+        rows[block] = inverse_path(model, *path.sample(shares[block]), rows[block.start])[0]
+    rows[0] = q
+    return rows
 
 
 def _require_inside(model: RobotModel, path: Path, rows: JointPath, shares: Array) -> None:
@@ -242,37 +258,34 @@ def _directions() -> Array:
     return np.arange(_SIDES) * math.pi / _SIDES - math.pi / 2.0
 
 
-def _excess(bounds: _Bounds, columns: Array, positions: Array) -> Array:
+def _excess(bounds: _Bounds, path: Path, rows: JointPath, shares: Array) -> Array:
     """Returns how much slower each row must be passed to keep every bound, shape (N,); 1 or less keeps them."""
-    excess = np.zeros(len(columns))
-    column, position = _held(columns.T), _held(positions.T)
+    last = len(rows) - 1
+    excess = np.zeros(len(rows) + 3)
     limits = (bounds.velocity, bounds.acceleration, bounds.jerk)
-    for order, (limit, tool_limit) in enumerate(zip(limits, bounds.tool, strict=True), start=1):
-        column, position = np.diff(column), np.diff(position)
-        span = CYCLE_TIME**order
-        joints = (np.abs(column) / (span * limit)[:, np.newaxis]).max(axis=0)
-        tool = np.sqrt((position * position).sum(axis=0)) / (span * tool_limit)
-        _raise(excess, np.maximum(joints, tool), order)
-    return excess
-
-
-def _turn_excess(bounds: _Bounds, rotations: Array) -> Array:
-    """Returns how much slower each row must be passed to keep the bounds of the tool's turn, shape (N,)."""
-    excess = np.zeros(len(rotations))
-    difference = turns_between(np.moveaxis(_held(np.moveaxis(rotations, 0, 2)), 2, 0)).T
-    for order, limit in enumerate((bounds.velocity[-1], bounds.acceleration[-1], bounds.jerk[-1]), start=1):
-        _raise(excess, np.sqrt((difference * difference).sum(axis=0)) / (CYCLE_TIME**order * limit), order)
-        difference = np.diff(difference)
-    return excess
+    for block in blocks(len(excess)):
+        # With the three rows before; the first one has stood, and the last one stands, for three more cycles.
+        held = np.clip(np.arange(block.start - 3, block.stop), 0, last)
+        u = shares[held]
+        column, position = _columns(path, rows[held], u).T, path.positions(u).T
+        for order, (limit, tool_limit) in enumerate(zip(limits, bounds.tool, strict=True), start=1):
+            column, position = np.diff(column), np.diff(position)
+            span = CYCLE_TIME**order
+            joints = (np.abs(column) / (span * limit)[:, np.newaxis]).max(axis=0)
+            tool = np.sqrt((position * position).sum(axis=0)) / (span * tool_limit)
+            _raise(excess[block], np.maximum(joints, tool), order)
+        if _turns_unevenly(path):
+            turn = turns_between(path.sample(u)[0][:, :3, :3]).T
+            for order, limit in enumerate(limits, start=1):
+                _raise(excess[block], np.sqrt((turn * turn).sum(axis=0)) / (CYCLE_TIME**order * limit[-1]), order)
+                turn = np.diff(turn)
+    excess[last] = excess[last:].max()
+    return excess[: last + 1]
 
 
 def _raise(excess: Array, ratio: Array, order: int) -> None:
-    """Takes in how much too large differences of `_held` rows are; those of order n grow with the speed to the n."""
-    factor = ratio ** (1.0 / order)
-    # The difference at a row looks back; behind the end it is the end's.
-    count, offset = len(excess), 3 - order
-    np.maximum(excess, factor[offset : offset + count], out=excess)
-    excess[-1] = max(excess[-1], float(factor[offset + count :].max()))
+    """Takes in how much too large differences are that look back; those of order n grow with the speed to the n."""
+    np.maximum(excess, ratio[3 - order :] ** (1.0 / order), out=excess)
 
 
 def _excess_between(bounds: _Bounds, powers: list[Array]) -> Array:
@@ -306,36 +319,30 @@ def _spread(excess: Array, u: Array, knots: int, cycles: int) -> Array:
     return result
 
 
-def _held(rows: Array) -> Array:
-    """Returns what stands for three more cycles at both ends of the last axis."""
-    return np.concatenate((np.repeat(rows[..., :1], 3, axis=-1), rows, np.repeat(rows[..., -1:], 3, axis=-1)), axis=-1)
+def _quintics(model: RobotModel, path: Path, rows: JointPath, law: TimeLaw) -> Iterator[tuple[slice, list[Array]]]:
+    """Yields the curve through the rows with the path's velocities and accelerations: continuous in both.
 
-
-def _quintics(model: RobotModel, path: Path, rows: JointPath, law: TimeLaw) -> list[Array]:
-    """Returns the curve through the rows with the path's velocities and accelerations: continuous in both.
-
-    Returns:
-        Its coefficients by ascending power, each of shape (N - 1, n).
+    Yields:
+        Some of its N - 1 cycles, and their coefficients by ascending power, each of shape (cycles, n).
     """
-    before, after = (inverse_path(model, *path.sample(law.u + side), rows[0])[0] for side in (-_NUDGE, _NUDGE))
-    first, second = (after - before) / (2.0 * _NUDGE), (after - 2.0 * rows + before) / _NUDGE**2
-    du, ddu = law.du[:, np.newaxis], law.ddu[:, np.newaxis]
+    last = len(rows) - 1
     h = CYCLE_TIME
-    v = first * du * h
-    a = (second * du**2 + first * ddu) * (h * h / 2.0)
-    v[0] = v[-1] = a[0] = a[-1] = 0.0
-    # In powers of the part of the cycle: the quintic with given value, slope and bend on both ends.
-    rise, slope, bend = np.diff(rows, axis=0) - v[:-1] - a[:-1], np.diff(v, axis=0) - 2.0 * a[:-1], np.diff(a, axis=0)
-    return [
-        rows[:-1],
-        v[:-1] / h,
-        a[:-1] / h**2,
-        (10.0 * rise - 4.0 * slope + bend) / h**3,
-        (-15.0 * rise + 7.0 * slope - 2.0 * bend) / h**4,
-        (6.0 * rise - 3.0 * slope + bend) / h**5,
-    ]
+    for block in blocks(last):
+        ends = slice(block.start, block.stop + 1)
+        here, u = rows[ends], law.u[ends]
+        before, after = (inverse_path(model, *path.sample(u + side), here[0])[0] for side in (-_NUDGE, _NUDGE))
+        first, second = (after - before) / (2.0 * _NUDGE), (after - 2.0 * here + before) / _NUDGE**2
+        du, ddu = law.du[ends, np.newaxis], law.ddu[ends, np.newaxis]
+        v = first * du
+        a = second * du**2 + first * ddu
+        if block.start == 0:
+            v[0] = a[0] = 0.0
+        if block.stop == last:
+            v[-1] = a[-1] = 0.0
+        parts = quintic((here[:-1], v[:-1], a[:-1]), (here[1:], v[1:], a[1:]), h)
+        yield block, [part / h**power for power, part in enumerate(parts)]
 
 
-def _joined(powers: list[Array]) -> PiecewisePolynomial:
-    breaks = np.arange(len(powers[0]) + 1, dtype=np.float64) * CYCLE_TIME
-    return PiecewisePolynomial(breaks, np.stack(powers, axis=2))
+def _joined(coefficients: Array) -> PiecewisePolynomial:
+    breaks = np.arange(len(coefficients) + 1, dtype=np.float64) * CYCLE_TIME
+    return PiecewisePolynomial(breaks, coefficients)

@@ -137,6 +137,9 @@ def _tool_state(path: Path, corner: Pose, share: float) -> State:
     rows[:, 3:6] = [_rotation_vector(R) for R in corner.rotation.T @ T[:, :3, :3]]
     if psi is not None:
         rows[:, 6] = psi
+    for row in (0, 2):  # Half a turn away from the corner the vector may be either of two, and must not change.
+        if rows[row, 3:6] @ rows[1, 3:6] < 0.0 and (size := float(np.linalg.norm(rows[row, 3:6]))) > math.pi / 2.0:
+            rows[row, 3:6] *= 1.0 - math.tau / size
     before, here, after = rows
     return here, (after - before) / (2.0 * _NUDGE), (after - 2.0 * here + before) / _NUDGE**2
 

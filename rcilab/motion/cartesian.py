@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Literal, TypeAlias, get_args
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,6 +20,7 @@ from rcilab.motion.path import (
     ArcOrientation,
     CircleOrientation,
     Path,
+    Way,
     build_arc,
     build_circle,
     build_line,
@@ -34,9 +35,6 @@ PathLaw = Literal["jerk_limited", "s_profile"]
 """How a path is followed: as fast as all limits allow, or by the manual's S profile (3.5)."""
 
 _LAWS: tuple[PathLaw, ...] = ("jerk_limited", "s_profile")
-
-Way: TypeAlias = Literal["shorter", "longer"]
-"""Which way round the arm angle goes: on the circle there are two, and one of them may lead across +-pi."""
 
 _WAYS: tuple[Way, ...] = get_args(Way)
 

@@ -43,11 +43,11 @@ class ChainBounds:
 
     knots: Array
     first: Array
-    """Shape (K + 1, m)."""
+    """Shape (m, K + 1): what follows is the least or the largest over the rows, knot by knot."""
     second: Array
-    """Shape (K + 1, m)."""
+    """Shape (m, K + 1)."""
     acceleration: Array
-    """Shape (K + 1, m)."""
+    """Shape (m, K + 1)."""
     most: Array
     """Largest x that velocities and jerks allow, shape (K + 1,)."""
 
@@ -83,11 +83,11 @@ def chain_bounds(chain: Chain, limits: ColumnLimits) -> ChainBounds:
     """Returns what a chain allows."""
     first, second, third = derivatives_at_knots(chain)
     n = chain.n
-    speed = np.minimum(_at_knots(chain.speed, 1.0, np.minimum), 1.0)[:, np.newaxis]
+    speed = np.minimum(_at_knots(chain.speed, 1.0, np.minimum), 1.0)
     leads = _at_knots(chain.leads_tool, 0.0, np.maximum)
     lengths = _norms(first, n)
     thirds = _norms(third, n)
-    velocity = limits.velocity * speed
+    velocity = np.outer(speed, limits.velocity)
     for table in (lengths, thirds):
         table[:, n:] *= leads[:, np.newaxis]
     with np.errstate(divide="ignore"):
@@ -101,9 +101,9 @@ def chain_bounds(chain: Chain, limits: ColumnLimits) -> ChainBounds:
     acceleration = np.concatenate((limits.acceleration[: n + 1], np.repeat(sides, _SIDES)))
     return ChainBounds(
         knots=chain.knots,
-        first=np.hstack((first[:, : n + 1], translation[0], rotation[0])),
-        second=np.hstack((second[:, : n + 1], translation[1], rotation[1])),
-        acceleration=acceleration * speed,
+        first=np.vstack((first[:, : n + 1].T, translation[0], rotation[0])),
+        second=np.vstack((second[:, : n + 1].T, translation[1], rotation[1])),
+        acceleration=np.outer(acceleration, speed),
         most=most,
     )
 
@@ -121,13 +121,13 @@ def fastest_law(bounds: ChainBounds, slowdown: Array, cycles: int) -> ChainLaw:
 
 def _fastest_squares(bounds: ChainBounds, slowdown: Array) -> Array:
     size = np.maximum(np.abs(bounds.first), _LEAST)
-    reserve = bounds.acceleration / (slowdown**2)[:, np.newaxis] / size
+    reserve = bounds.acceleration / slowdown**2 / size
     tilt = -bounds.second / np.copysign(size, bounds.first)
     most = np.minimum(_ceiling(reserve, tilt), bounds.most / slowdown**2)
     # A step on, x has grown by 2 step s'', and each row bounds s'' by tilt * x -+ reserve: the most that x can become,
     # and the most that it can have been, are the least of many straight lines, hence concave in x.
-    step = 2.0 * np.diff(bounds.knots)[:, np.newaxis]
-    gain, factor = step * reserve[:-1], 1.0 + step * tilt[:-1]
+    step = 2.0 * np.diff(bounds.knots)
+    gain, factor = step * reserve[:, :-1], 1.0 + step * tilt[:, :-1]
     binds = factor > _LEAST
     inverse = np.where(binds, 1.0 / np.maximum(factor, _LEAST), 0.0)
     backward = _chords(np.where(binds, gain * inverse, _UNBOUND), inverse, most[1:])
@@ -153,7 +153,7 @@ def _chords(offset: Array, slope: Array, top: Array) -> list[list[float]]:
     """
     table = np.empty((len(top), _CHORDS + 1))
     for i in range(_CHORDS + 1):
-        table[:, i] = (offset + slope * (top * (i / _CHORDS))[:, np.newaxis]).min(axis=1)
+        table[:, i] = (offset + slope * (top * (i / _CHORDS))).min(axis=0)
     return table.tolist()
 
 
@@ -182,15 +182,15 @@ def _smooth(knots: Array, squares: Array, cycles: int) -> ChainLaw:
 def _ceiling(reserve: Array, tilt: Array) -> Array:
     """Returns the largest x at each knot at which some s'' keeps every row, shape (K + 1,)."""
     # Where two rows leave no s'' between them: tilt_i x - reserve_i = tilt_j x + reserve_j.
-    most = np.full(len(tilt), _LEAST)
-    for i in range(tilt.shape[1]):
-        pairs = (tilt[:, i, np.newaxis] - tilt) / (reserve[:, i, np.newaxis] + reserve)
-        np.maximum(most, pairs.max(axis=1), out=most)
+    most = np.full(tilt.shape[1], _LEAST)
+    for i in range(len(tilt) - 1):
+        pairs = np.abs(tilt[i] - tilt[i + 1 :]) / (reserve[i] + reserve[i + 1 :])
+        np.maximum(most, pairs.max(axis=0), out=most)
     return 1.0 / most
 
 
 def _half_planes(first: Array, second: Array) -> tuple[Array, Array]:
-    """Returns rows whose bounds stand for a round one on first s'' + second x, each of shape (K + 1, _SIDES)."""
+    """Returns rows whose bounds stand for a round one on first s'' + second x, each of shape (_SIDES, K + 1)."""
     length = np.sqrt((first * first).sum(axis=1))
     along = first / np.maximum(length, _LEAST)[:, np.newaxis]
     forward = (along * second).sum(axis=1)
@@ -198,7 +198,7 @@ def _half_planes(first: Array, second: Array) -> tuple[Array, Array]:
     across = np.sqrt((aside * aside).sum(axis=1))
     angles = np.arange(_SIDES) * math.pi / _SIDES - math.pi / 2.0
     c, s = np.cos(angles), np.sin(angles)
-    return np.outer(length, c), np.outer(forward, c) + np.outer(across, s)
+    return np.outer(c, length), np.outer(c, forward) + np.outer(s, across)
 
 
 def _norms(table: Array, n: int) -> Array:

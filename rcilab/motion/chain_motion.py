@@ -10,6 +10,7 @@ from rcilab.arrays import Array
 from rcilab.clock import CYCLE_TIME
 from rcilab.errors import PlanningError
 from rcilab.limits import JointLimits, Limits
+from rcilab.motion.blocks import blocks
 from rcilab.motion.chain import Chain, Rows
 from rcilab.motion.chain_law import ChainLaw, ColumnLimits, chain_bounds, column_limits, fastest_law
 from rcilab.motion.hermite import quintic
@@ -48,12 +49,18 @@ def plan_chain(chain: Chain, limits: Limits) -> tuple[Array, list[float]]:
     for round_ in range(2 * _ROUNDS):
         law = fastest_law(allowed, slowdown, cycles)
         interval = chain.interval(law.s)
-        q, powers = _curve(chain, law)
-        excess = np.maximum(_tool_excess(chain, bounds, law, interval), _joint_excess(chain, bounds, powers, interval))
+        q, coefficients = np.empty((len(law.s), chain.n)), np.empty((len(law.s) - 1, chain.n, 6))
+        excess = _tool_excess(chain, bounds, law, interval)
+        for block in blocks(len(coefficients)):
+            ends = slice(block.start, block.stop + 1)
+            q[ends], powers = _curve(chain, law, ends)
+            coefficients[block] = np.stack(powers, axis=2)
+            joints = _joint_excess(chain, bounds, powers, interval[ends])
+            np.maximum(excess[block], joints, out=excess[block])
         if excess.max() <= 1.0:
             _require_inside(chain, q, law, limits.joint)
             corners = [int(np.searchsorted(law.s, middle)) * CYCLE_TIME for middle in chain.middles]
-            return np.stack(powers, axis=2), corners
+            return coefficients, corners
         worst = float(law.s[excess.argmax()])
         somewhere = round_ < _ROUNDS
         slowdown *= _spread(excess, law.s, chain.knots, cycles) if somewhere else float(excess.max()) * _HASTE
@@ -64,24 +71,27 @@ def plan_chain(chain: Chain, limits: Limits) -> tuple[Array, list[float]]:
     )
 
 
-def _curve(chain: Chain, law: ChainLaw) -> tuple[Array, list[Array]]:
-    """Returns the joint angles at every cycle, shape (N, n), and their coefficients by power, each (N - 1, n)."""
+def _curve(chain: Chain, law: ChainLaw, rows: slice) -> tuple[Array, list[Array]]:
+    """Returns the joint angles at N cycles, shape (N, n), and their coefficients by power, each (N - 1, n)."""
     h = CYCLE_TIME
-    q, first, second = chain.sample(law.s, slice(chain.n))
-    ds, dds = law.ds[:, np.newaxis], law.dds[:, np.newaxis]
+    q, first, second = chain.sample(law.s[rows], slice(chain.n))
+    ds, dds = law.ds[rows, np.newaxis], law.dds[rows, np.newaxis]
     v = first * ds
     a = second * ds**2 + first * dds
-    v[0] = v[-1] = a[0] = a[-1] = 0.0
+    if rows.start == 0:
+        v[0] = a[0] = 0.0
+    if rows.stop == len(law.s):
+        v[-1] = a[-1] = 0.0
     parts = quintic((q[:-1], v[:-1], a[:-1]), (q[1:], v[1:], a[1:]), h)
     return q, [part / h**power for power, part in enumerate(parts)]
 
 
 def _joint_excess(chain: Chain, limits: ColumnLimits, powers: list[Array], interval: Rows) -> Array:
-    """Returns how much slower each cycle must be to keep the joints' bounds in it, shape (N,)."""
+    """Returns how much slower each cycle must be to keep the joints' bounds in it, shape (N - 1,)."""
     n = chain.n
     speed = np.maximum(chain.speed[interval[:-1]], chain.speed[interval[1:]])
     scales = speed, speed, np.ones_like(speed)
-    excess = np.zeros(len(interval))
+    excess = np.zeros(len(powers[0]))
     for order, (limit, scale) in enumerate(zip(_tables(limits, slice(n)), scales, strict=True), start=1):
         powers = [float(p) * powers[p] for p in range(1, len(powers))]
         largest = np.abs(powers[0])
@@ -91,7 +101,7 @@ def _joint_excess(chain: Chain, limits: ColumnLimits, powers: list[Array], inter
                 value = value * (part * CYCLE_TIME) + coefficient
             np.maximum(largest, np.abs(value), out=largest)
         ratio = ((largest / limit).max(axis=1) / scale) ** (1.0 / order)
-        np.maximum(excess[:-1], ratio, out=excess[:-1])
+        np.maximum(excess, ratio, out=excess)
     return excess
 
 
@@ -100,27 +110,28 @@ def _tool_excess(chain: Chain, limits: ColumnLimits, law: ChainLaw, interval: Ro
 
     By backward differences at 1 ms, as the controller judges them, with rest before and after.
     """
-    n, count = chain.n, len(law.s)
+    n, last = chain.n, len(law.s) - 1
     speed = _looking_back(chain.speed[interval], np.maximum)
     leads = _looking_back(chain.leads_tool[interval], np.minimum) > 0.0
-    excess = np.zeros(count)
+    excess = np.zeros(last + 4)
     if not leads.any():
-        return excess
-    table = chain.values(law.s, slice(n, None))
-    table = np.concatenate((np.repeat(table[:1], 3, axis=0), table, np.repeat(table[-1:], 3, axis=0)))
-    for order, limit in enumerate(_tables(limits, slice(n, None)), start=1):
-        table = np.diff(table, axis=0) / CYCLE_TIME
-        squares = table * table
-        ratio = np.abs(table[:, 0]) / limit[0]
-        np.maximum(ratio, np.sqrt(squares[:, 1:4].sum(axis=1)) / limit[1], out=ratio)
-        np.maximum(ratio, np.sqrt(squares[:, 4:7].sum(axis=1)) / limit[2], out=ratio)
-        # The difference at a row looks back; behind the end it is the end's.
-        offset = 3 - order
-        seen = ratio[offset : offset + count]
-        seen[-1] = max(seen[-1], float(ratio[offset + count :].max()))
-        seen = np.where(leads, seen if order == 3 else seen / speed, 0.0)
-        np.maximum(excess, seen ** (1.0 / order), out=excess)
-    return excess
+        return excess[: last + 1]
+    for block in blocks(len(excess)):
+        # With the three rows before; the first one has stood, and the last one stands, for three more cycles.
+        rows = np.clip(np.arange(block.start - 3, block.stop), 0, last)
+        here = rows[3:]
+        table = chain.values(law.s[rows], slice(n, None)).T.copy()
+        for order, limit in enumerate(_tables(limits, slice(n, None)), start=1):
+            table = np.diff(table) / CYCLE_TIME
+            squares = table * table
+            ratio = np.abs(table[0]) / limit[0]
+            np.maximum(ratio, np.sqrt(squares[1:4].sum(axis=0)) / limit[1], out=ratio)
+            np.maximum(ratio, np.sqrt(squares[4:7].sum(axis=0)) / limit[2], out=ratio)
+            seen = ratio[3 - order :]
+            seen = np.where(leads[here], seen if order == 3 else seen / speed[here], 0.0)
+            np.maximum(excess[block], seen ** (1.0 / order), out=excess[block])
+    excess[last] = excess[last:].max()
+    return excess[: last + 1]
 
 
 def _tables(limits: ColumnLimits, columns: slice) -> tuple[Array, Array, Array]:

@@ -63,8 +63,10 @@ def plan_joint(
         goal: Joint angles at the end, shape (n,), [rad]; strictly inside the limits, as the robot demands.
         speed: Part of the velocity and acceleration limits to use, from `MIN_SPEED` = 0.001 to 1; the
             jerk limit is used in full.
-        law: "jerk_limited": the fastest motion inside the limits, with `LIMIT_MARGIN` to spare; from rest a straight
-            line in joint space. "s_profile": exactly the motion of the vendor's joint generator (manual 3.5). That one
+        law: "jerk_limited": the fastest motion inside the limits, with `LIMIT_MARGIN` to spare. From rest, or moving
+            straight towards or away from `goal`, it is the fastest one on the straight line in joint space; with
+            another start velocity or acceleration there is no such line, and each joint goes its own way in the same
+            time. "s_profile": exactly the motion of the vendor's joint generator (manual 3.5). That one
             has speeds of its own and does not know the robot's limits: `rcilab.check` judges it. A joint that is to
             move less than 1e-6 rad stays, so the motion may end that far from `goal`.
         start_velocity: Joint velocities at the start, shape (n,), [rad/s]; None is rest. Derivatives of the running

@@ -33,6 +33,8 @@ ArcOrientation = Literal["through_via", "start_to_goal"]
 """How the tool turns on an arc: through the orientation of via, or by one slerp that ignores it, as the vendor's."""
 CircleOrientation = Literal["held", "turning"]
 """What the tool does on a circle: it keeps its orientation, or turns with the circle, about its axis."""
+Way: TypeAlias = Literal["shorter", "longer"]
+"""Which way round the arm angle goes: on the circle there are two, and one of them may lead across +-pi."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from rcilab.arrays import Words, as_number, as_vector, described
 from rcilab.errors import InvalidValueError
 from rcilab.motion.joint import MIN_SPEED
+from rcilab.motion.path import CircleOrientation, Way
 from rcilab.motion.samples import MOST
 from rcilab.robots import describe_robot
 from rcilab.spatial import Pose
@@ -36,8 +37,8 @@ ALLOWED: dict[WaypointType, tuple[str, ...]] = {
     "joint": ("q", "position", "wxyz", "psi"),
     "line": ("q", "position", "wxyz", "psi"),
     "arc": ("via", "via_wxyz", "q", "position", "wxyz", "psi"),
-    "circle": ("center", "axis", "angle", "psi"),
-    "nullspace": ("psi",),
+    "circle": ("center", "axis", "angle", "orientation", "psi"),
+    "nullspace": ("psi", "way"),
 }
 """What else a waypoint of each type may have."""
 NEEDED: dict[WaypointType, tuple[str, ...]] = {
@@ -48,6 +49,9 @@ NEEDED: dict[WaypointType, tuple[str, ...]] = {
     "nullspace": ("psi",),
 }
 """What it must have, besides a target: a joint move, a line and an arc go to q, or to position and wxyz."""
+
+WORDS: dict[str, tuple[str, ...]] = {"orientation": get_args(CircleOrientation), "way": get_args(Way)}
+"""The words that some of them are one of; the first is meant where none is given."""
 
 Floats: TypeAlias = tuple[float, ...]
 
@@ -63,8 +67,8 @@ class Waypoint:
     """
 
     type: WaypointType
-    """joint: straight in joint space. line, arc: the tool straight, or over `via`. circle: around `center`, orientation
-    held. nullspace: the elbow alone."""
+    """joint: straight in joint space. line, arc: the tool straight, or over `via`. circle: around `center`.
+    nullspace: the elbow alone."""
     q: Floats | None = None
     """Target as joint angles, n of them, [rad]; of a line or an arc the pose and the arm angle there."""
     position: Floats | None = None
@@ -81,8 +85,14 @@ class Waypoint:
     """Axis of the circle in base, 3 numbers of any length; the tool goes around it by the right-hand rule."""
     angle: float | None = None
     """How far around the circle, more than 0 up to 2 pi, [rad]; None is all around."""
+    orientation: CircleOrientation | None = None
+    """Of the tool on a circle: "held", or "turning" with the circle, about its axis. Every circle has one: "held" where
+    none is given."""
     psi: float | None = None
     """Arm angle of a 7-axis arm at the target, -pi to pi, [rad]; None holds the one before, or in a joint move any."""
+    way: Way | None = None
+    """Which way round a nullspace move goes, "shorter" or "longer"; the longer one to the arm angle of the start is a
+    full turn. Every one has it: "shorter" where none is given."""
     speed: float = 0.2
     """Part of the velocity and acceleration limits to use on the way here, 0.001 to 1; jerk limits are used in full."""
     blend: float = 0.0
@@ -96,6 +106,9 @@ class Waypoint:
             known = ", ".join(get_args(WaypointType))
             raise InvalidValueError("type", described(self.type), f"is unknown; known: {known}")
         allowed = (*ALLOWED[self.type], *ALWAYS)
+        for name, known in WORDS.items():
+            if getattr(self, name) is None and name in allowed:
+                object.__setattr__(self, name, known[0])
         for name in _OPTIONAL:
             value = getattr(self, name)
             if value is not None and name not in allowed:
@@ -104,7 +117,9 @@ class Waypoint:
                 )
             if value is None and name in NEEDED[self.type]:
                 raise InvalidValueError(name, None, f"is missing: {self.type} needs {', '.join(NEEDED[self.type])}")
-            if value is not None and name not in ("q", "angle", "psi"):
+            if name in WORDS:
+                _require_word(name, value)
+            elif value is not None and name not in ("q", "angle", "psi"):
                 object.__setattr__(self, name, _vector(name, value))
         self._require_target()
         for name, lowest, highest, unit in _RANGES:
@@ -149,19 +164,25 @@ class Waypoint:
 
     @classmethod
     def circle(
-        cls, center: ArrayLike, axis: ArrayLike, angle: float | None = None, *, psi: float | None = None,
-        speed: float = 0.2, blend: float = 0.0, dwell: float = 0.0,
+        cls, center: ArrayLike, axis: ArrayLike, angle: float | None = None, *,
+        orientation: CircleOrientation = "held", psi: float | None = None, speed: float = 0.2, blend: float = 0.0,
+        dwell: float = 0.0,
     ) -> Waypoint:  # fmt: skip
-        """Returns a circle, or a part of it, around a centre, shape (3,), [m], and an axis, shape (3,)."""
+        """Returns a circle, or a part of it, around a centre, shape (3,), [m], and an axis, shape (3,).
+
+        The tool keeps its orientation ("held"), or it turns with the circle ("turning").
+        """
         return cls(
-            type="circle", center=_vector("center", center), axis=_vector("axis", axis), angle=angle, psi=psi,
-            speed=speed, blend=blend, dwell=dwell,
+            type="circle", center=_vector("center", center), axis=_vector("axis", axis), angle=angle,
+            orientation=orientation, psi=psi, speed=speed, blend=blend, dwell=dwell,
         )  # fmt: skip
 
     @classmethod
-    def nullspace(cls, psi: float, *, speed: float = 0.2, blend: float = 0.0, dwell: float = 0.0) -> Waypoint:
-        """Returns a move of the elbow alone, to an arm angle, [rad]."""
-        return cls(type="nullspace", psi=psi, speed=speed, blend=blend, dwell=dwell)
+    def nullspace(
+        cls, psi: float, *, way: Way = "shorter", speed: float = 0.2, blend: float = 0.0, dwell: float = 0.0
+    ) -> Waypoint:
+        """Returns a move of the elbow alone, to an arm angle, [rad], the shorter or the longer way round."""
+        return cls(type="nullspace", psi=psi, way=way, speed=speed, blend=blend, dwell=dwell)
 
     @property
     def pose(self) -> Pose | None:
@@ -326,6 +347,12 @@ def angles_of(value: ArrayLike, name: str, n: int | None = None, robot: str = ""
             problem = f"rad of joint {joint} is more than two turns, {MOST:.4g} rad; degrees times pi / 180 are radians"
             raise InvalidValueError(name, angle, problem)
     return angles
+
+
+def _require_word(name: str, value: object) -> None:
+    known = WORDS[name]
+    if value is not None and not (isinstance(value, str) and value in known):
+        raise InvalidValueError(name, described(value), f"is unknown; known: {', '.join(known)}")
 
 
 def _target(target: Pose | ArrayLike) -> dict[str, Any]:

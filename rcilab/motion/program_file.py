@@ -11,7 +11,7 @@ from typing import Any
 from rcilab.arrays import Words, described
 from rcilab.errors import InvalidValueError, ModelError, VersionMismatchError
 from rcilab.motion.lined_json import LONGEST, Node, read_json
-from rcilab.motion.program import ALLOWED, ALWAYS, Program, Waypoint, require_fit
+from rcilab.motion.program import ALLOWED, ALWAYS, WORDS, Program, Waypoint, require_fit
 from rcilab.robots import RobotDescription, describe_robot
 
 FORMAT = "rcilab program"
@@ -124,7 +124,8 @@ def _waypoint(node: Node, number: int, name: str, robot: RobotDescription) -> Wa
         if key == "type" or (value.value is None and key not in ALWAYS):
             continue
         what = f"{kind}, {key}"
-        values[key] = _number(name, value, what) if key in _SCALARS else _vector(name, value, what)
+        read = _number if key in _SCALARS else _text if key in WORDS else _vector
+        values[key] = read(name, value, what)
     try:
         waypoint = Waypoint(**values)
         require_fit(waypoint, len(robot.home), robot.name)

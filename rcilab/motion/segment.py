@@ -162,12 +162,13 @@ def _path(model: RobotModel, q: JointVector, waypoint: Waypoint) -> Path:
     if waypoint.q is not None:
         goal = model.forward(waypoint.q)
         psi = model.arm_angle(waypoint.q) if model.n == 7 else None
-    psis = arm_angles(model, q, psi, "shorter")
+    psis = arm_angles(model, q, psi, waypoint.way or "shorter")
     if waypoint.type == "circle":
         assert waypoint.center is not None
         assert waypoint.axis is not None
         angle = math.tau if waypoint.angle is None else waypoint.angle
-        return build_circle(T, waypoint.center, waypoint.axis, angle, *psis)
+        orientation = waypoint.orientation or "held"
+        return build_circle(T, waypoint.center, waypoint.axis, angle, *psis, orientation=orientation)
     if waypoint.type == "nullspace":
         return build_line(T, T, *psis)
     assert goal is not None

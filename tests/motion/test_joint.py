@@ -9,7 +9,8 @@ from rcilab.model import load_model
 from rcilab.motion import LIMIT_MARGIN, _ruckig, plan_joint
 from rcilab.motion.joint import MIN_SPEED
 
-MODELS = [load_model(name) for name in ("xMatePro7", "xMate3", "Panda")]
+ALL = [load_model(name) for name in ("xMatePro7", "xMate3", "Panda", "xMatePro3", "xMate7")]
+MODELS = ALL[:3]
 MODEL = MODELS[0]
 LIMITS = MODEL.limits.joint
 
@@ -37,12 +38,59 @@ def test_no_backward_difference_of_a_planned_motion_reaches_a_limit(model, seed,
     assert ((limits.lower < q) & (q < limits.upper)).all()
 
 
-def test_from_rest_the_motion_is_a_straight_line_in_joint_space():
-    rng = np.random.default_rng(1)
-    start, goal = random_angles(rng), random_angles(rng)
-    motion = plan_joint(MODEL, start, goal)
-    fraction = (motion.q - start) / (goal - start)
-    assert np.abs(fraction - fraction[:, :1]).max() < 1e-12
+def offset_from_line(q, start, goal):
+    """How far rows are from the straight line in joint space, by the share of the joint that goes farthest, [rad]."""
+    way = goal - start
+    longest = np.abs(way).argmax()
+    share = (q[:, longest] - start[longest]) / way[longest]
+    return np.abs(q - start - share[:, np.newaxis] * way).max()
+
+
+def time_along_line(model, way, speed):
+    """The least time on a straight line from rest to rest, from the seven steps by hand (a single coordinate, 0 to 1).
+
+    Biagiotti and Melchiorri, Trajectory Planning for Automatic Machines and Robots (2008), 3.4.
+    """
+    joint, part = model.limits.joint, LIMIT_MARGIN * speed
+    moves = way != 0.0
+    v, a, j = (
+        (bound[moves] / np.abs(way[moves])).min()
+        for bound in (part * joint.velocity, part * joint.acceleration, LIMIT_MARGIN * joint.jerk)
+    )
+    rise = v / a + a / j if v * j > a * a else 2.0 * np.sqrt(v / j)
+    if v * rise <= 1.0:
+        return 1.0 / v + rise
+    if 2.0 * (a / j) ** 2 * a <= 1.0:
+        return a / j + np.sqrt((a / j) ** 2 + 4.0 / a)
+    return 4.0 * np.cbrt(0.5 / j)
+
+
+@settings(max_examples=100)
+@given(st.sampled_from(ALL), st.integers(0, 2**32), st.floats(0.01, 1.0), st.floats(-6.0, 0.0), st.floats(0.0, 1.0))
+def test_from_rest_it_is_the_fastest_motion_on_the_straight_line_in_joint_space(model, seed, speed, size, still):
+    rng = np.random.default_rng(seed)
+    start = random_angles(rng, model)
+    goal = start + 10.0**size * (random_angles(rng, model) - start) * (rng.random(model.n) >= 0.9 * still)
+    motion = plan_joint(model, start, goal, speed=speed)
+    if np.array_equal(start, goal):
+        assert motion.duration == 0.0
+        return
+    q = motion.polynomial.sample(np.linspace(0.0, motion.duration, 997))
+    assert offset_from_line(q, start, goal) < 1e-12
+    assert motion.duration == pytest.approx(time_along_line(model, goal - start, speed), rel=1e-4)
+
+
+@settings(max_examples=30)
+@given(st.sampled_from(ALL), st.integers(0, 2**32), st.floats(0.05, 1.0), st.floats(0.05, 1.0))
+def test_who_moves_along_the_line_stays_on_it_though_the_speed_changes(model, seed, first, second):
+    rng = np.random.default_rng(seed)
+    start, goal = 0.5 * random_angles(rng, model), 0.5 * random_angles(rng, model)
+    motion = plan_joint(model, start, goal, speed=first)
+    now = motion.at(rng.uniform(0.1, 0.5) * motion.duration)
+    rest = plan_joint(model, now.q, goal, speed=second, start_velocity=now.dq, start_acceleration=now.ddq)
+    assert offset_from_line(rest.q, start, goal) < 1e-11
+    assert np.abs(rest.at(0.0).dq - now.dq).max() < 1e-11
+    assert np.abs(rest.at(0.0).ddq - now.ddq).max() < 1e-11
 
 
 def test_one_joint_takes_the_time_that_its_limits_give_by_hand():
@@ -63,10 +111,10 @@ def test_our_polynomial_is_ruckigs_trajectory(monkeypatch):
     build = _ruckig._polynomial
     monkeypatch.setattr(_ruckig, "_polynomial", lambda found: trajectories.append(found) or build(found))
     rng = np.random.default_rng(2)
-    for moving in [0.0, 1.0] * 100:
+    for _ in range(150):
         start = rng.uniform(-1, 1, 7)
-        dq = moving * rng.uniform(-1.3, 1.3, 7) * LIMITS.velocity  # Also above the bound, which makes it brake first.
-        ddq = moving * rng.uniform(-1.3, 1.3, 7) * LIMITS.acceleration
+        dq = rng.uniform(-1.3, 1.3, 7) * LIMITS.velocity  # Also above the bound, which makes it brake first.
+        ddq = rng.uniform(-1.3, 1.3, 7) * LIMITS.acceleration
         bounds = 0.5 * LIMITS.velocity, 0.5 * LIMITS.acceleration, LIMITS.jerk
         curve = _ruckig.plan_profile(start, rng.uniform(-1, 1, 7), *bounds, dq, ddq)
         trajectory = trajectories[-1]
@@ -78,15 +126,16 @@ def test_our_polynomial_is_ruckigs_trajectory(monkeypatch):
         assert np.abs(curve.at(0.0)[0] - start).max() == 0.0
 
 
-def test_from_rest_our_polynomial_equals_ruckigs_to_rounding(monkeypatch):
-    trajectories = []
-    build = _ruckig._polynomial
-    monkeypatch.setattr(_ruckig, "_polynomial", lambda found: trajectories.append(found) or build(found))
-    rng = np.random.default_rng(3)
+def test_from_rest_it_is_ruckigs_trajectory_where_all_joints_are_bound_alike():
+    rng, rest = np.random.default_rng(3), np.zeros(7)
     for _ in range(50):
-        motion = plan_joint(MODEL, random_angles(rng), random_angles(rng), speed=rng.uniform(0.05, 1.0))
-        for t in rng.uniform(0.0, motion.duration, 20):
-            assert np.allclose(motion.at(t).q, trajectories[-1].at_time(t)[0], rtol=0.0, atol=1e-12)
+        start, goal = random_angles(rng), random_angles(rng)
+        bounds = [bound * np.abs(goal - start) for bound in rng.uniform((0.1, 0.5, 100.0), (1.0, 10.0, 1000.0))]
+        ours = _ruckig.plan_profile(start, goal, *bounds, rest, rest)
+        theirs = _ruckig._timed(start, goal, *bounds, rest, rest)
+        times = np.linspace(0.0, ours.duration, 100)
+        assert ours.duration == pytest.approx(theirs.duration, rel=1e-6)
+        assert np.allclose(ours.sample(times), theirs.sample(times), rtol=0.0, atol=1e-6)
 
 
 @settings(max_examples=60)

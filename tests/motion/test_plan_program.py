@@ -22,7 +22,7 @@ from rcilab.motion.segment import build_segments
 from rcilab.spatial import Pose
 
 TOOL = Pose((0.0, 0.02, 0.1))
-MODELS = {name: load_model(name, tool=TOOL) for name in ("xMatePro3", "xMatePro7", "xMate3", "xMate7")}
+MODELS = {name: load_model(name, tool=TOOL) for name in ("xMatePro3", "xMatePro7", "xMate3", "xMate7", "Panda")}
 SEVEN, SIX = MODELS["xMatePro7"], MODELS["xMate3"]
 TYPES = ("joint", "line", "arc", "circle", "nullspace")
 names, seeds = st.sampled_from(sorted(MODELS)), st.integers(0, 2**32)
@@ -55,13 +55,17 @@ def drawn(model, seed, count, types=TYPES) -> Program:
         psi = float(rng.uniform(-0.3, 0.3)) if model.n == 7 and rng.random() < 0.5 else None
         kind = types[rng.integers(len(types))]
         if kind == "nullspace" and model.n == 7:
-            waypoints.append(Waypoint.nullspace(float(rng.uniform(-0.5, 0.5)), **how))
+            way = "longer" if rng.random() < 0.1 else "shorter"
+            waypoints.append(Waypoint.nullspace(float(rng.uniform(-0.5, 0.5)), way=way, **how))
             continue
         if kind == "circle":
             angle = float(rng.uniform(1.0, math.tau))
             center = T.position - (0.04, 0.0, 0.0)
-            waypoints.append(Waypoint.circle(center, (0.0, 0.0, 1.0), angle, psi=psi, **how))
-            goal = Pose(center + 0.04 * np.array([math.cos(angle), math.sin(angle), 0.0]), T.wxyz)
+            turning = rng.random() < 0.5
+            orientation = "turning" if turning else "held"
+            waypoints.append(Waypoint.circle(center, (0.0, 0.0, 1.0), angle, orientation=orientation, psi=psi, **how))
+            R = Pose.from_rpy((0, 0, 0), (0.0, 0.0, angle * turning))
+            goal = Pose(center + 0.04 * np.array([math.cos(angle), math.sin(angle), 0.0]), (R @ T).wxyz)
         elif kind == "arc":
             via = (T.position + goal.position) / 2.0 + rng.uniform(-0.05, 0.05, 3)
             over = via if rng.random() < 0.5 else Pose(via, T.wxyz)
@@ -130,8 +134,9 @@ def distance_to_way(points, way):
     return best
 
 
-@settings(max_examples=10)
-@given(names, seeds)
+@pytest.mark.parametrize("name", sorted(MODELS))
+@settings(max_examples=2)
+@given(seed=seeds)
 def test_a_random_program_keeps_every_joint_limit_is_smooth_and_arrives(name, seed):
     model = MODELS[name]
     steps = drawn(model, seed, 4)
@@ -142,8 +147,9 @@ def test_a_random_program_keeps_every_joint_limit_is_smooth_and_arrives(name, se
     assert np.allclose(motion.q[-1], build_segments(model, steps)[-1].goal, atol=1e-9)
 
 
-@settings(max_examples=4)
-@given(names, seeds)
+@pytest.mark.parametrize("name", sorted(MODELS))
+@settings(max_examples=1)
+@given(seed=seeds)
 def test_between_paths_of_the_tool_its_limits_and_the_arm_angles_are_kept_too(name, seed):
     model = MODELS[name]
     motion = planned(model, drawn(model, seed, 3, TYPES[1:]))
@@ -166,8 +172,7 @@ def test_the_tool_leaves_its_way_only_inside_the_blend_radius(name, seed):
     for i, segment in enumerate(segments):
         mine = points[index == i]
         corners = [(segments[j], radius_at(segments, j)) for j in (i - 1, i) if j >= 0]
-        # A joint move from stop to stop is plan_joint's, which is not always straight in joint space.
-        if not len(mine) or (segment.path is None and not any(radius for _, radius in corners)):
+        if not len(mine):
             continue
         off = distance_to_way(mine, segment.positions(model, np.linspace(0.0, 1.0, 1001)))
         for corner, radius in corners:

@@ -20,7 +20,7 @@ import rcilab
 from rcilab.errors import InvalidValueError, ModelError, VersionMismatchError
 from rcilab.model import load_model
 from rcilab.motion import Motion, Program, Waypoint, plan_program
-from rcilab.motion.program import ALLOWED, ALWAYS
+from rcilab.motion.program import ALLOWED, ALWAYS, WORDS
 from rcilab.motion.program_file import SCHEMA
 from rcilab.spatial import Pose
 
@@ -47,6 +47,7 @@ PROGRAM = Program(
     ),
 )
 TEXT = PROGRAM.to_json()
+VALIDATOR = jsonschema.Draft202012Validator(json.loads(SCHEMA.read_text()))
 
 angles = st.floats(-12.0, 12.0)
 places = st.tuples(*[st.floats(-10.0, 10.0)] * 3)
@@ -62,8 +63,15 @@ waypoints = st.one_of(
     st.builds(Waypoint.joint, st.tuples(*[angles] * 7), **rests),
     st.builds(Waypoint.line, poses, psi=psis, **rests),
     st.builds(Waypoint.arc, places | poses, poses, psi=psis, **rests),
-    st.builds(Waypoint.circle, places, places.filter(lambda x: math.hypot(*x) > 0.01), st.floats(0.1, 6.2), **rests),
-    st.builds(Waypoint.nullspace, st.floats(-math.pi, math.pi), **rests),
+    st.builds(
+        Waypoint.circle,
+        places,
+        places.filter(lambda x: math.hypot(*x) > 0.01),
+        st.floats(0.1, 6.2),
+        orientation=st.sampled_from(["held", "turning"]),
+        **rests,
+    ),
+    st.builds(Waypoint.nullspace, st.floats(-math.pi, math.pi), way=st.sampled_from(["shorter", "longer"]), **rests),
 )
 printable = st.text(st.characters(exclude_categories=("C", "Z")))
 
@@ -75,7 +83,7 @@ def test_json_and_script_give_back_the_same_program_to_the_last_bit(start, steps
     text = program.to_json()
     assert Program.from_json(text) == program
     assert Program.from_json(text).to_json() == text
-    jsonschema.validate(json.loads(text), json.loads(SCHEMA.read_text()))
+    VALIDATOR.validate(json.loads(text))
     scope = {}
     exec(program.to_python().split("model = ")[0], scope)
     assert scope["program"] == program
@@ -120,21 +128,16 @@ def test_the_schema_knows_what_the_class_knows():
     assert properties["type"]["enum"] == list(ALLOWED)
     for key, default in (("speed", 0.2), ("blend", 0.0), ("dwell", 0.0)):
         assert properties[key]["default"] == default
+    for key, words in WORDS.items():
+        assert properties[key]["enum"] == list(words)
+        assert properties[key]["default"] == words[0]
+    alone = {**schema, "$ref": "#/$defs/waypoint", "required": [], "properties": {}, "additionalProperties": True}
+    waypoint_alone = jsonschema.Draft202012Validator(alone)
     for kind, allowed in ALLOWED.items():
+        assert waypoint_alone.is_valid({"type": kind, **_least(kind)})
         for key in set(properties) - {"type", *ALWAYS, *allowed}:
-            wrong = {"type": kind, **_least(kind), key: [1.0, 0.0, 0.0] if key != "angle" else 1.0}
-            with pytest.raises(jsonschema.ValidationError):
-                jsonschema.validate(
-                    wrong,
-                    {
-                        **schema,
-                        "$ref": "#/$defs/waypoint",
-                        "type": "object",
-                        "required": [],
-                        "properties": {},
-                        "additionalProperties": True,
-                    },
-                )
+            value = {"angle": 1.0, "psi": 1.0, "orientation": "held", "way": "longer"}.get(key, [1.0, 0.0, 0.0])
+            assert not waypoint_alone.is_valid({"type": kind, **_least(kind), key: value}), (kind, key)
 
 
 def _least(kind):
@@ -186,7 +189,7 @@ GOOD = '{"type": "nullspace", "psi": 0.1}'
             '{"type": "nullspace", "psi": 0.1, "psi": 0.1}',
             'line 6: "psi" is there already, in line 6; keep one|is there already',
         ),
-        ('{"type": "nullspace", "psi": 0.1, "q": [1]}', "q: .* has no meaning here; nullspace takes: psi, speed"),
+        ('{"type": "nullspace", "psi": 0.1, "q": [1]}', "q: .* has no meaning here; nullspace takes: psi, way, speed"),
         ('{"psi": 0.1}', "line 6, waypoint 2, type: None is missing; known: joint, line"),
         ('{"type": "spline"}', r"waypoint 2 \(spline\), type: 'spline' is unknown; known: joint, line"),
         ('{"type": 3}', "waypoint 2, type: 3.0 must be text"),
@@ -218,6 +221,15 @@ GOOD = '{"type": "nullspace", "psi": 0.1}'
         (
             '{"type": "circle", "center": [0.5, 0, 0.5], "axis": [0,0,1], "angle": 0}',
             "angle: 0.0 must be from more than 0 to 6.2832",
+        ),
+        (
+            '{"type": "circle", "center": [0.5, 0, 0.5], "axis": [0,0,1], "orientation": "fixed"}',
+            r"line 6, waypoint 2 \(circle\), orientation: 'fixed' is unknown; known: held, turning",
+        ),
+        ('{"type": "nullspace", "psi": 1, "way": 2}', "line 6, waypoint 2, way: 2.0 must be text in double quotes"),
+        (
+            '{"type": "nullspace", "psi": 1, "orientation": "held"}',
+            "orientation: 'held' has no meaning here; nullspace",
         ),
         ('{"type": "arc", "q": [0,0,0,0,0,0,0]}', "via: nothing is missing: arc needs via"),
         ('{"type": "line" "q": 1}', 'line 6: "q" is neither a comma|is neither a comma nor the end of the object'),
@@ -300,5 +312,8 @@ def test_values_from_python_are_checked_as_well():
         Program(model="xMatePro7", start=MODEL.home, waypoints=(3,))
     with pytest.raises(InvalidValueError, match=r"via: .* must be finite"):
         Waypoint.arc((math.nan, 0.0, 0.0), HOME)
+    with pytest.raises(InvalidValueError, match=r"way: .* is unknown; known: shorter, longer"):
+        Waypoint.nullspace(0.1, way=np.ones(2))
+    assert Waypoint(type="nullspace", psi=0.1) == Waypoint.nullspace(0.1)
     assert Waypoint.line(HOME).pose.is_close(HOME, 1e-12)
     assert Waypoint.nullspace(0.1).pose is None
