@@ -35,6 +35,7 @@ TOOL_MARGIN = 0.99
 to acceleration^2 / (2 jerk), some mm/s at the tool, and not all of them with the same."""
 
 _CHANGE = RAMP_PART * CYCLE_TIME  # [s] Times an acceleration: how much a velocity may change in a cycle.
+_IDENTITY = np.eye(6)
 _SAME = 1e-9  # [m/s, rad/s] Twists closer than this are the same; as a number, a weight closer to 1 is 1.
 _SLOWEST = 1e-12  # [rad/s] Below this a joint stands.
 
@@ -220,11 +221,12 @@ def damped_inverse(J: Matrix, solver: SymmetricSolver) -> tuple[Matrix, bool]:
         Shape (n, 6), and True when a direction was damped.
     """
     A = J.dot(J.T)  # For so small matrices half the cost of the operator.
-    inverse = solver.solve(A, J).T
-    elements = inverse.ravel("K")
-    # The Frobenius norm is no smaller than the largest singular value of the inverse, 1 / s of the smallest s.
-    if elements.dot(elements) < DAMPED_BELOW**-2 and solver.has_solved:
-        return inverse, False
+    B = solver.solve(A, _IDENTITY)
+    elements = B.ravel()
+    # The Frobenius norm is no smaller than the largest eigenvalue of the inverse, 1 / s^2 of the smallest s. It has to
+    # be that of B: in the product with J a direction that is lost altogether would cancel.
+    if elements.dot(elements) < DAMPED_BELOW**-4 and solver.has_solved:
+        return J.T.dot(B), False
     squares, U = np.linalg.eigh(A)
     weights = 1.0 / np.maximum(squares, DAMPED_BELOW**2)
     return J.T.dot((U * weights).dot(U.T)), bool(squares[0] < DAMPED_BELOW**2)
