@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -12,21 +11,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.arrays import JointVector, as_number, as_path, as_rows, as_vector, described
+from rcilab.arrays import JointVector, as_path, as_rows, described
 from rcilab.dynamics.payload import NO_LOAD, Payload
-from rcilab.errors import InvalidValueError, KinematicsError, ModelError, SingularError
-from rcilab.kinematics.closed_form import ClosedForm, build_closed_form
-from rcilab.kinematics.feasible_arcs import FeasibleArcs
+from rcilab.errors import InvalidValueError, KinematicsError, ModelError
 from rcilab.kinematics.frames import Frame
-from rcilab.kinematics.inverse_batch import SolutionBatch, as_pose_batch
-from rcilab.kinematics.moving_arm import MovingArm
-from rcilab.kinematics.reach import Reach, closest_reachable
+from rcilab.kinematics.reaching_arm import ReachingArm
 from rcilab.kinematics.singularity import Dexterity, DexterityPath, dexterity, dexterity_path
-from rcilab.kinematics.solutions import Solutions, joint_limit_lists
 from rcilab.kinematics.workspace import Workspace, sample_workspace
 from rcilab.limits import Limits
 from rcilab.robots import RCI_ROBOT_NAMES, RobotDescription, describe_robot
-from rcilab.safety_box import SafetyBox, active_box
+from rcilab.safety_box import SafetyBox
 from rcilab.safety_distance import STANDARD_DISTANCE, SafetyDistance
 from rcilab.spatial import IDENTITY, Pose
 
@@ -36,9 +30,6 @@ if TYPE_CHECKING:
     from rcilab.kinematics.collision import Clearance, CollisionGeometry
 
 __all__ = ["RobotModel", "load_model", "require_model", "require_rci"]
-
-_PSI_SEARCH = tuple(math.radians(sign * step) for step in range(10, 181, 10) for sign in (1, -1))
-"""Offsets looked at, nearest first, to say what is in the way of a pose that no arm angle reaches."""
 
 
 def load_model(name: str, *, tool: Pose | None = None, load: Payload | None = None) -> RobotModel:
@@ -83,11 +74,11 @@ def require_rci(model: RobotModel) -> RobotModel:
     )
 
 
-class RobotModel(MovingArm):
+class RobotModel(ReachingArm):
     """An arm with a tool and a load. Immutable: `with_tool` and `with_load` return another one.
 
     All joint vectors have shape (n,) and are in [rad]; all poses are in the base frame, of the tool unless a frame is
-    named. Where its frames are and how they move is in `MovingArm`.
+    named. Where its frames are and how they move is in `MovingArm`, the inverse and the arm angle in `ReachingArm`.
     """
 
     def __init__(
@@ -97,14 +88,7 @@ class RobotModel(MovingArm):
         load: Payload = NO_LOAD,
         stiffness_frame: Pose = IDENTITY,
     ) -> None:
-        if not isinstance(tool, Pose):
-            raise InvalidValueError(
-                "tool", described(tool), "is no Pose; Pose.from_matrix makes one, Pose() is no tool"
-            )
-        if not isinstance(stiffness_frame, Pose):
-            raise InvalidValueError(
-                "stiffness frame", described(stiffness_frame), "is no Pose; Pose.from_matrix makes one"
-            )
+        super().__init__(description, tool, stiffness_frame)
         if not isinstance(load, Payload):
             raise InvalidValueError(
                 "load", described(load), "is no Payload; Payload(mass=...) makes one, Payload() is no load"
@@ -112,10 +96,7 @@ class RobotModel(MovingArm):
         if load.mass > description.rated_payload:
             bound = f"{description.rated_payload:g} kg for {description.name}"
             raise InvalidValueError("load mass", load.mass, f"kg is above {bound}, the payload it is rated for")
-        super().__init__(description.dh, tool, stiffness_frame)
-        self.description = description
         self.load = load
-        self._T_tool_flange = tool.inverse()
 
     @property
     def name(self) -> str:
@@ -157,118 +138,6 @@ class RobotModel(MovingArm):
             InvalidValueError: It is no `Pose`.
         """
         return RobotModel(self.description, self.T_flange_tool, self.load, T_tool_stiffness)
-
-    def inverse(self, T: Pose | ArrayLike, psi: float | None = None, near: ArrayLike | None = None) -> Solutions:
-        """Returns every analytic solution inside the joint limits (GetJointPos); `.nearest(q)` is the vendor's answer.
-
-        The xMates have 8 solutions at an arm angle. The Panda has offsets, and up to 16 or none; they are found along
-        its self-motion at the pose and settled by Newton's method, which takes milliseconds. Where two of them are
-        about to meet, one may be taken for both; the one next to `near` is always found.
-
-        Args:
-            T: Pose of the tool in base: a `Pose` or a homogeneous matrix, shape (4, 4).
-            psi: Arm angle of a 7-axis arm, [rad]; of the Panda the angle of joint 3. When absent: that of `near`, or 0;
-                and if nothing is inside the limits there, the closest arm angle that has a solution, a little inside
-                its range.
-            near: Joint angles, [rad], that decide what a singular pose leaves open.
-
-        Raises:
-            UnreachableError: The pose is out of reach, or every branch breaks a joint limit; the message says by how
-                much, and `.distance`, `.joint` and `.excess` hold the numbers.
-            InvalidValueError: T, psi or near is not usable, or psi was given for a 6-axis arm.
-        """
-        pose = T if isinstance(T, Pose) else Pose.from_matrix(T)
-        r, p = pose.parts
-        if not math.isfinite(sum(r) + sum(p)):
-            raise InvalidValueError("pose", repr(pose), "must be finite in every element")
-        guess = None if near is None else self._floats(near)
-        if psi is not None and not math.isfinite(psi := as_number(psi, "psi", "rad")):
-            raise InvalidValueError("psi", psi, "must be finite, [rad]")
-        flange = pose @ self._T_tool_flange if self._has_tool else pose
-        if self.n == 7:
-            return self._inverse_seven(flange, psi, guess)
-        if psi is not None:
-            raise InvalidValueError("psi", psi, f"has no meaning for {self.name}: a 6-axis arm has no arm angle")
-        solutions = Solutions(self._closed_form.at(flange, guess).branches(0.0), *self._bounds, None)
-        if not len(solutions):
-            raise solutions.refusal()
-        return solutions
-
-    def closest(self, T: Pose | ArrayLike, near: ArrayLike, psi: float | None = None) -> Reach:
-        """Returns joint angles for a target, or for the closest pose to it that the arm can take.
-
-        Args:
-            T: Wanted pose of the tool in base: a `Pose` or a homogeneous matrix, shape (4, 4).
-            near: Present joint angles, shape (n,), [rad]: where to start from, and which branch to stay on.
-            psi: Arm angle of a 7-axis arm, [rad]; that of `near` when absent.
-
-        Raises:
-            InvalidValueError: T, near or psi is not usable, or psi was given for a 6-axis arm.
-        """
-        q = as_vector(near, self.n, "near", "rad")
-        target = T if isinstance(T, Pose) else Pose.from_matrix(T)
-        held = self._natural_psi(q.tolist()) if psi is None and self.n == 7 else psi
-
-        def solve(pose: Pose, may_search: bool) -> Solutions:
-            return self.inverse(pose, psi if may_search else held, q)
-
-        return closest_reachable(solve, self._closed_form.envelope, self.T_flange_tool, self.forward(q), q, target)
-
-    def inverse_batch(self, T: ArrayLike, psi: ArrayLike = 0.0) -> SolutionBatch:
-        """Returns every analytic solution of many poses at once (GetJointPos), at one arm angle each.
-
-        Args:
-            T: Poses of the tool in base, shape (N, 4, 4), such as `forward_path` gives.
-            psi: Arm angle of a 7-axis arm, [rad], one number or shape (N,); of no meaning for 6 axes.
-
-        Returns:
-            `.q`, shape (N, 8, n), not a number where a pose is out of reach; `.inside`; `.nearest(q)`.
-
-        Raises:
-            InvalidValueError: T or psi has another shape, is not finite, or holds what is no pose.
-        """
-        poses = as_pose_batch(T)
-        angles = np.asarray(psi, dtype=np.float64)
-        if angles.shape not in ((), (len(poses),)) or not np.isfinite(angles).all():
-            raise InvalidValueError(
-                "psi", described(angles), f"needs one number or shape ({len(poses)},), finite [rad]"
-            )
-        flange = poses @ self._T_tool_flange.matrix if self._has_tool else poses
-        joint = self.limits.joint
-        return SolutionBatch(self._closed_form.batch(flange, angles), joint.lower, joint.upper)
-
-    def feasible_arcs(self, T: Pose | ArrayLike, box: SafetyBox | None = None) -> FeasibleArcs:
-        """Returns which arm angles a pose leaves to a 7-axis arm, and what forbids the others.
-
-        Args:
-            T: Pose of the tool in base: a `Pose` or a homogeneous matrix, shape (4, 4).
-            box: What the tool shall stay in; nothing when absent.
-
-        Returns:
-            `.feasible`: ranges of arm angles, [rad]; `.arcs`: the whole circle, each part with its reasons.
-
-        Raises:
-            UnreachableError: The pose is out of reach at every arm angle.
-            InvalidValueError: T or the box is not usable.
-            KinematicsError: The arm has 6 axes.
-        """
-        self._require_arm_angle()
-        pose = T if isinstance(T, Pose) else Pose.from_matrix(T)
-        bound = active_box(box)
-        is_outside = bound is not None and bound.excess(pose.parts[1]) > 0.0
-        flange = pose @ self._T_tool_flange if self._has_tool else pose
-        joint = self.limits.joint
-        return self._closed_form.arcs(flange, joint.lower, joint.upper, is_outside)
-
-    def arm_angle(self, q: ArrayLike) -> float:
-        """Returns the arm angle psi of a 7-axis arm, [rad] in (-pi, pi]; of the Panda the angle of joint 3.
-
-        Raises:
-            SingularError: The shoulder-wrist line is vertical or the arm is stretched; psi has no meaning there.
-            KinematicsError: The arm has 6 axes.
-        """
-        self._require_arm_angle()
-        return self._closed_form.arm_angle(self._floats(q))
 
     def elbow(self, q: ArrayLike) -> tuple[float, int]:
         """Returns the elbow as Franka counts it: the angle of joint 3, [rad], and on which side of its flip joint 4 is.
@@ -411,54 +280,6 @@ class RobotModel(MovingArm):
         tool = f", tool={self.T_flange_tool!r}" if self._has_tool else ""
         load = f", load={self.load.mass:g} kg" if self.load.mass else ""
         return f"RobotModel({self.name}, {self.n} axes{tool}{load})"
-
-    @cached_property
-    def _closed_form(self) -> ClosedForm:
-        return build_closed_form(self.description)
-
-    @cached_property
-    def _bounds(self) -> tuple[list[float], list[float]]:
-        return joint_limit_lists(self.limits.joint)
-
-    def _inverse_seven(self, flange: Pose, psi: float | None, near: Sequence[float] | None) -> Solutions:
-        start = self._natural_psi(near) if psi is None else psi
-        pose = self._closed_form.at(flange, near)
-        solutions = Solutions(pose.branches(start), *self._bounds, start)
-        if len(solutions):
-            return solutions
-        if psi is not None:
-            raise solutions.refusal()
-        best = solutions
-        for angle in self._other_arm_angles(flange, start):
-            solutions = Solutions(pose.branches(angle), *self._bounds, angle)
-            if len(solutions):
-                return solutions
-            best = min(best, solutions, key=_least_excess)
-        raise best.refusal(everywhere=True)
-
-    def _other_arm_angles(self, flange: Pose, start: float) -> Iterator[float]:
-        """Yields the closest arm angle that has a solution if one has; then steps all round, to see what is missing."""
-        joint = self.limits.joint
-        closest = self._closed_form.arcs(flange, joint.lower, joint.upper, False).nearest(start)
-        if closest is not None:
-            yield closest
-        yield from (math.remainder(start + offset, math.tau) for offset in _PSI_SEARCH)
-
-    def _require_arm_angle(self) -> None:
-        if self.n != 7:
-            raise KinematicsError(f"{self.name} has 6 axes: only a 7-axis arm has an arm angle")
-
-    def _natural_psi(self, near: Sequence[float] | None) -> float:
-        if near is None:
-            return 0.0
-        try:
-            return self._closed_form.arm_angle(near)
-        except SingularError:
-            return 0.0
-
-
-def _least_excess(solutions: Solutions) -> float:
-    return min((branch.excess for branch in solutions.all), default=math.inf)
 
 
 def _digest(*parts: object) -> str:

@@ -74,6 +74,17 @@ class SafetyBox:
         return signs * np.array(self.size) @ self.T_base_box.rotation.T + self.T_base_box.position
 
 
+def require_box(box: object) -> SafetyBox:
+    """Returns `box` if it is a safety box, active or not.
+
+    Raises:
+        InvalidValueError: It is something else; the message says what makes one.
+    """
+    if isinstance(box, SafetyBox):
+        return box
+    raise InvalidValueError("box", described(box), "is no SafetyBox; SafetyBox(size=..., T_base_box=...) makes one")
+
+
 def active_box(box: object) -> SafetyBox | None:
     """Returns the safety box if it bounds anything; None when there is none, or when it is not active.
 
@@ -82,6 +93,5 @@ def active_box(box: object) -> SafetyBox | None:
     """
     if box is None:
         return None
-    if not isinstance(box, SafetyBox):
-        raise InvalidValueError("box", described(box), "is no SafetyBox; SafetyBox(size=..., T_base_box=...) makes one")
-    return box if box.active else None
+    bound = require_box(box)
+    return bound if bound.active else None

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from rcilab.errors import InvalidValueError
 from rcilab.model import load_model
-from rcilab.safety_box import SafetyBox, active_box
+from rcilab.safety_box import SafetyBox, active_box, require_box
 from rcilab.spatial import Pose
 
 TURNED = SafetyBox(size=(0.4, 0.6, 1.0), T_base_box=Pose.from_rpy((0.5, -0.2, 0.4), (0.3, -0.7, 2.0)))
@@ -71,10 +71,12 @@ def test_only_an_active_box_bounds_anything_and_what_is_no_box_is_refused_in_wor
     assert active_box(None) is None
     assert active_box(replace(TURNED, active=False)) is None
     assert active_box(TURNED) is TURNED
+    assert require_box(still := replace(TURNED, active=False)) is still
     model = load_model("xMatePro7")
     for ask in (
         lambda: model.feasible_arcs(model.forward(model.home), "box"),
         lambda: model.sample_workspace(5, box=3),
+        lambda: require_box(None),
     ):
         with pytest.raises(InvalidValueError, match="is no SafetyBox"):
             ask()

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import os
 import shutil
-import signal
-import subprocess
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
+
+from rcilab.bench.keeper import keeper, launch
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "firefox", "microsoft-edge")
 """Names a browser may have on the path."""
 
 _CHROMIUM = BROWSERS[:4]
-_PATIENCE = 10.0  # [s]
 _FLAGS = (
     "--headless",
     "--no-sandbox",
@@ -45,21 +43,8 @@ def find_chromium() -> str | None:
 
 @contextmanager
 def open_page(url: str, browser: str) -> Iterator[None]:
-    """Keeps a page open in a headless Chromium of our own; it and its profile are gone afterwards."""
-    with tempfile.TemporaryDirectory(prefix="rcilab-bench-", ignore_cleanup_errors=True) as profile:
-        process = subprocess.Popen(
-            [browser, *_FLAGS, f"--user-data-dir={profile}", url],
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            start_new_session=True,  # A group of its own: its helpers end with it, and nothing else does.
-        )
-        try:
-            yield
-        finally:
-            with suppress(ProcessLookupError):
-                os.killpg(process.pid, signal.SIGTERM)
-            try:
-                process.wait(_PATIENCE)
-            except subprocess.TimeoutExpired:
-                os.killpg(process.pid, signal.SIGKILL)
-                process.wait(_PATIENCE)
+    """Keeps a page open in a headless Chromium of our own; it and its profile are gone afterwards, and when we die."""
+    profile = tempfile.mkdtemp(prefix="rcilab-bench-")
+    with keeper([browser, *_FLAGS, f"--user-data-dir={profile}", url], directory=profile) as process:
+        launch(process)
+        yield

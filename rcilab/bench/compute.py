@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from rcilab.arrays import Array
-from rcilab.bench.measure import Measurement, summarise, time_calls
+from rcilab.bench.measure import Measurement, cost_by_length, summarise, time_calls
 from rcilab.conformance.check import check
 from rcilab.conformance.clearance_path import clearance_path
 from rcilab.conformance.conditions import MOTION_CONDITIONS
@@ -27,6 +27,7 @@ from rcilab.spatial import Pose
 
 _ROBOT = "xMatePro7"
 _SEED = 20
+_LENGTHS = (1.0, 10.0, 100.0)  # [s] of motion.
 
 
 def bench_forward() -> Measurement:
@@ -82,8 +83,12 @@ def bench_plan_joint() -> Measurement:
     model = load_model(_ROBOT)
     ends = _random_q(model, 400).reshape(200, 2, model.n)
     times = time_calls(lambda pair: plan_joint(model, pair[0], pair[1]), list(ends))
-    sampled = time_calls(lambda pair: plan_joint(model, pair[0], pair[1]).q, list(ends[:50]))
-    note = f"{_ROBOT}, 200 random pairs; with every 1 ms sample of q: {1e3 * np.median(sampled):.2f} ms"
+    some = [motion_of(model, duration) for duration in _LENGTHS]
+    growth = cost_by_length(
+        lambda case: plan_joint(model, case[0], case[1], speed=case[2]).q,
+        [(motion.duration, [(motion.start, motion.q[-1], motion.speed)] * 5) for motion in some],
+    )
+    note = f"{_ROBOT}, 200 random pairs; with every 1 ms sample of q {growth}"
     return summarise("plan_joint", times, "ms", 1.0, note)
 
 
@@ -93,11 +98,13 @@ def bench_program() -> Measurement:
     program = program_of(model, 20)
     times = time_calls(lambda steps: plan_program(model, steps), [program] * 10, warm_up=1)
     motion = plan_program(model, program)
-    lengths = {count: program_of(model, count) for count in (2, 5, 10, 40)}
-    growth = _growth(lambda steps: plan_program(model, steps), lengths)
+    others = [program_of(model, count) for count in (2, 20, 160)]
+    growth = cost_by_length(
+        lambda steps: plan_program(model, steps), [(plan_program(model, it).duration, [it] * 3) for it in others]
+    )
     note = (
         f"{_ROBOT}, 15 lines, 3 arcs and 2 joint moves at speed 0.5, every corner blended by 20 mm, "
-        f"{motion.duration:.1f} s; 10 % quantile {1e3 * np.percentile(times, 10):.0f} ms; by waypoints: {growth}"
+        f"{motion.duration:.1f} s; 10 % quantile {1e3 * np.percentile(times, 10):.0f} ms; {growth}"
     )
     return summarise("program", times, "ms", 200.0, note)
 
@@ -132,12 +139,9 @@ def _bench_check(name: str, call: Callable[[Motion], object], model: RobotModel,
     """Measures a judgement, each time of a fresh motion, so that nothing is cached, and how it grows with length."""
     motions = [motion_of(model, 10.0) for _ in range(30)]
     times = time_calls(call, motions, warm_up=0)
-    costs: list[str] = []
-    for duration in (1.0, 10.0, 100.0):
-        some = [motion_of(model, duration) for _ in range(5)]
-        median = 1e3 * float(np.median(time_calls(call, some, warm_up=0)))
-        costs.append(f"{some[0].duration:.0f} s {median:.1f} ms")
-    note = f"{_ROBOT}, {len(motions[0].times)} samples; by length: {', '.join(costs)}"
+    some = ([motion_of(model, duration) for _ in range(5)] for duration in _LENGTHS)
+    growth = cost_by_length(call, ((row[0].duration, row) for row in some))
+    note = f"{_ROBOT}, {len(motions[0].times)} samples; {growth}"
     return summarise(name, times, "ms", target, note)
 
 

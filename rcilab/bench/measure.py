@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
@@ -61,3 +61,22 @@ def time_calls(call: Callable[[Any], object], arguments: Sequence[object], *, wa
         call(argument)
         times.append((time.perf_counter_ns() - start) * 1e-9)
     return times
+
+
+def cost_by_length(call: Callable[[Any], object], cases: Iterable[tuple[float, Sequence[object]]]) -> str:
+    """Returns in words how the cost of a call grows with the length of the motion that it plans or judges.
+
+    Args:
+        call: What to time.
+        cases: For each length, [s], arguments to call with, once each; the median counts.
+    """
+    costs = [
+        f"{plain(length)} s {plain(1e3 * float(np.median(time_calls(call, arguments, warm_up=0))))} ms"
+        for length, arguments in cases
+    ]
+    return f"by length of the motion: {', '.join(costs)}"
+
+
+def plain(value: float) -> str:
+    """Returns a number to three digits and without an exponent, as a person reads it."""
+    return f"{value:.0f}" if abs(value) >= 999.5 else f"{value:.3g}"

@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from rcilab.arrays import JointVector
-from rcilab.bench.measure import Measurement, summarise, time_calls
+from rcilab.bench.measure import Measurement, cost_by_length, summarise, time_calls
 from rcilab.conformance.check import check
 from rcilab.model import RobotModel, load_model
 from rcilab.motion.cartesian import plan_arc, plan_line
@@ -57,12 +57,9 @@ def bench_replan() -> Measurement:
 def _bench_path(name: str, plan: Callable[[RobotModel, float], Motion]) -> Measurement:
     model = load_model(_ROBOT)
     times = time_calls(partial(plan, model), [0.2] * _ROUNDS)
-    lengths: list[str] = []
-    for speed in (1.0, 0.1, _SLOWEST):
-        duration = plan(model, speed).duration
-        cost = float(np.median(time_calls(partial(plan, model), [speed] * 5, warm_up=0)))
-        lengths.append(f"{duration:.1f} s {1e3 * cost:.0f} ms")
-    note = f"{_ROBOT}, a metre from end to end at speed 0.2; by length: {', '.join(lengths)}"
+    speeds = (1.0, 0.1, _SLOWEST)
+    growth = cost_by_length(partial(plan, model), [(plan(model, speed).duration, [speed] * 3) for speed in speeds])
+    note = f"{_ROBOT}, a metre from end to end at speed 0.2; {growth}"
     return summarise(name, times, "ms", 50.0, note)
 
 

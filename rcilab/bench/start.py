@@ -13,6 +13,7 @@ from typing import IO
 
 import numpy as np
 
+from rcilab.bench.keeper import keeper, launch
 from rcilab.bench.measure import Measurement, summarise
 from rcilab.errors import ConnectionLostError, DeadlineError
 
@@ -56,16 +57,12 @@ def _time_page() -> tuple[float, int]:
     """Returns how long the page took, [s], and how large it is, [bytes]."""
     port = free_port()
     with tempfile.TemporaryFile("w+", encoding="utf-8") as said:
-        start = time.perf_counter()
-        process = subprocess.Popen(
-            [sys.executable, "-m", "rcilab.cli", "--no-browser", "--port", str(port)], stdout=said, stderr=said
-        )
-        try:
+        command = [sys.executable, "-m", "rcilab.cli", "--no-browser", "--port", str(port)]
+        with keeper(command, said=said) as process:
+            start = time.perf_counter()
+            launch(process)
             page = _wait_for_page(f"http://127.0.0.1:{port}/", process, said)
             return time.perf_counter() - start, len(page)
-        finally:
-            process.terminate()
-            process.wait(_PATIENCE)
 
 
 def _wait_for_page(url: str, process: subprocess.Popen[bytes], said: IO[str]) -> bytes:

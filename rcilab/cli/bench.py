@@ -148,11 +148,13 @@ def _print_machine(machine: dict[str, Any]) -> None:
 
 def _row(found: Measurement | Absent) -> str:
     from rcilab.bench.compare.peer import Absent
+    from rcilab.bench.measure import plain
 
     verdict = {True: "ok", False: "SLOW", None: "-"}[found.ok]
     if isinstance(found, Absent):
         numbers = f"{verdict:4} {found.name:20} {'-':>10} {'-':>10} {'-':>10}"
     else:
         target = "-" if found.target is None else f"{found.target:g}"
-        numbers = f"{verdict:4} {found.name:20} {found.median:10.3g} {found.p99:10.3g} {target:>10} {found.unit}"
+        median, p99 = plain(found.median), plain(found.p99)
+        numbers = f"{verdict:4} {found.name:20} {median:>10} {p99:>10} {target:>10} {found.unit}"
     return numbers + "\n" + textwrap.fill(found.note, 110, initial_indent=" " * 7, subsequent_indent=" " * 7)

@@ -18,7 +18,7 @@ from rcilab.client.link import Link
 from rcilab.errors import CommandRejectedError, InvalidValueError
 from rcilab.limits import Limits
 from rcilab.protocols import rci
-from rcilab.safety_box import SafetyBox
+from rcilab.safety_box import SafetyBox, require_box
 from rcilab.spatial import Pose
 
 HIGHEST_FREQUENCY = 1000.0  # [Hz] RCI manual 3.1.9: cut-off frequencies end there; it switches the filter off.
@@ -75,10 +75,7 @@ class RciSettings:
 
     def set_cartesian_limit(self, box: SafetyBox) -> None:
         """Sets the safety box that the origin of the tool must stay in, and whether it is watched."""
-        if not isinstance(box, SafetyBox):
-            raise InvalidValueError(
-                "box", described(box), "is no SafetyBox; SafetyBox(size=(1, 1, 1), T_base_box=Pose(), active=True) is"
-            )
+        require_box(box)
         self._ask(rci.SetCartesianLimit(box.size, box.T_base_box.as_row_major(), box.active))
 
     def set_joint_limit(self, lower: ArrayLike, upper: ArrayLike) -> None:

@@ -8,7 +8,7 @@ from rcilab.conformance.breach import Breach
 from rcilab.conformance.condition import Condition
 from rcilab.conformance.tool_conditions import BOX_TOLERANCE, CARTESIAN_POSITION
 from rcilab.faults import Fault
-from rcilab.safety_box import SafetyBox
+from rcilab.safety_box import SafetyBox, active_box
 
 
 class BoxMonitor:
@@ -26,7 +26,7 @@ class BoxMonitor:
 
     def __init__(self, box: SafetyBox | None, row: Condition = CARTESIAN_POSITION) -> None:
         self._row = row
-        self._box = box if box is not None and box.active else None
+        self._box = active_box(box)
         self.excess = -1.0
 
     @property

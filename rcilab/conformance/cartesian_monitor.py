@@ -12,7 +12,7 @@ from rcilab.conformance.spans import spans
 from rcilab.conformance.tool_conditions import TOOL_CONDITIONS
 from rcilab.faults import Fault
 from rcilab.limits import Limits
-from rcilab.safety_box import SafetyBox
+from rcilab.safety_box import SafetyBox, active_box
 from rcilab.spatial import IDENTITY, Pose, turn_between
 
 _TURN = 2.0 * math.pi  # [rad]
@@ -47,7 +47,7 @@ class CartesianMonitor:
     def __init__(
         self, limits: Limits, box: SafetyBox | None = None, rows: Sequence[Condition] = TOOL_CONDITIONS
     ) -> None:
-        self._box = box if box is not None and box.active else None
+        self._box = active_box(box)
         self._rows = [(row, *(float(bound[0]) for bound in row.bounds(limits))) for row in rows]
         self.reset(IDENTITY)
 

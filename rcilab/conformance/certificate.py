@@ -17,7 +17,7 @@ from rcilab.conformance.start import StartState, as_start
 from rcilab.errors import CertificateError, InvalidValueError
 from rcilab.model import RobotModel, require_model
 from rcilab.motion.motion import Motion, require_motion
-from rcilab.safety_box import SafetyBox
+from rcilab.safety_box import SafetyBox, active_box
 from rcilab.safety_distance import SafetyDistance
 from rcilab.state import Mode
 
@@ -82,7 +82,7 @@ class Certificate:
         changed = [name for name, fingerprint in self.entries if now.get(name, fingerprint) != fingerprint]
         if start is not None and "start state" in changed and self._same_start(start):
             changed.remove("start state")
-        if "safety box" in changed and (box is None or not box.active):
+        if "safety box" in changed and active_box(box) is None:
             changed.remove("safety box")
         if "safety distance" in changed and distance is None:
             changed.remove("safety distance")
@@ -203,6 +203,7 @@ def _distance_fingerprint(distance: SafetyDistance | None) -> str:
 
 
 def _box_fingerprint(box: SafetyBox | None) -> str:
-    if box is None or not box.active:
+    bound = active_box(box)
+    if bound is None:
         return NO_SAFETY_BOX
-    return hashlib.sha256(repr((box.size, box.T_base_box.as_row_major())).encode()).hexdigest()
+    return hashlib.sha256(repr((bound.size, bound.T_base_box.as_row_major())).encode()).hexdigest()

@@ -21,7 +21,7 @@ from rcilab.conformance.wording import advise
 from rcilab.errors import InvalidValueError
 from rcilab.model import RobotModel, require_model
 from rcilab.motion.motion import Motion, require_motion
-from rcilab.safety_box import SafetyBox
+from rcilab.safety_box import SafetyBox, active_box
 from rcilab.safety_distance import STANDARD_DISTANCE, SafetyDistance
 from rcilab.state import Mode, require_mode
 
@@ -69,12 +69,10 @@ def check(
     require_model(model)
     if motion.n != model.n:
         raise InvalidValueError("motion", motion, f"is for {motion.n} joints, {model.name} has {model.n}")
-    if box is not None and not isinstance(box, SafetyBox):  # pyright: ignore[reportUnnecessaryIsInstance]
-        raise InvalidValueError("box", described(box), "is no SafetyBox; SafetyBox(size=..., T_base_box=...) makes one")
+    box = active_box(box)
     if distance is not None and not isinstance(distance, SafetyDistance):  # pyright: ignore[reportUnnecessaryIsInstance]
         raise InvalidValueError("distance", described(distance), "is no SafetyDistance; SafetyDistance(links=...) is")
     state = as_start(motion.start if start is None else start, model.n)
-    box = box if box is not None and box.active else None
     mode = require_mode(mode)
     rows = condition_table(model.description).rows(mode, has_elbow=model.n == 7, has_box=box is not None)
     if distance is not None:

@@ -12,7 +12,7 @@ from rcilab.conformance.measured_conditions import ACCELERATION_CUTOFF, MEASURED
 from rcilab.errors import InvalidValueError
 from rcilab.faults import Fault
 from rcilab.limits import Limits
-from rcilab.safety_box import SafetyBox
+from rcilab.safety_box import SafetyBox, active_box
 
 _SHARE = CYCLE_TIME / (CYCLE_TIME + 1.0 / (2.0 * math.pi * ACCELERATION_CUTOFF))
 """How much of a new difference the first-order low pass takes in one cycle."""
@@ -36,7 +36,7 @@ class MeasuredMonitor:
 
     def __init__(self, limits: Limits, box: SafetyBox | None = None) -> None:
         self._n = len(limits.joint.velocity)
-        self._box = box if box is not None and box.active else None
+        self._box = active_box(box)
         self._rows: list[tuple[Condition, int]] = []
         self._lower: list[float] = []
         self._upper: list[float] = []

@@ -25,7 +25,7 @@ from rcilab.controller.settings import Settings
 from rcilab.controller.tool import ToolMotion
 from rcilab.model import RobotModel
 from rcilab.protocols import rci
-from rcilab.safety_box import SafetyBox
+from rcilab.safety_box import SafetyBox, active_box
 
 
 class Law(Enum):
@@ -133,5 +133,4 @@ class Actuator:
 
 def guiding_box(settings: Settings) -> SafetyBox | None:
     """Returns the box whose walls push, or None when there are none."""
-    box = settings.safety_box
-    return box if settings.virtual_guide and box is not None and box.active else None
+    return active_box(settings.safety_box) if settings.virtual_guide else None

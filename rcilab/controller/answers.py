@@ -15,6 +15,7 @@ from rcilab.kinematics.inverse import build_geometry
 from rcilab.kinematics.singularity import find_singularity
 from rcilab.model import RobotModel
 from rcilab.protocols import rci
+from rcilab.safety_box import active_box
 from rcilab.state import ControllerMode
 
 
@@ -89,8 +90,8 @@ def judge_recovery(settings: Settings, watch: Watch) -> rci.RecoveryStatus | Non
     for q, lower, upper in zip(watch.measured.q.tolist(), settings.joint_lower, settings.joint_upper, strict=True):
         if not lower - ANGLE_ALLOWANCE < q < upper + ANGLE_ALLOWANCE:
             return rci.RecoveryStatus.MANUAL_RECOVERY_NEEDED
-    box = settings.safety_box
-    if box is not None and box.active and guiding_box(settings) is None:
+    box = active_box(settings.safety_box)
+    if box is not None and guiding_box(settings) is None:
         if box.excess(watch.tool.pose.parts[1]) > BOX_ALLOWANCE:
             return rci.RecoveryStatus.MANUAL_RECOVERY_NEEDED
     return None if watch.find_collision(settings.collision_thresholds) is None else rci.RecoveryStatus.REFLEX

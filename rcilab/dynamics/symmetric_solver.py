@@ -10,6 +10,8 @@ import eigenpy  # pyright: ignore[reportMissingImports]  # It lives behind a .pt
 
 from rcilab.arrays import Array, Matrix
 
+_SUCCESS = eigenpy.ComputationInfo.Success  # pyright: ignore[reportAttributeAccessIssue]
+
 
 class SymmetricSolver:
     """Solves A x = b for symmetric, positive-definite A. One instance serves one thread at a time.
@@ -29,3 +31,8 @@ class SymmetricSolver:
             b: Shape (size,) or (size, columns).
         """
         return self._decomposition.compute(A).solve(b)
+
+    @property
+    def has_solved(self) -> bool:
+        """Whether the last matrix was positive-definite, so that its solution has a meaning; of NaN it is not known."""
+        return self._decomposition.info() == _SUCCESS

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from rcilab.arrays import Array
 from rcilab.kinematics.arm_angle import reference_frame
-from rcilab.kinematics.inverse import ALL_FLIPS, ArmGeometry, wrist_centre
+from rcilab.kinematics.inverse import ALL_FLIPS, Angles, ArmGeometry, wrist_centre
 from rcilab.kinematics.singularity import SINGULAR
 from rcilab.spatial import Pose
 
@@ -32,8 +32,9 @@ INSIDE = 0.1
 
 _TINY = 1e-9  # Of a sine or a length in [m]: below it the elbow has no circle, or the circle no upper side.
 _SAME = 1e-12  # [rad] Arm angles that differ by rounding alone.
-_TURNS = {0: 0, 2: 3, 4: 5, 6: 8}  # Joints that turn about z, counted from 0: which form is their X; Y is the next.
-_BENDS = {1: 2, 5: 7}  # Joints that bend about y, whose bend changes on the circle: which form is their cosine.
+_TURNS = {0: 0, 2: 1, 4: 2, 6: 3}  # Joints that turn about z, counted from 0: which form is their X; Y is 4 further.
+_BENDS = {1: 8, 5: 9}  # Joints that bend about y, whose bend changes on the circle: which form is their cosine.
+_TURNING, _BENDING = slice(0, None, 2), slice(1, None, 4)  # The same joints, in the order of their forms.
 _FLIPS = np.array(ALL_FLIPS) > 0.0  # Shape (8, 3): which of upright joints 2, 4 and 6 are negative.
 _TURNED = np.stack(  # Shape (7, 8): which branches turn or mirror each joint, see `inverse_seven`.
     (
@@ -45,8 +46,13 @@ _TURNED = np.stack(  # Shape (7, 8): which branches turn or mirror each joint, s
         _FLIPS[:, 2],
         _FLIPS[:, 2],
     )
-).astype(np.intp)
-_JOINTS, _BRANCHES = range(1, 8), range(8)
+)
+_TWINS = 2 * np.arange(7)[:, None] + _TURNED  # Which of every joint's two angles, counted through, a branch has.
+_MEMBERS = tuple(tuple(i for i in range(8) if bits >> i & 1) for bits in range(256))
+"""By a number: which of its bits are set, counted from 0."""
+_NUMBERS = tuple(tuple(i + 1 for i in members) for members in _MEMBERS)
+"""The same, counted from 1."""
+_SIZES = np.array([len(members) for members in _MEMBERS])
 _WHY: list[Reason] = ["joint limits", "singularity", "safety box"]
 _REASONS: dict[tuple[bool, ...], tuple[Reason, ...]] = {
     found: tuple(why for why, is_so in zip(_WHY, found, strict=True) if is_so)
@@ -152,43 +158,46 @@ def feasible_arcs(
     middle[:-1] += middle[1:]
     middle[-1] += 0.5 * (starts[0] + tau)
     values = forms[:, 1:2] * np.cos(middle) + forms[:, 2:3] * np.sin(middle) + forms[:, 0:1]
-    q, lost = _angles_at(values, acos(c4))
+    both, lost = _angles_at(values, acos(c4), arm.offsets)
     lost |= s4 < SINGULAR or horizontal < SINGULAR * length
-    broken = _broken(q, np.array(arm.offsets), lower, upper)
-    return FeasibleArcs(arcs=tuple(_arcs(starts, broken, lost, outside_box)))
+    return FeasibleArcs(arcs=tuple(_arcs(starts, _broken(both, lower, upper), lost, outside_box)))
 
 
 def _linear_forms(
     arm: ArmGeometry, r: tuple[float, ...], wrist: tuple[float, float, float], length: float, c4: float, s4: float
 ) -> Array:
-    """Returns X1 Y1 cos2 X3 Y3 X5 Y5 cos6 X7 Y7 as factors of (1, cos psi, sin psi), shape (10, 3)."""
+    """Returns X1 X3 X5 X7 Y1 Y3 Y5 Y7 cos2 cos6 as factors of (1, cos psi, sin psi), shape (10, 3)."""
     upper, fore = arm.upper, arm.fore
-    ux, uy, uz = wrist[0] / length, wrist[1] / length, wrist[2] / length
+    x, y, z = wrist
+    ux, uy, uz = x / length, y / length, z / length
     (ax, ay, az), (bx, by, _) = reference_frame((ux, uy, uz))
     along, aside = upper * (upper + fore * c4) / length, upper * fore * s4 / length
-    e = np.array(
-        (
-            (along * ux, aside * ax, aside * bx),
-            (along * uy, aside * ay, aside * by),
-            (along * uz, aside * az, 0.0),
+    dot = upper * fore * c4  # Of shoulder to elbow and elbow to wrist, the same all round.
+    r0, r1, hx, r3, r4, hy, r6, r7, hz = r
+    tx, ty, tz = y * hz - z * hy, z * hx - x * hz, x * hy - y * hx
+    columns: list[tuple[float, ...]] = []
+    for (ex, ey, ez), (wx, wy, wz) in (
+        ((along * ux, along * uy, along * uz), wrist),
+        ((aside * ax, aside * ay, aside * az), (0.0, 0.0, 0.0)),
+        ((aside * bx, aside * by, 0.0), (0.0, 0.0, 0.0)),
+    ):
+        fx, fy, fz = wx - ex, wy - ey, wz - ez  # Elbow to wrist.
+        ahead = hx * fx + hy * fy + hz * fz
+        columns.append(
+            (
+                ex,
+                ez * (dot / upper) - upper * fz,
+                dot * ahead - fore * fore * (hx * ex + hy * ey + hz * ez),
+                -(r0 * fx + r3 * fy + r6 * fz),
+                ey,
+                y * ex - x * ey,  # (e x w) . z
+                fore * (tx * ex + ty * ey + tz * ez),
+                r1 * fx + r4 * fy + r7 * fz,
+                ez / upper,
+                ahead / fore,
+            )
         )
-    )
-    f = -e  # Elbow to wrist.
-    f[:, 0] += wrist
-    dot = upper * fore * c4  # e . f, the same all round.
-    (wx, wy, wz), (hx, hy, hz) = wrist, (r[2], r[5], r[8])
-    ahead = np.array((hx, hy, hz))
-    forms = np.empty((10, 3))
-    forms[0:2] = e[:2]
-    forms[2] = e[2] / upper
-    forms[3] = e[2] * (dot / upper) - upper * f[2]
-    forms[4] = wy * e[0] - wx * e[1]  # (e x w) . z
-    forms[5] = ahead @ (dot * f - fore * fore * e)
-    forms[6] = fore * np.array((wy * hz - wz * hy, wz * hx - wx * hz, wx * hy - wy * hx)) @ e
-    forms[7] = ahead @ f / fore
-    forms[8] = -np.array((r[0], r[3], r[6])) @ f
-    forms[9] = np.array((r[1], r[4], r[7])) @ f
-    return forms
+    return np.array(columns).T
 
 
 def _breaks(forms: Array, crossings: tuple[Array, Array]) -> Array:
@@ -205,6 +214,8 @@ def _breaks(forms: Array, crossings: tuple[Array, Array]) -> Array:
         return np.array((-pi,))
     is_distinct = np.ones(len(found), dtype=np.bool_)
     is_distinct[1:] = found[1:] - found[:-1] > _SAME
+    if len(found) > 1:  # Around the circle.
+        is_distinct[0] = found[0] + tau - found[-1] > _SAME
     return found[is_distinct]
 
 
@@ -225,7 +236,7 @@ def _crossings(lower: tuple[float, ...], upper: tuple[float, ...], offsets: tupl
             x = _TURNS[joint]
             bounds |= {acos(SINGULAR), acos(-SINGULAR)} if joint in (2, 4) else set()
             for bound in bounds:
-                add({x: sin(bound), x + 1: -cos(bound)}, 0.0)
+                add({x: sin(bound), x + 4: -cos(bound)}, 0.0)
         elif joint in _BENDS:
             slight = sqrt(1.0 - SINGULAR * SINGULAR)
             for level in {cos(bound) for bound in bounds} | {slight, -slight}:
@@ -233,44 +244,45 @@ def _crossings(lower: tuple[float, ...], upper: tuple[float, ...], offsets: tupl
     return np.array(factors), np.array(levels)
 
 
-def _angles_at(values: Array, q4: float) -> tuple[Array, NDArray[np.bool_]]:
-    """Returns upright joint angles of the branch with no flip, shape (7, m), and where the arm is singular."""
-    q = np.empty((7, values.shape[1]))
-    for joint, x in _TURNS.items():
-        q[joint] = np.arctan2(values[x + 1], values[x])
-    for joint, row in _BENDS.items():
-        q[joint] = np.arccos(np.clip(values[row], -1.0, 1.0))
+def _angles_at(values: Array, q4: float, offsets: Angles) -> tuple[Array, NDArray[np.bool_]]:
+    """Returns both angles that every joint has in some branch, shape (7, 2, m), and where the arm is singular.
+
+    The first is that of the branch with no flip, the second its twin.
+    """
+    both = np.empty((7, 2, values.shape[1]))
+    q, twin = both[:, 0], both[:, 1]
+    np.arctan2(values[4:8], values[0:4], out=q[_TURNING])
+    np.arccos(np.minimum(np.maximum(values[8:10], -1.0), 1.0), out=q[_BENDING])
     q[3] = q4
-    unbent_2, unbent_6 = np.sin(q[1]) < SINGULAR, np.sin(q[5]) < SINGULAR
-    across_3, across_5 = np.abs(np.cos(q[2])) < SINGULAR, np.abs(np.cos(q[4])) < SINGULAR
-    return q, (unbent_2 & across_3) | (unbent_6 & across_5) | (unbent_2 & unbent_6)
-
-
-def _broken(q: Array, offsets: Array, lower: Array, upper: Array) -> NDArray[np.bool_]:
-    """Returns which joints are beyond their limits in which branch, shape (7, 8, m)."""
-    twin = -q
-    turning = list(_TURNS)
-    twin[turning] = q[turning] + pi
-    both = np.stack((q, twin), axis=1) + offsets[:, None, None]
+    unbent, across = np.sin(q[_BENDING]) < SINGULAR, np.abs(np.cos(q[2:5:2])) < SINGULAR
+    crossed = unbent & across
+    np.negative(q, out=twin)
+    np.add(q[_TURNING], pi, out=twin[_TURNING])
+    if any(offsets):
+        both += np.array(offsets)[:, None, None]
     both -= tau * np.ceil((both - pi) / tau)
+    return both, crossed[0] | crossed[1] | (unbent[0] & unbent[1])
+
+
+def _broken(both: Array, lower: Array, upper: Array) -> NDArray[np.uint8]:
+    """Returns the joints beyond their limits in every branch, as bits from that of joint 1, shape (8, m)."""
     beyond = (both <= lower[:, None, None]) | (both >= upper[:, None, None])
-    return beyond[np.arange(7)[:, None], _TURNED]
+    return np.packbits(beyond.reshape(14, -1).take(_TWINS, axis=0), axis=0, bitorder="little")[0]
 
 
-def _arcs(starts: Array, broken: NDArray[np.bool_], lost: NDArray[np.bool_], outside: bool) -> list[Arc]:
+def _arcs(starts: Array, broken: NDArray[np.uint8], lost: NDArray[np.bool_], outside: bool) -> list[Arc]:
     """Returns arcs without neighbours that are alike."""
-    counts = broken.sum(axis=0)
-    best = broken[:, counts.argmin(axis=0), np.arange(len(starts))]
-    looks = np.concatenate((best, counts == 0, lost[None]))  # All that an arc says, one column an arc.
+    best = broken[_SIZES.take(broken).argmin(axis=0), np.arange(len(starts))]
+    possible = np.packbits(broken == 0, axis=0, bitorder="little")[0]
+    looks = best + 256 * possible.astype(np.intp) + 65536 * lost  # All that an arc says.
     is_new = np.empty(len(starts), dtype=np.bool_)
-    is_new[1:] = (looks[:, 1:] != looks[:, :-1]).any(axis=0)
-    is_new[0] = (looks[:, 0] != looks[:, -1]).any() or not is_new[1:].any()
-    first = np.flatnonzero(is_new)
-    begins = starts[first].tolist()
+    np.not_equal(looks[1:], looks[:-1], out=is_new[1:])
+    is_new[0] = looks[0] != looks[-1] or not is_new[1:].any()
+    begins = starts[is_new].tolist()
     arcs: list[Arc] = []
-    for start, end, look in zip(begins, [*begins[1:], begins[0] + tau], looks[:, first].T.tolist(), strict=True):
-        joints, branches = tuple(itertools.compress(_JOINTS, look)), tuple(itertools.compress(_BRANCHES, look[7:]))
-        reasons = _REASONS[bool(joints), look[15], outside]
+    for start, end, look in zip(begins, [*begins[1:], begins[0] + tau], looks[is_new].tolist(), strict=True):
+        joints, branches = _NUMBERS[look & 255], _MEMBERS[look >> 8 & 255]
+        reasons = _REASONS[bool(joints), look > 65535, outside]
         arcs.append(Arc(start=start, end=end, reasons=reasons, joints=joints, branches=branches))
     return arcs
 

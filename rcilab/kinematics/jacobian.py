@@ -44,16 +44,22 @@ def tool_jacobian(chain: Chain, q: Sequence[float], T_flange_tool: Pose = IDENTI
         c, s = cos(angle), sin(angle)
         ux, uy, uz = c * xx + s * yx, c * xy + s * yy, c * xz + s * yz
         vx, vy, vz = c * yx - s * xx, c * yy - s * xy, c * yz - s * xz
-        px, py, pz = px + d * zx + a * ux, py + d * zy + a * uy, pz + d * zz + a * uz
+        if d:
+            px, py, pz = px + d * zx, py + d * zy, pz + d * zz
+        if a:
+            px, py, pz = px + a * ux, py + a * uy, pz + a * uz
         xx, xy, xz = ux, uy, uz
-        yx, yy, yz, zx, zy, zz = (
-            ca * vx + sa * zx,
-            ca * vy + sa * zy,
-            ca * vz + sa * zz,
-            ca * zx - sa * vx,
-            ca * zy - sa * vy,
-            ca * zz - sa * vz,
-        )
+        if not ca:  # Most neighbouring axes are at right angles.
+            yx, yy, yz, zx, zy, zz = sa * zx, sa * zy, sa * zz, -sa * vx, -sa * vy, -sa * vz
+        else:
+            yx, yy, yz, zx, zy, zz = (
+                ca * vx + sa * zx,
+                ca * vy + sa * zy,
+                ca * vz + sa * zz,
+                ca * zx - sa * vx,
+                ca * zy - sa * vy,
+                ca * zz - sa * vz,
+            )
     rotation, (x, y, z) = (xx, yx, zx, xy, yy, zy, xz, yz, zz), (px, py, pz)
     if T_flange_tool is not IDENTITY:
         rotation, (x, y, z) = (Pose.from_parts(rotation, (x, y, z)) @ T_flange_tool).parts

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.arrays import Array, JointVector, as_path, as_rows, as_vector
+from rcilab.arrays import Array, JointVector, as_path, as_rows, as_vector, described
 from rcilab.errors import InvalidValueError
 from rcilab.kinematics import forward as forward_kinematics
 from rcilab.kinematics.differential import MovingFrame, drift_path, jacobian_path, moving_frame
@@ -28,9 +28,18 @@ class MovingArm:
         dh: Standard Denavit-Hartenberg table, one row a joint.
         T_flange_tool: Pose of the tool in the flange frame.
         T_tool_stiffness: Pose of the stiffness frame in the tool frame.
+
+    Raises:
+        InvalidValueError: A pose is none.
     """
 
     def __init__(self, dh: Sequence[DhRow], T_flange_tool: Pose, T_tool_stiffness: Pose) -> None:
+        for name, pose, more in (
+            ("tool", T_flange_tool, ", Pose() is no tool"),
+            ("stiffness frame", T_tool_stiffness, ""),
+        ):
+            if not isinstance(pose, Pose):  # pyright: ignore[reportUnnecessaryIsInstance]
+                raise InvalidValueError(name, described(pose), f"is no Pose; Pose.from_matrix makes one{more}")
         self.T_flange_tool = T_flange_tool
         self.T_tool_stiffness = T_tool_stiffness
         self.n = len(dh)

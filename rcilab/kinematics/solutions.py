@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 
 from rcilab.arrays import JointVector, as_vector, frozen
 from rcilab.errors import UnreachableError
-from rcilab.limits import JointLimits
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,11 +109,6 @@ class Solutions(Sequence[JointVector]):
         rows = "\n".join("  " + " ".join(f"{degrees(angle):8.2f}" for angle in q) for q in self._feasible)
         psi = "" if self.psi is None else f" at arm angle {degrees(self.psi):.2f} deg"
         return f"{len(self)} of {len(self._branches)} branches inside the limits{psi}, [deg]:\n{rows}"
-
-
-def joint_limit_lists(limits: JointLimits) -> tuple[list[float], list[float]]:
-    """Returns lower and upper joint limits as plain floats, [rad]."""
-    return limits.lower.tolist(), limits.upper.tolist()
 
 
 def _is_inside(q: tuple[float, ...], lower: list[float], upper: list[float]) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Literal, TypeAlias, get_args
+from typing import TYPE_CHECKING, Literal, TypeAlias, get_args
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from rcilab.kinematics.forward import build_chain
 from rcilab.kinematics.jacobian import tool_jacobian
 from rcilab.model import RobotModel
 from rcilab.motion import _ruckig
+
+if TYPE_CHECKING:
+    from rcilab.dynamics.symmetric_solver import SymmetricSolver
 
 Frame: TypeAlias = Literal["base", "tool"]
 """Axes in which a twist is given; its point is the tool tip in both."""
@@ -32,6 +35,7 @@ TOOL_MARGIN = 0.99
 to acceleration^2 / (2 jerk), some mm/s at the tool, and not all of them with the same."""
 
 _CHANGE = RAMP_PART * CYCLE_TIME  # [s] Times an acceleration: how much a velocity may change in a cycle.
+_IDENTITY = np.eye(6)
 _SAME = 1e-9  # [m/s, rad/s] Twists closer than this are the same; as a number, a weight closer to 1 is 1.
 _SLOWEST = 1e-12  # [rad/s] Below this a joint stands.
 
@@ -63,6 +67,8 @@ class TwistFollower:
         jerk: Sequence[float],
         speed: float,
     ) -> None:
+        from rcilab.dynamics.symmetric_solver import SymmetricSolver  # Loads for 0.1 s.
+
         tool = model.limits.cartesian
         self._chain, self._T_flange_tool = build_chain(model.description.dh), model.T_flange_tool
         self._joints = list(zip(lower, upper, velocity, acceleration, jerk, strict=True))
@@ -76,9 +82,11 @@ class TwistFollower:
             )
         ]
         self._in_tool = False
-        self._start = self._goal = self._change = np.zeros(6)
+        self._goal = np.zeros(6)
+        self._line = np.zeros((6, 2))  # The twist at the first step, and from there to the goal.
         self._norms = (0.0, 0.0)
         self._weight = 1.0
+        self._solver = SymmetricSolver(6)
         self._blend = _ruckig.Stepper([0.0], [0.0], [0.0], [1.0], [1.0])
         self._begins = False
         self._cut = 1.0
@@ -124,9 +132,10 @@ class TwistFollower:
             # Rows are the same vectors in other axes, so that everything below holds in those, too.
             R = np.array(rotation).reshape(3, 3)
             J = J.T.reshape(-1, 3).dot(R).reshape(-1, 6).T
-        inverse, self.is_damped = damped_inverse(J)
-        twist = self._goal if self._weight == 1.0 else self._blended(J, inverse, dq, ddq)
-        wanted: list[float] = inverse.dot(twist).tolist()
+        inverse, self.is_damped = damped_inverse(J, self._solver)
+        wanted = None if self._weight == 1.0 else self._blended(J, inverse, dq, ddq)
+        if wanted is None:
+            wanted = inverse.dot(self._goal).tolist()
         # While the twist changes, so do the joint velocities, on purpose.
         last = wanted if self._weight != 1.0 or self._last is None else self._last
         part = self._allowed = self._part_inside(q, wanted, last)
@@ -134,24 +143,30 @@ class TwistFollower:
         self.part = part * self._cut
         return [part * v for v in wanted]
 
-    def _blended(self, J: Matrix, inverse: Matrix, dq: Sequence[float], ddq: Sequence[float]) -> Array:
-        """Returns the twist of this cycle, on the straight line from the twist at the first step to the goal."""
+    def _blended(self, J: Matrix, inverse: Matrix, dq: Sequence[float], ddq: Sequence[float]) -> list[float] | None:
+        """Returns joint velocities for the twist of this cycle; None when it is the goal.
+
+        It is on the straight line from the twist at the first step to the goal.
+        """
+        line = self._line
         if self._begins:
-            self._start = J.dot(dq)
-            self._change = self._goal - self._start
-            self._norms = _norms(self._change)
-        change, norms = self._change, self._norms
+            line[:, 0] = J.dot(dq)
+            line[:, 1] = self._goal - line[:, 0]
+            self._norms = _norms(line[:, 1])
+        norms = self._norms
         if max(norms) < _SAME:
             self._weight = 1.0
-            return self._goal
+            return None
+        starts, strides = inverse.dot(line).T.tolist()
         rate = rate_change = math.inf  # [1/s], [1/s^2]
-        for stride, (a_max, j_max) in zip([*inverse.dot(change).tolist(), *norms], self._bounds, strict=True):
+        for stride, (a_max, j_max) in zip([*strides, *norms], self._bounds, strict=True):
             if stride := abs(stride):
                 rate = a_max / stride if rate * stride > a_max else rate
                 rate_change = j_max / stride if rate_change * stride > j_max else rate_change
         blend = self._blend
         if self._begins:
             # What the tool accelerates along the line already goes on; the rest is for the joints to lose.
+            change = line[:, 1]
             running = float(change.dot(J.dot(ddq)) / change.dot(change))
             blend.place([0.0], [0.0], [min(max(running, -rate), rate)])
             self._begins = False
@@ -159,7 +174,7 @@ class TwistFollower:
         blend.towards_velocity([1.0])
         (weight,), (slope,) = blend.dq, blend.ddq
         self._weight = 1.0 if abs(weight - 1.0) < _SAME and abs(slope) < _SAME * rate_change else weight
-        return self._start + weight * change
+        return [start + weight * stride for start, stride in zip(starts, strides, strict=True)]
 
     def _part_inside(self, q: Sequence[float], wanted: Sequence[float], last: Sequence[float]) -> float:
         """Returns the part of joint velocities that keeps their bounds and can be taken back before a range ends.
@@ -191,7 +206,7 @@ class TwistFollower:
         return min(part, before / math.sqrt(bend)) if bend > 1.0 else part
 
 
-def damped_inverse(J: Matrix) -> tuple[Matrix, bool]:
+def damped_inverse(J: Matrix, solver: SymmetricSolver) -> tuple[Matrix, bool]:
     """Returns the matrix that turns a twist into the smallest joint velocities, and whether it is damped.
 
     Damped least squares with numerical filtering (Maciejewski and Klein 1988; Siciliano et al., Robotics, 2009, 3.5):
@@ -200,18 +215,18 @@ def damped_inverse(J: Matrix) -> tuple[Matrix, bool]:
 
     Args:
         J: Jacobian, shape (6, n).
+        solver: Of six equations.
 
     Returns:
         Shape (n, 6), and True when a direction was damped.
     """
     A = J.dot(J.T)  # For so small matrices half the cost of the operator.
-    try:
-        B = np.linalg.inv(A)
-        # The Frobenius norm is no smaller than the largest eigenvalue of the inverse, 1 / s^2 of the smallest s.
-        if float(np.vdot(B, B)) < DAMPED_BELOW**-4:
-            return J.T.dot(B), False
-    except np.linalg.LinAlgError:
-        pass
+    B = solver.solve(A, _IDENTITY)
+    elements = B.ravel()
+    # The Frobenius norm is no smaller than the largest eigenvalue of the inverse, 1 / s^2 of the smallest s. It has to
+    # be that of B: in the product with J a direction that is lost altogether would cancel.
+    if elements.dot(elements) < DAMPED_BELOW**-4 and solver.has_solved:
+        return J.T.dot(B), False
     squares, U = np.linalg.eigh(A)
     weights = 1.0 / np.maximum(squares, DAMPED_BELOW**2)
     return J.T.dot((U * weights).dot(U.T)), bool(squares[0] < DAMPED_BELOW**2)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from rcilab.arrays import JointVector
 from rcilab.clock import CYCLE_TIME
 from rcilab.command import JointPosition
+from rcilab.dynamics.symmetric_solver import SymmetricSolver as SymmetricSolver  # Loaded now, not as the arm waits.
 from rcilab.motion import Jog
 from rcilab.state import RobotState
 from rcilab.supervisor.jog_command import HOLD_TIMEOUT, JogCommand, JogKind, read_jog

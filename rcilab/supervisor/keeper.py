@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections import deque
 from collections.abc import Callable
@@ -123,7 +124,7 @@ class ProcessKeeper:
         self._worker_started = time.monotonic()
         words[Word.SUPERVISOR_BEAT] = time.monotonic_ns()
         self._worker = Child(
-            ["-m", "rcilab.supervisor.worker", "--block", str(self._block.descriptor)],
+            ["-m", "rcilab.supervisor.worker", "--block", str(self._block.descriptor), "--parent", str(os.getpid())],
             "the control process",
             [self._block.descriptor],
         )

@@ -139,7 +139,7 @@ class VirtualController(Child):
     ) -> None:
         arguments = ["-m", "rcilab.cli", "controller", "--model", model_name, "--plant", plant, "--port", "0"]
         super().__init__(
-            [*arguments, *(["--lockstep"] if lockstep else []), *options, "--exit-with-parent"],
+            [*arguments, *(["--lockstep"] if lockstep else []), *options, "--exit-with-parent", str(os.getpid())],
             "the virtual controller",
         )
         self._said = ""

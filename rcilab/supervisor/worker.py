@@ -55,9 +55,10 @@ class Worker:
 
     Args:
         block: The shared block.
+        parent: Process id of the supervisor, without which it ends. Told, since it may be gone before we look.
     """
 
-    def __init__(self, block: ControlBlock) -> None:
+    def __init__(self, block: ControlBlock, parent: int) -> None:
         self._block = block
         self._words = block.words
         self._settings = parse_settings(block.settings)
@@ -66,7 +67,7 @@ class Worker:
         self._publisher = Publisher(block)
         self._log = CycleLog(self._publisher.recorder, self._publisher.on_row)
         self._stops_seen = self._words[Word.STOPS_ASKED]
-        self._parent = os.getppid()
+        self._parent = parent
         self._link: Link | None = None
         self._address = ""
         self._is_ending = False
@@ -306,7 +307,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Runs the control process on the block it was handed."""
     parser = argparse.ArgumentParser(prog="rcilab.supervisor.worker", description=__doc__)
     parser.add_argument("--block", type=int, required=True, metavar="FD", help="open descriptor of the shared block")
-    return Worker(ControlBlock(parser.parse_args(argv).block)).run()
+    parser.add_argument("--parent", type=int, required=True, metavar="PID", help="the supervisor: end when it is gone")
+    args = parser.parse_args(argv)
+    return Worker(ControlBlock(args.block), args.parent).run()
 
 
 if __name__ == "__main__":

@@ -1,10 +1,12 @@
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
 from rcilab.bench.compute import motion_of
-from rcilab.bench.measure import summarise, time_calls
+from rcilab.bench.measure import cost_by_length, plain, summarise, time_calls
 from rcilab.conformance.check import check
 from rcilab.model import load_model
 
@@ -40,3 +42,15 @@ def test_a_motion_to_stream_takes_as_long_as_asked_and_conforms(duration: float)
     motion = motion_of(model, duration, model.home)
     assert motion.duration == pytest.approx(duration, rel=0.25)
     assert check(motion, model).ok
+
+
+def test_the_cost_by_length_names_every_length_beside_the_median_of_its_calls() -> None:
+    called: list[object] = []
+    words = cost_by_length(called.append, [(1.0, ["a"]), (97.16, ["b", "c", "d"])])
+    assert called == ["a", "b", "c", "d"]
+    assert re.fullmatch(r"by length of the motion: 1 s [\d.e-]+ ms, 97\.2 s [\d.e-]+ ms", words)
+
+
+@pytest.mark.parametrize(("value", "words"), [(0.0123, "0.0123"), (7.0, "7"), (999.6, "1000"), (123456.7, "123457")])
+def test_a_large_number_is_written_without_an_exponent(value: float, words: str) -> None:
+    assert plain(value) == words

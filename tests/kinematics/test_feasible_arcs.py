@@ -108,6 +108,16 @@ def test_arcs_cover_the_circle_once_and_neighbours_differ(name, seed):
             assert branch in middle.branches
 
 
+@pytest.mark.parametrize("name", NAMES)
+@settings(max_examples=60)
+@given(seed=seeds, zeros=st.sets(st.sampled_from([0, 1, 2, 4, 5, 6])))
+def test_at_even_poses_where_limits_are_met_together_no_arc_is_as_thin_as_rounding(name, seed, zeros):
+    model = load_model(name)
+    q = random_q(model, seed)
+    q[sorted(zeros)], q[3] = 0.0, 0.7
+    assert all(arc.end - arc.start > 1e-11 for arc in model.feasible_arcs(model.forward(q)).arcs)
+
+
 def test_a_box_forbids_all_arm_angles_or_none_and_an_inactive_one_nothing():
     model = load_model("xMatePro7", tool=TOOL)
     T = model.forward(model.home)

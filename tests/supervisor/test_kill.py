@@ -221,3 +221,25 @@ def is_alive(pid: int) -> bool:
 
 def shared_memory():
     return set(Path("/dev/shm").iterdir()) if Path("/dev/shm").is_dir() else set()
+
+
+STILLBORN = """
+import os
+from rcilab.model import load_model
+from rcilab.supervisor.keeper import ProcessKeeper
+from rcilab.supervisor.layout import ControlBlock
+from rcilab.supervisor.settings import build_settings
+model = load_model("xMatePro7")
+block = ControlBlock.create(model.n, build_settings(model, is_virtual=True))
+keeper = ProcessKeeper(block, model.name, "ideal", None, auto_restart=False)
+keeper.launch()
+print(keeper.worker_pid, keeper.controller_pid, flush=True)
+os._exit(0)
+"""
+
+
+def test_a_supervisor_that_dies_while_its_processes_load_leaves_none_of_them_behind():
+    done = subprocess.run([sys.executable, "-c", STILLBORN], capture_output=True, text=True, check=True)
+    pids = [int(word) for word in done.stdout.split()]
+    assert len(pids) == 2
+    wait_for(lambda: not any(map(is_alive, pids)), 2.0 * SOON)

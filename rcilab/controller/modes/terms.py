@@ -15,7 +15,7 @@ from rcilab.controller.plant import Measurement
 from rcilab.controller.settings import Settings
 from rcilab.limits import JointLimits
 from rcilab.model import RobotModel
-from rcilab.safety_box import SafetyBox
+from rcilab.safety_box import SafetyBox, active_box
 from rcilab.spatial import Pose
 
 _ROUNDING = 1e-6  # [rad], [m] Where an arm stands beyond a bound, it may be that much farther.
@@ -55,7 +55,8 @@ def _up_to(joint: JointLimits, measured: Measurement) -> JointLimits:
 
 def _around(box: SafetyBox | None, T_base_tool: Pose) -> SafetyBox | None:
     """Returns the box, large enough for the tool as it stands; None when it bounds nothing."""
-    if box is None or not box.active:
+    box = active_box(box)
+    if box is None:
         return None
     excess = box.excess(T_base_tool.parts[1])
     if excess <= 0.0:
