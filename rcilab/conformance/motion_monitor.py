@@ -25,7 +25,7 @@ from rcilab.conformance.torque_monitor import TorqueMonitor
 from rcilab.errors import InvalidValueError
 from rcilab.kinematics.closed_form import build_closed_form
 from rcilab.model import RobotModel, require_model
-from rcilab.safety_box import SafetyBox
+from rcilab.safety_box import SafetyBox, active_box
 from rcilab.safety_distance import SafetyDistance
 from rcilab.spatial import IDENTITY, Pose
 from rcilab.state import Mode, require_mode
@@ -57,7 +57,7 @@ class Monitor:
         distance: SafetyDistance | None = None,
     ) -> None:
         self._model, self.mode = require_model(model), require_mode(mode)
-        table, box = condition_table(model.description), box if box is not None and box.active else None
+        table, box = condition_table(model.description), active_box(box)
         limits = model.limits
         self._own_rows = {row.id: row for row in table.conditions}
         rows = table.rows(self.mode, has_elbow=model.n == 7)
