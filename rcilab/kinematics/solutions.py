@@ -12,6 +12,8 @@ from numpy.typing import ArrayLike
 from rcilab.arrays import JointVector, as_vector, frozen
 from rcilab.errors import UnreachableError
 
+_AT_LIMIT = 1e-3  # [rad] An excess of less than 0.1 deg is not worth a number.
+
 
 @dataclass(frozen=True, slots=True)
 class Branch:
@@ -98,9 +100,12 @@ class Solutions(Sequence[JointVector]):
         elif self.psi is not None:
             place += f" at arm angle {degrees(self.psi):.1f} deg"
             advice += " or change the arm angle"
+        beyond = f"{degrees(best.excess):.1f} deg beyond its limit"
+        if best.excess < _AT_LIMIT:
+            beyond = "right at its limit, and has to stay inside"
         return UnreachableError(
-            f"joint {joint} would have to be at {degrees(angle):.1f} deg, {degrees(best.excess):.1f} deg beyond its "
-            f"limit ({degrees(lower):.0f} to {degrees(upper):.0f} deg), {place}; {advice}",
+            f"joint {joint} would have to be at {degrees(angle):.1f} deg, {beyond} "
+            f"({degrees(lower):.0f} to {degrees(upper):.0f} deg), {place}; {advice}",
             joint=joint,
             excess=best.excess,
         )

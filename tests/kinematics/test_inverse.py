@@ -206,3 +206,11 @@ def test_a_joint_with_more_than_a_turn_is_moved_by_full_turns_to_come_near():
     model = load_model("xMatePro7")
     q = np.array([0.1, 0.5, 0.2, 1.0, 0.3, 0.7, math.radians(300)])
     np.testing.assert_allclose(model.inverse(model.forward(q), psi=model.arm_angle(q)).nearest(q), q, atol=1e-9)
+
+
+def test_a_pose_with_a_joint_right_at_its_limit_is_refused_in_words() -> None:
+    model = load_model("xMatePro7")
+    q = model.home.copy()
+    q[1] = model.limits.joint.upper[1]
+    with pytest.raises(UnreachableError, match=r"joint 2 would have to be at 120\.0 deg, right at its limit, and has to"):
+        model.inverse(model.forward(q), psi=model.arm_angle(q))
