@@ -30,14 +30,14 @@ class Session:
         self._generation = 0
         self._worker: threading.Thread | None = None
 
-    def open(self, model: RobotModel, target: str) -> None:
-        """Closes what is open and starts a supervisor for this arm and destination; returns at once."""
+    def open(self, model: RobotModel, target: str, plant: str = "ideal") -> None:
+        """Closes what is open and starts a supervisor for this arm, destination and plant; returns at once."""
         with self._lock:
             self._generation += 1
             generation, previous = self._generation, self._worker
             self._ready = self._shown = None
             self._worker = threading.Thread(
-                target=self._exchange, args=(generation, previous, model, target), name="session", daemon=True
+                target=self._exchange, args=(generation, previous, model, target, plant), name="session", daemon=True
             )
             self._worker.start()
 
@@ -89,7 +89,9 @@ class Session:
             with suppress(RcilabError):  # Closed in the meantime.
                 ready.set_operator_present(True)
 
-    def _exchange(self, generation: int, previous: threading.Thread | None, model: RobotModel, target: str) -> None:
+    def _exchange(
+        self, generation: int, previous: threading.Thread | None, model: RobotModel, target: str, plant: str
+    ) -> None:
         if previous is not None:
             previous.join()
         old, self._current = self._current, None
@@ -101,7 +103,7 @@ class Session:
         try:
             from rcilab.supervisor import Supervisor
 
-            supervisor = Supervisor(model, target)
+            supervisor = Supervisor(model, target, plant)
             self._current = self._shown = supervisor
             supervisor.start()
         except RcilabError as error:

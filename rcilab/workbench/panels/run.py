@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 from rcilab.workbench import requests
 from rcilab.workbench.panels.target import planned_html
+from rcilab.workbench.pushing import PLANTS
 from rcilab.workbench.readiness import is_moving, obstacle
 from rcilab.workbench.text import Text
-from rcilab.workbench.widgets import Ask, Html, esc, on_press
+from rcilab.workbench.widgets import Ask, Html, Linked, esc, on_press
 
 if TYPE_CHECKING:
     from rcilab.supervisor import SupervisorStatus
@@ -56,6 +57,11 @@ class RunPanel:
                 text("run.virtual"), icon="device-desktop", color="gray", hint=text("run.virtual_hint")
             )
             on_press(virtual, ask, lambda page: requests.ChooseRobot(page=page, target="virtual"))
+            plants = {text(f"plant.{plant}"): plant for plant in PLANTS}
+            self._plants = {plant: label for label, plant in plants.items()}
+            chosen = self._plants[state.plant]
+            plant = gui.add_dropdown(text("plant.title"), tuple(plants), initial_value=chosen, hint=text("plant.hint"))
+            self._plant = Linked(plant, ask, lambda v, p: requests.ChooseRobot(page=p, plant=plants.get(v)))
         with gui.add_folder(text("run.health")):
             self._health = Html(gui)
         gui.add_html(f'<p class="rl-note">{esc(text("stop.note"))}</p>')
@@ -73,7 +79,9 @@ class RunPanel:
         tone = {"idle": "good", "moving": "good", "stopping": "warn", "starting": "warn", "connecting": "warn"}.get(
             status.phase, "bad"
         )
-        where = text("where.virtual") if state.target == "virtual" else state.target
+        self._plant.show(self._plants[state.plant])
+        self._plant.handle.disabled = moving or state.target != "virtual"
+        where = text(f"where.{state.plant}") if state.target == "virtual" else state.target
         address = f'<br><span class="rl-dim">{esc(status.address)}</span>' if status.address else ""
         self._where.show(
             f'<p class="rl-verdict rl-{tone}"><b>{esc(where)}</b> {esc(text("phase." + status.phase))}{address}</p>'

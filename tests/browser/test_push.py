@@ -1,0 +1,57 @@
+"""Push the arm as a person: choose MuJoCo, guide, drag a link with the mouse, hold the button, let go."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rcilab.workbench import requests
+
+
+@pytest.fixture
+def physics(page):
+    """The page with MuJoCo behind it, chosen by hand; the ideal arm comes back afterwards."""
+    page.open_tab("Run")
+    pid = page.status.controller_pid
+    page.tab.get_by_role("textbox", name="It moves", exact=True).click()
+    page.tab.get_by_role("option", name="MuJoCo (physics)").click()
+    page.wait(lambda: page.status.controller_pid not in (None, pid), "another controller", 30.0)
+    page.wait(lambda: page.status.phase == "idle" and bool(page.status.powered), "a powered, idle arm", 30.0)
+    page.wait(lambda: "MuJoCo" in page.chip("where"), "the status line to name the plant")
+    yield page
+    page.bench.session.stop()
+    page.wait(lambda: page.status.phase == "idle", "an idle arm")
+    page.bench.conductor.ask(requests.ChooseRobot(plant="ideal"))
+    page.wait(lambda: page.state.plant == "ideal" and page.status.phase != "idle", "the ideal arm to come")
+    page.wait(lambda: page.status.phase == "idle" and bool(page.status.powered), "a powered, idle arm", 30.0)
+
+
+def test_a_guided_arm_is_pulled_by_the_mouse_and_pushed_by_the_button(physics):
+    page = physics
+    page.button("Start guiding").click()
+    page.wait(lambda: page.chip("phase") == "guided by hand", "a free arm")
+    start = np.array(page.status.q)
+    x, y = page.project("/live/joint1/joint2/joint3/joint4", (0.0, 0.0, 0.0))
+    mouse = page.tab.mouse
+    mouse.move(x, y)
+    page.tab.wait_for_timeout(300)
+    mouse.down()
+    for step in range(1, 9):
+        mouse.move(x + 10 * step, y)
+        page.tab.wait_for_timeout(60)
+    page.wait(lambda: page.state.push.acting is not None, "the pull")
+    page.wait(lambda: np.abs(page.status.q - start).max() > 0.05, "the arm to follow the mouse")
+    mouse.up()
+    page.wait(lambda: page.state.push.acting is None, "the pull to end with the mouse")
+    page.wait(lambda: page.shows("live", page.status.q, 1e-2), "the live arm where the arm is")
+    before = np.array(page.status.q)
+    page.button("Hold to push").scroll_into_view_if_needed()
+    page.button("Hold to push").hover()
+    mouse.down()
+    page.wait(lambda: np.abs(page.status.q - before).max() > 0.05, "the arm to follow the push")
+    page.tab.evaluate("window.dispatchEvent(new Event('blur'))")
+    page.wait(lambda: page.state.push.acting is None, "the push to end when the window loses the focus")
+    mouse.up()
+    page.button("Stop guiding").click()
+    page.wait(lambda: page.status.code == "idle.guided", "the arm to be held again")
+    assert not page.status.faults
