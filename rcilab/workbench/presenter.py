@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from rcilab.workbench.live import LiveChannel
 from rcilab.workbench.panels import Panel
 from rcilab.workbench.panels.check import CheckPanel
+from rcilab.workbench.panels.health import HealthPanel
 from rcilab.workbench.panels.jog import JogPanel
 from rcilab.workbench.panels.push import PushPanel
 from rcilab.workbench.panels.run import RunPanel
@@ -35,7 +36,7 @@ _TABS = (
     ("tab.jog", "adjustments-horizontal", JogPanel),
     ("tab.target", "current-location", TargetPanel),
     ("tab.check", "clipboard-check", CheckPanel),
-    ("tab.run", "player-play", RunPanel, PushPanel),
+    ("tab.run", "player-play", RunPanel, PushPanel, HealthPanel),
     ("tab.settings", "settings", SettingsPanel),
 )
 

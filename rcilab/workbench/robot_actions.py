@@ -15,7 +15,7 @@ from rcilab.faults import Fault
 from rcilab.model import load_model
 from rcilab.workbench import requests
 from rcilab.workbench.goal_actions import initial_goal
-from rcilab.workbench.pushing import PLANTS, TOOL
+from rcilab.workbench.pushing import PLANTS, TOOL, is_guided
 from rcilab.workbench.reach import Tone
 from rcilab.workbench.readiness import is_moving, obstacle
 from rcilab.workbench.session import Session
@@ -42,6 +42,7 @@ class RobotActions:
         self._powered = False  # The virtual arm's motors have been switched on once.
         self._incident = 0
         self._phase = ""
+        self._guided = False
         self._asked_to_guide = -math.inf
 
     def drive(self, request: requests.Drive) -> None:
@@ -135,6 +136,9 @@ class RobotActions:
             if status.incident.code == "crashed.controller":
                 self._powered = False  # The one that is started in its place comes up without motor power.
             self._store.say("bad", _tell_incident(status.incident.code, status.incident.message))
+        if self._guided and status.code == "idle.operator":
+            self._store.say("warn", message("notice.operator"))
+        self._guided = is_guided(status)
         before, self._phase = self._phase, status.phase
         self._record(status)
         if not self._placed and status.q_c is not None:

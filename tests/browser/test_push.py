@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from browser.test_settings import choose
 from rcilab.workbench import requests
 
 
@@ -13,8 +14,7 @@ def physics(page):
     """The page with MuJoCo behind it, chosen by hand; the ideal arm comes back afterwards."""
     page.open_tab("Run")
     pid = page.status.controller_pid
-    page.tab.get_by_role("textbox", name="It moves", exact=True).click()
-    page.tab.get_by_role("option", name="MuJoCo (physics)").click()
+    choose(page, "It moves", "MuJoCo (physics)")
     page.wait(lambda: page.status.controller_pid not in (None, pid), "another controller", 30.0)
     page.wait(lambda: page.status.phase == "idle" and bool(page.status.powered), "a powered, idle arm", 30.0)
     page.wait(lambda: "MuJoCo" in page.chip("where"), "the status line to name the plant")

@@ -1,4 +1,4 @@
-"""Run: where to, power, Execute, Stop, Recover; what the controller says and how well the cycles are kept."""
+"""Run: where to, power, Execute, Recover, and what the controller says."""
 
 from __future__ import annotations
 
@@ -45,6 +45,7 @@ class RunPanel:
                 button = gui.add_button(text(f"run.{what}"), icon=icon, color=color, hint=text(f"run.{what}_hint"))
                 on_press(button, ask, _drive(what))
                 self._buttons[what] = button
+            self._faults = Html(gui)
         with gui.add_folder(text("run.where")):
             self._where = Html(gui)
             typed = state.target if state.target != "virtual" else ""
@@ -62,9 +63,6 @@ class RunPanel:
             chosen = self._plants[state.plant]
             plant = gui.add_dropdown(text("plant.title"), tuple(plants), initial_value=chosen, hint=text("plant.hint"))
             self._plant = Linked(plant, ask, lambda v, p: requests.ChooseRobot(page=p, plant=plants.get(v)))
-        with gui.add_folder(text("run.health")):
-            self._health = Html(gui)
-        gui.add_html(f'<p class="rl-note">{esc(text("stop.note"))}</p>')
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows the robot."""
@@ -87,7 +85,7 @@ class RunPanel:
             f'<p class="rl-verdict rl-{tone}"><b>{esc(where)}</b> {esc(text("phase." + status.phase))}{address}</p>'
             + (f'<p class="rl-note">{esc(status.message)}</p>' if tone == "bad" else "")
         )
-        self._health.show(faults_html(status, text) + health_html(status, text))
+        self._faults.show(faults_html(status, text))
 
 
 def _drive(what: Any):  # type: ignore[no-untyped-def]
@@ -109,22 +107,3 @@ def faults_html(status: SupervisorStatus, text: Text) -> str:
 def _remedy(fault: Any, text: Text) -> str:
     key = f"remedy.{fault.name}"
     return text(key) if text.has(key) else text("remedy.smoothness")
-
-
-def health_html(status: SupervisorStatus, text: Text) -> str:
-    """Returns how well the cycles are kept, as a table."""
-    late = status.lateness
-    mode = "—" if status.robot_mode is None else text(f"robot_mode.{status.robot_mode.name}")
-    power = {None: "—", True: text("run.on"), False: text("run.off")}[status.powered]
-    rows = [
-        ("mode", mode),
-        ("control", "—" if status.controller_mode is None else text(f"controller_mode.{status.controller_mode.name}")),
-        ("power", power),
-        ("success", f"{100.0 * status.success_rate:.1f} %"),
-        ("rate", f"{status.rate_hz:.0f} Hz"),
-        ("late", text("run.late_value", late=status.late_cycles, lost=status.lost_cycles, cycles=late.cycles)),
-        ("lateness", f"{late.p50:.0f} / {late.p99:.0f} / {late.p999:.0f} / {late.max:.0f} µs"),
-        ("scheduling", text(f"scheduling.{status.scheduling}")),
-    ]
-    body = "".join(f"<tr><th>{esc(text(f'health.{name}'))}</th><td>{esc(value)}</td></tr>" for name, value in rows)
-    return f'<table class="rl-table rl-facts-table">{body}</table>'
