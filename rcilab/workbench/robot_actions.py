@@ -138,7 +138,7 @@ class RobotActions:
             self._store.say("bad", _tell_incident(status.incident.code, status.incident.message))
         if self._guided and status.code == "idle.operator":
             self._store.say("warn", message("notice.operator"))
-        self._guided = is_guided(status)
+        self._guided = is_guided(status) or (self._guided and status.phase == "stopping")
         before, self._phase = self._phase, status.phase
         self._record(status)
         if not self._placed and status.q_c is not None:

@@ -6,10 +6,12 @@ import math
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from rcilab.errors import UsageError
 from rcilab.model import load_model
 from rcilab.supervisor import SupervisorStatus
 from rcilab.workbench import push_actions, requests
@@ -18,10 +20,11 @@ from rcilab.workbench.goal_actions import initial_goal
 from rcilab.workbench.lease import Lease
 from rcilab.workbench.push_actions import PushActions
 from rcilab.workbench.pushing import SPRING, STRONGEST, place_of, spring_force
+from rcilab.workbench.robot_actions import RobotActions
 from rcilab.workbench.store import Store, UiState
 
 MODEL = load_model("xMatePro7")
-OWN = SupervisorStatus(phase="idle", target="virtual", world_address="127.0.0.1:1", q=MODEL.home)
+OWN = SupervisorStatus(phase="idle", powered=True, target="virtual", world_address="127.0.0.1:1", q=MODEL.home)
 
 
 class FakePush:
@@ -52,6 +55,9 @@ class FakeSession:
 
     def status(self) -> SupervisorStatus:
         return self.shown
+
+    def supervisor(self):
+        raise UsageError("there is none")
 
 
 @pytest.fixture
@@ -165,6 +171,37 @@ def test_an_arm_at_an_address_cannot_be_pushed_and_that_is_said(actions, store, 
     actions.tick()
     assert store.state.notice.text.code == "push.no_world"
     assert store.state.push.acting is None
+
+
+def test_guiding_that_ends_because_nobody_is_there_is_told(store, session):
+    robot = RobotActions(store, session)
+    for phase, code in (("moving", "moving.guided"), ("stopping", "stopping"), ("idle", "idle.operator")):
+        session.shown = replace(OWN, phase=phase, code=code)
+        robot.watch()
+    assert store.state.notice.text.code == "notice.operator"
+
+
+def test_a_real_arm_is_freed_only_when_asked_twice(store, session, monkeypatch):
+    freed = []
+    supervisor = SimpleNamespace(
+        start_guiding=lambda *way: freed.append(way) or SimpleNamespace(done=True, error=None),
+        **dict.fromkeys(("recover", "power_on", "power_off", "reconnect", "stop_guiding")),
+    )
+    monkeypatch.setattr(session, "supervisor", lambda: supervisor)
+    store.update(target="rci://192.168.0.160:1337")
+    robot = RobotActions(store, session)
+    robot.drive(requests.Drive(page=1, what="guide"))
+    assert store.state.notice.text.code == "guide.sure"
+    assert freed == []
+    robot.drive(requests.Drive(page=1, what="guide"))
+    assert freed == [("joint", "free")]
+
+
+def test_the_plant_is_not_chosen_for_a_robot_at_an_address(store, session):
+    store.update(target="rci://192.168.0.160:1337")
+    RobotActions(store, session).choose_robot(requests.ChooseRobot(page=1, plant="ideal"))
+    assert store.state.notice.text.code == "plant.address"
+    assert store.state.plant == "mujoco"
 
 
 def wait(condition: Callable[[], bool], what: str, timeout: float = 30.0) -> None:
