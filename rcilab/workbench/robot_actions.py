@@ -145,7 +145,8 @@ class RobotActions:
             self._placed = True
             self._store.update(goal=initial_goal(self._store.state.model, status.q_c))
             return "placed"
-        if not self._powered and status.phase == "idle" and self._store.state.target == "virtual":
+        may_power = self._session.is_ready and status.phase == "idle" and self._store.state.target == "virtual"
+        if may_power and not self._powered:
             self._powered = True
             if not status.powered:
                 self.drive(requests.Drive(what="power_on"))

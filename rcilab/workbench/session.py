@@ -62,6 +62,11 @@ class Session:
 
         return SupervisorStatus(phase="starting", code="starting", message="Starting the control process.")
 
+    @property
+    def is_ready(self) -> bool:
+        """Whether `supervisor` has one to ask; its status may show an idle arm a moment earlier."""
+        return self._ready is not None
+
     def supervisor(self) -> Supervisor:
         """Returns the supervisor to ask something of.
 

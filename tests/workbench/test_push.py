@@ -52,6 +52,7 @@ class FakeSession:
     """Stands for the robot side."""
 
     shown = OWN
+    is_ready = True
 
     def status(self) -> SupervisorStatus:
         return self.shown
