@@ -163,6 +163,8 @@ class CycleLog:
         """Of the newest row, [s]."""
         self.lost_total = 0
         """Controller cycles whose state never arrived."""
+        self.state: RobotState | None = None
+        """The state of the newest row."""
         self._last_id: int | None = None
         self._origins: deque[int] = deque(maxlen=_GRID_CYCLES)
         self._nothing = (math.nan,) * recorder.n
@@ -189,6 +191,7 @@ class CycleLog:
             sent_ns: When it was answered, monotonic, [ns]; 0 when it was not.
             command: What was sent in answer.
         """
+        self.state = state
         number = state.message_id
         lost = 0
         if self._last_id is None or number < self._last_id:

@@ -175,6 +175,16 @@ class RigidBody:
         J[:3] -= np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0))) @ J[3:]  # omega x arm
         return J
 
+    def link_pose(self, q: JointVector, link: int) -> Pose:
+        """Returns the pose of a link's frame in base.
+
+        Args:
+            q: Joint angles, shape (n,), [rad].
+            link: Number of the link, from 1.
+        """
+        pin.forwardKinematics(self._model, self._data, q)
+        return Pose.from_matrix(self._data.oMi[link].homogeneous)
+
     def tool_jacobian(self, q: JointVector) -> Matrix:
         """Returns the Jacobian at the tool, linear rows first, base axes, shape (6, n)."""
         return pin.computeFrameJacobian(self._model, self._data, q, self._tool, pin.LOCAL_WORLD_ALIGNED)

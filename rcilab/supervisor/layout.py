@@ -8,6 +8,7 @@
     requests    mailbox to the control process
     replies     mailbox back
     jog         how somebody moves the arm by hand, guarded by a sequence number
+    felt        the controller's newest estimate of the force and moment from outside
     cycles      ring of every cycle
     motion      rows of the motion to stream
 
@@ -37,7 +38,7 @@ from rcilab.errors import UsageError, VersionMismatchError
 from rcilab.supervisor.lateness import SIZE as HISTOGRAM_WORDS
 
 MAGIC = b"RCILABCP"
-VERSION = 3  # Count up with every change of this file, of the snapshot or of `cycle_dtype`.
+VERSION = 4  # Count up with every change of this file, of the snapshot or of `cycle_dtype`.
 
 RING_CYCLES = 32768  # 33 s of cycles: how long a reader may sleep.
 MOTION_TIME = 300.0  # [s] Longest motion that can be handed over.
@@ -157,14 +158,15 @@ class ControlBlock:
         for size in _region_sizes(self.n):
             regions.append(self._memory[place : place + size])
             place += size
-        words, _, self.snapshot, histogram, self.requests, self.replies, self.jog, self.cycles, motion = regions
+        words, _, self.snapshot, histogram, self.requests, self.replies, self.jog, felt, self.cycles, motion = regions
         self.words = words.cast("Q")
+        self.felt = felt[: 8 * 6].cast("d")
         self.histogram = histogram[: 8 * HISTOGRAM_WORDS].cast("Q")
         self.motion: Array = np.frombuffer(motion, "<f8", MOTION_ROWS * self.n).reshape(MOTION_ROWS, self.n)
 
 
 def _region_sizes(n: int) -> tuple[int, ...]:
-    """Returns the sizes of words, settings, snapshot, histogram, requests, replies, jog, cycles and motion, [bytes]."""
+    """Returns the sizes of all regions but the header, in the order of the list above, [bytes]."""
     mail = MAIL_SLOTS * MAIL_SIZE
     return (
         _PAGE,
@@ -173,6 +175,7 @@ def _region_sizes(n: int) -> tuple[int, ...]:
         _whole_pages(8 * HISTOGRAM_WORDS),
         mail,
         mail,
+        _PAGE,
         _PAGE,
         _whole_pages(RING_CYCLES * cycle_dtype(n).itemsize),
         _whole_pages(MOTION_ROWS * n * 8),

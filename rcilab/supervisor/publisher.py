@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 import time
 from dataclasses import replace
 from typing import Any
@@ -13,6 +14,7 @@ from rcilab.supervisor.layout import RING_CYCLES, ControlBlock, Word
 from rcilab.supervisor.snapshot import Snapshot, write_snapshot
 
 _SNAPSHOT_CYCLES = 20  # Rows between two snapshots: 50 a second.
+_WRENCH = struct.Struct("=6d")
 _RATE_TIME = 1.0  # [s] over which states are counted.
 
 
@@ -60,6 +62,8 @@ class Publisher:
         self._words[Word.CYCLES] = count
         self._words[Word.LOST] = log.lost_total
         self._histogram.add(log.lateness)
+        if log.state is not None:
+            _WRENCH.pack_into(self._block.felt, 0, *log.state.tau_ext_in_base.tolist())
         self.beat()
         if count % _SNAPSHOT_CYCLES == 0 and self.snapshot.phase in ("moving", "stopping"):
             self.update(motion_time=self._motion_cycle * CYCLE_TIME)

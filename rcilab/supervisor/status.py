@@ -8,7 +8,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from rcilab.arrays import JointVector
+from rcilab.arrays import Array, JointVector
 from rcilab.client.recorder import cycle_dtype
 from rcilab.faults import Fault
 from rcilab.state import ControllerMode, RobotMode
@@ -21,7 +21,7 @@ PHASES: tuple[Phase, ...] = (
     "starting",  # our processes are being started
     "connecting",  # the control process is trying to reach the controller
     "idle",  # states arrive; the arm stands still and takes requests
-    "moving",  # a motion is being streamed
+    "moving",  # a motion is being streamed, or the arm is free for a hand to guide it (code "moving.guided")
     "stopping",  # a motion is being brought to rest before its end
     "fault",  # the controller has error bits set; recover() leads out
     "lost",  # no states arrive, or the controller closed the connection; reconnect() tries again
@@ -40,9 +40,11 @@ MESSAGES: dict[str, str] = {
     "idle.stopped": "The motion was stopped on request; the arm stands still.",
     "idle.operator": "The motion was stopped: nobody was at the controls for {seconds:g} s.",
     "idle.failed": "The last request failed: {error}",
+    "idle.guided": "Hand guiding has ended; the arm stands still.",
     "idle.jogged": "The arm stands where it was jogged to.",
     "moving": "The arm is moving.",
     "moving.jog": "The arm is moved by hand: it follows what is held.",
+    "moving.guided": "Hand guiding: the arm is weightless and goes where it is pushed.",
     "stopping": "The arm is being brought to rest.",
     "stopping.operator": "Nobody is at the controls: the arm is being brought to rest.",
     "fault": "The controller stopped the arm: {faults}. Recover leads out.",
@@ -113,6 +115,8 @@ class SupervisorStatus:
     """Commanded joint angles, shape (n,), [rad]; plan the next motion from here."""
     dq: JointVector | None = None
     """Measured joint velocities, shape (n,), [rad/s]."""
+    tau_ext: Array | None = None
+    """Force and moment from outside as the controller estimates them, base axes, shape (6,), [N, N m]."""
     robot_mode: RobotMode | None = None
     controller_mode: ControllerMode | None = None
     faults: tuple[Fault, ...] = ()

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from rcilab.faults import faults_from_bits
 from rcilab.state import ControllerMode, RobotMode
 from rcilab.supervisor.lateness import late_cycles, summarise
@@ -59,6 +61,7 @@ class StatusReader:
             "robot_mode": RobotMode(last["robot_mode"]),
             "controller_mode": ControllerMode(last["controller_mode"]),
             "faults": faults_from_bits(bits >> place & 1 for place in range(32)) if bits else (),
+            "tau_ext": np.array(self._block.felt),
             "success_rate": float(last["success_rate"]),
             "message_id": int(last["message_id"]),
         }

@@ -15,6 +15,7 @@ from rcilab.arrays import as_vector
 from rcilab.client.address import parse_address
 from rcilab.errors import ConnectionLostError, RcilabError, UsageError
 from rcilab.supervisor.admission import require_admissible, require_ready
+from rcilab.supervisor.guiding import GuideKind, GuideSpace, require_guidable
 from rcilab.supervisor.jog_command import JogCommand, JogKind, write_jog
 from rcilab.supervisor.keeper import ANSWER_TIMEOUT, ProcessKeeper
 from rcilab.supervisor.launch import require_plant
@@ -227,8 +228,32 @@ class Supervisor:
             if self._block is not None:
                 self._block.words[Word.JOG_BEAT] = 0
 
+    def start_guiding(self, space: GuideSpace = "joint", kind: GuideKind = "free") -> Ticket:
+        """Frees the arm for a hand to guide it (startDrag), until `stop_guiding` or `stop`; done once it is free.
+
+        The phase is "moving" meanwhile and the code "moving.guided". It ends like a motion when nobody is at the
+        controls any more, and by itself when the controller leaves it, as on a fault.
+
+        Args:
+            space: In joint space every joint is free, and `kind` has no effect.
+            kind: What stays free in Cartesian space.
+
+        Raises:
+            InvalidValueError: There is no such space or kind.
+            UsageError: The arm is moving, no controller is connected, or nobody is at the controls.
+        """
+        require_guidable(space, kind)
+        with self._lock:
+            self._require_block()
+            require_ready(self.status(), is_operator_overdue=self._is_operator_overdue())
+            return self._ask("start guiding", kind="start_guiding", space=space, type=kind)
+
+    def stop_guiding(self) -> Ticket:
+        """Ends hand guiding (stopDrag); done once the arm stands still."""
+        return self._ask("stop guiding", kind="stop_guiding")
+
     def stop(self) -> Ticket:
-        """Brings a running motion to rest within the limits; done when it stands, at once when nothing moves."""
+        """Brings a running motion to rest within the limits, or ends guiding; done when the arm stands still."""
         with self._lock:
             block = self._require_block()
             block.words[Word.JOG_BEAT] = 0

@@ -35,6 +35,7 @@ from rcilab.protocols.rci import STATE_SIZE
 from rcilab.realtime import enter_realtime
 from rcilab.state import ControllerMode, RobotState
 from rcilab.supervisor.failure import pack_failure
+from rcilab.supervisor.guiding import HandGuide
 from rcilab.supervisor.jogging import HeldJog
 from rcilab.supervisor.layout import OPERATOR_TIMEOUT, ControlBlock, Word
 from rcilab.supervisor.mailbox import Mailbox
@@ -74,6 +75,7 @@ class Worker:
         self._deferred: list[dict[str, Any]] = []
         self._model = load_model(self._settings.name, tool=self._settings.T_flange_tool)
         self._jog: HeldJog | None = None
+        self._guide: HandGuide | None = None
 
     def run(self) -> int:
         """Lives until asked to end or until the supervisor is gone; returns the exit code."""
@@ -92,6 +94,7 @@ class Worker:
                 self._publisher.beat()
                 self._listen()
                 self._serve()
+                self._mind_guiding()
         finally:
             self._disconnect()
         return 0
@@ -117,7 +120,10 @@ class Worker:
     def _show_state(self, state: RobotState) -> None:
         """Keeps the phase in step with what the robot reports while nothing moves."""
         phase = self._publisher.snapshot.phase
-        if state.faults:
+        if self._guide is not None and self._guide.has_ended(state):
+            self._guide = None
+            self._say_ready()
+        elif state.faults:
             if phase != "fault":
                 self._say("fault", "fault", faults=_names(state.faults))
         elif phase in ("fault", "lost"):
@@ -144,7 +150,7 @@ class Worker:
             self._say("lost", "lost.unreachable", error=str(error))
         elif isinstance(error, ControlError) and error.faults:
             self._say("fault", "fault", faults=_names(error.faults))
-        elif self._link is not None:
+        elif self._link is not None and self._guide is None:
             self._say("idle", "idle.failed", error=str(error))
         self._outbox.post({"id": request["id"], "failure": pack_failure(error)})
 
@@ -187,6 +193,35 @@ class Worker:
     def _do_stop(self, request: dict[str, Any]) -> None:
         # Served in its turn, so what it was meant for stands still by now; see `_watch`.
         self._stops_seen = request["number"]
+        self._end_guiding("idle.stopped")
+
+    def _do_start_guiding(self, request: dict[str, Any]) -> None:
+        self._require_link()
+        guide = HandGuide(self._commands)
+        guide.start(request["space"], request["type"])
+        self._guide = guide
+        self._publisher.update(motion_time=None, motion_duration=None)
+        self._say("moving", "moving.guided")
+
+    def _do_stop_guiding(self, request: dict[str, Any]) -> None:
+        self._end_guiding("idle.guided")
+
+    def _mind_guiding(self) -> None:
+        """Ends hand guiding once nobody is at the controls any more."""
+        if self._guide is None or not self._is_operator_gone():
+            return
+        try:
+            self._end_guiding("idle.operator", seconds=OPERATOR_TIMEOUT)
+        except RcilabError as error:  # Whatever it was, the states that follow tell where the arm is.
+            self._say("idle", "idle.failed", error=str(error))
+
+    def _end_guiding(self, code: str, **facts: Any) -> None:
+        """Ends hand guiding, where there is any, and returns once the arm is at rest."""
+        guide, self._guide = self._guide, None
+        if guide is not None:
+            self._say("stopping", "stopping")
+            guide.stop()
+            self._say("idle", code, **facts)
 
     def _do_end(self, request: dict[str, Any]) -> None:
         self._is_ending = True
@@ -278,6 +313,8 @@ class Worker:
     def _say_ready(self) -> None:
         if self._link is not None and self._link.latest is not None and self._link.latest.faults:
             self._say("fault", "fault", faults=_names(self._link.latest.faults))
+        elif self._guide is not None:
+            self._say("moving", "moving.guided")
         elif self._publisher.snapshot.powered:
             self._say("idle", "idle")
         else:
@@ -294,6 +331,7 @@ class Worker:
 
     def _disconnect(self) -> None:
         if self._link is not None:
+            self._guide = None  # The controller ends it with the connection.
             self._link.close()
             self._link = None
             self._publisher.update(powered=None)

@@ -132,6 +132,12 @@ class ArmView:
         """Names of the joint frames, base to flange."""
         return tuple(self._frames)
 
+    @property
+    def link_meshes(self) -> dict[str, int]:
+        """Names of the meshes of the moving links, each with the number of its link, from 1."""
+        below = {name: name.count("/joint") for name, _ in self._meshes}
+        return {name: link for name, link in below.items() if link > 0}
+
     def show(self, q: ArrayLike | Sequence[float]) -> None:
         """Puts the arm into a pose.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Coroutine, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -99,6 +99,19 @@ class ViserScene:
             handle.color = color
         if opacity is not None:
             handle.opacity = _viser_opacity(opacity)
+
+    def on_drag(self, name: str, act: Callable[[Any], Coroutine[Any, Any, None]]) -> None:
+        """Hears of a mesh that is dragged with the mouse; the camera then stays where it is.
+
+        Args:
+            name: Name of the mesh.
+            act: Called with viser's `SceneNodeDragEvent`, on the server's event loop.
+        """
+        self._handle(name).on_drag(act)
+
+    def ignore_drag(self, name: str) -> None:
+        """Lets a drag that begins on this mesh turn the camera again."""
+        self._handle(name).remove_drag_callback()
 
     def remove(self, name: str) -> None:
         """Removes a node and everything below it; see `Scene`."""

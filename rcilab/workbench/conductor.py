@@ -13,6 +13,7 @@ from rcilab.errors import RcilabError
 from rcilab.workbench import requests
 from rcilab.workbench.goal_actions import GoalActions
 from rcilab.workbench.mailbox import Mailbox
+from rcilab.workbench.push_actions import PushActions
 from rcilab.workbench.robot_actions import RobotActions
 from rcilab.workbench.session import Session
 from rcilab.workbench.store import Store
@@ -34,6 +35,7 @@ class Conductor:
         self._store, self._session = store, session
         self._goal = GoalActions(store, session)
         self.robot = RobotActions(store, session)
+        self._push = PushActions(store, session)
         self._view = ViewActions(store)
         self._mailbox: Mailbox[requests.Request] = Mailbox()
         self._thread: threading.Thread | None = None
@@ -52,6 +54,9 @@ class Conductor:
             requests.SetLaw: self._goal.set_law,
             requests.Drive: self.robot.drive,
             requests.ChooseRobot: self.robot.choose_robot,
+            requests.SetPush: self._push.set_push,
+            requests.HoldPush: self._push.hold,
+            requests.PullArm: self._push.pull,
             requests.Seek: self._view.seek,
             requests.Play: self._view.play,
             requests.SetView: self._view.set_view,
@@ -74,6 +79,7 @@ class Conductor:
         self._ending.set()
         if self._thread is not None:
             self._thread.join(10.0)
+        self._push.close()
 
     def act(self, request: requests.Request) -> None:
         """Carries out one request; what goes wrong becomes a sentence on the page."""
@@ -92,6 +98,7 @@ class Conductor:
         elif event == "rested":
             self._goal.catch_up()
         self._goal.settle()
+        self._push.tick()
 
     def _run(self) -> None:
         last = time.monotonic()
@@ -121,7 +128,9 @@ def _coalescing_key(request: requests.Request) -> str | None:
         return f"target.{request.page}"
     if isinstance(request, requests.MoveJoint):
         return f"joint.{request.joint}.{request.page}"
-    if isinstance(request, requests.Seek | requests.SetSpeed | requests.SetArmAngle):
+    if isinstance(request, requests.PullArm) and request.phase == "update":
+        return f"pull.{request.page}"
+    if isinstance(request, requests.Seek | requests.SetSpeed | requests.SetArmAngle | requests.HoldPush):
         return f"{type(request).__name__}.{request.page}"
     return None
 

@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, Any
 from rcilab.workbench.live import LiveChannel
 from rcilab.workbench.panels import Panel
 from rcilab.workbench.panels.check import CheckPanel
+from rcilab.workbench.panels.health import HealthPanel
 from rcilab.workbench.panels.jog import JogPanel
+from rcilab.workbench.panels.push import PushPanel
 from rcilab.workbench.panels.run import RunPanel
 from rcilab.workbench.panels.settings import SettingsPanel
 from rcilab.workbench.panels.status import status_values
@@ -34,7 +36,7 @@ _TABS = (
     ("tab.jog", "adjustments-horizontal", JogPanel),
     ("tab.target", "current-location", TargetPanel),
     ("tab.check", "clipboard-check", CheckPanel),
-    ("tab.run", "player-play", RunPanel),
+    ("tab.run", "player-play", RunPanel, PushPanel, HealthPanel),
     ("tab.settings", "settings", SettingsPanel),
 )
 
@@ -94,11 +96,12 @@ class Presenter:
         gui.set_panel_label(self._text("panel.main"))
         tabs = gui.add_tab_group()
         self._panels = []
-        for label, icon, kind in _TABS:
-            panel = kind(self._text, self._ask)
+        for label, icon, *kinds in _TABS:
             with tabs.add_tab(self._text(label), icon):
-                panel.build(gui, state)
-            self._panels.append(panel)
+                for kind in kinds:
+                    panel = kind(self._text, self._ask)
+                    panel.build(gui, state)
+                    self._panels.append(panel)
         self._timeline = TimelinePanel(self._text, self._ask)
         window = gui.add_panel()
         with window.add_tab(self._text("panel.timeline"), "timeline"):

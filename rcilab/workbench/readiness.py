@@ -30,6 +30,8 @@ def obstacle(state: UiState, status: SupervisorStatus) -> Message | None:
     """Returns what stands in the way of Execute, or None when it may be pressed."""
     if state.busy is not None:
         return message("ready.busy")
+    if status.code == "moving.guided":
+        return message("ready.guided")
     if status.phase in _NOT_IDLE:
         return message(_NOT_IDLE[status.phase])
     if not status.powered:

@@ -91,15 +91,47 @@ class SetLaw(Request):
 class Drive(Request):
     """Something for the robot: what the buttons of the Run tab say."""
 
-    what: Literal["execute", "stop", "recover", "power_on", "power_off", "reconnect"]
+    what: Literal["execute", "stop", "recover", "power_on", "power_off", "reconnect", "guide", "unguide"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ChooseRobot(Request):
-    """Another arm, another destination, or both."""
+    """Another arm, another destination, or another plant for the virtual controller."""
 
     model: str | None = None
     target: str | None = None
+    plant: str | None = None
+    """"ideal" or "mujoco"."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetPush(Request):
+    """How to push the arm and how to guide it; what is None stays."""
+
+    link: int | None = None
+    """From 1; 0: the tool."""
+    direction: str | None = None
+    newtons: float | None = None
+    grab: bool | None = None
+    way: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HoldPush(Request):
+    """The push button is held; said ten times a second."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PullArm(Request):
+    """The mouse drags a link of the arm."""
+
+    link: int
+    """From 1."""
+    grabbed: tuple[float, ...]
+    """Where it was taken hold of, base axes, [m]."""
+    hand: tuple[float, ...]
+    """Where the mouse is, base axes, [m]."""
+    phase: Literal["start", "update", "end"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

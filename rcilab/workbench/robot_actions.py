@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+import time
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +15,7 @@ from rcilab.faults import Fault
 from rcilab.model import load_model
 from rcilab.workbench import requests
 from rcilab.workbench.goal_actions import initial_goal
+from rcilab.workbench.pushing import PLANTS, TOOL, is_guided
 from rcilab.workbench.reach import Tone
 from rcilab.workbench.readiness import is_moving, obstacle
 from rcilab.workbench.session import Session
@@ -22,6 +26,7 @@ if TYPE_CHECKING:
     from rcilab.supervisor import SupervisorStatus, Ticket
 
 _LONGEST_RECORDING = 600_000  # Rows: ten minutes of cycles.
+_SECOND_THOUGHT = 10.0  # [s] A choice: a second press that comes later asks anew.
 _DELAY_WINDOW = 1000  # Rows that the play-out delay is looked for in; longer than any, and every motion moves by then.
 
 
@@ -37,6 +42,8 @@ class RobotActions:
         self._powered = False  # The virtual arm's motors have been switched on once.
         self._incident = 0
         self._phase = ""
+        self._guided = False
+        self._asked_to_guide = -math.inf
 
     def drive(self, request: requests.Drive) -> None:
         """Passes one button of the Run tab on to the supervisor."""
@@ -52,14 +59,32 @@ class RobotActions:
             "power_on": supervisor.power_on,
             "power_off": supervisor.power_off,
             "reconnect": supervisor.reconnect,
+            "guide": self._guide,
+            "unguide": supervisor.stop_guiding,
         }[request.what]
-        self._tickets.append((request.what, act()))
+        ticket = act()
+        if ticket is not None:
+            self._tickets.append((request.what, ticket))
+
+    def _guide(self) -> Ticket | None:
+        """Frees the arm for a hand to guide it; a real one only when that is asked for twice."""
+        state, now = self._store.state, time.monotonic()
+        if state.target != "virtual" and now - self._asked_to_guide > _SECOND_THOUGHT:
+            self._asked_to_guide = now
+            self._store.say("warn", message("guide.sure", address=state.target, seconds=f"{_SECOND_THOUGHT:.0f}"))
+            return None
+        self._asked_to_guide = -math.inf
+        space, kind = state.push.way.split(".")
+        return self._session.supervisor().start_guiding(space, kind)  # type: ignore[arg-type]  # One of WAYS.
 
     def choose_robot(self, request: requests.ChooseRobot) -> None:
-        """Takes another arm or another destination; refused while the arm moves."""
+        """Takes another arm, destination or plant; refused while the arm moves."""
         state = self._store.state
         if is_moving(self._session.status()):
             self._store.say("warn", message("notice.moving"))
+            return
+        if request.plant is not None and request.model is None and request.target is None:
+            self._choose_plant(request.plant)
             return
         model = state.model if request.model is None else load_model(request.model)
         target = state.target if request.target is None else request.target.strip()
@@ -71,6 +96,18 @@ class RobotActions:
             return
         self.open(model.name, target)
 
+    def _choose_plant(self, plant: str) -> None:
+        """Has the virtual controller started again with another plant; goal and plan stay."""
+        state = self._store.state
+        if plant not in PLANTS or plant == state.plant:
+            return
+        if state.target != "virtual":
+            self._store.say("warn", message("plant.address", address=state.target))
+            return
+        self._store.update(plant=plant, playing=False)
+        self._powered, self._tickets, self._recording, self._incident, self._phase = False, [], False, 0, ""
+        self._session.open(state.model, state.target, plant)
+
     def open(self, name: str, target: str) -> None:
         """Connects to a destination with an arm, starting from a clean table."""
         state = self._store.state
@@ -81,7 +118,9 @@ class RobotActions:
         if model is not state.model:
             self._store.forget()
             changes |= {"model": model, "goal": initial_goal(model, model.home), "plot_joint": 0, "problems": {}}
-        self._session.open(model, target)  # First: from here on no state of the old arm is shown on the new one.
+            changes |= {"push": replace(state.push, link=TOOL)}  # The other arm may have no such link.
+        # First: from here on no state of the old arm is shown on the new one.
+        self._session.open(model, target, state.plant)
         self._store.update(place=0.0, playing=False, **changes)
 
     def watch(self) -> str | None:
@@ -97,13 +136,17 @@ class RobotActions:
             if status.incident.code == "crashed.controller":
                 self._powered = False  # The one that is started in its place comes up without motor power.
             self._store.say("bad", _tell_incident(status.incident.code, status.incident.message))
+        if self._guided and status.code == "idle.operator":
+            self._store.say("warn", message("notice.operator"))
+        self._guided = is_guided(status) or (self._guided and status.phase == "stopping")
         before, self._phase = self._phase, status.phase
         self._record(status)
         if not self._placed and status.q_c is not None:
             self._placed = True
             self._store.update(goal=initial_goal(self._store.state.model, status.q_c))
             return "placed"
-        if not self._powered and status.phase == "idle" and self._store.state.target == "virtual":
+        may_power = self._session.is_ready and status.phase == "idle" and self._store.state.target == "virtual"
+        if may_power and not self._powered:
             self._powered = True
             if not status.powered:
                 self.drive(requests.Drive(what="power_on"))

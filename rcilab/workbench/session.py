@@ -30,14 +30,14 @@ class Session:
         self._generation = 0
         self._worker: threading.Thread | None = None
 
-    def open(self, model: RobotModel, target: str) -> None:
-        """Closes what is open and starts a supervisor for this arm and destination; returns at once."""
+    def open(self, model: RobotModel, target: str, plant: str = "ideal") -> None:
+        """Closes what is open and starts a supervisor for this arm, destination and plant; returns at once."""
         with self._lock:
             self._generation += 1
             generation, previous = self._generation, self._worker
             self._ready = self._shown = None
             self._worker = threading.Thread(
-                target=self._exchange, args=(generation, previous, model, target), name="session", daemon=True
+                target=self._exchange, args=(generation, previous, model, target, plant), name="session", daemon=True
             )
             self._worker.start()
 
@@ -61,6 +61,11 @@ class Session:
         from rcilab.supervisor import SupervisorStatus
 
         return SupervisorStatus(phase="starting", code="starting", message="Starting the control process.")
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether `supervisor` has one to ask; its status may show an idle arm a moment earlier."""
+        return self._ready is not None
 
     def supervisor(self) -> Supervisor:
         """Returns the supervisor to ask something of.
@@ -89,7 +94,9 @@ class Session:
             with suppress(RcilabError):  # Closed in the meantime.
                 ready.set_operator_present(True)
 
-    def _exchange(self, generation: int, previous: threading.Thread | None, model: RobotModel, target: str) -> None:
+    def _exchange(
+        self, generation: int, previous: threading.Thread | None, model: RobotModel, target: str, plant: str
+    ) -> None:
         if previous is not None:
             previous.join()
         old, self._current = self._current, None
@@ -101,7 +108,7 @@ class Session:
         try:
             from rcilab.supervisor import Supervisor
 
-            supervisor = Supervisor(model, target)
+            supervisor = Supervisor(model, target, plant)
             self._current = self._shown = supervisor
             supervisor.start()
         except RcilabError as error:

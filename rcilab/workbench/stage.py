@@ -10,6 +10,7 @@ import numpy as np
 from rcilab.views.arm_view import ArmView
 from rcilab.views.viser_scene import ViserScene
 from rcilab.workbench import requests
+from rcilab.workbench.grip import Grip
 from rcilab.workbench.planning import PATH_POINTS
 from rcilab.workbench.readiness import is_moving
 from rcilab.workbench.text import Text
@@ -60,6 +61,7 @@ class Stage:
         self._candidate.show(state.goal.q)
         self._show_plan(state, status, live)
         self._show_target(state, text)
+        self._grip.show(state, status, text)
 
     def _build(self, state: UiState) -> None:
         server, full = self._server, state.quality == "full"
@@ -68,6 +70,7 @@ class Stage:
             for arm in (self._live, self._candidate, self._ghost):
                 arm.remove()
             self._gizmo.remove()
+            self._grip.remove()
         server.scene.configure_default_lights(True, cast_shadow=full)
         scene.configure_environment_map("studio" if full else None, environment_intensity=0.55)
         scene.set_background_image(_backdrop(), format="jpeg", jpeg_quality=92)
@@ -89,6 +92,7 @@ class Stage:
         scene.add_frame("/base_axes", axes_length=0.22, axes_radius=0.004, origin_radius=0.006)
         drawing = ViserScene(server, shadows=full)
         self._live = ArmView(drawing, "live", state.model, "live", quality="fine" if full else "coarse")
+        self._grip = Grip(server, drawing, self._live, self._ask)
         self._candidate = ArmView(drawing, "candidate", state.model, "candidate")
         self._ghost = ArmView(drawing, "plan", state.model, "plan")
         self._visible, self._plan, self._tone, self._said = {}, None, "", ""

@@ -15,6 +15,7 @@ from rcilab.model import RobotModel
 from rcilab.spatial import Pose
 from rcilab.workbench.lease import Lease
 from rcilab.workbench.planning import Plan, PlannableLaw
+from rcilab.workbench.pushing import Plant, PushState
 from rcilab.workbench.reach import Reach, Tone
 from rcilab.workbench.text import Message
 
@@ -66,6 +67,9 @@ class UiState:
     model: RobotModel
     target: str = "virtual"
     """"virtual" or an address, rci://HOST:PORT."""
+    plant: Plant = "ideal"
+    """What the virtual controller moves."""
+    push: PushState = field(default_factory=PushState)
     goal: Goal
     plan: Plan | None = None
     no_plan: Message | None = None

@@ -126,5 +126,18 @@
     if (event.key === "Escape" && !event.repeat) pressStop();
   }, true);
 
+  // A button that is held must not stay held when the window loses the focus: nobody hears the release then.
+  let held = null;
+  window.addEventListener("pointerdown", (event) => { held = event; }, true);
+  window.addEventListener("pointerup", () => { held = null; }, true);
+  const letGo = () => {
+    if (!held) return;
+    const { target, pointerId } = held;
+    held = null;
+    target.dispatchEvent(new PointerEvent("pointercancel", { bubbles: true, pointerId }));
+  };
+  window.addEventListener("blur", letGo);
+  document.addEventListener("visibilitychange", () => { if (document.hidden) letGo(); });
+
   if (document.body) build(); else document.addEventListener("DOMContentLoaded", build);
 })();

@@ -1,4 +1,4 @@
-"""Run: where to, power, Execute, Stop, Recover; what the controller says and how well the cycles are kept."""
+"""Run: where to, power, Execute, Recover, and what the controller says."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 from rcilab.workbench import requests
 from rcilab.workbench.panels.target import planned_html
+from rcilab.workbench.pushing import PLANTS
 from rcilab.workbench.readiness import is_moving, obstacle
 from rcilab.workbench.text import Text
-from rcilab.workbench.widgets import Ask, Html, esc, on_press
+from rcilab.workbench.widgets import Ask, Html, Linked, esc, on_press
 
 if TYPE_CHECKING:
     from rcilab.supervisor import SupervisorStatus
@@ -44,6 +45,7 @@ class RunPanel:
                 button = gui.add_button(text(f"run.{what}"), icon=icon, color=color, hint=text(f"run.{what}_hint"))
                 on_press(button, ask, _drive(what))
                 self._buttons[what] = button
+            self._faults = Html(gui)
         with gui.add_folder(text("run.where")):
             self._where = Html(gui)
             typed = state.target if state.target != "virtual" else ""
@@ -56,9 +58,11 @@ class RunPanel:
                 text("run.virtual"), icon="device-desktop", color="gray", hint=text("run.virtual_hint")
             )
             on_press(virtual, ask, lambda page: requests.ChooseRobot(page=page, target="virtual"))
-        with gui.add_folder(text("run.health")):
-            self._health = Html(gui)
-        gui.add_html(f'<p class="rl-note">{esc(text("stop.note"))}</p>')
+            plants = {text(f"plant.{plant}"): plant for plant in PLANTS}
+            self._plants = {plant: label for label, plant in plants.items()}
+            chosen = self._plants[state.plant]
+            plant = gui.add_dropdown(text("plant.title"), tuple(plants), initial_value=chosen, hint=text("plant.hint"))
+            self._plant = Linked(plant, ask, lambda v, p: requests.ChooseRobot(page=p, plant=plants.get(v)))
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows the robot."""
@@ -73,13 +77,15 @@ class RunPanel:
         tone = {"idle": "good", "moving": "good", "stopping": "warn", "starting": "warn", "connecting": "warn"}.get(
             status.phase, "bad"
         )
-        where = text("where.virtual") if state.target == "virtual" else state.target
+        self._plant.show(self._plants[state.plant])
+        self._plant.handle.disabled = moving or state.target != "virtual"
+        where = text(f"where.{state.plant}") if state.target == "virtual" else state.target
         address = f'<br><span class="rl-dim">{esc(status.address)}</span>' if status.address else ""
         self._where.show(
             f'<p class="rl-verdict rl-{tone}"><b>{esc(where)}</b> {esc(text("phase." + status.phase))}{address}</p>'
             + (f'<p class="rl-note">{esc(status.message)}</p>' if tone == "bad" else "")
         )
-        self._health.show(faults_html(status, text) + health_html(status, text))
+        self._faults.show(faults_html(status, text))
 
 
 def _drive(what: Any):  # type: ignore[no-untyped-def]
@@ -101,22 +107,3 @@ def faults_html(status: SupervisorStatus, text: Text) -> str:
 def _remedy(fault: Any, text: Text) -> str:
     key = f"remedy.{fault.name}"
     return text(key) if text.has(key) else text("remedy.smoothness")
-
-
-def health_html(status: SupervisorStatus, text: Text) -> str:
-    """Returns how well the cycles are kept, as a table."""
-    late = status.lateness
-    mode = "—" if status.robot_mode is None else text(f"robot_mode.{status.robot_mode.name}")
-    power = {None: "—", True: text("run.on"), False: text("run.off")}[status.powered]
-    rows = [
-        ("mode", mode),
-        ("control", "—" if status.controller_mode is None else text(f"controller_mode.{status.controller_mode.name}")),
-        ("power", power),
-        ("success", f"{100.0 * status.success_rate:.1f} %"),
-        ("rate", f"{status.rate_hz:.0f} Hz"),
-        ("late", text("run.late_value", late=status.late_cycles, lost=status.lost_cycles, cycles=late.cycles)),
-        ("lateness", f"{late.p50:.0f} / {late.p99:.0f} / {late.p999:.0f} / {late.max:.0f} µs"),
-        ("scheduling", text(f"scheduling.{status.scheduling}")),
-    ]
-    body = "".join(f"<tr><th>{esc(text(f'health.{name}'))}</th><td>{esc(value)}</td></tr>" for name, value in rows)
-    return f'<table class="rl-table rl-facts-table">{body}</table>'

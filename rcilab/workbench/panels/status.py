@@ -35,13 +35,15 @@ def _chips(state: UiState, status: SupervisorStatus, text: Text) -> list[dict[st
     doing = text.say(state.busy) if state.busy is not None else phase
     if status.phase == "idle" and status.powered is False:
         doing = text("phase.unpowered")
+    if status.code == "moving.guided":
+        doing = text("phase.guided")
     mode = "—" if status.robot_mode is None else text(f"robot_mode.{status.robot_mode.name}")
     faults = text("bar.none") if not status.faults else ", ".join(fault.manual_name for fault in status.faults)
     connected = status.rate_hz > 0.0
     lease = state.lease
     return [
         _chip(text, "model", state.model.name),
-        _chip(text, "where", text("where.virtual") if state.target == "virtual" else state.target),
+        _chip(text, "where", text(f"where.{state.plant}") if state.target == "virtual" else state.target),
         _chip(text, "phase", doing, _TONES.get(status.phase, "bad"), hint=status.message),
         _chip(text, "mode", mode),
         _chip(text, "rate", f"{status.rate_hz:.0f} Hz" if connected else "—"),

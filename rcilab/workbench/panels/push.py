@@ -1,0 +1,105 @@
+"""Push: a force on a link for as long as a button is held, and hand guiding, which makes the arm follow it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rcilab.workbench import requests
+from rcilab.workbench.pushing import DIRECTIONS, SPRING, STRONGEST, TOOL, WAYS, can_grab, is_guided, no_push
+from rcilab.workbench.readiness import is_moving
+from rcilab.workbench.text import Text
+from rcilab.workbench.widgets import Ask, Html, Linked, esc, on_press
+
+if TYPE_CHECKING:
+    from rcilab.supervisor import SupervisorStatus
+    from rcilab.workbench.store import UiState
+
+_HOLD_RATE = 10.0  # [1/s] A held button says so this often.
+
+
+class PushPanel:
+    """A group of the Run tab."""
+
+    def __init__(self, text: Text, ask: Ask) -> None:
+        self._text, self._ask = text, ask
+
+    def build(self, gui: Any, state: UiState) -> None:
+        """Adds the controls."""
+        with gui.add_folder(self._text("guide.title")):
+            self._build_guiding(gui, state)
+        with gui.add_folder(self._text("push.title")):
+            self._build_push(gui, state)
+
+    def _build_guiding(self, gui: Any, state: UiState) -> None:
+        text, ask = self._text, self._ask
+        ways = {text(f"guide.{way}"): way for way in WAYS}
+        self._ways = {way: label for label, way in ways.items()}
+        way = gui.add_dropdown(
+            text("guide.way"), tuple(ways), initial_value=self._ways[state.push.way], hint=text("guide.way_hint")
+        )
+        self._way = Linked(way, ask, lambda v, p: requests.SetPush(page=p, way=ways.get(v)))
+        self._guide = gui.add_button(text("drive.guide"), icon="hand-move", color="blue", hint=text("guide.hint"))
+        on_press(self._guide, ask, lambda page: requests.Drive(page=page, what="guide"))
+        self._unguide = gui.add_button(text("drive.unguide"), icon="hand-stop", color="gray")
+        on_press(self._unguide, ask, lambda page: requests.Drive(page=page, what="unguide"))
+
+    def _build_push(self, gui: Any, state: UiState) -> None:
+        text, ask, push = self._text, self._ask, state.push
+        self._note = Html(gui)
+        places = {text("push.tool"): TOOL}
+        places |= {text("push.link", number=number): number for number in range(1, state.model.n + 1)}
+        self._places = {link: label for label, link in places.items()}
+        link = gui.add_dropdown(text("push.where"), tuple(places), initial_value=self._places[push.link])
+        self._link = Linked(link, ask, lambda v, p: requests.SetPush(page=p, link=places.get(v)))
+        direction = gui.add_dropdown(
+            text("push.direction"), tuple(DIRECTIONS), initial_value=push.direction, hint=text("push.direction_hint")
+        )
+        self._direction = Linked(direction, ask, lambda v, p: requests.SetPush(page=p, direction=v))
+        force = gui.add_slider(text("push.force"), 0.0, STRONGEST, 1.0, push.newtons)
+        self._force = Linked(force, ask, lambda v, p: requests.SetPush(page=p, newtons=v))
+        self._button = gui.add_button(text("push.hold"), icon="hand-finger", color="grape", hint=text("push.hold_hint"))
+
+        @self._button.on_hold(callback_hz=_HOLD_RATE)
+        async def _(event: Any) -> None:
+            ask(requests.HoldPush(page=event.client_id))
+
+        grab = gui.add_checkbox(text("push.grab"), push.grab, hint=text("push.grab_hint", stiffness=f"{SPRING:.0f}"))
+        self._grab = Linked(grab, ask, lambda v, p: requests.SetPush(page=p, grab=v))
+        self._felt = Html(gui)
+
+    def show(self, state: UiState, status: SupervisorStatus) -> None:
+        """Follows state and robot."""
+        text, push = self._text, state.push
+        self._way.show(self._ways[push.way])
+        self._link.show(self._places[push.link])
+        self._direction.show(push.direction)
+        self._force.show(push.newtons)
+        self._grab.show(push.grab)
+        guided, reason = is_guided(status), no_push(status)
+        self._guide.disabled = is_moving(status) or status.phase != "idle" or not status.powered
+        self._unguide.disabled = not guided
+        self._button.disabled = reason is not None
+        if reason is None and state.plant == "ideal" and not guided:
+            said = text("push.ideal")
+        elif reason is None and not guided:
+            said = text("push.stiff")
+        else:
+            said = text("push.free") if reason is None else text.say(reason)
+        if can_grab(state, status):
+            said += " " + text("push.drag")
+        self._note.show(f'<p class="rl-note">{esc(said)}</p>')
+        self._felt.show(felt_html(status, text))
+
+
+def felt_html(status: SupervisorStatus, text: Text) -> str:
+    """Returns what the controller believes presses on the arm."""
+    if status.tau_ext is None:
+        return ""
+    force = " / ".join(f"{round(float(number)) + 0:d}" for number in status.tau_ext[:3])
+    moment = " / ".join(f"{float(number) + 0.0:.1f}" for number in np.round(status.tau_ext[3:], 1))
+    return (
+        f'<table class="rl-table rl-facts-table"><tr><th>{esc(text("push.felt"))}</th>'
+        f"<td>{force} N<br>{moment} N·m</td></tr></table>"
+    )
