@@ -16,6 +16,7 @@ from rcilab.workbench.mailbox import Mailbox
 from rcilab.workbench.robot_actions import RobotActions
 from rcilab.workbench.session import Session
 from rcilab.workbench.store import Store
+from rcilab.workbench.telling import tell_error
 from rcilab.workbench.text import message
 from rcilab.workbench.view_actions import ViewActions
 
@@ -108,7 +109,7 @@ class Conductor:
         try:
             action()
         except RcilabError as error:
-            self._store.say("bad", message("notice.plain", text=str(error)))
+            self._store.say("bad", tell_error(error))
         except Exception as error:  # A bug of ours must neither end the thread nor stay unseen.
             self.errors.append(error)
             traceback.print_exc(file=sys.stderr)

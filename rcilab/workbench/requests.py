@@ -91,7 +91,7 @@ class SetLaw(Request):
 class Drive(Request):
     """Something for the robot: what the buttons of the Run tab say."""
 
-    what: Literal["execute", "stop", "recover", "power_on", "power_off", "reconnect"]
+    what: Literal["execute", "confirm", "cancel", "stop", "recover", "power_on", "power_off", "reconnect"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
