@@ -33,10 +33,11 @@ class LoopEvent(asyncio.Event):
 
 def install() -> None:
     """Has every message buffer that viser makes from now on use such events. May be called again."""
-    from viser.infra import _infra
+    from viser.infra import _infra as module
     from viser.infra._async_message_buffer import AsyncMessageBuffer
 
-    if _infra.AsyncMessageBuffer is not AsyncMessageBuffer:
+    infra: Any = module
+    if infra.AsyncMessageBuffer is not AsyncMessageBuffer:
         return
 
     class LoopBuffer(AsyncMessageBuffer):
@@ -44,7 +45,7 @@ def install() -> None:
             super().__init__(event_loop, *args, **options)
             self.message_event, self.flush_event = LoopEvent(event_loop), LoopEvent(event_loop)
 
-    _infra.AsyncMessageBuffer = LoopBuffer
+    infra.AsyncMessageBuffer = LoopBuffer
 
 
 def _running_loop() -> asyncio.AbstractEventLoop | None:

@@ -69,7 +69,9 @@ class Session:
         Raises:
             StartingError: It is not there yet.
         """
-        ready = self._ready
+        ready, shown = self._ready, self._shown
+        if ready is None and shown is not None and shown.status().phase == "idle":
+            return shown  # What the page shows as ready is ready, even while start() is about to return.
         if ready is None:
             raise StartingError("the control process is still starting; try again in a moment")
         return ready
