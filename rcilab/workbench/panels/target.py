@@ -63,7 +63,7 @@ class TargetPanel:
                 speed = gui.add_slider("%", 1, 100, 1, 50, hint=text("target.speed_hint"))
                 self._speed = Linked(speed, ask, lambda v, p: requests.SetSpeed(page=p, speed=v / 100.0))
                 self._speed_field = NumberField(gui.add_text("", "", hint=text("target.speed_hint")), ask, "speed")
-                self._speed_problem = Html(gui)
+            self._speed_problem = Html(gui)
             laws = {text(f"law.{law}"): law for law in LAWS}
             self._laws = {law: label for label, law in laws.items()}
             law = gui.add_dropdown(text("target.law"), tuple(laws))
