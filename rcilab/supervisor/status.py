@@ -49,6 +49,7 @@ MESSAGES: dict[str, str] = {
     "stopping.operator": "Nobody is at the controls: the arm is being brought to rest.",
     "fault": "The controller stopped the arm: {faults}. Recover leads out.",
     "lost.unreachable": "{error}",
+    "lost.other_arm": "{error}",
     "lost.silent": "{address} has stopped sending states; reconnect tries again.",
     "crashed.controller": "The virtual controller has died ({how}); {next}.",
     "crashed.worker": "The control process has died ({how}); {next}.",

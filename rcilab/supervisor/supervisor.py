@@ -145,7 +145,7 @@ class Supervisor:
             phase, code, message = self._judge(shown)
             fields = self._reader.read_fields(shown)
             if phase in ("crashed", "lost", "starting"):
-                fields["rate_hz"] = 0.0
+                fields |= {"rate_hz": 0.0, "robot_mode": None, "controller_mode": None}  # Nobody says so any more.
             return SupervisorStatus(
                 phase=phase,
                 code=code,

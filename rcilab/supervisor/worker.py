@@ -28,7 +28,7 @@ from rcilab.client.recorder import CycleLog
 from rcilab.client.recovery import recover
 from rcilab.client.start_check import describe_start_mismatch
 from rcilab.client.transport import SocketTransport
-from rcilab.errors import ConnectionLostError, ControlError, RcilabError, UsageError
+from rcilab.errors import ConnectionLostError, ControlError, ModelError, RcilabError, UsageError
 from rcilab.model import load_model
 from rcilab.motion import plan_stop
 from rcilab.protocols.rci import STATE_SIZE
@@ -147,7 +147,8 @@ class Worker:
             pass  # Said already.
         elif isinstance(error, ConnectionLostError) or (request["kind"] == "connect" and self._link is None):
             self._disconnect()
-            self._say("lost", "lost.unreachable", error=str(error))
+            code = "lost.other_arm" if isinstance(error, ModelError) else "lost.unreachable"
+            self._say("lost", code, error=str(error))
         elif isinstance(error, ControlError) and error.faults:
             self._say("fault", "fault", faults=_names(error.faults))
         elif self._link is not None and self._guide is None:

@@ -17,7 +17,7 @@ from rcilab.workbench.live import LIVE_PATH, LiveChannel
 from rcilab.workbench.page import decorate
 from rcilab.workbench.session import Session
 from rcilab.workbench.store import Store, UiState
-from rcilab.workbench.text import message
+from rcilab.workbench.telling import tell_error
 
 if TYPE_CHECKING:
     import viser
@@ -67,7 +67,7 @@ class Workbench:
         goal = initial_goal(model, model.home)
         state = UiState(model=model, target=config.target, goal=goal, language=config.language, quality=config.quality)
         self.store = Store(state)
-        self.session = Session(lambda error: self.store.say("bad", message("notice.plain", text=str(error))))
+        self.session = Session(lambda error: self.store.say("bad", tell_error(error, self.session.status())))
         self.conductor = Conductor(self.store, self.session)
         self.server: viser.ViserServer
         self._stopped = threading.Event()

@@ -17,6 +17,7 @@ from rcilab.workbench.push_actions import PushActions
 from rcilab.workbench.robot_actions import RobotActions
 from rcilab.workbench.session import Session
 from rcilab.workbench.store import Store
+from rcilab.workbench.telling import tell_error
 from rcilab.workbench.text import message
 from rcilab.workbench.view_actions import ViewActions
 
@@ -115,7 +116,7 @@ class Conductor:
         try:
             action()
         except RcilabError as error:
-            self._store.say("bad", message("notice.plain", text=str(error)))
+            self._store.say("bad", tell_error(error))
         except Exception as error:  # A bug of ours must neither end the thread nor stay unseen.
             self.errors.append(error)
             traceback.print_exc(file=sys.stderr)

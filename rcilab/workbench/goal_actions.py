@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
@@ -18,7 +19,7 @@ from rcilab.workbench.reach import judge_joints, judge_pose
 from rcilab.workbench.readiness import is_moving
 from rcilab.workbench.session import Session
 from rcilab.workbench.store import Goal, Store
-from rcilab.workbench.text import Message
+from rcilab.workbench.text import Message, message
 
 POSE_FIELDS = ("x", "y", "z", "roll", "pitch", "yaw")
 FURTHEST = 3.0  # [m] A choice: no arm of ours reaches half as far, and the gizmo should stay in sight.
@@ -107,6 +108,10 @@ class GoalActions:
             parsed = parse_number(request.text, -bound, bound, unit)
             value = parsed.value
             act = None if value is None else lambda: self._aim(_with_number(state.goal.target, index, value))
+        elif request.field == "speed":
+            parsed = parse_number(request.text, 100.0 * SLOWEST, 100.0, "%")
+            value = parsed.value
+            act = None if value is None else lambda: self.set_speed(requests.SetSpeed(speed=value / 100.0))
         elif kind == "psi" and state.model.n == 7:
             parsed = parse_number(request.text, -180.0, 180.0, "deg")
             value = parsed.value
@@ -126,6 +131,7 @@ class GoalActions:
         """Plans faster or slower."""
         if math.isfinite(request.speed):
             self._store.update(speed=min(max(request.speed, SLOWEST), 1.0))
+            self._clear_problems("speed")
             self.plan()
 
     def set_law(self, request: requests.SetLaw) -> None:
@@ -136,16 +142,21 @@ class GoalActions:
 
     def plan(self, request: requests.Plan | None = None) -> None:
         """Plans from where the arm stands to the goal, unless it is moving: then when it has come to rest."""
-        del request
         state, status = self._store.state, self._session.status()
         if is_moving(status):
             self._stale = True
             return
         self._stale = False
-        start = state.goal.q if status.q_c is None else status.q_c
-        made = make_plan(state.model, frozen(start), state.goal.q, state.speed, state.law)
+        if status.q_c is None:
+            if request is not None:  # Nothing has changed: what was planned is not lost.
+                self._store.say("warn", message("plan.no_arm"))
+            else:
+                self._store.update(plan=None, no_plan=message("plan.no_arm"), recording=None, place=0.0, playing=False)
+            return
+        made = make_plan(state.model, frozen(status.q_c), state.goal.q, state.speed, state.law)
         self._planned = time.monotonic()
         if isinstance(made, Plan):
+            made = replace(made, short=state.goal.reach.short)
             self._store.update(plan=made, no_plan=None, recording=None, place=0.0, playing=False)
         else:
             self._store.update(plan=None, no_plan=made, recording=None, place=0.0, playing=False)

@@ -6,10 +6,13 @@ Why not viser's own number boxes: they turn a typed "-0.25" into "+0.25" and sen
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 
 from rcilab.workbench.text import Message, message
 
+_TWO_WAYS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
+"""A comma that is a decimal comma to some and groups thousands for others, such as 1,000."""
 _LONGEST = 40  # Characters; nobody types a longer number on purpose.
 
 
@@ -24,7 +27,8 @@ class Parsed:
 def parse_number(typed: str, low: float, high: float, unit: str) -> Parsed:
     """Returns the number that somebody typed.
 
-    Accepts a decimal comma, a typographic minus and the unit behind the number.
+    Accepts a decimal comma, a typographic minus and the unit behind the number; where a comma may as well group
+    thousands, the answer asks which is meant.
 
     Args:
         typed: As it stands in the field.
@@ -39,6 +43,10 @@ def parse_number(typed: str, low: float, high: float, unit: str) -> Parsed:
     )
     if not plain:
         return Parsed(None, message("parse.empty", low=_short(low), high=_short(high), unit=unit))
+    if _TWO_WAYS.fullmatch(plain):
+        return Parsed(
+            None, message("parse.two_ways", typed=shown, point=plain.replace(",", "."), whole=plain.replace(",", ""))
+        )
     if plain.count(",") == 1 and "." not in plain:
         plain = plain.replace(",", ".")
     try:

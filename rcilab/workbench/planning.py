@@ -33,6 +33,8 @@ class Plan:
     """Positions of the tool, shape (N, 3), [m]."""
     effort: Array = field(repr=False)
     """How much of its velocity limit the busiest joint uses at each of these positions, 0 to 1, shape (N,)."""
+    short: Message | None = None
+    """How far short of the target it ends, in words; None when it leads there."""
     complete: bool = False
     """Whether collisions were looked for, too. While somebody drags they are not: it would halve the rate."""
 
@@ -55,6 +57,10 @@ def make_plan(
     from rcilab.conformance import check
     from rcilab.motion import plan_joint
 
+    for name, q in (("plan.start_limit", start), ("plan.at_limit", goal)):
+        outside = np.flatnonzero(~((model.limits.joint.lower < q) & (q < model.limits.joint.upper)))
+        if outside.size:
+            return message(name, joint=int(outside[0]) + 1)
     if float(np.abs(goal - start).max()) < SMALLEST_MOTION:
         return message("plan.here")
     try:

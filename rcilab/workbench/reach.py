@@ -32,7 +32,9 @@ class Reach:
     q: JointVector
     """The configuration at the nearest reachable pose, shape (n,), [rad]."""
     solutions: Solutions | None
-    """All branches at that pose."""
+    """All branches at that pose; None when the target is out of reach, or was posed joint by joint."""
+    short: Message | None = None
+    """How far that pose is from the target, in words; None when the target is reached."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +65,8 @@ def judge_pose(model: RobotModel, target: Pose, near: JointVector, psi: float | 
     """
     found = model.closest(target, near, psi)
     if found.refusal is not None:
-        return Reach(tone="bad", reason=_why_not(found.refusal), q=found.q, solutions=found.solutions)
+        short = _how_short(target, found.pose)
+        return Reach(tone="bad", reason=_why_not(found.refusal), q=found.q, solutions=None, short=short)
     return _judge_configuration(model, found.q, found.solutions)
 
 
@@ -73,13 +76,21 @@ def judge_joints(model: RobotModel, q: JointVector) -> Reach:
 
 
 def _judge_configuration(model: RobotModel, q: JointVector, solutions: Solutions | None) -> Reach:
+    least = margin(model, q)
+    if least.angle <= 0.0:
+        return Reach(tone="warn", reason=message("reach.at_limit", joint=least.joint), q=q, solutions=solutions)
     if model.dexterity(q).smallest < NEAR_SINGULAR:
         return Reach(tone="warn", reason=message("reach.singular"), q=q, solutions=solutions)
-    least = margin(model, q)
     if least.angle < NEAR_LIMIT:
         reason = message("reach.limit", joint=least.joint, margin=f"{math.degrees(least.angle):.1f}")
         return Reach(tone="warn", reason=reason, q=q, solutions=solutions)
     return Reach(tone="good", reason=message("reach.good"), q=q, solutions=solutions)
+
+
+def _how_short(target: Pose, reached: Pose) -> Message:
+    away = float(np.linalg.norm(target.position - reached.position)) * 1000.0
+    turned = math.degrees(2.0 * math.acos(min(1.0, abs(float(np.asarray(target.wxyz) @ np.asarray(reached.wxyz))))))
+    return message("reach.short", mm=f"{away:.0f}", deg=f"{turned:.1f}")
 
 
 def _why_not(refusal: UnreachableError) -> Message:

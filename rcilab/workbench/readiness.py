@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rcilab.workbench.store import UiState
+from rcilab.workbench.telling import tell_status
 from rcilab.workbench.text import Message, message
 
 if TYPE_CHECKING:
@@ -21,7 +22,6 @@ _NOT_IDLE = {
     "stopping": "ready.moving",
     "fault": "ready.fault",
     "lost": "ready.lost",
-    "crashed": "ready.crashed",
     "closed": "ready.starting",
 }
 
@@ -32,6 +32,8 @@ def obstacle(state: UiState, status: SupervisorStatus) -> Message | None:
         return message("ready.busy")
     if status.code == "moving.guided":
         return message("ready.guided")
+    if status.phase == "crashed" or (status.phase == "lost" and state.target == "virtual"):
+        return tell_status(status)
     if status.phase in _NOT_IDLE:
         return message(_NOT_IDLE[status.phase])
     if not status.powered:
@@ -43,6 +45,24 @@ def obstacle(state: UiState, status: SupervisorStatus) -> Message | None:
     if status.q_c is None or float(np.abs(status.q_c - state.plan.starts_at).max()) > _SAME_PLACE:
         return message("ready.elsewhere")
     return None
+
+
+def describe_move(state: UiState) -> Message | None:
+    """Returns what a foreign robot is about to do and waits for a second yes to, or None when nothing waits."""
+    plan = state.plan
+    if plan is None or state.asked is not plan.motion:
+        return None
+    travel = np.degrees(np.abs(plan.motion.goal - plan.motion.start))
+    joint = int(travel.argmax())
+    return message(
+        "run.ask",
+        model=state.model.name,
+        address=state.target,
+        duration=f"{plan.motion.duration:.2f}",
+        joint=joint + 1,
+        angle=f"{travel[joint]:.1f}",
+        mm=f"{1000.0 * float(np.linalg.norm(plan.path[-1] - plan.path[0])):.0f}",
+    )
 
 
 def is_moving(status: SupervisorStatus) -> bool:

@@ -91,7 +91,9 @@ class SetLaw(Request):
 class Drive(Request):
     """Something for the robot: what the buttons of the Run tab say."""
 
-    what: Literal["execute", "stop", "recover", "power_on", "power_off", "reconnect", "guide", "unguide"]
+    what: Literal[
+        "execute", "confirm", "cancel", "stop", "recover", "power_on", "power_off", "reconnect", "guide", "unguide"
+    ]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 import time
+from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rcilab.client.run import find_delay
-from rcilab.errors import CertificateError, ControlError, RcilabError
-from rcilab.faults import Fault
+from rcilab.errors import CertificateError, ConnectionLostError, ControlError, RcilabError
 from rcilab.model import load_model
 from rcilab.workbench import requests
 from rcilab.workbench.goal_actions import initial_goal
@@ -19,7 +19,8 @@ from rcilab.workbench.pushing import PLANTS, TOOL, is_guided
 from rcilab.workbench.reach import Tone
 from rcilab.workbench.readiness import is_moving, obstacle
 from rcilab.workbench.session import Session
-from rcilab.workbench.store import Recording, Store
+from rcilab.workbench.store import Goal, Recording, Store
+from rcilab.workbench.telling import StartingError, tell_error, tell_incident
 from rcilab.workbench.text import Message, message
 
 if TYPE_CHECKING:
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 
 _LONGEST_RECORDING = 600_000  # Rows: ten minutes of cycles.
 _SECOND_THOUGHT = 10.0  # [s] A choice: a second press that comes later asks anew.
+_POWER_PAUSE = 2.0  # [s] A choice: between two attempts to switch the virtual arm on.
 _DELAY_WINDOW = 1000  # Rows that the play-out delay is looked for in; longer than any, and every motion moves by then.
 
 
@@ -40,6 +42,9 @@ class RobotActions:
         self._recording = False
         self._placed = False  # The goal stands where the arm was first seen.
         self._powered = False  # The virtual arm's motors have been switched on once.
+        self._power_asked = float("-inf")
+        self._arrival: Message | None = None  # What to say at the end of the motion under way.
+        self._untouched: Goal | None = store.state.goal  # The goal that nobody has posed yet.
         self._incident = 0
         self._phase = ""
         self._guided = False
@@ -47,11 +52,18 @@ class RobotActions:
 
     def drive(self, request: requests.Drive) -> None:
         """Passes one button of the Run tab on to the supervisor."""
-        if request.what == "execute":
-            self._execute()
+        if request.what in ("execute", "confirm"):
+            self._execute(is_agreed=request.what == "confirm")
+            return
+        if request.what == "cancel":
+            self._store.update(asked=None)
             return
         if request.what == "stop":
             self._session.stop()
+            return
+        status = self._session.status()
+        if request.what != "reconnect" and status.phase in ("starting", "connecting", "lost", "crashed"):
+            self._store.say("warn", obstacle(self._store.state, status) or message("ready.starting"))
             return
         supervisor = self._session.supervisor()
         act = {
@@ -86,6 +98,9 @@ class RobotActions:
         if request.plant is not None and request.model is None and request.target is None:
             self._choose_plant(request.plant)
             return
+        if request.target is not None and not request.target.strip():
+            self._store.say("warn", message("run.address_needed"))
+            return
         model = state.model if request.model is None else load_model(request.model)
         target = state.target if request.target is None else request.target.strip()
         if target != "virtual":
@@ -105,19 +120,22 @@ class RobotActions:
             self._store.say("warn", message("plant.address", address=state.target))
             return
         self._store.update(plant=plant, playing=False)
-        self._powered, self._tickets, self._recording, self._incident, self._phase = False, [], False, 0, ""
+        self._powered, self._power_asked = False, float("-inf")
+        self._tickets, self._recording, self._incident, self._phase = [], False, 0, ""
         self._session.open(state.model, state.target, plant)
 
     def open(self, name: str, target: str) -> None:
-        """Connects to a destination with an arm, starting from a clean table."""
+        """Connects to a destination with an arm; goal, plan and undo stay unless it is another arm."""
         state = self._store.state
         model = state.model if state.model.name == name else load_model(name)
-        self._placed = self._powered = False
+        self._powered, self._power_asked = False, float("-inf")
         self._rows, self._recording, self._tickets, self._incident, self._phase = [], False, [], 0, ""
-        changes: dict[str, object] = {"target": target, "plan": None, "no_plan": None, "recording": None}
+        changes: dict[str, object] = {"target": target, "recording": None, "asked": None}
         if model is not state.model:
             self._store.forget()
-            changes |= {"model": model, "goal": initial_goal(model, model.home), "plot_joint": 0, "problems": {}}
+            self._placed, self._untouched = False, initial_goal(model, model.home)
+            changes |= {"model": model, "goal": self._untouched, "plan": None, "no_plan": None}
+            changes |= {"plot_joint": 0, "problems": {}}
             changes |= {"push": replace(state.push, link=TOOL)}  # The other arm may have no such link.
         # First: from here on no state of the old arm is shown on the new one.
         self._session.open(model, target, state.plant)
@@ -135,7 +153,7 @@ class RobotActions:
             self._incident = status.incident.number
             if status.incident.code == "crashed.controller":
                 self._powered = False  # The one that is started in its place comes up without motor power.
-            self._store.say("bad", _tell_incident(status.incident.code, status.incident.message))
+            self._store.say("bad", tell_incident(status.incident.code, status.incident.message, status))
         if self._guided and status.code == "idle.operator":
             self._store.say("warn", message("notice.operator"))
         self._guided = is_guided(status) or (self._guided and status.phase == "stopping")
@@ -143,16 +161,26 @@ class RobotActions:
         self._record(status)
         if not self._placed and status.q_c is not None:
             self._placed = True
-            self._store.update(goal=initial_goal(self._store.state.model, status.q_c))
+            if self._store.state.goal is self._untouched:
+                self._store.update(goal=initial_goal(self._store.state.model, status.q_c))
             return "placed"
         may_power = self._session.is_ready and status.phase == "idle" and self._store.state.target == "virtual"
         if may_power and not self._powered:
-            self._powered = True
-            if not status.powered:
-                self.drive(requests.Drive(what="power_on"))
+            self._switch_on(status)
         return "rested" if before in ("moving", "stopping") and not is_moving(status) else None
 
-    def _execute(self) -> None:
+    def _switch_on(self, status: SupervisorStatus) -> None:
+        """Has the virtual arm's motors switched on, and tries again until that has succeeded once."""
+        if status.powered:
+            self._powered = True
+            return
+        if time.monotonic() - self._power_asked < _POWER_PAUSE or any(what == "power_on" for what, _ in self._tickets):
+            return
+        with suppress(StartingError):  # The next look will find it there.
+            self._tickets.append(("power_on", self._session.supervisor().power_on()))
+            self._power_asked = time.monotonic()
+
+    def _execute(self, *, is_agreed: bool) -> None:
         state = self._store.state
         if state.plan is not None and not state.plan.complete:
             state = self._store.update(plan=state.plan.completed(state.model))
@@ -163,16 +191,20 @@ class RobotActions:
         certificate = None if state.plan is None else state.plan.report.certificate
         if state.plan is None or certificate is None:
             return
+        if state.target != "virtual" and not (is_agreed and state.asked is state.plan.motion):
+            self._store.update(asked=state.plan.motion)
+            return
         supervisor = self._session.supervisor()
         supervisor.drain()
         try:
             ticket = supervisor.execute(state.plan.motion, certificate)
         except CertificateError as error:
-            self._store.say("warn", message("notice.stale", error=str(error)))
+            self._store.say("warn", tell_error(error))
             return
+        self._arrival = state.plan.short
         self._rows, self._recording = [], True
         self._tickets.append(("execute", ticket))
-        self._store.update(recording=None, playing=False)
+        self._store.update(recording=None, playing=False, asked=None)
 
     def _collect_tickets(self) -> None:
         waiting = []
@@ -181,18 +213,21 @@ class RobotActions:
                 waiting.append((what, ticket))
             elif ticket.error is not None:
                 self._store.say(*self._tell_failure(what, ticket.error))
+            elif what == "power_on":
+                self._powered = True
+            elif what == "execute" and self._arrival is not None:
+                self._store.say("warn", message("notice.arrived_short", short=self._arrival))
             elif what == "execute":
                 self._store.say("good", message("notice.arrived"))
         self._tickets = waiting
 
     def _tell_failure(self, what: str, error: RcilabError) -> tuple[Tone, Message]:
-        if isinstance(error, ControlError) and error.faults:
-            faults = ", ".join(fault.manual_name for fault in error.faults if isinstance(fault, Fault))
-            return "bad", message("notice.fault", faults=faults)
+        if isinstance(error, ConnectionLostError) or (isinstance(error, ControlError) and error.faults):
+            return "bad", tell_error(error, self._session.status())
         if isinstance(error, ControlError) and what == "execute":
             left_alone = self._session.status().code == "idle.operator"
             return "warn", message("notice.operator" if left_alone else "notice.stopped")
-        return "bad", message("notice.refused", what=message(f"drive.{what}"), error=str(error))
+        return "bad", message("notice.refused", what=message(f"drive.{what}"), error=tell_error(error))
 
     def _record(self, status: SupervisorStatus) -> None:
         try:
@@ -218,10 +253,3 @@ class RobotActions:
             )
         if not is_moving(status) and not any(what == "execute" for what, _ in self._tickets):
             self._recording = False
-
-
-_TOLD = ("crashed.controller", "crashed.worker", "crashed.frozen", "lost.silent", "lost.unreachable")
-
-
-def _tell_incident(code: str, sentence: str) -> Message:
-    return message(f"incident.{code}", detail=sentence) if code in _TOLD else message("notice.plain", text=sentence)

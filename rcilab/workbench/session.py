@@ -7,7 +7,8 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
-from rcilab.errors import RcilabError, UsageError
+from rcilab.errors import RcilabError
+from rcilab.workbench.telling import StartingError
 
 if TYPE_CHECKING:
     from rcilab.model import RobotModel
@@ -71,11 +72,13 @@ class Session:
         """Returns the supervisor to ask something of.
 
         Raises:
-            UsageError: It is not there yet.
+            StartingError: It is not there yet.
         """
-        ready = self._ready
+        ready, shown = self._ready, self._shown
+        if ready is None and shown is not None and shown.status().phase == "idle":
+            return shown  # What the page shows as ready is ready, even while start() is about to return.
         if ready is None:
-            raise UsageError("the control process is still starting; try again in a moment")
+            raise StartingError("the control process is still starting; try again in a moment")
         return ready
 
     def stop(self) -> None:

@@ -6,7 +6,7 @@ import threading
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,6 +18,9 @@ from rcilab.workbench.planning import Plan, PlannableLaw
 from rcilab.workbench.pushing import Plant, PushState
 from rcilab.workbench.reach import Reach, Tone
 from rcilab.workbench.text import Message
+
+if TYPE_CHECKING:
+    from rcilab.motion import Motion
 
 _UNDO_DEPTH = 100
 
@@ -74,6 +77,8 @@ class UiState:
     plan: Plan | None = None
     no_plan: Message | None = None
     """Why there is no plan."""
+    asked: Motion | None = None
+    """The motion that a foreign robot is to make and that awaits a second yes."""
     recording: Recording | None = None
     speed: float = 0.5
     law: PlannableLaw = "jerk_limited"

@@ -17,7 +17,7 @@ def test_the_language_changes_everywhere_and_back(page):
     page.tab.get_by_role("tab", name="关节").wait_for()
     page.wait(lambda: page.tab.locator("#rl-stop").inner_text().startswith("停止"), "Stop in Chinese")
     assert page.tab.locator("[data-id=model] small").inner_text() == "机器人"
-    page.tab.get_by_role("tab", name="设置").click()
+    page.tab.locator('[role="tab"][aria-selected="true"]', has_text="设置").wait_for()  # The tab stays open.
     choose(page, "语言", "English")
     page.tab.get_by_role("tab", name="Settings").wait_for()
 
@@ -28,6 +28,7 @@ def test_another_arm_stands_there_without_a_restart(page):
     page.wait(lambda: page.state.model.name == "xMate3", "the other model", 30)
     page.wait(lambda: page.status.q is not None and len(page.status.q) == 6, "states of a 6-axis arm", 30)
     page.wait(lambda: page.shows("live", page.status.q), "the other arm in the scene", 30)
+    page.open_tab("Jog")
     page.wait(lambda: page.rows().get_by_role("slider").count() == 6, "six sliders")
     page.open_tab("Settings")
     choose(page, "Robot", "xMatePro7")

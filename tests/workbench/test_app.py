@@ -12,7 +12,9 @@ import pytest
 from rcilab.errors import InvalidValueError, ModelError, UsageError
 from rcilab.workbench import requests
 from rcilab.workbench.app import Workbench, WorkbenchConfig
+from rcilab.workbench.panels.target import planned_html
 from rcilab.workbench.readiness import obstacle
+from rcilab.workbench.text import Text
 
 
 def wait(condition: Callable[[], bool], what: str, timeout: float = 30.0) -> None:
@@ -84,7 +86,11 @@ def test_an_angle_that_is_no_number_changes_nothing(bench, ask, angle):
 
 def test_an_angle_beyond_its_limit_is_taken_at_the_limit(bench, ask):
     ask(requests.MoveJoint(joint=1, angle=77.0))
-    assert bench.store.state.goal.q[1] == bench.store.state.model.limits.joint.upper[1]
+    state = bench.store.state
+    assert state.goal.q[1] == state.model.limits.joint.upper[1]
+    assert state.goal.reach.reason.code == "reach.at_limit"
+    assert state.plan is None
+    assert state.no_plan.code == "plan.at_limit"
 
 
 def test_a_typed_number_is_taken_and_a_bad_one_is_answered_beside_its_field(bench, ask):
@@ -95,6 +101,55 @@ def test_a_typed_number_is_taken_and_a_bad_one_is_answered_beside_its_field(benc
     assert bench.store.state.goal.q[0] == pytest.approx(math.radians(-0.25))
     ask(requests.TypeField(field="joint.0", text="3"))
     assert "joint.0" not in bench.store.state.problems
+
+
+@pytest.mark.parametrize(
+    ("typed", "speed", "problem"),
+    [
+        ("7.5", 0.075, None),
+        ("33,3 %", 0.333, None),
+        ("0.5", None, "parse.range"),
+        ("500", None, "parse.range"),
+        ("-3", None, "parse.range"),
+        ("nan", None, "parse.not_finite"),
+        ("abc", None, "parse.garbage"),
+        ("", None, "parse.empty"),
+    ],
+)
+def test_a_typed_speed_is_taken_as_it_was_typed_or_answered_in_words(bench, ask, typed, speed, problem):
+    ask(requests.TypeField(field="speed", text=typed))
+    state = bench.store.state
+    assert state.speed == pytest.approx(0.5 if speed is None else speed)
+    assert (state.problems["speed"].code if "speed" in state.problems else None) == problem
+
+
+def test_a_target_out_of_reach_has_no_ways_and_its_plan_says_how_far_short_it_ends(bench, ask):
+    here = bench.store.state.model.forward(bench.store.state.goal.q)
+    ask(requests.MoveTarget(position=(2.0, 0.3, 0.6), wxyz=tuple(here.wxyz)))
+    state = bench.store.state
+    assert state.goal.reach.tone == "bad"
+    assert state.goal.reach.solutions is None
+    assert state.plan.short.code == "reach.short"
+    reached = state.model.forward(state.goal.q).position
+    assert float(state.plan.short.values["mm"]) == pytest.approx(
+        1000.0 * np.linalg.norm(np.array((2.0, 0.3, 0.6)) - reached), abs=1.0
+    )
+    for language in ("en", "zh"):
+        shown = planned_html(state, Text(language))
+        assert Text(language)("check.passed") not in shown
+        assert str(state.plan.short.values["mm"]) in shown
+    ask(requests.ChooseBranch(index=0))
+    assert bench.store.state.goal is state.goal
+    ask(requests.SetSpeed(speed=1.0))
+    ask(requests.Drive(what="execute"))
+    wait(lambda: told(bench) == "notice.arrived_short", "the arrival short of the target")
+
+
+def test_connecting_without_an_address_asks_for_one_and_does_nothing(bench, ask):
+    before = bench.session.status().address
+    ask(requests.ChooseRobot(target="  "))
+    assert told(bench) == "run.address_needed"
+    assert bench.session.status().address == before
 
 
 @pytest.mark.parametrize("field", ["", "joint.", "joint.7", "joint.-1", "pose.w", "nonsense", "joint.²"])
@@ -187,7 +242,8 @@ def test_an_address_that_is_none_is_answered_and_nothing_is_lost(bench, ask):
     before = bench.session.status().address
     ask(requests.ChooseRobot(target="http://robot"))
     assert bench.store.state.notice.tone == "bad"
-    assert "rci://" in str(bench.store.state.notice.text.values["text"])
+    assert told(bench) == "address.bad"
+    assert bench.store.state.notice.text.values["typed"] == "http://robot"
     assert bench.session.status().address == before
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import signal
 import threading
@@ -13,8 +14,12 @@ import numpy as np
 import pytest
 from websockets.sync.client import connect
 
+from rcilab.supervisor.launch import start_controller
 from rcilab.workbench import requests
 from rcilab.workbench.app import Workbench, WorkbenchConfig
+from rcilab.workbench.readiness import describe_move, obstacle
+from rcilab.workbench.telling import tell_status
+from rcilab.workbench.text import Text
 
 
 def wait(condition: Callable[[], bool], what: str, timeout: float = 30.0) -> None:
@@ -79,6 +84,8 @@ def test_a_killed_process_is_noticed_told_and_replaced(bench, who, code):
     wait(lambda: bench.session.status().phase != "moving", "the loss to be noticed")
     assert time.monotonic() - killed < 2.0  # The machine may be busy; the supervisor's own tests hold it to 0.5 s.
     wait(lambda: told(bench) == code, "to be told")
+    for language, cable in (("en", "cable"), ("zh", "网线")):
+        assert cable not in Text(language).say(bench.store.state.notice.text)
     assert np.array_equal(bench.store.state.goal.q, goal), "what the operator has set is not lost"
     move_on(bench)
 
@@ -106,10 +113,61 @@ def test_a_page_that_goes_away_in_mid_motion_means_one_controlled_stop(bench):
 
 def test_an_unreachable_robot_is_told_and_the_page_stays_usable(bench):
     wait(lambda: is_ready(bench), "an idle arm")
+    for typed in ("7", "12"):
+        bench.conductor.ask(requests.TypeField(field="joint.0", text=typed))
+    wait(lambda: math.isclose(bench.store.state.goal.q[0], math.radians(12.0)), "a goal")
+    wait(lambda: bench.store.state.plan is not None and bench.store.state.plan.complete, "a plan")
+    goal, plan = bench.store.state.goal, bench.store.state.plan
     bench.conductor.ask(requests.ChooseRobot(target="rci://127.0.0.9:9"))
     wait(lambda: bench.session.status().phase == "lost", "no connection")
-    assert "127.0.0.9" in bench.session.status().message
+    status = bench.session.status()
+    assert "127.0.0.9" in status.message
+    assert status.robot_mode is None, "nobody says so any more"
+    assert (bench.store.state.goal, bench.store.state.plan) == (goal, plan), "goal and plan are kept"
+    assert obstacle(bench.store.state, status).code == "ready.lost"
+    assert "无法连接" in Text("zh").say(tell_status(status))
+    wait(lambda: told(bench) == "incident.lost.unreachable", "to be told")
+    bench.conductor.ask(requests.Drive(what="power_on"))
+    wait(lambda: told(bench) == "ready.lost", "to be told what to press")
+    bench.conductor.ask(requests.PoseGoal(name="undo"))
+    wait(lambda: math.isclose(bench.store.state.goal.q[0], math.radians(7.0)), "undo to reach behind the connection")
     bench.conductor.ask(requests.MoveJoint(joint=0, angle=0.3))
     wait(lambda: bench.store.state.goal.q[0] == 0.3, "the candidate to be posed all the same")
+    assert bench.store.state.no_plan.code == "plan.no_arm"
     bench.conductor.ask(requests.ChooseRobot(target="virtual"))
     move_on(bench)
+
+
+def test_a_foreign_robot_moves_only_after_a_second_yes_that_knows_what_will_move():
+    controller = start_controller("xMatePro7", "ideal", False)
+    try:
+        address = controller.address
+        with Workbench(WorkbenchConfig(port=0, quality="light", target=address)) as bench:
+            ask = bench.conductor.ask
+            wait(lambda: bench.session.status().phase == "idle", "a connection")
+            ask(requests.Drive(what="power_on"))
+            wait(lambda: is_ready(bench), "motor power")
+            start = float(bench.session.status().q_c[0])
+            ask(requests.MoveJoint(joint=0, angle=start + 0.1))
+            wait(lambda: bench.store.state.plan is not None, "a plan")
+            ask(requests.Drive(what="confirm"))
+            ask(requests.Drive(what="execute"))
+            wait(lambda: describe_move(bench.store.state) is not None, "the second question")
+            question = Text("en").say(describe_move(bench.store.state))
+            assert address in question
+            assert "joint 1 the farthest, by 5.7°" in question
+            ask(requests.MoveJoint(joint=0, angle=start + 0.2))
+            wait(lambda: describe_move(bench.store.state) is None, "another plan to need another yes")
+            ask(requests.Drive(what="execute"))
+            ask(requests.Drive(what="cancel"))
+            ask(requests.Drive(what="execute"))
+            wait(lambda: describe_move(bench.store.state) is not None, "the second question")
+            assert float(bench.session.status().q_c[0]) == start
+            ask(requests.Drive(what="confirm"))
+            wait(lambda: abs(float(bench.session.status().q_c[0]) - start - 0.2) < 1e-9, "the arm to arrive")
+            controller.kill()
+            wait(lambda: bench.session.status().phase == "lost", "the loss")
+            assert bench.session.status().robot_mode is None
+            assert bench.conductor.errors == []
+    finally:
+        controller.end()

@@ -100,9 +100,23 @@
   const size = () => send({ kind: "size", height: window.innerHeight });
   window.addEventListener("resize", size);
 
+  // Another language builds the tabs anew; the one that was open is opened again.
+  let tabs = null, chosen = 0, count = 0;
+  const keepTab = () => {
+    const lists = [...document.querySelectorAll('[role="tablist"]')];
+    const list = lists.sort((a, b) => b.children.length - a.children.length)[0];
+    const found = list ? [...list.querySelectorAll('[role="tab"]')] : [];
+    if (found.length < 4 || found.length < count) return;
+    if (list !== tabs && tabs !== null && chosen > 0) found[chosen].click();
+    else chosen = Math.max(0, found.findIndex((tab) => tab.getAttribute("aria-selected") === "true"));
+    tabs = list;
+    count = found.length;
+  };
+
   // The time cursor: one line in every plot whose x axis is the motion's time; a click there moves it.
   const follow = () => {
     const cursor = said.cursor;
+    keepTab();
     document.querySelectorAll(".u-over").forEach((over) => {
       let line = over.querySelector(".rl-cursor");
       if (!line) {

@@ -54,7 +54,12 @@ class CheckPanel:
             f'<p class="rl-note">{esc(text("check.note"))}</p>'
         )
         rows = "".join(self._row(row) for row in report.rows)
-        sentences = "".join(f"<li>{esc(violation)}</li>" for violation in report.violations[:8])
+        from rcilab.conformance.explain import explain_violation
+
+        language = "zh" if text.language == "zh" else "en"
+        sentences = "".join(
+            f"<li>{esc(explain_violation(violation, language))}</li>" for violation in report.violations[:8]
+        )
         self._table.show(
             f'<div class="rl-cards">{rows}</div>' + (f'<ul class="rl-list">{sentences}</ul>' if sentences else "")
         )

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 from rcilab.workbench import requests
 from rcilab.workbench.panels.target import planned_html
 from rcilab.workbench.pushing import PLANTS
-from rcilab.workbench.readiness import is_moving, obstacle
+from rcilab.workbench.readiness import describe_move, is_moving, obstacle
+from rcilab.workbench.telling import phase_code, tell_status
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, Html, Linked, esc, on_press
 
@@ -35,6 +36,11 @@ class RunPanel:
         self._planned = Html(gui)
         self._execute = gui.add_button(text("run.execute"), color=(23, 128, 68), icon="player-play", disabled=True)
         on_press(self._execute, ask, lambda page: requests.Drive(page=page, what="execute"))
+        self._question = Html(gui)
+        self._agree = gui.add_button(text("run.confirm"), color="red", icon="player-play", visible=False)
+        on_press(self._agree, ask, _drive("confirm"))
+        self._cancel = gui.add_button(text("run.cancel"), color="gray", visible=False)
+        on_press(self._cancel, ask, _drive("cancel"))
         self._reason = Html(gui)
         self._buttons: dict[str, Any] = {}
         with gui.add_folder(text("run.robot")):
@@ -51,9 +57,7 @@ class RunPanel:
             typed = state.target if state.target != "virtual" else ""
             self._address = gui.add_text(text("run.address"), typed, hint=text("run.address_hint"))
             connect = gui.add_button(text("run.connect"), icon="plug-connected", color="gray")
-            on_press(
-                connect, ask, lambda page: requests.ChooseRobot(page=page, target=self._address.value or "virtual")
-            )
+            on_press(connect, ask, lambda page: requests.ChooseRobot(page=page, target=self._address.value))
             virtual = gui.add_button(
                 text("run.virtual"), icon="device-desktop", color="gray", hint=text("run.virtual_hint")
             )
@@ -69,6 +73,11 @@ class RunPanel:
         text, reason, moving = self._text, obstacle(state, status), is_moving(status)
         self._planned.show(planned_html(state, text))
         self._execute.disabled = reason is not None
+        question = None if reason is not None else describe_move(state)
+        said = "" if question is None else esc(text.say(question))
+        self._question.show(said and f'<p class="rl-verdict rl-warn" role="alert">{said}</p>')
+        self._execute.visible = question is None
+        self._agree.visible = self._cancel.visible = question is not None
         self._reason.show("" if reason is None else f'<p class="rl-note rl-why">{esc(text.say(reason))}</p>')
         self._plan.disabled = moving
         self._buttons["recover"].disabled = status.phase not in ("fault", "crashed", "lost")
@@ -82,8 +91,8 @@ class RunPanel:
         where = text(f"where.{state.plant}") if state.target == "virtual" else state.target
         address = f'<br><span class="rl-dim">{esc(status.address)}</span>' if status.address else ""
         self._where.show(
-            f'<p class="rl-verdict rl-{tone}"><b>{esc(where)}</b> {esc(text("phase." + status.phase))}{address}</p>'
-            + (f'<p class="rl-note">{esc(status.message)}</p>' if tone == "bad" else "")
+            f'<p class="rl-verdict rl-{tone}"><b>{esc(where)}</b> {esc(text(phase_code(status)))}{address}</p>'
+            + (f'<p class="rl-note">{esc(text.say(tell_status(status)))}</p>' if tone == "bad" else "")
         )
         self._faults.show(faults_html(status, text))
 

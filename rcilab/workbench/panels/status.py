@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from rcilab.workbench.readiness import is_moving
+from rcilab.workbench.telling import phase_code, tell_status
 from rcilab.workbench.text import Text
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ def status_values(state: UiState, status: SupervisorStatus, text: Text, cursor_e
 
 
 def _chips(state: UiState, status: SupervisorStatus, text: Text) -> list[dict[str, Any]]:
-    phase = text(f"phase.{status.phase}")
+    phase = text(phase_code(status))
     doing = text.say(state.busy) if state.busy is not None else phase
     if status.phase == "idle" and status.powered is False:
         doing = text("phase.unpowered")
@@ -44,7 +45,7 @@ def _chips(state: UiState, status: SupervisorStatus, text: Text) -> list[dict[st
     return [
         _chip(text, "model", state.model.name),
         _chip(text, "where", text(f"where.{state.plant}") if state.target == "virtual" else state.target),
-        _chip(text, "phase", doing, _TONES.get(status.phase, "bad"), hint=status.message),
+        _chip(text, "phase", doing, _TONES.get(status.phase, "bad"), hint=text.say(tell_status(status))),
         _chip(text, "mode", mode),
         _chip(text, "rate", f"{status.rate_hz:.0f} Hz" if connected else "—"),
         _chip(text, "success", f"{100.0 * status.success_rate:.0f} %" if connected else "—"),

@@ -58,11 +58,16 @@ class TargetPanel:
                 ask(requests.ChooseBranch(page=event.client_id, index=int(event.target.value) - 1))
 
         with gui.add_folder(text("target.motion")):
-            speed = gui.add_slider(text("target.speed"), 1, 100, 1, 50, hint=text("target.speed_hint"))
-            self._speed = Linked(speed, ask, lambda v, p: requests.SetSpeed(page=p, speed=v / 100.0))
+            with gui.add_folder(text("target.speed")):
+                gui.add_html('<i class="rl-rows"></i>')
+                speed = gui.add_slider("%", 1, 100, 1, 50, hint=text("target.speed_hint"))
+                self._speed = Linked(speed, ask, lambda v, p: requests.SetSpeed(page=p, speed=v / 100.0))
+                self._speed_field = NumberField(gui.add_text("", "", hint=text("target.speed_hint")), ask, "speed")
+            self._speed_problem = Html(gui)
             laws = {text(f"law.{law}"): law for law in LAWS}
             self._laws = {law: label for label, law in laws.items()}
-            law = gui.add_dropdown(text("target.law"), tuple(laws), hint=text("target.law_hint"))
+            law = gui.add_dropdown(text("target.law"), tuple(laws))
+            gui.add_html(f'<p class="rl-note">{esc(text("target.law_hint"))}</p>')  # A tooltip would cover the list.
             self._law = Linked(law, ask, lambda v, p: requests.SetLaw(page=p, law=laws.get(v, "")))
             self._plan = gui.add_button(text("target.plan"), icon="route", hint=text("target.plan_hint"))
             on_press(self._plan, ask, lambda page: requests.Plan(page=page))
@@ -91,13 +96,16 @@ class TargetPanel:
         if solutions is not None and len(solutions):
             self._choice.options = tuple(str(number) for number in range(1, len(solutions) + 1))
         self._speed.show(round(state.speed * 100.0))
+        self._speed_field.show(shown(state.speed * 100.0), state.problems.get("speed"), state.typed)
+        self._speed_problem.show(problems_html(state, self._text, [("speed", self._text("target.speed"))]))
         self._law.show(self._laws[state.law])
         self._planned.show(planned_html(state, self._text))
 
     def _branch_table(self, state: UiState, status: SupervisorStatus) -> str:
         solutions, text = state.goal.reach.solutions, self._text
         if solutions is None or not len(solutions):
-            return f'<p class="rl-note">{esc(text("target.no_branches"))}</p>'
+            code = "target.out_of_reach" if state.goal.reach.tone == "bad" else "target.no_branches"
+            return f'<p class="rl-note">{esc(text(code))}</p>'
         here = state.goal.q if status.q_c is None else status.q_c
         rows = []
         for number, q in enumerate(solutions, start=1):
@@ -121,7 +129,8 @@ def planned_html(state: UiState, text: Text) -> str:
         return f'<p class="rl-note">{esc(text.say(state.no_plan)) if state.no_plan else ""}</p>'
     report = state.plan.report
     tone, word = ("good", "check.passed") if report.ok else ("bad", "check.failed")
-    duration = f"{state.plan.motion.duration:.3f}"
-    return (
-        f'<p class="rl-verdict rl-{tone}"><b>{esc(text(word))}</b> {esc(text("target.planned", duration=duration))}</p>'
-    )
+    said = text("target.planned", duration=f"{state.plan.motion.duration:.3f}")
+    if state.plan.short is not None:
+        said += " " + text("target.leads_short", short=text.say(state.plan.short))
+        tone, word = (tone, word) if not report.ok else ("warn", "target.not_there")
+    return f'<p class="rl-verdict rl-{tone}"><b>{esc(text(word))}</b> {esc(said)}</p>'
