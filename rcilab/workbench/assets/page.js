@@ -101,15 +101,18 @@
   window.addEventListener("resize", size);
 
   // Another language builds the tabs anew; the one that was open is opened again.
-  let tabs = null, chosen = 0, count = 0;
+  let first = null, chosen = 0, count = 0;
   const keepTab = () => {
     const lists = [...document.querySelectorAll('[role="tablist"]')];
     const list = lists.sort((a, b) => b.children.length - a.children.length)[0];
     const found = list ? [...list.querySelectorAll('[role="tab"]')] : [];
     if (found.length < 4 || found.length < count) return;
-    if (list !== tabs && tabs !== null && chosen > 0) found[chosen].click();
-    else chosen = Math.max(0, found.findIndex((tab) => tab.getAttribute("aria-selected") === "true"));
-    tabs = list;
+    if (found[0] !== first && first !== null && chosen > 0) {  // viser's tabs hear keys and fingers, not click().
+      found[chosen].dispatchEvent(new KeyboardEvent("keydown", { key: "Enter", bubbles: true }));
+    } else {
+      chosen = Math.max(0, found.findIndex((tab) => tab.getAttribute("aria-selected") === "true"));
+    }
+    first = found[0];
     count = found.length;
   };
 
