@@ -212,7 +212,5 @@ def test_a_pose_with_a_joint_right_at_its_limit_is_refused_in_words() -> None:
     model = load_model("xMatePro7")
     q = model.home.copy()
     q[1] = model.limits.joint.upper[1]
-    with pytest.raises(
-        UnreachableError, match=r"at 120\.0 deg, right at its limit, and has to stay inside"
-    ):
+    with pytest.raises(UnreachableError, match=r"at 120\.0 deg, right at its limit, and has to stay inside"):
         model.inverse(model.forward(q), psi=model.arm_angle(q))

@@ -87,6 +87,8 @@ def test_a_request_that_failed_with_its_controller_does_not_ask_for_a_cable():
 class Power:
     """A robot side whose control process comes late and refuses power once."""
 
+    is_ready = True
+
     def __init__(self) -> None:
         self.is_there, self.asked = False, 0
         self.ticket = SimpleNamespace(done=True, error=RcilabError("busy"))
