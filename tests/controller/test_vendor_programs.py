@@ -10,6 +10,7 @@ import pytest
 
 from tests.peers import programs, wire
 from tests.peers.arena import PLANTS, Arena, arena
+from tests.peers.endurance import require_led
 from tests.peers.kinematics import Model
 from tests.peers.robot import ControlException, Output, Robot
 
@@ -122,6 +123,18 @@ def test_dragging_opens_and_closes(place: Arena) -> None:
         last = ended_well(robot)
         tool_height = last.pos_m[11] - Model(robot.load_robot_model()).pose(last.q)[2, 3]
         assert tool_height != 0.0  # The tool of the drag program is in the pose.
+
+
+@pytest.mark.parametrize("name", programs.DRAGS)
+def test_a_hand_leads_the_arm_where_the_drag_lets_it(place: Arena, name: str) -> None:
+    with place.connect() as robot:
+        programs.prepare(robot, factor=1.0)
+        robot.states.clear()
+        seen = programs.led_by_hand(
+            robot, SECONDS, *programs.DRAGS[name], lambda w: place.between(lambda c: c.plant.push(w))
+        )
+        ended_well(robot)
+        require_led(seen, name)
 
 
 def test_without_a_state_in_time_the_last_one_is_answered_again() -> None:

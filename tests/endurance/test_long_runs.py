@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.peers import endurance
+from tests.peers import endurance, programs
 from tests.peers.arena import PLANTS
 
 pytestmark = pytest.mark.endurance
@@ -42,6 +42,12 @@ def test_the_next_client_works_after_a_thousand_fuzzed_frames() -> None:
 
 def test_a_million_fuzzed_datagrams_change_nothing() -> None:
     endurance.fuzz_datagrams(1_000_000, 300)
+
+
+@pytest.mark.parametrize("plant", PLANTS)
+@pytest.mark.parametrize("name", programs.DRAGS)
+def test_a_drag_at_the_vendors_pace(plant: str, name: str) -> None:
+    endurance.run_drag(plant, name, *programs.DRAGS[name], 6.0)
 
 
 @pytest.mark.parametrize("plant", PLANTS)

@@ -85,6 +85,7 @@ class Process:
         found = re.match(r"listening rci://([\d.]+):(\d+) ", line)
         assert found, f"instead of listening the controller said {line!r}"
         self.host, self.port = found[1], int(found[2])
+        self.world_port = int(self.process.stdout.readline().rpartition(":")[2])
 
     def memory(self) -> int:
         """Returns the resident memory, [bytes]."""

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import os
 import socket
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from tests.peers import programs, wire
 from tests.peers.arena import Process, arena
 from tests.peers.fuzz import FrameFuzzer, Watcher, datagrams, good_client_works
 from tests.peers.robot import PATIENCE, Output, Robot
+from tests.peers.wire import State
 
 GROWTH = 1_000_000  # [bytes] What memory may grow by.
 _PRIORITY = 70  # Below the controller's.
@@ -171,6 +173,41 @@ def run_program(plant: str, name: str, seconds: float) -> None:
         assert min(state.success_rate[0] for state in robot.states) > 0.99
         assert np.ptp([state.q for state in robot.states[:: len(robot.states) // 500]], axis=0).max() > 5e-3
         time.sleep(0.01)
+
+
+def run_drag(plant: str, name: str, space: int, kind: int, seconds: float) -> None:
+    """Leads the arm by hand at 1 kHz, the hand through the world port of the controller."""
+    with (
+        Process("--plant", plant) as controller,
+        Robot(controller.host, controller.port, **_vendor()) as robot,  # type: ignore[arg-type]
+        socket.create_connection((controller.host, controller.world_port)) as hand,
+    ):
+
+        def push(wrench: list[float]) -> None:
+            hand.sendall(json.dumps({"request": "push", "wrench": wrench}).encode() + b"\n")
+            assert json.loads(hand.recv(4096))["ok"]
+
+        with realtime():
+            programs.prepare(robot, factor=0.2)
+            robot.states.clear()
+            seen = programs.led_by_hand(robot, seconds, space, kind, push)
+        require_led(seen, name)
+
+
+def require_led(seen: Sequence[State], name: str) -> None:
+    """A drag was one: in its mode, without a fault, and the tool went where the drag lets it and nowhere else."""
+    assert all(state.robot_mode == wire.ROBOT_GUIDING and not state.errors for state in seen)
+    T = np.reshape([state.pos_m for state in seen], (-1, 4, 4))
+    way = np.linalg.norm(T[:, :3, 3] - T[0, :3, 3], axis=1).max()
+    turn = np.arccos(np.clip((np.einsum("kij,ij->k", T[:, :3, :3], T[0, :3, :3]) - 1.0) / 2.0, -1.0, 1.0)).max()
+    if name == "rotation":
+        assert way < 8e-3  # 16 N against the stiffest spring there is, 3000 N/m.
+    else:
+        assert way > 0.02
+    if name == "translation":
+        assert turn < 0.03
+    else:
+        assert turn > 0.02
 
 
 def _own_memory() -> int:

@@ -14,10 +14,25 @@ import numpy as np
 
 from tests.peers import kinematics, s_profile, wire
 from tests.peers.kinematics import Matrix
-from tests.peers.robot import CARTESIAN_SPACE, DRAG_FREE, Callback, Output, Robot
+from tests.peers.robot import (
+    CARTESIAN_SPACE,
+    DRAG_FREE,
+    DRAG_ROTATION,
+    DRAG_TRANSLATION,
+    JOINT_SPACE,
+    Callback,
+    Output,
+    Robot,
+)
 from tests.peers.wire import State
 
 CYCLE = 0.001  # [s]
+DRAGS = {
+    "in joint space": (JOINT_SPACE, DRAG_FREE),
+    "translation": (CARTESIAN_SPACE, DRAG_TRANSLATION),
+    "rotation": (CARTESIAN_SPACE, DRAG_ROTATION),
+    "free": (CARTESIAN_SPACE, DRAG_FREE),
+}
 START = {  # Where the examples begin, [rad].
     7: (0.0, math.pi / 6, 0.0, math.pi / 3, 0.0, math.pi / 2, 0.0),
     6: (0.0, math.pi / 6, math.pi / 3, 0.0, math.pi / 2, 0.0),
@@ -189,6 +204,19 @@ def drag(robot: Robot, states: int) -> list[State]:
     robot.receive_fresh_state()
     robot.start_drag(CARTESIAN_SPACE, DRAG_FREE)
     seen = [robot.receive_fresh_state() for _ in range(states)]
+    robot.stop_drag()
+    return seen
+
+
+def led_by_hand(
+    robot: Robot, seconds: float, space: int, kind: int, push: Callable[[list[float]], None]
+) -> list[State]:
+    """Opens dragging and leads the arm: a hand pulls to and fro, turns the tool, and lets go; returns the states."""
+    robot.start_drag(space, kind)
+    seen: list[State] = []
+    for sign in (1.0, -1.0, 0.0):
+        push([0.0, 15.0 * sign, 5.0 * sign, 0.0, 0.0, 2.0 * sign])
+        seen += [robot.receive_fresh_state() for _ in range(round(seconds / 3.0 / CYCLE))]
     robot.stop_drag()
     return seen
 
