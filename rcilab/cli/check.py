@@ -30,6 +30,12 @@ def add_parser(subparsers: Any) -> None:
         metavar="OUT",
         help="also write the motion (.npz), slowed down by the least factor that passes; nothing when none does",
     )
+    parser.add_argument(
+        "--mode",
+        metavar="MODE",
+        default="joint_position",
+        help="how it will be sent, which decides what is judged: %(default)s, cartesian_position, torque ...",
+    )
     parser.add_argument("--explain", choices=tuple(LANGUAGES), help="say it in whole sentences, in English or Chinese")
     parser.set_defaults(run=run)
 
@@ -49,7 +55,7 @@ def run(args: Namespace) -> int:
     if name is None:
         raise UsageError("a motion does not say for which arm it is: add --model NAME, such as --model xMatePro7")
     model = load_model(name, tool=found.T_flange_tool if isinstance(found, Program) else None)
-    report = check(as_motion(found, model), model)
+    report = check(as_motion(found, model), model, mode=args.mode)
     print(report if args.explain is None else report.explain(args.explain))
     if args.slow_down is None:
         return 0 if report.ok else 1

@@ -52,3 +52,10 @@ def test_a_motion_needs_the_name_of_an_arm(tmp_path, capsys):
     assert main(["check", str(tmp_path / "motion.npz")]) == 2
     assert "add --model NAME" in capsys.readouterr().err
     assert main(["check", str(tmp_path / "motion.npz"), "--model", "xMatePro7"]) == 0
+
+
+def test_check_judges_as_it_will_be_sent_and_refuses_a_mode_that_is_none(file, capsys):
+    assert main(["check", str(file), "--mode", "cartesian_position"]) in (0, 1)
+    assert "cartesian.velocity.translation" in capsys.readouterr().out
+    assert main(["check", str(file), "--mode", "sideways"]) == 2
+    assert "known: joint_position" in capsys.readouterr().err
