@@ -9,7 +9,7 @@ import pytest
 def test_page_opens_and_the_arm_stands_where_the_controller_has_it(page):
     page.wait(lambda: page.shows("live", page.status.q), "the live arm in the controller's pose")
     assert page.chip("model") == "xMatePro7"
-    assert page.chip("where") == "virtual controller"
+    assert page.chip("where") == "virtual controller, ideal arm"
     page.wait(lambda: page.chip("rate").endswith("Hz"), "a state rate in the bar")
 
 
