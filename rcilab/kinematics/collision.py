@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from rcilab.arrays import Array, JointPath, JointVector, Vector3, frozen
 from rcilab.robots.description import RobotDescription
 from rcilab.robots.shapes import Capsule, build_shapes
-from rcilab.robots.upright import upright_joints
+from rcilab.robots.upright import upright_flange, upright_joints
 
 FLOOR = -1
 """Stands for the floor where a link's number is expected."""
@@ -166,7 +166,8 @@ def collision_geometry(
     """
     capsule = None
     if tool_radius is not None and any(tool):
-        capsule = Capsule(frozen([0.0, 0.0, 0.0]), frozen(tool), tool_radius)
+        end = upright_flange(description).rotation @ np.array(tool)
+        capsule = Capsule(frozen([0.0, 0.0, 0.0]), frozen(end), tool_radius)
     return CollisionGeometry(description, capsule, floor_height)
 
 

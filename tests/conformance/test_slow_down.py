@@ -158,7 +158,7 @@ def test_a_step_in_velocity_is_not_mended_but_told_as_a_jump():
     assert "jumps at t = 0.299 s" in str(report.slow_down())
     # It only becomes smaller, and with patience small enough.
     patient = report.slow_down(at_most=500.0)
-    assert 250.0 < patient.factor < 300.0
+    assert 200.0 < patient.factor < 300.0
 
 
 def test_a_limit_on_the_factor_is_kept():
@@ -182,7 +182,7 @@ def test_every_obstacle_has_a_sentence_in_both_languages():
     report = check(hurried(FULL, 4.0), MODEL)
     for obstacle in get_args(Obstacle):
         result = replace(report.slow_down(at_most=3.0), obstacle=obstacle)
-        assert "joint 1, commanded" in result.explain()
-        assert "关节 1，指令" in result.explain("zh")
+        assert "joint 7, commanded" in result.explain()
+        assert "关节 7，指令" in result.explain("zh")
     with pytest.raises(InvalidValueError, match="known: en, zh"):
         report.slow_down().explain("de")

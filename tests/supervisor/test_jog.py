@@ -184,8 +184,9 @@ def test_a_jog_is_read_as_a_whole_or_not_at_all() -> None:
     writer = threading.Thread(target=write)
     writer.start()
     try:
-        seen = [read_jog(memory, words) for _ in range(20_000)]
+        seen = {read_jog(memory, words) for _ in range(20_000)}
+        wait_for(lambda: seen.update({read_jog(memory, words)}) or seen >= set(sides))
     finally:
         ending.set()
         writer.join()
-    assert {command for command in seen if command is not None} == set(sides)
+    assert seen - {None} == set(sides)

@@ -192,7 +192,7 @@ def test_another_arm_than_the_controller_s_is_refused_and_both_are_named():
     try:
         with Supervisor(load_model("xMate3"), controller.address) as supervisor:
             status = supervisor.status()
-            assert (status.phase, status.code) == ("lost", "lost.unreachable")
+            assert (status.phase, status.code) == ("lost", "lost.other_arm")
             assert "is an xMatePro7 (7 axes), you gave xMate3 (6)" in status.message
             with pytest.raises(ModelError, match="xMatePro7"):
                 supervisor.reconnect().wait(SOON)
