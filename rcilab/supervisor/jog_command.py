@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import struct
+import time
 from dataclasses import dataclass
 from typing import Literal, TypeAlias, get_args
 
+from numpy.typing import ArrayLike
+
+from rcilab.arrays import as_vector
 from rcilab.errors import InvalidValueError
 from rcilab.supervisor.layout import Word
 
@@ -30,6 +34,32 @@ class JogCommand:
     def __post_init__(self) -> None:
         if self.kind not in _KINDS:
             raise InvalidValueError("kind", self.kind, f"is no way to jog; there are {', '.join(_KINDS)}")
+
+
+def build_jog(kind: JogKind, values: ArrayLike, n: int) -> JogCommand:
+    """Returns a jog of an arm with n joints.
+
+    Raises:
+        InvalidValueError: The kind is unknown, or the values are not as many finite numbers as it needs.
+    """
+    size, unit = (n, "rad/s") if kind == "joint" else (6, "m/s, rad/s")
+    return JogCommand(kind, tuple(as_vector(values, size, "values", unit).tolist()))
+
+
+def hold_jog(memory: memoryview, words: memoryview, command: JogCommand) -> None:
+    """Writes the jog that is held now, and when."""
+    write_jog(memory, words, command)
+    words[Word.JOG_BEAT] = time.monotonic_ns()
+
+
+def release_jog(words: memoryview) -> None:
+    """Says that nothing is held any more."""
+    words[Word.JOG_BEAT] = 0
+
+
+def is_held(words: memoryview) -> bool:
+    """Returns whether a jog has been held within the last `HOLD_TIMEOUT`."""
+    return time.monotonic_ns() - words[Word.JOG_BEAT] <= HOLD_TIMEOUT * 1e9
 
 
 def write_jog(memory: memoryview, words: memoryview, command: JogCommand) -> None:

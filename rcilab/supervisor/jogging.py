@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from typing import TYPE_CHECKING
 
 from rcilab.arrays import JointVector
@@ -11,8 +10,8 @@ from rcilab.command import JointPosition
 from rcilab.dynamics.symmetric_solver import SymmetricSolver as SymmetricSolver  # Loaded now, not as the arm waits.
 from rcilab.motion import Jog
 from rcilab.state import RobotState
-from rcilab.supervisor.jog_command import HOLD_TIMEOUT, JogCommand, JogKind, read_jog
-from rcilab.supervisor.layout import ControlBlock, Word
+from rcilab.supervisor.jog_command import JogCommand, JogKind, is_held, read_jog
+from rcilab.supervisor.layout import ControlBlock
 
 if TYPE_CHECKING:
     from rcilab.model import RobotModel
@@ -58,8 +57,7 @@ class HeldJog:
     def _lead(self) -> None:
         """Takes what is held now."""
         words = self._block.words
-        beat = words[Word.JOG_BEAT]
-        if not self.is_wanted or time.monotonic_ns() - beat > HOLD_TIMEOUT * 1e9:
+        if not (self.is_wanted and is_held(words)):
             if self._command is not None:
                 self._let_go(self._command.kind)
                 self._command = None

@@ -5,18 +5,17 @@ from __future__ import annotations
 import threading
 import time
 from contextlib import suppress
-from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rcilab.arrays import as_vector
 from rcilab.client.address import parse_address
+from rcilab.closing import Closing
 from rcilab.errors import ConnectionLostError, RcilabError, UsageError
 from rcilab.supervisor.admission import require_admissible, require_ready
 from rcilab.supervisor.guiding import GuideKind, GuideSpace, require_guidable
-from rcilab.supervisor.jog_command import JogCommand, JogKind, write_jog
+from rcilab.supervisor.jog_command import JogKind, build_jog, hold_jog, release_jog
 from rcilab.supervisor.keeper import ANSWER_TIMEOUT, ProcessKeeper
 from rcilab.supervisor.launch import require_plant
 from rcilab.supervisor.layout import OPERATOR_TIMEOUT, ControlBlock, Word
@@ -39,7 +38,7 @@ VIRTUAL = "virtual"
 _TICK = 0.02  # [s] between two looks of the watching thread.
 
 
-class Supervisor:
+class Supervisor(Closing):
     """Runs motions in a process of its own, so that nothing the page does can disturb a cycle.
 
     All methods may be called from any thread. Requests return a `Ticket` at once; nothing here waits for the robot
@@ -208,25 +207,22 @@ class Supervisor:
             InvalidValueError: The kind is unknown, or the values are not as many finite numbers as it needs.
             UsageError: Another motion is under way, no controller is connected, or nobody is at the controls.
         """
-        size, unit = (self.model.n, "rad/s") if kind == "joint" else (6, "m/s, rad/s")
-        command = JogCommand(kind, tuple(as_vector(values, size, "values", unit).tolist()))
+        command = build_jog(kind, values, self.model.n)
         with self._lock:
             block = self._require_block()
-            if self._jogging is None or self._jogging.done:
+            is_under_way = self._jogging is not None and not self._jogging.done
+            if not is_under_way:
                 require_ready(self.status(), is_operator_overdue=self._is_operator_overdue())
-                write_jog(block.jog, block.words, command)
-                block.words[Word.JOG_BEAT] = time.monotonic_ns()
+            hold_jog(block.jog, block.words, command)
+            if self._jogging is None or not is_under_way:
                 self._jogging = self._ask("jog", kind="jog")
-            else:
-                write_jog(block.jog, block.words, command)
-                block.words[Word.JOG_BEAT] = time.monotonic_ns()
             return self._jogging
 
     def release_jog(self) -> None:
         """Brings a jog to rest at once."""
         with self._lock:
             if self._block is not None:
-                self._block.words[Word.JOG_BEAT] = 0
+                release_jog(self._block.words)
 
     def start_guiding(self, space: GuideSpace = "joint", kind: GuideKind = "free") -> Ticket:
         """Frees the arm for a hand to guide it (startDrag), until `stop_guiding` or `stop`; done once it is free.
@@ -256,7 +252,7 @@ class Supervisor:
         """Brings a running motion to rest within the limits, or ends guiding; done when the arm stands still."""
         with self._lock:
             block = self._require_block()
-            block.words[Word.JOG_BEAT] = 0
+            release_jog(block.words)
             block.words[Word.STOPS_ASKED] += 1
             return self._ask("stop", kind="stop", number=block.words[Word.STOPS_ASKED])
 
@@ -310,11 +306,6 @@ class Supervisor:
     def __enter__(self) -> Supervisor:
         self.start()
         return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def _ask(self, what: str, **letter: Any) -> Ticket:
         with self._lock:

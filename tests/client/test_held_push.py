@@ -10,6 +10,7 @@ import pytest
 
 from rcilab.client.held_push import HeldPush
 from rcilab.errors import ConnectionLostError, InvalidValueError
+from tests.waiting import wait_for
 
 
 class FakeWorld:
@@ -32,13 +33,6 @@ class FakeWorld:
 
     def close(self) -> None:
         self.asked.append(("close",))
-
-
-def wait_for(condition) -> None:
-    deadline = time.monotonic() + 10.0
-    while not condition():
-        assert time.monotonic() < deadline, "it did not happen"
-        time.sleep(0.005)
 
 
 @pytest.fixture

@@ -11,9 +11,9 @@ from rcilab.client.world import World
 from rcilab.errors import InvalidValueError, UsageError
 from rcilab.model import load_model
 from rcilab.supervisor import Supervisor
+from tests.waiting import SOON, wait_for
 
 MODEL = load_model("xMatePro7")
-SOON = 20.0  # [s] Generous: the machine may be busy.
 
 
 @pytest.fixture(scope="module")
@@ -34,14 +34,6 @@ def world(supervisor):
     host, _, port = supervisor.status().world_address.partition(":")
     with World(host, int(port)) as world:
         yield world
-
-
-def wait_for(condition, timeout=SOON):
-    deadline = time.monotonic() + timeout
-    while not (found := condition()):
-        assert time.monotonic() < deadline, "it did not happen"
-        time.sleep(0.005)
-    return found
 
 
 def test_a_guided_arm_goes_where_it_is_pushed_and_stays_where_it_is_let_go(supervisor, world):

@@ -17,10 +17,10 @@ from rcilab.model import load_model
 from rcilab.spatial import Pose
 from rcilab.supervisor import Supervisor
 from rcilab.supervisor.jog_command import HOLD_TIMEOUT, JogCommand, read_jog, write_jog
+from tests.waiting import SOON, wait_for
 
 TOOL = Pose([0.0, 0.0, 0.1])
 MODEL = load_model("xMatePro7", tool=TOOL)
-SOON = 20.0  # [s] Generous: the machine may be busy.
 
 
 @pytest.fixture(scope="module")
@@ -35,14 +35,6 @@ def supervisor(shared):
     wait_for(lambda: shared.status().phase == "idle")
     shared.drain()
     return shared
-
-
-def wait_for(condition, timeout=SOON):
-    deadline = time.monotonic() + timeout
-    while not (found := condition()):
-        assert time.monotonic() < deadline, "it did not happen"
-        time.sleep(0.005)
-    return found
 
 
 def hold(supervisor, kind, values, until, timeout=SOON):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 import pytest
 
@@ -14,18 +12,10 @@ from rcilab.motion import plan_joint
 from rcilab.state import RobotMode
 from rcilab.supervisor import Supervisor
 from rcilab.supervisor.launch import start_controller
+from tests.waiting import SOON, wait_for
 
 MODEL = load_model("xMatePro7")
 GOAL = np.array([0.3, 0.4, 0.2, 1.2, 0.1, 0.8, 0.5])
-SOON = 20.0  # [s] Generous: the machine may be busy.
-
-
-def wait_for(condition, timeout=SOON):
-    deadline = time.monotonic() + timeout
-    while not (found := condition()):
-        assert time.monotonic() < deadline, "it did not happen"
-        time.sleep(0.005)
-    return found
 
 
 def wait_for_phase(supervisor, *phases):

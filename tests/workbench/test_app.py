@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Iterator
 
 import numpy as np
@@ -15,27 +14,13 @@ from rcilab.workbench.app import Workbench, WorkbenchConfig
 from rcilab.workbench.panels.target import planned_html
 from rcilab.workbench.readiness import obstacle
 from rcilab.workbench.text import Text
-
-
-def wait(condition: Callable[[], bool], what: str, timeout: float = 30.0) -> None:
-    end = time.monotonic() + timeout
-    while not condition():
-        assert time.monotonic() < end, f"within {timeout} s this did not happen: {what}"
-        time.sleep(0.02)
-
-
-def told(bench: Workbench) -> str | None:
-    notice = bench.store.state.notice
-    return None if notice is None else notice.text.code
+from tests.workbench.opened import opened, told, wait
 
 
 @pytest.fixture(scope="module")
 def bench() -> Iterator[Workbench]:
-    with Workbench(WorkbenchConfig(port=0, quality="light")) as opened:
-        wait(lambda: opened.session.status().phase == "idle" and bool(opened.session.status().powered), "an idle arm")
-        yield opened
-        assert opened.conductor.errors == []
-        assert opened.presenter.errors == []
+    with opened() as found:
+        yield found
 
 
 @pytest.fixture

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -15,13 +15,14 @@ from rcilab.errors import UsageError
 from rcilab.model import load_model
 from rcilab.supervisor import SupervisorStatus
 from rcilab.workbench import push_actions, requests
-from rcilab.workbench.app import Workbench, WorkbenchConfig
+from rcilab.workbench.app import Workbench
 from rcilab.workbench.goal_actions import initial_goal
 from rcilab.workbench.lease import Lease
 from rcilab.workbench.push_actions import PushActions
 from rcilab.workbench.pushing import SPRING, STRONGEST, place_of, spring_force
 from rcilab.workbench.robot_actions import RobotActions
 from rcilab.workbench.store import Store, UiState
+from tests.workbench.opened import opened, told, wait
 
 MODEL = load_model("xMatePro7")
 OWN = SupervisorStatus(phase="idle", powered=True, target="virtual", world_address="127.0.0.1:1", q=MODEL.home)
@@ -205,25 +206,10 @@ def test_the_plant_is_not_chosen_for_a_robot_at_an_address(store, session):
     assert store.state.plant == "mujoco"
 
 
-def wait(condition: Callable[[], bool], what: str, timeout: float = 30.0) -> None:
-    end = time.monotonic() + timeout
-    while not condition():
-        assert time.monotonic() < end, f"within {timeout} s this did not happen: {what}"
-        time.sleep(0.02)
-
-
-def told(bench: Workbench) -> str | None:
-    notice = bench.store.state.notice
-    return None if notice is None else notice.text.code
-
-
 @pytest.fixture(scope="module")
 def bench() -> Iterator[Workbench]:
-    with Workbench(WorkbenchConfig(port=0, quality="light")) as opened:
-        wait(lambda: opened.session.status().phase == "idle" and bool(opened.session.status().powered), "an idle arm")
-        yield opened
-        assert opened.conductor.errors == []
-        assert opened.presenter.errors == []
+    with opened() as found:
+        yield found
 
 
 def test_another_plant_keeps_goal_and_plan_and_is_refused_in_mid_motion(bench):

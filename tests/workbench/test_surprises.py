@@ -8,7 +8,7 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -20,23 +20,12 @@ from rcilab.workbench.app import Workbench, WorkbenchConfig
 from rcilab.workbench.readiness import describe_move, obstacle
 from rcilab.workbench.telling import tell_status
 from rcilab.workbench.text import Text
-
-
-def wait(condition: Callable[[], bool], what: str, timeout: float = 30.0) -> None:
-    end = time.monotonic() + timeout
-    while not condition():
-        assert time.monotonic() < end, f"within {timeout} s this did not happen: {what}"
-        time.sleep(0.02)
+from tests.workbench.opened import told, wait
 
 
 def is_ready(bench: Workbench) -> bool:
     status = bench.session.status()
     return status.phase == "idle" and bool(status.powered) and status.q_c is not None
-
-
-def told(bench: Workbench) -> str | None:
-    notice = bench.store.state.notice
-    return None if notice is None else notice.text.code
 
 
 def set_out(bench: Workbench) -> float:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import string
 from importlib.resources import files
 from pathlib import Path
 
@@ -19,22 +18,13 @@ from rcilab.supervisor.status import PHASES
 from rcilab.workbench.planning import LAWS
 from rcilab.workbench.text import LANGUAGES, Text, load_catalogue, message
 from rcilab.workbench.view_actions import QUALITIES
+from tests.catalogues import require_equal
 
 SOURCES = sorted(Path(rcilab.workbench.__file__).parent.rglob("*.py"))
 
 
-def fields(entry: str) -> set[str]:
-    return {name for _, name, _, _ in string.Formatter().parse(entry) if name}
-
-
 def test_every_language_has_the_same_keys_and_places_to_fill():
-    english = load_catalogue("en")
-    for language in LANGUAGES:
-        catalogue = load_catalogue(language)
-        assert set(catalogue) == set(english), language
-        for key, entry in catalogue.items():
-            assert entry.strip(), key
-            assert fields(entry) == fields(english[key]), f"{language}: {key}"
+    require_equal(load_catalogue, LANGUAGES)
 
 
 def test_no_key_stands_twice_in_a_catalogue():
