@@ -268,7 +268,7 @@ def schedule(path: Path, speed: float) -> Array:
     Raises:
         InvalidValueError: The speed is out of range.
     """
-    return _s_law(path, speed).u
+    return _s_law(path, speed).s
 
 
 def follow_path(model: RobotModel, q: JointVector, path: Path, speed: float) -> Motion:
