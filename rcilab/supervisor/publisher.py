@@ -11,10 +11,12 @@ from rcilab.client.recorder import CycleLog, Recorder
 from rcilab.clock import CYCLE_TIME
 from rcilab.supervisor.lateness import LatenessHistogram
 from rcilab.supervisor.layout import RING_CYCLES, ControlBlock, Word
+from rcilab.spatial import Pose
 from rcilab.supervisor.snapshot import Snapshot, write_snapshot
 
 _SNAPSHOT_CYCLES = 20  # Rows between two snapshots: 50 a second.
 _WRENCH = struct.Struct("=6d")
+_POSE = struct.Struct("=16d")
 _RATE_TIME = 1.0  # [s] over which states are counted.
 
 
@@ -40,6 +42,7 @@ class Publisher:
     def restart(self) -> None:
         """Forgets the timing: another connection begins."""
         self._histogram.clear()
+        self._block.tool[15] = 0.0
         self._words[Word.LOST] = 0
 
     def beat(self) -> None:
@@ -67,6 +70,10 @@ class Publisher:
         self.beat()
         if count % _SNAPSHOT_CYCLES == 0 and self.snapshot.phase in ("moving", "stopping"):
             self.update(motion_time=self._motion_cycle * CYCLE_TIME)
+
+    def show_tool(self, T_flange_tool: Pose) -> None:
+        """Shows which tool the controller has, by the poses it reports."""
+        _POSE.pack_into(self._block.tool, 0, *T_flange_tool.as_row_major())
 
     def on_cycle(self, cycle: int) -> None:
         """Takes note of how far the motion is."""

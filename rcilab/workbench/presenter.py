@@ -16,6 +16,8 @@ from rcilab.workbench.panels.jog import JogPanel
 from rcilab.workbench.panels.push import PushPanel
 from rcilab.workbench.panels.run import RunPanel
 from rcilab.workbench.panels.settings import SettingsPanel
+from rcilab.workbench.panels.setup import SetupPanel
+from rcilab.workbench.panels.setup_numbers import SetupNumbersPanel
 from rcilab.workbench.panels.status import status_values
 from rcilab.workbench.panels.target import TargetPanel
 from rcilab.workbench.panels.timeline import TimelinePanel
@@ -35,6 +37,7 @@ _MAIN_WIDTH, _TIMELINE_WIDTH = 352, 380  # [px]
 _TABS = (
     ("tab.jog", "adjustments-horizontal", JogPanel),
     ("tab.target", "current-location", TargetPanel),
+    ("tab.setup", "tool", SetupPanel, SetupNumbersPanel),
     ("tab.check", "clipboard-check", CheckPanel),
     ("tab.run", "player-play", RunPanel, PushPanel, HealthPanel),
     ("tab.settings", "settings", SettingsPanel),
