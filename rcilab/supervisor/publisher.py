@@ -9,9 +9,9 @@ from typing import Any
 
 from rcilab.client.recorder import CycleLog, Recorder
 from rcilab.clock import CYCLE_TIME
+from rcilab.spatial import Pose
 from rcilab.supervisor.lateness import LatenessHistogram
 from rcilab.supervisor.layout import RING_CYCLES, ControlBlock, Word
-from rcilab.spatial import Pose
 from rcilab.supervisor.snapshot import Snapshot, write_snapshot
 
 _SNAPSHOT_CYCLES = 20  # Rows between two snapshots: 50 a second.
