@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rcilab.arrays import Array
 from rcilab.robots.mesh import revolve
 from rcilab.safety_box import SafetyBox
 from rcilab.spatial import Pose
@@ -55,10 +56,7 @@ class SetupStage:
         self._crossing: Any = server.scene.add_label(
             "/outside_label", "", anchor="bottom-left", depth_test=False, font_screen_scale=1.0, visible=False
         )
-        nowhere = np.zeros((1, 2, 3), dtype=np.float32)
-        self._line: Any = server.scene.add_line_segments(
-            "/outside", nowhere, _OUTSIDE_COLOR, thickness=0.018, visible=False
-        )
+        self._lines = 0
 
     def show(self, state: UiState, text: Text) -> None:
         """Draws what is chosen to be seen, puts handles on what is edited."""
@@ -81,8 +79,9 @@ class SetupStage:
         """Takes box, labels and handles away; what is on the flange goes with the arm."""
         if self._gizmo is not None:
             self._gizmo.remove()
-        for handle in (self._label, self._crossing, self._line):
-            handle.remove()
+        self._label.remove()
+        self._crossing.remove()
+        self._draw_outside([])
         self._view.remove_box()
 
     def _exchange_handles(self, part: str, state: UiState) -> None:
@@ -157,13 +156,18 @@ class SetupStage:
             return
         self._outside = wanted
         runs = [] if path is None else outside_runs(path, state.setup.wanted.box)
-        self._line.visible = self._crossing.visible = bool(runs)
+        self._draw_outside(runs)
+        self._crossing.visible = bool(runs)
         if runs:
-            segments = np.concatenate([np.stack([run[:-1], run[1:]], axis=1) for run in runs])
-            self._line.points = segments.astype(np.float32)
-            self._line.colors = np.broadcast_to(np.array(_OUTSIDE_COLOR, dtype=np.uint8), segments.shape).copy()
             self._crossing.position = runs[0][len(runs[0]) // 2]
             self._crossing.text = text("setup.outside")
+
+    def _draw_outside(self, runs: list[Array]) -> None:
+        for number in range(len(runs), self._lines):
+            self._drawing.remove(f"/outside{number}")
+        for number, run in enumerate(runs):
+            self._drawing.add_polyline(f"/outside{number}", run, color=_OUTSIDE_COLOR, thickness=0.02)
+        self._lines = len(runs)
 
     def _hear(self, face: int) -> Any:
         async def act(event: Any) -> None:

@@ -41,7 +41,7 @@ class SetupPanel:
         self._table = Html(gui)
         self._stale = Html(gui)
         with gui.add_folder(text("setup.edit_title")):
-            gui.add_html('<i class="rl-buttons"></i>')
+            gui.add_html('<i class="rl-buttons rl-setup-head"></i>')
             self._undo = gui.add_button(
                 text("setup.undo"), icon="arrow-back-up", color="gray", hint=text("setup.undo_hint")
             )
