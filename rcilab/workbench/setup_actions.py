@@ -196,7 +196,7 @@ class SetupActions:
         if not self._past:
             return
         setup, before = self._store.state.setup, self._past.pop()
-        parts = {part for part in SETUP_PARTS if getattr(before, part) is not getattr(setup.wanted, part)}
+        parts: set[SetupPart] = {p for p in SETUP_PARTS if getattr(before, p) is not getattr(setup.wanted, p)}
         self._clear_problems(f"setup.{part}.{name}" for part in parts for name in FIELD_NAMES[part])
         self._take(replace(setup, wanted=before, inertia=None), parts)
 

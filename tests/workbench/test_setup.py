@@ -9,11 +9,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rcilab.client.setup import RobotSetup
+from rcilab.client.setup import SETUP_PARTS, RobotSetup
 from rcilab.errors import CommandRejectedError
 from rcilab.protocols import rci
 from rcilab.spatial import Pose
 from rcilab.supervisor import SupervisorStatus
+from rcilab.supervisor.launch import start_controller
 from rcilab.workbench import requests
 from rcilab.workbench.app import Workbench
 from rcilab.workbench.panels.check import CheckPanel
@@ -255,3 +256,31 @@ def test_the_check_tab_says_that_its_report_is_out_of_date(bench, ask):
     panel.build(gui, bench.store.state)
     panel.show(bench.store.state, bench.session.status())
     assert "Out of date" in gui.made[0].content
+
+
+def test_a_robot_that_is_not_ours_is_changed_only_after_a_second_yes(bench, ask):
+    controller = start_controller("xMatePro7")
+    try:
+        ask(requests.ChooseRobot(target=controller.address))
+        wait(lambda: bench.session.status().phase == "idle" and bench.session.is_ready, "the other controller")
+        type_in(ask, load_mass="1.5")
+        assert setup_obstacle(bench.store.state, bench.session.status()).code == "ready.setup_unsent"
+        ask(requests.PressSetup(what="confirm"))
+        ask(requests.PressSetup(what="send"))
+        ask(requests.PressSetup(what="cancel"))
+        ask(requests.PressSetup(what="confirm"))
+        ask(requests.PressSetup(what="send"))
+        type_in(ask, load_mass="1.6")  # Not what was asked about.
+        ask(requests.PressSetup(what="confirm"))
+        assert bench.session.status().setup.parts == ()
+        ask(requests.PressSetup(what="send"))
+        ask(requests.PressSetup(what="confirm"))
+        wait(lambda: bench.session.status().setup.load is wanted(bench).load, "the robot to have the load")
+        assert bench.session.status().setup.parts == tuple(
+            sorted(bench.store.state.setup.touched, key=SETUP_PARTS.index)
+        )
+    finally:
+        ask(requests.ChooseRobot(target="virtual"))
+        controller.end()
+    wait(lambda: bench.session.status().phase == "idle" and bench.session.is_ready, "our own controller")
+    wait(lambda: settled(bench), "our own controller to have the set-up")
