@@ -51,7 +51,8 @@ class SetupActions:
         self._store, self._session = store, session
         self._past: list[RobotSetup] = []
         self._arm = store.state.model.name
-        self._dragged = -math.inf  # When a handle was last moved by a hand that still holds it.
+        self._drag: tuple[int | None, str] | None = None  # Which page drags which part.
+        self._dragged = -math.inf  # When it was last heard to.
         self._ticket: Ticket | None = None
         self._told = 0  # How often the controller has taken a set-up, as far as that was said or was our doing.
 
@@ -90,9 +91,9 @@ class SetupActions:
         if isinstance(changed, Message):
             self._store.say("warn", changed)
         else:
-            self._edit(changed, request.part, is_dragged=True)
+            self._edit(changed, request.part, drag=(request.page, request.part))
             self._clear_problems(f"setup.{request.part}.{name}" for name in FIELD_NAMES[request.part])
-        self._dragged = -math.inf if request.ended else time.monotonic()
+        self._hear_drag(request.ended)
 
     def resize(self, request: requests.ResizeBox) -> None:
         """Follows a handle on a face of the safety box; the other faces stay."""
@@ -110,8 +111,8 @@ class SetupActions:
         hand = box.T_base_box.rotation.T @ np.array(request.hand)
         bounds[request.face] = min(max(float(hand[axis]), low), high)
         wanted = setup.wanted.updated(RobotSetup(box=box_between(box, bounds)))
-        self._edit(replace(setup, wanted=wanted), "box", is_dragged=True)
-        self._dragged = -math.inf if request.ended else time.monotonic()
+        self._edit(replace(setup, wanted=wanted), "box", drag=(request.page, "box"))
+        self._hear_drag(request.ended)
 
     def set_setup(self, request: requests.SetSetup) -> None:
         """Turns a switch; what does not exist is ignored."""
@@ -186,10 +187,16 @@ class SetupActions:
         else:
             self._store.update(setup=replace(self._store.state.setup, refusal=tell_error(ticket.error)))
 
-    def _edit(self, changed: SetupState, part: SetupPart, *, is_dragged: bool = False) -> None:
+    def _hear_drag(self, has_ended: bool) -> None:
+        self._dragged = -math.inf if has_ended else time.monotonic()
+        if has_ended:
+            self._drag = None
+
+    def _edit(self, changed: SetupState, part: SetupPart, *, drag: tuple[int | None, str] | None = None) -> None:
         """Takes over an edit; a drag is one step to undo."""
-        if not is_dragged or time.monotonic() - self._dragged > _HAND_GONE:
+        if drag is None or drag != self._drag:
             self._past = [*self._past[-_UNDO_DEPTH:], self._store.state.setup.wanted]
+        self._drag = drag
         self._take(changed, {part})
 
     def _undo(self) -> None:

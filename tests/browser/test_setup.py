@@ -1,4 +1,4 @@
-"""The set-up as a person edits it: a typed tool, a dragged face of the safety box, undo; in step with the controller."""
+"""The set-up as a person edits it: a typed tool, a dragged face of the safety box, undo."""
 
 from __future__ import annotations
 
