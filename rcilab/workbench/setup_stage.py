@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from rcilab.workbench.store import UiState
 
-_OUTSIDE_COLOR = (214, 48, 38)
+_OUTSIDE_COLOR = (190, 0, 10)  # Lines are drawn paler than their colour.
 _HAND_AWAY = 0.6  # [s]
 _SCALES = {"box": 0.24, "tool": 0.17, "load": 0.17, "force": 0.17}  # [m]
 _HANDLE = 0.026  # [m]
