@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from rcilab.conformance import Certificate
     from rcilab.model import RobotModel
     from rcilab.motion import Motion
+    from rcilab.safety_box import SafetyBox
 
 
 def require_admissible(
@@ -23,6 +24,7 @@ def require_admissible(
     status: SupervisorStatus,
     *,
     is_operator_overdue: bool,
+    box: SafetyBox | None = None,
 ) -> None:
     """Returns if the motion may begin now.
 
@@ -32,6 +34,7 @@ def require_admissible(
         model: The arm.
         status: Where the arm is and what it does.
         is_operator_overdue: Whether somebody ought to be at the controls and is not.
+        box: The safety box that the controller was told.
 
     Raises:
         InvalidValueError: It is no motion, or the certificate is something else, such as a report.
@@ -45,7 +48,7 @@ def require_admissible(
     mismatch = describe_start_mismatch(motion.q[0], q_c)
     if mismatch is not None:
         raise CertificateError(mismatch, ["start state"])
-    certificate.verify(motion, model, q_c)
+    certificate.verify(motion, model, q_c, box)
     if len(motion.q) > MOTION_ROWS:
         raise UsageError(
             f"the motion takes {motion.duration:.1f} s, {MOTION_TIME:g} s at most can be handed over; split it"

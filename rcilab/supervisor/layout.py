@@ -8,7 +8,7 @@
     requests    mailbox to the control process
     replies     mailbox back
     jog         how somebody moves the arm by hand, guarded by a sequence number
-    felt        the controller's newest estimate of the force and moment from outside
+    felt        the controller's newest estimate of the force and moment from outside, and the tool that it has
     cycles      ring of every cycle
     motion      rows of the motion to stream
 
@@ -38,7 +38,7 @@ from rcilab.errors import UsageError, VersionMismatchError
 from rcilab.supervisor.lateness import SIZE as HISTOGRAM_WORDS
 
 MAGIC = b"RCILABCP"
-VERSION = 4  # Count up with every change of this file, of the snapshot or of `cycle_dtype`.
+VERSION = 5  # Count up with every change of this file, of the snapshot or of `cycle_dtype`.
 
 RING_CYCLES = 32768  # 33 s of cycles: how long a reader may sleep.
 MOTION_TIME = 300.0  # [s] Longest motion that can be handed over.
@@ -161,6 +161,7 @@ class ControlBlock:
         words, _, self.snapshot, histogram, self.requests, self.replies, self.jog, felt, self.cycles, motion = regions
         self.words = words.cast("Q")
         self.felt = felt[: 8 * 6].cast("d")
+        self.tool = felt[8 * 6 : 8 * (6 + 16)].cast("d")
         self.histogram = histogram[: 8 * HISTOGRAM_WORDS].cast("Q")
         self.motion: Array = np.frombuffer(motion, "<f8", MOTION_ROWS * self.n).reshape(MOTION_ROWS, self.n)
 

@@ -9,12 +9,14 @@ from typing import Any
 
 from rcilab.client.recorder import CycleLog, Recorder
 from rcilab.clock import CYCLE_TIME
+from rcilab.spatial import Pose
 from rcilab.supervisor.lateness import LatenessHistogram
 from rcilab.supervisor.layout import RING_CYCLES, ControlBlock, Word
 from rcilab.supervisor.snapshot import Snapshot, write_snapshot
 
 _SNAPSHOT_CYCLES = 20  # Rows between two snapshots: 50 a second.
 _WRENCH = struct.Struct("=6d")
+_POSE = struct.Struct("=16d")
 _RATE_TIME = 1.0  # [s] over which states are counted.
 
 
@@ -40,6 +42,7 @@ class Publisher:
     def restart(self) -> None:
         """Forgets the timing: another connection begins."""
         self._histogram.clear()
+        self._block.tool[15] = 0.0
         self._words[Word.LOST] = 0
 
     def beat(self) -> None:
@@ -73,6 +76,10 @@ class Publisher:
         """Says how long the motion takes that begins now, [s]; None: as long as somebody holds it."""
         self._motion_cycle = 0
         self.update(motion_time=None if duration is None else 0.0, motion_duration=duration)
+
+    def show_tool(self, T_flange_tool: Pose) -> None:
+        """Shows which tool the controller has, by the poses it reports."""
+        _POSE.pack_into(self._block.tool, 0, *T_flange_tool.as_row_major())
 
     def on_cycle(self, cycle: int) -> None:
         """Takes note of how far the motion is."""

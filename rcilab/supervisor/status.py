@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 
 from rcilab.arrays import Array, JointVector
 from rcilab.client.recorder import cycle_dtype
+from rcilab.client.setup import RobotSetup
 from rcilab.faults import Fault
+from rcilab.spatial import Pose
 from rcilab.state import ControllerMode, RobotMode
 
 __all__ = ["MESSAGES", "PHASES", "Incident", "Lateness", "Phase", "SupervisorStatus", "cycle_dtype"]
@@ -118,6 +120,12 @@ class SupervisorStatus:
     """Measured joint velocities, shape (n,), [rad/s]."""
     tau_ext: Array | None = None
     """Force and moment from outside as the controller estimates them, base axes, shape (6,), [N, N m]."""
+    T_flange_tool: Pose | None = None
+    """The tool that the controller has, by the poses it reports at rest; None while unknown."""
+    setup: RobotSetup = field(default_factory=RobotSetup)
+    """What the controller has acknowledged of its set-up since it was connected; it can be asked for none of it."""
+    setup_times: int = 0
+    """How often it has taken a set-up, also at a new connection."""
     robot_mode: RobotMode | None = None
     controller_mode: ControllerMode | None = None
     faults: tuple[Fault, ...] = ()

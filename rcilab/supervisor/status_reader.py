@@ -6,7 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from rcilab.errors import InvalidValueError
 from rcilab.faults import faults_from_bits
+from rcilab.spatial import Pose
 from rcilab.state import ControllerMode, RobotMode
 from rcilab.supervisor.lateness import late_cycles, summarise
 from rcilab.supervisor.layout import ControlBlock, Word
@@ -62,6 +64,16 @@ class StatusReader:
             "controller_mode": ControllerMode(last["controller_mode"]),
             "faults": faults_from_bits(bits >> place & 1 for place in range(32)) if bits else (),
             "tau_ext": np.array(self._block.felt),
+            "T_flange_tool": self._read_tool(),
             "success_rate": float(last["success_rate"]),
             "message_id": int(last["message_id"]),
         }
+
+    def _read_tool(self) -> Pose | None:
+        numbers = self._block.tool.tolist()
+        if numbers[15] != 1.0:
+            return None
+        try:
+            return Pose.from_row_major(numbers)
+        except InvalidValueError:  # It is being written at this moment.
+            return None

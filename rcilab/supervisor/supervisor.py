@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rcilab.client.address import parse_address
+from rcilab.client.setup import RobotSetup, require_setup
 from rcilab.closing import Closing
 from rcilab.errors import ConnectionLostError, RcilabError, UsageError
 from rcilab.supervisor.admission import require_admissible, require_ready
@@ -21,6 +22,8 @@ from rcilab.supervisor.launch import require_plant
 from rcilab.supervisor.layout import OPERATOR_TIMEOUT, ControlBlock, Word
 from rcilab.supervisor.ring import RingReader
 from rcilab.supervisor.settings import build_settings
+from rcilab.supervisor.setup_desk import SetupDesk, standard_setup
+from rcilab.supervisor.setup_letter import pack_setup
 from rcilab.supervisor.snapshot import Snapshot
 from rcilab.supervisor.status import MESSAGES, Incident, Phase, SupervisorStatus
 from rcilab.supervisor.status_reader import StatusReader
@@ -52,6 +55,8 @@ class Supervisor(Closing):
         stop_without_operator: Whether a motion is brought to rest once nobody has been at the controls for 2 s (see
             `set_operator_present`). False lets it finish; meant for the virtual controller.
         auto_restart: Whether a process of ours that died is started again by itself (at most 3 times a minute).
+        setup: What the controller is told at every connection. None: the virtual one the model's tool and load, a
+            real one nothing, since it has its own.
 
     Raises:
         InvalidValueError: The target is no address, the model no model, or the plant unknown.
@@ -65,12 +70,17 @@ class Supervisor(Closing):
         *,
         stop_without_operator: bool = True,
         auto_restart: bool = True,
+        setup: RobotSetup | None = None,
     ) -> None:
         from rcilab.model import require_model, require_rci
 
         self.model = require_rci(require_model(model))
         require_plant(plant)
         self._target = VIRTUAL if target == VIRTUAL else str(parse_address(target))
+        if setup is None:
+            setup = standard_setup(self.model, is_virtual=self._target == VIRTUAL)
+        self.model = require_setup(setup).applied_to(self.model)
+        self._setup = SetupDesk(setup)
         self._plant = plant
         self._stop_without_operator = stop_without_operator
         self._auto_restart = auto_restart
@@ -155,6 +165,8 @@ class Supervisor(Closing):
                 world_address=self._keeper.world_address,
                 controller_pid=self._keeper.controller_pid,
                 worker_pid=self._keeper.worker_pid,
+                setup=self._setup.acknowledged,
+                setup_times=self._setup.times,
                 **fields,
             )
 
@@ -175,15 +187,21 @@ class Supervisor(Closing):
 
         Raises:
             CertificateError: The certificate is missing, or does not fit the motion, the model, or where the arm is.
-            UsageError: The arm is moving, no controller is connected, nobody is at the controls, or the motion takes
-                more than 300 s.
+            UsageError: The arm is moving, no controller is connected, nobody is at the controls, the motion takes more
+                than 300 s, or the controller has not taken the set-up it was told last.
         """
         require_admissible(
-            motion, certificate, self.model, self.status(), is_operator_overdue=self._is_operator_overdue()
+            motion,
+            certificate,
+            self.model,
+            self.status(),
+            is_operator_overdue=self._is_operator_overdue(),
+            box=self._setup.wanted.box,
         )
         rows = motion.q
         with self._lock:
             block = self._require_block()
+            self._setup.require_given()
             block.motion[: len(rows)] = rows
             return self._ask("execute", kind="execute", rows=len(rows), duration=motion.duration)
 
@@ -256,6 +274,27 @@ class Supervisor(Closing):
             block.words[Word.STOPS_ASKED] += 1
             return self._ask("stop", kind="stop", number=block.words[Word.STOPS_ASKED])
 
+    def set_up(self, setup: RobotSetup) -> Ticket:
+        """Tells the controller a tool, a load, a safety box, a force-control frame; done once it has taken all of it.
+
+        From now on motions are checked with it, and it is told again at every new connection.
+
+        Args:
+            setup: What to tell; parts that are None stay.
+
+        Raises:
+            InvalidValueError: It is no set-up, or the load is heavier than the arm is rated for.
+            UsageError: The arm is moving, or no controller is connected.
+        """
+        model = require_setup(setup).applied_to(self.model)
+        with self._lock:
+            self._require_block()
+            require_ready(self.status(), is_operator_overdue=False)
+            ticket = self._ask("set up", kind="set_up", setup=pack_setup(setup))
+            self._setup.follow(ticket, setup)
+            self.model = model
+            return ticket
+
     def recover(self) -> Ticket:
         """Asks the controller to clear its faults (automatic error recovery)."""
         return self._ask("recover", kind="recover")
@@ -271,7 +310,10 @@ class Supervisor(Closing):
             address = self._keeper.address
             if address is None:
                 raise UsageError("there is no controller to connect to; restart() starts the virtual one again")
-            return self._ask("reconnect", kind="connect", address=address, timeout=ANSWER_TIMEOUT)
+            letter = self._setup.letter()
+            ticket = self._ask("reconnect", kind="connect", address=address, timeout=ANSWER_TIMEOUT, setup=letter)
+            self._setup.follow(ticket, self._setup.wanted, is_new_connection=True)
+            return ticket
 
     def set_operator_present(self, present: bool) -> None:
         """Tells that somebody is at the controls; call with True at least once a second while that is so.
@@ -316,9 +358,8 @@ class Supervisor(Closing):
 
     def _open(self) -> None:
         """Makes the shared block and what works on it, and starts the processes."""
-        is_virtual = self._target == VIRTUAL
-        block = ControlBlock.create(self.model.n, build_settings(self.model, is_virtual=is_virtual))
-        address = None if is_virtual else self._target
+        block = ControlBlock.create(self.model.n, build_settings(self.model))
+        address = None if self._target == VIRTUAL else self._target
         self._keeper = ProcessKeeper(block, self.model.name, self._plant, address, auto_restart=self._auto_restart)
         self._desk = TicketDesk(block)
         self._reader, self._ring = StatusReader(block), RingReader(block)
@@ -355,7 +396,9 @@ class Supervisor(Closing):
                         self._connecting = self.reconnect()
 
     def _collect_replies(self) -> None:
-        for failure in self._desk.collect():
+        failures = self._desk.collect()
+        self._setup.look()
+        for failure in failures:
             if self._crash is None and failure["kind"] in ("ConnectionLostError", "ControlError", "ModelError"):
                 shown = self._reader.read_snapshot()
                 if shown.phase in ("lost", "fault"):

@@ -12,6 +12,7 @@ import os
 import sys
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -26,13 +27,15 @@ from rcilab.client.opening import await_first_state, require_arm_there
 from rcilab.client.punctual import PRIORITY
 from rcilab.client.recorder import CycleLog
 from rcilab.client.recovery import recover
+from rcilab.client.setup import give_setup
 from rcilab.client.start_check import describe_start_mismatch
 from rcilab.client.transport import SocketTransport
-from rcilab.errors import ConnectionLostError, ControlError, ModelError, RcilabError, UsageError
+from rcilab.errors import ConnectionLostError, ControlError, InvalidValueError, ModelError, RcilabError, UsageError
 from rcilab.model import load_model
 from rcilab.motion import plan_stop
 from rcilab.protocols.rci import STATE_SIZE
 from rcilab.realtime import enter_realtime
+from rcilab.spatial import Pose
 from rcilab.state import ControllerMode, RobotState
 from rcilab.supervisor.failure import pack_failure
 from rcilab.supervisor.guiding import HandGuide
@@ -41,6 +44,7 @@ from rcilab.supervisor.layout import OPERATOR_TIMEOUT, ControlBlock, Word
 from rcilab.supervisor.mailbox import Mailbox
 from rcilab.supervisor.publisher import Publisher
 from rcilab.supervisor.settings import parse_settings
+from rcilab.supervisor.setup_letter import parse_setup
 from rcilab.supervisor.status import MESSAGES, Phase
 
 SILENCE = 0.3  # [s] without a state while idle before the connection counts as lost; a choice below half a second.
@@ -120,6 +124,9 @@ class Worker:
     def _show_state(self, state: RobotState) -> None:
         """Keeps the phase in step with what the robot reports while nothing moves."""
         phase = self._publisher.snapshot.phase
+        with suppress(InvalidValueError):  # A controller may report no pose before it is ready.
+            flange = self._model.pose(state.q_c, "flange")
+            self._publisher.show_tool(flange.inverse() @ Pose.from_matrix(state.T_base_tool_c))
         if self._guide is not None and self._guide.has_ended(state):
             self._guide = None
             self._say_ready()
@@ -173,11 +180,14 @@ class Worker:
         self._log.restart()
         self._publisher.restart()
         self._commands = RciCommands(link, self._settings.limits)
-        if self._settings.sends_tool:
-            self._commands.set_coor(self._settings.T_flange_tool)
-        if self._settings.load is not None:
-            self._commands.set_load(*self._settings.load)
         self._learn_power()
+        self._do_set_up(request)
+
+    def _do_set_up(self, request: dict[str, Any]) -> None:
+        self._require_link()
+        setup = parse_setup(request["setup"])
+        self._model = setup.applied_to(self._model)
+        give_setup(self._commands, setup)
         self._say_ready()
 
     def _do_power(self, request: dict[str, Any]) -> None:

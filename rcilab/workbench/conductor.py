@@ -17,6 +17,7 @@ from rcilab.workbench.mailbox import Mailbox
 from rcilab.workbench.push_actions import PushActions
 from rcilab.workbench.robot_actions import RobotActions
 from rcilab.workbench.session import Session
+from rcilab.workbench.setup_actions import SetupActions, is_setup_field
 from rcilab.workbench.store import Store
 from rcilab.workbench.telling import tell_error
 from rcilab.workbench.text import message
@@ -39,6 +40,7 @@ class Conductor:
         self._goal = GoalActions(store, session)
         self.robot = RobotActions(store, session)
         self._push = PushActions(store, session)
+        self._setup = SetupActions(store, session)
         self._view = ViewActions(store)
         self._export = ExportActions(store, deliver)
         self._mailbox: Mailbox[requests.Request] = Mailbox()
@@ -50,7 +52,7 @@ class Conductor:
             requests.MoveJoint: self._goal.move_joint,
             requests.PoseGoal: self._goal.pose_goal,
             requests.MoveTarget: self._goal.move_target,
-            requests.TypeField: self._goal.type_field,
+            requests.TypeField: self._type_field,
             requests.SetArmAngle: self._goal.set_arm_angle,
             requests.ChooseBranch: self._goal.choose_branch,
             requests.Plan: self._goal.plan,
@@ -61,6 +63,10 @@ class Conductor:
             requests.SetPush: self._push.set_push,
             requests.HoldPush: self._push.hold,
             requests.PullArm: self._push.pull,
+            requests.MoveSetup: self._setup.move,
+            requests.ResizeBox: self._setup.resize,
+            requests.SetSetup: self._setup.set_setup,
+            requests.PressSetup: self._setup.press,
             requests.Seek: self._view.seek,
             requests.Play: self._view.play,
             requests.SetView: self._view.set_view,
@@ -107,6 +113,10 @@ class Conductor:
             self._goal.catch_up()
         self._goal.settle()
         self._push.tick()
+        self._setup.tick()
+
+    def _type_field(self, request: requests.TypeField) -> None:
+        (self._setup if is_setup_field(request.field) else self._goal).type_field(request)
 
     def _run(self) -> None:
         last = time.monotonic()
@@ -136,6 +146,8 @@ def _coalescing_key(request: requests.Request) -> str | None:
         return f"target.{request.page}"
     if isinstance(request, requests.MoveJoint):
         return f"joint.{request.joint}.{request.page}"
+    if isinstance(request, requests.MoveSetup | requests.ResizeBox) and not request.ended:
+        return f"{type(request).__name__}.{request.page}"
     if isinstance(request, requests.PullArm) and request.phase == "update":
         return f"pull.{request.page}"
     if isinstance(request, requests.Seek | requests.SetSpeed | requests.SetArmAngle | requests.HoldPush):

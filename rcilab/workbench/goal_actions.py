@@ -153,7 +153,7 @@ class GoalActions:
             elif state.recording is None:  # A run that is looked at stays, whatever is posed.
                 self._store.update(plan=None, no_plan=message("plan.no_arm"), recording=None, place=0.0, playing=False)
             return
-        made = make_plan(state.model, frozen(status.q_c), state.goal.q, state.speed, state.law)
+        made = make_plan(state.model, frozen(status.q_c), state.goal.q, state.speed, state.law, state.setup.wanted.box)
         self._planned = time.monotonic()
         if isinstance(made, Plan):
             made = replace(made, short=state.goal.reach.short)
@@ -166,7 +166,7 @@ class GoalActions:
         state = self._store.state
         if state.plan is None or state.plan.complete or time.monotonic() - self._planned < SETTLED:
             return
-        self._store.update(plan=state.plan.completed(state.model))
+        self._store.update(plan=state.plan.completed())
 
     def catch_up(self) -> None:
         """Plans what was put off while the arm was moving."""

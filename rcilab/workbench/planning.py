@@ -6,10 +6,13 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rcilab.arrays import Array, JointVector
+from rcilab.clock import CYCLE_TIME
 from rcilab.errors import RcilabError
 from rcilab.model import RobotModel
+from rcilab.safety_box import SafetyBox, active_box
 from rcilab.workbench.text import Message, message
 
 if TYPE_CHECKING:
@@ -29,6 +32,10 @@ class Plan:
 
     motion: Motion
     report: Report
+    model: RobotModel
+    """The arm it was judged for, with its tool and load."""
+    box: SafetyBox | None = None
+    """The safety box it was judged with."""
     path: Array = field(repr=False)
     """Positions of the tool, shape (N, 3), [m]."""
     effort: Array = field(repr=False)
@@ -43,15 +50,41 @@ class Plan:
         """Joint angles it must be executed from, [rad]."""
         return self.motion.start
 
-    def completed(self, model: RobotModel) -> Plan:
+    def completed(self) -> Plan:
         """Returns this plan with a report on all conditions, collisions too: what may be executed."""
         from rcilab.conformance import check
 
-        return self if self.complete else replace(self, report=check(self.motion, model), complete=True)
+        if self.complete:
+            return self
+        return replace(self, report=check(self.motion, self.model, box=self.box), complete=True)
+
+    def stale_parts(self, model: RobotModel, box: SafetyBox | None) -> tuple[str, ...]:
+        """Returns what has changed since the plan was judged, as certificates name it: tool, load, safety box.
+
+        Args:
+            model: The arm as it is now.
+            box: The safety box that is in force now; without one, a plan that was judged inside a box is as good.
+        """
+        then, now = self.model.fingerprint, model.fingerprint
+        changed = [part for part in ("tool", "load") if then[part] != now[part]]
+        bound, judged = active_box(box), active_box(self.box)
+        if bound is not None and (judged is None or not _is_same_box(bound, judged)):
+            changed.append("box")
+        return tuple(changed)
+
+
+def tool_path(model: RobotModel, motion: Motion) -> Array:
+    """Returns where the tool is at `PATH_POINTS` moments of a motion, shape (N, 3), [m]."""
+    return model.forward_path(motion.q[_sampled_rows(motion)])[:, :3, 3]
 
 
 def make_plan(
-    model: RobotModel, start: JointVector, goal: JointVector, speed: float, law: PlannableLaw
+    model: RobotModel,
+    start: JointVector,
+    goal: JointVector,
+    speed: float,
+    law: PlannableLaw,
+    box: SafetyBox | None = None,
 ) -> Plan | Message:
     """Returns a motion from start to goal that is judged but for collisions, or why there is none."""
     from rcilab.conformance import check
@@ -65,11 +98,17 @@ def make_plan(
         return message("plan.here")
     try:
         motion = plan_joint(model, start, goal, speed=speed, law=law)
-        report = check(motion, model, start=start, distance=None)
+        report = check(motion, model, start=start, box=box, distance=None)
     except RcilabError as error:
         return message("plan.failed", error=str(error))
+    effort = np.abs(motion.dq[_sampled_rows(motion)] / model.limits.joint.velocity).max(axis=1)
+    return Plan(motion=motion, report=report, path=tool_path(model, motion), effort=effort, model=model, box=box)
+
+
+def _sampled_rows(motion: Motion) -> NDArray[np.intp]:
     times = np.linspace(0.0, motion.duration, PATH_POINTS)
-    rows = np.minimum((times / 1e-3).astype(int), len(motion.times) - 1)
-    path = model.forward_path(motion.q[rows])[:, :3, 3]
-    effort = np.abs(motion.dq[rows] / model.limits.joint.velocity).max(axis=1)
-    return Plan(motion=motion, report=report, path=path, effort=effort)
+    return np.minimum((times / CYCLE_TIME).astype(np.intp), len(motion.times) - 1)
+
+
+def _is_same_box(a: SafetyBox, b: SafetyBox) -> bool:
+    return a.size == b.size and a.T_base_box.is_close(b.T_base_box, 0.0)

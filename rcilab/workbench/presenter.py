@@ -17,6 +17,8 @@ from rcilab.workbench.panels.push import PushPanel
 from rcilab.workbench.panels.recording import RecordingPanel
 from rcilab.workbench.panels.run import RunPanel
 from rcilab.workbench.panels.settings import SettingsPanel
+from rcilab.workbench.panels.setup import SetupPanel
+from rcilab.workbench.panels.setup_numbers import SetupNumbersPanel
 from rcilab.workbench.panels.status import status_values
 from rcilab.workbench.panels.target import TargetPanel
 from rcilab.workbench.panels.timeline import TimelinePanel
@@ -36,6 +38,7 @@ _MAIN_WIDTH, _TIMELINE_WIDTH = 352, 380  # [px]
 _TABS = (
     ("tab.jog", "adjustments-horizontal", JogPanel),
     ("tab.target", "current-location", TargetPanel),
+    ("tab.setup", "tool", SetupPanel, SetupNumbersPanel),
     ("tab.check", "clipboard-check", CheckPanel),
     ("tab.run", "player-play", RunPanel, RecordingPanel, PushPanel, HealthPanel),
     ("tab.settings", "settings", SettingsPanel),

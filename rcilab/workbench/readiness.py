@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rcilab.workbench.setting_up import name_parts, setup_obstacle
 from rcilab.workbench.store import UiState
 from rcilab.workbench.telling import tell_status
 from rcilab.workbench.text import Message, message
@@ -40,6 +41,12 @@ def obstacle(state: UiState, status: SupervisorStatus) -> Message | None:
         return message("ready.power")
     if state.plan is None:
         return message("ready.no_plan")
+    stale = state.plan.stale_parts(state.model, state.setup.wanted.box)
+    if stale:
+        return message("ready.stale", what=name_parts(stale))
+    unset = setup_obstacle(state, status)
+    if unset is not None:
+        return unset
     if not state.plan.report.ok:
         return message("ready.violations", count=len(state.plan.report.violations))
     if status.q_c is None or float(np.abs(status.q_c - state.plan.starts_at).max()) > _SAME_PLACE:

@@ -47,7 +47,7 @@ class TypeField(Request):
     """A number field holds this text now."""
 
     field: str
-    """joint.0 ... joint.6, pose.x ... pose.yaw, psi."""
+    """joint.0 ... joint.6, pose.x ... pose.yaw, psi, speed, setup.PART.NAME (see `setup_fields`)."""
     text: str
 
 
@@ -134,6 +134,45 @@ class PullArm(Request):
     hand: tuple[float, ...]
     """Where the mouse is, base axes, [m]."""
     phase: Literal["start", "update", "end"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MoveSetup(Request):
+    """The handles of a part of the set-up were moved."""
+
+    part: Literal["box", "tool", "load", "force"]
+    position: tuple[float, ...]
+    """Of the box in base; of the others in the flange frame, [m]."""
+    wxyz: tuple[float, ...]
+    ended: bool = False
+    """Whether the mouse was released."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ResizeBox(Request):
+    """A handle on a face of the safety box was dragged."""
+
+    face: int
+    """0 to 2: the low faces along x, y, z of the box; 3 to 5: the high ones."""
+    hand: tuple[float, ...]
+    """Where the mouse is, base axes, [m]."""
+    ended: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetSetup(Request):
+    """A switch of the set-up."""
+
+    name: Literal["edited", "box", "tool", "load", "force", "active", "axes"]
+    """What has handles; whether a part is drawn; whether the box bounds; what the force-control frame follows."""
+    value: str | bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PressSetup(Request):
+    """A button of the set-up."""
+
+    what: Literal["undo", "send", "confirm", "cancel"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

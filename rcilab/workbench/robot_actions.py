@@ -17,11 +17,13 @@ from rcilab.workbench.reach import Tone
 from rcilab.workbench.readiness import is_moving, obstacle
 from rcilab.workbench.run_keeper import RunKeeper
 from rcilab.workbench.session import Session
-from rcilab.workbench.store import Goal, Store
+from rcilab.workbench.setting_up import SetupState
+from rcilab.workbench.store import Goal, Store, UiState
 from rcilab.workbench.telling import StartingError, tell_error, tell_incident
 from rcilab.workbench.text import Message, message
 
 if TYPE_CHECKING:
+    from rcilab.client.setup import RobotSetup
     from rcilab.supervisor import SupervisorStatus, Ticket
 
 _SECOND_THOUGHT = 10.0  # [s] A choice: a second press that comes later asks anew.
@@ -119,7 +121,7 @@ class RobotActions:
         self._store.update(plant=plant, playing=False)
         self._powered, self._power_asked = False, float("-inf")
         self._tickets, self._recording, self._incident, self._phase = [], False, 0, ""
-        self._session.open(state.model, state.target, plant)
+        self._session.open(state.model, state.target, plant, _own_setup(state, state.target))
 
     def open(self, name: str, target: str) -> None:
         """Connects to a destination with an arm; goal, plan and undo stay unless it is another arm."""
@@ -135,8 +137,9 @@ class RobotActions:
             changes |= {"model": model, "goal": self._untouched, "plan": None, "no_plan": None}
             changes |= {"plot_joint": 0, "problems": {}}
             changes |= {"push": replace(state.push, link=TOOL)}  # The other arm may have no such link.
+            changes |= {"setup": SetupState()}  # Nor may it bear the same load.
         # First: from here on no state of the old arm is shown on the new one.
-        self._session.open(model, target, state.plant)
+        self._session.open(model, target, state.plant, _own_setup(state, target) if model is state.model else None)
         self._store.update(place=0.0, playing=False, **changes)
 
     def watch(self) -> str | None:
@@ -181,7 +184,7 @@ class RobotActions:
     def _execute(self, *, is_agreed: bool) -> None:
         state = self._store.state
         if state.plan is not None and not state.plan.complete:
-            state = self._store.update(plan=state.plan.completed(state.model))
+            state = self._store.update(plan=state.plan.completed())
         reason = obstacle(state, self._session.status())
         if reason is not None:
             self._store.say("warn", reason)
@@ -247,3 +250,9 @@ class RobotActions:
     def close(self) -> None:
         """Ends a recording, so that its file has an end."""
         self._end_recording()
+
+
+
+def _own_setup(state: UiState, target: str) -> RobotSetup | None:
+    """Returns what our own controller is told at once; a foreign one is told nothing that was not agreed to."""
+    return state.setup.wanted.only(state.setup.touched) if target == "virtual" else None

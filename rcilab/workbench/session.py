@@ -11,6 +11,7 @@ from rcilab.errors import RcilabError
 from rcilab.workbench.telling import StartingError
 
 if TYPE_CHECKING:
+    from rcilab.client.setup import RobotSetup
     from rcilab.model import RobotModel
     from rcilab.supervisor import Supervisor, SupervisorStatus
 
@@ -31,14 +32,17 @@ class Session:
         self._generation = 0
         self._worker: threading.Thread | None = None
 
-    def open(self, model: RobotModel, target: str, plant: str = "ideal") -> None:
+    def open(self, model: RobotModel, target: str, plant: str = "ideal", setup: RobotSetup | None = None) -> None:
         """Closes what is open and starts a supervisor for this arm, destination and plant; returns at once."""
         with self._lock:
             self._generation += 1
             generation, previous = self._generation, self._worker
             self._ready = self._shown = None
             self._worker = threading.Thread(
-                target=self._exchange, args=(generation, previous, model, target, plant), name="session", daemon=True
+                target=self._exchange,
+                args=(generation, previous, model, target, plant, setup),
+                name="session",
+                daemon=True,
             )
             self._worker.start()
 
@@ -100,7 +104,13 @@ class Session:
                 ready.set_operator_present(True)
 
     def _exchange(
-        self, generation: int, previous: threading.Thread | None, model: RobotModel, target: str, plant: str
+        self,
+        generation: int,
+        previous: threading.Thread | None,
+        model: RobotModel,
+        target: str,
+        plant: str,
+        setup: RobotSetup | None,
     ) -> None:
         if previous is not None:
             previous.join()
@@ -113,7 +123,7 @@ class Session:
         try:
             from rcilab.supervisor import Supervisor
 
-            supervisor = Supervisor(model, target, plant)
+            supervisor = Supervisor(model, target, plant, setup=setup)
             self._current = self._shown = supervisor
             supervisor.start()
         except RcilabError as error:

@@ -14,6 +14,7 @@ from rcilab.workbench.grip import Grip
 from rcilab.workbench.planning import PATH_POINTS
 from rcilab.workbench.readiness import is_moving
 from rcilab.workbench.replay import replayed_pose
+from rcilab.workbench.setup_stage import SetupStage, hides_target
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask
 
@@ -56,6 +57,10 @@ class Stage:
         if wanted != self._built:
             self._build(state)
             self._built = wanted
+        if state.model.T_flange_tool is not self._tool:
+            self._tool = state.model.T_flange_tool
+            for arm in (self._live, self._candidate, self._ghost):
+                arm.show_tool(self._tool)
         live = status.q
         if live is None:  # Nothing is connected: what stands there is the run that is looked at.
             replayed = replayed_pose(state)
@@ -70,6 +75,7 @@ class Stage:
         self._show_plan(state, status, live)
         self._show_target(state, text)
         self._grip.show(state, status, text)
+        self._setup.show(state, text)
 
     def _build(self, state: UiState) -> None:
         server, full = self._server, state.quality == "full"
@@ -79,6 +85,7 @@ class Stage:
                 arm.remove()
             self._gizmo.remove()
             self._grip.remove()
+            self._setup.remove()
         server.scene.configure_default_lights(True, cast_shadow=full)
         scene.configure_environment_map("studio" if full else None, environment_intensity=0.55)
         scene.set_background_image(_backdrop(), format="jpeg", jpeg_quality=92)
@@ -101,6 +108,8 @@ class Stage:
         drawing = ViserScene(server, shadows=full)
         self._live = ArmView(drawing, "live", state.model, "live", quality="fine" if full else "coarse")
         self._grip = Grip(server, drawing, self._live, self._ask)
+        self._setup = SetupStage(server, drawing, self._live, self._ask)
+        self._tool = state.model.T_flange_tool
         self._candidate = ArmView(drawing, "candidate", state.model, "candidate")
         self._ghost = ArmView(drawing, "plan", state.model, "plan")
         self._visible, self._plan, self._tone, self._said = {}, None, "", ""
@@ -143,6 +152,9 @@ class Stage:
 
     def _show_target(self, state: UiState, text: Text) -> None:
         goal = state.goal
+        away = hides_target(state)
+        if self._gizmo.visible == away:
+            self._gizmo.visible = self._mark.visible = self._label.visible = not away
         if time.monotonic() - self._touched > _HAND_AWAY:
             position, wxyz = goal.target.position, goal.target.wxyz
             if np.abs(np.asarray(self._gizmo.position) - position).max() > 1e-7:
@@ -164,9 +176,10 @@ class Stage:
     def _show_plan(self, state: UiState, status: SupervisorStatus, live: np.ndarray) -> None:
         plan = state.plan
         if plan is not self._plan:
+            moved = plan is None or self._plan is None or plan.path is not self._plan.path
             self._plan = plan
             self._path.visible = plan is not None
-            if plan is not None:
+            if plan is not None and moved:
                 colors = _effort_colors(plan.effort).astype(np.uint8)
                 self._path.points = np.stack([plan.path[:-1], plan.path[1:]], axis=1).astype(np.float32)
                 self._path.colors = np.stack([colors[:-1], colors[1:]], axis=1)

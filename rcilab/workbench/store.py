@@ -18,6 +18,7 @@ from rcilab.workbench.lease import Lease
 from rcilab.workbench.planning import Plan, PlannableLaw
 from rcilab.workbench.pushing import Plant, PushState
 from rcilab.workbench.reach import Reach, Tone
+from rcilab.workbench.setting_up import SetupState
 from rcilab.workbench.text import Message
 
 if TYPE_CHECKING:
@@ -84,6 +85,8 @@ class UiState:
     """What the virtual controller moves."""
     push: PushState = field(default_factory=PushState)
     goal: Goal
+    setup: SetupState = field(default_factory=SetupState)
+    """Safety box, tool, load, force-control frame; `model` has this tool and this load."""
     plan: Plan | None = None
     no_plan: Message | None = None
     """Why there is no plan."""

@@ -230,7 +230,7 @@ from rcilab.supervisor.keeper import ProcessKeeper
 from rcilab.supervisor.layout import ControlBlock
 from rcilab.supervisor.settings import build_settings
 model = load_model("xMatePro7")
-block = ControlBlock.create(model.n, build_settings(model, is_virtual=True))
+block = ControlBlock.create(model.n, build_settings(model))
 keeper = ProcessKeeper(block, model.name, "ideal", None, auto_restart=False)
 keeper.launch()
 print(keeper.worker_pid, keeper.controller_pid, flush=True)

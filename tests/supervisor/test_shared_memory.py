@@ -183,14 +183,11 @@ def test_percentiles_of_the_histogram_are_those_of_the_numbers():
 
 def test_settings_survive_the_way_through_json():
     model = load_model("xMate3", tool=Pose((0.0, 0.0, 0.1)))
-    settings = parse_settings(json.loads(json.dumps(build_settings(model, is_virtual=True))))
+    settings = parse_settings(json.loads(json.dumps(build_settings(model))))
     assert settings.n == 6
-    assert settings.sends_tool
     assert settings.T_flange_tool.is_close(model.T_flange_tool, 0.0)
-    assert settings.load is None
     assert np.array_equal(settings.limits.joint.jerk, model.limits.joint.jerk)
     assert settings.limits.cartesian == model.limits.cartesian
-    assert not build_settings(model, is_virtual=False)["sends_tool"]
 
 
 def test_an_error_keeps_its_kind_its_sentence_and_its_faults():

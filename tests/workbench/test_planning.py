@@ -29,19 +29,19 @@ def test_a_plan_is_judged_but_for_collisions_until_it_is_completed():
     quick = planned(ON_THE_FLOOR)
     assert quick.report.ok
     assert not quick.complete
-    whole = quick.completed(MODEL)
+    whole = quick.completed()
     assert whole.complete
     assert [violation.condition.id for violation in whole.report.violations] == ["clearance.floor"]
     assert whole.report.certificate is None
     assert whole.motion is quick.motion
-    assert whole.completed(MODEL) is whole
+    assert whole.completed() is whole
 
 
 def test_only_a_completed_plan_has_a_certificate_to_run_with():
     quick = planned(HOME + 0.2)
     with pytest.raises(CertificateError, match="nobody looked for collisions"):
         quick.report.certificate.verify(quick.motion, MODEL, HOME)
-    quick.completed(MODEL).report.certificate.verify(quick.motion, MODEL, HOME)
+    quick.completed().report.certificate.verify(quick.motion, MODEL, HOME)
 
 
 def test_a_goal_that_rests_is_looked_at_for_collisions_and_one_that_is_dragged_is_not(monkeypatch):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from rcilab.workbench.setting_up import name_parts
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, Html, esc
 
@@ -22,7 +23,7 @@ class CheckPanel:
     def __init__(self, text: Text, ask: Ask) -> None:
         del ask
         self._text = text
-        self._drawn: Report | None = None
+        self._drawn: tuple[Report, tuple[str, ...]] | None = None
 
     def build(self, gui: Any, state: UiState) -> None:
         """Adds the report."""
@@ -38,16 +39,19 @@ class CheckPanel:
             self._verdict.show(f'<p class="rl-note">{esc(reason)}</p>')
             self._table.show("")
             return
+        stale = state.plan.stale_parts(state.model, state.setup.wanted.box)
         report = state.plan.report
-        if report is self._drawn:
+        if (report, stale) == self._drawn:
             return
-        self._drawn = report
+        self._drawn = report, stale
         unheeded = sum(not row.ok for row in report.rows if row.condition.necessity == "recommended")
         if report.ok:
             code = "check.passed_unheeded" if unheeded else "check.passed_long"
             headline = ("good", "check.passed", text(code, count=unheeded))
         else:
             headline = ("bad", "check.failed", text("check.failed_long", count=len(report.violations)))
+        if stale:
+            headline = ("warn", "setup.stale", text("setup.stale_why", what=text.say(name_parts(stale))))
         tone, word, rest = headline
         self._verdict.show(
             f'<p class="rl-verdict rl-{tone} rl-big"><b>{esc(text(word))}</b> {esc(rest)}</p>'

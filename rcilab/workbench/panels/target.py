@@ -12,6 +12,7 @@ from rcilab.workbench.goal_actions import POSE_FIELDS
 from rcilab.workbench.panels.jog import problems_html, reach_html
 from rcilab.workbench.planning import LAWS
 from rcilab.workbench.reach import margin
+from rcilab.workbench.setting_up import name_parts
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, Html, Linked, NumberField, esc, on_press, shown
 
@@ -127,6 +128,10 @@ def planned_html(state: UiState, text: Text) -> str:
     """Returns one line about the plan: how long it takes and whether it passed, or why there is none."""
     if state.plan is None:
         return f'<p class="rl-note">{esc(text.say(state.no_plan)) if state.no_plan else ""}</p>'
+    stale = state.plan.stale_parts(state.model, state.setup.wanted.box)
+    if stale:
+        said = text("setup.stale_why", what=text.say(name_parts(stale)))
+        return f'<p class="rl-verdict rl-warn"><b>{esc(text("setup.stale"))}</b> {esc(said)}</p>'
     report = state.plan.report
     tone, word = ("good", "check.passed") if report.ok else ("bad", "check.failed")
     said = text("target.planned", duration=f"{state.plan.motion.duration:.3f}")

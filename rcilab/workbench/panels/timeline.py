@@ -109,7 +109,7 @@ class TimelinePanel:
             self._readout.show(f'<p class="rl-clock"><b>{t:.3f}</b> / {duration:.3f} s<span>{esc(kinds)}</span></p>')
         for plot in self._plots.values():
             plot.height = _plot_height(state)
-        wanted = (state.plan, state.recording, state.plot_joint, state.model)
+        wanted = (state.plan, state.recording, state.plot_joint, state.model.name)
         now = time.monotonic()
         if wanted != self._drawn and now - self._drawn_at > _REDRAW_TIME:
             self._drawn, self._drawn_at = wanted, now

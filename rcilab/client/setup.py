@@ -1,0 +1,97 @@
+"""What is fixed to the arm and where its tool may be: the four settings of the RCI that belong together.
+
+Tool (`setCoor`), load (`setLoad`), safety box (`setCartesianLimit`) and force-control frame (`setFcCoor`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal, TypeAlias
+
+from rcilab.dynamics.payload import Payload
+from rcilab.errors import InvalidValueError
+from rcilab.protocols.rci import ForceFrame
+from rcilab.safety_box import SafetyBox
+from rcilab.spatial import IDENTITY, Pose
+
+if TYPE_CHECKING:
+    from rcilab.client.settings import RciSettings
+    from rcilab.model import RobotModel
+
+SetupPart: TypeAlias = Literal["box", "tool", "load", "force"]
+
+SETUP_PARTS: tuple[SetupPart, ...] = ("box", "tool", "load", "force")
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class ForceControlFrame:
+    """The frame in which the controller reports forces, and in which it controls them."""
+
+    T_flange_force: Pose = IDENTITY
+    type: ForceFrame = ForceFrame.WORLD
+    """What its axes follow."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class RobotSetup:
+    """A set-up, or a part of one: what is None is left as the controller has it."""
+
+    box: SafetyBox | None = None
+    tool: Pose | None = None
+    """Pose of the tool in the flange frame."""
+    load: Payload | None = None
+    force: ForceControlFrame | None = None
+
+    @property
+    def parts(self) -> tuple[SetupPart, ...]:
+        """Names of what is not None."""
+        return tuple(part for part in SETUP_PARTS if getattr(self, part) is not None)
+
+    def only(self, parts: Iterable[str]) -> RobotSetup:
+        """Returns a set-up of these parts alone."""
+        return RobotSetup(**{part: getattr(self, part) for part in SETUP_PARTS if part in parts})
+
+    def updated(self, newer: RobotSetup) -> RobotSetup:
+        """Returns this set-up with the parts of a newer one in it."""
+        return replace(self, **{part: getattr(newer, part) for part in newer.parts})
+
+    def applied_to(self, model: RobotModel) -> RobotModel:
+        """Returns the arm with this tool and this load.
+
+        Raises:
+            InvalidValueError: The load is heavier than the arm is rated for.
+        """
+        changed = model if self.tool is None else model.with_tool(self.tool)
+        return changed if self.load is None else changed.with_load(self.load)
+
+
+def require_setup(setup: object) -> RobotSetup:
+    """Returns `setup` if it is one.
+
+    Raises:
+        InvalidValueError: It is something else.
+    """
+    if isinstance(setup, RobotSetup):
+        return setup
+    raise InvalidValueError("setup", setup, "is no RobotSetup; RobotSetup(tool=..., box=...) makes one")
+
+
+def give_setup(settings: RciSettings, setup: RobotSetup) -> None:
+    """Tells a controller; nothing may move meanwhile. A refusal leaves the parts before it in force.
+
+    Args:
+        settings: The commands of a connection, or a session.
+        setup: What to tell.
+
+    Raises:
+        CommandRejectedError: The controller refused a part; the error names it.
+    """
+    if setup.tool is not None:
+        settings.set_coor(setup.tool)
+    if setup.load is not None:
+        settings.set_load(setup.load.mass, setup.load.center_of_mass, setup.load.inertia)
+    if setup.box is not None:
+        settings.set_cartesian_limit(setup.box)
+    if setup.force is not None:
+        settings.set_fc_coor(setup.force.T_flange_force, setup.force.type)

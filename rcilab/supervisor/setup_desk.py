@@ -1,0 +1,86 @@
+"""Which set-up the controller was told, whether it took it, and what it is told again at every new connection."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from rcilab.client.setup import RobotSetup
+from rcilab.errors import UsageError
+from rcilab.spatial import IDENTITY
+from rcilab.supervisor.setup_letter import pack_setup
+
+if TYPE_CHECKING:
+    from rcilab.model import RobotModel
+    from rcilab.supervisor.ticket import Ticket
+
+
+class SetupDesk:
+    """Guarded by the lock of its owner.
+
+    Args:
+        setup: What the controller is told at its first connection.
+    """
+
+    def __init__(self, setup: RobotSetup) -> None:
+        self.wanted = setup
+        """What it was told last, all of it."""
+        self.acknowledged = RobotSetup()
+        """What it has answered yes to since it was connected."""
+        self.times = 0
+        """How often it has taken a set-up."""
+        self._waiting: tuple[Ticket, RobotSetup] | None = None
+        self._refusal: str | None = None
+
+    def letter(self) -> dict[str, Any]:
+        """Returns what a letter that connects says of the set-up."""
+        return pack_setup(self.wanted)
+
+    def follow(self, ticket: Ticket, setup: RobotSetup, *, is_new_connection: bool = False) -> None:
+        """Takes note of a request that carries a set-up.
+
+        Args:
+            ticket: The request.
+            setup: What it carries.
+            is_new_connection: Whether what the controller has is not known any more.
+        """
+        if is_new_connection:
+            self.acknowledged = RobotSetup()
+        self.wanted = self.wanted.updated(setup)
+        self._waiting = ticket, setup
+        self._refusal = None
+
+    def look(self) -> None:
+        """Takes note of the answer, when there is one."""
+        if self._waiting is None or not self._waiting[0].done:
+            return
+        (ticket, setup), self._waiting = self._waiting, None
+        if ticket.error is not None:
+            self._refusal = str(ticket.error)
+        elif setup.parts:
+            self.acknowledged = self.acknowledged.updated(setup)
+            self.times += 1
+
+    def require_given(self) -> None:
+        """Makes sure that nothing is under way and that nothing was refused.
+
+        Raises:
+            UsageError: The controller has another set-up than motions are checked with.
+        """
+        self.look()
+        if self._waiting is not None:
+            raise UsageError("the controller is being told its set-up; wait for the ticket of set_up()")
+        if self._refusal is not None and self.wanted.parts:
+            raise UsageError(f"the controller did not take its set-up ({self._refusal}); call set_up() again")
+
+
+def standard_setup(model: RobotModel, *, is_virtual: bool) -> RobotSetup:
+    """Returns what a controller is told unless somebody says otherwise.
+
+    Args:
+        model: The arm.
+        is_virtual: Whether the controller is ours: then it is told of tool and load. A real one has its own settings.
+    """
+    if not is_virtual:
+        return RobotSetup()
+    has_tool = not model.T_flange_tool.is_close(IDENTITY, 0.0)
+    return RobotSetup(tool=model.T_flange_tool if has_tool else None, load=model.load if model.load.mass else None)

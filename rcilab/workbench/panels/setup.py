@@ -1,0 +1,122 @@
+"""Setup: what is fixed to the arm and where its tool may be; what is wanted beside what the controller has."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from rcilab.client.setup import SETUP_PARTS
+from rcilab.workbench import requests
+from rcilab.workbench.setting_up import (
+    describe_held,
+    describe_part,
+    differing_tool,
+    name_parts,
+    pending_parts,
+    setup_obstacle,
+)
+from rcilab.workbench.text import Text
+from rcilab.workbench.widgets import Ask, Html, Linked, esc, on_press
+
+if TYPE_CHECKING:
+    from rcilab.supervisor import SupervisorStatus
+    from rcilab.workbench.store import UiState
+
+
+class SetupPanel:
+    """The head of the Setup tab: whether the controller has it, undo, a second yes, which part is edited."""
+
+    def __init__(self, text: Text, ask: Ask) -> None:
+        self._text, self._ask = text, ask
+
+    def build(self, gui: Any, state: UiState) -> None:
+        """Adds the controls."""
+        text, ask = self._text, self._ask
+        self._verdict = Html(gui)
+        self._send = gui.add_button(text("setup.send"), icon="send", color="orange", visible=False)
+        on_press(self._send, ask, _press("send"))
+        self._agree = gui.add_button(text("setup.confirm"), icon="send", color="red", visible=False)
+        on_press(self._agree, ask, _press("confirm"))
+        self._cancel = gui.add_button(text("run.cancel"), color="gray", visible=False)
+        on_press(self._cancel, ask, _press("cancel"))
+        self._table = Html(gui)
+        self._stale = Html(gui)
+        with gui.add_folder(text("setup.edit_title")):
+            gui.add_html('<i class="rl-buttons rl-setup-head"></i>')
+            self._undo = gui.add_button(
+                text("setup.undo"), icon="arrow-back-up", color="gray", hint=text("setup.undo_hint")
+            )
+            on_press(self._undo, ask, _press("undo"))
+            self._again = gui.add_button(text("setup.check"), icon="clipboard-check", hint=text("setup.check_hint"))
+            on_press(self._again, ask, lambda page: requests.Plan(page=page))
+            choices = {text("setup.nothing"): "", **{text(f"setup.part.{part}"): part for part in SETUP_PARTS}}
+            self._choices = {part: label for label, part in choices.items()}
+            edited = gui.add_dropdown(
+                text("setup.edit"), tuple(choices), initial_value=self._choices[state.setup.edited]
+            )
+            self._edited = Linked(
+                edited, ask, lambda v, p: requests.SetSetup(page=p, name="edited", value=choices.get(v, ""))
+            )
+
+    def show(self, state: UiState, status: SupervisorStatus) -> None:
+        """Follows state and controller."""
+        text, setup = self._text, state.setup
+        pending, foreign = pending_parts(state, status), state.target != "virtual"
+        question = setup.asked is setup.wanted and bool(pending)
+        self._verdict.show(self._verdict_html(state, status))
+        is_asked = bool(pending) and (foreign or setup.refusal is not None)
+        self._send.visible = is_asked and not question
+        self._agree.visible = self._cancel.visible = question
+        self._undo.disabled = not setup.can_undo
+        self._edited.show(self._choices[setup.edited])
+        stale = () if state.plan is None else state.plan.stale_parts(state.model, setup.wanted.box)
+        self._again.disabled = not stale
+        said = text.say(name_parts(stale)) if stale else ""
+        self._stale.show(
+            f'<p class="rl-verdict rl-warn"><b>{esc(text("setup.stale"))}</b> '
+            f"{esc(text('setup.stale_why', what=said))}</p>"
+            if stale
+            else ""
+        )
+        self._table.show(self._table_html(state, status))
+
+    def _verdict_html(self, state: UiState, status: SupervisorStatus) -> str:
+        text, setup = self._text, state.setup
+        pending = pending_parts(state, status)
+        obstacle = setup_obstacle(state, status)
+        differing = differing_tool(state, status)
+        if setup.asked is setup.wanted and pending:
+            parts = "; ".join(f"{text(f'setup.part.{part}')}: {self._said(setup.wanted, part)}" for part in pending)
+            said = text("setup.ask", model=state.model.name, address=state.target, what=parts)
+            return f'<p class="rl-verdict rl-warn" role="alert">{esc(said)}</p>'
+        if obstacle is not None:
+            tone = "bad" if setup.refusal is not None else "warn"
+            word = "setup.refused" if setup.refusal is not None else "setup.pending"
+            return _verdict(tone, text(word), text.say(obstacle))
+        if differing is not None:
+            return _verdict("warn", text("setup.differs"), text("setup.differs_long", tool=text.say(differing)))
+        if not setup.touched:
+            return f'<p class="rl-note">{esc(text("setup.untouched"))}</p>'
+        return _verdict("good", text("setup.given"), text("setup.given_long"))
+
+    def _table_html(self, state: UiState, status: SupervisorStatus) -> str:
+        text, pending = self._text, pending_parts(state, status)
+        rows = []
+        for part in SETUP_PARTS:
+            here, held = self._said(state.setup.wanted, part), text.say(describe_held(status, part))
+            mark = ' class="rl-differs"' if part in pending else ""
+            rows.append(
+                f"<tr{mark}><th>{esc(text(f'setup.part.{part}'))}</th><td>{esc(here)}"
+                f'<br><span class="rl-dim">{esc(text("setup.held", held=held))}</span></td></tr>'
+            )
+        return f'<table class="rl-table rl-facts-table rl-setup">{"".join(rows)}</table>'
+
+    def _said(self, setup: Any, part: str) -> str:
+        return self._text.say(describe_part(setup, part))
+
+
+def _press(what: Any):  # type: ignore[no-untyped-def]
+    return lambda page: requests.PressSetup(page=page, what=what)
+
+
+def _verdict(tone: str, word: str, rest: str) -> str:
+    return f'<p class="rl-verdict rl-{tone}"><b>{esc(word)}</b> {esc(rest)}</p>'

@@ -1,0 +1,103 @@
+"""The numbers of the part of the set-up that is edited; the other parts' are folded away."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from rcilab.client.setup import SETUP_PARTS
+from rcilab.workbench import requests
+from rcilab.workbench.panels.jog import problems_html
+from rcilab.workbench.setting_up import FORCE_AXES
+from rcilab.workbench.setup_fields import FIELD_NAMES, INERTIA_NAMES, POSE_NAMES, read_field
+from rcilab.workbench.text import Text
+from rcilab.workbench.widgets import Ask, Html, Linked, NumberField, esc, shown
+
+if TYPE_CHECKING:
+    from rcilab.supervisor import SupervisorStatus
+    from rcilab.workbench.store import UiState
+
+_ROWS: dict[str, tuple[tuple[str, tuple[str, ...]], ...]] = {
+    "box": (("low", FIELD_NAMES["box"][:3]), ("high", FIELD_NAMES["box"][3:6]), ("turned", POSE_NAMES[3:])),
+    "tool": (("place", POSE_NAMES[:3]), ("turned", POSE_NAMES[3:])),
+    "load": (
+        ("mass", ("mass",)),
+        ("center", POSE_NAMES[:3]),
+        ("moments", INERTIA_NAMES[:3]),
+        ("products", INERTIA_NAMES[3:]),
+    ),
+    "force": (("place", POSE_NAMES[:3]), ("turned", POSE_NAMES[3:])),
+}
+
+
+class SetupNumbersPanel:
+    """A group of the Setup tab for each part; only that of the edited one is shown."""
+
+    def __init__(self, text: Text, ask: Ask) -> None:
+        self._text, self._ask = text, ask
+
+    def build(self, gui: Any, state: UiState) -> None:
+        """Adds the controls."""
+        text, ask = self._text, self._ask
+        self._folders: dict[str, Any] = {}
+        self._fields: dict[str, list[NumberField]] = {}
+        self._problems: dict[str, Html] = {}
+        self._seen: dict[str, Linked] = {}
+        for part in SETUP_PARTS:
+            folder = gui.add_folder(text(f"setup.part.{part}"), visible=state.setup.edited == part)
+            with folder:
+                gui.add_html('<i class="rl-triples"></i>')
+                if part == "box":
+                    active = gui.add_checkbox(text("setup.active"), False, hint=text("setup.active_hint"))
+                    self._active = Linked(active, ask, _switch("active"))
+                if part == "force":
+                    self._build_axes(gui, ask)
+                self._build_numbers(gui, part)
+                see = gui.add_checkbox(text("setup.see"), False, hint=text("setup.see_hint"))
+                self._seen[part] = Linked(see, ask, _switch(part))
+                gui.add_html(f'<p class="rl-note">{esc(text(f"setup.note.{part}"))}</p>')
+            self._folders[part] = folder
+
+    def show(self, state: UiState, status: SupervisorStatus) -> None:
+        """Follows the set-up."""
+        setup = state.setup
+        for part, folder in self._folders.items():
+            if folder.visible != (part == setup.edited):
+                folder.visible = part == setup.edited
+        box, force = setup.wanted.box, setup.wanted.force
+        assert box is not None
+        assert force is not None
+        self._active.show(box.active)
+        self._axes.show(next(self._labels[name] for name, kind in FORCE_AXES.items() if kind == force.type))
+        for part, seen in self._seen.items():
+            seen.show(part in setup.seen)
+        for part, fields in self._fields.items():
+            labels = []
+            for field, name in zip(fields, FIELD_NAMES[part], strict=True):
+                number = read_field(setup, part, name)
+                said = f"{number + 0.0:.6g}" if part == "load" and name in INERTIA_NAMES else shown(number)
+                field.show(said, state.problems.get(field.field), state.typed)
+                labels.append((field.field, self._label(name)))
+            self._problems[part].show(problems_html(state, self._text, labels))
+
+    def _build_numbers(self, gui: Any, part: str) -> None:
+        text = self._text
+        self._fields[part] = []
+        for row, names in _ROWS[part]:
+            gui.add_html(f'<p class="rl-rowname">{esc(text(f"setup.row.{row}"))}</p>')
+            for name in names:
+                box = gui.add_text(self._label(name), "", hint=text("target.type_hint"))
+                self._fields[part].append(NumberField(box, self._ask, f"setup.{part}.{name}"))
+        self._problems[part] = Html(gui)
+
+    def _build_axes(self, gui: Any, ask: Ask) -> None:
+        names = {self._text(f"setup.axes.{name}"): name for name in FORCE_AXES}
+        self._labels = {name: label for label, name in names.items()}
+        axes = gui.add_dropdown(self._text("setup.axes"), tuple(names), hint=self._text("setup.axes_hint"))
+        self._axes = Linked(axes, ask, lambda v, p: requests.SetSetup(page=p, name="axes", value=names.get(v, "")))
+
+    def _label(self, name: str) -> str:
+        return self._text(f"setup.field.{name}")
+
+
+def _switch(name: Any):  # type: ignore[no-untyped-def]
+    return lambda value, page: requests.SetSetup(page=page, name=name, value=bool(value))

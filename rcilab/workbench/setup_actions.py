@@ -1,0 +1,242 @@
+"""What happens when somebody edits the set-up: take it over, tell the controller, undo. Owned by the conductor."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterable
+from dataclasses import replace
+from types import MappingProxyType
+from typing import TYPE_CHECKING, cast
+
+import numpy as np
+
+from rcilab.client.setup import SETUP_PARTS, RobotSetup, SetupPart
+from rcilab.errors import RcilabError
+from rcilab.safety_box import SafetyBox
+from rcilab.spatial import Pose
+from rcilab.workbench import requests
+from rcilab.workbench.parse import parse_number
+from rcilab.workbench.planning import Plan, tool_path
+from rcilab.workbench.reach import judge_joints, judge_pose
+from rcilab.workbench.session import Session
+from rcilab.workbench.setting_up import FORCE_AXES, SetupState, name_parts, pending_parts
+from rcilab.workbench.setup_fields import (
+    FARTHEST_FACE,
+    FIELD_NAMES,
+    INERTIA_NAMES,
+    THINNEST,
+    box_between,
+    faces,
+    field_range,
+    with_field,
+    with_inertia,
+    with_pose,
+)
+from rcilab.workbench.store import Goal, Store
+from rcilab.workbench.telling import StartingError, tell_error
+from rcilab.workbench.text import Message, message
+
+if TYPE_CHECKING:
+    from rcilab.supervisor import Ticket
+
+_UNDO_DEPTH = 100
+_HAND_GONE = 1.0  # [s] A choice: a drag that was not heard of for so long has ended, whatever became of its page.
+
+
+class SetupActions:
+    """Handles in the scene, typed numbers, switches; each edit goes to a virtual controller by itself."""
+
+    def __init__(self, store: Store, session: Session) -> None:
+        self._store, self._session = store, session
+        self._past: list[RobotSetup] = []
+        self._arm = store.state.model.name
+        self._drag: tuple[int | None, str] | None = None  # Which page drags which part.
+        self._dragged = -math.inf  # When it was last heard to.
+        self._ticket: Ticket | None = None
+        self._told = 0  # How often the controller has taken a set-up, as far as that was said or was our doing.
+
+    def type_field(self, request: requests.TypeField) -> None:
+        """Takes a typed number, or says beside the field what is wrong with it."""
+        _, _, place = request.field.partition(".")
+        part, _, name = place.partition(".")
+        if name not in FIELD_NAMES.get(part, ()):
+            return
+        state = self._store.state
+        bounds = field_range(part, name, state.model.description.rated_payload)
+        parsed = parse_number(request.text, bounds.low, bounds.high, bounds.unit)
+        if parsed.value is None:
+            assert parsed.problem is not None
+            self._complain(request.field, parsed.problem)
+            return
+        changed = with_field(state.setup, part, name, parsed.value)
+        if isinstance(changed, SetupState) and name in INERTIA_NAMES:
+            self._store.update(setup=changed)  # The moments stand as typed, also while no body has them yet.
+            changed = with_inertia(changed)
+        if isinstance(changed, Message):
+            self._complain(request.field, changed)
+            return
+        related = INERTIA_NAMES if name in (*INERTIA_NAMES, "mass") else (name,)
+        self._clear_problems(f"setup.{part}.{other}" for other in related)
+        self._edit(changed, cast("SetupPart", part))
+
+    def move(self, request: requests.MoveSetup) -> None:
+        """Follows the handles of a part."""
+        numbers = (*request.position, *request.wxyz)
+        if request.part not in SETUP_PARTS or len(numbers) != 7 or not all(map(math.isfinite, numbers)):
+            return
+        if math.hypot(*request.wxyz) < 1e-6:
+            return
+        changed = with_pose(self._store.state.setup, request.part, Pose(request.position, request.wxyz))
+        if isinstance(changed, Message):
+            self._store.say("warn", changed)
+        else:
+            self._edit(changed, request.part, drag=(request.page, request.part))
+            self._clear_problems(f"setup.{request.part}.{name}" for name in FIELD_NAMES[request.part])
+        self._hear_drag(request.ended)
+
+    def resize(self, request: requests.ResizeBox) -> None:
+        """Follows a handle on a face of the safety box; the other faces stay."""
+        setup = self._store.state.setup
+        box = setup.wanted.box
+        if box is None or request.face not in range(6) or not np.isfinite(request.hand).all():
+            return
+        bounds = faces(box)
+        axis, opposite = request.face % 3, (request.face + 3) % 6
+        low, high = -FARTHEST_FACE, FARTHEST_FACE
+        if request.face < 3:
+            high = bounds[opposite] - THINNEST
+        else:
+            low = bounds[opposite] + THINNEST
+        hand = box.T_base_box.rotation.T @ np.array(request.hand)
+        bounds[request.face] = min(max(float(hand[axis]), low), high)
+        wanted = setup.wanted.updated(RobotSetup(box=box_between(box, bounds)))
+        self._edit(replace(setup, wanted=wanted), "box", drag=(request.page, "box"))
+        self._hear_drag(request.ended)
+
+    def set_setup(self, request: requests.SetSetup) -> None:
+        """Turns a switch; what does not exist is ignored."""
+        setup, value = self._store.state.setup, request.value
+        box, force = setup.wanted.box, setup.wanted.force
+        assert box is not None
+        assert force is not None
+        if request.name == "edited" and value in ("", *SETUP_PARTS):
+            seen = setup.seen | ({value} if value else set())
+            self._store.update(setup=replace(setup, edited=value, seen=frozenset(seen)))
+        elif request.name in SETUP_PARTS and isinstance(value, bool):
+            seen = setup.seen | {request.name} if value else setup.seen - {request.name}
+            self._store.update(setup=replace(setup, seen=frozenset(seen)))
+        elif request.name == "active" and isinstance(value, bool):
+            switched = SafetyBox(size=box.size, T_base_box=box.T_base_box, active=value)
+            self._edit(replace(setup, wanted=setup.wanted.updated(RobotSetup(box=switched))), "box")
+        elif request.name == "axes" and value in FORCE_AXES:
+            turned = replace(force, type=FORCE_AXES[str(value)])
+            self._edit(replace(setup, wanted=setup.wanted.updated(RobotSetup(force=turned))), "force")
+
+    def press(self, request: requests.PressSetup) -> None:
+        """Does what one of the buttons says."""
+        state = self._store.state
+        setup = state.setup
+        if request.what == "undo":
+            self._undo()
+        elif request.what == "cancel":
+            self._store.update(setup=replace(setup, asked=None))
+        elif request.what == "send" and state.target != "virtual":
+            self._store.update(setup=replace(setup, asked=setup.wanted, refusal=None))
+        elif request.what == "send":
+            self._store.update(setup=replace(setup, refusal=None))
+        elif request.what == "confirm" and setup.asked is setup.wanted:
+            self._store.update(setup=replace(setup, asked=None))
+            self._send()
+
+    def tick(self) -> None:
+        """Looks what became of a set-up that was sent, and tells our own controller what is new."""
+        state, status = self._store.state, self._session.status()
+        if state.model.name != self._arm:
+            self._arm, self._past, self._ticket, self._told = state.model.name, [], None, 0
+        self._collect()
+        if status.setup_times < self._told:
+            self._told = 0  # Another supervisor counts anew.
+        if status.setup_times > self._told and self._ticket is None:
+            self._told = status.setup_times
+            self._store.say("good", message("setup.sent_again", what=name_parts(status.setup.parts)))
+        is_held = time.monotonic() - self._dragged < _HAND_GONE
+        if state.target == "virtual" and not is_held and state.setup.refusal is None and status.phase == "idle":
+            self._send()
+
+    def _send(self) -> None:
+        """Tells the controller every part that it has not taken yet."""
+        state, status = self._store.state, self._session.status()
+        parts = pending_parts(state, status)
+        if self._ticket is not None or not parts:
+            return
+        try:
+            self._ticket = self._session.supervisor().set_up(state.setup.wanted.only(parts))
+        except StartingError:
+            return
+        except RcilabError as error:
+            self._store.update(setup=replace(state.setup, refusal=tell_error(error)))
+
+    def _collect(self) -> None:
+        ticket = self._ticket
+        if ticket is None or not ticket.done:
+            return
+        self._ticket = None
+        if ticket.error is None:
+            self._told += 1
+        else:
+            self._store.update(setup=replace(self._store.state.setup, refusal=tell_error(ticket.error)))
+
+    def _hear_drag(self, has_ended: bool) -> None:
+        self._dragged = -math.inf if has_ended else time.monotonic()
+        if has_ended:
+            self._drag = None
+
+    def _edit(self, changed: SetupState, part: SetupPart, *, drag: tuple[int | None, str] | None = None) -> None:
+        """Takes over an edit; a drag is one step to undo."""
+        if drag is None or drag != self._drag:
+            self._past = [*self._past[-_UNDO_DEPTH:], self._store.state.setup.wanted]
+        self._drag = drag
+        self._take(changed, {part})
+
+    def _undo(self) -> None:
+        if not self._past:
+            return
+        setup, before = self._store.state.setup, self._past.pop()
+        parts: set[SetupPart] = {p for p in SETUP_PARTS if getattr(before, p) is not getattr(setup.wanted, p)}
+        self._clear_problems(f"setup.{part}.{name}" for part in parts for name in FIELD_NAMES[part])
+        self._take(replace(setup, wanted=before, inertia=None), parts)
+
+    def _take(self, setup: SetupState, parts: set[SetupPart]) -> None:
+        """Exchanges the set-up and what depends on it: the arm's tool and load, goal, path. The plan may go stale."""
+        state = self._store.state
+        changes: dict[str, object] = {}
+        if parts & {"tool", "load"}:
+            changes["model"] = model = setup.wanted.only(parts).applied_to(state.model)
+            if "tool" in parts:
+                self._store.forget()  # Goals of another tool.
+                target = model.forward(state.goal.q)
+                reach = judge_joints(model, state.goal.q)
+                if state.goal.reach.solutions is not None:
+                    reach = replace(judge_pose(model, target, state.goal.q, state.goal.psi), q=state.goal.q)
+                changes["goal"] = Goal(q=state.goal.q, target=target, reach=reach, psi=state.goal.psi)
+                if isinstance(state.plan, Plan):
+                    changes["plan"] = replace(state.plan, path=tool_path(model, state.plan.motion), short=None)
+        changes["setup"] = replace(
+            setup, touched=setup.touched | parts, asked=None, refusal=None, can_undo=bool(self._past)
+        )
+        self._store.update(**changes, typed=state.typed + 1)
+
+    def _complain(self, field: str, problem: Message) -> None:
+        problems = self._store.state.problems
+        self._store.update(problems=MappingProxyType({**problems, field: problem}))
+
+    def _clear_problems(self, fields: Iterable[str]) -> None:
+        gone = set(fields)
+        kept = {field: problem for field, problem in self._store.state.problems.items() if field not in gone}
+        self._store.update(problems=MappingProxyType(kept))
+
+
+def is_setup_field(field: str) -> bool:
+    """Returns whether a typed field belongs to the set-up."""
+    return field.startswith("setup.")

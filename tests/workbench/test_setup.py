@@ -1,0 +1,286 @@
+"""Safety box, tool, load and force-control frame on the page: requests in, state out, the controller told."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rcilab.client.setup import SETUP_PARTS, RobotSetup
+from rcilab.errors import CommandRejectedError
+from rcilab.protocols import rci
+from rcilab.spatial import Pose
+from rcilab.supervisor import SupervisorStatus
+from rcilab.supervisor.launch import start_controller
+from rcilab.workbench import requests
+from rcilab.workbench.app import Workbench
+from rcilab.workbench.panels.check import CheckPanel
+from rcilab.workbench.panels.target import planned_html
+from rcilab.workbench.readiness import obstacle
+from rcilab.workbench.setting_up import SetupState, describe_held, describe_part, pending_parts, setup_obstacle
+from rcilab.workbench.setup_fields import FACE_NAMES, FIELD_NAMES, faces, read_field, with_field
+from rcilab.workbench.text import Message, Text
+from tests.workbench.opened import opened, told, wait
+
+NO_TURN = (1.0, 0.0, 0.0, 0.0)
+
+
+@pytest.fixture(scope="module")
+def bench() -> Iterator[Workbench]:
+    with opened() as found:
+        yield found
+
+
+@pytest.fixture
+def ask(bench) -> Callable[[requests.Request], None]:
+    """Asks, and returns once it has been dealt with."""
+
+    def act(request: requests.Request) -> None:
+        height = bench.store.state.height + 1.0
+        bench.conductor.ask(request)
+        bench.conductor.ask(requests.SetView(name="height", value=height))
+        wait(lambda: bench.store.state.height == height, f"an answer to {request}")
+
+    while bench.store.state.setup.can_undo:
+        act(requests.PressSetup(what="undo"))
+    act(requests.PoseGoal(name="here"))
+    return act
+
+
+def type_in(ask, **numbers: str) -> None:
+    for name, text in numbers.items():
+        ask(requests.TypeField(field="setup." + name.replace("_", "."), text=text))
+
+
+def settled(bench: Workbench) -> bool:
+    return pending_parts(bench.store.state, bench.session.status()) == ()
+
+
+def wanted(bench: Workbench) -> RobotSetup:
+    return bench.store.state.setup.wanted
+
+
+def test_a_typed_tool_is_what_the_controller_reports_and_what_the_goal_is_solved_with(bench, ask):
+    q = np.array(bench.store.state.goal.q)
+    flange = bench.store.state.model.forward(q)
+    type_in(ask, tool_z="140", tool_pitch="-0.25")
+    state = bench.store.state
+    assert math.degrees(wanted(bench).tool.rpy[1]) == pytest.approx(-0.25)
+    assert np.array_equal(state.goal.q, q)
+    assert state.goal.target.is_close(flange @ wanted(bench).tool, 1e-12)
+    wait(lambda: settled(bench), "the controller to have the tool")
+    wait(
+        lambda: (T := bench.session.status().T_flange_tool) is not None and T.is_close(wanted(bench).tool, 1e-9),
+        "the controller to report the tool",
+    )
+    held = Text("en").say(describe_held(bench.session.status(), "tool"))
+    assert held == Text("en").say(describe_part(wanted(bench), "tool")) == "0, 0, 140 mm, 0, -0.2, 0°"
+
+
+def test_an_edit_makes_the_plan_stale_in_words_and_undo_makes_it_good_again(bench, ask):
+    ask(requests.MoveJoint(joint=0, angle=float(bench.session.status().q_c[0]) + 0.3))
+    plan = bench.store.state.plan
+    wait(lambda: bench.store.state.plan.complete, "a complete check")
+    type_in(ask, load_mass="1.5", tool_z="100")
+    wait(lambda: settled(bench), "the controller to have both")
+    state, status = bench.store.state, bench.session.status()
+    assert state.plan.motion is plan.motion
+    assert not np.allclose(state.plan.path, plan.path)
+    reason = obstacle(state, status)
+    assert reason.code == "ready.stale"
+    assert "tool, load" in Text("en").say(reason)
+    for language in ("en", "zh"):
+        assert Text(language)("setup.stale") in planned_html(state, Text(language))
+    ask(requests.Drive(what="execute"))
+    assert told(bench) == "ready.stale"
+    ask(requests.PressSetup(what="undo"))
+    ask(requests.PressSetup(what="undo"))
+    wait(lambda: settled(bench), "the controller to have the first set-up")
+    assert obstacle(bench.store.state, bench.session.status()) is None
+    type_in(ask, load_mass="1.5")
+    ask(requests.Plan())
+    wait(lambda: settled(bench), "the controller to have the load")
+    assert obstacle(bench.store.state, bench.session.status()) is None
+
+
+def test_a_motion_out_of_the_box_is_refused_before_it_runs(bench, ask):
+    model, q = bench.store.state.model, np.array(bench.session.status().q_c)
+    x, y, z = 1000.0 * model.forward(q).position
+    for name, value in zip(FACE_NAMES, (x - 60, y - 60, z - 60, x + 60, y + 60, z + 60), strict=True):
+        type_in(ask, **{f"box_{name}": f"{value:.2f}"})
+    ask(requests.SetSetup(name="active", value=True))
+    ask(requests.MoveJoint(joint=0, angle=float(q[0]) + 0.3))
+    wait(lambda: settled(bench), "the controller to have the box")
+    state = bench.store.state
+    assert not state.plan.report.ok
+    assert "cartesian.position" in {violation.condition.id for violation in state.plan.report.violations}
+    assert obstacle(state, bench.session.status()).code == "ready.violations"
+    assert "on, 120 × 120 × 120 mm" == Text("en").say(describe_held(bench.session.status(), "box"))
+    ask(requests.SetSetup(name="active", value=False))
+    ask(requests.Plan())
+    wait(lambda: settled(bench), "the controller to have switched the box off")
+    assert obstacle(bench.store.state, bench.session.status()) is None
+
+
+def test_a_drag_is_one_step_to_undo_and_is_sent_when_it_has_ended(bench, ask):
+    before = wanted(bench).tool
+    for step in range(1, 4):
+        ask(requests.MoveSetup(part="tool", position=(0.0, 0.0, 0.03 * step), wxyz=NO_TURN))
+    assert pending_parts(bench.store.state, bench.session.status()) == ("tool",)
+    ask(requests.MoveSetup(part="tool", position=(0.0, 0.0, 0.1), wxyz=NO_TURN, ended=True))
+    assert wanted(bench).tool.position[2] == pytest.approx(0.1)
+    wait(lambda: settled(bench), "the controller to have the tool")
+    ask(requests.PressSetup(what="undo"))
+    assert wanted(bench).tool is before
+    assert bench.store.state.model.T_flange_tool is before
+
+
+def test_a_face_of_the_box_follows_its_handle_and_cannot_pass_the_other(bench, ask):
+    low = faces(wanted(bench).box)
+    ask(requests.ResizeBox(face=3, hand=(0.5, 9.0, 9.0), ended=True))
+    assert faces(wanted(bench).box) == pytest.approx([*low[:3], 0.5, *low[4:]])
+    ask(requests.ResizeBox(face=3, hand=(-7.0, 0.0, 0.0), ended=True))
+    assert 0.0 < wanted(bench).box.size[0] < 0.05
+    ask(requests.ResizeBox(face=1, hand=(math.nan, 0.0, 0.0)))
+    ask(requests.ResizeBox(face=6, hand=(0.0, 0.0, 0.0)))
+    assert faces(wanted(bench).box)[1] == low[1]
+
+
+@pytest.mark.parametrize(
+    ("field", "typed", "problem"),
+    [
+        ("box.xmin", "4000", "setup.faces"),
+        ("box.zmax", "9999", "parse.range"),
+        ("tool.x", "nan", "parse.not_finite"),
+        ("tool.z", "1,000", "parse.two_ways"),
+        ("load.mass", "-1", "parse.range"),
+        ("load.mass", "99", "parse.range"),
+        ("load.ixx", "0.1", "setup.massless"),
+        ("load.iyy", "-0.1", "parse.range"),
+        ("force.yaw", "", "parse.empty"),
+    ],
+)
+def test_a_bad_number_is_answered_beside_its_field_and_changes_nothing(bench, ask, field, typed, problem):
+    before = wanted(bench)
+    type_in(ask, **{field.replace(".", "_"): typed})
+    assert bench.store.state.problems[f"setup.{field}"].code == problem
+    assert wanted(bench) is before
+
+
+def test_an_inertia_is_taken_once_some_body_has_it(bench, ask):
+    type_in(ask, load_mass="2", load_ixx="0.004")
+    assert bench.store.state.problems["setup.load.ixx"].code == "setup.no_body"
+    assert not wanted(bench).load.inertia.any()
+    type_in(ask, load_iyy="0.003", load_izz="0.002")
+    assert np.diagonal(wanted(bench).load.inertia).tolist() == [0.004, 0.003, 0.002]
+    assert not any(name.startswith("setup.load.i") for name in bench.store.state.problems)
+    type_in(ask, load_mass="0")
+    assert not wanted(bench).load.inertia.any()
+
+
+def test_what_is_no_number_or_no_part_is_ignored(bench, ask):
+    before = bench.store.state.setup
+    ask(requests.MoveSetup(part="tool", position=(math.nan, 0.0, 0.0), wxyz=NO_TURN))
+    ask(requests.MoveSetup(part="tool", position=(0.0, 0.0, 0.1), wxyz=(0.0,) * 4))
+    ask(requests.MoveSetup(part="lamp", position=(0.0, 0.0, 0.1), wxyz=NO_TURN))
+    ask(requests.MoveSetup(part="tool", position=(0.0, 0.0, 7.0), wxyz=NO_TURN))
+    ask(requests.SetSetup(name="edited", value="lamp"))
+    ask(requests.SetSetup(name="axes", value="moon"))
+    type_in(ask, lamp_x="1", tool_w="1")
+    assert bench.store.state.setup.wanted is before.wanted
+    assert told(bench) == "setup.far"
+
+
+def test_a_watching_page_cannot_change_the_set_up(bench, ask):
+    ask(requests.PageCame(page=1))
+    ask(requests.PageCame(page=2))
+    before = wanted(bench)
+    ask(requests.MoveSetup(page=2, part="tool", position=(0.0, 0.0, 0.1), wxyz=NO_TURN))
+    ask(requests.TypeField(page=2, field="setup.load.mass", text="1"))
+    assert wanted(bench) is before
+    for page in (1, 2):
+        ask(requests.PageWent(page=page))
+
+
+def test_after_a_new_connection_the_controller_is_told_again_and_the_page_says_so(bench, ask):
+    type_in(ask, load_mass="1")
+    wait(lambda: settled(bench), "the controller to have the load")
+    ask(requests.Drive(what="reconnect"))
+    wait(lambda: told(bench) == "setup.sent_again", "the page to say so")
+    assert settled(bench)
+
+
+def test_every_number_comes_back_as_it_was_typed():
+    setup = SetupState()
+    setup = replace(setup, wanted=setup.wanted.updated(RobotSetup(tool=Pose((0.1, 0.2, 0.3)))))
+    turned = with_field(setup, "box", "yaw", 30.0)
+    assert isinstance(turned, SetupState)
+    for part, names in FIELD_NAMES.items():
+        for name in names:
+            changed = with_field(turned, part, name, 20.0)
+            assert isinstance(changed, SetupState), (part, name)
+            assert read_field(changed, part, name) == pytest.approx(20.0), (part, name)
+
+
+def test_a_foreign_robot_is_told_nothing_before_a_second_yes(bench, ask):
+    setup = replace(bench.store.state.setup, touched=frozenset({"tool"}))
+    foreign = replace(bench.store.state, target="rci://192.168.0.160:1337", setup=setup)
+    status = SupervisorStatus(phase="idle", target=foreign.target)
+    reason = setup_obstacle(foreign, status)
+    assert reason.code == "ready.setup_unsent"
+    assert "192.168.0.160" in Text("zh").say(reason)
+    refused = CommandRejectedError("SetLoad", rci.SettingStatus.INVALID_ARGUMENT, "")
+    foreign = replace(foreign, setup=replace(setup, refusal=Message("notice.plain", {"text": str(refused)})))
+    assert "SetLoad" in Text("en").say(setup_obstacle(foreign, status))
+
+
+def test_the_check_tab_says_that_its_report_is_out_of_date(bench, ask):
+    class Shown:
+        def __init__(self):
+            self.content = ""
+
+    class Gui:
+        def __init__(self):
+            self.made = []
+
+        def add_html(self, content):
+            self.made.append(Shown())
+            return self.made[-1]
+
+    ask(requests.MoveJoint(joint=0, angle=float(bench.session.status().q_c[0]) + 0.3))
+    type_in(ask, tool_z="100")
+    gui, panel = Gui(), CheckPanel(Text("en"), lambda request: None)
+    panel.build(gui, bench.store.state)
+    panel.show(bench.store.state, bench.session.status())
+    assert "Out of date" in gui.made[0].content
+
+
+def test_a_robot_that_is_not_ours_is_changed_only_after_a_second_yes(bench, ask):
+    controller = start_controller("xMatePro7")
+    try:
+        ask(requests.ChooseRobot(target=controller.address))
+        wait(lambda: bench.session.status().phase == "idle" and bench.session.is_ready, "the other controller")
+        type_in(ask, load_mass="1.5")
+        assert setup_obstacle(bench.store.state, bench.session.status()).code == "ready.setup_unsent"
+        ask(requests.PressSetup(what="confirm"))
+        ask(requests.PressSetup(what="send"))
+        ask(requests.PressSetup(what="cancel"))
+        ask(requests.PressSetup(what="confirm"))
+        ask(requests.PressSetup(what="send"))
+        type_in(ask, load_mass="1.6")  # Not what was asked about.
+        ask(requests.PressSetup(what="confirm"))
+        assert bench.session.status().setup.parts == ()
+        ask(requests.PressSetup(what="send"))
+        ask(requests.PressSetup(what="confirm"))
+        wait(lambda: bench.session.status().setup.load is wanted(bench).load, "the robot to have the load")
+        assert bench.session.status().setup.parts == tuple(
+            sorted(bench.store.state.setup.touched, key=SETUP_PARTS.index)
+        )
+    finally:
+        ask(requests.ChooseRobot(target="virtual"))
+        controller.end()
+    wait(lambda: bench.session.status().phase == "idle" and bench.session.is_ready, "our own controller")
+    wait(lambda: settled(bench), "our own controller to have the set-up")
