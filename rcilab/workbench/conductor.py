@@ -12,7 +12,9 @@ from typing import Any
 from rcilab.errors import RcilabError
 from rcilab.workbench import requests
 from rcilab.workbench.goal_actions import GoalActions
+from rcilab.workbench.jog_actions import JogActions
 from rcilab.workbench.mailbox import Mailbox
+from rcilab.workbench.pose_actions import PoseActions
 from rcilab.workbench.push_actions import PushActions
 from rcilab.workbench.robot_actions import RobotActions
 from rcilab.workbench.session import Session
@@ -37,6 +39,8 @@ class Conductor:
         self._goal = GoalActions(store, session)
         self.robot = RobotActions(store, session)
         self._push = PushActions(store, session)
+        self._jog = JogActions(store, session, self._goal)
+        self._poses = PoseActions(store, self._goal)
         self._view = ViewActions(store)
         self._mailbox: Mailbox[requests.Request] = Mailbox()
         self._thread: threading.Thread | None = None
@@ -55,6 +59,10 @@ class Conductor:
             requests.SetLaw: self._goal.set_law,
             requests.Drive: self.robot.drive,
             requests.ChooseRobot: self.robot.choose_robot,
+            requests.SetJog: self._jog.set_jog,
+            requests.HoldJog: self._jog.hold,
+            requests.PressJog: self._jog.press,
+            requests.NamedPose: self._poses.act,
             requests.SetPush: self._push.set_push,
             requests.HoldPush: self._push.hold,
             requests.PullArm: self._push.pull,
@@ -81,6 +89,7 @@ class Conductor:
         if self._thread is not None:
             self._thread.join(10.0)
         self._push.close()
+        self._jog.release()
 
     def act(self, request: requests.Request) -> None:
         """Carries out one request; what goes wrong becomes a sentence on the page."""
@@ -100,6 +109,8 @@ class Conductor:
             self._goal.catch_up()
         self._goal.settle()
         self._push.tick()
+        self._jog.tick(elapsed)
+        self._poses.tick()
 
     def _run(self) -> None:
         last = time.monotonic()
@@ -131,7 +142,9 @@ def _coalescing_key(request: requests.Request) -> str | None:
         return f"joint.{request.joint}.{request.page}"
     if isinstance(request, requests.PullArm) and request.phase == "update":
         return f"pull.{request.page}"
-    if isinstance(request, requests.Seek | requests.SetSpeed | requests.SetArmAngle | requests.HoldPush):
+    if isinstance(
+        request, requests.Seek | requests.SetSpeed | requests.SetArmAngle | requests.HoldPush | requests.HoldJog
+    ):
         return f"{type(request).__name__}.{request.page}"
     return None
 

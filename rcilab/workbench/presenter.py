@@ -13,12 +13,14 @@ from rcilab.workbench.panels import Panel
 from rcilab.workbench.panels.check import CheckPanel
 from rcilab.workbench.panels.health import HealthPanel
 from rcilab.workbench.panels.jog import JogPanel
+from rcilab.workbench.panels.poses import PosesPanel
 from rcilab.workbench.panels.push import PushPanel
 from rcilab.workbench.panels.run import RunPanel
 from rcilab.workbench.panels.settings import SettingsPanel
 from rcilab.workbench.panels.status import status_values
 from rcilab.workbench.panels.target import TargetPanel
 from rcilab.workbench.panels.timeline import TimelinePanel
+from rcilab.workbench.panels.tool_jog import ToolJogPanel
 from rcilab.workbench.session import Session
 from rcilab.workbench.stage import Stage
 from rcilab.workbench.store import Store
@@ -33,7 +35,7 @@ if TYPE_CHECKING:
 _PERIOD = 1.0 / 30.0  # [s] A choice: the display's rate is enough, and it leaves the processor to the robot.
 _MAIN_WIDTH, _TIMELINE_WIDTH = 352, 380  # [px]
 _TABS = (
-    ("tab.jog", "adjustments-horizontal", JogPanel),
+    ("tab.jog", "adjustments-horizontal", JogPanel, ToolJogPanel, PosesPanel),
     ("tab.target", "current-location", TargetPanel),
     ("tab.check", "clipboard-check", CheckPanel),
     ("tab.run", "player-play", RunPanel, PushPanel, HealthPanel),

@@ -90,7 +90,7 @@ class BenchPage:
 
     def rows(self):
         """The sliders and typed numbers of the Jog tab."""
-        return self.tab.locator("div:has(> div > .rl-rows)").first
+        return self.tab.locator("div:has(> div > .rl-joints)").first
 
     def slider(self, joint: int):
         return self.rows().get_by_role("slider").nth(joint - 1)
