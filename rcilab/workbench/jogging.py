@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from rcilab.arrays import Array, JointVector, frozen
 from rcilab.motion.online import POSITION_MARGIN
 from rcilab.safety_distance import ADVISED_DISTANCE
-from rcilab.spatial import Pose
 from rcilab.workbench.telling import tell_status
 from rcilab.workbench.text import Message, message
 
@@ -19,7 +18,7 @@ if TYPE_CHECKING:
     from rcilab.model import RobotModel
     from rcilab.supervisor import SupervisorStatus
     from rcilab.supervisor.jog_command import JogKind
-    from rcilab.workbench.store import UiState
+    from rcilab.workbench.store import Store, UiState
 
 Frame = Literal["base", "tool"]
 
@@ -32,9 +31,11 @@ FASTEST_TOOL = 0.25  # [m/s] What ISO 10218-1 calls reduced speed; no jog moves 
 FASTEST_TURN = math.radians(45.0)  # [rad/s] Of the tool. A choice.
 FASTEST_JOINT = math.radians(30.0)  # [rad/s] A choice.
 SLOWEST = 0.01
+STILL = 1e-3  # [rad/s] A choice: below this a jogged joint stands.
 
 _AT_LIMIT = math.radians(0.05)  # [rad] A choice: closer than this to its limit a jogged joint has arrived there.
 _REACTION = 0.2  # [s] A choice: what the page, the control process and the arm need together until it stands.
+_APPROACH = 1e-4  # [m/s] A choice: slower than this nothing comes nearer.
 
 _NO_JOG = {
     "starting": "ready.starting",
@@ -108,28 +109,6 @@ def jog_velocity(model: RobotModel, q: JointVector, jog: JogState, axis: Axis) -
     return "joint", values
 
 
-def step_joint(model: RobotModel, q: JointVector, joint: int, angle: float) -> JointVector:
-    """Returns joint angles with one joint moved by an angle, [rad], or to the end of its range."""
-    limits, moved = model.limits.joint, np.array(q)
-    low, high = limits.lower[joint] + POSITION_MARGIN, limits.upper[joint] - POSITION_MARGIN
-    moved[joint] = min(max(q[joint] + angle, low), high)
-    return frozen(moved)
-
-
-def step_pose(T_base_tool: Pose, axis: Axis, jog: JogState) -> Pose:
-    """Returns a pose that is one step of `jog` further along or about an axis of the base or of the tool."""
-    index, amount = AXES.index(axis.name), axis.sign * jog.step
-    along, about = np.zeros(3), np.zeros(3)
-    if index < 3:
-        along[index] = amount / 1000.0
-    else:
-        about[index - 3] = math.radians(amount)
-    turn = Pose.from_rpy(np.zeros(3), about)
-    if jog.frame == "tool":
-        return T_base_tool @ Pose(along) @ turn
-    return Pose(T_base_tool.position + along, (turn @ Pose(wxyz=T_base_tool.wxyz)).wxyz)
-
-
 def inside(model: RobotModel, q: JointVector) -> JointVector:
     """Returns the joint angles nearest to `q` from which a jog can begin, shape (n,), [rad]."""
     limits = model.limits.joint
@@ -147,18 +126,16 @@ def at_limit(model: RobotModel, q: JointVector, axis: Axis) -> Message | None:
     return None
 
 
-def is_too_near(distance: float, before: float | None, elapsed: float) -> bool:
+def is_too_near(distance: float, before: float, elapsed: float) -> bool:
     """Returns whether two links, or a link and the floor, come so near that a jog must end now.
 
     Args:
         distance: Smallest distance now, [m].
-        before: At the last look, [m]; None at the first.
+        before: At the last look, [m].
         elapsed: Time since then, [s].
     """
-    if before is None or elapsed <= 0.0:
-        return False
-    closing = (before - distance) / elapsed
-    return closing > 1e-4 and distance < ADVISED_DISTANCE + closing * _REACTION
+    closing = (before - distance) / max(elapsed, 1e-3)  # [m/s]
+    return closing > _APPROACH and distance < ADVISED_DISTANCE + closing * _REACTION
 
 
 def no_jog(state: UiState, status: SupervisorStatus) -> Message | None:
@@ -174,3 +151,11 @@ def no_jog(state: UiState, status: SupervisorStatus) -> Message | None:
     if not status.powered:
         return message("ready.power")
     return None
+
+
+def change_jog(store: Store, **changes: Any) -> None:
+    """Exchanges settings and words of the jog."""
+    jog = store.state.jog
+    changed = replace(jog, **changes)
+    if changed != jog:
+        store.update(jog=changed)
