@@ -117,7 +117,7 @@ class JogActions:
             self._advance(self._preview, elapsed)
         press = self._press
         is_held = press is not None and press.is_robot and not press.is_spent
-        if not self._robot.watch(press.axis if press is not None and is_held else None, elapsed) and press is not None:
+        if not self._robot.watch(press.axis if press is not None and is_held else None) and press is not None:
             press.is_spent = True
 
     def _begin_preview(self, axis: Axis) -> bool:

@@ -28,31 +28,30 @@ class JogPanel:
 
     def build(self, gui: Any, state: UiState) -> None:
         """Adds the controls."""
-        self._build_settings(gui, state)
+        with gui.add_folder(self._text("jog.how")):
+            self._build_settings(gui, state)
         with gui.add_folder(self._text("jog.joints")):
             self._build_joints(gui, state)
         self._said = Html(gui)
 
     def _build_settings(self, gui: Any, state: UiState) -> None:
         text, ask, jog = self._text, self._ask, state.jog
+        gui.add_html('<i class="rl-jogset"></i>')
         robot = gui.add_checkbox(text("jog.robot"), jog.robot, hint=text("jog.robot_hint"))
         self._robot = Linked(robot, ask, lambda v, p: requests.SetJog(page=p, robot=bool(v)))
-        self._note = Html(gui)
+        steps = {text("jog.step_of", step=f"{step:g}") if step else text("jog.held"): step for step in STEPS}
+        self._steps = {step: label for label, step in steps.items()}
+        step = gui.add_dropdown(
+            text("jog.step"), tuple(steps), initial_value=self._steps[jog.step], hint=text("jog.step_hint")
+        )
+        self._step = Linked(step, ask, lambda v, p: requests.SetJog(page=p, step=steps.get(v)))
+        speed = gui.add_slider(text("jog.speed"), 1, 100, 1, round(100.0 * jog.speed), hint=text("jog.speed_hint"))
+        self._speed = Linked(speed, ask, lambda v, p: requests.SetJog(page=p, speed=v / 100.0))
+        self._pace, self._note = Html(gui), Html(gui)
         self._agree = gui.add_button(text("jog.confirm"), color="red", icon="hand-move", visible=False)
         on_press(self._agree, ask, lambda page: requests.SetJog(page=page, robot=True, agreed=True))
         self._cancel = gui.add_button(text("run.cancel"), color="gray", visible=False)
         on_press(self._cancel, ask, lambda page: requests.SetJog(page=page, robot=False))
-        with gui.add_folder(text("jog.how")):
-            gui.add_html('<i class="rl-jogset"></i>')
-            steps = {text("jog.step_of", step=f"{step:g}") if step else text("jog.held"): step for step in STEPS}
-            self._steps = {step: label for label, step in steps.items()}
-            step = gui.add_dropdown(
-                text("jog.step"), tuple(steps), initial_value=self._steps[jog.step], hint=text("jog.step_hint")
-            )
-            self._step = Linked(step, ask, lambda v, p: requests.SetJog(page=p, step=steps.get(v)))
-            speed = gui.add_slider(text("jog.speed"), 1, 100, 1, round(100.0 * jog.speed), hint=text("jog.speed_hint"))
-            self._speed = Linked(speed, ask, lambda v, p: requests.SetJog(page=p, speed=v / 100.0))
-            self._pace = Html(gui)
 
     def _build_joints(self, gui: Any, state: UiState) -> None:
         text, limits = self._text, state.model.limits.joint
