@@ -29,8 +29,7 @@ _DRAWN = """() => window.__viserMutable && __viserMutable.nodeRefFromName
 
 def close_toasts(tab) -> None:
     """Closes viser's notice about software rendering, which covers the top left of the scene."""
-    for button in tab.locator(".mantine-Notification-closeButton").all():
-        button.click()
+    tab.evaluate("document.querySelectorAll('.mantine-Notification-closeButton').forEach((button) => button.click())")
 
 
 def wait_for(condition: Callable[[], bool], what: str, timeout: float = 15.0, tab=None) -> None:
