@@ -107,12 +107,11 @@ def add_jog_button(gui: Any, ask: Ask, label: str, axis: str, sign: int) -> None
 
 def note_html(state: UiState, text: Text) -> str:
     """Returns what the buttons move, or the question before a foreign robot is moved."""
-    where = text(f"where.{state.plant}") if state.target == "virtual" else state.target
     if state.jog.asked:
         asked = text("jog.ask", model=state.model.name, address=state.target)
         return f'<p class="rl-verdict rl-warn" role="alert">{esc(asked)}</p>'
     if state.jog.robot:
-        return f'<p class="rl-verdict rl-warn rl-slim">{esc(text("jog.live", where=where))}</p>'
+        return f'<p class="rl-verdict rl-warn rl-slim">{esc(text("jog.live"))}</p>'
     return f'<p class="rl-note">{esc(text("jog.note"))}</p>'
 
 
