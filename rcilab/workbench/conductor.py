@@ -13,7 +13,9 @@ from rcilab.errors import RcilabError
 from rcilab.workbench import requests
 from rcilab.workbench.export_actions import Deliver, ExportActions
 from rcilab.workbench.goal_actions import GoalActions
+from rcilab.workbench.jog_actions import JogActions
 from rcilab.workbench.mailbox import Mailbox
+from rcilab.workbench.pose_actions import PoseActions
 from rcilab.workbench.push_actions import PushActions
 from rcilab.workbench.robot_actions import RobotActions
 from rcilab.workbench.session import Session
@@ -41,6 +43,8 @@ class Conductor:
         self.robot = RobotActions(store, session)
         self._push = PushActions(store, session)
         self._setup = SetupActions(store, session)
+        self._jog = JogActions(store, session, self._goal)
+        self._poses = PoseActions(store, self._goal)
         self._view = ViewActions(store)
         self._export = ExportActions(store, deliver)
         self._mailbox: Mailbox[requests.Request] = Mailbox()
@@ -60,6 +64,10 @@ class Conductor:
             requests.SetLaw: self._goal.set_law,
             requests.Drive: self.robot.drive,
             requests.ChooseRobot: self.robot.choose_robot,
+            requests.SetJog: self._jog.set_jog,
+            requests.HoldJog: self._jog.hold,
+            requests.PressJog: self._jog.press,
+            requests.NamedPose: self._poses.act,
             requests.SetPush: self._push.set_push,
             requests.HoldPush: self._push.hold,
             requests.PullArm: self._push.pull,
@@ -94,6 +102,7 @@ class Conductor:
         self._push.close()
         self._export.close()
         self.robot.close()
+        self._jog.release()
 
     def act(self, request: requests.Request) -> None:
         """Carries out one request; what goes wrong becomes a sentence on the page."""
@@ -114,6 +123,8 @@ class Conductor:
         self._goal.settle()
         self._push.tick()
         self._setup.tick()
+        self._jog.tick(elapsed)
+        self._poses.tick()
 
     def _type_field(self, request: requests.TypeField) -> None:
         (self._setup if is_setup_field(request.field) else self._goal).type_field(request)
@@ -150,7 +161,9 @@ def _coalescing_key(request: requests.Request) -> str | None:
         return f"{type(request).__name__}.{request.page}"
     if isinstance(request, requests.PullArm) and request.phase == "update":
         return f"pull.{request.page}"
-    if isinstance(request, requests.Seek | requests.SetSpeed | requests.SetArmAngle | requests.HoldPush):
+    if isinstance(
+        request, requests.Seek | requests.SetSpeed | requests.SetArmAngle | requests.HoldPush | requests.HoldJog
+    ):
         return f"{type(request).__name__}.{request.page}"
     return None
 

@@ -173,6 +173,17 @@ class GoalActions:
         if self._stale:
             self.plan()
 
+    def pose(self, q: JointVector) -> None:
+        """Poses the candidate arm at these joint angles."""
+        self._pose(q)
+
+    def follow(self, q: JointVector) -> Goal:
+        """Puts the goal where the moving arm is and returns it; planned is when the arm has come to rest."""
+        goal = initial_goal(self._store.state.model, q)
+        self._store.update(goal=goal)
+        self._stale = True
+        return goal
+
     def _pose(self, q: JointVector) -> None:
         model = self._store.state.model
         goal = Goal(q=q, target=model.forward(q), reach=judge_joints(model, q), psi=self._arm_angle(q))

@@ -13,6 +13,7 @@ from rcilab.workbench.panels import Panel
 from rcilab.workbench.panels.check import CheckPanel
 from rcilab.workbench.panels.health import HealthPanel
 from rcilab.workbench.panels.jog import JogPanel
+from rcilab.workbench.panels.poses import PosesPanel
 from rcilab.workbench.panels.push import PushPanel
 from rcilab.workbench.panels.recording import RecordingPanel
 from rcilab.workbench.panels.run import RunPanel
@@ -22,6 +23,7 @@ from rcilab.workbench.panels.setup_numbers import SetupNumbersPanel
 from rcilab.workbench.panels.status import status_values
 from rcilab.workbench.panels.target import TargetPanel
 from rcilab.workbench.panels.timeline import TimelinePanel
+from rcilab.workbench.panels.tool_jog import ToolJogPanel
 from rcilab.workbench.session import Session
 from rcilab.workbench.stage import Stage
 from rcilab.workbench.store import Store
@@ -36,7 +38,7 @@ if TYPE_CHECKING:
 _PERIOD = 1.0 / 30.0  # [s] A choice: the display's rate is enough, and it leaves the processor to the robot.
 _MAIN_WIDTH, _TIMELINE_WIDTH = 352, 380  # [px]
 _TABS = (
-    ("tab.jog", "adjustments-horizontal", JogPanel),
+    ("tab.jog", "adjustments-horizontal", JogPanel, ToolJogPanel, PosesPanel),
     ("tab.target", "current-location", TargetPanel),
     ("tab.setup", "tool", SetupPanel, SetupNumbersPanel),
     ("tab.check", "clipboard-check", CheckPanel),

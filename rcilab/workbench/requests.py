@@ -32,6 +32,49 @@ class PoseGoal(Request):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class SetJog(Request):
+    """How to jog; what is None stays."""
+
+    robot: bool | None = None
+    """Whether the buttons move the robot, not the goal."""
+    agreed: bool = False
+    """Whether this is the second yes for a foreign robot."""
+    step: float | None = None
+    """[mm, deg]; 0: as long as a button is held."""
+    frame: str | None = None
+    speed: float | None = None
+    """Share of the fastest jog, 0 to 1."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JogButton(Request):
+    """One of the buttons of the Jog tab."""
+
+    axis: str
+    """"joint.0" ... "joint.6", or "x", "y", "z", "roll", "pitch", "yaw"."""
+    sign: int
+    """1 or -1."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HoldJog(JogButton):
+    """It is held; said ten times a second."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PressJog(JogButton):
+    """It was pressed and released."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NamedPose(Request):
+    """Something with a stored pose."""
+
+    what: Literal["store", "recall", "delete", "choose"]
+    name: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class MoveTarget(Request):
     """The gizmo was moved."""
 

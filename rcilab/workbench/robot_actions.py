@@ -252,7 +252,6 @@ class RobotActions:
         self._end_recording()
 
 
-
 def _own_setup(state: UiState, target: str) -> RobotSetup | None:
     """Returns what our own controller is told at once; a foreign one is told nothing that was not agreed to."""
     return state.setup.wanted.only(state.setup.touched) if target == "virtual" else None

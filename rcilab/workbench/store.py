@@ -14,6 +14,7 @@ import numpy as np
 from rcilab.arrays import JointVector
 from rcilab.model import RobotModel
 from rcilab.spatial import Pose
+from rcilab.workbench.jogging import JogState
 from rcilab.workbench.lease import Lease
 from rcilab.workbench.planning import Plan, PlannableLaw
 from rcilab.workbench.pushing import Plant, PushState
@@ -84,6 +85,7 @@ class UiState:
     plant: Plant = "ideal"
     """What the virtual controller moves."""
     push: PushState = field(default_factory=PushState)
+    jog: JogState = field(default_factory=JogState)
     goal: Goal
     setup: SetupState = field(default_factory=SetupState)
     """Safety box, tool, load, force-control frame; `model` has this tool and this load."""

@@ -29,8 +29,7 @@ _DRAWN = """() => window.__viserMutable && __viserMutable.nodeRefFromName
 
 def close_toasts(tab) -> None:
     """Closes viser's notice about software rendering, which covers the top left of the scene."""
-    for button in tab.locator(".mantine-Notification-closeButton").all():
-        button.click()
+    tab.evaluate("document.querySelectorAll('.mantine-Notification-closeButton').forEach((button) => button.click())")
 
 
 def wait_for(condition: Callable[[], bool], what: str, timeout: float = 15.0, tab=None) -> None:
@@ -90,7 +89,7 @@ class BenchPage:
 
     def rows(self):
         """The sliders and typed numbers of the Jog tab."""
-        return self.tab.locator("div:has(> div > .rl-rows)").first
+        return self.tab.locator("div:has(> div > .rl-joints)").first
 
     def slider(self, joint: int):
         return self.rows().get_by_role("slider").nth(joint - 1)

@@ -14,7 +14,7 @@ from browser.page import BenchPage, close_toasts
 def test_the_language_changes_everywhere_and_back(page):
     page.open_tab("Settings")
     choose(page, "Language", "中文")
-    page.tab.get_by_role("tab", name="关节").wait_for()
+    page.tab.get_by_role("tab", name="点动").wait_for()
     page.wait(lambda: page.tab.locator("#rl-stop").inner_text().startswith("停止"), "Stop in Chinese")
     assert page.tab.locator("[data-id=model] small").inner_text() == "机器人"
     page.tab.locator('[role="tab"][aria-selected="true"]', has_text="设置").wait_for()  # The tab stays open.

@@ -143,18 +143,55 @@
     if (event.key === "Escape" && !event.repeat) pressStop();
   }, true);
 
-  // A button that is held must not stay held when the window loses the focus: nobody hears the release then.
+  // A button that is held must not stay held when nobody would hear its release: when the window loses the focus, the
+  // button goes out of sight (another tab), or the mouse comes back with no button down.
+  const holds = (target) => target instanceof Element ? target.closest("div:has(> div > .rl-held) button") : null;
   let held = null;
-  window.addEventListener("pointerdown", (event) => { held = event; }, true);
+  window.addEventListener("pointerdown", (event) => {
+    if (held && held.key) letGo();
+    held = event;
+    watchHeld();
+  }, true);
   window.addEventListener("pointerup", () => { held = null; }, true);
+  window.addEventListener("pointermove", (event) => {
+    if (held && !held.key && event.pointerId === held.pointerId && event.buttons === 0) letGo();
+  }, true);
   const letGo = () => {
     if (!held) return;
     const { target, pointerId } = held;
     held = null;
+    target.classList.remove("rl-holding");
     target.dispatchEvent(new PointerEvent("pointercancel", { bubbles: true, pointerId }));
+  };
+  const watchHeld = () => {
+    if (!held) return;
+    if (!held.target.isConnected || held.target.getClientRects().length === 0) letGo();
+    else setTimeout(watchHeld, 50);
   };
   window.addEventListener("blur", letGo);
   document.addEventListener("visibilitychange", () => { if (document.hidden) letGo(); });
+
+  // Space and Enter hold a jog button as the mouse does: from key down to key up, which is the click.
+  const isKey = (event) => event.key === " " || event.key === "Enter";
+  window.addEventListener("keydown", (event) => {
+    if (event.key === "Escape") letGo();
+    const button = isKey(event) ? holds(event.target) : null;
+    if (!button) return;
+    event.preventDefault();
+    if (event.repeat || held || button.disabled) return;
+    button.dispatchEvent(new PointerEvent("pointerdown", { bubbles: true, button: 0, buttons: 1, pointerId: 1 }));
+    held = { target: button, pointerId: 1, key: event.key };
+    button.classList.add("rl-holding");
+  }, true);
+  window.addEventListener("keyup", (event) => {
+    if (!isKey(event) || !holds(event.target)) return;
+    event.preventDefault();
+    if (!held || held.key !== event.key) return;
+    const button = held.target;
+    letGo();
+    button.click();
+  }, true);
+  window.addEventListener("focusout", (event) => { if (held && held.key && event.target === held.target) letGo(); }, true);
 
   if (document.body) build(); else document.addEventListener("DOMContentLoaded", build);
 })();

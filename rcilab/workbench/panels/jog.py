@@ -1,73 +1,147 @@
-"""Jog: pose the candidate arm joint by joint. Nothing here moves the robot."""
+"""Jog: what the buttons move and how fast; joint by joint with sliders, buttons and numbers."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal
+import math
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rcilab.workbench import requests
+from rcilab.workbench.jogging import FASTEST_JOINT, FASTEST_TOOL, FASTEST_TURN, STEPS, no_jog
+from rcilab.workbench.reach import NEAR_LIMIT
 from rcilab.workbench.text import Text
-from rcilab.workbench.widgets import Ask, Html, Linked, NumberField, esc, shown
+from rcilab.workbench.widgets import Ask, Html, Linked, NumberField, esc, on_press, shown
 
 if TYPE_CHECKING:
     from rcilab.supervisor import SupervisorStatus
     from rcilab.workbench.store import UiState
 
-_Name = Literal["zero", "home", "here", "undo"]
-_NAMES: tuple[_Name, ...] = ("zero", "home", "here", "undo")
+_HOLD_RATE = 10.0  # [1/s] A held button says so this often.
 
 
 class JogPanel:
-    """Sliders in degrees with the limits at their ends, a typed number beside each, named poses."""
+    """The switch between goal and robot, step and speed; a row a joint, the limits at its ends."""
 
     def __init__(self, text: Text, ask: Ask) -> None:
         self._text, self._ask = text, ask
 
     def build(self, gui: Any, state: UiState) -> None:
-        """Adds one row a joint."""
+        """Adds the controls."""
+        with gui.add_folder(self._text("jog.how")):
+            self._build_settings(gui, state)
+        with gui.add_folder(self._text("jog.joints")):
+            self._build_joints(gui, state)
+        self._said = Html(gui)
+
+    def _build_settings(self, gui: Any, state: UiState) -> None:
+        text, ask, jog = self._text, self._ask, state.jog
+        gui.add_html('<i class="rl-jogset"></i>')
+        robot = gui.add_checkbox(text("jog.robot"), jog.robot, hint=text("jog.robot_hint"))
+        self._robot = Linked(robot, ask, lambda v, p: requests.SetJog(page=p, robot=bool(v)))
+        steps = {text("jog.step_of", step=f"{step:g}") if step else text("jog.held"): step for step in STEPS}
+        self._steps = {step: label for label, step in steps.items()}
+        step = gui.add_dropdown(
+            text("jog.step"), tuple(steps), initial_value=self._steps[jog.step], hint=text("jog.step_hint")
+        )
+        self._step = Linked(step, ask, lambda v, p: requests.SetJog(page=p, step=steps.get(v)))
+        speed = gui.add_slider(text("jog.speed"), 1, 100, 1, round(100.0 * jog.speed), hint=text("jog.speed_hint"))
+        self._speed = Linked(speed, ask, lambda v, p: requests.SetJog(page=p, speed=v / 100.0))
+        self._pace, self._note = Html(gui), Html(gui)
+        self._agree = gui.add_button(text("jog.confirm"), color="red", icon="hand-move", visible=False)
+        on_press(self._agree, ask, lambda page: requests.SetJog(page=page, robot=True, agreed=True))
+        self._cancel = gui.add_button(text("run.cancel"), color="gray", visible=False)
+        on_press(self._cancel, ask, lambda page: requests.SetJog(page=page, robot=False))
+
+    def _build_joints(self, gui: Any, state: UiState) -> None:
         text, limits = self._text, state.model.limits.joint
-        gui.add_html(f'<p class="rl-note">{esc(text("jog.note"))}</p>')
-        self._buttons = gui.add_button_group(text("jog.poses"), [text(f"jog.{name}") for name in _NAMES])
-        names: dict[str, _Name] = {text(f"jog.{name}"): name for name in _NAMES}
-
-        @self._buttons.on_click
-        async def _(event: Any) -> None:
-            self._ask(requests.PoseGoal(page=event.client_id, name=names[event.target.value]))
-
         self._sliders: list[Linked] = []
         self._fields: list[NumberField] = []
+        self._margins: list[Html] = []
         source = state.model.limits.source("joint.lower")
         angles = np.degrees(state.goal.q)
-        with gui.add_folder(text("jog.joints")):
-            gui.add_html('<i class="rl-rows"></i>')
-            for joint in range(state.model.n):
-                low, high = float(np.degrees(limits.lower[joint])), float(np.degrees(limits.upper[joint]))
-                slider = gui.add_slider(
-                    f"J{joint + 1}",
-                    round(low, 3),
-                    round(high, 3),
-                    0.1,
-                    round(float(np.clip(angles[joint], low, high)), 3),
-                    marks=((low, f"{low:.0f}"), (0.0, ""), (high, f"{high:.0f}")),
-                    hint=text("jog.limit_hint", joint=joint + 1, low=f"{low:.0f}", high=f"{high:.0f}", source=source),
-                )
-                self._sliders.append(Linked(slider, self._ask, _joint_request(joint)))
-                box = gui.add_text("", shown(angles[joint]), hint=text("jog.type_hint"))
-                self._fields.append(NumberField(box, self._ask, f"joint.{joint}"))
-        self._problems = Html(gui)
-        self._reach = Html(gui)
+        gui.add_html('<i class="rl-joints rl-held"></i>')
+        for joint in range(state.model.n):
+            low, high = float(np.degrees(limits.lower[joint])), float(np.degrees(limits.upper[joint]))
+            hint = text("jog.limit_hint", joint=joint + 1, low=f"{low:.0f}", high=f"{high:.0f}", source=source)
+            add_jog_button(gui, self._ask, f"J{joint + 1}", f"joint.{joint}", -1)
+            value = round(float(np.clip(angles[joint], low, high)), 3)
+            slider = gui.add_slider(
+                f"J{joint + 1}", round(low, 3), round(high, 3), 0.1, value, marks=((0.0, ""),), hint=hint
+            )
+            self._sliders.append(Linked(slider, self._ask, _joint_request(joint)))
+            add_jog_button(gui, self._ask, f"J{joint + 1}", f"joint.{joint}", 1)
+            box = gui.add_text("", shown(angles[joint]), hint=text("jog.type_hint"))
+            self._fields.append(NumberField(box, self._ask, f"joint.{joint}"))
+            self._margins.append(Html(gui))
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:
-        """Moves sliders and numbers to the goal."""
+        """Follows goal and settings."""
+        jog, limits = state.jog, state.model.limits.joint
+        self._robot.show(jog.robot or jog.asked)
+        self._note.show(note_html(state, self._text))
+        self._agree.visible = self._cancel.visible = jog.asked
+        self._step.show(self._steps[jog.step])
+        self._speed.show(round(100.0 * jog.speed))
+        self._pace.show(pace_html(jog.speed, self._text))
         for joint, angle in enumerate(np.degrees(state.goal.q)):
             self._sliders[joint].show(round(float(angle), 3))
             field = self._fields[joint]
             field.show(shown(angle), state.problems.get(field.field), state.typed)
-        self._problems.show(
-            problems_html(state, self._text, [(f.field, f"J{i + 1}") for i, f in enumerate(self._fields)])
-        )
-        self._reach.show(reach_html(state, self._text))
+            ends = float(limits.lower[joint]), float(limits.upper[joint])
+            self._margins[joint].show(margin_html(float(state.goal.q[joint]), *ends, self._text))
+        fields = [(field.field, f"J{number}") for number, field in enumerate(self._fields, start=1)]
+        self._said.show(problems_html(state, self._text, fields) + said_html(state, status, self._text))
+
+
+def add_jog_button(gui: Any, ask: Ask, label: str, axis: str, sign: int) -> None:
+    """Adds a button that moves an axis while it is held, or by a step when it is pressed."""
+    button = gui.add_button(f"{label} {'+' if sign > 0 else '−'}")
+
+    @button.on_hold(callback_hz=_HOLD_RATE)
+    async def _(event: Any) -> None:
+        ask(requests.HoldJog(page=event.client_id, axis=axis, sign=sign))
+
+    on_press(button, ask, lambda page: requests.PressJog(page=page, axis=axis, sign=sign))
+
+
+def note_html(state: UiState, text: Text) -> str:
+    """Returns what the buttons move, or the question before a foreign robot is moved."""
+    if state.jog.asked:
+        asked = text("jog.ask", model=state.model.name, address=state.target)
+        return f'<p class="rl-verdict rl-warn" role="alert">{esc(asked)}</p>'
+    if state.jog.robot:
+        return f'<p class="rl-verdict rl-warn rl-slim">{esc(text("jog.live"))}</p>'
+    return f'<p class="rl-note">{esc(text("jog.note"))}</p>'
+
+
+def pace_html(speed: float, text: Text) -> str:
+    """Returns how fast that is."""
+    turn, joint = math.degrees(speed * FASTEST_TURN), math.degrees(speed * FASTEST_JOINT)
+    said = text("jog.pace", mm=f"{1000.0 * speed * FASTEST_TOOL:.3g}", turn=f"{turn:.2g}", joint=f"{joint:.2g}")
+    return f'<p class="rl-pace">{esc(said)}</p>'
+
+
+def margin_html(angle: float, low: float, high: float, text: Text) -> str:
+    """Returns the limits of a joint and how far it is from the nearer one, [rad], as a bar and in words."""
+    left = max(min(angle - low, high - angle), 0.0)
+    tone, sign = ("bad", "◆ ") if left < 1e-3 else ("warn", "▲ ") if left < NEAR_LIMIT else ("good", "")
+    share = 100.0 * min(left / (0.5 * (high - low)), 1.0)
+    said = sign + text("jog.left", angle=f"{math.degrees(left):.0f}" if tone == "good" else f"{math.degrees(left):.1f}")
+    ends = [f"{math.degrees(bound):.0f}" for bound in (low, high)]
+    return (
+        f'<div class="rl-margin rl-{tone}"><span>{ends[0]}</span><i class="rl-meter"><i style="width:{share:.0f}%">'
+        f"</i></i><b>{esc(said)}</b><span>{ends[1]}</span></div>"
+    )
+
+
+def said_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
+    """Returns why a jog cannot begin, what ended the last one, or else what is to be said about the goal."""
+    reason = no_jog(state, status) if state.jog.robot else None
+    said = reason or state.jog.said
+    if said is None:
+        return reach_html(state, text)
+    return f'<p class="rl-verdict rl-warn" role="alert"><b>▲</b> {esc(text.say(said))}</p>'
 
 
 def problems_html(state: UiState, text: Text, fields: list[tuple[str, str]]) -> str:

@@ -1,0 +1,176 @@
+"""What jogging is made of: its settings, how fast and how far one button goes, what stands in the way."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from rcilab.arrays import Array, JointVector, frozen
+from rcilab.motion.online import POSITION_MARGIN
+from rcilab.safety_distance import ADVISED_DISTANCE
+from rcilab.workbench.telling import tell_status
+from rcilab.workbench.text import Message, message
+
+if TYPE_CHECKING:
+    from rcilab.model import RobotModel
+    from rcilab.supervisor import SupervisorStatus
+    from rcilab.supervisor.jog_command import JogKind
+    from rcilab.workbench.store import Store, UiState
+
+Frame = Literal["base", "tool"]
+
+FRAMES: tuple[Frame, ...] = ("base", "tool")
+AXES = ("x", "y", "z", "roll", "pitch", "yaw")
+STEPS = (0.0, 0.1, 1.0, 5.0, 10.0)
+"""Millimetres or degrees that one press goes; 0: as long as the button is held."""
+
+FASTEST_TOOL = 0.25  # [m/s] What ISO 10218-1 calls reduced speed; no jog moves the tool tip faster.
+FASTEST_TURN = math.radians(45.0)  # [rad/s] Of the tool. A choice.
+FASTEST_JOINT = math.radians(30.0)  # [rad/s] A choice.
+SLOWEST = 0.01
+STILL = 1e-3  # [rad/s] A choice: below this a jogged joint stands.
+
+_AT_LIMIT = math.radians(0.05)  # [rad] A choice: closer than this to its limit a jogged joint has arrived there.
+_REACTION = 0.5  # [s] A choice: a jog that nobody renews any more, 0.3 s, and the way to rest are shorter.
+_AHEAD = 0.1  # [s] How far ahead distances are looked at.
+_APPROACH = 1e-4  # [m/s] A choice: slower than this nothing comes nearer.
+STANDING = 0.02  # A choice: a smaller part of a jog than that is none.
+
+_NO_JOG = {
+    "starting": "ready.starting",
+    "connecting": "ready.starting",
+    "stopping": "ready.moving",
+    "fault": "ready.fault",
+    "lost": "ready.lost",
+    "closed": "ready.starting",
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class JogState:
+    """How the page jogs."""
+
+    robot: bool = False
+    """Whether the buttons move the robot; otherwise they pose the goal."""
+    asked: bool = False
+    """Whether a foreign robot was chosen and that awaits a second yes."""
+    step: float = 0.0
+    """One of `STEPS`."""
+    frame: Frame = "base"
+    speed: float = 0.3
+    """Share of the fastest jog, 0 to 1."""
+    said: Message | None = None
+    """What stopped or refused the last jog."""
+    poses: tuple[str, ...] = ()
+    """Names of the stored poses of this arm."""
+    pose: str = ""
+    """The one that is chosen."""
+
+
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """One button: a joint or an axis of the tool, and a direction."""
+
+    name: str
+    """"joint.0" ... "joint.6", or one of `AXES`."""
+    sign: int
+    """1 or -1."""
+
+    @property
+    def joint(self) -> int | None:
+        """Number of the joint from 0; None for an axis of the tool."""
+        return int(self.name[6:]) if self.name.startswith("joint.") else None
+
+    def exists(self, model: RobotModel) -> bool:
+        """Returns whether an arm has it."""
+        names = (*(f"joint.{joint}" for joint in range(model.n)), *AXES)
+        return self.name in names and self.sign in (-1, 1)
+
+
+def jog_velocity(model: RobotModel, q: JointVector, jog: JogState, axis: Axis) -> tuple[JogKind, Array]:
+    """Returns the kind and the values of a jog for `Supervisor.jog`: joint velocities or a twist.
+
+    Args:
+        model: The arm.
+        q: Joint angles now, shape (n,), [rad]; they decide how fast a joint may turn for `FASTEST_TOOL`.
+        jog: Speed and frame.
+        axis: What moves.
+    """
+    joint = axis.joint
+    if joint is None:
+        twist = np.zeros(6)
+        index = AXES.index(axis.name)
+        twist[index] = axis.sign * jog.speed * (FASTEST_TOOL if index < 3 else FASTEST_TURN)
+        return jog.frame, twist
+    lever = float(np.linalg.norm(model.jacobian(q)[:3, joint]))  # [m]
+    values = np.zeros(model.n)
+    values[joint] = axis.sign * jog.speed * min(FASTEST_JOINT, FASTEST_TOOL / max(lever, 1e-3))
+    return "joint", values
+
+
+def inside(model: RobotModel, q: JointVector) -> JointVector:
+    """Returns the joint angles nearest to `q` from which a jog can begin, shape (n,), [rad]."""
+    limits = model.limits.joint
+    return frozen(np.clip(q, limits.lower + POSITION_MARGIN, limits.upper - POSITION_MARGIN))
+
+
+def at_limit(model: RobotModel, q: JointVector, axis: Axis) -> Message | None:
+    """Returns which joint has come to which limit, so that this button leads no further; None when none has."""
+    limits, joint = model.limits.joint, axis.joint
+    for number in range(model.n) if joint is None else (joint,):
+        for end, bound in (("lower", limits.lower[number]), ("upper", limits.upper[number])):
+            is_ahead = joint is None or (end == "upper") == (axis.sign > 0)
+            if is_ahead and abs(q[number] - bound) < _AT_LIMIT:
+                return message(f"jog.at_{end}", joint=number + 1, angle=f"{math.degrees(bound):.0f}")
+    return None
+
+
+def safe_share(model: RobotModel, q: JointVector, kind: JogKind, values: Array) -> tuple[float, tuple[int, int]]:
+    """Returns the part of a jog, 0 to 1, that keeps links from each other and the floor, and which come nearest.
+
+    No controller looks for that. The arm may come nearer by what is left to `ADVISED_DISTANCE` within `_REACTION`, so
+    that it slows down on its way there, and stands in time even when nobody looks at it any more meanwhile.
+
+    Args:
+        model: The arm.
+        q: Joint angles now, shape (n,), [rad].
+        kind: As for `Supervisor.jog`.
+        values: Likewise.
+    """
+    dq = values
+    if kind != "joint":
+        R = model.forward(q).rotation if kind == "tool" else np.eye(3)
+        dq = model.joint_velocity(q, np.concatenate([R @ values[:3], R @ values[3:]])).rates
+    found = model.clearance(np.stack([q, q + _AHEAD * dq]))
+    now, ahead = found.distance
+    closing = float(now - ahead) / _AHEAD  # [m/s]
+    first, second = (int(number) for number in found.links[1])
+    if closing <= _APPROACH:
+        return 1.0, (first, second)
+    return min(max(float(now) - ADVISED_DISTANCE, 0.0) / (closing * _REACTION), 1.0), (first, second)
+
+
+def no_jog(state: UiState, status: SupervisorStatus) -> Message | None:
+    """Returns why the buttons cannot move the robot now, or None when they can."""
+    if status.code == "moving.guided":
+        return message("ready.guided")
+    if status.phase == "crashed" or (status.phase == "lost" and state.target == "virtual"):
+        return tell_status(status)
+    if status.phase == "moving" and status.code != "moving.jog":
+        return message("ready.moving")
+    if status.phase in _NO_JOG:
+        return message(_NO_JOG[status.phase])
+    if not status.powered:
+        return message("ready.power")
+    return None
+
+
+def change_jog(store: Store, **changes: Any) -> None:
+    """Exchanges settings and words of the jog."""
+    jog = store.state.jog
+    changed = replace(jog, **changes)
+    if changed != jog:
+        store.update(jog=changed)

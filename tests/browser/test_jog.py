@@ -1,0 +1,92 @@
+"""Jog as a person: hold a button with the mouse or a key, and every way in which that ends."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from browser.page import close_toasts
+from rcilab.workbench import requests
+
+
+@pytest.fixture
+def jogging(page):
+    """The Jog tab with the robot under its buttons, switched on by hand."""
+    box = page.tab.get_by_label("Move the robot", exact=True)
+    box.check()
+    page.wait(lambda: page.state.jog.robot, "the buttons to move the robot")
+    yield page
+    page.tab.mouse.up()
+    page.bench.conductor.ask(requests.SetJog(robot=False, step=0.0))
+    page.wait(lambda: page.status.phase == "idle", "the arm to rest")
+
+
+def moves(page) -> bool:
+    return page.status.dq is not None and float(np.abs(page.status.dq).max()) > 0.01
+
+
+def press(page, name: str) -> None:
+    """Puts the mouse on a button and holds it down until the arm moves."""
+    button = page.button(name)
+    button.scroll_into_view_if_needed()
+    button.hover()
+    page.tab.mouse.down()
+    page.wait(lambda: moves(page), f"the arm to move with {name}")
+
+
+def require_rest(page) -> None:
+    """Waits until the arm stands for longer than any pause between two words of a button that is held."""
+
+    def rests() -> bool:
+        there = np.array(page.status.q_c)
+        page.tab.wait_for_timeout(500)
+        return np.array_equal(page.status.q_c, there)
+
+    page.wait(rests, "the arm to stand")
+
+
+def test_a_held_button_moves_the_robot_until_it_is_let_go_in_any_way(jogging):
+    page, mouse, keyboard = jogging, jogging.tab.mouse, jogging.tab.keyboard
+    start = np.array(page.status.q_c)
+    press(page, "J1 +")
+    mouse.up()
+    require_rest(page)
+    moved = page.status.q_c - start
+    assert moved[0] > 0.0
+    assert np.abs(moved[1:]).max() < 1e-12
+    press(page, "J1 −")
+    mouse.move(5000, 5000)  # Far outside of the page.
+    assert moves(page)
+    mouse.up()
+    require_rest(page)
+    press(page, "z −")
+    page.tab.evaluate("window.dispatchEvent(new Event('blur'))")
+    require_rest(page)
+    mouse.up()
+    press(page, "z +")
+    page.tab.get_by_role("tab", name="Check").focus()
+    keyboard.press("Enter")
+    require_rest(page)
+    mouse.up()
+    page.open_tab("Jog")
+    press(page, "J1 +")
+    keyboard.press("Escape")
+    require_rest(page)
+    mouse.up()
+    page.wait(lambda: page.status.phase == "idle", "an idle arm")
+    page.button("J1 −").focus()
+    keyboard.down("Space")
+    page.wait(lambda: moves(page), "the arm to move with the key")
+    keyboard.up("Space")
+    require_rest(page)
+    page.wait(lambda: page.status.phase == "idle", "an idle arm")
+    page.wait(lambda: np.array_equal(page.state.goal.q, page.status.q_c), "the goal where the arm is")
+    press(page, "J1 +")
+    page.tab.goto("about:blank")
+    require_rest(page)
+    assert not page.state.jog.robot
+    mouse.up()
+    assert page.status.faults == ()
+    page.tab.goto(f"{page.bench.url}?fixedDpr=0.4")
+    page.wait_until_drawn()
+    close_toasts(page.tab)
