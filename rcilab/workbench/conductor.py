@@ -99,10 +99,10 @@ class Conductor:
         self._ending.set()
         if self._thread is not None:
             self._thread.join(10.0)
+        self._jog.release()
         self._push.close()
         self._export.close()
         self.robot.close()
-        self._jog.release()
 
     def act(self, request: requests.Request) -> None:
         """Carries out one request; what goes wrong becomes a sentence on the page."""
