@@ -104,11 +104,11 @@ class RobotJog:
             return
         share = state.jog.speed * FASTEST_JOINT / float(state.model.limits.joint.velocity.max())
         # A straight line of the joints: the tool leaves its own by 0.03 mm in a step of 10 mm.
-        made = make_plan(state.model, status.q_c, led.q, share, "jerk_limited")
+        made = make_plan(state.model, status.q_c, led.q, share, "jerk_limited", state.setup.wanted.box)
         if not isinstance(made, Plan):
             change_jog(self._store, said=made)
             return
-        report = made.completed(state.model).report
+        report = made.completed().report
         if report.certificate is None:
             broken = message(f"condition.{report.violations[0].condition.id}")
             change_jog(self._store, said=message("jog.unsafe", condition=broken))
