@@ -9,7 +9,6 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from rcilab.client.run import Run as Run
     from rcilab.client.session import RobotSession as RobotSession
     from rcilab.client.session import connect as connect
     from rcilab.command import CartesianPosition as CartesianPosition
@@ -34,6 +33,8 @@ if TYPE_CHECKING:
     from rcilab.motion.program import Waypoint as Waypoint
     from rcilab.notebook.plot import plot as plot
     from rcilab.notebook.preview import preview as preview
+    from rcilab.recording.run import Run as Run
+    from rcilab.recording.run_file import load_run as load_run
     from rcilab.safety_box import SafetyBox as SafetyBox
     from rcilab.safety_distance import SafetyDistance as SafetyDistance
     from rcilab.spatial import Pose as Pose
@@ -55,13 +56,14 @@ _HOMES = {
     "Report": "rcilab.conformance.report",
     "RobotModel": "rcilab.model",
     "RobotSession": "rcilab.client.session",
-    "Run": "rcilab.client.run",
+    "Run": "rcilab.recording.run",
     "SafetyBox": "rcilab.safety_box",
     "SafetyDistance": "rcilab.safety_distance",
     "Waypoint": "rcilab.motion.program",
     "check": "rcilab.conformance.check",
     "connect": "rcilab.client.session",
     "load_model": "rcilab.model",
+    "load_run": "rcilab.recording.run_file",
     "plan_arc": "rcilab.motion.cartesian",
     "plan_circle": "rcilab.motion.cartesian",
     "plan_joint": "rcilab.motion.joint",

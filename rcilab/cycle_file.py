@@ -3,24 +3,99 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from os import PathLike, fspath
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rcilab.errors import InvalidValueError
 
+UNITS = {
+    "t": "s",
+    "received_ns": "ns",
+    "sent_ns": "ns",
+    "lateness": "s",
+    "q": "rad",
+    "q_c": "rad",
+    "dq": "rad/s",
+    "command": "rad",
+    "tau": "N m",
+    "command_psi": "rad",
+    "command_tau": "N m",
+}
+"""Unit of each field that has one and only one; a pose mixes numbers without a unit and [m]."""
+
 _HIDDEN = ("reserved",)
+_CHUNK = 2000  # Rows of a CSV between two reports of progress.
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Column:
+    """One number a cycle."""
+
+    name: str
+    """Such as q[1], command_pose[1,4] or t."""
+    unit: str
+    """"" for a number without one."""
+    values: NDArray[Any]
+    """Shape (N,)."""
+
+    @property
+    def title(self) -> str:
+        """Name and unit, such as "q[1] [rad]"."""
+        return f"{self.name} [{self.unit}]" if self.unit else self.name
+
+
+def split_columns(name: str, unit: str, values: NDArray[Any]) -> list[Column]:
+    """Returns the columns of an array with one entry a cycle: name[1], name[2], ... or name[1,1], ..., from 1."""
+    columns: list[Column] = []
+    for place in np.ndindex(values.shape[1:]):
+        index = ",".join(str(i + 1) for i in place)
+        columns.append(Column(f"{name}[{index}]" if place else name, unit, values[(slice(None), *place)]))
+    return columns
+
+
+def cycle_columns(cycles: NDArray[np.void]) -> list[Column]:
+    """Returns every number of recorded cycles, each as a column with its unit."""
+    columns: list[Column] = []
+    for name in _fields(cycles):
+        found = split_columns(name, UNITS.get(name, ""), cycles[name])
+        if name == "command_pose":  # The last column of the matrix is the position.
+            found = [Column(c.name, "m" if c.name.endswith(",4]") and "[4," not in c.name else "", c.values) for c in found]
+        columns += found
+    return columns
+
+
+def write_csv(columns: Sequence[Column], stream: IO[str], progress: Callable[[float], None] | None = None) -> None:
+    """Writes columns as CSV: a header line with names and units, then plain numbers; nan where there is nothing.
+
+    Args:
+        columns: All of the same length.
+        stream: Where to; opened with newline="".
+        progress: Told the share that is done, now and then.
+    """
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow([column.title for column in columns])
+    count = len(columns[0].values) if columns else 0
+    for start in range(0, count, _CHUNK):
+        rows: Iterable[tuple[object, ...]] = zip(
+            *(column.values[start : start + _CHUNK].tolist() for column in columns), strict=True
+        )
+        writer.writerows(rows)
+        if progress is not None:
+            progress(min(1.0, (start + _CHUNK) / count))
 
 
 def save_cycles(cycles: NDArray[np.void], file: str | PathLike[str]) -> None:
     """Writes recorded cycles, one row each, in SI units; the ending of the name chooses the format.
 
-    .csv: a header line, then plain numbers; an array of a cycle becomes columns `q[1]`, `q[2]`, ..., a matrix
-    `command_pose[1,1]`, ...; nan where there was nothing. .npz: one array a field, `numpy.load(file)["q"]` of shape
-    (N, n).
+    .csv: a header line with units, then plain numbers; an array of a cycle becomes columns `q[1] [rad]`,
+    `q[2] [rad]`, ..., a matrix `command_pose[1,1]`, ...; nan where there was nothing. .npz: one array a field,
+    `numpy.load(file)["q"]` of shape (N, n).
 
     Args:
         cycles: The rows, a structured array of shape (N,).
@@ -38,29 +113,24 @@ def save_cycles(cycles: NDArray[np.void], file: str | PathLike[str]) -> None:
         raise InvalidValueError("file", fspath(file), f"cannot be written: {error.strerror}") from error
 
 
-def _write_csv(cycles: NDArray[np.void], path: Path) -> None:
-    names: list[str] = []
-    columns: list[list[object]] = []
-    for name in _fields(cycles):
-        values = cycles[name]
-        for place in np.ndindex(values.shape[1:]):
-            index = ",".join(str(i + 1) for i in place)
-            names.append(f"{name}[{index}]" if place else name)
-            columns.append(values[(slice(None), *place)].tolist())
-    with path.open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(names)
-        writer.writerows(zip(*columns, strict=True))
-
-
-def _write_npz(cycles: NDArray[np.void], path: Path) -> None:
+def write_npz(cycles: NDArray[np.void], stream: IO[bytes]) -> None:
+    """Writes recorded cycles as one array a field."""
     arrays: dict[str, Any] = {name: np.ascontiguousarray(cycles[name]) for name in _fields(cycles)}
+    np.savez_compressed(stream, **arrays)
+
+
+def _save_csv(cycles: NDArray[np.void], path: Path) -> None:
+    with path.open("w", newline="", encoding="utf-8") as stream:
+        write_csv(cycle_columns(cycles), stream)
+
+
+def _save_npz(cycles: NDArray[np.void], path: Path) -> None:
     with path.open("wb") as stream:
-        np.savez_compressed(stream, **arrays)
+        write_npz(cycles, stream)
 
 
 def _fields(cycles: NDArray[np.void]) -> list[str]:
     return [name for name in cycles.dtype.names or () if name not in _HIDDEN]
 
 
-_WRITERS = {".csv": _write_csv, ".npz": _write_npz}
+_WRITERS = {".csv": _save_csv, ".npz": _save_npz}

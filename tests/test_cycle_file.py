@@ -37,10 +37,10 @@ def test_a_csv_has_a_column_a_number_and_loses_no_digit(record, tmp_path):
     with open(tmp_path / "last.csv", newline="") as stream:
         rows = list(csv.DictReader(stream))
     assert len(rows) == 3
-    assert [float(row["q[3]"]) for row in rows] == record["q"][:, 2].tolist()
+    assert [float(row["q[3] [rad]"]) for row in rows] == record["q"][:, 2].tolist()
     assert [row["command_pose[1,1]"] for row in rows] == ["nan", "1.0", "nan"]
-    assert [row["command_psi"] for row in rows] == ["nan", "0.25", "nan"]
-    assert float(rows[2]["command_tau[7]"]) == 1.0
+    assert [row["command_psi [rad]"] for row in rows] == ["nan", "0.25", "nan"]
+    assert float(rows[2]["command_tau[7] [N m]"]) == 1.0
 
 
 def test_an_unknown_ending_a_missing_folder_and_no_record_are_told(record, tmp_path):

@@ -5,11 +5,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from rcilab.client.run import Run as Run
     from rcilab.client.session import RobotSession as RobotSession
     from rcilab.client.session import connect as connect
+    from rcilab.recording.run import Run as Run
 
-_HOME = {"connect": "session", "RobotSession": "session", "Run": "run"}
+_HOME = {
+    "connect": "rcilab.client.session",
+    "RobotSession": "rcilab.client.session",
+    "Run": "rcilab.recording.run",
+}
 
 __all__ = ["RobotSession", "Run", "connect"]
 
@@ -20,4 +24,4 @@ def __getattr__(name: str) -> object:
 
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+    return getattr(import_module(_HOME[name]), name)

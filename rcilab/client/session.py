@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
@@ -22,7 +23,8 @@ from rcilab.client.opening import await_first_state, require_arm_there, require_
 from rcilab.client.punctual import punctual
 from rcilab.client.recorder import RECORD_TIME, CycleLog, Recorder
 from rcilab.client.recovery import recover
-from rcilab.client.run import Run, build_run
+from rcilab.recording.run import Run, build_run
+from rcilab.recording.setup import Setup
 from rcilab.client.transport import SocketTransport
 from rcilab.client.world import World
 from rcilab.clock import CYCLE_TIME
@@ -287,6 +289,7 @@ class RobotSession(Motions, Closing):
         )
         self._mover = threading.get_ident()
         self._moving = True
+        started_ns = time.time_ns()
         try:
             with punctual(self._realtime):
                 reason = loop.run(callback)
@@ -295,7 +298,13 @@ class RobotSession(Motions, Closing):
             if self._closing:
                 self._disconnect()
         return build_run(
-            recorder.rows(), plan=plan, stopped=reason, truncated=recorder.truncated, realtime=self._realtime
+            recorder.rows(),
+            plan=plan,
+            stopped=reason,
+            truncated=recorder.truncated,
+            realtime=self._realtime,
+            model=self.model,
+            setup=Setup(target=self._link.name, mode=mode, started_ns=started_ns),
         )
 
     def _request(self, request: Request, timeout: float | None = None) -> Any:

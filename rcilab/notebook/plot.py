@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from rcilab.client.run import Run
+    from rcilab.recording.run import Run
     from rcilab.conformance.report import Violation
 
 # Okabe and Ito's palette, told apart with every kind of colour vision, without its yellow (too pale on white).
@@ -208,7 +208,7 @@ def _plan_times(run: Run) -> Array:
 
 
 def _require_run(run: object) -> None:
-    from rcilab.client.run import Run
+    from rcilab.recording.run import Run
 
     if not isinstance(run, Run):
         raise InvalidValueError("run", run, "is no run; execute returns one")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rcilab.client.run import find_delay
+from rcilab.recording.run import find_delay
 from rcilab.errors import CertificateError, ConnectionLostError, ControlError, RcilabError
 from rcilab.model import load_model
 from rcilab.workbench import requests

@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from os import PathLike
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rcilab.arrays import Array, JointPath
 from rcilab.clock import CYCLE_TIME
-from rcilab.cycle_file import save_cycles
 from rcilab.faults import FAULT_COUNT, Fault
+from rcilab.recording.setup import Setup
+from rcilab.recording.tracking import Tracking, compute_tracking
 
 if TYPE_CHECKING:
+    from rcilab.conformance import Report
+    from rcilab.model import RobotModel
     from rcilab.motion import Motion
 
 _LONGEST_DELAY = 64  # [cycles] between a command and the state that shows it; more is no play-out buffer any more.
@@ -61,6 +65,12 @@ class Run:
     """Whether the beginning is missing because the run was longer than the recorder."""
     realtime: bool = True
     """False in lock-step, where a millisecond lasts as long as it takes and timing means nothing."""
+    model: RobotModel | None = None
+    """The arm, with its tool and load; None when it is not known."""
+    setup: Setup = Setup()
+    """Where and how it was made."""
+    is_complete: bool = True
+    """False when it was read from a file whose end is missing: all that came before is here."""
 
     @property
     def t(self) -> Array:
@@ -141,6 +151,28 @@ class Run:
             return self._lag()
         return self.q - self._planned(self.delay)
 
+    @property
+    def planned(self) -> JointPath:
+        """Planned joint angles that each measurement answers to, the play-out delay taken out, shape (N, n), [rad].
+
+        Without a plan NaN.
+        """
+        return np.full_like(self.q, np.nan) if self.plan is None else self._planned(self.delay)
+
+    @property
+    def tracking(self) -> Tracking:
+        """Error per joint and at the tool, over time, as RMS and as maximum; against the commands without a plan."""
+        return compute_tracking(self.model, self.q, self.q - self.error)
+
+    @property
+    def report(self) -> Report | None:
+        """The verdict on the plan; None without a plan or an arm. Judged anew each time, by the table of today."""
+        if self.plan is None or self.model is None:
+            return None
+        from rcilab.conformance import check
+
+        return check(self.plan, self.model)
+
     def _planned(self, delay: int) -> JointPath:
         """The plan at every row, `delay` cycles late, shape (N, n), [rad]."""
         assert self.plan is not None
@@ -191,13 +223,46 @@ class Run:
             late=int((lateness > CYCLE_TIME).sum()),
         )
 
-    def save(self, file: str | PathLike[str]) -> None:
-        """Writes every recorded cycle to a file; its ending chooses the format: .csv or .npz.
+    def save(
+        self,
+        file: str | PathLike[str],
+        *,
+        progress: Callable[[float], None] | None = None,
+        language: str = "en",
+    ) -> None:
+        """Writes the run to a file; its ending chooses the format.
+
+        ==========  ============================================================================================
+        .rcirun     everything, to be loaded with `rcilab.load_run` or shown with `rcilab replay FILE`
+        .csv        a row a cycle, units in the header; with the plan and the error beside the measurements
+        .npz        one numpy array a field of the recording
+        .parquet    the columns of the CSV, for pandas, polars, DuckDB (needs the extra `export`)
+        .mcap       messages with JSON schemas, for Foxglove and PlotJuggler (needs the extra `export`)
+        .html       one page with 3D, timeline and plots that needs no network and no rcilab
+        ==========  ============================================================================================
+
+        Args:
+            file: Its name; an existing file is replaced.
+            progress: Told the share that is done, 0 to 1.
+            language: Of the HTML page, "en" or "zh".
 
         Raises:
             InvalidValueError: The ending is unknown, or the file cannot be written.
+            UsageError: The format needs a library that is not installed, or an arm and there is none.
         """
-        save_cycles(self.cycles, file)
+        from rcilab.recording.export import save_run
+
+        save_run(self, file, progress=progress, language=language)
+
+    def to_pandas(self) -> Any:
+        """Returns the columns of the CSV as a `pandas.DataFrame`, indexed by t; units stand in `.attrs["units"]`.
+
+        Raises:
+            UsageError: pandas is not installed.
+        """
+        from rcilab.recording.frame import to_pandas
+
+        return to_pandas(self)
 
     def __repr__(self) -> str:
         facts = [f"{self.duration:.3f} s", f"{len(self.cycles)} cycles"]
@@ -206,6 +271,8 @@ class Run:
             facts.append(f"success rate {float(self.success_rate[-1]):.3f}")
         if self.stopped:
             facts.append(f"stopped: {self.stopped}")
+        if not self.is_complete:
+            facts.append("cut off: the end of its file is missing")
         if self.faults:
             facts.append("faults: " + ", ".join(fault.name for fault in self.faults))
         return f"<Run {', '.join(facts)}>"
@@ -257,11 +324,21 @@ def build_run(
     stopped: str | None = None,
     truncated: bool = False,
     realtime: bool = True,
+    model: RobotModel | None = None,
+    setup: Setup | None = None,
 ) -> Run:
     """Returns the run in a recording: the rows from the first command on."""
     rows = cycles[np.isfinite(cycles["t"])]
     rows.flags.writeable = False
-    return Run(plan=plan, cycles=rows, stopped=stopped, truncated=truncated, realtime=realtime)
+    return Run(
+        plan=plan,
+        cycles=rows,
+        stopped=stopped,
+        truncated=truncated,
+        realtime=realtime,
+        model=model,
+        setup=setup or Setup(),
+    )
 
 
 def _degrees(error: JointPath) -> float:

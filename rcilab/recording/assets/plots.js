@@ -1,0 +1,142 @@
+// Plots that share one time axis. Every pixel column shows the smallest and the largest value in it: no spike is lost.
+"use strict";
+
+const COLORS = ["#0b6fc2", "#e07b00", "#1a9850", "#c2357a", "#7b52c7", "#8a6d3b", "#008b9a"];
+const LEFT = 58, RIGHT = 14, TITLE = 20, AXIS = 22;
+
+class Plots {
+  constructor(box, rows, t, faults, onSeek) {
+    Object.assign(this, { box, rows, t, faults, onSeek, joint: 0, place: 0 });
+    this.end = t.length ? Math.max(t[t.length - 1], 1e-3) : 1;
+    this.range = [0, this.end];
+    this.canvas = document.createElement("canvas"); this.over = document.createElement("canvas");
+    box.append(this.canvas, this.over);
+    const seek = (event) => onSeek(this.range[0] + (event.offsetX - LEFT) / (this.over.clientWidth - LEFT - RIGHT) * (this.range[1] - this.range[0]));
+    let held = false;
+    this.over.addEventListener("pointerdown", (event) => { held = true; this.over.setPointerCapture(event.pointerId); seek(event); });
+    this.over.addEventListener("pointermove", (event) => { if (held) seek(event); });
+    this.over.addEventListener("pointerup", () => { held = false; });
+    this.over.addEventListener("dblclick", () => this.zoom(0, this.end));
+    this.over.addEventListener("wheel", (event) => {
+      event.preventDefault();
+      const [a, b] = this.range, share = Math.min(1, Math.max(0, (event.offsetX - LEFT) / (this.over.clientWidth - LEFT - RIGHT)));
+      const pivot = a + share * (b - a), scale = Math.exp(event.deltaY * 0.0015);
+      this.zoom(pivot - (pivot - a) * scale, pivot + (b - pivot) * scale);
+    }, { passive: false });
+    new ResizeObserver(() => this.draw()).observe(box);
+  }
+
+  zoom(a, b) {
+    const width = Math.min(this.end, Math.max(b - a, 0.02)), start = Math.min(Math.max(a, 0), this.end - width);
+    this.range = [start, start + width];
+    this.draw();
+  }
+
+  choose(joint) { this.joint = joint; this.draw(); }
+
+  first(time) {  // The first sample at or after a time.
+    let low = 0, high = this.t.length;
+    while (low < high) { const middle = (low + high) >> 1; if (this.t[middle] < time) low = middle + 1; else high = middle; }
+    return low;
+  }
+
+  curves(row) { return this.joint && row.actual.length > 1 ? [this.joint - 1] : row.actual.map((_, i) => i); }
+
+  draw() {
+    const { canvas, over } = this, ratio = window.devicePixelRatio || 1, width = this.box.clientWidth, height = this.box.clientHeight;
+    if (!width || !height) return;
+    for (const c of [canvas, over]) { c.width = Math.round(width * ratio); c.height = Math.round(height * ratio); }
+    const g = canvas.getContext("2d");
+    g.scale(ratio, ratio);
+    g.font = "11px system-ui, sans-serif"; g.textBaseline = "middle";
+    this.columns = Math.max(1, Math.floor(width - LEFT - RIGHT));
+    const edges = new Int32Array(this.columns + 1);
+    for (let c = 0; c <= this.columns; c++) edges[c] = this.first(this.range[0] + (this.range[1] - this.range[0]) * c / this.columns);
+    edges[this.columns] = Math.min(this.t.length, this.first(this.range[1]) + 1);
+    const each = (height - AXIS) / this.rows.length;
+    this.rows.forEach((row, i) => this.drawRow(g, row, i * each + TITLE, each - TITLE - 5, edges));
+    this.drawTimes(g, height - AXIS);
+    this.show(this.place);
+  }
+
+  drawRow(g, row, top, height, edges) {
+    const chosen = this.curves(row), limit = this.joint && row.limits ? [row.limits[0][this.joint - 1], row.limits[1][this.joint - 1]] : null;
+    const [a, b] = [edges[0], edges[this.columns]];
+    let low = Infinity, high = -Infinity;
+    for (const set of [row.actual, row.plan || []]) for (const j of chosen) if (set[j]) for (let i = a; i < b; i++) {
+      const v = set[j][i];
+      if (v < low) low = v; if (v > high) high = v;
+    }
+    if (!(low <= high)) { low = -1; high = 1; }
+    if (limit && high - low > 0.25 * (limit[1] - limit[0])) { low = Math.min(low, limit[0]); high = Math.max(high, limit[1]); }
+    const least = row.least || 1e-9, spare = Math.max(0.08 * (high - low), least); low -= spare; high += spare;
+    if (row.positive) low = 0;
+    const y = (v) => top + height * (high - v) / (high - low);
+    g.save();
+    g.beginPath(); g.rect(LEFT, top, this.columns, height); g.clip();
+    g.fillStyle = "#fbfcfe"; g.fillRect(LEFT, top, this.columns, height);
+    const step = nice((high - low) / Math.max(2, height / 30));
+    g.lineWidth = 1; g.strokeStyle = "#e6ebf2";
+    for (let v = Math.ceil(low / step) * step; v <= high; v += step) line(g, LEFT, y(v), LEFT + this.columns, y(v));
+    if (limit) {
+      g.fillStyle = "rgba(209,57,43,.08)"; g.fillRect(LEFT, top, this.columns, y(limit[1]) - top); g.fillRect(LEFT, y(limit[0]), this.columns, top + height - y(limit[0]));
+      g.strokeStyle = "#d1392b"; g.setLineDash([5, 4]); limit.forEach((v) => line(g, LEFT, y(v), LEFT + this.columns, y(v))); g.setLineDash([]);
+    }
+    g.fillStyle = "rgba(214,48,38,.30)";
+    for (let c = 0; c < this.columns; c++) for (let i = edges[c]; i < edges[c + 1]; i++) if (this.faults[i]) { g.fillRect(LEFT + c - 1, top, 3, height); break; }
+    for (const j of chosen) {
+      if (row.plan) { g.setLineDash([4, 3]); g.globalAlpha = 0.55; this.curve(g, row.plan[j], edges, y, row.actual.length > 1 ? "#111827" : "#51607a", 1); g.setLineDash([]); g.globalAlpha = 1; }
+      this.curve(g, row.actual[j], edges, y, row.actual.length > 1 ? COLORS[j % COLORS.length] : "#0f1c2e", 1.6);
+    }
+    g.restore();
+    g.strokeStyle = "#d4dce6"; g.strokeRect(LEFT + 0.5, Math.round(top) + 0.5, this.columns, Math.round(height));
+    g.fillStyle = "#6b7a90"; g.textAlign = "right";
+    for (let v = Math.ceil(low / step) * step; v <= high; v += step) g.fillText(label(v, step), LEFT - 6, y(v));
+    g.fillStyle = "#33425a"; g.textAlign = "left"; g.font = "600 11.5px system-ui, sans-serif";
+    g.fillText(`${row.title} [${row.unit}]`, LEFT, top - 9);
+    g.font = "11px system-ui, sans-serif";
+  }
+
+  curve(g, values, edges, y, color, width) {
+    g.beginPath(); g.strokeStyle = color; g.lineWidth = width; g.lineJoin = "round";
+    let open = false;
+    for (let c = 0; c < this.columns; c++) {
+      let low = Infinity, high = -Infinity, from = -1, to = -1;
+      for (let i = edges[c]; i < edges[c + 1]; i++) {
+        const v = values[i];
+        if (v < low) { low = v; from = i; }
+        if (v > high) { high = v; to = i; }
+      }
+      if (from < 0) continue;
+      const pair = from <= to ? [low, high] : [high, low], x = LEFT + c + 0.5;
+      for (const v of pair) { if (open) g.lineTo(x, y(v)); else { g.moveTo(x, y(v)); open = true; } }
+    }
+    g.stroke();
+  }
+
+  drawTimes(g, top) {
+    const [a, b] = this.range, step = nice((b - a) / 8);
+    g.fillStyle = "#6b7a90"; g.textAlign = "center";
+    for (let v = Math.ceil(a / step) * step; v <= b + 1e-9; v += step) g.fillText(`${label(v, step)} s`, LEFT + (v - a) / (b - a) * this.columns, top + 11);
+  }
+
+  show(time) {  // The cursor and the values under it, over curves that stay as they are.
+    this.place = time;
+    const g = this.over.getContext("2d"), ratio = window.devicePixelRatio || 1, width = this.box.clientWidth, height = this.box.clientHeight;
+    g.setTransform(ratio, 0, 0, ratio, 0, 0); g.clearRect(0, 0, width, height);
+    const [a, b] = this.range, x = LEFT + (time - a) / (b - a) * this.columns;
+    if (x < LEFT - 1 || x > LEFT + this.columns + 1) return;
+    g.strokeStyle = "#0f1c2e"; g.lineWidth = 1.5; line(g, x, TITLE - 4, x, height - AXIS);
+    const i = Math.min(this.first(time), this.t.length - 1), each = (height - AXIS) / this.rows.length;
+    g.font = "600 11px system-ui, sans-serif"; g.textAlign = "right"; g.textBaseline = "middle";
+    this.rows.forEach((row, k) => {
+      const chosen = this.curves(row);
+      if (chosen.length !== 1 || i < 0) return;
+      g.fillStyle = "#0f1c2e"; g.fillText(`${row.actual[chosen[0]][i].toFixed(row.digits)} ${row.unit}`, LEFT + this.columns, k * each + TITLE - 9);
+    });
+  }
+}
+
+function line(g, x0, y0, x1, y1) { g.beginPath(); g.moveTo(x0, y0); g.lineTo(x1, y1); g.stroke(); }
+function nice(step) { const p = 10 ** Math.floor(Math.log10(step)), m = step / p; return p * (m <= 1 ? 1 : m <= 2 ? 2 : m <= 5 ? 5 : 10); }
+function label(v, step) { return (Math.abs(v) < step * 1e-6 ? 0 : v).toFixed(Math.max(0, Math.min(6, -Math.floor(Math.log10(step))))); }

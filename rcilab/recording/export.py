@@ -1,0 +1,102 @@
+"""The forms in which people take a run away, by the ending of a file's name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from io import BytesIO, TextIOWrapper
+from os import PathLike, fspath
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, TypeAlias
+
+from rcilab.cycle_file import write_csv, write_npz
+from rcilab.errors import InvalidValueError
+from rcilab.language import require_language
+
+if TYPE_CHECKING:
+    from rcilab.recording.run import Run
+
+Progress: TypeAlias = Callable[[float], None]
+"""Told the share that is done, 0 to 1."""
+
+_Writer: TypeAlias = "Callable[[Run, IO[bytes], Progress, str], None]"
+
+
+def save_run(
+    run: Run, file: str | PathLike[str], *, progress: Progress | None = None, language: str = "en"
+) -> None:
+    """Writes a run to a file; see `Run.save`."""
+    path = Path(fspath(file))
+    require_ending(path.suffix)
+    content = export_run(run, path.suffix, progress=progress, language=language)
+    try:
+        path.write_bytes(content)
+    except OSError as error:
+        raise InvalidValueError("file", fspath(file), f"cannot be written: {error.strerror}") from error
+
+
+def export_run(run: Run, ending: str, *, progress: Progress | None = None, language: str = "en") -> bytes:
+    """Returns a run in one of the forms of `ENDINGS`; see `Run.save`."""
+    write = WRITERS[require_ending(ending)]
+    stream = BytesIO()
+    report = progress or (lambda share: None)
+    write(run, stream, report, require_language(language))
+    report(1.0)
+    return stream.getvalue()
+
+
+def require_ending(ending: str) -> str:
+    """Returns an ending that chooses a format.
+
+    Raises:
+        InvalidValueError: It chooses none; the message lists those that do.
+    """
+    if ending not in WRITERS:
+        raise InvalidValueError("file ending", ending, f"chooses no format; there are {', '.join(WRITERS)}")
+    return ending
+
+
+def _rcirun(run: Run, stream: IO[bytes], progress: Progress, language: str) -> None:
+    from rcilab.recording.run_file import write_run
+
+    write_run(run, stream)
+
+
+def _csv(run: Run, stream: IO[bytes], progress: Progress, language: str) -> None:
+    from rcilab.recording.columns import run_columns
+
+    text = TextIOWrapper(stream, encoding="utf-8", newline="")
+    write_csv(run_columns(run), text, progress)
+    text.flush()
+    text.detach()
+
+
+def _npz(run: Run, stream: IO[bytes], progress: Progress, language: str) -> None:
+    write_npz(run.cycles, stream)
+
+
+def _parquet(run: Run, stream: IO[bytes], progress: Progress, language: str) -> None:
+    from rcilab.recording.frame import write_parquet
+
+    write_parquet(run, stream, progress)
+
+
+def _mcap(run: Run, stream: IO[bytes], progress: Progress, language: str) -> None:
+    from rcilab.recording.mcap_file import write_mcap
+
+    write_mcap(run, stream, progress)
+
+
+def _html(run: Run, stream: IO[bytes], progress: Progress, language: str) -> None:
+    from rcilab.recording.html_file import write_html
+
+    write_html(run, stream, language)
+
+
+WRITERS: dict[str, _Writer] = {
+    ".rcirun": _rcirun,
+    ".csv": _csv,
+    ".npz": _npz,
+    ".parquet": _parquet,
+    ".mcap": _mcap,
+    ".html": _html,
+}

@@ -1,0 +1,152 @@
+"""A run as MCAP: messages with JSON schemas, for Foxglove and PlotJuggler.
+
+Topics, one message a cycle: /measured, /commanded, /plan, /error, /health, and /tool as a foxglove.PoseInFrame, which
+Foxglove draws in 3D. Times are those of the controller's cycles, counted from when the run began. The facts of the run
+stand in the metadata record "rcilab".
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import IO, TYPE_CHECKING, Any
+
+import numpy as np
+
+from rcilab.recording.columns import run_facts
+from rcilab.recording.extra import require_library
+from rcilab.spatial import Pose
+
+if TYPE_CHECKING:
+    from rcilab.arrays import Array
+    from rcilab.recording.run import Run
+
+_TOLD = 2000  # Messages between two reports of progress.
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Signal:
+    """One entry of a message."""
+
+    name: str
+    text: str
+    """Meaning and unit, for the schema."""
+    values: Array
+    """Shape (N,) or (N, n)."""
+
+
+def write_mcap(run: Run, stream: IO[bytes], progress: Callable[[float], None]) -> None:
+    """Writes a run as MCAP.
+
+    Raises:
+        UsageError: mcap is not installed.
+    """
+    writer = require_library("mcap.writer", "MCAP").Writer(stream)
+    writer.start(profile="", library="rcilab")
+    facts = {key: value if isinstance(value, str) else json.dumps(value) for key, value in run_facts(run).items()}
+    writer.add_metadata("rcilab", facts)
+    stamps = run.setup.started_ns + np.rint(run.t * 1e9).astype(np.int64)
+    topics = {topic: signals for topic, signals in _topics(run).items() if signals}
+    channels = {topic: _register(writer, topic, f"rcilab.{topic}", _schema(signals)) for topic, signals in topics.items()}
+    tables = {
+        topic: [(signal.name, signal.values.tolist()) for signal in signals] for topic, signals in topics.items()
+    }
+    tool = None if run.model is None else run.model.forward_path(run.q)
+    tool_channel = None if tool is None else _register(writer, "tool", "foxglove.PoseInFrame", _POSE_SCHEMA)
+    for row, stamp in enumerate(stamps.tolist()):
+        for topic, table in tables.items():
+            message = {name: _clean(values[row]) for name, values in table}
+            _write(writer, channels[topic], stamp, message)
+        if tool is not None and tool_channel is not None:
+            _write(writer, tool_channel, stamp, _pose_message(tool[row], stamp))
+        if row % _TOLD == 0:
+            progress(row / len(stamps))
+    writer.finish()
+
+
+def _topics(run: Run) -> dict[str, list[_Signal]]:
+    cycles, tracking = run.cycles, run.tracking
+    planned = run.planned
+    return {
+        "measured": [
+            _Signal("q", "measured joint angles, [rad]", run.q),
+            _Signal("dq", "measured joint velocities, [rad/s]", run.dq),
+            _Signal("tau", "measured joint torques, [N m]", run.tau),
+        ],
+        "commanded": [
+            _Signal("q_c", "commanded joint angles as the controller reports them, [rad]", run.q_c),
+            _Signal("command", "joint angles sent in answer, [rad]", run.command),
+        ],
+        "plan": [_Signal("q", "planned joint angles at this instant, [rad]", planned)] if run.plan is not None else [],
+        "error": [
+            _Signal("joint", "measured minus planned joint angles, [rad]", tracking.joint),
+            _Signal("tool", "distance of the tool from its plan, [m]", tracking.position),
+            _Signal("tool_turn", "angle of the tool from its plan, [rad]", tracking.rotation),
+        ],
+        "health": [
+            _Signal("success_rate", "share of commands that arrived in time, 0 to 1", run.success_rate),
+            _Signal("lateness", "how late the cycle was handled, [s]", cycles["lateness"]),
+            _Signal("lost", "controller cycles that never arrived before this one", cycles["lost"]),
+            _Signal("faults", "error bits as one number, bit k is fault k of the manual", cycles["faults"]),
+        ],
+    }
+
+
+def _schema(signals: list[_Signal]) -> dict[str, Any]:
+    kinds: dict[bool, dict[str, Any]] = {
+        False: {"type": "number"},
+        True: {"type": "array", "items": {"type": "number"}},
+    }
+    properties = {s.name: {**kinds[s.values.ndim > 1], "description": s.text} for s in signals}
+    return {"type": "object", "properties": properties}
+
+
+def _register(writer: Any, topic: str, name: str, schema: dict[str, Any]) -> int:
+    number = writer.register_schema(name=name, encoding="jsonschema", data=json.dumps(schema).encode())
+    return writer.register_channel(topic=f"/{topic}", message_encoding="json", schema_id=number)
+
+
+def _write(writer: Any, channel: int, stamp: int, message: dict[str, Any]) -> None:
+    data = json.dumps(message, separators=(",", ":")).encode()
+    writer.add_message(channel_id=channel, log_time=stamp, publish_time=stamp, data=data)
+
+
+def _clean(value: Any) -> Any:
+    """Returns a number, or a list of them, as JSON can say it: nothing instead of NaN."""
+    if isinstance(value, list):
+        return [_clean(entry) for entry in value]
+    return None if value != value else value
+
+
+def _pose_message(T: Array, stamp: int) -> dict[str, Any]:
+    pose = Pose.from_matrix(T)
+    x, y, z = pose.position.tolist()
+    w, i, j, k = pose.wxyz.tolist()
+    return {
+        "timestamp": {"sec": stamp // 1_000_000_000, "nsec": stamp % 1_000_000_000},
+        "frame_id": "base",
+        "pose": {"position": {"x": x, "y": y, "z": z}, "orientation": {"x": i, "y": j, "z": k, "w": w}},
+    }
+
+
+def _numbers(*names: str) -> dict[str, Any]:
+    return {"type": "object", "properties": {name: {"type": "number"} for name in names}}
+
+
+_POSE_SCHEMA: dict[str, Any] = {
+    "type": "object",
+    "title": "foxglove.PoseInFrame",
+    "properties": {
+        "timestamp": {
+            "type": "object",
+            "title": "time",
+            "properties": {"sec": {"type": "integer", "minimum": 0}, "nsec": {"type": "integer", "minimum": 0}},
+        },
+        "frame_id": {"type": "string"},
+        "pose": {
+            "type": "object",
+            "properties": {"position": _numbers("x", "y", "z"), "orientation": _numbers("x", "y", "z", "w")},
+        },
+    },
+}

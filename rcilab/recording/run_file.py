@@ -1,0 +1,270 @@
+"""A run in a file, `.rcirun`: written while the arm moves, and readable however the writer ended.
+
+The file is a row of blocks (`blocks.py`), in this order:
+
+    HEAD    JSON: {"arm": {"name", "tool": 16 numbers row-major, "load": [mass, centre, inertia]} or null,
+            "fields": [[name, type as numpy spells it, shape], ...] of one cycle, "bytes": its size,
+            "realtime": whether timing means something, "setup": where and how (`Setup`),
+            "report": the verdict on the plan, one object a condition, or null}
+    PLAN    the planned motion as `Motion.save` writes it; missing for a callback
+    CYCL    u32 number of cycles, then zlib of their bytes, transposed: the first byte of every cycle, then the second
+            byte of every cycle, and so on (neighbours are then alike and take a quarter of the room). Any number of
+            these
+    TAIL    JSON: {"stopped": why the motion ended early or null, "truncated": whether the beginning is missing}.
+            A file without it was cut off: by a crash, by a full disk, or because it is still being written
+
+All units are SI. Blocks of other kinds are left out by a reader.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import struct
+import zlib
+from io import BytesIO
+from os import PathLike, fspath
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rcilab.errors import InvalidValueError, ModelError
+from rcilab.model import load_model
+from rcilab.motion.motion import Motion
+from rcilab.recording.blocks import Block, decode_blocks, encode_block, encode_header
+from rcilab.recording.run import Run
+from rcilab.recording.setup import Setup
+from rcilab.spatial import Pose
+
+if TYPE_CHECKING:
+    from rcilab.conformance import Report
+    from rcilab.model import RobotModel
+
+ENDING = ".rcirun"
+BLOCK_CYCLES = 256  # A choice: what a crash may cost at most, about a quarter of a second.
+
+_ROWS = struct.Struct("<I")
+
+
+class RunWriter:
+    """Writes a run while it happens; what has been written stays readable whatever happens next. Owned by one thread.
+
+    Args:
+        stream: Where to, binary; closed by `close` when `owns_stream`.
+        dtype: Layout of one cycle.
+        plan: What is meant to happen; None for a callback.
+        model: The arm.
+        setup: Where and how.
+        report: The verdict on the plan.
+        realtime: False in lock-step.
+    """
+
+    def __init__(
+        self,
+        stream: IO[bytes],
+        dtype: np.dtype[np.void],
+        *,
+        plan: Motion | None,
+        model: RobotModel | None,
+        setup: Setup | None = None,
+        report: Report | None = None,
+        realtime: bool = True,
+    ) -> None:
+        self._stream = stream
+        self._dtype = dtype
+        self._waiting: NDArray[np.void] = np.zeros(0, dtype)
+        head = {
+            "arm": None if model is None else _arm_facts(model),
+            "fields": [[name, field[0].base.str, list(field[0].shape)] for name, field in _fields(dtype)],
+            "bytes": dtype.itemsize,
+            "realtime": realtime,
+            "setup": (setup or Setup()).as_dict(),
+            "report": None if report is None else report_facts(report),
+        }
+        stream.write(encode_header() + encode_block("HEAD", json.dumps(head).encode()))
+        if plan is not None:
+            buffer = BytesIO()
+            plan.save(buffer)
+            stream.write(encode_block("PLAN", buffer.getvalue()))
+        stream.flush()
+
+    def add(self, cycles: NDArray[np.void]) -> None:
+        """Adds cycles; every `BLOCK_CYCLES` of them are written at once."""
+        self._waiting = np.concatenate([self._waiting, cycles]) if len(self._waiting) else cycles
+        while len(self._waiting) >= BLOCK_CYCLES:
+            self._write(self._waiting[:BLOCK_CYCLES])
+            self._waiting = self._waiting[BLOCK_CYCLES:]
+        self._stream.flush()
+
+    def finish(self, *, stopped: str | None = None, truncated: bool = False) -> None:
+        """Writes what is left, and that the run ended properly."""
+        if len(self._waiting):
+            self._write(self._waiting)
+            self._waiting = self._waiting[:0]
+        self._stream.write(encode_block("TAIL", json.dumps({"stopped": stopped, "truncated": truncated}).encode()))
+        self._stream.flush()
+
+    def _write(self, cycles: NDArray[np.void]) -> None:
+        planes = np.frombuffer(cycles.tobytes(), np.uint8).reshape(len(cycles), self._dtype.itemsize).T
+        self._stream.write(encode_block("CYCL", _ROWS.pack(len(cycles)) + zlib.compress(planes.tobytes(), 1)))
+
+
+class RunFile:
+    """A `.rcirun` on disk that grows while the arm moves. Owned by one thread.
+
+    Args:
+        path: Where to; an existing file is replaced.
+        dtype: Layout of one cycle.
+        facts: `plan`, `model`, `setup`, `report`, `realtime` as for `RunWriter`.
+
+    Raises:
+        InvalidValueError: The file cannot be written. The methods raise it, too, and leave what was written.
+    """
+
+    def __init__(self, path: Path, dtype: np.dtype[np.void], **facts: Any) -> None:
+        self.path = path
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._stream = path.open("wb")
+            self._writer = RunWriter(self._stream, dtype, **facts)
+        except OSError as error:
+            raise _unwritable(path, error) from error
+
+    def add(self, cycles: NDArray[np.void]) -> None:
+        """Adds cycles."""
+        try:
+            self._writer.add(cycles)
+        except OSError as error:
+            raise _unwritable(self.path, error) from error
+
+    def close(self, *, stopped: str | None = None, truncated: bool = False) -> None:
+        """Writes the end and closes the file."""
+        try:
+            with self._stream:
+                self._writer.finish(stopped=stopped, truncated=truncated)
+                os.fsync(self._stream.fileno())
+        except OSError as error:
+            raise _unwritable(self.path, error) from error
+
+
+def write_run(run: Run, stream: IO[bytes]) -> None:
+    """Writes a whole run."""
+    writer = RunWriter(
+        stream,
+        run.cycles.dtype,
+        plan=run.plan,
+        model=run.model,
+        setup=run.setup,
+        report=run.report,
+        realtime=run.realtime,
+    )
+    writer.add(run.cycles)
+    writer.finish(stopped=run.stopped, truncated=run.truncated)
+
+
+def load_run(file: str | PathLike[str]) -> Run:
+    """Returns the run in a `.rcirun` file; of one that was cut off, all up to its last whole block.
+
+    Args:
+        file: The file's name.
+
+    Returns:
+        The run. `is_complete` is False when the file was cut off.
+
+    Raises:
+        InvalidValueError: There is no such file, it holds no run, or not even its beginning is whole.
+        VersionMismatchError: It was written by another version of this format.
+    """
+    name = fspath(file)
+    try:
+        content = Path(name).read_bytes()
+    except FileNotFoundError as error:
+        raise InvalidValueError("run file", name, "does not exist") from error
+    except OSError as error:
+        raise InvalidValueError("run file", name, f"cannot be read: {error.strerror}") from error
+    return decode_run(content, name)
+
+
+def decode_run(content: bytes, name: str = "stream") -> Run:
+    """Returns the run in the bytes of a `.rcirun` file; see `load_run`."""
+    blocks = decode_blocks(content, name)
+    if not blocks or blocks[0].kind != "HEAD":
+        raise InvalidValueError("run file", name, "ends before its first block; nothing was recorded in it")
+    try:
+        return _build(blocks)
+    except (KeyError, TypeError, ValueError, ModelError, zlib.error, struct.error) as error:
+        raise InvalidValueError("run file", name, f"is damaged: {error}") from error
+
+
+def report_facts(report: Report) -> list[dict[str, Any]]:
+    """Returns a verdict as plain facts, one object a condition."""
+    return [
+        {
+            "condition": row.id,
+            "verdict": row.verdict,
+            "value": row.value,
+            "bound": row.bound,
+            "unit": row.unit,
+            "place": row.place,
+            "time": row.time,
+            "source": row.source,
+        }
+        for row in report.rows
+    ]
+
+
+def _build(blocks: tuple[Block, ...]) -> Run:
+    head = json.loads(blocks[0].payload)
+    dtype = np.dtype([(name, kind, tuple(shape)) for name, kind, shape in head["fields"]])
+    if dtype.itemsize != head["bytes"]:
+        raise ValueError(f"a cycle takes {head['bytes']} bytes, its fields {dtype.itemsize}")
+    parts = [_decode_cycles(block.payload, dtype) for block in blocks if block.kind == "CYCL"]
+    cycles = np.concatenate(parts) if parts else np.zeros(0, dtype)
+    cycles.flags.writeable = False
+    plans = [block.payload for block in blocks if block.kind == "PLAN"]
+    tails = [json.loads(block.payload) for block in blocks if block.kind == "TAIL"]
+    tail = tails[-1] if tails else {}
+    return Run(
+        plan=Motion.load(BytesIO(plans[0])) if plans else None,
+        cycles=cycles,
+        stopped=tail.get("stopped"),
+        truncated=tail.get("truncated", False),
+        realtime=head["realtime"],
+        model=None if head["arm"] is None else _build_arm(head["arm"]),
+        setup=Setup.from_dict(head["setup"]),
+        is_complete=bool(tails),
+    )
+
+
+def _decode_cycles(payload: bytes, dtype: np.dtype[np.void]) -> NDArray[np.void]:
+    (rows,) = _ROWS.unpack_from(payload)
+    planes = np.frombuffer(zlib.decompress(payload[_ROWS.size :]), np.uint8).reshape(dtype.itemsize, rows)
+    return np.frombuffer(planes.T.tobytes(), dtype)
+
+
+def _arm_facts(model: RobotModel) -> dict[str, Any]:
+    load = model.load
+    return {
+        "name": model.name,
+        "tool": model.T_flange_tool.as_row_major(),
+        "load": [load.mass, load.center_of_mass.tolist(), load.inertia.tolist()],
+    }
+
+
+def _build_arm(facts: dict[str, Any]) -> RobotModel:
+    from rcilab.dynamics.payload import Payload
+
+    mass, center, inertia = facts["load"]
+    load = Payload(mass=mass, center_of_mass=np.array(center), inertia=np.array(inertia))
+    return load_model(facts["name"], tool=Pose.from_row_major(facts["tool"]), load=load)
+
+
+def _fields(dtype: np.dtype[np.void]) -> list[tuple[str, Any]]:
+    assert dtype.names is not None and dtype.fields is not None
+    return [(name, dtype.fields[name]) for name in dtype.names]
+
+
+def _unwritable(path: Path, error: OSError) -> InvalidValueError:
+    return InvalidValueError("run file", str(path), f"cannot be written: {error.strerror}")
