@@ -65,7 +65,9 @@ def cycle_columns(cycles: NDArray[np.void]) -> list[Column]:
     for name in _fields(cycles):
         found = split_columns(name, UNITS.get(name, ""), cycles[name])
         if name == "command_pose":  # The last column of the matrix is the position.
-            found = [Column(c.name, "m" if c.name.endswith(",4]") and "[4," not in c.name else "", c.values) for c in found]
+            found = [
+                Column(c.name, "m" if c.name.endswith(",4]") and "[4," not in c.name else "", c.values) for c in found
+            ]
         columns += found
     return columns
 

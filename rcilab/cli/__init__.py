@@ -9,7 +9,7 @@ from importlib import import_module
 
 from rcilab.errors import RcilabError
 
-COMMANDS = ("workbench", "controller", "world", "run", "check", "urdf", "mjcf", "lab", "doctor", "bench")
+COMMANDS = ("workbench", "controller", "world", "run", "replay", "check", "urdf", "mjcf", "lab", "doctor", "bench")
 """Each is a module here with `add_parser(subparsers)` and `run(args) -> int`."""
 
 _USAGE = 2  # Exit status of a request that cannot be served, as argparse uses it.

@@ -6,10 +6,12 @@ import argparse
 import signal
 import sys
 import threading
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rcilab.supervisor import SupervisorStatus
+    from rcilab.workbench.app import WorkbenchConfig
 
 
 def add_parser(subparsers: Any) -> None:
@@ -22,35 +24,58 @@ def add_parser(subparsers: Any) -> None:
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Adds the options, for `rcilab workbench` and for a bare `rcilab`."""
     parser.add_argument("--model", default="xMatePro7", help="robot to show first (default: %(default)s)")
+    parser.add_argument("--robot", default="virtual", metavar="rci://HOST:PORT", help="controller to connect to")
+    add_page_options(parser)
+
+
+def add_page_options(parser: argparse.ArgumentParser) -> None:
+    """Adds what any page can be told."""
     parser.add_argument("--host", default="127.0.0.1", help="address to listen on; others than loopback need --token")
     parser.add_argument("--port", type=_port, default=None, help="port of the page (default: 8080; 0: any free one)")
     parser.add_argument("--token", default=None, help="secret that every page must bring")
     parser.add_argument("--no-browser", action="store_true", help="do not open a browser")
-    parser.add_argument("--robot", default="virtual", metavar="rci://HOST:PORT", help="controller to connect to")
+    parser.add_argument(
+        "--runs",
+        type=Path,
+        metavar="FOLDER",
+        default=Path.home() / "rcilab-runs",
+        help="folder that every motion is recorded in, cycle by cycle (default: %(default)s)",
+    )
     parser.add_argument("--language", choices=("en", "zh"), default="en", help="language of the page")
     parser.add_argument("--quality", choices=("full", "light"), default="full", help="light: for software rendering")
 
 
 def run(args: argparse.Namespace) -> int:
     """Serves the page until Ctrl-C or a termination signal."""
-    from rcilab.workbench.app import Workbench, WorkbenchConfig
+    return serve(page_config(args, model=args.model, target=args.robot), browser=not args.no_browser)
+
+
+def page_config(args: argparse.Namespace, **options: Any) -> WorkbenchConfig:
+    """Returns how to start the page, from the options of `add_page_options` and more."""
+    from rcilab.workbench.app import WorkbenchConfig
     from rcilab.workbench.security import DEFAULT_PORT
 
-    config = WorkbenchConfig(
-        model=args.model,
-        target=args.robot,
+    return WorkbenchConfig(
         host=args.host,
         port=DEFAULT_PORT if args.port is None else args.port,
         token=args.token,
         language=args.language,
         quality=args.quality,
+        runs=args.runs,
+        **options,
     )
+
+
+def serve(config: WorkbenchConfig, *, browser: bool) -> int:
+    """Serves a page until Ctrl-C or a termination signal."""
+    from rcilab.workbench.app import Workbench
+
     ending = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: ending.set())
     with Workbench(config) as bench:
         print(f"rcilab workbench: {bench.url}  (Ctrl-C ends it)", flush=True)
-        if not args.no_browser:
+        if browser:
             import webbrowser
 
             webbrowser.open(bench.url)

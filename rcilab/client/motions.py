@@ -13,9 +13,9 @@ from rcilab.client.commands import RciCommands
 from rcilab.client.control_loop import Callback
 from rcilab.client.filters import CommandFilter, LowPass, RateLimiter
 from rcilab.client.following import Progress, follow, follow_poses, report_progress
-from rcilab.recording.run import Run
 from rcilab.client.start_check import describe_start_mismatch, require_motion
 from rcilab.errors import UsageError
+from rcilab.recording.run import Run
 from rcilab.spatial import Pose
 from rcilab.state import Mode, RobotState, require_mode
 

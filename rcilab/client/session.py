@@ -23,14 +23,14 @@ from rcilab.client.opening import await_first_state, require_arm_there, require_
 from rcilab.client.punctual import punctual
 from rcilab.client.recorder import RECORD_TIME, CycleLog, Recorder
 from rcilab.client.recovery import recover
-from rcilab.recording.run import Run, build_run
-from rcilab.recording.setup import Setup
 from rcilab.client.transport import SocketTransport
 from rcilab.client.world import World
 from rcilab.clock import CYCLE_TIME
 from rcilab.closing import Closing
 from rcilab.errors import ConnectionLostError, InvalidValueError, UsageError
 from rcilab.protocols.rci import STATE_SIZE, Request
+from rcilab.recording.run import Run, build_run
+from rcilab.recording.setup import Setup
 from rcilab.safety_box import SafetyBox
 from rcilab.spatial import Pose
 from rcilab.state import ControllerMode, Mode, RobotState

@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from rcilab.recording.run import Run
     from rcilab.conformance.report import Violation
+    from rcilab.recording.run import Run
 
 # Okabe and Ito's palette, told apart with every kind of colour vision, without its yellow (too pale on white).
 JOINT_COLORS = ("#0072B2", "#E69F00", "#009E73", "#D55E00", "#56B4E9", "#CC79A7", "#000000")

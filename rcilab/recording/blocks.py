@@ -1,4 +1,4 @@
-"""A file in whole blocks: what was written before a crash can be read, up to the last block that is whole.
+r"""A file in whole blocks: what was written before a crash can be read, up to the last block that is whole.
 
     magic       8 bytes, b"\\x89RCIRUN\\n"
     version     u32

@@ -21,9 +21,7 @@ Progress: TypeAlias = Callable[[float], None]
 _Writer: TypeAlias = "Callable[[Run, IO[bytes], Progress, str], None]"
 
 
-def save_run(
-    run: Run, file: str | PathLike[str], *, progress: Progress | None = None, language: str = "en"
-) -> None:
+def save_run(run: Run, file: str | PathLike[str], *, progress: Progress | None = None, language: str = "en") -> None:
     """Writes a run to a file; see `Run.save`."""
     path = Path(fspath(file))
     require_ending(path.suffix)

@@ -48,10 +48,10 @@ def write_mcap(run: Run, stream: IO[bytes], progress: Callable[[float], None]) -
     writer.add_metadata("rcilab", facts)
     stamps = run.setup.started_ns + np.rint(run.t * 1e9).astype(np.int64)
     topics = {topic: signals for topic, signals in _topics(run).items() if signals}
-    channels = {topic: _register(writer, topic, f"rcilab.{topic}", _schema(signals)) for topic, signals in topics.items()}
-    tables = {
-        topic: [(signal.name, signal.values.tolist()) for signal in signals] for topic, signals in topics.items()
+    channels = {
+        topic: _register(writer, topic, f"rcilab.{topic}", _schema(signals)) for topic, signals in topics.items()
     }
+    tables = {topic: [(signal.name, signal.values.tolist()) for signal in signals] for topic, signals in topics.items()}
     tool = None if run.model is None else run.model.forward_path(run.q)
     tool_channel = None if tool is None else _register(writer, "tool", "foxglove.PoseInFrame", _POSE_SCHEMA)
     for row, stamp in enumerate(stamps.tolist()):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
@@ -67,7 +67,7 @@ class Run:
     """False in lock-step, where a millisecond lasts as long as it takes and timing means nothing."""
     model: RobotModel | None = None
     """The arm, with its tool and load; None when it is not known."""
-    setup: Setup = Setup()
+    setup: Setup = field(default_factory=Setup)
     """Where and how it was made."""
     is_complete: bool = True
     """False when it was read from a file whose end is missing: all that came before is here."""

@@ -23,7 +23,11 @@ class Setup:
     @property
     def started(self) -> str:
         """When it began, as 2026-05-01T12:00:00Z; "" when that is not known."""
-        return time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(self.started_ns // 1_000_000_000)) if self.started_ns else ""
+        return (
+            time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(self.started_ns // 1_000_000_000))
+            if self.started_ns
+            else ""
+        )
 
     def as_dict(self) -> dict[str, Any]:
         """Returns the fields, ready for JSON."""

@@ -21,6 +21,7 @@ QUANTITIES: tuple[Quantity, ...] = ("q", "dq", "ddq", "jerk")
 
 _WIDENED = 3  # Points that a marked violation reaches to both sides: one bad cycle is still some pixels wide.
 _FARTHEST = 3.0  # Multiple of the limit that a plot reaches at most; `rcilab.check` gives the number beyond.
+_LEAST_ERROR = 1e-6  # [deg or mm] Smallest range of a plot of errors: below it there is only rounding.
 _ROUND_ENDS = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 15.0, 20.0, 25.0, 30.0, 40.0, 50.0, 60.0)
 
 
@@ -123,6 +124,40 @@ def bounds_of(limits: JointLimits, quantity: Quantity) -> tuple[Array, Array]:
     return -upper, upper
 
 
+def build_error_frame(t: Array, errors: Array, last: float, buckets: int = 240) -> Frame:
+    """Returns what a plot of errors shows: no limits, and an axis that reaches as far as the largest of them.
+
+    Args:
+        t: Times of the errors, [s], shape (N,).
+        errors: One column a curve, in the unit to be shown, shape (N, k).
+        last: Where the other plots end, [s], so that this one fits below them.
+        buckets: Number of buckets the time is cut into.
+    """
+    edges = np.linspace(0.0, last, buckets + 1)
+    times = np.repeat(edges[:-1], 2)
+    times[1::2] = 0.5 * (edges[:-1] + edges[1:])
+    times[-1] = last
+    end = max(_round_end(last), last)
+    times = np.append(times, end)
+    thin = decimate(Curves(t=t, values=errors), edges)
+    largest = float(np.nanmax(np.abs(thin))) if np.isfinite(thin).any() else 0.0
+    return Frame(
+        t=times,
+        plan=tuple(np.append(column, np.nan) for column in thin.T),
+        actual=(),
+        upper=np.nan,
+        lower=np.nan,
+        violated=np.zeros(len(times), dtype=bool),
+        bound=max(1.12 * largest, _LEAST_ERROR),
+        end=float(end),
+    )
+
+
+def last_time(*curves: Curves | None) -> float:
+    """Returns when the last of these curves ends, [s]; 1 without any."""
+    return max([0.0] + [float(c.t[-1]) for c in curves if c is not None and len(c.t)]) or 1.0
+
+
 def build_frame(
     plan: Curves | None, actual: Curves | None, limits: JointLimits, quantity: Quantity, joint: int, buckets: int = 240
 ) -> Frame:
@@ -138,9 +173,8 @@ def build_frame(
         buckets: Number of buckets the time is cut into.
     """
     low, high = bounds_of(limits, quantity)
-    ends = [0.0] + [float(curves.t[-1]) for curves in (plan, actual) if curves is not None and len(curves.t)]
-    last = max(ends) or 1.0
-    end = next((end for end in _ROUND_ENDS if end >= last - 1e-9), last)
+    last = last_time(plan, actual)
+    end = _round_end(last)
     edges = np.linspace(0.0, last, buckets + 1)
     t = np.repeat(edges[:-1], 2)
     t[1::2] = 0.5 * (edges[:-1] + edges[1:])
@@ -175,3 +209,7 @@ def build_frame(
         violated=violated,
         bound=min(1.12 * max(limit, float(np.abs(curves).max())), _FARTHEST * limit),
     )
+
+
+def _round_end(last: float) -> float:
+    return next((end for end in _ROUND_ENDS if end >= last - 1e-9), last)

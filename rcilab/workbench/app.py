@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import threading
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING
 
@@ -15,12 +16,15 @@ from rcilab.workbench.conductor import Conductor
 from rcilab.workbench.goal_actions import initial_goal
 from rcilab.workbench.live import LIVE_PATH, LiveChannel
 from rcilab.workbench.page import decorate
+from rcilab.workbench.replay import replayed, require_replayable
 from rcilab.workbench.session import Session
 from rcilab.workbench.store import Store, UiState
 from rcilab.workbench.telling import tell_error
 
 if TYPE_CHECKING:
     import viser
+
+    from rcilab.recording.run import Run
 
 _BRAND = (11, 111, 194)
 _BEAT = 0.4  # [s] A choice: the control process stops a motion when it has heard of nobody for 2 s.
@@ -40,6 +44,10 @@ class WorkbenchConfig:
     token: str | None = None
     language: str = "en"
     quality: str = "full"
+    runs: Path | None = None
+    """Folder that every motion is recorded in, cycle by cycle; None keeps the last one in memory only."""
+    replay: Run | None = None
+    """A run to look at; nothing is connected then until somebody asks for it."""
 
 
 class Workbench:
@@ -59,16 +67,19 @@ class Workbench:
             from rcilab.client.address import parse_address
 
             parse_address(config.target)
-        model = require_rci(load_model(config.model))
+        replay = config.replay
+        model = require_rci(load_model(config.model)) if replay is None else require_replayable(replay)
         self._config = config
         self._bound = security.bind(config.host, config.port)
         self.port: int = self._bound.getsockname()[1]
         """Port the page is served on."""
         goal = initial_goal(model, model.home)
         state = UiState(model=model, target=config.target, goal=goal, language=config.language, quality=config.quality)
-        self.store = Store(state)
+        if replay is not None:
+            state = replayed(state, replay)
+        self.store = Store(replace(state, runs=config.runs))
         self.session = Session(lambda error: self.store.say("bad", tell_error(error, self.session.status())))
-        self.conductor = Conductor(self.store, self.session)
+        self.conductor = Conductor(self.store, self.session, self._deliver)
         self.server: viser.ViserServer
         self._stopped = threading.Event()
         self._opened = False
@@ -102,7 +113,8 @@ class Workbench:
         self.presenter = Presenter(self.server, self.store, self.session, live, ask)
         self.presenter.start()
         self.conductor.start()
-        self.conductor.robot.open(self._config.model, self._config.target)
+        if self._config.replay is None:
+            self.conductor.robot.open(self._config.model, self._config.target)
         threading.Thread(target=self._beat, args=(live,), name="operator", daemon=True).start()
 
     def close(self) -> None:
@@ -117,6 +129,12 @@ class Workbench:
         self.session.close()
         self.presenter.close()
         self._door.close()
+
+    def _deliver(self, page: int | None, name: str, content: bytes) -> None:
+        """Has a page's browser save a file; a page that has gone wants it no more."""
+        client = self.server.get_clients().get(-1 if page is None else page)
+        if client is not None:
+            client.send_file_download(name, content, save_immediately=True)
 
     def _follow_pages(self) -> None:
         ask = self.conductor.ask

@@ -11,6 +11,7 @@ from typing import Any
 
 from rcilab.errors import RcilabError
 from rcilab.workbench import requests
+from rcilab.workbench.export_actions import Deliver, ExportActions
 from rcilab.workbench.goal_actions import GoalActions
 from rcilab.workbench.mailbox import Mailbox
 from rcilab.workbench.push_actions import PushActions
@@ -30,14 +31,16 @@ class Conductor:
     Args:
         store: The state.
         session: The robot side.
+        deliver: Sends a file to a page.
     """
 
-    def __init__(self, store: Store, session: Session) -> None:
+    def __init__(self, store: Store, session: Session, deliver: Deliver = lambda page, name, content: None) -> None:
         self._store, self._session = store, session
         self._goal = GoalActions(store, session)
         self.robot = RobotActions(store, session)
         self._push = PushActions(store, session)
         self._view = ViewActions(store)
+        self._export = ExportActions(store, deliver)
         self._mailbox: Mailbox[requests.Request] = Mailbox()
         self._thread: threading.Thread | None = None
         self._ending = threading.Event()
@@ -61,6 +64,8 @@ class Conductor:
             requests.Seek: self._view.seek,
             requests.Play: self._view.play,
             requests.SetView: self._view.set_view,
+            requests.Export: self._export.export,
+            requests.SetRecording: self._view.set_recording,
             requests.TakeControls: self._view.take_controls,
             requests.PageCame: self._view.page_came,
             requests.PageWent: self._view.page_went,
@@ -81,6 +86,8 @@ class Conductor:
         if self._thread is not None:
             self._thread.join(10.0)
         self._push.close()
+        self._export.close()
+        self.robot.close()
 
     def act(self, request: requests.Request) -> None:
         """Carries out one request; what goes wrong becomes a sentence on the page."""

@@ -14,6 +14,7 @@ from rcilab.workbench.panels.check import CheckPanel
 from rcilab.workbench.panels.health import HealthPanel
 from rcilab.workbench.panels.jog import JogPanel
 from rcilab.workbench.panels.push import PushPanel
+from rcilab.workbench.panels.recording import RecordingPanel
 from rcilab.workbench.panels.run import RunPanel
 from rcilab.workbench.panels.settings import SettingsPanel
 from rcilab.workbench.panels.status import status_values
@@ -36,7 +37,7 @@ _TABS = (
     ("tab.jog", "adjustments-horizontal", JogPanel),
     ("tab.target", "current-location", TargetPanel),
     ("tab.check", "clipboard-check", CheckPanel),
-    ("tab.run", "player-play", RunPanel, PushPanel, HealthPanel),
+    ("tab.run", "player-play", RunPanel, RecordingPanel, PushPanel, HealthPanel),
     ("tab.settings", "settings", SettingsPanel),
 )
 

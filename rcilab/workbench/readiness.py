@@ -22,7 +22,7 @@ _NOT_IDLE = {
     "stopping": "ready.moving",
     "fault": "ready.fault",
     "lost": "ready.lost",
-    "closed": "ready.starting",
+    "closed": "ready.closed",
 }
 
 

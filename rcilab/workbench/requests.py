@@ -161,6 +161,21 @@ class SetView(Request):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Export(Request):
+    """The last run as a file, through the browser."""
+
+    ending: str
+    """.csv, .parquet, .mcap, .html or .rcirun."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetRecording(Request):
+    """Whether every cycle of a motion is written to a file."""
+
+    on: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class TakeControls(Request):
     """This page wants the controls."""
 
@@ -175,5 +190,5 @@ class PageWent(Request):
     """A page has gone."""
 
 
-Harmless: TypeAlias = PageCame | PageWent | TakeControls | Seek | Play | SetView
+Harmless: TypeAlias = PageCame | PageWent | TakeControls | Seek | Play | SetView | Export
 """What a watching page may ask for as well: nothing of it moves a goal or a robot."""

@@ -8,9 +8,6 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from rcilab.recording.run import find_delay
 from rcilab.errors import CertificateError, ConnectionLostError, ControlError, RcilabError
 from rcilab.model import load_model
 from rcilab.workbench import requests
@@ -18,18 +15,17 @@ from rcilab.workbench.goal_actions import initial_goal
 from rcilab.workbench.pushing import PLANTS, TOOL, is_guided
 from rcilab.workbench.reach import Tone
 from rcilab.workbench.readiness import is_moving, obstacle
+from rcilab.workbench.run_keeper import RunKeeper
 from rcilab.workbench.session import Session
-from rcilab.workbench.store import Goal, Recording, Store
+from rcilab.workbench.store import Goal, Store
 from rcilab.workbench.telling import StartingError, tell_error, tell_incident
 from rcilab.workbench.text import Message, message
 
 if TYPE_CHECKING:
     from rcilab.supervisor import SupervisorStatus, Ticket
 
-_LONGEST_RECORDING = 600_000  # Rows: ten minutes of cycles.
 _SECOND_THOUGHT = 10.0  # [s] A choice: a second press that comes later asks anew.
 _POWER_PAUSE = 2.0  # [s] A choice: between two attempts to switch the virtual arm on.
-_DELAY_WINDOW = 1000  # Rows that the play-out delay is looked for in; longer than any, and every motion moves by then.
 
 
 class RobotActions:
@@ -38,8 +34,9 @@ class RobotActions:
     def __init__(self, store: Store, session: Session) -> None:
         self._store, self._session = store, session
         self._tickets: list[tuple[str, Ticket]] = []
-        self._rows: list[np.ndarray] = []
+        self._keeper = RunKeeper(store)
         self._recording = False
+        self._stopped: str | None = None  # Why the recorded motion did not reach its end.
         self._placed = False  # The goal stands where the arm was first seen.
         self._powered = False  # The virtual arm's motors have been switched on once.
         self._power_asked = float("-inf")
@@ -129,7 +126,8 @@ class RobotActions:
         state = self._store.state
         model = state.model if state.model.name == name else load_model(name)
         self._powered, self._power_asked = False, float("-inf")
-        self._rows, self._recording, self._tickets, self._incident, self._phase = [], False, [], 0, ""
+        self._end_recording()
+        self._tickets, self._incident, self._phase = [], 0, ""
         changes: dict[str, object] = {"target": target, "recording": None, "asked": None}
         if model is not state.model:
             self._store.forget()
@@ -202,7 +200,8 @@ class RobotActions:
             self._store.say("warn", tell_error(error))
             return
         self._arrival = state.plan.short
-        self._rows, self._recording = [], True
+        self._keeper.begin(state.plan)
+        self._recording, self._stopped = True, None
         self._tickets.append(("execute", ticket))
         self._store.update(recording=None, playing=False, asked=None)
 
@@ -212,6 +211,7 @@ class RobotActions:
             if not ticket.done:
                 waiting.append((what, ticket))
             elif ticket.error is not None:
+                self._stopped = str(ticket.error) if what == "execute" else self._stopped
                 self._store.say(*self._tell_failure(what, ticket.error))
             elif what == "power_on":
                 self._powered = True
@@ -236,20 +236,14 @@ class RobotActions:
             return
         if not self._recording:
             return
-        rows = rows[np.isfinite(rows["t"])]
-        if len(rows):
-            self._rows.append(rows)
-            together = np.concatenate(self._rows)[-_LONGEST_RECORDING:]
-            self._rows = [together]
-            first = together[:_DELAY_WINDOW]
-            self._store.update(
-                recording=Recording(
-                    t=together["t"],
-                    q=together["q"],
-                    q_c=together["q_c"],
-                    dq=together["dq"],
-                    delay=find_delay(first["q_c"], first["command"]),
-                )
-            )
+        self._keeper.add(rows)
         if not is_moving(status) and not any(what == "execute" for what, _ in self._tickets):
-            self._recording = False
+            self._end_recording()
+
+    def _end_recording(self) -> None:
+        self._recording = False
+        self._keeper.finish(self._stopped)
+
+    def close(self) -> None:
+        """Ends a recording, so that its file has an end."""
+        self._end_recording()

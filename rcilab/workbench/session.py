@@ -61,6 +61,8 @@ class Session:
             return shown.status()
         from rcilab.supervisor import SupervisorStatus
 
+        if self._worker is None:
+            return SupervisorStatus()  # Nobody has asked for a connection.
         return SupervisorStatus(phase="starting", code="starting", message="Starting the control process.")
 
     @property

@@ -13,6 +13,7 @@ from rcilab.workbench import requests
 from rcilab.workbench.grip import Grip
 from rcilab.workbench.planning import PATH_POINTS
 from rcilab.workbench.readiness import is_moving
+from rcilab.workbench.replay import replayed_pose
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask
 
@@ -55,7 +56,10 @@ class Stage:
         if wanted != self._built:
             self._build(state)
             self._built = wanted
-        live = state.goal.q if status.q is None else status.q
+        live = status.q
+        if live is None:  # Nothing is connected: what stands there is the run that is looked at.
+            replayed = replayed_pose(state)
+            live = state.goal.q if replayed is None else replayed
         self._live.show(live)
         self._see("candidate", self._candidate, self._differs(state.goal.q, live) and not is_moving(status))
         self._candidate.show(state.goal.q)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +22,9 @@ from rcilab.workbench.text import Message
 
 if TYPE_CHECKING:
     from rcilab.motion import Motion
+    from rcilab.recording.run import Run
+    from rcilab.recording.tracking import Tracking
+    from rcilab.workbench.export_actions import Export
 
 _UNDO_DEPTH = 100
 
@@ -61,6 +65,12 @@ class Recording:
     """Measured, [rad/s], shape (N, n)."""
     delay: int
     """Cycles between a command and the state that shows it: the controller's play-out, and its answer."""
+    run: Run | None = None
+    """All of it, once the arm stands still."""
+    tracking: Tracking | None = None
+    """How far the arm was from its plan, once it stands still."""
+    file: str = ""
+    """Where it is on disk; "" where it is not."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -80,6 +90,12 @@ class UiState:
     asked: Motion | None = None
     """The motion that a foreign robot is to make and that awaits a second yes."""
     recording: Recording | None = None
+    record: bool = True
+    """Whether every cycle of a motion is written to a file as well."""
+    runs: Path | None = None
+    """Folder of these files; None: there is none."""
+    export: Export | None = None
+    """What is being written for a page."""
     speed: float = 0.5
     law: PlannableLaw = "jerk_limited"
     busy: Message | None = None

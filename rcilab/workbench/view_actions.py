@@ -55,6 +55,10 @@ class ViewActions:
         if known.get(request.name, False):
             self._store.update(**{request.name: value})
 
+    def set_recording(self, request: requests.SetRecording) -> None:
+        """Has the next motions written to files, or not."""
+        self._store.update(record=request.on)
+
     def page_came(self, request: requests.PageCame) -> None:
         """Notes a page; the first one gets the controls."""
         if request.page is not None:

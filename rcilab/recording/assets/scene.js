@@ -81,7 +81,7 @@ class Scene {
     this.meshes = arm.meshes.map((mesh) => ({ ...mesh, ...this.upload(array(mesh.vertices), array(mesh.faces)) }));
     this.ground = this.buffer(new Float32Array([-3, -3, 0, 3, -3, 0, -3, 3, 0, 3, 3, 0]));
     this.paths = path ? this.makePaths(path, array) : [];
-    this.camera = { yaw: -0.83, pitch: 0.36, distance: 2.75, at: [0.1, 0.03, 0.52] };
+    this.camera = { yaw: -0.83, pitch: 0.36, distance: 3.15, at: [0.06, 0.0, 0.5] };
     this.steer();
   }
 
@@ -156,7 +156,7 @@ class Scene {
     gl.clearColor(0, 0, 0, 0); gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT | gl.STENCIL_BUFFER_BIT);
     const { yaw, pitch, distance, at } = this.camera;
     const eye = [at[0] + distance * Math.cos(pitch) * Math.cos(yaw), at[1] + distance * Math.cos(pitch) * Math.sin(yaw), at[2] + distance * Math.sin(pitch)];
-    const shift = mat.identity(); shift[13] = 0.07;  // The tables lie over the lower edge.
+    const shift = mat.identity(); shift[13] = 0.27;  // The tables lie over the lower edge.
     const view = mat.mul(shift, mat.mul(mat.perspective(0.62, width / height, 0.05, 20), mat.look(eye, at)));
     const poses = this.links(q);
     gl.enable(gl.DEPTH_TEST); gl.enable(gl.BLEND); gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);

@@ -8,7 +8,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rcilab.clock import CYCLE_TIME
-from rcilab.views.plots import QUANTITIES, Frame, Quantity, build_frame, plan_curves, recorded_curves
+from rcilab.views.plots import (
+    QUANTITIES,
+    Curves,
+    Frame,
+    Quantity,
+    build_error_frame,
+    build_frame,
+    last_time,
+    plan_curves,
+    recorded_curves,
+)
 from rcilab.workbench import requests
 from rcilab.workbench.text import Text
 from rcilab.workbench.view_actions import RATES
@@ -22,6 +32,8 @@ COLORS = ("#0b6fc2", "#e07b00", "#1a9850", "#c2357a", "#7b52c7", "#8a6d3b", "#00
 """One colour a joint, told apart on white by people with common colour blindness; the number stands in the legend."""
 
 _REDRAW_TIME = 0.25  # [s] A choice: plots are redrawn at most so often while something is dragged or moves.
+_ERRORS = ("error", "tool")
+"""Rows below the others, there once a motion has been executed."""
 _UNITS = {"q": "°", "dq": "°/s", "ddq": "°/s²", "jerk": "°/s³"}
 _OTHER_HEIGHT = 46 + 62 + 108 + 4 * 22 + 30  # [px] Bar, window head, strip, titles, legend.
 
@@ -56,11 +68,11 @@ class TimelinePanel:
             choice, ask, lambda v, p: requests.SetView(page=p, name="plot_joint", value=joints.get(v, 0))
         )
         self._readout = Html(gui)
-        self._plots: dict[Quantity, Any] = {}
-        self._titles: dict[Quantity, Html] = {}
+        self._plots: dict[str, Any] = {}
+        self._titles: dict[str, Html] = {}
         empty = build_frame(None, None, state.model.limits.joint, "q", 0)
         data, series, bands = plot_contents(empty, 0, state.model.n)
-        for quantity in QUANTITIES:
+        for quantity in (*QUANTITIES, *_ERRORS):
             self._titles[quantity] = Html(gui)
             self._plots[quantity] = gui.add_uplot(
                 data,
@@ -71,7 +83,8 @@ class TimelinePanel:
                 scales={"x": {"time": False, "range": (0.0, 1.0)}, "y": {"range": (-112.0, 112.0)}},
                 cursor={"drag": {"x": False, "y": False}, "sync": {"key": "rcilab"}},
                 padding=(6, 12, 0, 0),
-                axes=_axes(last=quantity == "jerk"),
+                axes=_axes(last=quantity in ("jerk", "tool")),
+                visible=quantity not in _ERRORS,
             )
         self._legend = Html(gui)
 
@@ -91,6 +104,8 @@ class TimelinePanel:
             t, kinds = state.place * duration, text("timeline.plan_only")
             if state.recording is not None:
                 kinds = text("timeline.kinds", delay=state.recording.delay)
+                if status.q is None:
+                    kinds = text("timeline.replayed")
             self._readout.show(f'<p class="rl-clock"><b>{t:.3f}</b> / {duration:.3f} s<span>{esc(kinds)}</span></p>')
         for plot in self._plots.values():
             plot.height = _plot_height(state)
@@ -100,6 +115,7 @@ class TimelinePanel:
             self._drawn, self._drawn_at = wanted, now
             for quantity in QUANTITIES:
                 self._draw(state, quantity)
+            self._draw_errors(state)
 
     def _draw(self, state: UiState, quantity: Quantity) -> None:
         plan = None if state.plan is None else plan_curves(state.plan.motion, quantity)
@@ -113,16 +129,40 @@ class TimelinePanel:
         unit = _UNITS[quantity] if joint else self._text("plot.percent")
         title = self._text(f"plot.{quantity}") + (f" · J{joint}" if joint else "") + f" [{unit}]"
         self._titles[quantity].show(f'<div class="rl-plot-title">{esc(title)}</div>')
-        plot = self._plots[quantity]
-        data, series, _ = plot_contents(frame, joint, state.model.n)
+        self._fill(quantity, frame, state, (-frame.bound, frame.bound))
+        if quantity == "jerk":
+            self._legend.show(legend_html(frame, joint, state.model.n, self._text))
+
+    def _draw_errors(self, state: UiState) -> None:
+        """Draws measured against planned of a finished motion: joints, [deg], and the tool, [mm]."""
+        recording, joint, text = state.recording, state.plot_joint, self._text
+        tracking = None if recording is None else recording.tracking
+        for name in _ERRORS:
+            self._plots[name].visible = tracking is not None
+        if recording is None or tracking is None:
+            for name in _ERRORS:
+                self._titles[name].show("")
+            return
+        t = recording.t - recording.delay * CYCLE_TIME
+        last = last_time(*(plan_curves(p.motion, "q") for p in (state.plan,) if p is not None), Curves(t=t, values=t))
+        errors = np.degrees(tracking.joint if not joint else tracking.joint[:, joint - 1 : joint])
+        frame = build_error_frame(t, errors, last)
+        self._fill("error", frame, state, (-frame.bound, frame.bound))
+        title = text("plot.error") + (f" · J{joint}" if joint else "")
+        self._titles["error"].show(f'<div class="rl-plot-title">{esc(title)} [°]</div>')
+        frame = build_error_frame(t, 1000.0 * tracking.position[:, None], last)
+        self._fill("tool", frame, state, (0.0, frame.bound))
+        self._titles["tool"].show(f'<div class="rl-plot-title">{esc(text("plot.tool"))} [mm]</div>')
+
+    def _fill(self, name: str, frame: Frame, state: UiState, reach: tuple[float, float]) -> None:
+        plot = self._plots[name]
+        data, series, _ = plot_contents(frame, 0 if name == "tool" else state.plot_joint, state.model.n)
         if plot.series != series:
             plot.series = series
         plot.data = data
-        scale = {"x": {"time": False, "range": (0.0, frame.end)}, "y": {"range": (-frame.bound, frame.bound)}}
+        scale = {"x": {"time": False, "range": (0.0, frame.end)}, "y": {"range": reach}}
         if plot.scales != scale:
             plot.scales = scale
-        if quantity == "jerk":
-            self._legend.show(legend_html(frame, joint, state.model.n, self._text))
 
 
 def plot_contents(frame: Frame, joint: int, n: int) -> tuple[tuple[np.ndarray, ...], tuple[Any, ...], tuple[Any, ...]]:
@@ -169,7 +209,10 @@ def legend_html(frame: Frame, joint: int, n: int, text: Text) -> str:
 
 
 def _plot_height(state: UiState) -> int:
-    return max(90, int((state.height - _OTHER_HEIGHT) / len(QUANTITIES)) // 4 * 4)
+    finished = state.recording is not None and state.recording.tracking is not None
+    rows = len(QUANTITIES) + len(_ERRORS) * finished
+    spare = 44 * finished  # Titles of the rows of errors, and their times.
+    return max(84 if finished else 90, int((state.height - _OTHER_HEIGHT - spare) / rows) // 4 * 4)
 
 
 def _axes(*, last: bool) -> tuple[Any, ...]:

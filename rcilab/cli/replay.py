@@ -1,0 +1,31 @@
+"""`rcilab replay FILE`: opens the page on a recorded run."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from rcilab.cli.workbench import add_page_options, page_config, serve
+
+
+def add_parser(subparsers: Any) -> None:
+    """Adds the command and its options."""
+    parser = subparsers.add_parser(
+        "replay",
+        help="open the page on a recorded run",
+        description="Opens the page with a run that was recorded by the page or by run.save('….rcirun'): the timeline "
+        "scrubs plan and actual. Nothing is connected until you ask for it on the Run tab.",
+    )
+    parser.add_argument("file", type=Path, help="the run, .rcirun; one that was cut off by a crash opens, too")
+    add_page_options(parser)
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Serves the page until Ctrl-C or a termination signal."""
+    from rcilab.recording.run_file import load_run
+
+    found = load_run(args.file)
+    print(f"{args.file}: {found!r}")
+    return serve(page_config(args, replay=found), browser=not args.no_browser)

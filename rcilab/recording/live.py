@@ -1,0 +1,105 @@
+"""A run while it happens: cycles are added as they come, in memory and, where wanted, in a file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rcilab.recording.run import Run, build_run, find_delay
+from rcilab.recording.setup import Setup
+
+if TYPE_CHECKING:
+    from rcilab.model import RobotModel
+    from rcilab.motion import Motion
+    from rcilab.recording.run_file import RunFile
+
+_FIRST_CAPACITY = 4096  # Cycles; doubled whenever it is full.
+_DELAY_WINDOW = (
+    1000  # Cycles that the play-out delay is looked for in; longer than any, and every motion moves by then.
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class RunFacts:
+    """What is known of a run before its first cycle."""
+
+    plan: Motion | None
+    model: RobotModel
+    setup: Setup
+
+
+class LiveRecording:
+    """Collects the cycles of one run. Owned by one thread; what it returns stays as it is.
+
+    Args:
+        facts: What is known of the run already.
+        file: Where every cycle goes as well; None keeps them in memory only.
+    """
+
+    def __init__(self, facts: RunFacts, file: RunFile | None = None) -> None:
+        self.facts = facts
+        self.file = file
+        self._memory: NDArray[np.void] | None = None
+        self._count = 0
+
+    def add(self, cycles: NDArray[np.void]) -> None:
+        """Adds those cycles that belong to the motion, the ones from its first command on.
+
+        Raises:
+            InvalidValueError: They cannot be written to the file, which is given up; in memory they are.
+        """
+        rows = cycles[np.isfinite(cycles["t"])]
+        if not len(rows):
+            return
+        self._make_room(rows)
+        assert self._memory is not None
+        self._memory[self._count : self._count + len(rows)] = rows
+        self._count += len(rows)
+        if self.file is not None:
+            file, self.file = self.file, None
+            file.add(rows)
+            self.file = file
+
+    @property
+    def cycles(self) -> NDArray[np.void] | None:
+        """All cycles so far, read-only; None before the first."""
+        if self._memory is None:
+            return None
+        rows = self._memory[: self._count]
+        rows.flags.writeable = False
+        return rows
+
+    @property
+    def delay(self) -> int:
+        """Cycles between a command and the state that shows it, see `find_delay`."""
+        cycles = self.cycles
+        if cycles is None:
+            return 1
+        first = cycles[:_DELAY_WINDOW]
+        return find_delay(first["q_c"], first["command"])
+
+    def finish(self, stopped: str | None = None) -> Run | None:
+        """Ends the recording and returns the run; None when not one cycle came.
+
+        Raises:
+            InvalidValueError: The end of the file cannot be written; all that came before is in it.
+        """
+        file, self.file = self.file, None
+        if file is not None:
+            file.close(stopped=stopped)
+        cycles = self.cycles
+        if cycles is None:
+            return None
+        facts = self.facts
+        return build_run(cycles, plan=facts.plan, stopped=stopped, model=facts.model, setup=facts.setup)
+
+    def _make_room(self, rows: NDArray[np.void]) -> None:
+        needed = self._count + len(rows)
+        if self._memory is None or needed > len(self._memory):
+            larger = np.zeros(max(needed, _FIRST_CAPACITY, 2 * self._count), rows.dtype)
+            if self._memory is not None:
+                larger[: self._count] = self._memory[: self._count]
+            self._memory = larger

@@ -1,0 +1,108 @@
+"""Taking the last run away: written in a thread of its own, then sent to the page that asked."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeAlias
+
+from rcilab.errors import RcilabError
+from rcilab.recording.extra import MissingExtraError
+from rcilab.workbench import requests
+from rcilab.workbench.telling import tell_error
+from rcilab.workbench.text import Message, message
+
+if TYPE_CHECKING:
+    from rcilab.recording.run import Run
+    from rcilab.workbench.store import Store
+
+ENDINGS = (".csv", ".parquet", ".mcap", ".html", ".rcirun")
+"""What the page offers, in the order of its buttons."""
+
+Deliver: TypeAlias = Callable[["int | None", str, bytes], None]
+"""Sends a file to a page: client id (None: nobody), name, content."""
+
+_STEP = 0.05  # Share between two updates of the progress bar.
+
+
+@dataclass(frozen=True, slots=True)
+class Export:
+    """An export under way."""
+
+    ending: str
+    share: float
+    """0 to 1."""
+
+
+class ExportActions:
+    """Exports are made one after the other; the conductor's thread starts them and never waits.
+
+    Args:
+        store: Where the run and the progress are.
+        deliver: Sends a file to a page.
+    """
+
+    def __init__(self, store: Store, deliver: Deliver) -> None:
+        self._store, self._deliver = store, deliver
+        self._worker: threading.Thread | None = None
+
+    def export(self, request: requests.Export) -> None:
+        """Begins an export; refused while another one is under way."""
+        recording = self._store.state.recording
+        run = None if recording is None else recording.run
+        if request.ending not in ENDINGS:
+            return
+        if run is None:
+            self._store.say("warn", message("export.nothing"))
+        elif self._worker is not None and self._worker.is_alive():
+            self._store.say("warn", message("export.busy"))
+        else:
+            self._store.update(export=Export(request.ending, 0.0))
+            self._worker = threading.Thread(
+                target=self._write, args=(run, request.ending, request.page), name="export", daemon=True
+            )
+            self._worker.start()
+
+    def close(self) -> None:
+        """Waits for an export under way."""
+        if self._worker is not None:
+            self._worker.join(10.0)
+
+    def _write(self, run: Run, ending: str, page: int | None) -> None:
+        try:
+            from rcilab.recording.export import export_run
+
+            content = export_run(run, ending, progress=self._follow(ending), language=self._store.state.language)
+            self._deliver(page, file_name(run, ending), content)
+        except MissingExtraError as error:
+            self._store.say("bad", message("export.missing", library=error.library))
+        except (RcilabError, MemoryError) as error:
+            told: Message = tell_error(error) if isinstance(error, RcilabError) else message("export.memory")
+            self._store.say("bad", told)
+        else:
+            size = f"{max(len(content) / 1e6, 0.01):.2f}"
+            self._store.say("good", message("export.done", file=file_name(run, ending), size=size))
+        finally:
+            self._store.update(export=None)
+
+    def _follow(self, ending: str) -> Callable[[float], None]:
+        shown = 0.0
+
+        def follow(share: float) -> None:
+            nonlocal shown
+            if share - shown >= _STEP:
+                shown = share
+                self._store.update(export=Export(ending, share))
+
+        return follow
+
+
+def file_name(run: Run, ending: str) -> str:
+    """Returns what the browser saves a run as."""
+    stamp = (
+        time.strftime("%Y%m%d-%H%M%S", time.localtime(run.setup.started_ns * 1e-9)) if run.setup.started_ns else "run"
+    )
+    arm = "arm" if run.model is None else run.model.name
+    return f"{arm}-{stamp}{ending}"

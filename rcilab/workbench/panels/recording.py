@@ -1,0 +1,112 @@
+"""Recording: how far the arm was from its plan, and the run to take away."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rcilab.workbench import requests
+from rcilab.workbench.export_actions import ENDINGS
+from rcilab.workbench.text import Text
+from rcilab.workbench.widgets import Ask, Html, Linked, esc, on_press
+
+if TYPE_CHECKING:
+    from rcilab.recording.tracking import Tracking
+    from rcilab.supervisor import SupervisorStatus
+    from rcilab.workbench.store import Recording, UiState
+
+_ICONS: dict[str, Any] = {
+    ".csv": "file-spreadsheet",
+    ".parquet": "table",
+    ".mcap": "chart-line",
+    ".html": "world",
+    ".rcirun": "device-floppy",
+}
+
+
+class RecordingPanel:
+    """The last run in numbers, and its exports."""
+
+    def __init__(self, text: Text, ask: Ask) -> None:
+        self._text, self._ask = text, ask
+        self._drawn: Recording | None = None
+
+    def build(self, gui: Any, state: UiState) -> None:
+        """Adds table, buttons and the check box."""
+        text, ask = self._text, self._ask
+        with gui.add_folder(text("record.title")):
+            gui.add_html('<i class="rl-exports"></i>')
+            self._summary = Html(gui)
+            self._buttons: dict[str, Any] = {}
+            for ending in ENDINGS:
+                kind = ending[1:]
+                button = gui.add_button(
+                    text(f"export.{kind}"), icon=_ICONS[ending], color="gray", hint=text(f"export.{kind}_hint")
+                )
+                on_press(button, ask, _export(ending))
+                self._buttons[ending] = button
+            self._progress = Html(gui)
+            box = gui.add_checkbox(text("record.every"), state.record, hint=text("record.every_hint"))
+            self._record = Linked(box, ask, lambda v, p: requests.SetRecording(page=p, on=bool(v)))
+            self._where = Html(gui)
+        self._drawn = None
+        self._summary.show(f'<p class="rl-note">{esc(text("record.nothing"))}</p>')
+
+    def show(self, state: UiState, status: SupervisorStatus) -> None:
+        """Follows the recording and the export under way."""
+        text, recording, export = self._text, state.recording, state.export
+        if recording is not self._drawn:
+            self._drawn = recording
+            self._summary.show(summary_html(recording, text))
+        for button in self._buttons.values():
+            button.disabled = recording is None or recording.run is None or export is not None
+        self._progress.show("" if export is None else progress_html(export.ending, export.share, text))
+        self._record.handle.disabled = state.runs is None
+        self._record.show(state.record and state.runs is not None)
+        where = text("record.memory") if state.runs is None else text("record.folder", folder=state.runs)
+        if recording is not None and recording.file:
+            where = text("record.file", file=recording.file)
+        self._where.show(f'<p class="rl-note rl-path">{esc(where)}</p>')
+
+
+def summary_html(recording: Recording | None, text: Text) -> str:
+    """Returns how far joints and tool were from the plan: RMS and largest, as a table."""
+    if recording is None:
+        return f'<p class="rl-note">{esc(text("record.nothing"))}</p>'
+    run, tracking = recording.run, recording.tracking
+    if run is None or tracking is None:
+        return f'<p class="rl-note">{esc(text("record.running", cycles=len(recording.t)))}</p>'
+    facts = text("record.facts", duration=f"{run.duration:.3f}", cycles=len(run.t), lost=run.timing.lost)
+    tone, ended = ("good", text("record.arrived"))
+    if run.faults:
+        tone, ended = "bad", text("record.faulted", faults=", ".join(fault.manual_name for fault in run.faults))
+    elif not run.is_complete:
+        tone, ended = "warn", text("record.cut")
+    elif run.stopped:
+        tone, ended = "warn", text("record.stopped")
+    return (
+        f'<p class="rl-verdict rl-{tone}"><b>{esc(ended)}</b> {esc(facts)}</p>'
+        f'<table class="rl-table"><tr><th>{esc(text("record.error"))}</th><th>{esc(text("record.rms"))}</th>'
+        f"<th>{esc(text('record.max'))}</th></tr>{_rows(tracking, text)}</table>"
+    )
+
+
+def progress_html(ending: str, share: float, text: Text) -> str:
+    """Returns a bar, and the same in words."""
+    percent = f"{100.0 * share:.0f}"
+    said = esc(text("export.progress", kind=text(f"export.{ending[1:]}"), percent=percent))
+    return f'<p class="rl-note" role="status">{said}</p><div class="rl-meter"><i style="width:{percent}%"></i></div>'
+
+
+def _rows(tracking: Tracking, text: Text) -> str:
+    rms, largest = np.degrees(tracking.joint_rms), np.degrees(tracking.joint_max)
+    rows = [(f"J{j + 1}", f"{rms[j]:.4f}°", f"{largest[j]:.4f}°") for j in range(len(rms))]
+    mm = [f"{1000.0 * value:.3f} mm" for value in (tracking.position_rms, tracking.position_max)]
+    turn = [f"{np.degrees(value):.4f}°" for value in (tracking.rotation_rms, tracking.rotation_max)]
+    rows += [(text("record.tool"), mm[0], mm[1]), (text("record.turn"), turn[0], turn[1])]
+    return "".join(f"<tr><td>{esc(name)}</td><td>{a}</td><td>{b}</td></tr>" for name, a, b in rows)
+
+
+def _export(ending: str):  # type: ignore[no-untyped-def]
+    return lambda page: requests.Export(page=page, ending=ending)

@@ -1,0 +1,61 @@
+"""A recorded run on the page: its plan and its recording, as if it had just been made, with nothing connected."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rcilab.errors import UsageError
+from rcilab.workbench.goal_actions import initial_goal
+from rcilab.workbench.planning import PATH_POINTS, Plan
+from rcilab.workbench.run_keeper import whole_recording
+
+if TYPE_CHECKING:
+    from rcilab.arrays import JointVector
+    from rcilab.model import RobotModel
+    from rcilab.recording.run import Run
+    from rcilab.workbench.store import UiState
+
+
+def require_replayable(run: Run) -> RobotModel:
+    """Returns the arm of a run that can be shown.
+
+    Raises:
+        UsageError: It has no cycle, no plan, or nobody knows which arm it was.
+    """
+    if run.model is None:
+        raise UsageError("this run cannot be replayed: its file does not say which arm made it")
+    if not len(run.cycles):
+        raise UsageError("this run cannot be replayed: not one cycle was recorded")
+    if run.plan is None:
+        raise UsageError("this run has no plan to compare with (a callback made it); save it as .html to look at it")
+    return run.model
+
+
+def replayed(state: UiState, run: Run) -> UiState:
+    """Returns a state that shows a run."""
+    model, motion, report = require_replayable(run), run.plan, run.report
+    assert motion is not None  # Both are required above.
+    assert report is not None
+    rows = np.linspace(0, len(motion.q) - 1, PATH_POINTS).astype(np.intp)
+    plan = Plan(
+        motion=motion,
+        report=report,
+        path=model.position_path(motion.q[rows]),
+        effort=np.abs(motion.dq[rows] / model.limits.joint.velocity).max(axis=1),
+        complete=True,
+    )
+    goal = initial_goal(model, motion.goal)
+    return replace(state, model=model, plan=plan, goal=goal, recording=whole_recording(run), place=0.0)
+
+
+def replayed_pose(state: UiState) -> JointVector | None:
+    """Returns where the recorded arm was at the place that the timeline stands at; None without a finished run."""
+    recording = state.recording
+    if recording is None or recording.run is None or state.plan is None:
+        return None
+    t = state.place * state.plan.motion.duration + recording.delay * 1e-3
+    row = min(int(np.searchsorted(recording.t, t)), len(recording.t) - 1)
+    return recording.q[row]

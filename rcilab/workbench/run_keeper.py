@@ -1,0 +1,104 @@
+"""Keeps what became of the last motion: for the plots while it happens, as a run once the arm stands still."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rcilab.errors import InvalidValueError
+from rcilab.recording.live import LiveRecording, RunFacts
+from rcilab.recording.run import Run
+from rcilab.recording.setup import Setup
+from rcilab.workbench.store import Recording, Store
+from rcilab.workbench.text import message
+
+if TYPE_CHECKING:
+    from rcilab.recording.run_file import RunFile
+    from rcilab.workbench.planning import Plan
+    from rcilab.workbench.store import UiState
+
+
+class RunKeeper:
+    """Owned by the conductor's thread.
+
+    Args:
+        store: Where the recording is shown.
+    """
+
+    def __init__(self, store: Store) -> None:
+        self._store = store
+        self._live: LiveRecording | None = None
+        self._file = ""
+
+    def begin(self, plan: Plan) -> None:
+        """Begins a recording; with "record every cycle" also in a file."""
+        state = self._store.state
+        plant = state.plant if state.target == "virtual" else ""
+        setup = Setup(target=state.target, plant=plant, mode="joint_position", started_ns=time.time_ns())
+        facts = RunFacts(plan=plan.motion, model=state.model, setup=setup)
+        self._live = LiveRecording(facts, self._open(state, plan, setup))
+
+    def add(self, rows: NDArray[np.void]) -> None:
+        """Adds cycles and shows them."""
+        if self._live is None:
+            return
+        before = self._live.cycles
+        try:
+            self._live.add(rows)
+        except InvalidValueError as error:
+            self._complain(error)
+        cycles = self._live.cycles
+        if cycles is not None and (before is None or len(cycles) > len(before)):
+            self._store.update(recording=as_recording(cycles, self._live.delay))
+
+    def finish(self, stopped: str | None) -> None:
+        """Ends the recording; from here on it can be exported."""
+        if self._live is None:
+            return
+        live, self._live = self._live, None
+        run: Run | None = None
+        try:
+            run = live.finish(stopped)
+        except InvalidValueError as error:
+            self._complain(error)
+            run = live.finish(stopped)  # Its file is given up now; the run in memory is whole.
+        if run is not None:
+            self._store.update(recording=whole_recording(run, self._file))
+
+    def _open(self, state: UiState, plan: Plan, setup: Setup) -> RunFile | None:
+        self._file = ""
+        if state.runs is None or not state.record:
+            return None
+        from rcilab.client.recorder import cycle_dtype
+        from rcilab.recording.run_file import ENDING, RunFile
+
+        stamp = time.strftime("%Y%m%d-%H%M%S", time.localtime(setup.started_ns * 1e-9))
+        path = state.runs / f"{stamp}-{setup.started_ns // 1_000_000 % 1000:03d}-{state.model.name}{ENDING}"
+        try:
+            file = RunFile(
+                path, cycle_dtype(state.model.n), plan=plan.motion, model=state.model, setup=setup, report=plan.report
+            )
+        except InvalidValueError as error:
+            self._complain(error)
+            return None
+        self._file = str(path)
+        return file
+
+    def _complain(self, error: InvalidValueError) -> None:
+        self._file = ""
+        self._store.say("warn", message("record.unwritable", file=str(error.value), why=error.requirement))
+
+
+def as_recording(cycles: NDArray[np.void], delay: int) -> Recording:
+    """Returns what the plots need of a run that goes on."""
+    return Recording(t=cycles["t"], q=cycles["q"], q_c=cycles["q_c"], dq=cycles["dq"], delay=delay)
+
+
+def whole_recording(run: Run, file: str = "") -> Recording:
+    """Returns a finished run for plots, table and export."""
+    return Recording(
+        t=run.t, q=run.q, q_c=run.q_c, dq=run.dq, delay=run.delay, run=run, tracking=run.tracking, file=file
+    )

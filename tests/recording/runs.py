@@ -1,0 +1,39 @@
+"""A run whose error is known: the arm follows its plan one cycle late, and joint 2 with a known offset."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from rcilab.client.recorder import Recorder
+from rcilab.dynamics.payload import Payload
+from rcilab.model import load_model
+from rcilab.motion import plan_joint
+from rcilab.recording.run import Run, build_run
+from rcilab.recording.setup import Setup
+from rcilab.spatial import Pose
+
+MODEL = load_model("xMatePro7", tool=Pose((0.0, 0.01, 0.12), (0.9, 0.1, 0.2, 0.3)), load=Payload(mass=1.5))
+PLAN = plan_joint(MODEL, MODEL.home, MODEL.home + 0.2, speed=0.3)
+SETUP = Setup(target="virtual", plant="mujoco", mode="joint_position", started_ns=1_700_000_000_123_456_789)
+OFFSET = 1e-3  # [rad] of joint 2.
+
+
+@lru_cache
+def some_cycles(count: int | None = None) -> np.ndarray:
+    rows = PLAN.q if count is None else PLAN.q[:count]
+    recorder = Recorder(7, len(rows))
+    for k, q in enumerate(rows):
+        before = rows[max(k - 1, 0)]
+        measured = before + OFFSET * np.eye(7)[1]
+        stamp = 1_000_000 * k
+        recorder.write(
+            k + 5, k * 1e-3, stamp, stamp + 90_000, 2e-5, 1.0,
+            measured, before, PLAN.dq[k], q, 0, 0, (1, 1, 1), [1.0] * 7
+        )  # fmt: skip
+    return recorder.rows()
+
+
+def some_run(**facts) -> Run:
+    return build_run(some_cycles(), plan=PLAN, model=MODEL, setup=SETUP, **facts)

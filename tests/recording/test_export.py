@@ -1,0 +1,104 @@
+"""Every form in which a run is taken away holds the same numbers, with their units."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+
+import numpy as np
+import pytest
+
+from rcilab.recording.export import export_run
+from tests.recording.runs import OFFSET, PLAN, SETUP, some_run
+
+RUN = some_run()
+
+
+def test_tracking_knows_the_error_we_made():
+    tracking = RUN.tracking
+    assert RUN.delay == 1
+    assert tracking.joint_max == pytest.approx([0.0, OFFSET, 0, 0, 0, 0, 0], abs=1e-12)
+    assert tracking.joint_rms == pytest.approx([0.0, OFFSET, 0, 0, 0, 0, 0], abs=1e-12)
+    assert tracking.rotation_max == pytest.approx(OFFSET, rel=1e-6)  # One joint turns the tool by its own error.
+    q = np.array(RUN.planned[100])
+    moved = RUN.model.forward(q + OFFSET * np.eye(7)[1]).position - RUN.model.forward(q).position
+    assert tracking.position[100] == pytest.approx(np.linalg.norm(moved), rel=1e-9)
+
+
+def test_a_csv_says_units_and_loses_no_digit():
+    rows = list(csv.DictReader(io.StringIO(export_run(RUN, ".csv").decode())))
+    assert len(rows) == len(RUN.t)
+    assert [float(row["q[2] [rad]"]) for row in rows] == RUN.q[:, 1].tolist()
+    assert [float(row["error[2] [rad]"]) for row in rows] == RUN.error[:, 1].tolist()
+    assert [float(row["q_plan[1] [rad]"]) for row in rows] == RUN.planned[:, 0].tolist()
+    without = {name for name in rows[0] if "[" not in name.replace("[", "", 1) and not name.endswith("]")}
+    assert without == {
+        "message_id", "success_rate", "faults", "lost", "robot_mode", "controller_mode", "motion_generator_mode"
+    }  # fmt: skip
+    assert {"command_pose[1,4] [m]", "command_pose[1,1]", "tool_error [m]", "t [s]", "tau[7] [N m]"} <= set(rows[0])
+
+
+def test_a_data_frame_and_parquet_hold_the_same_columns():
+    pandas, parquet = pytest.importorskip("pandas"), pytest.importorskip("pyarrow.parquet")
+    frame = RUN.to_pandas()
+    assert frame.index.name == "t"
+    assert frame["q[2]"].tolist() == RUN.q[:, 1].tolist()
+    assert frame.attrs["units"]["tool_error"] == "m"
+    table = parquet.read_table(io.BytesIO(export_run(RUN, ".parquet")))
+    assert set(table.column_names) == {"t", *frame.columns}
+    assert table.schema.field("q[2]").metadata == {b"unit": b"rad"}
+    assert json.loads(table.schema.metadata[b"rcilab"])["arm"] == "xMatePro7"
+    assert isinstance(frame, pandas.DataFrame)
+
+
+def test_an_mcap_opens_with_the_mcap_reader_and_fits_its_schemas():
+    reader = pytest.importorskip("mcap.reader").make_reader(io.BytesIO(export_run(RUN, ".mcap")))
+    summary = reader.get_summary()
+    topics = {channel.topic for channel in summary.channels.values()}
+    assert topics == {"/measured", "/commanded", "/plan", "/error", "/health", "/tool"}
+    assert set(summary.statistics.channel_message_counts.values()) == {len(RUN.t)}
+    first = {}
+    for schema, channel, message in reader.iter_messages():
+        assert (schema.encoding, channel.message_encoding) == ("jsonschema", "json")
+        said = json.loads(message.data)
+        assert set(said) == set(json.loads(schema.data)["properties"])
+        first.setdefault(channel.topic, (message.log_time, said))
+    assert first["/measured"][0] == SETUP.started_ns
+    assert first["/measured"][1]["q"] == RUN.q[0].tolist()
+    assert first["/error"][1]["joint"][1] == pytest.approx(OFFSET)
+    assert first["/tool"][1]["pose"]["position"]["z"] == pytest.approx(RUN.model.forward(RUN.q[0]).position[2])
+    (record,) = reader.iter_metadata()
+    assert record.metadata["arm"] == "xMatePro7"
+
+
+def test_nothing_an_export_says_is_no_number_in_json():
+    assert "NaN" not in export_run(RUN, ".html").decode()
+    facts = json.loads(json.dumps(some_facts(), allow_nan=False))
+    assert facts["conforms"] is True
+    assert math.isclose(facts["tool_error_max_m"], RUN.tracking.position_max)
+
+
+def some_facts():
+    from rcilab.recording.columns import run_facts
+
+    return run_facts(RUN)
+
+
+def test_progress_ends_at_one_and_never_goes_back():
+    for ending in (".csv", ".html", ".rcirun"):
+        shares: list[float] = []
+        export_run(RUN, ending, progress=shares.append)
+        assert shares == sorted(shares)
+        assert shares[-1] == 1.0
+
+
+def test_the_page_asks_for_nothing_from_elsewhere_and_speaks_both_languages():
+    for language, word in (("en", "Plan against actual"), ("zh", "规划与实际")):
+        page = export_run(RUN, ".html", language=language).decode()
+        assert "http" not in page.replace('http-equiv="Content-Security-Policy"', "")
+        assert "default-src 'none'" in page
+        assert word in page
+        assert "@@" not in page
+    assert PLAN.duration < 60.0

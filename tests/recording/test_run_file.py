@@ -1,0 +1,140 @@
+"""A run comes back from its file as it was, and a file that was cut off gives back every whole block."""
+
+from __future__ import annotations
+
+import struct
+
+import numpy as np
+import pytest
+
+import rcilab
+from rcilab.client.recorder import cycle_dtype
+from rcilab.errors import InvalidValueError, UsageError, VersionMismatchError
+from rcilab.recording.blocks import MAGIC, encode_block, encode_header
+from rcilab.recording.export import export_run
+from rcilab.recording.live import LiveRecording, RunFacts
+from rcilab.recording.run import Run
+from rcilab.recording.run_file import BLOCK_CYCLES, RunFile, decode_run
+from tests.recording.runs import MODEL, PLAN, SETUP, some_cycles, some_run
+
+
+def same(a: Run, b: Run) -> bool:
+    return a.cycles.tobytes() == b.cycles.tobytes() and a.cycles.dtype == b.cycles.dtype
+
+
+def test_a_run_comes_back_as_it_was(tmp_path):
+    run = some_run(stopped="on request")
+    run.save(tmp_path / "a.rcirun")
+    back = rcilab.load_run(tmp_path / "a.rcirun")
+    assert same(back, run)
+    assert back.plan is not None
+    assert np.array_equal(back.plan.q, PLAN.q)
+    assert back.model is not None
+    assert back.model.fingerprint == MODEL.fingerprint  # Tool and load, too.
+    assert (back.setup, back.stopped, back.realtime, back.is_complete) == (SETUP, "on request", True, True)
+    assert back.report is not None
+    assert back.report.ok
+    assert repr(back) == repr(run)
+
+
+def test_a_callback_without_plan_or_arm_comes_back_too():
+    run = Run(plan=None, cycles=some_cycles(10))
+    back = decode_run(export_run(run, ".rcirun"))
+    assert same(back, run)
+    assert (back.plan, back.model, back.report) == (None, None, None)
+
+
+def test_a_file_cut_anywhere_opens_up_to_the_last_whole_block(tmp_path):
+    run = some_run()
+    whole = export_run(run, ".rcirun")
+    ends = [at for at, _ in block_places(whole)]
+    rows = [0, 0, 0, 0] + [
+        min(k * BLOCK_CYCLES, len(run.cycles)) for k in range(1, len(ends))
+    ]  # Header, head, plan: none.
+    places = sorted({p for end in ends for p in (end - 1, end, end + 1, end + 7)} | set(range(12, len(whole), 9973)))
+    for cut in places:
+        if cut >= len(whole):
+            continue
+        if cut < ends[1]:
+            with pytest.raises(InvalidValueError, match="ends before its first block"):
+                decode_run(whole[:cut])
+            continue
+        back = decode_run(whole[:cut])
+        assert not back.is_complete
+        kept = rows[sum(end <= cut for end in ends)]
+        assert len(back.cycles) == kept
+        assert back.cycles.tobytes() == run.cycles[:kept].tobytes()
+
+
+@pytest.mark.parametrize("cut", [1, 7, 8, 11])
+def test_a_file_cut_in_its_header_says_so(cut):
+    with pytest.raises(InvalidValueError, match=r"rcilab did not write it|ends before its first block"):
+        decode_run(export_run(some_run(), ".rcirun")[:cut])
+
+
+def test_a_spoiled_byte_costs_what_comes_after_it_and_nothing_before():
+    run = some_run()
+    content = bytearray(export_run(run, ".rcirun"))
+    ends = [at for at, _ in block_places(bytes(content))]
+    content[ends[3] + 40] ^= 1  # In the second block of cycles.
+    back = decode_run(bytes(content))
+    assert back.cycles.tobytes() == run.cycles[:BLOCK_CYCLES].tobytes()
+    assert not back.is_complete
+
+
+def test_what_was_written_before_a_crash_is_there(tmp_path):
+    path = tmp_path / "runs" / "a.rcirun"
+    live = LiveRecording(
+        RunFacts(plan=PLAN, model=MODEL, setup=SETUP), RunFile(path, cycle_dtype(7), plan=PLAN, model=MODEL)
+    )
+    run = some_run()
+    for start in range(0, len(run.cycles), 33):
+        live.add(run.cycles[start : start + 33])
+    crashed = rcilab.load_run(path)  # Nobody has closed it.
+    assert len(crashed.cycles) == len(run.cycles) // BLOCK_CYCLES * BLOCK_CYCLES
+    assert not crashed.is_complete
+    assert "cut off" in repr(crashed)
+    ended = live.finish("on request")
+    assert ended is not None
+    assert same(ended, run)
+    back = rcilab.load_run(path)
+    assert same(back, run)
+    assert (back.is_complete, back.stopped) == (True, "on request")
+
+
+def test_other_files_are_refused_in_words(tmp_path):
+    for content, words in (
+        (b"", "is empty"),
+        (b"PK\x03\x04 a zip", "rcilab did not write it"),
+        (encode_header() + encode_block("HEAD", b"{}"), "is damaged"),
+        (encode_header() + encode_block("CYCL", b""), "ends before its first block"),
+    ):
+        (tmp_path / "x.rcirun").write_bytes(content)
+        with pytest.raises(InvalidValueError, match=words):
+            rcilab.load_run(tmp_path / "x.rcirun")
+    with pytest.raises(VersionMismatchError, match="99"):
+        decode_run(MAGIC + struct.pack("<I", 99))
+    with pytest.raises(InvalidValueError, match="does not exist"):
+        rcilab.load_run(tmp_path / "nothing.rcirun")
+    with pytest.raises(InvalidValueError, match=r"there are \.rcirun, \.csv"):
+        some_run().save(tmp_path / "a.xls")
+    with pytest.raises(InvalidValueError, match="cannot be written"):
+        some_run().save(tmp_path / "no" / "folder.rcirun")
+
+
+def test_a_missing_library_is_named_with_its_extra(monkeypatch):
+    import sys
+
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(UsageError, match=r"Parquet needs pyarrow.*pip install 'rcilab\[export\]'"):
+        export_run(some_run(), ".parquet")
+
+
+def block_places(content: bytes) -> list[tuple[int, bytes]]:
+    """Where each block ends, the header first."""
+    places, at = [(12, b"")], 12
+    while at < len(content):
+        kind, length, _ = struct.unpack_from("<4sII", content, at)
+        at += 12 + length
+        places.append((at, kind))
+    return places

@@ -1,0 +1,10 @@
+"""The words of the exported page are complete in both languages."""
+
+from __future__ import annotations
+
+from rcilab.language import LANGUAGES, load_words
+from tests.catalogues import require_equal
+
+
+def test_every_language_has_the_same_keys_and_places_to_fill():
+    require_equal(lambda language: load_words("rcilab.recording", language), LANGUAGES)
