@@ -15,13 +15,13 @@ from importlib.resources import files
 from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rcilab.language import Language, load_words, require_language
 from rcilab.robots.shapes import ROLE_COLORS, build_shapes
 from rcilab.robots.upright import upright_flange, upright_joints
 
 if TYPE_CHECKING:
-    from rcilab.arrays import Array
     from rcilab.model import RobotModel
     from rcilab.recording.run import Run
 
@@ -65,7 +65,7 @@ class _Packed:
         self._parts: list[bytes] = []
         self._size = 0
 
-    def add(self, array: Array, kind: str = "<f4") -> dict[str, Any]:
+    def add(self, array: NDArray[Any], kind: str = "<f4") -> dict[str, Any]:
         """Adds an array and returns how the page finds it."""
         flat = np.ascontiguousarray(array, dtype=kind)
         place = {"at": self._size, "count": int(flat.size), "kind": kind}

@@ -262,9 +262,8 @@ def _build_arm(facts: dict[str, Any]) -> RobotModel:
 
 
 def _fields(dtype: np.dtype[np.void]) -> list[tuple[str, Any]]:
-    assert dtype.names is not None
     assert dtype.fields is not None
-    return [(name, dtype.fields[name]) for name in dtype.names]
+    return list(dtype.fields.items())
 
 
 def _unwritable(path: Path, error: OSError) -> InvalidValueError:

@@ -211,8 +211,8 @@ def legend_html(frame: Frame, joint: int, n: int, text: Text) -> str:
 def _plot_height(state: UiState) -> int:
     finished = state.recording is not None and state.recording.tracking is not None
     rows = len(QUANTITIES) + len(_ERRORS) * finished
-    spare = 44 * finished  # Titles of the rows of errors, and their times.
-    return max(84 if finished else 90, int((state.height - _OTHER_HEIGHT - spare) / rows) // 4 * 4)
+    spare = 80 * finished  # [px] Titles of the rows of errors, and their times.
+    return max(72 if finished else 90, int((state.height - _OTHER_HEIGHT - spare) / rows) // 4 * 4)
 
 
 def _axes(*, last: bool) -> tuple[Any, ...]:

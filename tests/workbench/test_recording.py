@@ -1,0 +1,152 @@
+"""What became of a motion on the page: recorded whole, in a file too, exported, and replayed with nothing connected."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+import rcilab
+from rcilab.errors import UsageError
+from rcilab.recording.export import export_run
+from rcilab.recording.run_file import decode_run
+from rcilab.workbench import requests
+from rcilab.workbench.app import Workbench, WorkbenchConfig
+from rcilab.workbench.export_actions import ENDINGS
+from rcilab.workbench.panels.recording import progress_html, summary_html
+from rcilab.workbench.readiness import obstacle
+from rcilab.workbench.replay import replayed_pose, require_replayable
+from rcilab.workbench.text import Text
+from tests.recording.runs import some_run
+from tests.workbench.opened import told, wait
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory) -> Iterator[Workbench]:
+    config = WorkbenchConfig(port=0, quality="light", runs=tmp_path_factory.mktemp("home") / "runs")
+    with Workbench(config) as found:
+        wait(lambda: bool(found.session.status().powered), "an arm with power")
+        yield found
+        assert found.conductor.errors == []
+        assert found.presenter.errors == []
+
+
+def execute(bench: Workbench, angle: float, speed: float = 0.5) -> None:
+    bench.conductor.ask(requests.SetSpeed(speed=speed))
+    bench.conductor.ask(requests.MoveJoint(joint=0, angle=angle))
+    wait(
+        lambda: (
+            (plan := bench.store.state.plan) is not None
+            and abs(plan.motion.goal[0] - angle) < 1e-9
+            and obstacle(bench.store.state, bench.session.status()) is None
+        ),
+        "a plan that may be executed",
+    )
+    bench.conductor.ask(requests.Drive(what="execute"))
+
+
+def finished(bench: Workbench):
+    wait(lambda: (r := bench.store.state.recording) is not None and r.run is not None, "a finished recording")
+    return bench.store.state.recording
+
+
+def test_a_motion_is_recorded_whole_judged_against_its_plan_and_kept_in_a_file(bench):
+    execute(bench, 0.2)
+    recording = finished(bench)
+    run = recording.run
+    assert np.array_equal(np.diff(run.cycles["message_id"]), 1 + run.cycles["lost"][1:])  # Every cycle, none twice.
+    assert run.t[-1] >= run.plan.duration
+    assert run.stopped is None
+    assert recording.tracking.joint_max.max() < 1e-6  # The ideal plant is where it is told to be.
+    back = rcilab.load_run(recording.file)
+    assert back.is_complete
+    assert back.cycles.tobytes() == run.cycles.tobytes()
+    assert (back.setup.target, back.setup.plant) == ("virtual", "ideal")
+    html = summary_html(recording, Text("en"))
+    assert "Ran to its end" in html
+    assert "J7" in html
+
+
+def test_a_motion_whose_control_process_is_killed_leaves_every_cycle_until_then(bench):
+    status = bench.session.status()
+    execute(bench, -1.0 if status.q_c[0] > 0 else 1.0, speed=0.1)
+    wait(lambda: (r := bench.store.state.recording) is not None and len(r.t) > 300, "a motion on its way")
+    os.kill(bench.session.status().worker_pid, signal.SIGKILL)
+    recording = finished(bench)
+    run = recording.run
+    assert 300 < len(run.t) < len(run.plan.q)
+    assert np.array_equal(np.diff(run.cycles["message_id"]), 1 + run.cycles["lost"][1:])
+    assert "control process" in run.stopped
+    assert rcilab.load_run(recording.file).cycles.tobytes() == run.cycles.tobytes()
+    assert "Stopped before its end" in summary_html(recording, Text("en"))
+
+
+def test_exports_reach_the_page_that_asked_and_problems_are_told(bench, monkeypatch):
+    if bench.store.state.recording is None:
+        execute(bench, 0.1)
+    run = finished(bench).run
+    sent = []
+    actions = bench.conductor._export
+    monkeypatch.setattr(actions, "_deliver", lambda page, name, content: sent.append((page, name, content)))
+    for ending in (".csv", ".html", ".rcirun"):
+        bench.conductor.ask(requests.Export(page=7, ending=ending))
+        wait(lambda ending=ending: bool(sent) and sent[-1][1].endswith(ending), f"the {ending}")
+        wait(lambda: bench.store.state.export is None, "the end of the export")
+    assert {page for page, _, _ in sent} == {7}
+    assert sent[0][1].startswith("xMatePro7-20")
+    assert decode_run(sent[2][2]).cycles.tobytes() == run.cycles.tobytes()
+    import sys
+
+    monkeypatch.setitem(sys.modules, "mcap.writer", None)
+    bench.conductor.ask(requests.Export(page=7, ending=".mcap"))
+    wait(lambda: told(bench) == "export.missing", "what is missing")
+    wait(lambda: bench.store.state.export is None, "the end of the export")
+    bench.store.update(recording=None)
+    bench.conductor.ask(requests.Export(page=7, ending=".csv"))
+    wait(lambda: told(bench) == "export.nothing", "that there is nothing")
+    bench.conductor.ask(requests.Export(page=7, ending="../../etc/passwd"))
+    assert len(sent) == 3
+
+
+def test_a_run_is_replayed_with_nothing_connected_until_it_is_asked_for():
+    run = some_run()
+    with Workbench(WorkbenchConfig(port=0, quality="light", replay=run)) as bench:
+        assert bench.store.state.model is run.model
+        assert bench.store.state.recording.run is run
+        bench.conductor.ask(requests.Seek(place=0.5))
+        wait(lambda: bench.store.state.place == 0.5, "the middle of the run")
+        middle = replayed_pose(bench.store.state)
+        row = int(np.searchsorted(run.t, 0.5 * run.plan.duration + 1e-3))
+        assert np.array_equal(middle, run.q[row])
+        status = bench.session.status()
+        assert (status.phase, status.worker_pid) == ("closed", None)
+        assert obstacle(bench.store.state, status).code == "ready.closed"
+        bench.conductor.ask(requests.ChooseRobot(target="virtual"))
+        wait(lambda: bench.session.status().phase == "idle", "a virtual controller, once it was asked for")
+        assert bench.conductor.errors == []
+        assert bench.presenter.errors == []
+
+
+def test_a_run_that_cannot_be_replayed_says_why():
+    from dataclasses import replace
+
+    for facts, words in (
+        ({"model": None}, "which arm"),
+        ({"plan": None}, "callback"),
+        ({"cycles": some_run().cycles[:0]}, "cycle"),
+    ):
+        with pytest.raises(UsageError, match=words):
+            require_replayable(replace(some_run(), **facts))
+
+
+def test_every_export_of_the_page_is_named_in_both_languages():
+    for language in ("en", "zh"):
+        text = Text(language)
+        for ending in ENDINGS:
+            assert text.has(f"export.{ending[1:]}")
+            assert text.has(f"export.{ending[1:]}_hint")
+        assert "40 %" in progress_html(".csv", 0.4, text)
+    assert len(export_run(some_run(), ".npz")) > 1000
