@@ -1,0 +1,62 @@
+"""After a run: its error in the panel, its file in the downloads, and that file alive with the network cut off."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+
+from rcilab.recording.export import export_run
+from tests.recording.runs import some_run
+
+
+def test_a_run_is_shown_against_its_plan_and_downloaded(page, tmp_path):
+    page.plan_to(1, 12.0 if page.status.q_c[0] <= 0 else -12.0)
+    page.open_tab("Run")
+    page.wait(lambda: page.button("Execute").is_enabled(), "Execute to be pressable")
+    page.button("Execute").click()
+    page.wait(lambda: page.state.recording is not None and page.state.recording.run is not None, "a finished run", 30)
+    page.wait(
+        lambda: "Ran to its end" in page.tab.locator(".rl-verdict:visible").all_inner_texts().__str__(), "its end"
+    )
+    page.wait(lambda: page.tab.locator(".rl-plot-title", has_text="Error of the tool").count() == 1, "a plot of errors")
+    page.wait(lambda: page.button("CSV").is_enabled(), "exports to be pressable")
+    with page.tab.expect_download(timeout=20_000) as coming:
+        page.button("CSV").click()
+    coming.value.save_as(tmp_path / "run.csv")
+    with open(tmp_path / "run.csv", newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    run = page.state.recording.run
+    assert [float(row["q[1] [rad]"]) for row in rows] == run.q[:, 0].tolist()
+    assert "q_plan[1] [rad]" in rows[0]
+
+
+def test_the_exported_page_lives_without_a_network(chromium, tmp_path):
+    run = some_run()
+    file = Path(tmp_path / "run.html")
+    file.write_bytes(export_run(run, ".html"))
+    context = chromium.new_context(viewport={"width": 1000, "height": 640}, offline=True)
+    tab = context.new_page()
+    problems: list[str] = []
+    asked: list[str] = []
+    tab.on("pageerror", lambda error: problems.append(str(error)))
+    tab.on("console", lambda said: problems.append(said.text) if said.type == "error" else None)
+    tab.on("request", lambda request: asked.append(request.url))
+    tab.goto(file.as_uri())
+    tab.wait_for_selector("body[data-ready=yes]", timeout=20_000)
+    assert tab.locator("#missing").is_hidden()
+    pictures = [tab.locator("#scene").screenshot()]
+    tab.get_by_role("slider").focus()
+    tab.keyboard.press("End")
+    assert tab.locator("#clock b").inner_text() == f"{run.t[-1]:.3f}"
+    pictures.append(tab.locator("#scene").screenshot())
+    assert pictures[0] != pictures[1], "the arm stands elsewhere at the end"
+    tab.get_by_label("Joint").select_option("2")
+    largest = np.degrees(run.tracking.joint_max[1])
+    assert f"{largest:.4f}°" in tab.locator("table.numbers").inner_text()
+    tab.get_by_role("button", name="Play").click()
+    tab.get_by_role("button", name="Pause").click()
+    assert problems == []
+    assert asked == [file.as_uri()]
+    context.close()
