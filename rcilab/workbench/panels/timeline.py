@@ -83,7 +83,7 @@ class TimelinePanel:
                 scales={"x": {"time": False, "range": (0.0, 1.0)}, "y": {"range": (-112.0, 112.0)}},
                 cursor={"drag": {"x": False, "y": False}, "sync": {"key": "rcilab"}},
                 padding=(6, 12, 0, 0),
-                axes=_axes(last=quantity in ("jerk", "tool")),
+                axes=_axes(last=quantity in ("jerk", "tool"), space=16 if quantity in _ERRORS else 28),
                 visible=quantity not in _ERRORS,
             )
         self._legend = Html(gui)
@@ -157,6 +157,8 @@ class TimelinePanel:
     def _fill(self, name: str, frame: Frame, state: UiState, reach: tuple[float, float]) -> None:
         plot = self._plots[name]
         data, series, _ = plot_contents(frame, 0 if name == "tool" else state.plot_joint, state.model.n)
+        if name == "tool":  # It is no joint's.
+            series = tuple({**look, "stroke": "#111827"} if "pxAlign" in look else look for look in series)
         if plot.series != series:
             plot.series = series
         plot.data = data
@@ -215,7 +217,7 @@ def _plot_height(state: UiState) -> int:
     return max(72 if finished else 90, int((state.height - _OTHER_HEIGHT - spare) / rows) // 4 * 4)
 
 
-def _axes(*, last: bool) -> tuple[Any, ...]:
+def _axes(*, last: bool, space: int) -> tuple[Any, ...]:
     font = "11px system-ui, sans-serif"
     x: Any = {"font": font, "size": 22, "gap": 2, "ticks": {"size": 3}} if last else {"show": False}
-    return x, {"font": font, "size": 46, "gap": 3, "space": 28, "ticks": {"size": 3}}
+    return x, {"font": font, "size": 46, "gap": 3, "space": space, "ticks": {"size": 3}}
