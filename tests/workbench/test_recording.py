@@ -111,7 +111,7 @@ def test_exports_reach_the_page_that_asked_and_problems_are_told(bench, monkeypa
     assert len(sent) == 3
 
 
-def test_a_run_is_replayed_with_nothing_connected_until_it_is_asked_for():
+def test_a_run_is_replayed_with_nothing_connected_until_it_is_asked_for(monkeypatch):
     run = some_run()
     with Workbench(WorkbenchConfig(port=0, quality="light", replay=run)) as bench:
         assert bench.store.state.model is run.model
@@ -124,8 +124,10 @@ def test_a_run_is_replayed_with_nothing_connected_until_it_is_asked_for():
         status = bench.session.status()
         assert (status.phase, status.worker_pid) == ("closed", None)
         assert obstacle(bench.store.state, status).code == "ready.closed"
+        opened = []
+        monkeypatch.setattr(bench.session, "open", lambda *what: opened.append(what[:2]))
         bench.conductor.ask(requests.ChooseRobot(target="virtual"))
-        wait(lambda: bench.session.status().phase == "idle", "a virtual controller, once it was asked for")
+        wait(lambda: opened == [(run.model, "virtual")], "a virtual controller, once it is asked for")
         assert bench.conductor.errors == []
         assert bench.presenter.errors == []
 
