@@ -150,7 +150,7 @@ class GoalActions:
         if status.q_c is None:
             if request is not None:  # Nothing has changed: what was planned is not lost.
                 self._store.say("warn", message("plan.no_arm"))
-            else:
+            elif state.recording is None:  # A run that is looked at stays, whatever is posed.
                 self._store.update(plan=None, no_plan=message("plan.no_arm"), recording=None, place=0.0, playing=False)
             return
         made = make_plan(state.model, frozen(status.q_c), state.goal.q, state.speed, state.law)

@@ -61,7 +61,11 @@ class Stage:
             replayed = replayed_pose(state)
             live = state.goal.q if replayed is None else replayed
         self._live.show(live)
-        self._see("candidate", self._candidate, self._differs(state.goal.q, live) and not is_moving(status))
+        self._see(
+            "candidate",
+            self._candidate,
+            status.q is not None and self._differs(state.goal.q, live) and not is_moving(status),
+        )
         self._candidate.show(state.goal.q)
         self._show_plan(state, status, live)
         self._show_target(state, text)

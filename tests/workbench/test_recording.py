@@ -121,6 +121,10 @@ def test_a_run_is_replayed_with_nothing_connected_until_it_is_asked_for(monkeypa
         middle = replayed_pose(bench.store.state)
         row = int(np.searchsorted(run.t, 0.5 * run.plan.duration + 1e-3))
         assert np.array_equal(middle, run.q[row])
+        bench.conductor.ask(requests.MoveJoint(joint=0, angle=0.5))
+        wait(lambda: abs(bench.store.state.goal.q[0] - 0.5) < 1e-9, "a goal that was posed")
+        assert bench.store.state.recording.run is run, "posing a goal loses nothing of the run"
+        assert bench.store.state.plan.motion is run.plan
         status = bench.session.status()
         assert (status.phase, status.worker_pid) == ("closed", None)
         assert obstacle(bench.store.state, status).code == "ready.closed"

@@ -12,7 +12,14 @@ if TYPE_CHECKING:
     from rcilab.supervisor import SupervisorStatus
     from rcilab.workbench.store import UiState
 
-_TONES = {"idle": "good", "moving": "good", "starting": "warn", "connecting": "warn", "stopping": "warn"}
+_TONES = {
+    "idle": "good",
+    "moving": "good",
+    "starting": "warn",
+    "connecting": "warn",
+    "stopping": "warn",
+    "closed": "warn",
+}
 
 
 def status_values(state: UiState, status: SupervisorStatus, text: Text, cursor_end: float) -> dict[str, Any]:
