@@ -49,7 +49,7 @@ class SetupActions:
 
     def __init__(self, store: Store, session: Session) -> None:
         self._store, self._session = store, session
-        self._past: list[RobotSetup] = []
+        self._past: list[tuple[RobotSetup, frozenset[SetupPart]]] = []  # What was wanted, what of it was edited.
         self._arm = store.state.model.name
         self._drag: tuple[int | None, str] | None = None  # Which page drags which part.
         self._dragged = -math.inf  # When it was last heard to.
@@ -195,17 +195,21 @@ class SetupActions:
     def _edit(self, changed: SetupState, part: SetupPart, *, drag: tuple[int | None, str] | None = None) -> None:
         """Takes over an edit; a drag is one step to undo."""
         if drag is None or drag != self._drag:
-            self._past = [*self._past[-_UNDO_DEPTH:], self._store.state.setup.wanted]
+            now = self._store.state.setup
+            self._past = [*self._past[-_UNDO_DEPTH:], (now.wanted, now.touched)]
         self._drag = drag
-        self._take(changed, {part})
+        self._take(replace(changed, touched=changed.touched | {part}), {part})
 
     def _undo(self) -> None:
         if not self._past:
             return
-        setup, before = self._store.state.setup, self._past.pop()
+        setup, (before, touched) = self._store.state.setup, self._past.pop()
+        touched |= frozenset(self._session.status().setup.parts)  # What it was told it must be told to forget.
+        if self._ticket is not None:
+            touched |= setup.touched
         parts: set[SetupPart] = {p for p in SETUP_PARTS if getattr(before, p) is not getattr(setup.wanted, p)}
         self._clear_problems(f"setup.{part}.{name}" for part in parts for name in FIELD_NAMES[part])
-        self._take(replace(setup, wanted=before, inertia=None), parts)
+        self._take(replace(setup, wanted=before, touched=touched, inertia=None), parts)
 
     def _take(self, setup: SetupState, parts: set[SetupPart]) -> None:
         """Exchanges the set-up and what depends on it: the arm's tool and load, goal, path. The plan may go stale."""
@@ -222,9 +226,7 @@ class SetupActions:
                 changes["goal"] = Goal(q=state.goal.q, target=target, reach=reach, psi=state.goal.psi)
                 if isinstance(state.plan, Plan):
                     changes["plan"] = replace(state.plan, path=tool_path(model, state.plan.motion), short=None)
-        changes["setup"] = replace(
-            setup, touched=setup.touched | parts, asked=None, refusal=None, can_undo=bool(self._past)
-        )
+        changes["setup"] = replace(setup, asked=None, refusal=None, can_undo=bool(self._past))
         self._store.update(**changes, typed=state.typed + 1)
 
     def _complain(self, field: str, problem: Message) -> None:

@@ -47,6 +47,7 @@ def ask(bench) -> Callable[[requests.Request], None]:
     while bench.store.state.setup.can_undo:
         act(requests.PressSetup(what="undo"))
     act(requests.PoseGoal(name="here"))
+    wait(lambda: settled(bench), "the controller to have the first set-up")
     return act
 
 
@@ -263,8 +264,12 @@ def test_a_robot_that_is_not_ours_is_changed_only_after_a_second_yes(bench, ask)
     try:
         ask(requests.ChooseRobot(target=controller.address))
         wait(lambda: bench.session.status().phase == "idle" and bench.session.is_ready, "the other controller")
+        told_before = setup_obstacle(bench.store.state, bench.session.status())
         type_in(ask, load_mass="1.5")
         assert setup_obstacle(bench.store.state, bench.session.status()).code == "ready.setup_unsent"
+        ask(requests.PressSetup(what="undo"))
+        assert setup_obstacle(bench.store.state, bench.session.status()) == told_before
+        type_in(ask, load_mass="1.5")
         ask(requests.PressSetup(what="confirm"))
         ask(requests.PressSetup(what="send"))
         ask(requests.PressSetup(what="cancel"))
