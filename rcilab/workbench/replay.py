@@ -44,10 +44,7 @@ def replayed(state: UiState, run: Run) -> UiState:
         motion=motion,
         report=report,
         path=model.position_path(motion.q[rows]),
-<<<<<<< HEAD
         model=model,
-=======
->>>>>>> c-record
         effort=np.abs(motion.dq[rows] / model.limits.joint.velocity).max(axis=1),
         complete=True,
     )

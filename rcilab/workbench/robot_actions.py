@@ -17,12 +17,8 @@ from rcilab.workbench.reach import Tone
 from rcilab.workbench.readiness import is_moving, obstacle
 from rcilab.workbench.run_keeper import RunKeeper
 from rcilab.workbench.session import Session
-<<<<<<< HEAD
 from rcilab.workbench.setting_up import SetupState
 from rcilab.workbench.store import Goal, Store, UiState
-=======
-from rcilab.workbench.store import Goal, Store
->>>>>>> c-record
 from rcilab.workbench.telling import StartingError, tell_error, tell_incident
 from rcilab.workbench.text import Message, message
 
@@ -254,11 +250,8 @@ class RobotActions:
     def close(self) -> None:
         """Ends a recording, so that its file has an end."""
         self._end_recording()
-<<<<<<< HEAD
 
 
 def _own_setup(state: UiState, target: str) -> RobotSetup | None:
     """Returns what our own controller is told at once; a foreign one is told nothing that was not agreed to."""
     return state.setup.wanted.only(state.setup.touched) if target == "virtual" else None
-=======
->>>>>>> c-record

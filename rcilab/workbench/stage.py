@@ -14,10 +14,7 @@ from rcilab.workbench.grip import Grip
 from rcilab.workbench.planning import PATH_POINTS
 from rcilab.workbench.readiness import is_moving
 from rcilab.workbench.replay import replayed_pose
-<<<<<<< HEAD
 from rcilab.workbench.setup_stage import SetupStage, hides_target
-=======
->>>>>>> c-record
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask
 
@@ -60,13 +57,10 @@ class Stage:
         if wanted != self._built:
             self._build(state)
             self._built = wanted
-<<<<<<< HEAD
         if state.model.T_flange_tool is not self._tool:
             self._tool = state.model.T_flange_tool
             for arm in (self._live, self._candidate, self._ghost):
                 arm.show_tool(self._tool)
-=======
->>>>>>> c-record
         live = status.q
         if live is None:  # Nothing is connected: what stands there is the run that is looked at.
             replayed = replayed_pose(state)
