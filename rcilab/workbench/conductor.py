@@ -13,6 +13,7 @@ from rcilab.errors import RcilabError
 from rcilab.workbench import requests
 from rcilab.workbench.goal_actions import GoalActions
 from rcilab.workbench.mailbox import Mailbox
+from rcilab.workbench.program_actions import ProgramActions
 from rcilab.workbench.push_actions import PushActions
 from rcilab.workbench.robot_actions import RobotActions
 from rcilab.workbench.session import Session
@@ -37,6 +38,7 @@ class Conductor:
         self._goal = GoalActions(store, session)
         self.robot = RobotActions(store, session)
         self._push = PushActions(store, session)
+        self._program = ProgramActions(store, session, self._goal)
         self._view = ViewActions(store)
         self._mailbox: Mailbox[requests.Request] = Mailbox()
         self._thread: threading.Thread | None = None
@@ -47,7 +49,7 @@ class Conductor:
             requests.MoveJoint: self._goal.move_joint,
             requests.PoseGoal: self._goal.pose_goal,
             requests.MoveTarget: self._goal.move_target,
-            requests.TypeField: self._goal.type_field,
+            requests.TypeField: self._type_field,
             requests.SetArmAngle: self._goal.set_arm_angle,
             requests.ChooseBranch: self._goal.choose_branch,
             requests.Plan: self._goal.plan,
@@ -58,6 +60,10 @@ class Conductor:
             requests.SetPush: self._push.set_push,
             requests.HoldPush: self._push.hold,
             requests.PullArm: self._push.pull,
+            requests.EditProgram: self._program.edit,
+            requests.PlanProgram: self._program.plan,
+            requests.CancelProgram: self._program.cancel,
+            requests.LoadProgram: self._program.load,
             requests.Seek: self._view.seek,
             requests.Play: self._view.play,
             requests.SetView: self._view.set_view,
@@ -81,6 +87,7 @@ class Conductor:
         if self._thread is not None:
             self._thread.join(10.0)
         self._push.close()
+        self._program.close()
 
     def act(self, request: requests.Request) -> None:
         """Carries out one request; what goes wrong becomes a sentence on the page."""
@@ -100,6 +107,11 @@ class Conductor:
             self._goal.catch_up()
         self._goal.settle()
         self._push.tick()
+        self._program.tick()
+
+    def _type_field(self, request: requests.TypeField) -> None:
+        owner = self._program if request.field.startswith("program.") else self._goal
+        owner.type_field(request)
 
     def _run(self) -> None:
         last = time.monotonic()

@@ -14,7 +14,7 @@ from rcilab.workbench.text import Message, message
 
 if TYPE_CHECKING:
     from rcilab.conformance import Report
-    from rcilab.motion import Motion
+    from rcilab.motion import Motion, Program
 
 PlannableLaw = Literal["jerk_limited", "s_profile"]
 LAWS: tuple[PlannableLaw, ...] = ("jerk_limited", "s_profile")
@@ -35,6 +35,8 @@ class Plan:
     """How much of its velocity limit the busiest joint uses at each of these positions, 0 to 1, shape (N,)."""
     short: Message | None = None
     """How far short of the target it ends, in words; None when it leads there."""
+    program: Program | None = None
+    """The program that the motion goes through; None where it leads to the goal."""
     complete: bool = False
     """Whether collisions were looked for, too. While somebody drags they are not: it would halve the rate."""
 
@@ -68,6 +70,11 @@ def make_plan(
         report = check(motion, model, start=start, distance=None)
     except RcilabError as error:
         return message("plan.failed", error=str(error))
+    return picture(model, motion, report)
+
+
+def picture(model: RobotModel, motion: Motion, report: Report) -> Plan:
+    """Returns a judged motion with what views draw of it."""
     times = np.linspace(0.0, motion.duration, PATH_POINTS)
     rows = np.minimum((times / 1e-3).astype(int), len(motion.times) - 1)
     path = model.forward_path(motion.q[rows])[:, :3, 3]

@@ -13,12 +13,15 @@ from rcilab.workbench.panels import Panel
 from rcilab.workbench.panels.check import CheckPanel
 from rcilab.workbench.panels.health import HealthPanel
 from rcilab.workbench.panels.jog import JogPanel
+from rcilab.workbench.panels.program import ProgramPanel
+from rcilab.workbench.panels.program_file import ProgramFilePanel
 from rcilab.workbench.panels.push import PushPanel
 from rcilab.workbench.panels.run import RunPanel
 from rcilab.workbench.panels.settings import SettingsPanel
 from rcilab.workbench.panels.status import status_values
 from rcilab.workbench.panels.target import TargetPanel
 from rcilab.workbench.panels.timeline import TimelinePanel
+from rcilab.workbench.panels.waypoint import WaypointPanel
 from rcilab.workbench.session import Session
 from rcilab.workbench.stage import Stage
 from rcilab.workbench.store import Store
@@ -35,6 +38,7 @@ _MAIN_WIDTH, _TIMELINE_WIDTH = 352, 380  # [px]
 _TABS = (
     ("tab.jog", "adjustments-horizontal", JogPanel),
     ("tab.target", "current-location", TargetPanel),
+    ("tab.program", "list-numbers", ProgramPanel, WaypointPanel, ProgramFilePanel),
     ("tab.check", "clipboard-check", CheckPanel),
     ("tab.run", "player-play", RunPanel, PushPanel, HealthPanel),
     ("tab.settings", "settings", SettingsPanel),

@@ -10,6 +10,7 @@ import numpy as np
 from rcilab.clock import CYCLE_TIME
 from rcilab.views.plots import QUANTITIES, Frame, Quantity, build_frame, plan_curves, recorded_curves
 from rcilab.workbench import requests
+from rcilab.workbench.program_draft import tell_place
 from rcilab.workbench.text import Text
 from rcilab.workbench.view_actions import RATES
 from rcilab.workbench.widgets import Ask, Html, Linked, esc, on_press
@@ -91,6 +92,8 @@ class TimelinePanel:
             t, kinds = state.place * duration, text("timeline.plan_only")
             if state.recording is not None:
                 kinds = text("timeline.kinds", delay=state.recording.delay)
+            where = tell_place(state.plan, t)
+            kinds = kinds if where is None else text.say(where)
             self._readout.show(f'<p class="rl-clock"><b>{t:.3f}</b> / {duration:.3f} s<span>{esc(kinds)}</span></p>')
         for plot in self._plots.values():
             plot.height = _plot_height(state)
