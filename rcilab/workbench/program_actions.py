@@ -83,7 +83,7 @@ class ProgramActions:
         """Takes what was typed about a step, the rounds or the name, or says beside the field what is wrong with it."""
         self._open()
         _, key, name = (*request.field.split("."), "", "")[:3]
-        waypoint = self._draft.waypoint(int(key)) if key.isdigit() else None
+        waypoint = self._draft.waypoint(int(key)) if key.isdecimal() else None
         if name == "name":
             self._rename(request)
         elif name == "rounds":

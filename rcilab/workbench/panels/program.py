@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,6 +24,7 @@ _TOOLS = (
     ("up", "arrow-up"), ("down", "arrow-down"), ("duplicate", "copy"), ("delete", "trash"), ("undo", "arrow-back-up"),
     ("redo", "arrow-forward-up"),
 )  # fmt: skip
+_SAID = re.compile(r"[0-9]+:(select|move|up|down|delete|duplicate|undo|redo):([0-9]{1,9}):([0-9]{1,9})")
 
 
 class ProgramPanel:
@@ -35,7 +37,7 @@ class ProgramPanel:
         """Adds the controls."""
         text, ask = self._text, self._ask
         with gui.add_folder(text("program.add")):
-            gui.add_html('<i class="rl-buttons"></i>')
+            gui.add_html('<i class="rl-buttons rl-bare"></i>')
             for source, icon in (("here", "map-pin"), ("target", "current-location")):
                 button = gui.add_button(
                     text(f"program.add_{source}"), icon=icon, hint=text(f"program.add_{source}_hint")
@@ -52,7 +54,7 @@ class ProgramPanel:
                 ask(request)
 
         with gui.add_folder(text("program.tools")):
-            gui.add_html('<i class="rl-tools"></i>')
+            gui.add_html('<i class="rl-tools rl-bare"></i>')
             self._tools: dict[str, Any] = {}
             for what, icon in _TOOLS:
                 button = gui.add_button(text(f"program.{what}"), icon=icon, color="gray", hint=text(f"program.{what}"))
@@ -122,13 +124,11 @@ class ProgramPanel:
 
 def read_row(said: str, page: int | None) -> requests.EditProgram | None:
     """Returns what somebody did in the list: NUMBER:WHAT:KEY:PLACE; None for anything else."""
-    parts = said.split(":")
-    if page is None or len(parts) != 4 or not all(part.isdigit() and len(part) < 10 for part in parts[2:]):
+    found = _SAID.fullmatch(said)
+    if page is None or found is None:
         return None
-    what = parts[1]
-    if what not in ("select", "move", "up", "down", "delete", "duplicate", "undo", "redo"):
-        return None
-    return requests.EditProgram(page=page, what=what, key=int(parts[2]), place=int(parts[3]))
+    what: Any = found[1]
+    return requests.EditProgram(page=page, what=what, key=int(found[2]), place=int(found[3]))
 
 
 def _edit(what: Any, **values: Any):  # type: ignore[no-untyped-def]

@@ -74,7 +74,7 @@ def _cells(number: int, waypoint: Waypoint, arm: RobotModel, text: Text) -> tupl
         _where(waypoint, arm),
         f"{100.0 * waypoint.speed:.3g}",
         "–" if waypoint.blend == 0.0 else f"{1000.0 * waypoint.blend:.3g}",
-        "–" if psi is None else f"{math.degrees(psi):.0f}°",
+        "–" if psi is None else f"{round(math.degrees(psi))}°",
         "–" if waypoint.dwell == 0.0 else f"{waypoint.dwell:.3g}",
     )
 

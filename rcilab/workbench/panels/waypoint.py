@@ -37,7 +37,7 @@ class WaypointPanel:
         self._boxes: dict[str, Any] = {}
         self._folder = gui.add_folder(text("program.selected", number=1))
         with self._folder:
-            gui.add_html('<i class="rl-pairs"></i>')
+            gui.add_html('<i class="rl-pairs rl-worded"></i>')
             kinds = {text(f"program.type.{kind}"): kind for kind in TYPES}
             self._kinds = {kind: label for label, kind in kinds.items()}
             choice = gui.add_dropdown(text("program.type"), tuple(kinds), hint=text("program.type_hint"))
@@ -56,23 +56,17 @@ class WaypointPanel:
             gui.add_html('<i class="rl-trios"></i>')
             for name in VIA_FIELDS:
                 self._field(gui, name)
+            self._button(gui, "via", "here", "map-pin")
+            self._button(gui, "via", "target", "current-location")
         self._problems = Html(gui)
         self._teach = gui.add_folder(text("program.teach"))
         with self._teach:
             gui.add_html('<i class="rl-buttons"></i>')
-            self._vias: list[Any] = []
             for what, source, icon in (
-                ("teach", "here", "map-pin"), ("teach", "target", "current-location"),
-                ("via", "here", "map-pin"), ("via", "target", "current-location"), ("start", "here", "flag"),
-                ("aim", "here", "eye"),
+                ("teach", "here", "map-pin"), ("teach", "target", "current-location"), ("start", "here", "flag"),
+                ("aim", "target", "eye"),
             ):  # fmt: skip
-                name = what if what in ("start", "aim") else f"{what}_{source}"
-                button = gui.add_button(
-                    text(f"program.{name}"), icon=icon, color="gray", hint=text(f"program.{name}_hint")
-                )
-                on_press(button, ask, _edit(what, source))
-                if what == "via":
-                    self._vias.append(button)
+                self._button(gui, what, source, icon)
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows the selected waypoint."""
@@ -88,8 +82,6 @@ class WaypointPanel:
         self._folder.visible = self._teach.visible = True
         self._folder.label = self._text("program.selected", number=place + 1)
         self._pose.visible, self._via.visible = "x" in values, waypoint.type == "arc"
-        for button in self._vias:
-            button.visible = waypoint.type == "arc"
         self._kind.handle.disabled = waypoint.type not in TYPES
         if waypoint.type in TYPES:
             self._kind.show(self._kinds[waypoint.type])
@@ -103,6 +95,11 @@ class WaypointPanel:
     def _field(self, gui: Any, name: str) -> None:
         box = gui.add_text(self._text(f"program.field.{name}"), "", hint=self._text(f"program.hint.{_hint_of(name)}"))
         self._fields[name] = NumberField(box, self._ask, f"program.0.{name}")
+
+    def _button(self, gui: Any, what: Any, source: Any, icon: str) -> None:
+        name = self._text(f"program.{what}_{source}")
+        button = gui.add_button(name, icon=icon, color="gray", hint=self._text(f"program.{what}_{source}_hint"))
+        on_press(button, self._ask, lambda page: requests.EditProgram(page=page, what=what, source=source))
 
     def _note(self, waypoint: Waypoint) -> str:
         if waypoint.type in TYPES:
@@ -127,7 +124,3 @@ def _values(waypoint: Waypoint, arm: RobotModel) -> dict[str, str]:
 
 def _hint_of(name: str) -> str:
     return "mm" if name in (*POSE_FIELDS[:3], *VIA_FIELDS) else "deg" if name in POSE_FIELDS else name
-
-
-def _edit(what: Any, source: Any):  # type: ignore[no-untyped-def]
-    return lambda page: requests.EditProgram(page=page, what=what, source=source)
