@@ -2,11 +2,16 @@
 // the script. What is done is written into a hidden field of viser's, so that it comes from this page and no other.
 (() => {
   "use strict";
-  let serial = 0, had = false, dragged = null, waiting = [], timer = 0;
+  const LATE = 1500;  // [ms] A choice: for so long the list may still come as it was before the last choice.
+  let serial = 0, had = false, dragged = null, waiting = [], timer = 0, picked = null, since = 0;
 
   const listOf = (node) => node instanceof Element ? node.closest(".rl-steps") : null;
   const rows = (list) => [...list.querySelectorAll("[data-key]")];
-  const chosen = (list) => rows(list).findIndex((row) => row.getAttribute("aria-selected") === "true");
+  const find = (list, holds) => rows(list).findIndex(holds);
+  const chosen = (list) => {
+    const mine = performance.now() - since < LATE ? find(list, (row) => row.dataset.key === picked) : -1;
+    return mine >= 0 ? mine : find(list, (row) => row.getAttribute("aria-selected") === "true");
+  };
 
   const flush = () => {
     timer = 0;
@@ -19,6 +24,8 @@
   };
 
   const say = (what, key, place = 0) => {
+    if (what === "select") { picked = key; since = performance.now(); }
+    if (["delete", "duplicate", "undo", "redo"].includes(what)) picked = null;  // Another row will be chosen for us.
     waiting.push(`${what}:${key}:${place}`);
     if (!timer) flush();
   };
@@ -26,10 +33,14 @@
   const choose = (list, place) => {
     const all = rows(list), row = all[Math.min(Math.max(place, 0), all.length - 1)];
     if (!row) return;
-    all.forEach((other) => other.setAttribute("aria-selected", other === row ? "true" : "false"));
+    mark(list, row);
+    say("select", row.dataset.key);
+  };
+
+  const mark = (list, row) => {
+    rows(list).forEach((other) => other.setAttribute("aria-selected", other === row ? "true" : "false"));
     list.setAttribute("aria-activedescendant", row.id);
     reveal(row);
-    say("select", row.dataset.key);
   };
 
   const reveal = (row) => {
@@ -52,7 +63,8 @@
   });
 
   document.addEventListener("keydown", (event) => {
-    const list = listOf(event.target);
+    const lost = had && event.target === document.body;  // The list has just been exchanged.
+    const list = lost ? document.querySelector(".rl-steps") : listOf(event.target);
     if (!list) return;
     const at = chosen(list), row = rows(list)[at], key = row ? row.dataset.key : 0, control = event.ctrlKey || event.metaKey;
     const name = event.key.length === 1 ? event.key.toLowerCase() : event.key;
@@ -81,8 +93,8 @@
     seen = list;
     if (!list) return;
     if (had && document.activeElement === document.body) list.focus();
-    const row = list.querySelector('[aria-selected="true"]');
-    if (row) reveal(row);
+    const row = rows(list)[chosen(list)];
+    if (row) mark(list, row);
   }, 60);
 
   const clear = () => document.querySelectorAll(".rl-over").forEach((row) => row.classList.remove("rl-over"));
