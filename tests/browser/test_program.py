@@ -68,7 +68,7 @@ def test_a_program_is_written_by_keyboard_planned_saved_and_loaded(writing, tmp_
             page.wait(lambda: any("bad.json, line" in text for text in page.alerts()), "the line that is wrong")
             assert len(steps()) == 2
     page.wait(lambda: page.state.program.selected not in (first, second), "the saved program back")
-    assert page.alerts() == []
+    page.wait(lambda: page.alerts() == [], "no complaint any more")
     page.button("Show as Python").click()
     page.wait(
         lambda: "rcilab.plan_program(model, program)" in page.tab.locator(".rl-code pre").inner_text(), "a script"
