@@ -32,6 +32,7 @@ class ProgramPanel:
 
     def __init__(self, text: Text, ask: Ask) -> None:
         self._text, self._ask = text, ask
+        self._drawn: tuple[object, ...] = ()
 
     def build(self, gui: Any, state: UiState) -> None:
         """Adds the controls."""
@@ -83,7 +84,11 @@ class ProgramPanel:
         draft = program.draft if program.draft.model == state.model.name else Draft(model=state.model.name)
         plan = state.plan if state.plan is not None and program.planned is draft and state.plan.program else None
         time = 0.0 if plan is None else state.place * plan.motion.duration
-        self._list.show(list_html(state, draft, None if plan is None else number_at(plan, time), text))
+        running = None if plan is None else number_at(plan, time)
+        drawn = (draft, program.selected, program.failed, running, state.model)
+        if drawn != self._drawn:  # Where each waypoint is takes a while to compute.
+            self._drawn = drawn
+            self._list.show(list_html(state, draft, running, text))
         place, count = draft.place(program.selected), len(draft.steps)
         able = {
             "up": place is not None and place > 0, "down": place is not None and place < count - 1,
