@@ -22,6 +22,7 @@ from rcilab.workbench.panels.status import status_values
 from rcilab.workbench.panels.target import TargetPanel
 from rcilab.workbench.panels.timeline import TimelinePanel
 from rcilab.workbench.panels.waypoint import WaypointPanel
+from rcilab.workbench.program_marks import ProgramMarks
 from rcilab.workbench.session import Session
 from rcilab.workbench.stage import Stage
 from rcilab.workbench.store import Store
@@ -59,6 +60,7 @@ class Presenter:
     def __init__(self, server: viser.ViserServer, store: Store, session: Session, live: LiveChannel, ask: Ask) -> None:
         self._server, self._store, self._session, self._live, self._ask = server, store, session, live, ask
         self._stage = Stage(server, ask)
+        self._marks = ProgramMarks(server)
         self._text = Text(store.state.language)
         self._panels: list[Panel] = []
         self._containers: list[Any] = []
@@ -88,6 +90,7 @@ class Presenter:
         for panel in self._panels:
             panel.show(state, status)
         self._stage.show(state, status, self._text)
+        self._marks.show(state)
         self._live.publish(**status_values(state, status, self._text, self._timeline.end))
 
     def _build(self, state: UiState) -> None:
