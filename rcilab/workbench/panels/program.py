@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import time
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,6 +25,7 @@ _TOOLS = (
     ("up", "arrow-up"), ("down", "arrow-down"), ("duplicate", "copy"), ("delete", "trash"), ("undo", "arrow-back-up"),
     ("redo", "arrow-forward-up"),
 )  # fmt: skip
+_MOMENT = 0.25  # [s] A choice: a bar that comes and goes faster only flickers.
 _SAID = re.compile(r"[0-9]+:(select|move|up|down|delete|duplicate|undo|redo):([0-9]{1,9}):([0-9]{1,9})")
 
 
@@ -33,6 +35,7 @@ class ProgramPanel:
     def __init__(self, text: Text, ask: Ask) -> None:
         self._text, self._ask = text, ask
         self._drawn: tuple[object, ...] = ()
+        self._began = 0.0
 
     def build(self, gui: Any, state: UiState) -> None:
         """Adds the controls."""
@@ -83,8 +86,8 @@ class ProgramPanel:
         text, program = self._text, state.program
         draft = program.draft if program.draft.model == state.model.name else Draft(model=state.model.name)
         plan = state.plan if state.plan is not None and program.planned is draft and state.plan.program else None
-        time = 0.0 if plan is None else state.place * plan.motion.duration
-        running = None if plan is None else number_at(plan, time)
+        t = 0.0 if plan is None else state.place * plan.motion.duration
+        running = None if plan is None else number_at(plan, t)
         drawn = (draft, program.selected, program.failed, running, state.model)
         if drawn != self._drawn:  # Where each waypoint is takes a while to compute.
             self._drawn = drawn
@@ -102,12 +105,14 @@ class ProgramPanel:
         self._upto.disabled = place is None or planning or is_moving(status)
         self._loop.show(state.loop)
         self._rounds.show(str(program.rounds), state.problems.get(self._rounds.field), state.typed)
-        self._bar.visible = self._cancel.visible = planning
+        now = time.monotonic()
+        self._began = self._began if planning else now
+        self._bar.visible = self._cancel.visible = planning and now - self._began > _MOMENT
         if program.progress is not None:
             self._bar.value = round(100.0 * program.progress, 1)
         said = problems_html(state, text, [("program.0.rounds", text("program.rounds"))])
         if plan is not None:
-            where = tell_place(plan, time)
+            where = tell_place(plan, t)
             said += planned_html(state, text)
             said += "" if where is None else f'<p class="rl-note rl-now">▸ {esc(text.say(where))}</p>'
         elif count and not planning and program.answer is None:

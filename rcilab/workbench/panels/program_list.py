@@ -39,13 +39,13 @@ def list_html(state: UiState, draft: Draft, running: int | None, text: Text) -> 
     for number, step in enumerate(draft.steps, start=1):
         chosen, failed = step.key == state.program.selected, step.key == state.program.failed
         look = (" rl-failed" if failed else "") + (" rl-running" if number == running else "")
-        cells = _cells(number, step.waypoint, arm, text)
         sign = f'<em title="{esc(text("program.failed"))}">!</em>' if failed else ""
+        cells = (f"{number}{sign}", *_cells(step.waypoint, arm, text))
         rows.append(
             f'<div class="rl-step{look}" role="option" id="rl-step-{step.key}" data-key="{step.key}" '
             f'data-place="{number - 1}" aria-selected="{"true" if chosen else "false"}" draggable="true">'
             + "".join(f"<span>{cell}</span>" for cell in cells)
-            + f"{sign}</div>"
+            + "</div>"
         )
     return (
         f'<div class="rl-steps-head" aria-hidden="true">{heads}</div><div class="rl-steps" role="listbox" tabindex="0" '
@@ -65,11 +65,10 @@ def _start_row(draft: Draft, arm: RobotModel, running: bool, text: Text) -> str:
     )
 
 
-def _cells(number: int, waypoint: Waypoint, arm: RobotModel, text: Text) -> tuple[str, ...]:
+def _cells(waypoint: Waypoint, arm: RobotModel, text: Text) -> tuple[str, ...]:
     kind = f'<i class="rl-kind rl-kind-{waypoint.type}">{esc(text(f"program.type.{waypoint.type}"))}</i>'
     psi = arm_angle_of(waypoint, arm)
     return (
-        str(number),
         kind,
         _where(waypoint, arm),
         f"{100.0 * waypoint.speed:.3g}",
