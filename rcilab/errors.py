@@ -65,11 +65,13 @@ class PlanningError(RcilabError):
 
     Attributes:
         share: Where a path cannot be followed, as a part of the way, 0 to 1; None where it is no matter of place.
+        waypoint: Number of the waypoint of a program on the way to which it is, from 1; None where it is no program's.
     """
 
-    def __init__(self, message: str, *, share: float | None = None) -> None:
+    def __init__(self, message: str, *, share: float | None = None, waypoint: int | None = None) -> None:
         super().__init__(message)
         self.share = share
+        self.waypoint = waypoint
 
 
 class ConformanceError(RcilabError):

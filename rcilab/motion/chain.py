@@ -79,9 +79,13 @@ class Chain:
         """Returns in which interval each s is, shape (N,)."""
         return np.clip(np.searchsorted(self.knots, s, side="right") - 1, 0, len(self.knots) - 2)
 
+    def segment_at(self, s: float) -> Segment:
+        """Returns the segment that this is on."""
+        return self.segments[int(np.searchsorted(self.middles, s, side="right"))]
+
     def place(self, s: float) -> str:
         """Returns where that is, for people."""
-        segment = self.segments[int(np.searchsorted(self.middles, s, side="right"))]
+        segment = self.segment_at(s)
         x, y, z = self.sample(np.array([s]))[0][0, self.n + 1 : self.n + 4].tolist()
         return segment.label if segment.path is None else f"{segment.label}, tool at {x:.3f}, {y:.3f}, {z:.3f} m"
 
@@ -290,9 +294,12 @@ def _refusal(piece: _Piece, T: Array, reason: str) -> PlanningError:
     x, y, z = T[:3, 3].tolist()
     where = f"with the tool at {x:.3f}, {y:.3f}, {z:.3f} m"
     if piece.blend is None:
-        return PlanningError(f"{piece.segment.label}: cannot be followed {where}: {reason}")
+        return PlanningError(
+            f"{piece.segment.label}: cannot be followed {where}: {reason}", waypoint=piece.segment.number
+        )
     return PlanningError(
-        f"{piece.segment.label}: its blend cannot be followed {where}: {reason}, or give it a smaller blend radius"
+        f"{piece.segment.label}: its blend cannot be followed {where}: {reason}, or give it a smaller blend radius",
+        waypoint=piece.segment.number,
     )
 
 

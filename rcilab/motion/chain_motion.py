@@ -75,7 +75,8 @@ def plan_chain(chain: Chain, limits: Limits) -> tuple[Array, list[float]]:
         if slowdown.max() > _SLOWEST:
             break
     raise PlanningError(
-        f"{chain.place(worst)}: the joints would have to jump, because a singularity is close; lead the tool around it"
+        f"{chain.place(worst)}: the joints would have to jump, because a singularity is close; lead the tool around it",
+        waypoint=chain.segment_at(worst).number,
     )
 
 
@@ -189,5 +190,6 @@ def _require_inside(chain: Chain, q: Array, law: TimeLaw, limits: JointLimits) -
         raise PlanningError(
             f"{chain.place(float(law.s[row]))}: joint {joint + 1} would touch its limit at "
             f"{math.degrees(q[row, joint]):.2f} deg ({math.degrees(limits.lower[joint]):.0f} to "
-            f"{math.degrees(limits.upper[joint]):.0f} deg); a smaller blend radius stays closer to the waypoints"
+            f"{math.degrees(limits.upper[joint]):.0f} deg); a smaller blend radius stays closer to the waypoints",
+            waypoint=chain.segment_at(float(law.s[row])).number,
         )

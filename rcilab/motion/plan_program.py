@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from rcilab.arrays import Array, as_number, described, sealed
+from rcilab.arrays import Array, JointVector, as_number, as_vector, described, sealed
 from rcilab.clock import CYCLE_TIME
 from rcilab.errors import InvalidValueError
 from rcilab.model import RobotModel, require_model
@@ -19,14 +21,25 @@ from rcilab.motion.chain_motion import plan_chain
 from rcilab.motion.joint import MIN_SPEED, plan_joint
 from rcilab.motion.motion import Motion
 from rcilab.motion.piecewise import PiecewisePolynomial
-from rcilab.motion.program import Program, label
+from rcilab.motion.program import MOST_WAYPOINTS, Program, label
+from rcilab.motion.s_curve import STANDSTILL_DISTANCE
 from rcilab.motion.segment import Segment, build_segments, naming
 
 _SHORTENED = 1e-6
 """How much shorter than asked a radius must be to be mentioned, [m]."""
+_GEOMETRY = 0.3
+"""Part of the work that it takes to find the ways; about what was seen."""
 
 
-def plan_program(model: RobotModel, program: Program, *, speed: float = 1.0) -> Motion:
+def plan_program(
+    model: RobotModel,
+    program: Program,
+    *,
+    speed: float = 1.0,
+    start: ArrayLike | None = None,
+    rounds: int = 1,
+    progress: Callable[[float], None] | None = None,
+) -> Motion:
     """Returns the motion through the waypoints of a program, from rest to rest.
 
     On lines, arcs, circles and null-space moves, and on blends between them, the limits on joints, tool and arm angle
@@ -42,6 +55,12 @@ def plan_program(model: RobotModel, program: Program, *, speed: float = 1.0) -> 
         model: The arm; with its own tool, unless the program has one.
         program: The waypoints.
         speed: What to multiply the speed of every waypoint by, above 0 to 1.
+        start: Joint angles of the standing arm, shape (n,), [rad]: where they are not those of the program's start, a
+            joint move leads there first, at the speed of the first waypoint, and is segment 0. None begins at the
+            program's start.
+        rounds: How often to go through the waypoints. Between two rounds a joint move, a segment of its own, leads
+            back to the program's start.
+        progress: Called now and then with the part of the work that is done, 0 to 1; what it raises ends the planning.
 
     Raises:
         PlanningError: A target is out of reach, or a joint limit or a singularity is in the way; the message names the
@@ -60,12 +79,47 @@ def plan_program(model: RobotModel, program: Program, *, speed: float = 1.0) -> 
         if speed * waypoint.speed < MIN_SPEED:
             what = f"{label(number, waypoint)}, speed times {speed:g}"
             raise InvalidValueError(what, speed * waypoint.speed, f"must be at least {MIN_SPEED:g}")
+    count = len(program.waypoints)
+    if not 1 <= as_number(rounds, "rounds") <= MOST_WAYPOINTS / count or int(rounds) != rounds:
+        raise InvalidValueError(
+            "rounds", rounds, f"must be whole, 1 to {MOST_WAYPOINTS // count} for {count} waypoints"
+        )
     if program.T_flange_tool is not None:
         model = model.with_tool(program.T_flange_tool)
+    tell = progress or (lambda part: None)
+    approach = None if start is None else as_vector(start, model.n, "start", "rad")
+    if approach is not None and np.abs(approach - program.start).max() <= STANDSTILL_DISTANCE:
+        program, approach = replace(program, start=tuple(approach.tolist())), None
+    segments = build_segments(model, program, lambda part: tell(_GEOMETRY * part))
+    there, slow = np.array(program.start), speed * program.waypoints[0].speed
     track = _Track()
-    for run in _runs(build_segments(model, program)):
-        _plan_run(model, run, speed, track)
+    if approach is not None:
+        track.add(_plan_move(model, approach, there, slow, "the way to the start"))
+    curves: list[_Curve] = []
+    for run in _runs(segments):
+        curves.append(_plan_run(model, run, speed, track.notes))
+        tell(_GEOMETRY + (1.0 - _GEOMETRY) * run[-1].number / count)
+    back = None if rounds == 1 else _plan_move(model, curves[-1].goal, there, slow, "the way back to the start")
+    for number in range(int(rounds)):
+        for curve in (back, *curves) if back is not None and number else curves:
+            track.add(curve)
     return track.motion(speed * max(waypoint.speed for waypoint in program.waypoints))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Curve:
+    """Segments from stop to stop, planned."""
+
+    breaks: Array
+    """Where the pieces begin, and where the last one ends, shape (S + 1,), [s]."""
+    coefficients: Array
+    """Of the pieces, shape (S, n, k), ascending powers of the time since each began."""
+    goal: JointVector
+    """Where they end, shape (n,), [rad]."""
+    dwell: float = 0.0
+    """How long to stay there, [s]."""
+    corners: tuple[float, ...] = ()
+    """When one segment passes to the next, since the start, [s]."""
 
 
 def _runs(segments: list[Segment]) -> list[list[Segment]]:
@@ -82,7 +136,20 @@ def _runs(segments: list[Segment]) -> list[list[Segment]]:
     return runs
 
 
-def _plan_run(model: RobotModel, run: list[Segment], scale: float, track: _Track) -> None:
+def _plan_move(model: RobotModel, start: JointVector, goal: JointVector, speed: float, what: str) -> _Curve:
+    """Returns a joint move that is no waypoint's."""
+    if np.abs(goal - start).max() <= STANDSTILL_DISTANCE:
+        return _stand(goal)
+    with naming(what):
+        curve = plan_joint(model, start, goal, speed=speed).polynomial
+    return _Curve(curve.breaks, curve.coefficients, goal)
+
+
+def _stand(goal: JointVector, dwell: float = 0.0) -> _Curve:
+    return _Curve(np.zeros(1), np.zeros((0, len(goal), 1)), goal, dwell)
+
+
+def _plan_run(model: RobotModel, run: list[Segment], scale: float, notes: list[str]) -> _Curve:
     segment = run[0]
     speed = scale * segment.waypoint.speed
     if len(run) > 1:
@@ -90,23 +157,22 @@ def _plan_run(model: RobotModel, run: list[Segment], scale: float, track: _Track
         for before, blend in zip(run[:-1], blends, strict=True):
             asked = before.waypoint.blend
             if blend.radius < asked - _SHORTENED:
-                track.notes.append(
+                notes.append(
                     f"{before.label}: blend radius {1e3 * asked:.1f} mm shortened to {1e3 * blend.radius:.1f} mm: a "
                     "blend takes at most half of the ways before and after it"
                 )
         coefficients, corners = plan_chain(build_chain(model, run, blends, scale), model.limits)
         breaks = np.arange(len(coefficients) + 1, dtype=np.float64) * CYCLE_TIME
-        track.add(breaks, coefficients, run[-1].goal, run[-1].waypoint.dwell, corners)
-    elif segment.stands:
-        track.add(np.zeros(1), np.zeros((0, model.n, 1)), segment.goal, segment.waypoint.dwell)
-    else:
-        with naming(segment.label):
-            if segment.path is None:
-                motion = plan_joint(model, segment.start, segment.goal, speed=speed)
-            else:
-                motion = plan_along(model, segment.start, segment.path, speed)
-        curve = motion.polynomial
-        track.add(curve.breaks, curve.coefficients, motion.goal, segment.waypoint.dwell)
+        return _Curve(breaks, coefficients, run[-1].goal, run[-1].waypoint.dwell, tuple(corners))
+    if segment.stands:
+        return _stand(segment.goal, segment.waypoint.dwell)
+    with naming(segment.label, segment.number):
+        if segment.path is None:
+            motion = plan_joint(model, segment.start, segment.goal, speed=speed)
+        else:
+            motion = plan_along(model, segment.start, segment.path, speed)
+    curve = motion.polynomial
+    return _Curve(curve.breaks, curve.coefficients, motion.goal, segment.waypoint.dwell)
 
 
 class _Track:
@@ -120,26 +186,16 @@ class _Track:
         self._goal = np.zeros(0)
         self._end = 0.0
 
-    def add(
-        self, breaks: Array, coefficients: Array, goal: Array, dwell: float, corners: Sequence[float] = ()
-    ) -> None:  # fmt: skip
-        """Adds a run, from the next whole cycle on, and its dwell.
-
-        Args:
-            breaks: Where its pieces begin, and where the last one ends, shape (S + 1,), [s].
-            coefficients: Of its pieces, shape (S, n, k), ascending powers of the time since each began.
-            goal: Where it ends, shape (n,), [rad].
-            dwell: How long it stays there, [s].
-            corners: When it passes from one of its segments to the next, since its start, [s].
-        """
+    def add(self, curve: _Curve) -> None:
+        """Adds a run, from the next whole cycle on, and its dwell."""
         begin = _cycles(self._end) * CYCLE_TIME
         self._stand(begin)
-        self._starts += [begin, *(begin + corner for corner in corners)]
-        self._breaks.append(breaks[:-1] + begin)
-        self._pieces.append(coefficients)
-        self._end, self._goal = begin + float(breaks[-1]), goal
-        if dwell > 0.0:
-            self._stand((_cycles(self._end) + round(dwell / CYCLE_TIME)) * CYCLE_TIME)
+        self._starts += [begin, *(begin + corner for corner in curve.corners)]
+        self._breaks.append(curve.breaks[:-1] + begin)
+        self._pieces.append(curve.coefficients)
+        self._end, self._goal = begin + float(curve.breaks[-1]), curve.goal
+        if curve.dwell > 0.0:
+            self._stand((_cycles(self._end) + round(curve.dwell / CYCLE_TIME)) * CYCLE_TIME)
 
     def motion(self, speed: float) -> Motion:
         """Returns the whole motion."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from os import PathLike
 from typing import Any, Literal, TypeAlias, get_args
 
@@ -188,6 +188,22 @@ class Waypoint:
     def pose(self) -> Pose | None:
         """The target as a pose, if that is how it was given."""
         return None if self.position is None or self.wxyz is None else Pose(self.position, self.wxyz)
+
+    def retyped(self, type: WaypointType, via: ArrayLike | None = None) -> Waypoint:
+        """Returns the waypoint with another way to the same target: joint, line or arc.
+
+        Args:
+            type: The other type.
+            via: A point on the arc, shape (3,), [m]; only an arc has one.
+
+        Raises:
+            InvalidValueError: One of the two types leads to no target of its own, or the via does not fit the type.
+        """
+        for kind in (self.type, type):
+            if "q" not in ALLOWED.get(kind, ()):
+                raise InvalidValueError("type", described(kind), "has no target to keep; joint, line and arc have one")
+        point = None if via is None else _vector("via", via)
+        return replace(self, type=type, via=point, via_wxyz=None)
 
     def _require_target(self) -> None:
         if "q" not in ALLOWED[self.type]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -78,8 +78,10 @@ class Segment:
         return here, (after - before) / (2.0 * _NUDGE), (after - 2.0 * here + before) / _NUDGE**2
 
 
-def build_segments(model: RobotModel, program: Program) -> list[Segment]:
-    """Returns the segments of a program, each from where the one before ends.
+def build_segments(
+    model: RobotModel, program: Program, progress: Callable[[float], None] = lambda part: None
+) -> list[Segment]:
+    """Returns the segments of a program, each from where the one before ends; tells which part of them is built.
 
     Raises:
         PlanningError: A target is out of reach, or a joint limit or a singularity is in the way; the message names the
@@ -93,23 +95,24 @@ def build_segments(model: RobotModel, program: Program) -> list[Segment]:
         raise PlanningError(f"the start: {error}") from error
     segments: list[Segment] = []
     for number, waypoint in enumerate(program.waypoints, 1):
-        with naming(label(number, waypoint)):
+        with naming(label(number, waypoint), number):
             segments.append(_segment(model, q, number, waypoint))
         q = segments[-1].goal
+        progress(number / len(program.waypoints))
     return segments
 
 
 @contextmanager
-def naming(what: str) -> Iterator[None]:
-    """Puts the name of a waypoint in front of whatever goes wrong."""
+def naming(what: str, number: int | None = None) -> Iterator[None]:
+    """Puts the name of a waypoint in front of whatever goes wrong, and notes its number."""
     try:
         yield
     except InvalidValueError as error:
         raise InvalidValueError(f"{what}, {error.name}", error.value, error.requirement) from error
     except PlanningError as error:
-        raise PlanningError(f"{what}: {error}", share=error.share) from error
+        raise PlanningError(f"{what}: {error}", share=error.share, waypoint=number) from error
     except KinematicsError as error:
-        raise PlanningError(f"{what}: {error}") from error
+        raise PlanningError(f"{what}: {error}", waypoint=number) from error
 
 
 def _positions(path: Path, shares: Array) -> Array:

@@ -16,6 +16,7 @@ from rcilab.workbench.goal_actions import GoalActions
 from rcilab.workbench.jog_actions import JogActions
 from rcilab.workbench.mailbox import Mailbox
 from rcilab.workbench.pose_actions import PoseActions
+from rcilab.workbench.program_actions import ProgramActions
 from rcilab.workbench.push_actions import PushActions
 from rcilab.workbench.robot_actions import RobotActions
 from rcilab.workbench.session import Session
@@ -45,6 +46,7 @@ class Conductor:
         self._setup = SetupActions(store, session)
         self._jog = JogActions(store, session, self._goal)
         self._poses = PoseActions(store, self._goal)
+        self._program = ProgramActions(store, session, self._goal)
         self._view = ViewActions(store)
         self._export = ExportActions(store, deliver)
         self._mailbox: Mailbox[requests.Request] = Mailbox()
@@ -75,6 +77,10 @@ class Conductor:
             requests.ResizeBox: self._setup.resize,
             requests.SetSetup: self._setup.set_setup,
             requests.PressSetup: self._setup.press,
+            requests.EditProgram: self._program.edit,
+            requests.PlanProgram: self._program.plan,
+            requests.CancelProgram: self._program.cancel,
+            requests.LoadProgram: self._program.load,
             requests.Seek: self._view.seek,
             requests.Play: self._view.play,
             requests.SetView: self._view.set_view,
@@ -101,6 +107,7 @@ class Conductor:
             self._thread.join(10.0)
         self._jog.release()
         self._push.close()
+        self._program.close()
         self._export.close()
         self.robot.close()
 
@@ -125,9 +132,15 @@ class Conductor:
         self._setup.tick()
         self._jog.tick(elapsed)
         self._poses.tick()
+        self._program.tick()
 
     def _type_field(self, request: requests.TypeField) -> None:
-        (self._setup if is_setup_field(request.field) else self._goal).type_field(request)
+        if is_setup_field(request.field):
+            self._setup.type_field(request)
+        elif request.field.startswith("program."):
+            self._program.type_field(request)
+        else:
+            self._goal.type_field(request)
 
     def _run(self) -> None:
         last = time.monotonic()

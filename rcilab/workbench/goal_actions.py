@@ -90,6 +90,15 @@ class GoalActions:
         self._store.remember()
         self._aim(goal.target, None, near=solutions[request.index])
 
+    def lead_to(self, target: Pose, psi: float | None, q: JointVector | None) -> None:
+        """Poses the goal where a waypoint leads: at joint angles, or at a pose with an arm angle."""
+        self._store.remember()
+        if q is None:
+            self._aim(target, psi)
+        else:
+            self._pose(q)
+        self._clear_problems("pose.")
+
     def type_field(self, request: requests.TypeField) -> None:
         """Takes a typed number, or says beside the field what is wrong with it."""
         state = self._store.state

@@ -17,7 +17,7 @@ from rcilab.workbench.text import Message, message
 
 if TYPE_CHECKING:
     from rcilab.conformance import Report
-    from rcilab.motion import Motion
+    from rcilab.motion import Motion, Program
 
 PlannableLaw = Literal["jerk_limited", "s_profile"]
 LAWS: tuple[PlannableLaw, ...] = ("jerk_limited", "s_profile")
@@ -42,6 +42,8 @@ class Plan:
     """How much of its velocity limit the busiest joint uses at each of these positions, 0 to 1, shape (N,)."""
     short: Message | None = None
     """How far short of the target it ends, in words; None when it leads there."""
+    program: Program | None = None
+    """The program that the motion goes through; None where it leads to the goal."""
     complete: bool = False
     """Whether collisions were looked for, too. While somebody drags they are not: it would halve the rate."""
 
@@ -101,6 +103,11 @@ def make_plan(
         report = check(motion, model, start=start, box=box, distance=None)
     except RcilabError as error:
         return message("plan.failed", error=str(error))
+    return picture(model, motion, report, box)
+
+
+def picture(model: RobotModel, motion: Motion, report: Report, box: SafetyBox | None = None) -> Plan:
+    """Returns a judged motion with what views draw of it."""
     effort = np.abs(motion.dq[_sampled_rows(motion)] / model.limits.joint.velocity).max(axis=1)
     return Plan(motion=motion, report=report, path=tool_path(model, motion), effort=effort, model=model, box=box)
 

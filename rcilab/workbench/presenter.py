@@ -14,6 +14,8 @@ from rcilab.workbench.panels.check import CheckPanel
 from rcilab.workbench.panels.health import HealthPanel
 from rcilab.workbench.panels.jog import JogPanel
 from rcilab.workbench.panels.poses import PosesPanel
+from rcilab.workbench.panels.program import ProgramPanel
+from rcilab.workbench.panels.program_file import ProgramFilePanel
 from rcilab.workbench.panels.push import PushPanel
 from rcilab.workbench.panels.recording import RecordingPanel
 from rcilab.workbench.panels.run import RunPanel
@@ -24,6 +26,8 @@ from rcilab.workbench.panels.status import status_values
 from rcilab.workbench.panels.target import TargetPanel
 from rcilab.workbench.panels.timeline import TimelinePanel
 from rcilab.workbench.panels.tool_jog import ToolJogPanel
+from rcilab.workbench.panels.waypoint import WaypointPanel
+from rcilab.workbench.program_marks import ProgramMarks
 from rcilab.workbench.session import Session
 from rcilab.workbench.stage import Stage
 from rcilab.workbench.store import Store
@@ -40,6 +44,7 @@ _MAIN_WIDTH, _TIMELINE_WIDTH = 352, 380  # [px]
 _TABS = (
     ("tab.jog", "adjustments-horizontal", JogPanel, ToolJogPanel, PosesPanel),
     ("tab.target", "current-location", TargetPanel),
+    ("tab.program", "list-numbers", ProgramPanel, WaypointPanel, ProgramFilePanel),
     ("tab.setup", "tool", SetupPanel, SetupNumbersPanel),
     ("tab.check", "clipboard-check", CheckPanel),
     ("tab.run", "player-play", RunPanel, RecordingPanel, PushPanel, HealthPanel),
@@ -61,6 +66,7 @@ class Presenter:
     def __init__(self, server: viser.ViserServer, store: Store, session: Session, live: LiveChannel, ask: Ask) -> None:
         self._server, self._store, self._session, self._live, self._ask = server, store, session, live, ask
         self._stage = Stage(server, ask)
+        self._marks = ProgramMarks(server)
         self._text = Text(store.state.language)
         self._panels: list[Panel] = []
         self._containers: list[Any] = []
@@ -90,6 +96,7 @@ class Presenter:
         for panel in self._panels:
             panel.show(state, status)
         self._stage.show(state, status, self._text)
+        self._marks.show(state)
         self._live.publish(**status_values(state, status, self._text, self._timeline.end))
 
     def _build(self, state: UiState) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from rcilab.errors import UsageError
 from rcilab.workbench.goal_actions import initial_goal
-from rcilab.workbench.planning import PATH_POINTS, Plan
+from rcilab.workbench.planning import picture
 from rcilab.workbench.run_keeper import whole_recording
 
 if TYPE_CHECKING:
@@ -39,15 +39,7 @@ def replayed(state: UiState, run: Run) -> UiState:
     model, motion, report = require_replayable(run), run.plan, run.report
     assert motion is not None  # Both are required above.
     assert report is not None
-    rows = np.linspace(0, len(motion.q) - 1, PATH_POINTS).astype(np.intp)
-    plan = Plan(
-        motion=motion,
-        report=report,
-        path=model.position_path(motion.q[rows]),
-        model=model,
-        effort=np.abs(motion.dq[rows] / model.limits.joint.velocity).max(axis=1),
-        complete=True,
-    )
+    plan = replace(picture(model, motion, report), complete=True)
     goal = initial_goal(model, motion.goal)
     return replace(state, model=model, plan=plan, goal=goal, recording=whole_recording(run), place=0.0)
 

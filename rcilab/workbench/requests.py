@@ -90,7 +90,7 @@ class TypeField(Request):
     """A number field holds this text now."""
 
     field: str
-    """joint.0 ... joint.6, pose.x ... pose.yaw, psi, speed, setup.PART.NAME (see `setup_fields`)."""
+    """joint.0 ..., pose.x ..., psi, speed, program.KEY.speed ..., setup.PART.NAME (see `setup_fields`)."""
     text: str
 
 
@@ -219,6 +219,44 @@ class PressSetup(Request):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class EditProgram(Request):
+    """Change the program of the Program tab, or what of it is selected."""
+
+    what: Literal[
+        "select", "add", "teach", "via", "type", "delete", "duplicate", "up", "down", "move", "start", "aim", "undo",
+        "redo", "clear", "script",
+    ]  # fmt: skip
+    key: int | None = None
+    """Key of a step; None is the selected one."""
+    source: Literal["here", "target"] = "here"
+    """Where a waypoint, or its via, comes from: the arm, or the goal."""
+    type: str = ""
+    place: int = 0
+    """Where to move a step, from 0."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlanProgram(Request):
+    """Plan the program and check it."""
+
+    upto: bool = False
+    """Only to the selected waypoint."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CancelProgram(Request):
+    """Drop the planning that is under way."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoadProgram(Request):
+    """A file was chosen in the browser."""
+
+    name: str
+    content: bytes
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Seek(Request):
     """Go to a place in the planned motion."""
 
@@ -238,7 +276,7 @@ class Play(Request):
 class SetView(Request):
     """Settings of the page."""
 
-    name: Literal["language", "quality", "plot_joint", "rate", "height"]
+    name: Literal["language", "quality", "plot_joint", "rate", "height", "loop"]
     value: str | float | int
 
 

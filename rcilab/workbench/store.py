@@ -17,6 +17,7 @@ from rcilab.spatial import Pose
 from rcilab.workbench.jogging import JogState
 from rcilab.workbench.lease import Lease
 from rcilab.workbench.planning import Plan, PlannableLaw
+from rcilab.workbench.program_draft import ProgramState
 from rcilab.workbench.pushing import Plant, PushState
 from rcilab.workbench.reach import Reach, Tone
 from rcilab.workbench.setting_up import SetupState
@@ -92,6 +93,7 @@ class UiState:
     plan: Plan | None = None
     no_plan: Message | None = None
     """Why there is no plan."""
+    program: ProgramState = field(default_factory=ProgramState)
     asked: Motion | None = None
     """The motion that a foreign robot is to make and that awaits a second yes."""
     recording: Recording | None = None
@@ -108,6 +110,8 @@ class UiState:
     place: float = 0.0
     """Where in the plan the preview stands, 0 to 1."""
     playing: bool = False
+    loop: bool = False
+    """Whether the preview begins again at its end."""
     rate: float = 1.0
     plot_joint: int = 0
     """Joint shown in the plots, from 1; 0 shows all."""

@@ -40,6 +40,8 @@ class ViewActions:
         if not state.playing or state.plan is None:
             return
         place = state.place + elapsed * state.rate / max(state.plan.motion.duration, 1e-3)
+        if state.loop and place >= 1.0:
+            place = 0.0
         self._store.update(place=min(place, 1.0), playing=place < 1.0)
 
     def set_view(self, request: requests.SetView) -> None:
@@ -50,6 +52,7 @@ class ViewActions:
             "quality": value in QUALITIES,
             "rate": value in RATES,
             "height": isinstance(value, float),
+            "loop": isinstance(value, bool),
             "plot_joint": isinstance(value, int) and 0 <= value <= self._store.state.model.n,
         }
         if known.get(request.name, False):

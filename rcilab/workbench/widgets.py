@@ -62,18 +62,18 @@ class NumberField:
     Args:
         handle: From `gui.add_text`.
         ask: Takes requests.
-        field: Name of the field in `TypeField`.
+        field: Name of the field in `TypeField`. It may be exchanged; what was typed before is asked for at once.
     """
 
     def __init__(self, handle: Any, ask: Ask, field: str) -> None:
         self._handle, self._ask, self.field = handle, ask, field
-        self._typed: tuple[float, str, int | None] | None = None
+        self._typed: tuple[float, str, int | None, str] | None = None
         self._counted = 0
 
         @handle.on_update
         async def _(event: Any) -> None:
             if event.client_id is not None:
-                self._typed = (time.monotonic(), event.target.value, event.client_id)
+                self._typed = (time.monotonic(), event.target.value, event.client_id, self.field)
 
     def show(self, text: str, problem: Message | None, counted: int) -> None:
         """Commits what was typed, or writes the state's number; called at the display's rate.
@@ -85,11 +85,11 @@ class NumberField:
         """
         typed = self._typed
         if typed is not None:
-            if time.monotonic() - typed[0] < _TYPING_PAUSE:
+            if time.monotonic() - typed[0] < _TYPING_PAUSE and typed[3] == self.field:
                 return
             self._typed = None
             self._counted = counted
-            self._ask(TypeField(page=typed[2], field=self.field, text=typed[1]))
+            self._ask(TypeField(page=typed[2], field=typed[3], text=typed[1]))
             self._waiting = time.monotonic()
             return
         if problem is not None or time.monotonic() - getattr(self, "_waiting", 0.0) < 0.2:

@@ -134,7 +134,8 @@ def planned_html(state: UiState, text: Text) -> str:
         return f'<p class="rl-verdict rl-warn"><b>{esc(text("setup.stale"))}</b> {esc(said)}</p>'
     report = state.plan.report
     tone, word = ("good", "check.passed") if report.ok else ("bad", "check.failed")
-    said = text("target.planned", duration=f"{state.plan.motion.duration:.3f}")
+    code = "target.planned" if state.plan.program is None else "program.planned"
+    said = text(code, duration=f"{state.plan.motion.duration:.3f}")
     if state.plan.short is not None:
         said += " " + text("target.leads_short", short=text.say(state.plan.short))
         tone, word = (tone, word) if not report.ok else ("warn", "target.not_there")

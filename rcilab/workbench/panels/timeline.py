@@ -20,6 +20,7 @@ from rcilab.views.plots import (
     recorded_curves,
 )
 from rcilab.workbench import requests
+from rcilab.workbench.program_draft import tell_place
 from rcilab.workbench.text import Text
 from rcilab.workbench.view_actions import RATES
 from rcilab.workbench.widgets import Ask, Html, Linked, esc, on_press
@@ -106,6 +107,8 @@ class TimelinePanel:
                 kinds = text("timeline.kinds", delay=state.recording.delay)
                 if status.q is None:
                     kinds = text("timeline.replayed")
+            where = tell_place(state.plan, t)
+            kinds = kinds if where is None else text.say(where)
             self._readout.show(f'<p class="rl-clock"><b>{t:.3f}</b> / {duration:.3f} s<span>{esc(kinds)}</span></p>')
         for plot in self._plots.values():
             plot.height = _plot_height(state)

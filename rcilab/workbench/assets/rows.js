@@ -1,0 +1,122 @@
+// The list of the Program tab: rows that are chosen, moved and deleted by mouse and keyboard, and the button that copies
+// the script. What is done is written into a hidden field of viser's, so that it comes from this page and no other.
+(() => {
+  "use strict";
+  const LATE = 1500;  // [ms] A choice: for so long the list may still come as it was before the last choice.
+  let serial = 0, had = false, dragged = null, waiting = [], timer = 0, picked = null, since = 0;
+
+  const listOf = (node) => node instanceof Element ? node.closest(".rl-steps") : null;
+  const rows = (list) => [...list.querySelectorAll("[data-key]")];
+  const find = (list, holds) => rows(list).findIndex(holds);
+  const chosen = (list) => {
+    const mine = performance.now() - since < LATE ? find(list, (row) => row.dataset.key === picked) : -1;
+    return mine >= 0 ? mine : find(list, (row) => row.getAttribute("aria-selected") === "true");
+  };
+
+  const flush = () => {
+    timer = 0;
+    const words = waiting.shift();
+    const field = document.querySelector("div:has(> .rl-bridge) + div input, div:has(> div > .rl-bridge) + div input");
+    if (!words || !field) { waiting = []; return; }
+    Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value").set.call(field, `${++serial}:${words}`);
+    field.dispatchEvent(new Event("input", { bubbles: true }));
+    timer = setTimeout(flush, 80);  // viser passes on no more than twenty a second.
+  };
+
+  const say = (what, key, place = 0) => {
+    if (what === "select") { picked = key; since = performance.now(); }
+    if (["delete", "duplicate", "undo", "redo"].includes(what)) picked = null;  // Another row will be chosen for us.
+    waiting.push(`${what}:${key}:${place}`);
+    if (!timer) flush();
+  };
+
+  const choose = (list, place) => {
+    const all = rows(list), row = all[Math.min(Math.max(place, 0), all.length - 1)];
+    if (!row) return;
+    mark(list, row);
+    say("select", row.dataset.key);
+  };
+
+  const mark = (list, row) => {
+    rows(list).forEach((other) => other.setAttribute("aria-selected", other === row ? "true" : "false"));
+    list.setAttribute("aria-activedescendant", row.id);
+    reveal(row);
+  };
+
+  const reveal = (row) => {
+    const list = listOf(row), top = row.offsetTop - list.offsetTop;
+    if (top < list.scrollTop) list.scrollTop = top;
+    else if (top + row.offsetHeight > list.scrollTop + list.clientHeight) list.scrollTop = top + row.offsetHeight - list.clientHeight;
+  };
+
+  document.addEventListener("click", (event) => {
+    const copy = event.target instanceof Element && event.target.closest("[data-rl-copy]");
+    if (copy) {
+      const code = copy.parentElement.querySelector("pre");
+      navigator.clipboard.writeText(code.textContent).then(() => { copy.textContent = copy.dataset.done; }, () => {
+        getSelection().selectAllChildren(code);  // A page that may not write: Ctrl+C copies it.
+      });
+      return;
+    }
+    const list = listOf(event.target), row = list && event.target.closest("[data-key]");
+    if (row) { list.focus(); had = true; choose(list, rows(list).indexOf(row)); }
+  });
+
+  document.addEventListener("keydown", (event) => {
+    const lost = had && event.target === document.body;  // The list has just been exchanged.
+    const list = lost ? document.querySelector(".rl-steps") : listOf(event.target);
+    if (!list) return;
+    const at = chosen(list), row = rows(list)[at], key = row ? row.dataset.key : 0, control = event.ctrlKey || event.metaKey;
+    const name = event.key.length === 1 ? event.key.toLowerCase() : event.key;
+    if (event.altKey && (name === "ArrowUp" || name === "ArrowDown")) say(name === "ArrowUp" ? "up" : "down", key);
+    else if (control && name === "z") say(event.shiftKey ? "redo" : "undo", 0);
+    else if (control && name === "y") say("redo", 0);
+    else if (control && name === "d") say("duplicate", key);
+    else if (control || event.altKey) return;
+    else if (name === "ArrowUp") choose(list, at - 1);
+    else if (name === "ArrowDown") choose(list, at + 1);
+    else if (name === "Home") choose(list, 0);
+    else if (name === "End") choose(list, Infinity);
+    else if (name === "Delete") say("delete", key);
+    else return;
+    event.preventDefault();
+    event.stopPropagation();
+  }, true);
+
+  // Every change exchanges the list's HTML; whoever was in it stays in it.
+  document.addEventListener("focusin", (event) => { had = listOf(event.target) !== null; });
+  document.addEventListener("pointerdown", (event) => { if (!listOf(event.target)) had = false; }, true);
+  let seen = null;
+  setInterval(() => {
+    const list = document.querySelector(".rl-steps");
+    if (list === seen) return;
+    seen = list;
+    if (!list) return;
+    if (had && document.activeElement === document.body) list.focus();
+    const row = rows(list)[chosen(list)];
+    if (row) mark(list, row);
+  }, 60);
+
+  const clear = () => document.querySelectorAll(".rl-over").forEach((row) => row.classList.remove("rl-over"));
+  document.addEventListener("dragstart", (event) => {
+    const row = listOf(event.target) && event.target.closest("[data-key]");
+    if (!row) return;
+    dragged = row.dataset.key;
+    event.dataTransfer.effectAllowed = "move";
+    event.dataTransfer.setData("text/plain", "");
+  });
+  document.addEventListener("dragover", (event) => {
+    const row = dragged && listOf(event.target) && event.target.closest("[data-key]");
+    if (!row) return;
+    event.preventDefault();
+    clear();
+    row.classList.add("rl-over");
+  });
+  document.addEventListener("drop", (event) => {
+    const row = dragged && listOf(event.target) && event.target.closest("[data-key]");
+    if (row) { event.preventDefault(); say("move", dragged, row.dataset.place); }
+    dragged = null;
+    clear();
+  });
+  document.addEventListener("dragend", () => { dragged = null; clear(); });
+})();

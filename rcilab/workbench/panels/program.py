@@ -1,0 +1,145 @@
+"""Program: the waypoints as a list, and what plans them."""
+
+from __future__ import annotations
+
+import re
+import time
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rcilab.workbench import requests
+from rcilab.workbench.panels.jog import problems_html
+from rcilab.workbench.panels.program_list import list_html
+from rcilab.workbench.panels.target import planned_html
+from rcilab.workbench.program_draft import Draft, number_at, tell_place
+from rcilab.workbench.readiness import is_moving
+from rcilab.workbench.text import Text
+from rcilab.workbench.widgets import Ask, Html, Linked, NumberField, esc, on_press
+
+if TYPE_CHECKING:
+    from rcilab.supervisor import SupervisorStatus
+    from rcilab.workbench.store import UiState
+
+_TOOLS = (
+    ("up", "arrow-up"), ("down", "arrow-down"), ("duplicate", "copy"), ("delete", "trash"), ("undo", "arrow-back-up"),
+    ("redo", "arrow-forward-up"),
+)  # fmt: skip
+_MOMENT = 0.25  # [s] A choice: a bar that comes and goes faster only flickers.
+_SAID = re.compile(r"[0-9]+:(select|move|up|down|delete|duplicate|undo|redo):([0-9]{1,9}):([0-9]{1,9})")
+
+
+class ProgramPanel:
+    """The list with its tools, plan, progress, cancel, loop, rounds."""
+
+    def __init__(self, text: Text, ask: Ask) -> None:
+        self._text, self._ask = text, ask
+        self._drawn: tuple[object, ...] = ()
+        self._began = 0.0
+
+    def build(self, gui: Any, state: UiState) -> None:
+        """Adds the controls."""
+        text, ask = self._text, self._ask
+        with gui.add_folder(text("program.add")):
+            gui.add_html('<i class="rl-buttons rl-bare"></i>')
+            for source, icon in (("here", "map-pin"), ("target", "current-location")):
+                button = gui.add_button(
+                    text(f"program.add_{source}"), icon=icon, hint=text(f"program.add_{source}_hint")
+                )
+                on_press(button, ask, _edit("add", source=source))
+        self._list = Html(gui)
+        gui.add_html('<i class="rl-bridge"></i>')
+        bridge = gui.add_text(text("program.list"), "")  # Not shown: rows.js writes into it what is done in the list.
+
+        @bridge.on_update
+        async def _(event: Any) -> None:
+            request = read_row(event.target.value, event.client_id)
+            if request is not None:
+                ask(request)
+
+        with gui.add_folder(text("program.tools")):
+            gui.add_html('<i class="rl-tools rl-bare"></i>')
+            self._tools: dict[str, Any] = {}
+            for what, icon in _TOOLS:
+                button = gui.add_button(text(f"program.{what}"), icon=icon, color="gray", hint=text(f"program.{what}"))
+                on_press(button, ask, _edit(what))
+                self._tools[what] = button
+        with gui.add_folder(text("program.plan_title")):
+            gui.add_html('<i class="rl-buttons"></i>')
+            self._plan = gui.add_button(text("program.plan"), icon="route", hint=text("program.plan_hint"))
+            on_press(self._plan, ask, lambda page: requests.PlanProgram(page=page))
+            self._upto = gui.add_button(
+                text("program.upto"), icon="route", color="gray", hint=text("program.upto_hint")
+            )
+            on_press(self._upto, ask, lambda page: requests.PlanProgram(page=page, upto=True))
+            loop = gui.add_checkbox(text("program.loop"), False, hint=text("program.loop_hint"))
+            self._loop = Linked(loop, ask, lambda v, p: requests.SetView(page=p, name="loop", value=v))
+            box = gui.add_text(text("program.rounds"), "", hint=text("program.rounds_hint"))
+            self._rounds = NumberField(box, ask, "program.0.rounds")
+            self._bar = gui.add_progress_bar(0.0, visible=False, animated=True)
+            self._cancel = gui.add_button(text("program.cancel"), icon="x", color="gray", visible=False)
+            on_press(self._cancel, ask, lambda page: requests.CancelProgram(page=page))
+            self._answer = Html(gui)
+
+    def show(self, state: UiState, status: SupervisorStatus) -> None:
+        """Follows the program and its plan."""
+        text, program = self._text, state.program
+        draft = program.draft if program.draft.model == state.model.name else Draft(model=state.model.name)
+        plan = state.plan if state.plan is not None and program.planned is draft and state.plan.program else None
+        t = 0.0 if plan is None else state.place * plan.motion.duration
+        running = None if plan is None else number_at(plan, t)
+        drawn = (draft, program.selected, program.failed, running, state.model)
+        if drawn != self._drawn:  # Where each waypoint is takes a while to compute.
+            self._drawn = drawn
+            self._list.show(list_html(state, draft, running, text))
+        place, count = draft.place(program.selected), len(draft.steps)
+        able = {
+            "up": place is not None and place > 0, "down": place is not None and place < count - 1,
+            "duplicate": place is not None, "delete": place is not None, "undo": program.can_undo,
+            "redo": program.can_redo,
+        }  # fmt: skip
+        for what, button in self._tools.items():
+            button.disabled = not able[what]
+        planning = program.progress is not None
+        self._plan.disabled = not count or planning or is_moving(status)
+        self._upto.disabled = place is None or planning or is_moving(status)
+        self._loop.show(state.loop)
+        self._rounds.show(str(program.rounds), state.problems.get(self._rounds.field), state.typed)
+        now = time.monotonic()
+        self._began = self._began if planning else now
+        self._bar.visible = self._cancel.visible = planning and now - self._began > _MOMENT
+        if program.progress is not None:
+            self._bar.value = round(100.0 * program.progress, 1)
+        said = problems_html(state, text, [("program.0.rounds", text("program.rounds"))])
+        if plan is not None:
+            where = tell_place(plan, t)
+            said += planned_html(state, text)
+            said += "" if where is None else f'<p class="rl-note rl-now">▸ {esc(text.say(where))}</p>'
+        elif count and not planning and program.answer is None:
+            said += f'<p class="rl-note">{esc(self._elsewhere(draft, status))}</p>'
+        if program.answer is not None:
+            said += f'<p class="rl-verdict rl-{program.tone}">{esc(text.say(program.answer))}</p>'
+        self._answer.show(said)
+
+    def _elsewhere(self, draft: Draft, status: SupervisorStatus) -> str:
+        """Returns whether the program starts where the arm is, in words."""
+        if status.q_c is None or draft.start is None or len(status.q_c) != len(draft.start):
+            return self._text("program.not_planned")
+        travel = np.degrees(np.abs(status.q_c - np.array(draft.start)))
+        if float(travel.max()) < 1e-4:
+            return self._text("program.not_planned")
+        joint = int(travel.argmax())
+        return self._text("program.elsewhere", joint=joint + 1, angle=f"{travel[joint]:.1f}")
+
+
+def read_row(said: str, page: int | None) -> requests.EditProgram | None:
+    """Returns what somebody did in the list: NUMBER:WHAT:KEY:PLACE; None for anything else."""
+    found = _SAID.fullmatch(said)
+    if page is None or found is None:
+        return None
+    what: Any = found[1]
+    return requests.EditProgram(page=page, what=what, key=int(found[2]), place=int(found[3]))
+
+
+def _edit(what: Any, **values: Any):  # type: ignore[no-untyped-def]
+    return lambda page: requests.EditProgram(page=page, what=what, **values)

@@ -1,0 +1,93 @@
+"""Files of the Program tab: JSON there and back through the browser, and the program as Python."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any
+
+from rcilab.motion.program import Program
+from rcilab.workbench import requests
+from rcilab.workbench.panels.jog import problems_html
+from rcilab.workbench.text import Text
+from rcilab.workbench.widgets import Ask, Html, NumberField, esc, on_press
+
+if TYPE_CHECKING:
+    from rcilab.supervisor import SupervisorStatus
+    from rcilab.workbench.program_draft import Draft
+    from rcilab.workbench.store import UiState
+
+
+class ProgramFilePanel:
+    """Name, load, save, new, "show as Python"."""
+
+    def __init__(self, text: Text, ask: Ask) -> None:
+        self._text, self._ask = text, ask
+        self._draft: Draft | None = None
+        self._program: Program | None = None
+
+    def build(self, gui: Any, state: UiState) -> None:
+        """Adds the controls."""
+        text, ask = self._text, self._ask
+        with gui.add_folder(text("program.file")):
+            gui.add_html('<i class="rl-buttons"></i>')
+            load = gui.add_upload_button(
+                text("program.load"), icon="upload", color="gray", mime_type=".json,application/json",
+                hint=text("program.load_hint"),
+            )  # fmt: skip
+
+            @load.on_upload
+            async def _(event: Any) -> None:
+                file = event.target.value
+                ask(requests.LoadProgram(page=event.client_id, name=file.name, content=file.content))
+
+            self._save = gui.add_button(
+                text("program.save"), icon="download", color="gray", hint=text("program.save_hint")
+            )
+            self._save.on_click(lambda event: self._send(event, "json"))
+            self._clear = gui.add_button(
+                text("program.clear"), icon="file-plus", color="gray", hint=text("program.clear_hint")
+            )
+            on_press(self._clear, ask, lambda page: requests.EditProgram(page=page, what="clear"))
+            self._python = gui.add_button(
+                text("program.script"), icon="brand-python", color="gray", hint=text("program.script_hint")
+            )
+            on_press(self._python, ask, lambda page: requests.EditProgram(page=page, what="script"))
+            self._name = NumberField(
+                gui.add_text(text("program.name"), "", hint=text("program.name_hint")), ask, "program.0.name"
+            )
+            self._problems = Html(gui)
+            self._script = Html(gui)
+            self._fetch = gui.add_button(text("program.script_save"), icon="download", color="gray", visible=False)
+            self._fetch.on_click(lambda event: self._send(event, "py"))
+
+    def show(self, state: UiState, status: SupervisorStatus) -> None:
+        """Follows the program."""
+        text, draft = self._text, state.program.draft
+        if draft is not self._draft:
+            self._draft, self._program = draft, draft.program(state.model)
+        there = self._program is not None and draft.model == state.model.name
+        self._save.disabled = self._clear.disabled = not there
+        self._python.disabled = not there
+        self._name.show(draft.name, state.problems.get(self._name.field), state.typed)
+        labels = [("program.0.file", text("program.load")), ("program.0.name", text("program.name"))]
+        self._problems.show(problems_html(state, text, labels))
+        is_shown = there and state.program.is_script_shown
+        self._python.label = text("program.script_hide" if is_shown else "program.script")
+        self._fetch.visible = is_shown
+        if not is_shown or self._program is None:
+            self._script.show("")
+            return
+        self._script.show(
+            f'<div class="rl-code"><button type="button" data-rl-copy data-done="{esc(text("program.copied"))}">'
+            f'{esc(text("program.copy"))}</button><pre tabindex="0" aria-label="{esc(text("program.script_name"))}">'
+            f"{esc(self._program.to_python())}</pre></div>"
+        )
+
+    def _send(self, event: Any, kind: str) -> None:
+        """Has the browser of whoever asked save the program, or its script."""
+        program = self._program
+        if program is None or event.client is None:
+            return
+        content = program.to_json() if kind == "json" else program.to_python()
+        name = re.sub(r"[^\w-]+", "_", program.name).strip("_") or "program"
+        event.client.send_file_download(f"{name}.{kind}", content.encode(), save_immediately=True)

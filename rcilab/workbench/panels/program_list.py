@@ -1,0 +1,94 @@
+"""The waypoints as a list: HTML that rows.js makes selectable by mouse and keyboard."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from rcilab.errors import RcilabError
+from rcilab.motion.program import Waypoint
+from rcilab.workbench.program_draft import Draft, target_of
+from rcilab.workbench.program_fields import arm_angle_of
+from rcilab.workbench.text import Text
+from rcilab.workbench.widgets import esc
+
+if TYPE_CHECKING:
+    from rcilab.model import RobotModel
+    from rcilab.workbench.store import UiState
+
+_HEADS = ("number", "type", "place", "speed", "blend", "psi", "dwell")
+
+
+def list_html(state: UiState, draft: Draft, running: int | None, text: Text) -> str:
+    """Returns the list.
+
+    Args:
+        state: Of the page.
+        draft: The program.
+        running: Number of the waypoint that the preview is on the way to, 0 on the way to the start.
+        text: Words.
+    """
+    if not draft.steps or draft.start is None:
+        return f'<div class="rl-steps-none"><b>{esc(text("program.none"))}</b>{esc(text("program.none_long"))}</div>'
+    arm = draft.arm(state.model)
+    heads = "".join(
+        f'<span title="{esc(text(f"program.head.{name}_long"))}">{esc(text(f"program.head.{name}"))}</span>'
+        for name in _HEADS
+    )
+    rows = [_start_row(draft, arm, running == 0, text)]
+    for number, step in enumerate(draft.steps, start=1):
+        chosen, failed = step.key == state.program.selected, step.key == state.program.failed
+        look = (" rl-failed" if failed else "") + (" rl-running" if number == running else "")
+        sign = f'<em title="{esc(text("program.failed"))}">!</em>' if failed else ""
+        cells = (f"{number}{sign}", *_cells(step.waypoint, arm, text))
+        rows.append(
+            f'<div class="rl-step{look}" role="option" id="rl-step-{step.key}" data-key="{step.key}" '
+            f'data-place="{number - 1}" aria-selected="{"true" if chosen else "false"}" draggable="true">'
+            + "".join(f"<span>{cell}</span>" for cell in cells)
+            + "</div>"
+        )
+    return (
+        f'<div class="rl-steps-head" aria-hidden="true">{heads}</div><div class="rl-steps" role="listbox" tabindex="0" '
+        f'aria-label="{esc(text("program.list"))}" aria-activedescendant="rl-step-{state.program.selected}">'
+        + "".join(rows)
+        + f'</div><p class="rl-note rl-keys">{esc(text("program.keys"))}</p>'
+    )
+
+
+def _start_row(draft: Draft, arm: RobotModel, running: bool, text: Text) -> str:
+    assert draft.start is not None
+    look, name = " rl-running" if running else "", esc(text("program.start"))
+    position = _millimetres(tuple(arm.forward(draft.start).position.tolist()))
+    return (
+        f'<div class="rl-step rl-start{look}" role="presentation"><span>0</span><span>{name}</span>'
+        f"<span>{position}</span></div>"
+    )
+
+
+def _cells(waypoint: Waypoint, arm: RobotModel, text: Text) -> tuple[str, ...]:
+    kind = f'<i class="rl-kind rl-kind-{waypoint.type}">{esc(text(f"program.type.{waypoint.type}"))}</i>'
+    psi = arm_angle_of(waypoint, arm)
+    return (
+        kind,
+        _where(waypoint, arm),
+        f"{100.0 * waypoint.speed:.3g}",
+        "–" if waypoint.blend == 0.0 else f"{1000.0 * waypoint.blend:.3g}",
+        "–" if psi is None else f"{round(math.degrees(psi))}°",
+        "–" if waypoint.dwell == 0.0 else f"{waypoint.dwell:.3g}",
+    )
+
+
+def _where(waypoint: Waypoint, arm: RobotModel) -> str:
+    try:
+        target = target_of(waypoint, arm)
+    except RcilabError:
+        return "?"
+    if target is not None:
+        return _millimetres(tuple(target.position.tolist()))
+    if waypoint.type == "circle":
+        return f"{math.degrees(math.tau if waypoint.angle is None else waypoint.angle):.0f}°"
+    return "ψ"
+
+
+def _millimetres(position: tuple[float, ...]) -> str:
+    return " ".join(f"<b>{round(1000.0 * number):d}</b>" for number in position)

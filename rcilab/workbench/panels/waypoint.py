@@ -1,0 +1,126 @@
+"""The editor of the selected waypoint: type, numbers, and where it leads."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rcilab.motion.program import Waypoint
+from rcilab.workbench import requests
+from rcilab.workbench.goal_actions import POSE_FIELDS
+from rcilab.workbench.panels.jog import problems_html
+from rcilab.workbench.program_draft import TYPES, target_of
+from rcilab.workbench.program_fields import VIA_FIELDS, arm_angle_of
+from rcilab.workbench.text import Text
+from rcilab.workbench.widgets import Ask, Html, Linked, NumberField, esc, on_press, shown
+
+if TYPE_CHECKING:
+    from rcilab.model import RobotModel
+    from rcilab.supervisor import SupervisorStatus
+    from rcilab.workbench.store import UiState
+
+_PLAIN = ("speed", "blend", "dwell")
+
+
+class WaypointPanel:
+    """Shown while a waypoint is selected."""
+
+    def __init__(self, text: Text, ask: Ask) -> None:
+        self._text, self._ask = text, ask
+
+    def build(self, gui: Any, state: UiState) -> None:
+        """Adds the controls."""
+        text, ask = self._text, self._ask
+        self._fields: dict[str, NumberField] = {}
+        self._boxes: dict[str, Any] = {}
+        self._folder = gui.add_folder(text("program.selected", number=1))
+        with self._folder:
+            gui.add_html('<i class="rl-pairs rl-worded"></i>')
+            kinds = {text(f"program.type.{kind}"): kind for kind in TYPES}
+            self._kinds = {kind: label for label, kind in kinds.items()}
+            choice = gui.add_dropdown(text("program.type"), tuple(kinds), hint=text("program.type_hint"))
+            self._kind = Linked(
+                choice, ask, lambda v, p: requests.EditProgram(page=p, what="type", type=kinds.get(v, ""))
+            )
+            for name in (*_PLAIN, *(("psi",) if state.model.n == 7 else ())):
+                self._field(gui, name)
+        self._pose = gui.add_folder(text("program.pose"))
+        with self._pose:
+            gui.add_html('<i class="rl-trios"></i>')
+            for name in POSE_FIELDS:
+                self._field(gui, name)
+        self._via = gui.add_folder(text("program.via"))
+        with self._via:
+            gui.add_html('<i class="rl-trios"></i>')
+            for name in VIA_FIELDS:
+                self._field(gui, name)
+            self._button(gui, "via", "here", "map-pin")
+            self._button(gui, "via", "target", "current-location")
+        self._problems = Html(gui)
+        self._teach = gui.add_folder(text("program.teach"))
+        with self._teach:
+            gui.add_html('<i class="rl-buttons"></i>')
+            for what, source, icon in (
+                ("teach", "here", "map-pin"), ("teach", "target", "current-location"), ("start", "here", "flag"),
+                ("aim", "target", "eye"),
+            ):  # fmt: skip
+                self._button(gui, what, source, icon)
+
+    def show(self, state: UiState, status: SupervisorStatus) -> None:
+        """Follows the selected waypoint."""
+        draft, key = state.program.draft, state.program.selected
+        place, waypoint = draft.place(key), draft.waypoint(key)
+        if draft.model != state.model.name or waypoint is None or place is None:
+            for folder in (self._folder, self._pose, self._via, self._teach):
+                folder.visible = False
+            self._problems.show("")
+            return
+        arm = draft.arm(state.model)
+        values = _values(waypoint, arm)
+        self._folder.visible = self._teach.visible = True
+        self._folder.label = self._text("program.selected", number=place + 1)
+        self._pose.visible, self._via.visible = "x" in values, waypoint.type == "arc"
+        self._kind.handle.disabled = waypoint.type not in TYPES
+        if waypoint.type in TYPES:
+            self._kind.show(self._kinds[waypoint.type])
+        labels = []
+        for name, field in self._fields.items():
+            field.field = f"program.{key}.{name}"
+            field.show(values.get(name, ""), state.problems.get(field.field), state.typed)
+            labels.append((field.field, self._text(f"program.field.{name}")))
+        self._problems.show(problems_html(state, self._text, labels) + self._note(waypoint))
+
+    def _field(self, gui: Any, name: str) -> None:
+        box = gui.add_text(self._text(f"program.field.{name}"), "", hint=self._text(f"program.hint.{_hint_of(name)}"))
+        self._fields[name] = NumberField(box, self._ask, f"program.0.{name}")
+
+    def _button(self, gui: Any, what: Any, source: Any, icon: str) -> None:
+        name = self._text(f"program.{what}_{source}")
+        button = gui.add_button(name, icon=icon, color="gray", hint=self._text(f"program.{what}_{source}_hint"))
+        on_press(button, self._ask, lambda page: requests.EditProgram(page=page, what=what, source=source))
+
+    def _note(self, waypoint: Waypoint) -> str:
+        if waypoint.type in TYPES:
+            return ""
+        return f'<p class="rl-note">{esc(self._text("program.from_file"))}</p>'
+
+
+def _values(waypoint: Waypoint, arm: RobotModel) -> dict[str, str]:
+    """Returns what stands in each field that this waypoint has."""
+    psi, target = arm_angle_of(waypoint, arm), target_of(waypoint, arm)
+    values = {
+        "speed": shown(100.0 * waypoint.speed), "blend": shown(1000.0 * waypoint.blend), "dwell": shown(waypoint.dwell),
+        "psi": "" if psi is None else shown(math.degrees(psi)),
+    }  # fmt: skip
+    if target is not None:
+        numbers = (*(1000.0 * target.position), *np.degrees(target.rpy))
+        values |= {name: shown(number) for name, number in zip(POSE_FIELDS, numbers, strict=True)}
+    if waypoint.via is not None:
+        values |= {name: shown(1000.0 * number) for name, number in zip(VIA_FIELDS, waypoint.via, strict=True)}
+    return values
+
+
+def _hint_of(name: str) -> str:
+    return "mm" if name in (*POSE_FIELDS[:3], *VIA_FIELDS) else "deg" if name in POSE_FIELDS else name

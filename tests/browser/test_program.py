@@ -1,0 +1,75 @@
+"""Write a program as a person: add, choose by keys, type, plan, save, load, look at it as Python."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from browser.test_settings import choose
+from rcilab.motion import Program
+from rcilab.workbench import requests
+
+
+@pytest.fixture
+def writing(page):
+    """The Program tab with two waypoints, added by hand."""
+    page.bench.conductor.ask(requests.EditProgram(what="clear"))
+    page.type_joint(1, "12")
+    page.wait(lambda: page.state.plan is not None, "a target to add")
+    page.open_tab("Program")
+    page.wait(lambda: page.tab.get_by_text("No waypoints yet").is_visible(), "an empty program")
+    page.button("From the target").click()
+    page.button("From the arm").click()
+    page.wait(lambda: page.tab.get_by_role("option").count() == 2, "two rows")
+    yield page
+    page.bench.conductor.ask(requests.EditProgram(what="clear"))
+    page.bench.conductor.ask(requests.SetView(name="loop", value=False))
+
+
+def field(page, name: str):
+    """A text box of the editor by its label."""
+    label = page.tab.locator("label:visible", has_text=name).first
+    return label.locator("xpath=ancestor::div[contains(@class,'Flex-root')][1]").locator("input").first
+
+
+def test_a_program_is_written_by_keyboard_planned_saved_and_loaded(writing, tmp_path):
+    page, steps = writing, lambda: writing.state.program.draft.steps
+    first, second = (step.key for step in steps())
+    page.tab.get_by_role("option").first.click()
+    page.wait(lambda: page.state.program.selected == first, "the clicked row to be selected")
+    page.tab.keyboard.press("ArrowDown")
+    page.wait(lambda: page.state.program.selected == second, "the row below")
+    page.tab.keyboard.press("Alt+ArrowUp")
+    page.wait(lambda: steps()[0].key == second, "the row to have moved up")
+    page.tab.keyboard.press("Control+z")
+    page.wait(lambda: steps()[0].key == first, "undo, with the focus still in the list")
+    choose(page, "Type", "MoveL")
+    page.wait(lambda: steps()[1].waypoint.type == "line", "a line")
+    field(page, "Speed %").fill("150")
+    page.wait(lambda: any("outside" in text for text in page.alerts()), "an answer beside the field")
+    field(page, "Speed %").fill("40")
+    page.wait(lambda: steps()[1].waypoint.speed == 0.4 and page.alerts() == [], "40 %")
+    page.button("Plan all").click()
+    page.wait(lambda: page.state.plan is not None and page.state.plan.program is not None, "the program's plan")
+    page.wait(lambda: page.tab.get_by_text("to waypoint 1 of 2, MoveJ").first.is_visible(), "the segment's name")
+    with page.tab.expect_download() as coming:
+        page.button("Save").click()
+    file = tmp_path / "saved.json"
+    coming.value.save_as(file)
+    assert Program.load(file) == page.state.plan.program
+    bad = tmp_path / "bad.json"
+    bad.write_text(json.dumps({**json.loads(file.read_text()), "start": [0.0]}))
+    for path in (bad, file):
+        with page.tab.expect_file_chooser() as choosing:
+            page.button("Load").click()
+        choosing.value.set_files(path)
+        if path is bad:
+            page.wait(lambda: any("bad.json, line" in text for text in page.alerts()), "the line that is wrong")
+            assert len(steps()) == 2
+    page.wait(lambda: page.state.program.selected not in (first, second), "the saved program back")
+    page.wait(lambda: page.alerts() == [], "no complaint any more")
+    page.button("Show as Python").click()
+    page.wait(
+        lambda: "rcilab.plan_program(model, program)" in page.tab.locator(".rl-code pre").inner_text(), "a script"
+    )

@@ -1,0 +1,320 @@
+"""The Program tab without a browser: edits with undo, typed numbers, planning beside, files, another arm."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import threading
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from rcilab.model import load_model
+from rcilab.motion import Motion, Program, Waypoint
+from rcilab.spatial import Pose
+from rcilab.workbench import program_planner, requests
+from rcilab.workbench.goal_actions import GoalActions, initial_goal
+from rcilab.workbench.panels.program import read_row
+from rcilab.workbench.panels.program_list import list_html
+from rcilab.workbench.program_actions import ProgramActions
+from rcilab.workbench.program_draft import draft_of, number_at, tell_place, time_at
+from rcilab.workbench.store import Store, UiState
+from rcilab.workbench.text import Text
+from tests.waiting import wait_for
+
+MODEL = load_model("xMatePro7")
+HOME = np.array(MODEL.home)
+PLACE = MODEL.forward(HOME)
+Edit = requests.EditProgram
+
+
+def beside(*step: float) -> Pose:
+    return Pose(PLACE.position + step, PLACE.wxyz)
+
+
+SQUARE = Program(
+    model=MODEL.name,
+    start=MODEL.home,
+    name="square",
+    waypoints=(
+        Waypoint.joint(HOME + 0.1, speed=1.0),
+        Waypoint.line(beside(0.0, 0.1, 0.0), speed=0.8, blend=0.02),
+        Waypoint.line(beside(-0.1, 0.1, 0.0), speed=0.8, dwell=0.05),
+    ),
+)
+
+
+class Bench:
+    """A page's program on an arm that stands where it is told to."""
+
+    def __init__(self, model=MODEL, q=HOME) -> None:
+        self.status = SimpleNamespace(phase="idle", q_c=q)
+        session = SimpleNamespace(status=lambda: self.status)
+        self.store = Store(UiState(model=model, goal=initial_goal(model, q)))
+        self.goal = GoalActions(self.store, session)
+        self.actions = ProgramActions(self.store, session, self.goal)
+        self.actions.tick()
+
+    @property
+    def state(self):
+        return self.store.state
+
+    @property
+    def program(self):
+        return self.store.state.program
+
+    @property
+    def types(self) -> list[str]:
+        return [step.waypoint.type for step in self.program.draft.steps]
+
+    @property
+    def told(self) -> str | None:
+        return None if self.state.notice is None else self.state.notice.text.code
+
+    def edit(self, what, **values) -> None:
+        self.actions.edit(Edit(what=what, **values))
+
+    def type(self, name: str, text: str, key: int | None = None) -> str | None:
+        """Types into a field of a step, and returns what is answered beside it."""
+        field = f"program.{self.program.selected if key is None else key}.{name}"
+        self.actions.type_field(requests.TypeField(field=field, text=text))
+        problem = self.state.problems.get(field)
+        return None if problem is None else problem.code
+
+    def load(self, program: Program) -> None:
+        self.actions.load(requests.LoadProgram(name="square.json", content=program.to_json().encode()))
+
+    def plan(self, **values) -> None:
+        self.actions.plan(requests.PlanProgram(**values))
+        wait_for(self.is_done, 20.0, "the planning to end")
+
+    def is_done(self) -> bool:
+        self.actions.tick()
+        return self.program.progress is None
+
+
+@pytest.fixture
+def bench() -> Bench:
+    return Bench()
+
+
+@pytest.fixture
+def square(bench) -> Bench:
+    bench.load(SQUARE)
+    return bench
+
+
+def test_waypoints_are_added_after_the_selected_one_moved_copied_and_deleted_and_undo_brings_all_back(bench):
+    bench.edit("add", source="here")
+    bench.goal.move_target(requests.MoveTarget(position=tuple(beside(0.0, 0.1, 0.0).position), wxyz=tuple(PLACE.wxyz)))
+    bench.edit("add", source="target")
+    assert bench.program.draft.start == tuple(HOME.tolist())
+    assert np.allclose(MODEL.forward(bench.program.draft.steps[1].waypoint.q).position, beside(0.0, 0.1, 0.0).position)
+    first, second = (step.key for step in bench.program.draft.steps)
+    bench.edit("type", type="line")
+    bench.edit("duplicate")
+    assert bench.types == ["joint", "line", "line"]
+    bench.edit("select", key=first)
+    bench.edit("down")
+    bench.edit("move", key=second, place=2)
+    assert [step.key for step in bench.program.draft.steps][::2] == [first, second]
+    bench.edit("delete", key=second)
+    assert len(bench.types) == 2
+    full = bench.program.draft
+    for _ in range(7):
+        bench.edit("undo")
+    assert bench.types == []
+    assert not bench.program.can_undo
+    for _ in range(9):
+        bench.edit("redo")
+    assert bench.program.draft is full
+    assert not bench.program.can_redo
+
+
+def test_a_retyped_arc_has_a_via_that_can_be_planned_and_taught(square):
+    key = square.program.draft.steps[1].key
+    square.edit("type", key=key, type="arc")
+    assert square.told == "program.via_made"
+    square.plan()
+    assert square.state.plan.report.ok
+    square.goal.move_target(
+        requests.MoveTarget(position=tuple(beside(0.03, 0.05, 0.02).position), wxyz=tuple(PLACE.wxyz))
+    )
+    square.edit("via", key=key, source="target")
+    assert np.allclose(square.program.draft.waypoint(key).via, beside(0.03, 0.05, 0.02).position)
+    assert square.type("via_x", "600", key) is None
+    assert square.program.draft.waypoint(key).via[0] == 0.6
+    square.edit("type", key=key, type="joint")
+    assert square.program.draft.waypoint(key).via is None
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "problem"),
+    [
+        ("speed", "101", "parse.range"), ("speed", "0", "parse.range"), ("speed", "fast", "parse.garbage"),
+        ("blend", "-1", "parse.range"), ("dwell", "nan", "parse.not_finite"), ("psi", "181", "parse.range"),
+        ("x", "1e9", "parse.range"), ("yaw", "inf", "parse.not_finite"), ("rounds", "1.5", "program.whole"),
+        ("rounds", "0", "parse.range"), ("name", "a\nb", "program.name_bad"),
+    ],
+)  # fmt: skip
+def test_a_bad_number_is_answered_beside_its_field_and_changes_nothing(square, name, text, problem):
+    before = square.program.draft
+    assert square.type(name, text) == problem
+    assert square.program.draft is before
+    assert square.program.rounds == 1
+
+
+def test_typed_numbers_change_the_step_they_were_typed_for(square):
+    first, second = (step.key for step in square.program.draft.steps[:2])
+    square.edit("select", key=second)
+    for name, text in (("speed", "12.5"), ("blend", "15"), ("dwell", "0,25"), ("psi", "-10")):
+        assert square.type(name, text, first) is None
+    made = square.program.draft.waypoint(first)
+    assert (made.speed, made.blend, made.dwell) == (0.125, 0.015, 0.25)
+    assert made.q is None
+    assert made.psi == pytest.approx(np.radians(-10.0))
+    assert square.type("psi", "", first) is None
+    assert square.program.draft.waypoint(first).psi is None
+    before = square.program.draft.waypoint(second).position
+    assert square.type("z", "400", second) is None
+    assert square.program.draft.waypoint(second).position == (*before[:2], 0.4)
+    square.type("rounds", "2")
+    assert square.program.rounds == 2
+
+
+def test_the_plan_of_a_program_is_the_pages_plan_with_a_certificate_and_names_its_segments(square):
+    square.plan()
+    plan = square.state.plan
+    assert plan.complete
+    plan.report.certificate.verify(plan.motion, MODEL, HOME)
+    assert square.program.answer is None
+    assert [number_at(plan, t) for t in (0.0, time_at(plan, 1) + 1e-6, plan.motion.duration)] == [1, 2, 3]
+    said = Text("en").say(tell_place(plan, plan.motion.duration))
+    assert said == "to waypoint 3 of 3, MoveL"
+    second = square.program.draft.steps[1].key
+    square.edit("select", key=second)
+    assert square.state.place == pytest.approx(time_at(plan, 2) / plan.motion.duration)
+    square.plan(upto=True)
+    assert len(square.state.plan.program.waypoints) == 2
+
+
+def test_an_arm_that_is_elsewhere_is_led_to_the_start_first_and_told_so(square):
+    square.plan()
+    alone = square.state.plan.motion
+    square.status.q_c = HOME + 0.2
+    square.type("rounds", "2")
+    square.plan()
+    plan = square.state.plan
+    assert np.array_equal(plan.motion.start, HOME + 0.2)
+    assert square.program.answer.code == "program.approach"
+    assert tell_place(plan, 0.0).code == "program.at_start"
+    first = round(plan.motion.segment_starts[1] * 1000)
+    assert np.allclose(plan.motion.q[first : first + len(alone)], alone.q, atol=1e-9)
+    starts = plan.motion.segment_starts
+    assert [number_at(plan, t + 1e-6) for t in starts] == [0, 1, 2, 3, 0, 1, 2, 3]
+    assert np.allclose(plan.motion.goal, alone.goal)
+
+
+def test_an_error_names_the_waypoint_and_marks_it(square):
+    key = square.program.draft.steps[1].key
+    square.type("x", "2900", key)
+    before = square.state.plan
+    square.plan()
+    assert square.program.failed == key
+    assert "waypoint 2 (line)" in Text("en").say(square.program.answer)
+    assert square.state.plan is before
+    assert "rl-failed" in list_html(square.state, square.program.draft, None, Text("en"))
+
+
+def test_planning_can_be_cancelled_at_once_and_an_edit_drops_it(square, monkeypatch):
+    going, ended = threading.Event(), threading.Event()
+    tell = program_planner._Work._tell
+
+    def slowly(work, part) -> None:
+        going.wait(20.0)
+        try:
+            tell(work, part)
+        except BaseException:
+            ended.set()
+            raise
+
+    monkeypatch.setattr(program_planner._Work, "_tell", slowly)
+    for give_up in (lambda: square.actions.cancel(requests.CancelProgram()), lambda: square.edit("delete")):
+        going.clear()
+        ended.clear()
+        square.actions.plan(requests.PlanProgram())
+        assert square.program.progress == 0.0
+        assert square.state.busy is not None
+        give_up()
+        assert (square.program.progress, square.state.busy) == (None, None)
+        going.set()
+        assert ended.wait(20.0), "its thread ends, too"
+        square.actions.tick()
+        assert square.state.plan is None
+        assert square.program.answer.code in ("program.cancelled", "program.changed")
+
+
+def test_a_bad_file_is_answered_by_line_and_another_arms_by_name_and_nothing_is_lost(square):
+    before = square.program.draft
+    text = SQUARE.to_json().replace('"speed": 0.8', '"speed": 8', 1)
+    square.actions.load(requests.LoadProgram(name="bad.json", content=text.encode()))
+    problem = Text("en").say(square.state.problems["program.0.file"])
+    assert "bad.json, line 9" in problem
+    assert "waypoint 2" in problem
+    for content in (b"", b"\xff\xfe", b"[" * 1000):
+        square.actions.load(requests.LoadProgram(name="bad.json", content=content))
+        assert square.state.problems["program.0.file"].code == "program.file_bad"
+    other = Program(model="xMate7", start=load_model("xMate7").home, waypoints=SQUARE.waypoints[1:])
+    square.load(other)
+    assert square.state.problems["program.0.file"].code == "program.file_other"
+    assert square.program.draft is before
+    square.load(SQUARE)
+    assert "program.0.file" not in square.state.problems
+    square.edit("undo")
+    assert square.program.draft is before
+
+
+def test_another_arm_has_its_own_program_and_the_first_one_comes_back(square):
+    kept = square.program.draft
+    other = load_model("xMate7")
+    square.store.update(model=other, goal=initial_goal(other, np.array(other.home)))
+    square.status.q_c = np.array(other.home)
+    square.actions.tick()
+    assert square.program.draft.steps == ()
+    assert square.told == "program.kept"
+    square.edit("add", source="here")
+    square.store.update(model=MODEL, goal=initial_goal(MODEL, HOME))
+    square.actions.tick()
+    assert square.program.draft is kept
+    assert square.program.can_undo
+    assert square.told == "program.kept"
+
+
+def test_the_script_run_as_a_process_makes_the_same_motion_to_the_last_sample(square, tmp_path):
+    model = MODEL.with_tool(Pose((0.0, 0.0, 0.1)))
+    square.store.update(model=model)
+    square.plan()
+    program = square.program.draft.program(model)
+    assert program == square.state.plan.program
+    script, out = tmp_path / "square.py", tmp_path / "out.npz"
+    script.write_text(program.to_python(), encoding="utf-8")
+    done = subprocess.run([sys.executable, script, out], capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 0, done.stderr
+    assert np.array_equal(Motion.load(out).q, square.state.plan.motion.q)
+
+
+def test_files_bring_circles_and_elbow_moves_that_stay_as_they_are(bench):
+    moves = (Waypoint.circle(beside(0.05, 0.0, 0.0).position, (0, 0, 1), 1.0), Waypoint.nullspace(0.3))
+    bench.load(Program(model=MODEL.name, start=MODEL.home, waypoints=moves))
+    for what in ("type", "teach", "aim"):
+        bench.edit(what, type="line")
+        assert bench.told == "program.no_target"
+    assert "57°" in list_html(bench.state, bench.program.draft, None, Text("en"))
+    assert draft_of(bench.program.draft.program(MODEL)).program(MODEL).waypoints == moves
+
+
+@pytest.mark.parametrize("said", ["", "1:select:1", "1:clear:1:1", "1:select:x:1", "1:select:-1:0", "1:select:²:0"])
+def test_what_no_list_says_is_ignored(said):
+    assert read_row(said, 1) is None
+    assert read_row("1:select:1:0", None) is None
