@@ -123,7 +123,7 @@ class ProgramActions:
                 here=here,
                 rounds=self._program.rounds,
                 box=state.setup.wanted.box,
-            )  # fmt: skip
+            )
         )
         self._store.update(busy=message("program.planning"))
         self._set(progress=0.0, answer=None, failed=None)
