@@ -25,8 +25,14 @@ Matrix: TypeAlias = Array
 
 
 def frozen(value: ArrayLike) -> Array:
-    """Returns a read-only float64 copy of `value`."""
-    array = np.array(value, dtype=np.float64)
+    """Returns a read-only float64 copy of `value`, or itself where it is such a copy already."""
+    if isinstance(value, np.ndarray) and value.base is None and value.dtype == np.float64 and not value.flags.writeable:
+        return value
+    return sealed(np.array(value, dtype=np.float64))
+
+
+def sealed(array: Array) -> Array:
+    """Makes an array read-only that nobody else writes to, and returns it: `frozen` needs no copy of it."""
     array.flags.writeable = False
     return array
 

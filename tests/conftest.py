@@ -1,4 +1,4 @@
-"""What every test shares: fixed seeds, and no example is ever cut short by a busy machine."""
+"""What every test shares: fixed seeds, examples that a busy machine does not cut short, and one browser at a time."""
 
 from __future__ import annotations
 
@@ -20,3 +20,11 @@ def _no_files_of_the_user(tmp_path_factory: pytest.TempPathFactory) -> Iterator[
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CONFIG_HOME", os.fspath(tmp_path_factory.mktemp("config")))
         yield
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Where tests run side by side, those in a browser run one after the other: each drawing takes a core or more."""
+    if config.pluginmanager.hasplugin("xdist"):
+        for item in items:
+            if item.get_closest_marker("browser"):
+                item.add_marker(pytest.mark.xdist_group("browser"))

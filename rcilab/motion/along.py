@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rcilab.arrays import Array, JointPath, JointVector, as_number
+from rcilab.arrays import Array, JointPath, JointVector, as_number, sealed
 from rcilab.clock import CYCLE_TIME
 from rcilab.errors import InvalidValueError
 from rcilab.model import RobotModel
@@ -24,8 +24,10 @@ from rcilab.motion.margin import LIMIT_MARGIN
 from rcilab.motion.motion import Motion, standing
 from rcilab.motion.obstacle import examine, refusal
 from rcilab.motion.path import Path
+from rcilab.motion.path_bounds import LEAST, ROUNDNESS, PathBounds, half_planes, path_bounds
 from rcilab.motion.piecewise import PiecewisePolynomial
-from rcilab.motion.time_law import PathBounds, TimeLaw, fastest_squares, smooth_law
+from rcilab.motion.slowdown import spread
+from rcilab.motion.time_law import TimeLaw, fastest_squares, smooth_law
 from rcilab.motion.turning import TurnThrough, turns_between
 
 _KNOTS = 500
@@ -35,9 +37,6 @@ _FINE_KNOTS = 4000
 _STEP = 0.1
 """Turn of a joint from knot to knot beyond which it does not follow the tool but a singularity is in the way, [rad]. A
 choice: 50 rad on the whole way; no arm has that."""
-_SIDES = 12
-"""Half-planes on each side in place of a round bound on the tool's acceleration, on an arc or in an uneven turn; they
-lose 0.9 %."""
 _ROUNDS = 8
 """How often to slow down a law in places where it passes a limit, and then as a whole. Seen: 1 to 5 in places."""
 _SLOWEST = 4.0
@@ -86,25 +85,29 @@ def plan_along(model: RobotModel, q: JointVector, path: Path, speed: float) -> M
     bounds = _bounds(model, LIMIT_MARGIN * speed)
     allowed = _path_bounds(path, require_path(model, q, path), bounds)
     cycles = max(2, math.ceil(_longest_reversal(bounds) / CYCLE_TIME))
-    slowdown = np.ones(len(allowed.first))
+    slowdown = np.ones(len(allowed.knots))
     worst = 0.0
     for round_ in range(2 * _ROUNDS):
-        law = smooth_law(fastest_squares(allowed.slowed(slowdown)), cycles)
-        rows = _rows_along(model, q, path, law.u)
-        excess = _excess(bounds, path, rows, law.u)
+        law = smooth_law(allowed.knots, fastest_squares(allowed.slowed(slowdown)), cycles)
+        rows = _rows_along(model, q, path, law.s)
+        excess = _excess(bounds, path, rows, law.s)
         if excess.max() <= 1.0:
             coefficients, excess = np.empty((len(rows) - 1, model.n, 6)), np.zeros(len(rows) - 1)
             for block, powers in _quintics(model, path, rows, law):
                 coefficients[block] = np.stack(powers, axis=2)
                 excess[block] = _excess_between(bounds, powers)
             if excess.max() <= 1.0:
-                _require_inside(model, path, rows, law.u)
+                _require_inside(model, path, rows, law.s)
                 curve = _joined(coefficients)
                 return Motion(polynomial=curve, goal=rows[-1], law="jerk_limited", speed=speed)
-        worst = float(law.u[excess.argmax()])
+        worst = float(law.s[excess.argmax()])
         # Where slowing down in places only shifts what is too fast, the whole way is slowed down.
-        somewhere = round_ < _ROUNDS
-        slowdown *= _spread(excess, law.u, len(slowdown), cycles) if somewhere else float(excess.max()) * _HASTE
+        if round_ < _ROUNDS:
+            factor = np.ones(len(law.s))
+            factor[: len(excess)] = np.maximum(excess * excess * _HASTE, 1.0)
+            slowdown *= spread(factor, law.s, allowed.knots, cycles + 3)
+        else:
+            slowdown *= float(excess.max()) * _HASTE
         if slowdown.max() > _SLOWEST:
             break
     reason = "the joints would have to jump, because a singularity is close; lead the tool around it"
@@ -204,58 +207,42 @@ def _turns_unevenly(path: Path) -> bool:
 
 def _path_bounds(path: Path, knots: JointPath, bounds: _Bounds) -> PathBounds:
     shares = np.linspace(0.0, 1.0, len(knots))
-    columns = _columns(path, knots, shares)
+    columns = _columns(path, knots, shares).T
     step = shares[1]
-    first = np.gradient(columns, step, axis=0, edge_order=2)
+    first = np.gradient(columns, step, axis=1, edge_order=2)
     second = np.empty_like(columns)
-    second[1:-1] = (columns[2:] - 2.0 * columns[1:-1] + columns[:-2]) / step**2
-    second[0], second[-1] = second[1], second[-2]
-    along, toward = _tool_rows(path)
+    second[:, 1:-1] = (columns[:, 2:] - 2.0 * columns[:, 1:-1] + columns[:, :-2]) / step**2
+    second[:, 0], second[:, -1] = second[:, 1], second[:, -2]
     velocity, acceleration, _ = bounds.tool
-    round_ = 1.0 if path.circle is None else math.cos(math.pi / (2.0 * _SIDES))
-    count = len(knots)
-    firsts, seconds = [first, np.tile(along, (count, 1))], [second, np.tile(toward, (count, 1))]
-    velocities = [bounds.velocity, np.full(len(along), velocity)]
-    accelerations = [bounds.acceleration, np.full(len(along), round_ * acceleration)]
+    along, toward = (np.tile(rows, len(knots)) for rows in _tool_rows(path))
+    round_ = 1.0 if path.circle is None else ROUNDNESS
+    parts = [(first, second, bounds.velocity, bounds.acceleration), (along, toward, velocity, round_ * acceleration)]
     if _turns_unevenly(path):
-        along, toward = _turn_rows(path, shares)
-        firsts.append(along)
-        seconds.append(toward)
-        velocities.append(np.full(_SIDES, bounds.velocity[-1]))
-        accelerations.append(np.full(_SIDES, round_ * bounds.acceleration[-1]))
-    return PathBounds(
-        first=np.hstack(firsts),
-        second=np.hstack(seconds),
-        velocity=np.concatenate(velocities),
-        acceleration=np.concatenate(accelerations),
-    )
+        parts.append((*_turn_rows(path, shares), bounds.velocity[-1], ROUNDNESS * bounds.acceleration[-1]))
+    firsts, seconds, velocities, accelerations = zip(*parts, strict=True)
+    sizes = [np.full(len(rows), limit) for rows, limit in zip(firsts, velocities, strict=True)]
+    first = np.vstack(firsts)
+    fastest = (np.concatenate(sizes)[:, np.newaxis] / np.maximum(np.abs(first), LEAST)).min(axis=0)
+    limits = [np.full(len(rows), limit) for rows, limit in zip(firsts, accelerations, strict=True)]
+    return path_bounds(shares, first, np.vstack(seconds), np.concatenate(limits)[:, np.newaxis], fastest)
 
 
 def _tool_rows(path: Path) -> tuple[Array, Array]:
-    """Returns the tool's path derivatives along the way and towards the centre, as rows that bound their norm, [m]."""
+    """Returns the tool's path derivatives as rows that bound their norm, each of shape (1 or sides, 1), [m]."""
     if path.circle is None:
-        return np.array([math.dist(path.start.parts[1], path.goal.parts[1])]), np.zeros(1)
-    angles = _directions()
-    return np.cos(angles) * path.distance, np.sin(angles) * path.distance * path.circle.angle
+        return np.full((1, 1), math.dist(path.start.parts[1], path.goal.parts[1])), np.zeros((1, 1))
+    # Along the way, and towards the centre.
+    return half_planes(np.array([[path.distance, 0.0]]), np.array([[0.0, path.distance * path.circle.angle]]))
 
 
 def _turn_rows(path: Path, shares: Array) -> tuple[Array, Array]:
-    """Returns the path derivatives of an uneven turn as rows that bound its norm, each of shape (M + 1, sides), [rad].
+    """Returns the path derivatives of an uneven turn as rows that bound its norm, each of shape (sides, K + 1), [rad].
 
-    In the plane of its rotation velocity w by the share and of dw the acceleration is w u'' + dw u'^2.
+    In the plane of its rotation velocity w by the share and of dw the acceleration is w s'' + dw s'^2.
     """
     R = path.sample(np.concatenate((shares[:1] - shares[1], shares, shares[-1:] + shares[1])))[0][:, :3, :3]
     turns = turns_between(R) / shares[1]
-    w, dw = 0.5 * (turns[1:] + turns[:-1]), np.diff(turns, axis=0) / shares[1]
-    size = np.sqrt((w * w).sum(axis=1))
-    along = (w * dw).sum(axis=1) / np.where(size > 0.0, size, 1.0)
-    across = np.sqrt(np.maximum((dw * dw).sum(axis=1) - along * along, 0.0))
-    angles = _directions()
-    return np.outer(size, np.cos(angles)), np.outer(along, np.cos(angles)) + np.outer(across, np.sin(angles))
-
-
-def _directions() -> Array:
-    return np.arange(_SIDES) * math.pi / _SIDES - math.pi / 2.0
+    return half_planes(0.5 * (turns[1:] + turns[:-1]), np.diff(turns, axis=0) / shares[1])
 
 
 def _excess(bounds: _Bounds, path: Path, rows: JointPath, shares: Array) -> Array:
@@ -304,21 +291,6 @@ def _excess_between(bounds: _Bounds, powers: list[Array]) -> Array:
     return excess
 
 
-def _spread(excess: Array, u: Array, knots: int, cycles: int) -> Array:
-    """Returns by how much to slow down at each knot, given by how much each row or cycle is too fast."""
-    factor = np.ones(len(u))
-    factor[: len(excess)] = np.maximum(excess * excess * _HASTE, 1.0)
-    reach = cycles + 3
-    wide = np.pad(factor, reach, constant_values=1.0)
-    factor = np.lib.stride_tricks.sliding_window_view(wide, 2 * reach + 1).max(axis=1)
-    places = np.linspace(0.0, 1.0, knots)
-    result = np.interp(places, u, factor)
-    below = np.clip((u * (knots - 1)).astype(np.intp), 0, knots - 2)
-    np.maximum.at(result, below, factor)
-    np.maximum.at(result, below + 1, factor)
-    return result
-
-
 def _quintics(model: RobotModel, path: Path, rows: JointPath, law: TimeLaw) -> Iterator[tuple[slice, list[Array]]]:
     """Yields the curve through the rows with the path's velocities and accelerations: continuous in both.
 
@@ -329,10 +301,10 @@ def _quintics(model: RobotModel, path: Path, rows: JointPath, law: TimeLaw) -> I
     h = CYCLE_TIME
     for block in blocks(last):
         ends = slice(block.start, block.stop + 1)
-        here, u = rows[ends], law.u[ends]
+        here, u = rows[ends], law.s[ends]
         before, after = (inverse_path(model, *path.sample(u + side), here[0])[0] for side in (-_NUDGE, _NUDGE))
         first, second = (after - before) / (2.0 * _NUDGE), (after - 2.0 * here + before) / _NUDGE**2
-        du, ddu = law.du[ends, np.newaxis], law.ddu[ends, np.newaxis]
+        du, ddu = law.ds[ends, np.newaxis], law.dds[ends, np.newaxis]
         v = first * du
         a = second * du**2 + first * ddu
         if block.start == 0:
@@ -345,4 +317,4 @@ def _quintics(model: RobotModel, path: Path, rows: JointPath, law: TimeLaw) -> I
 
 def _joined(coefficients: Array) -> PiecewisePolynomial:
     breaks = np.arange(len(coefficients) + 1, dtype=np.float64) * CYCLE_TIME
-    return PiecewisePolynomial(breaks, coefficients)
+    return PiecewisePolynomial(breaks, sealed(coefficients))

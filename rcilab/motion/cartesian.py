@@ -268,7 +268,7 @@ def schedule(path: Path, speed: float) -> Array:
     Raises:
         InvalidValueError: The speed is out of range.
     """
-    return _s_law(path, speed).u
+    return _s_law(path, speed).s
 
 
 def follow_path(model: RobotModel, q: JointVector, path: Path, speed: float) -> Motion:
@@ -285,7 +285,7 @@ def follow_path(model: RobotModel, q: JointVector, path: Path, speed: float) -> 
         InvalidValueError: The speed is out of range.
     """
     law = _s_law(path, speed)
-    shares = law.u
+    shares = law.s
     if len(shares) == 1:
         return standing(q, law="s_profile", speed=speed)
     whole_turn = path.turn + (path.distance / _LEVER if path.unit == "m" else path.distance)

@@ -12,8 +12,10 @@ from rcilab.errors import PlanningError
 from rcilab.limits import JointLimits, Limits
 from rcilab.motion.blocks import blocks
 from rcilab.motion.chain import Chain, Rows
-from rcilab.motion.chain_law import ChainLaw, ColumnLimits, chain_bounds, column_limits, fastest_law
+from rcilab.motion.chain_bounds import ColumnLimits, chain_bounds, column_limits
 from rcilab.motion.hermite import quintic
+from rcilab.motion.slowdown import spread
+from rcilab.motion.time_law import TimeLaw, fastest_squares, smooth_law
 
 _ROUNDS = 12
 """How often to slow down in places, and then as often as a whole. Seen: 1 to 4 in places."""
@@ -21,6 +23,8 @@ _SLOWEST = 50.0
 """Beyond this a limit is passed by a jump. A choice."""
 _INSTANTS = (0.25, 0.5, 0.75)
 """Where in a cycle the curve is looked at, besides its start, in cycles."""
+_CHANGE = 1e-9
+"""By what part of itself a square of s' has changed that is not rounding."""
 _HASTE = 1.001
 """To slow down by the square of what was found, and this much more, so that few rounds do. A choice."""
 
@@ -45,25 +49,29 @@ def plan_chain(chain: Chain, limits: Limits) -> tuple[Array, list[float]]:
     reversal = 2.0 * float(chain.speed.max()) * float((bounds.acceleration[finite] / bounds.jerk[finite]).max())
     cycles = max(2, math.ceil(reversal / CYCLE_TIME))
     slowdown = np.ones(len(chain.knots))
+    squares = np.zeros(len(chain.knots))
     worst = 0.0
     for round_ in range(2 * _ROUNDS):
-        law = fastest_law(allowed, slowdown, cycles)
+        before, squares = squares, fastest_squares(allowed.slowed(slowdown))
+        law = smooth_law(chain.knots, squares, cycles)
         interval = chain.interval(law.s)
-        q, coefficients = np.empty((len(law.s), chain.n)), np.empty((len(law.s) - 1, chain.n, 6))
-        excess = _tool_excess(chain, bounds, law, interval)
-        for block in blocks(len(coefficients)):
-            ends = slice(block.start, block.stop + 1)
-            q[ends], powers = _curve(chain, law, ends)
-            coefficients[block] = np.stack(powers, axis=2)
-            joints = _joint_excess(chain, bounds, powers, interval[ends])
-            np.maximum(excess[block], joints, out=excess[block])
+        changed = np.abs(squares - before) > _CHANGE * squares
+        # Few places make the later rounds; where the law is as it was, it is looked at again only in the end.
+        looked_at = changed[interval] | changed[interval + 1]
+        excess = _excess(chain, bounds, law, interval, looked_at)
+        if excess.max() <= 1.0 and not looked_at.all():
+            excess = _excess(chain, bounds, law, interval, np.ones_like(looked_at))
         if excess.max() <= 1.0:
+            q, coefficients = _curve(chain, law)
             _require_inside(chain, q, law, limits.joint)
             corners = [int(np.searchsorted(law.s, middle)) * CYCLE_TIME for middle in chain.middles]
             return coefficients, corners
         worst = float(law.s[excess.argmax()])
-        somewhere = round_ < _ROUNDS
-        slowdown *= _spread(excess, law.s, chain.knots, cycles) if somewhere else float(excess.max()) * _HASTE
+        if round_ < _ROUNDS:
+            factor = np.where(excess > 1.0, excess * excess * _HASTE, 1.0)
+            slowdown *= spread(factor, law.s, chain.knots, cycles + 3)
+        else:
+            slowdown *= float(excess.max()) * _HASTE
         if slowdown.max() > _SLOWEST:
             break
     raise PlanningError(
@@ -71,8 +79,39 @@ def plan_chain(chain: Chain, limits: Limits) -> tuple[Array, list[float]]:
     )
 
 
-def _curve(chain: Chain, law: ChainLaw, rows: slice) -> tuple[Array, list[Array]]:
-    """Returns the joint angles at N cycles, shape (N, n), and their coefficients by power, each (N - 1, n)."""
+def _curve(chain: Chain, law: TimeLaw) -> tuple[Array, Array]:
+    """Returns the joint angles at N cycles, shape (N, n), and the coefficients between, shape (N - 1, n, 6)."""
+    q, coefficients = np.empty((len(law.s), chain.n)), np.empty((len(law.s) - 1, chain.n, 6))
+    for block in blocks(len(coefficients)):
+        ends = slice(block.start, block.stop + 1)
+        q[ends], powers = _quintics(chain, law, ends)
+        coefficients[block] = np.stack(powers, axis=2)
+    return q, coefficients
+
+
+def _excess(chain: Chain, limits: ColumnLimits, law: TimeLaw, interval: Rows, looked_at: Array) -> Array:
+    """Returns how much slower each row must be passed to keep every bound, shape (N,), in blocks that are looked at.
+
+    Args:
+        chain: The chain.
+        limits: What to keep.
+        law: How fast it is run through.
+        interval: In which interval each row is, shape (N,).
+        looked_at: Which rows to look at, shape (N,); the others of their blocks are looked at as well.
+    """
+    last = len(law.s) - 1
+    excess = np.zeros(last + 1)
+    for block in blocks(last):
+        ends = slice(block.start, block.stop + 1)
+        if looked_at[ends].any():
+            powers = _quintics(chain, law, ends)[1]
+            excess[block] = _joint_excess(chain, limits, powers, interval[ends])
+            np.maximum(excess[ends], _tool_excess(chain, limits, law, interval, ends), out=excess[ends])
+    return excess
+
+
+def _quintics(chain: Chain, law: TimeLaw, rows: slice) -> tuple[Array, list[Array]]:
+    """Returns the joint angles at N cycles, shape (N, n), and the curve's coefficients by power, each (N - 1, n)."""
     h = CYCLE_TIME
     q, first, second = chain.sample(law.s[rows], slice(chain.n))
     ds, dds = law.ds[rows, np.newaxis], law.dds[rows, np.newaxis]
@@ -105,22 +144,21 @@ def _joint_excess(chain: Chain, limits: ColumnLimits, powers: list[Array], inter
     return excess
 
 
-def _tool_excess(chain: Chain, limits: ColumnLimits, law: ChainLaw, interval: Rows) -> Array:
-    """Returns how much slower each row must be passed to keep the bounds on tool and arm angle, shape (N,).
+def _tool_excess(chain: Chain, limits: ColumnLimits, law: TimeLaw, interval: Rows, rows: slice) -> Array:
+    """Returns how much slower each of some rows must be to keep the bounds on tool and arm angle.
 
-    By backward differences at 1 ms, as the controller judges them, with rest before and after.
+    By backward differences at 1 ms, as the controller judges them, with rest before and after: the last row answers for
+    the three that follow it.
     """
     n, last = chain.n, len(law.s) - 1
-    speed = _looking_back(chain.speed[interval], np.maximum)
-    leads = _looking_back(chain.leads_tool[interval], np.minimum) > 0.0
-    excess = np.zeros(last + 4)
-    if not leads.any():
-        return excess[: last + 1]
-    for block in blocks(len(excess)):
-        # With the three rows before; the first one has stood, and the last one stands, for three more cycles.
-        rows = np.clip(np.arange(block.start - 3, block.stop), 0, last)
-        here = rows[3:]
-        table = chain.values(law.s[rows], slice(n, None)).T.copy()
+    end = rows.stop + 3 if rows.stop > last else rows.stop
+    # With the three rows before; the first one has stood, and the last one stands, for three more cycles.
+    held = np.clip(np.arange(rows.start - 3, end), 0, last)
+    leads = _looking_back(chain.leads_tool[interval[held]], np.minimum) > 0.0
+    excess = np.zeros(end - rows.start)
+    if leads.any():
+        speed = _looking_back(chain.speed[interval[held]], np.maximum)
+        table = chain.values(law.s[held], slice(n, None)).T.copy()
         for order, limit in enumerate(_tables(limits, slice(n, None)), start=1):
             table = np.diff(table) / CYCLE_TIME
             squares = table * table
@@ -128,10 +166,11 @@ def _tool_excess(chain: Chain, limits: ColumnLimits, law: ChainLaw, interval: Ro
             np.maximum(ratio, np.sqrt(squares[1:4].sum(axis=0)) / limit[1], out=ratio)
             np.maximum(ratio, np.sqrt(squares[4:7].sum(axis=0)) / limit[2], out=ratio)
             seen = ratio[3 - order :]
-            seen = np.where(leads[here], seen if order == 3 else seen / speed[here], 0.0)
-            np.maximum(excess[block], seen ** (1.0 / order), out=excess[block])
-    excess[last] = excess[last:].max()
-    return excess[: last + 1]
+            seen = np.where(leads, seen if order == 3 else seen / speed, 0.0)
+            np.maximum(excess, seen ** (1.0 / order), out=excess)
+    count = rows.stop - rows.start
+    excess[count - 1] = excess[count - 1 :].max()
+    return excess[:count]
 
 
 def _tables(limits: ColumnLimits, columns: slice) -> tuple[Array, Array, Array]:
@@ -139,24 +178,11 @@ def _tables(limits: ColumnLimits, columns: slice) -> tuple[Array, Array, Array]:
 
 
 def _looking_back(values: Array, join: np.ufunc) -> Array:
-    """Returns what a row and the three before it say, joined, shape (N,)."""
-    wide = np.concatenate((np.repeat(values[:1], 3), values))
-    return join(join(wide[3:], wide[2:-1]), join(wide[1:-2], wide[:-3]))
+    """Returns what each row from the fourth on and the three before it say, joined, shape (N - 3,)."""
+    return join(join(values[3:], values[2:-1]), join(values[1:-2], values[:-3]))
 
 
-def _spread(excess: Array, s: Array, knots: Array, cycles: int) -> Array:
-    """Returns by how much to slow down at each knot, given by how much each row is too fast."""
-    reach = cycles + 3
-    wide = np.pad(np.where(excess > 1.0, excess * excess * _HASTE, 1.0), reach, constant_values=1.0)
-    factor = np.lib.stride_tricks.sliding_window_view(wide, 2 * reach + 1).max(axis=1)
-    result = np.interp(knots, s, factor)
-    below = np.clip(np.searchsorted(knots, s, side="right") - 1, 0, len(knots) - 2)
-    np.maximum.at(result, below, factor)
-    np.maximum.at(result, below + 1, factor)
-    return result
-
-
-def _require_inside(chain: Chain, q: Array, law: ChainLaw, limits: JointLimits) -> None:
+def _require_inside(chain: Chain, q: Array, law: TimeLaw, limits: JointLimits) -> None:
     outside = np.argwhere(~((limits.lower < q) & (q < limits.upper)))
     if outside.size:
         row, joint = outside[0].tolist()

@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from rcilab.arrays import Array, as_number, described
+from rcilab.arrays import Array, as_number, described, sealed
 from rcilab.clock import CYCLE_TIME
 from rcilab.errors import InvalidValueError
 from rcilab.model import RobotModel, require_model
@@ -145,9 +145,13 @@ class _Track:
         """Returns the whole motion."""
         if not any(map(len, self._pieces)):
             self._breaks, self._pieces = [np.zeros(1)], [self._goal.reshape(1, -1, 1)]
-        powers = max(piece.shape[2] for piece in self._pieces)
-        widened = [np.pad(piece, ((0, 0), (0, 0), (0, powers - piece.shape[2]))) for piece in self._pieces]
-        curve = PiecewisePolynomial(np.concatenate((*self._breaks, [self._end])), np.concatenate(widened))
+        n, powers = self._goal.size, max(piece.shape[2] for piece in self._pieces)
+        coefficients = np.zeros((sum(map(len, self._pieces)), n, powers))
+        first = 0
+        for piece in self._pieces:
+            coefficients[first : first + len(piece), :, : piece.shape[2]] = piece
+            first += len(piece)
+        curve = PiecewisePolynomial(np.concatenate((*self._breaks, [self._end])), sealed(coefficients))
         return Motion(
             polynomial=curve, goal=self._goal, law="jerk_limited", speed=speed,
             segment_starts=np.array(self._starts), notes=tuple(self.notes),

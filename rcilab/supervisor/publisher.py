@@ -65,8 +65,14 @@ class Publisher:
         if log.state is not None:
             _WRENCH.pack_into(self._block.felt, 0, *log.state.tau_ext_in_base.tolist())
         self.beat()
-        if count % _SNAPSHOT_CYCLES == 0 and self.snapshot.phase in ("moving", "stopping"):
+        is_timed = self.snapshot.motion_duration is not None and self.snapshot.phase in ("moving", "stopping")
+        if is_timed and count % _SNAPSHOT_CYCLES == 0:
             self.update(motion_time=self._motion_cycle * CYCLE_TIME)
+
+    def begin_motion(self, duration: float | None) -> None:
+        """Says how long the motion takes that begins now, [s]; None: as long as somebody holds it."""
+        self._motion_cycle = 0
+        self.update(motion_time=None if duration is None else 0.0, motion_duration=duration)
 
     def on_cycle(self, cycle: int) -> None:
         """Takes note of how far the motion is."""

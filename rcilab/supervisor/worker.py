@@ -201,7 +201,7 @@ class Worker:
         guide = HandGuide(self._commands)
         guide.start(request["space"], request["type"])
         self._guide = guide
-        self._publisher.update(motion_time=None, motion_duration=None)
+        self._publisher.begin_motion(None)
         self._say("moving", "moving.guided")
 
     def _do_stop_guiding(self, request: dict[str, Any]) -> None:
@@ -235,7 +235,7 @@ class Worker:
             mismatch = describe_start_mismatch(rows[0], link.latest.q_c)
             if mismatch is not None:
                 raise UsageError(mismatch)
-        self._publisher.update(motion_time=0.0, motion_duration=request["duration"])
+        self._publisher.begin_motion(request["duration"])
         self._say("moving", "moving")
         self._move(link, follow(rows, self._publisher.on_cycle), "idle.arrived")
 
@@ -244,7 +244,7 @@ class Worker:
         self._record(link.poll(_LOOK))
         assert link.latest is not None  # A connection begins with a state.
         self._jog = HeldJog(self._block, self._model, link.latest.q_c)
-        self._publisher.update(motion_time=None, motion_duration=None)
+        self._publisher.begin_motion(None)
         self._say("moving", "moving.jog")
         try:
             self._move(link, self._jog, "idle.jogged")

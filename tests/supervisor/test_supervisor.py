@@ -199,6 +199,7 @@ def assert_in_limits(rows):
     """What was commanded keeps velocity, acceleration and jerk limits wherever cycles follow each other."""
     sent = rows[(rows["sent_ns"] > 0) & np.isfinite(rows["command"]).all(axis=1)]
     whole = np.diff(sent["message_id"].astype(int)) == 1
+    assert whole.sum() > 50
     limits = MODEL.limits.joint
     for order, bound in ((1, limits.velocity), (2, limits.acceleration), (3, limits.jerk)):
         differences = np.abs(np.diff(sent["command"], order, axis=0)) / 1e-3**order
