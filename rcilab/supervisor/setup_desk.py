@@ -27,8 +27,8 @@ class SetupDesk:
         self.acknowledged = RobotSetup()
         """What it has answered yes to since it was connected."""
         self.times = 0
-        """How often it has taken a set-up."""
-        self._waiting: tuple[Ticket, RobotSetup] | None = None
+        """At how many connections it has taken a set-up."""
+        self._waiting: list[tuple[Ticket, RobotSetup, bool]] = []
         self._refusal: str | None = None
 
     def letter(self) -> dict[str, Any]:
@@ -41,24 +41,24 @@ class SetupDesk:
         Args:
             ticket: The request.
             setup: What it carries.
-            is_new_connection: Whether what the controller has is not known any more.
+            is_new_connection: Whether it begins a connection: what the controller had before is then not known.
         """
-        if is_new_connection:
-            self.acknowledged = RobotSetup()
         self.wanted = self.wanted.updated(setup)
-        self._waiting = ticket, setup
+        self._waiting.append((ticket, setup, is_new_connection))
         self._refusal = None
 
     def look(self) -> None:
-        """Takes note of the answer, when there is one."""
-        if self._waiting is None or not self._waiting[0].done:
-            return
-        (ticket, setup), self._waiting = self._waiting, None
-        if ticket.error is not None:
-            self._refusal = str(ticket.error)
-        elif setup.parts:
+        """Takes note of the answers, as far as there are any."""
+        while self._waiting and self._waiting[0][0].done:
+            ticket, setup, is_new_connection = self._waiting.pop(0)
+            if is_new_connection:
+                self.acknowledged = RobotSetup()
+            if ticket.error is not None:
+                self._refusal = str(ticket.error)
+                continue
+            self._refusal = None
             self.acknowledged = self.acknowledged.updated(setup)
-            self.times += 1
+            self.times += is_new_connection and bool(setup.parts)
 
     def require_given(self) -> None:
         """Makes sure that nothing is under way and that nothing was refused.
@@ -67,7 +67,7 @@ class SetupDesk:
             UsageError: The controller has another set-up than motions are checked with.
         """
         self.look()
-        if self._waiting is not None:
+        if self._waiting:
             raise UsageError("the controller is being told its set-up; wait for the ticket of set_up()")
         if self._refusal is not None and self.wanted.parts:
             raise UsageError(f"the controller did not take its set-up ({self._refusal}); call set_up() again")

@@ -125,7 +125,7 @@ class SupervisorStatus:
     setup: RobotSetup = field(default_factory=RobotSetup)
     """What the controller has acknowledged of its set-up since it was connected; it can be asked for none of it."""
     setup_times: int = 0
-    """How often it has taken a set-up, also at a new connection."""
+    """At how many connections it has taken a set-up."""
     robot_mode: RobotMode | None = None
     controller_mode: ControllerMode | None = None
     faults: tuple[Fault, ...] = ()

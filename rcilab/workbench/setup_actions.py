@@ -54,7 +54,7 @@ class SetupActions:
         self._drag: tuple[int | None, str] | None = None  # Which page drags which part.
         self._dragged = -math.inf  # When it was last heard to.
         self._ticket: Ticket | None = None
-        self._told = 0  # How often the controller has taken a set-up, as far as that was said or was our doing.
+        self._told = 0  # At how many connections the controller has taken a set-up, as far as that was said.
 
     def type_field(self, request: requests.TypeField) -> None:
         """Takes a typed number, or says beside the field what is wrong with it."""
@@ -155,10 +155,8 @@ class SetupActions:
         if state.model.name != self._arm:
             self._arm, self._past, self._ticket, self._told = state.model.name, [], None, 0
         self._collect()
-        if status.setup_times < self._told:
-            self._told = 0  # Another supervisor counts anew.
-        if status.setup_times > self._told and self._ticket is None:
-            self._told = status.setup_times
+        told, self._told = self._told, status.setup_times  # Another supervisor counts anew.
+        if self._told > told:
             self._store.say("good", message("setup.sent_again", what=name_parts(status.setup.parts)))
         is_held = time.monotonic() - self._dragged < _HAND_GONE
         if state.target == "virtual" and not is_held and state.setup.refusal is None and status.phase == "idle":
@@ -182,9 +180,7 @@ class SetupActions:
         if ticket is None or not ticket.done:
             return
         self._ticket = None
-        if ticket.error is None:
-            self._told += 1
-        else:
+        if ticket.error is not None:
             self._store.update(setup=replace(self._store.state.setup, refusal=tell_error(ticket.error)))
 
     def _hear_drag(self, has_ended: bool) -> None:
