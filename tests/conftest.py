@@ -14,12 +14,19 @@ settings.register_profile(
 settings.load_profile("rcilab")
 
 
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Where tests run side by side, those in a browser run one after the other: each drawing takes a core or more."""
-    if config.pluginmanager.hasplugin("xdist"):
-        for item in items:
-            if item.get_closest_marker("browser"):
-                item.add_marker(pytest.mark.xdist_group("browser"))
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
+    """Where tests run side by side (`pytest -n 2`), those in a browser run one after the other, in one process."""
+    from xdist.scheduler import LoadScopeScheduling
+
+    class OneBrowserAtATime(LoadScopeScheduling):
+        """A file is a piece of work; all that drive a browser are one, as each drawing takes a core or more."""
+
+        def _split_scope(self, nodeid: str) -> str:
+            file = super()._split_scope(nodeid)
+            return "browser" if "browser" in file else file
+
+    return OneBrowserAtATime(config, log)
 
 
 @pytest.fixture(scope="session", autouse=True)
