@@ -44,7 +44,7 @@ def test_a_typed_negative_fraction_keeps_its_sign(page):
 def test_dragging_the_gizmo_brings_the_tool_to_it(page):
     start = np.array(page.state.goal.target.position)
     scale = 0.26
-    page.drag(page.project("/target", (0, 0, 0.9 * scale)), page.project("/target", (0, 0, 0.4 * scale)))
+    page.drag(page.project("/target", (0, 0, 0.9 * scale)), page.project("/target", (0, 0, 0.6 * scale)))
     page.wait(lambda: np.linalg.norm(page.state.goal.target.position - start) > 0.03, "the target to be dragged")
     goal = page.state.goal
     assert goal.reach.tone in ("good", "warn")

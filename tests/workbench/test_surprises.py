@@ -93,7 +93,7 @@ def test_a_page_that_goes_away_in_mid_motion_means_one_controlled_stop(bench):
         time.sleep(1.0)  # Two beats: from now on somebody is expected to be there.
         start = set_out(bench)
         going.set()
-    wait(lambda: bench.session.status().phase == "idle", "the arm to rest", 6.0)
+    wait(lambda: bench.session.status().phase == "idle", "the arm to rest")
     assert bench.session.status().code == "idle.operator"
     assert abs(float(bench.session.status().q_c[0]) - start) < 0.7
     assert not bench.session.status().faults
