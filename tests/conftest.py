@@ -33,5 +33,6 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
 def _no_files_of_the_user(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """What a person has stored, such as poses, neither changes a test nor is changed by one."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_CONFIG_HOME", os.fspath(tmp_path_factory.mktemp("config")))
+        for name in ("CONFIG", "STATE"):
+            patch.setenv(f"XDG_{name}_HOME", os.fspath(tmp_path_factory.mktemp(name.lower())))
         yield

@@ -29,6 +29,7 @@ LAYERS = [  # From the bottom. A part imports from lines below its own, and from
         "safety_box",
         "safety_distance",
         "closing",
+        "whole_file",
         "cycle_file",
     },
     {"protocols", "robots"},

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 import os
-import tempfile
 from pathlib import Path
 from typing import Any, cast
 
@@ -14,6 +13,7 @@ from numpy.typing import ArrayLike
 from rcilab.arrays import JointVector, as_vector, described, frozen
 from rcilab.errors import InvalidValueError, VersionMismatchError
 from rcilab.model import RobotModel, require_model
+from rcilab.whole_file import write_whole
 
 FORMAT = "rcilab poses"
 VERSION = 1
@@ -138,21 +138,10 @@ class PoseBook:
     def _write(self, content: dict[str, Any], own: dict[str, Any]) -> None:
         """Exchanges the file as a whole, so that whoever reads meets the old one or the new one."""
         content = {**content, "poses": {**content["poses"], self._model.name: own}}
-        temporary = None
         try:
-            self.file.parent.mkdir(parents=True, exist_ok=True)
-            handle, temporary = tempfile.mkstemp(dir=self.file.parent, prefix=".poses-")
-            with os.fdopen(handle, "w", encoding="utf-8") as out:
-                out.write(json.dumps(content, ensure_ascii=False, indent=1) + "\n")
-                out.flush()
-                os.fsync(out.fileno())
-            os.replace(temporary, self.file)
-            temporary = None
+            write_whole(self.file, json.dumps(content, ensure_ascii=False, indent=1) + "\n")
         except OSError as error:
             raise self._unsound(f"cannot be written: {error.strerror}") from error
-        finally:
-            if temporary is not None:
-                Path(temporary).unlink(missing_ok=True)
 
     def _unsound(self, reason: str) -> InvalidValueError:
         return InvalidValueError("file of poses", str(self.file), reason)

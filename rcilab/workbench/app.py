@@ -14,6 +14,7 @@ from rcilab.views.guarded_server import GuardedServer
 from rcilab.workbench import requests, security
 from rcilab.workbench.conductor import Conductor
 from rcilab.workbench.goal_actions import initial_goal
+from rcilab.workbench.keepsake import Keepsake, keepsake_file
 from rcilab.workbench.live import LIVE_PATH, LiveChannel
 from rcilab.workbench.page import decorate
 from rcilab.workbench.replay import replayed, require_replayable
@@ -79,7 +80,8 @@ class Workbench:
             state = replayed(state, replay)
         self.store = Store(replace(state, runs=config.runs))
         self.session = Session(lambda error: self.store.say("bad", tell_error(error, self.session.status())))
-        self.conductor = Conductor(self.store, self.session, self._deliver)
+        keepsake = Keepsake(keepsake_file(self.port) if config.port else None)  # Any free port is nobody's own.
+        self.conductor = Conductor(self.store, self.session, self._deliver, keepsake)
         self.server: viser.ViserServer
         self._stopped = threading.Event()
         self._opened = False
@@ -110,6 +112,8 @@ class Workbench:
             brand_color=_BRAND, show_logo=False, show_share_button=False, control_width="medium"
         )
         self._follow_pages()
+        if self._config.replay is None:
+            self.conductor.resume()
         self.presenter = Presenter(self.server, self.store, self.session, live, ask)
         self.presenter.start()
         self.conductor.start()

@@ -14,6 +14,7 @@ from rcilab.workbench import requests
 from rcilab.workbench.export_actions import Deliver, ExportActions
 from rcilab.workbench.goal_actions import GoalActions
 from rcilab.workbench.jog_actions import JogActions
+from rcilab.workbench.keepsake import Keepsake
 from rcilab.workbench.mailbox import Mailbox
 from rcilab.workbench.pose_actions import PoseActions
 from rcilab.workbench.program_actions import ProgramActions
@@ -36,10 +37,18 @@ class Conductor:
         store: The state.
         session: The robot side.
         deliver: Sends a file to a page.
+        keepsake: Where goal and program are written down for the case of a crash; None: nowhere.
     """
 
-    def __init__(self, store: Store, session: Session, deliver: Deliver = lambda page, name, content: None) -> None:
+    def __init__(
+        self,
+        store: Store,
+        session: Session,
+        deliver: Deliver = lambda page, name, content: None,
+        keepsake: Keepsake | None = None,
+    ) -> None:
         self._store, self._session = store, session
+        self._keepsake = keepsake or Keepsake(None)
         self._goal = GoalActions(store, session)
         self.robot = RobotActions(store, session)
         self._push = PushActions(store, session)
@@ -95,6 +104,16 @@ class Conductor:
         """Takes a request and returns at once; callable from any thread."""
         self._mailbox.put(request, _coalescing_key(request))
 
+    def resume(self) -> None:
+        """Brings back what a workbench had that ended here without being closed; before `start`."""
+        kept = self._keepsake.recall()
+        if kept is None or kept.model != self._store.state.model.name:
+            return
+        self._goal.pose(kept.q)
+        if kept.program is not None:
+            self._program.restore(kept.program)
+        self._store.say("good", message("notice.resumed"))
+
     def start(self) -> None:
         """Starts the thread."""
         self._thread = threading.Thread(target=self._run, name="conductor", daemon=True)
@@ -110,6 +129,7 @@ class Conductor:
         self._program.close()
         self._export.close()
         self.robot.close()
+        self._keepsake.drop()
 
     def act(self, request: requests.Request) -> None:
         """Carries out one request; what goes wrong becomes a sentence on the page."""
@@ -133,6 +153,7 @@ class Conductor:
         self._jog.tick(elapsed)
         self._poses.tick()
         self._program.tick()
+        self._keepsake.keep(self._store.state)
 
     def _type_field(self, request: requests.TypeField) -> None:
         if is_setup_field(request.field):

@@ -11,7 +11,7 @@ import numpy as np
 
 from rcilab.arrays import JointVector, frozen
 from rcilab.errors import InvalidValueError, PlanningError, RcilabError, VersionMismatchError
-from rcilab.motion.program import Waypoint
+from rcilab.motion.program import Program, Waypoint
 from rcilab.motion.program_file import read_program
 from rcilab.workbench import requests
 from rcilab.workbench.goal_actions import GoalActions
@@ -153,6 +153,12 @@ class ProgramActions:
         draft = draft_of(program)
         self._change(draft, draft.steps[0].key)
         self._store.say("good", message("program.loaded", count=len(draft.steps), name=request.name[:_LONGEST_NAME]))
+
+    def restore(self, program: Program) -> None:
+        """Takes a program that was here before."""
+        self._open()
+        draft = draft_of(program)
+        self._change(draft, draft.steps[0].key)
 
     def tick(self) -> None:
         """Shows how far the planning is, and what came of it; follows the choice of another arm."""

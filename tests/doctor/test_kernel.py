@@ -77,7 +77,7 @@ def test_the_configuration_beside_the_kernel_will_do_too(tree) -> None:
     assert is_judged(finding, "note", "preempt=voluntary, as built")
 
 
-@pytest.mark.parametrize("spoiled", [b"", b"no gzip at all", gzip.compress(b"CONFIG_PREEMPT_NONE=y\n")[:-12]])
+@pytest.mark.parametrize("spoiled", [b"", b"no gzip at all", gzip.compress(b"CONFIG_PREEMPT_NONE=y\n", mtime=0)[:-12]])
 def test_an_unknown_mode_is_a_sentence(tree, tmp_path: Path, spoiled: bytes) -> None:
     system = tree(DYNAMIC)
     (tmp_path / DEBUG_FILE.lstrip("/")).mkdir(parents=True)  # Something that exists and cannot be read.

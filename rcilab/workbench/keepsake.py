@@ -1,0 +1,99 @@
+"""What a workbench had when it ended without being closed: its goal and its program come back with the next one."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rcilab.arrays import JointVector, frozen
+from rcilab.errors import RcilabError
+from rcilab.motion.program import Program
+from rcilab.whole_file import write_whole
+
+if TYPE_CHECKING:
+    from rcilab.workbench.store import UiState
+
+_FORMAT, _VERSION = "rcilab workbench", 1
+_PAUSE = 1.0  # [s] A choice: between two writings, while somebody drags.
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Kept:
+    """What came back."""
+
+    model: str
+    q: JointVector
+    """The goal, shape (n,), [rad]."""
+    program: Program | None = None
+
+
+def keepsake_file(port: int) -> Path:
+    """Returns where the workbench at a port keeps it: in $XDG_STATE_HOME/rcilab, or ~/.local/state/rcilab."""
+    home = os.environ.get("XDG_STATE_HOME", "")
+    folder = Path(home) if os.path.isabs(home) else Path.home() / ".local" / "state"
+    return folder / "rcilab" / f"workbench-{port}.json"
+
+
+class Keepsake:
+    """Writes the goal and the program down when they have changed. Owned by the conductor's thread.
+
+    Nobody asked for this file, so where it cannot be written or read it is done without, silently.
+
+    Args:
+        file: Where; its place belongs to whoever holds the port it is named for. None: nowhere.
+    """
+
+    def __init__(self, file: Path | None) -> None:
+        self._file = file
+        self._written: tuple[object, ...] | None = None
+        self._next = 0.0
+
+    def recall(self) -> Kept | None:
+        """Returns what the workbench before kept, if it was not closed and the file can be understood."""
+        if self._file is None:
+            return None
+        try:
+            content: dict[str, Any] = json.loads(self._file.read_text(encoding="utf-8"))
+            if (content["format"], content["version"]) != (_FORMAT, _VERSION):
+                return None
+            program = content["program"]
+            return Kept(
+                model=str(content["model"]),
+                q=frozen(content["q"]),
+                program=None if program is None else Program.from_json(program),
+            )
+        except (OSError, ValueError, KeyError, TypeError, RcilabError):
+            return None
+
+    def keep(self, state: UiState) -> None:
+        """Writes down what is new, at most once a second."""
+        now = time.monotonic()
+        content = (state.model.name, state.goal.q.tobytes(), state.program.draft)
+        if self._file is None or content == self._written or now < self._next:
+            return
+        self._written, self._next = content, now + _PAUSE
+        program = state.program.draft.program(state.model) if state.program.draft.model == state.model.name else None
+        text = json.dumps(
+            {
+                "format": _FORMAT,
+                "version": _VERSION,
+                "model": state.model.name,
+                "q": np.asarray(state.goal.q).tolist(),
+                "program": None if program is None else program.to_json(),
+            }
+        )
+        with suppress(OSError):
+            write_whole(self._file, text)
+
+    def drop(self) -> None:
+        """Forgets it all: the workbench was closed by somebody who wanted that."""
+        if self._file is not None:
+            with suppress(OSError):
+                self._file.unlink(missing_ok=True)

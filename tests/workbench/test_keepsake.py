@@ -1,0 +1,90 @@
+"""A workbench that is killed leaves its goal and its program to the next one; one that is closed leaves nothing."""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rcilab.model import load_model
+from rcilab.motion import Program, Waypoint
+from rcilab.workbench import requests
+from rcilab.workbench.app import Workbench, WorkbenchConfig
+from rcilab.workbench.goal_actions import initial_goal
+from rcilab.workbench.keepsake import Keepsake, keepsake_file
+from rcilab.workbench.program_draft import draft_of
+from rcilab.workbench.store import UiState
+from tests.waiting import wait_for
+
+MODEL = load_model("xMatePro7")
+GOAL = MODEL.home + 0.1
+PROGRAM = Program(model=MODEL.name, start=MODEL.home, waypoints=(Waypoint.joint(GOAL), Waypoint.joint(MODEL.home)))
+
+
+def state_with_all() -> UiState:
+    state = UiState(model=MODEL, goal=initial_goal(MODEL, GOAL))
+    return replace(state, program=replace(state.program, draft=draft_of(PROGRAM)))
+
+
+def test_what_was_kept_is_recalled(tmp_path):
+    Keepsake(tmp_path / "deep" / "kept.json").keep(state_with_all())
+    kept = Keepsake(tmp_path / "deep" / "kept.json").recall()
+    assert kept.model == MODEL.name
+    assert np.array_equal(kept.q, GOAL)
+    assert [w.type for w in kept.program.waypoints] == ["joint", "joint"]
+
+
+def test_nothing_is_written_again_while_nothing_has_changed(tmp_path):
+    keepsake, state = Keepsake(tmp_path / "kept.json"), state_with_all()
+    keepsake.keep(state)
+    (tmp_path / "kept.json").unlink()
+    keepsake.keep(replace(state, speed=0.1))
+    assert not (tmp_path / "kept.json").exists()
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", "{}", '{"format": "rcilab workbench", "version": 2}', "\udcff"])
+def test_a_file_that_nobody_understands_is_as_good_as_none(tmp_path, text):
+    (tmp_path / "kept.json").write_text(text, errors="surrogateescape")
+    assert Keepsake(tmp_path / "kept.json").recall() is None
+
+
+def test_where_nothing_can_be_written_the_page_goes_on(tmp_path):
+    (tmp_path / "file").write_text("")
+    keepsake = Keepsake(tmp_path / "file" / "kept.json")
+    keepsake.keep(state_with_all())
+    assert keepsake.recall() is None
+    keepsake.drop()
+
+
+def test_the_next_workbench_at_the_port_has_goal_plan_and_program():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    file = keepsake_file(port)
+    with Workbench(WorkbenchConfig(port=port)) as bench:
+        wait_for(lambda: bench.session.status().phase == "idle", what="an idle arm")
+        for joint, angle in enumerate(GOAL.tolist()):
+            bench.conductor.ask(requests.MoveJoint(joint=joint, angle=angle))
+        bench.conductor.ask(requests.LoadProgram(name="mine.json", content=PROGRAM.to_json().encode()))
+        wait_for(lambda: is_kept(file), what="the goal and the program to be written down")
+        left = file.read_text()
+    assert not file.exists()
+    file.write_text(left)  # As if it had been killed.
+    with Workbench(WorkbenchConfig(port=port)) as bench:
+        assert np.allclose(bench.store.state.goal.q, GOAL, atol=1e-12)
+        assert bench.store.state.notice.text.code == "notice.resumed"
+        assert len(bench.store.state.program.draft.steps) == 2
+        plan = wait_for(lambda: bench.store.state.plan, what="a plan from the arm to the goal")
+        assert np.allclose(plan.motion.goal, GOAL, atol=1e-12)
+
+
+def is_kept(file: Path) -> bool:
+    if not os.path.exists(file):
+        return False
+    content = json.loads(file.read_text())
+    return content["program"] is not None and np.allclose(content["q"], GOAL)
