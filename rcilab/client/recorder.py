@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from rcilab.clock import CYCLE_TIME
 from rcilab.command import CartesianPosition, Command, JointPosition, JointTorque
+from rcilab.cycle_file import cycle_dtype
 from rcilab.faults import Fault
 from rcilab.state import RobotState
 
@@ -19,53 +20,6 @@ RECORD_TIME = 60.0  # [s] of cycles that a recorder keeps unless told otherwise;
 _CYCLE_NS = round(CYCLE_TIME * 1e9)
 _NO_POSE = (math.nan,) * 16
 _GRID_CYCLES = 8  # A controller that slips counts as late for so many cycles, a hiccup of ours for as many at most.
-
-
-def cycle_dtype(n: int) -> np.dtype[np.void]:
-    """Returns the layout of one recorded cycle of an arm with n joints.
-
-    ======================  ==================================================================================
-    message_id              number of the controller cycle
-    t                       time since the first command of the motion, in controller cycles, [s]; NaN outside
-    received_ns, sent_ns    monotonic stamps of the state's arrival and of the answer (0: not answered), [ns]
-    lateness                how late the cycle was handled, against the robot's own 1 ms grid, [s]
-    success_rate            share of commands that arrived in time, as the controller reports it, 0 to 1
-    q, q_c, dq              measured and commanded joint angles [rad], measured velocities [rad/s], shape (n,)
-    command                 joint angles sent in answer, [rad], shape (n,); NaN when none were sent
-    faults                  the error bits as one number, bit k = `Fault(k)`
-    lost                    controller cycles between the previous row and this one that never reached us
-    robot_mode, controller_mode, motion_generator_mode    as on the wire
-    tau                     measured joint torques, [N m], shape (n,)
-    command_pose            pose of the tool in base sent in answer, [m], shape (4, 4); NaN when none was sent
-    command_psi             arm angle sent with it, [rad]; NaN when none was sent
-    command_tau             joint torques sent in answer, [N m], shape (n,); NaN when none were sent
-    ======================  ==================================================================================
-    """
-    vector = ("<f8", (n,))
-    return np.dtype(
-        [
-            ("message_id", "<u8"),
-            ("t", "<f8"),
-            ("received_ns", "<i8"),
-            ("sent_ns", "<i8"),
-            ("lateness", "<f8"),
-            ("success_rate", "<f8"),
-            ("q", *vector),
-            ("q_c", *vector),
-            ("dq", *vector),
-            ("command", *vector),
-            ("faults", "<u4"),
-            ("lost", "<u4"),
-            ("robot_mode", "u1"),
-            ("controller_mode", "u1"),
-            ("motion_generator_mode", "u1"),
-            ("reserved", "u1", (5,)),
-            ("tau", *vector),
-            ("command_pose", "<f8", (4, 4)),
-            ("command_psi", "<f8"),
-            ("command_tau", *vector),
-        ]
-    )
 
 
 class Recorder:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from html import escape
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
@@ -294,7 +295,7 @@ class Run:
             )  # fmt: skip
         else:
             rows.append(("timing", "lock-step: simulated milliseconds wait for each other"))
-        cells = "".join(f"<tr><th style='text-align:left'>{name}</th><td>{value}</td></tr>" for name, value in rows)
+        cells = "".join(f"<tr><th style='text-align:left'>{name}</th><td>{escape(v)}</td></tr>" for name, v in rows)
         return f"<table><caption>Run</caption>{cells}</table>"
 
 

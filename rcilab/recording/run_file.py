@@ -30,7 +30,8 @@ from typing import IO, TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rcilab.errors import InvalidValueError, ModelError
+from rcilab.cycle_file import cycle_dtype
+from rcilab.errors import InvalidValueError, RcilabError
 from rcilab.model import load_model
 from rcilab.motion.motion import Motion
 from rcilab.recording.blocks import Block, decode_blocks, encode_block, encode_header
@@ -46,6 +47,7 @@ ENDING = ".rcirun"
 BLOCK_CYCLES = 256  # A choice: what a crash may cost at most, about a quarter of a second.
 
 _ROWS = struct.Struct("<I")
+_MOST_ROWS = 1_000_000  # In one block: half a gigabyte; a choice.
 
 
 class RunWriter:
@@ -194,7 +196,9 @@ def decode_run(content: bytes, name: str = "stream") -> Run:
         raise InvalidValueError("run file", name, "ends before its first block; nothing was recorded in it")
     try:
         return _build(blocks)
-    except (KeyError, TypeError, ValueError, ModelError, zlib.error, struct.error) as error:
+    except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RecursionError) as error:
+        raise InvalidValueError("run file", name, f"is damaged: {error}") from error
+    except (RcilabError, zlib.error, struct.error) as error:
         raise InvalidValueError("run file", name, f"is damaged: {error}") from error
 
 
@@ -220,16 +224,21 @@ def _build(blocks: tuple[Block, ...]) -> Run:
     dtype = np.dtype([(name, kind, tuple(shape)) for name, kind, shape in head["fields"]])
     if dtype.itemsize != head["bytes"]:
         raise ValueError(f"a cycle takes {head['bytes']} bytes, its fields {dtype.itemsize}")
+    if "q" not in (dtype.names or ()) or dtype != cycle_dtype(dtype["q"].shape[0]):
+        raise ValueError("its cycles have other fields than this version writes")
     parts = [_decode_cycles(block.payload, dtype) for block in blocks if block.kind == "CYCL"]
     cycles = np.concatenate(parts) if parts else np.zeros(0, dtype)
     cycles.flags.writeable = False
     plans = [block.payload for block in blocks if block.kind == "PLAN"]
     tails = [json.loads(block.payload) for block in blocks if block.kind == "TAIL"]
     tail = tails[-1] if tails else {}
+    stopped = tail.get("stopped")
+    if not isinstance(stopped, str | None):
+        raise TypeError("why it was stopped is no text")
     return Run(
         plan=Motion.load(BytesIO(plans[0])) if plans else None,
         cycles=cycles,
-        stopped=tail.get("stopped"),
+        stopped=stopped,
         truncated=tail.get("truncated", False),
         realtime=head["realtime"],
         model=None if head["arm"] is None else _build_arm(head["arm"]),
@@ -240,7 +249,11 @@ def _build(blocks: tuple[Block, ...]) -> Run:
 
 def _decode_cycles(payload: bytes, dtype: np.dtype[np.void]) -> NDArray[np.void]:
     (rows,) = _ROWS.unpack_from(payload)
-    planes = np.frombuffer(zlib.decompress(payload[_ROWS.size :]), np.uint8).reshape(dtype.itemsize, rows)
+    if rows > _MOST_ROWS:
+        raise ValueError(f"a block says that it holds {rows} cycles; {_MOST_ROWS} are the most")
+    size = rows * dtype.itemsize
+    data = zlib.decompressobj().decompress(payload[_ROWS.size :], size + 1)
+    planes = np.frombuffer(data, np.uint8).reshape(dtype.itemsize, rows)
     return np.frombuffer(planes.T.tobytes(), dtype)
 
 

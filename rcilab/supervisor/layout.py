@@ -32,8 +32,8 @@ from typing import Any
 import numpy as np
 
 from rcilab.arrays import Array
-from rcilab.client.recorder import cycle_dtype
 from rcilab.clock import CYCLE_TIME
+from rcilab.cycle_file import cycle_dtype
 from rcilab.errors import UsageError, VersionMismatchError
 from rcilab.supervisor.lateness import SIZE as HISTOGRAM_WORDS
 

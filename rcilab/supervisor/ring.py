@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rcilab.client.recorder import cycle_dtype
+from rcilab.cycle_file import cycle_dtype
 from rcilab.supervisor.layout import RING_CYCLES, ControlBlock, Word
 
 

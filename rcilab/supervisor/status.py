@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rcilab.arrays import Array, JointVector
-from rcilab.client.recorder import cycle_dtype
 from rcilab.client.setup import RobotSetup
+from rcilab.cycle_file import cycle_dtype
 from rcilab.faults import Fault
 from rcilab.spatial import Pose
 from rcilab.state import ControllerMode, RobotMode

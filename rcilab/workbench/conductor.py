@@ -127,8 +127,8 @@ class Conductor:
         self._jog.release()
         self._push.close()
         self._program.close()
-        self._export.close()
         self.robot.close()
+        self._export.close()
         self._keepsake.drop()
 
     def act(self, request: requests.Request) -> None:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import sys
 import threading
 import time
+import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
@@ -12,7 +14,7 @@ from rcilab.errors import RcilabError
 from rcilab.recording.extra import MissingExtraError
 from rcilab.workbench import requests
 from rcilab.workbench.telling import tell_error
-from rcilab.workbench.text import Message, message
+from rcilab.workbench.text import message
 
 if TYPE_CHECKING:
     from rcilab.recording.run import Run
@@ -50,7 +52,7 @@ class ExportActions:
 
     def export(self, request: requests.Export) -> None:
         """Begins an export; refused while another one is under way."""
-        recording = self._store.state.recording
+        recording = self._store.state.last_run
         run = None if recording is None else recording.run
         if request.ending not in ENDINGS:
             return
@@ -78,9 +80,13 @@ class ExportActions:
             self._deliver(page, file_name(run, ending), content)
         except MissingExtraError as error:
             self._store.say("bad", message("export.missing", library=error.library))
-        except (RcilabError, MemoryError) as error:
-            told: Message = tell_error(error) if isinstance(error, RcilabError) else message("export.memory")
-            self._store.say("bad", told)
+        except MemoryError:
+            self._store.say("bad", message("export.memory"))
+        except RcilabError as error:
+            self._store.say("bad", tell_error(error))
+        except Exception as error:  # A bug of ours must not pass for a download.
+            traceback.print_exc(file=sys.stderr)
+            self._store.say("bad", message("notice.bug", error=f"{type(error).__name__}: {error}"))
         else:
             size = f"{max(len(content) / 1e6, 0.01):.2f}"
             self._store.say("good", message("export.done", file=file_name(run, ending), size=size))

@@ -68,6 +68,7 @@ class ProgramActions:
         whole = {
             "add": lambda: self._add(request), "start": self._start_here, "undo": self._undo, "redo": self._redo,
             "clear": lambda: self._change(Draft(model=self._draft.model), None),
+            "tool": lambda: self._change(replace(self._draft, tool=None), self._program.selected),
             "script": lambda: self._set(is_script_shown=not self._program.is_script_shown),
         }  # fmt: skip
         if request.what in whole:
@@ -117,7 +118,7 @@ class ProgramActions:
         here = frozen(status.q_c)
         self._planner.start(
             Job(
-                model=state.model,
+                model=self._draft.arm(state.model),
                 draft=self._draft,
                 program=program,
                 here=here,
@@ -150,24 +151,23 @@ class ProgramActions:
             )
             return
         self._answer("program.0.file", None)
-        draft = draft_of(program)
+        draft = draft_of(program, self._store.state.model)
         self._change(draft, draft.steps[0].key)
         self._store.say("good", message("program.loaded", count=len(draft.steps), name=request.name[:_LONGEST_NAME]))
 
     def restore(self, program: Program) -> None:
         """Takes a program that was here before."""
         self._open()
-        draft = draft_of(program)
+        draft = draft_of(program, self._store.state.model)
         self._change(draft, draft.steps[0].key)
 
     def tick(self) -> None:
         """Shows how far the planning is, and what came of it; follows the choice of another arm."""
         self._open()
-        done = self._planner.take()
-        if done is not None:
+        if self._planner.is_done:
             self._store.update(busy=None)
             self._set(progress=None)
-            self._finish(*done)
+            self._finish(*self._planner.take())
         elif self._planner.progress != self._program.progress:
             self._set(progress=self._planner.progress)
 
@@ -357,14 +357,21 @@ class ProgramActions:
     def _aim(self, request: requests.EditProgram, key: int) -> None:
         waypoint = self._draft.waypoint(key)
         assert waypoint is not None
-        target = target_of(waypoint, self._store.state.model)
+        model = self._store.state.model
+        arm = self._draft.arm(model)
+        target = target_of(waypoint, arm)
         if target is None:
             self._store.say("warn", message("program.no_target"))
             return
+        if arm is not model:
+            target = target @ arm.T_flange_tool.inverse() @ model.T_flange_tool
         self._goal.lead_to(target, waypoint.psi, None if waypoint.q is None else frozen(waypoint.q))
 
-    def _finish(self, job: Job, result: Plan | RcilabError) -> None:
+    def _finish(self, job: Job, result: Plan | Message | RcilabError) -> None:
         steps = job.draft.steps
+        if isinstance(result, Message):
+            self._set(tone="bad", answer=result, failed=None, planned=None)
+            return
         if isinstance(result, RcilabError):
             number = result.waypoint if isinstance(result, PlanningError) else None
             failed = None if number is None else steps[number - 1].key

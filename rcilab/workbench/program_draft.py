@@ -87,6 +87,10 @@ class Draft:
             model=self.model, start=self.start, waypoints=waypoints, name=self.name, tool=self.tool or tool_of(model)
         )
 
+    def has_tool_of(self, model: RobotModel) -> bool:
+        """Returns whether the program is for the tool that the page has."""
+        return self.tool is None or self.arm(model).T_flange_tool.is_close(model.T_flange_tool)
+
     def arm(self, model: RobotModel) -> RobotModel:
         """Returns the arm with the tool that this program is for."""
         return model if self.tool is None else model.with_tool(Pose(self.tool[:3], self.tool[3:]))
@@ -115,17 +119,21 @@ class ProgramState:
     """Key of the step that could not be planned, or that breaks a condition."""
 
 
-def draft_of(program: Program) -> Draft:
-    """Returns a program to edit."""
+def draft_of(program: Program, model: RobotModel) -> Draft:
+    """Returns a program to edit; where it is for the tool of the page, it goes with that from here on.
+
+    Args:
+        program: The program.
+        model: The arm of the page, with its tool.
+    """
     steps = tuple(Step(next(_KEYS), waypoint) for waypoint in program.waypoints)
-    return Draft(model=program.model, start=program.start, steps=steps, name=program.name, tool=program.tool)
+    draft = Draft(model=program.model, start=program.start, steps=steps, name=program.name, tool=program.tool)
+    return replace(draft, tool=None) if draft.has_tool_of(model) else draft
 
 
-def tool_of(model: RobotModel) -> Floats | None:
-    """Returns the page's tool as programs have it; None for the bare flange."""
+def tool_of(model: RobotModel) -> Floats:
+    """Returns the page's tool as programs have it."""
     T = model.T_flange_tool
-    if np.allclose(T.position, 0.0, atol=1e-12) and abs(abs(float(T.wxyz[0])) - 1.0) < 1e-12:
-        return None
     return (*T.position.tolist(), *T.wxyz.tolist())
 
 

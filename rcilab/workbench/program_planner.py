@@ -10,8 +10,10 @@ from rcilab.errors import RcilabError
 from rcilab.model import RobotModel
 from rcilab.motion.program import Program
 from rcilab.safety_box import SafetyBox
+from rcilab.supervisor.layout import MOTION_TIME
 from rcilab.workbench.planning import Plan, picture
 from rcilab.workbench.program_draft import Draft
+from rcilab.workbench.text import Message, message
 
 _MOTION, _JUDGED = 0.75, 0.8
 """Parts of the work when the motion is made, and when all but collisions has been looked at; about what was seen."""
@@ -64,13 +66,16 @@ class ProgramPlanner:
             self._work.unwanted.set()
         self._work = None
 
-    def take(self) -> tuple[Job, Plan | RcilabError] | None:
-        """Returns what was planned, or why it could not be, once; None while that is not known."""
-        work = self._work
-        if work is None or not work.done.is_set():
-            return None
-        self._work = None
-        if isinstance(work.result, Plan | RcilabError):
+    @property
+    def is_done(self) -> bool:
+        """Whether there is something to take."""
+        return self._work is not None and self._work.done.is_set()
+
+    def take(self) -> tuple[Job, Plan | Message | RcilabError]:
+        """Returns what was planned, or why it could not be, once it is done."""
+        work, self._work = self._work, None
+        assert work is not None
+        if isinstance(work.result, Plan | Message | RcilabError):
             return work.job, work.result
         assert work.result is not None
         raise work.result
@@ -83,7 +88,7 @@ class _Work:
         self.job = job
         self.progress = 0.0
         self.unwanted, self.done = threading.Event(), threading.Event()
-        self.result: Plan | Exception | None = None
+        self.result: Plan | Message | Exception | None = None
 
     def run(self) -> None:
         try:
@@ -92,7 +97,7 @@ class _Work:
             self.result = error
         self.done.set()
 
-    def _plan(self) -> Plan:
+    def _plan(self) -> Plan | Message:
         from rcilab.conformance import check
         from rcilab.motion import plan_program
 
@@ -101,6 +106,8 @@ class _Work:
             job.model, job.program, start=job.here, rounds=job.rounds, progress=lambda part: self._tell(_MOTION * part)
         )
         self._tell(_MOTION)
+        if motion.duration > MOTION_TIME:
+            return message("program.long", duration=f"{motion.duration:.0f}", most=f"{MOTION_TIME:.0f}")
         report = check(motion, job.model, start=job.here, box=job.box, distance=None)
         plan = replace(picture(job.model, motion, report, job.box), program=job.program)
         self._tell(_JUDGED)

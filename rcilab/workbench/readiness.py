@@ -41,6 +41,11 @@ def obstacle(state: UiState, status: SupervisorStatus) -> Message | None:
         return message("ready.power")
     if state.plan is None:
         return message("ready.no_plan")
+    program = state.program
+    if state.plan.program is not None and program.planned is not program.draft:
+        return message("ready.program")
+    if state.plan.program is not None and not program.draft.has_tool_of(state.model):
+        return message("ready.program_tool")
     stale = state.plan.stale_parts(state.model, state.setup.wanted.box)
     if stale:
         return message("ready.stale", what=name_parts(stale))

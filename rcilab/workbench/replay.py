@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rcilab.client.setup import RobotSetup
+from rcilab.clock import CYCLE_TIME
 from rcilab.errors import UsageError
 from rcilab.workbench.goal_actions import initial_goal
 from rcilab.workbench.planning import picture
@@ -41,7 +43,12 @@ def replayed(state: UiState, run: Run) -> UiState:
     assert report is not None
     plan = replace(picture(model, motion, report), complete=True)
     goal = initial_goal(model, motion.goal)
-    return replace(state, model=model, plan=plan, goal=goal, recording=whole_recording(run), place=0.0)
+    wanted = state.setup.wanted.updated(RobotSetup(tool=model.T_flange_tool, load=model.load))
+    setup = replace(state.setup, wanted=wanted, touched=frozenset({"tool", "load"}))
+    recording = whole_recording(run)
+    return replace(
+        state, model=model, setup=setup, plan=plan, goal=goal, recording=recording, last_run=recording, place=0.0
+    )
 
 
 def replayed_pose(state: UiState) -> JointVector | None:
@@ -49,6 +56,6 @@ def replayed_pose(state: UiState) -> JointVector | None:
     recording = state.recording
     if recording is None or recording.run is None or state.plan is None:
         return None
-    t = state.place * state.plan.motion.duration + recording.delay * 1e-3
+    t = state.place * state.plan.motion.duration + recording.delay * CYCLE_TIME
     row = min(int(np.searchsorted(recording.t, t)), len(recording.t) - 1)
     return recording.q[row]

@@ -224,7 +224,7 @@ class EditProgram(Request):
 
     what: Literal[
         "select", "add", "teach", "via", "type", "delete", "duplicate", "up", "down", "move", "start", "aim", "undo",
-        "redo", "clear", "script",
+        "redo", "clear", "script", "tool",
     ]  # fmt: skip
     key: int | None = None
     """Key of a step; None is the selected one."""

@@ -120,7 +120,8 @@ class RobotActions:
             return
         self._store.update(plant=plant, playing=False)
         self._powered, self._power_asked = False, float("-inf")
-        self._tickets, self._recording, self._incident, self._phase = [], False, 0, ""
+        self._end_recording()
+        self._tickets, self._incident, self._phase = [], 0, ""
         self._session.open(state.model, state.target, plant, _own_setup(state, state.target))
 
     def open(self, name: str, target: str) -> None:
@@ -206,7 +207,7 @@ class RobotActions:
         self._keeper.begin(state.plan)
         self._recording, self._stopped = True, None
         self._tickets.append(("execute", ticket))
-        self._store.update(recording=None, playing=False, asked=None)
+        self._store.update(recording=None, last_run=None, playing=False, asked=None)
 
     def _collect_tickets(self) -> None:
         waiting = []
@@ -248,8 +249,12 @@ class RobotActions:
         self._keeper.finish(self._stopped)
 
     def close(self) -> None:
-        """Ends a recording, so that its file has an end."""
-        self._end_recording()
+        """Ends a recording, so that its file has an end: the arm is about to be stopped where it still moves."""
+        if self._recording:
+            self._record(self._session.status())
+        if self._recording:
+            self._stopped = "the workbench was closed"
+            self._end_recording()
 
 
 def _own_setup(state: UiState, target: str) -> RobotSetup | None:

@@ -66,13 +66,14 @@ class RunKeeper:
             self._complain(error)
             run = live.finish(stopped)  # Its file is given up now; the run in memory is whole.
         if run is not None:
-            self._store.update(recording=whole_recording(run, self._file))
+            recording = whole_recording(run, self._file)
+            self._store.update(recording=recording, last_run=recording)
 
     def _open(self, state: UiState, plan: Plan, setup: Setup) -> RunFile | None:
         self._file = ""
         if state.runs is None or not state.record:
             return None
-        from rcilab.client.recorder import cycle_dtype
+        from rcilab.cycle_file import cycle_dtype
         from rcilab.recording.run_file import ENDING, RunFile
 
         stamp = time.strftime("%Y%m%d-%H%M%S", time.localtime(setup.started_ns * 1e-9))

@@ -97,6 +97,8 @@ class UiState:
     asked: Motion | None = None
     """The motion that a foreign robot is to make and that awaits a second yes."""
     recording: Recording | None = None
+    last_run: Recording | None = None
+    """The run that was made last, whatever was planned since: for its table and for export."""
     record: bool = True
     """Whether every cycle of a motion is written to a file as well."""
     runs: Path | None = None

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import struct
+import zlib
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import rcilab
-from rcilab.client.recorder import cycle_dtype
+from rcilab.cycle_file import cycle_dtype
 from rcilab.errors import InvalidValueError, UsageError, VersionMismatchError
 from rcilab.recording.blocks import MAGIC, encode_block, encode_header
 from rcilab.recording.export import export_run
@@ -138,3 +140,25 @@ def block_places(content: bytes) -> list[tuple[int, bytes]]:
         at += 12 + length
         places.append((at, kind))
     return places
+
+
+def test_what_a_stranger_wrote_into_a_file_is_shown_and_not_run():
+    run = replace(some_run(), stopped="<img src=x onerror=alert(1)>")
+    assert "<img" not in decode_run(export_run(run, ".rcirun"))._repr_html_()
+
+
+@pytest.mark.parametrize(
+    ("kind", "payload", "words"),
+    [
+        ("TAIL", b'{"stopped": 7}', "no text"),
+        ("TAIL", b"[1]", "is damaged"),
+        ("TAIL", b"[" * 100_000, "is damaged"),
+        ("CYCL", struct.pack("<I", 4_000_000_000) + zlib.compress(b""), "are the most"),
+        ("CYCL", struct.pack("<I", 1) + zlib.compress(bytes(50_000_000)), "is damaged"),
+    ],
+)
+def test_a_block_that_lies_is_refused_in_words(kind, payload, words):
+    content = export_run(some_run(), ".rcirun")
+    head_ends = block_places(content)[1][0]
+    with pytest.raises(InvalidValueError, match=words):
+        decode_run(content[:head_ends] + encode_block(kind, payload))

@@ -13,7 +13,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rcilab.client.recorder import CycleLog, Recorder, cycle_dtype
+from rcilab.client.recorder import CycleLog, Recorder
+from rcilab.cycle_file import cycle_dtype
 from rcilab.errors import ConnectionLostError, ControlError, UsageError, VersionMismatchError
 from rcilab.faults import Fault
 from rcilab.model import load_model

@@ -28,7 +28,7 @@ PROGRAM = Program(model=MODEL.name, start=MODEL.home, waypoints=(Waypoint.joint(
 
 def state_with_all() -> UiState:
     state = UiState(model=MODEL, goal=initial_goal(MODEL, GOAL))
-    return replace(state, program=replace(state.program, draft=draft_of(PROGRAM)))
+    return replace(state, program=replace(state.program, draft=draft_of(PROGRAM, MODEL)))
 
 
 def test_what_was_kept_is_recalled(tmp_path):

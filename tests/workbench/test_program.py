@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from rcilab.client.setup import RobotSetup
 from rcilab.model import load_model
 from rcilab.motion import Motion, Program, Waypoint
 from rcilab.spatial import Pose
@@ -19,6 +20,7 @@ from rcilab.workbench.panels.program import read_row
 from rcilab.workbench.panels.program_list import list_html
 from rcilab.workbench.program_actions import ProgramActions
 from rcilab.workbench.program_draft import draft_of, number_at, tell_place, time_at
+from rcilab.workbench.readiness import obstacle
 from rcilab.workbench.store import Store, UiState
 from rcilab.workbench.text import Text
 from tests.waiting import wait_for
@@ -311,10 +313,60 @@ def test_files_bring_circles_and_elbow_moves_that_stay_as_they_are(bench):
         bench.edit(what, type="line")
         assert bench.told == "program.no_target"
     assert "57°" in list_html(bench.state, bench.program.draft, None, Text("en"))
-    assert draft_of(bench.program.draft.program(MODEL)).program(MODEL).waypoints == moves
+    assert draft_of(bench.program.draft.program(MODEL), MODEL).program(MODEL).waypoints == moves
 
 
 @pytest.mark.parametrize("said", ["", "1:select:1", "1:clear:1:1", "1:select:x:1", "1:select:-1:0", "1:select:²:0"])
 def test_what_no_list_says_is_ignored(said):
     assert read_row(said, 1) is None
     assert read_row("1:select:1:0", None) is None
+
+
+def test_a_program_that_was_changed_since_is_not_executed(square):
+    square.plan()
+    status = SimpleNamespace(phase="idle", code="idle", powered=True, q_c=HOME, setup=RobotSetup())
+    assert obstacle(square.state, status) is None
+    square.edit("delete")
+    assert obstacle(square.state, status).code == "ready.program"
+    square.edit("undo")
+    square.type("rounds", "2")
+    assert obstacle(square.state, status).code == "ready.program"
+    square.plan()
+    assert obstacle(square.state, status) is None
+
+
+def test_a_program_for_another_tool_is_planned_and_judged_with_it_and_not_executed_with_this_one(bench):
+    long = MODEL.with_tool(Pose([0.0, 0.0, 0.1]))
+    T = long.forward(HOME)
+    line = Waypoint.line(Pose(T.position + [0.0, 0.05, 0.0], T.wxyz))
+    bench.load(Program(model=MODEL.name, start=MODEL.home, waypoints=(line,), tool=(0, 0, 0.1, 1, 0, 0, 0)))
+    bench.plan()
+    plan = bench.state.plan
+    assert plan.model.forward(plan.motion.goal).is_close(line.pose, 1e-9)
+    status = SimpleNamespace(phase="idle", code="idle", powered=True, q_c=HOME, setup=RobotSetup())
+    assert obstacle(bench.state, status).code == "ready.program_tool"
+    bench.edit("aim")
+    assert bench.state.model.forward(bench.state.goal.q).is_close(
+        line.pose @ Pose([0.0, 0.0, 0.1]).inverse() @ MODEL.T_flange_tool, 1e-6
+    )
+    bench.edit("tool")
+    assert bench.program.draft.has_tool_of(MODEL)
+
+
+def test_a_program_longer_than_any_motion_may_be_is_told_before_it_is_sampled(square):
+    square.type("dwell", "3600")
+    square.type("rounds", "100")
+    square.plan()
+    assert square.program.answer.code == "program.long"
+    assert square.state.busy is None
+
+
+def test_a_bug_in_the_planning_leaves_the_page_usable(square, monkeypatch):
+    def fail(*args, **kwargs):
+        raise MemoryError
+
+    monkeypatch.setattr(program_planner, "picture", fail)
+    with pytest.raises(MemoryError):
+        square.plan()
+    assert square.state.busy is None
+    assert square.program.progress is None

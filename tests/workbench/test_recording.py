@@ -104,11 +104,16 @@ def test_exports_reach_the_page_that_asked_and_problems_are_told(bench, monkeypa
     bench.conductor.ask(requests.Export(page=7, ending=".mcap"))
     wait(lambda: told(bench) == "export.missing", "what is missing")
     wait(lambda: bench.store.state.export is None, "the end of the export")
+    bench.conductor.ask(requests.Export(page=7, ending="../../etc/passwd"))
     bench.store.update(recording=None)
     bench.conductor.ask(requests.Export(page=7, ending=".csv"))
+    wait(lambda: len(sent) == 4, "the run, which no other plan takes away")
+    assert sent[3][1].endswith(".csv")
+    wait(lambda: bench.store.state.export is None, "the end of the export")
+    bench.store.update(last_run=None)
+    bench.conductor.ask(requests.Export(page=7, ending=".csv"))
     wait(lambda: told(bench) == "export.nothing", "that there is nothing")
-    bench.conductor.ask(requests.Export(page=7, ending="../../etc/passwd"))
-    assert len(sent) == 3
+    assert len(sent) == 4
 
 
 def test_a_run_is_replayed_with_nothing_connected_until_it_is_asked_for(monkeypatch):
@@ -125,6 +130,10 @@ def test_a_run_is_replayed_with_nothing_connected_until_it_is_asked_for(monkeypa
         wait(lambda: abs(bench.store.state.goal.q[0] - 0.5) < 1e-9, "a goal that was posed")
         assert bench.store.state.recording.run is run, "posing a goal loses nothing of the run"
         assert bench.store.state.plan.motion is run.plan
+        wanted = bench.store.state.setup.wanted
+        assert wanted.tool.is_close(run.model.T_flange_tool, 0.0)
+        assert wanted.load.mass == run.model.load.mass
+        assert bench.store.state.setup.touched == {"tool", "load"}
         status = bench.session.status()
         assert (status.phase, status.worker_pid) == ("closed", None)
         assert obstacle(bench.store.state, status).code == "ready.closed"

@@ -3,7 +3,7 @@
 (() => {
   "use strict";
   const LATE = 1500;  // [ms] A choice: for so long the list may still come as it was before the last choice.
-  let serial = 0, had = false, dragged = null, waiting = [], timer = 0, picked = null, since = 0;
+  let serial = Date.now(), had = false, dragged = null, waiting = [], timer = 0, picked = null, since = 0;
 
   const listOf = (node) => node instanceof Element ? node.closest(".rl-steps") : null;
   const rows = (list) => [...list.querySelectorAll("[data-key]")];

@@ -12,6 +12,7 @@ from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, Html, NumberField, esc, on_press
 
 if TYPE_CHECKING:
+    from rcilab.model import RobotModel
     from rcilab.supervisor import SupervisorStatus
     from rcilab.workbench.program_draft import Draft
     from rcilab.workbench.store import UiState
@@ -22,8 +23,9 @@ class ProgramFilePanel:
 
     def __init__(self, text: Text, ask: Ask) -> None:
         self._text, self._ask = text, ask
-        self._draft: Draft | None = None
+        self._made_of: tuple[Draft, RobotModel] | None = None
         self._program: Program | None = None
+        self._script_text = ""
 
     def build(self, gui: Any, state: UiState) -> None:
         """Adds the controls."""
@@ -55,6 +57,10 @@ class ProgramFilePanel:
             self._name = NumberField(
                 gui.add_text(text("program.name"), "", hint=text("program.name_hint")), ask, "program.0.name"
             )
+            self._tool = gui.add_button(
+                text("program.take_tool"), icon="tool", color="gray", hint=text("program.take_tool_hint"), visible=False
+            )
+            on_press(self._tool, ask, lambda page: requests.EditProgram(page=page, what="tool"))
             self._problems = Html(gui)
             self._script = Html(gui)
             self._fetch = gui.add_button(text("program.script_save"), icon="download", color="gray", visible=False)
@@ -63,11 +69,13 @@ class ProgramFilePanel:
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows the program."""
         text, draft = self._text, state.program.draft
-        if draft is not self._draft:
-            self._draft, self._program = draft, draft.program(state.model)
+        if self._made_of != (draft, state.model):
+            self._made_of, self._program = (draft, state.model), draft.program(state.model)
+            self._script_text = ""
         there = self._program is not None and draft.model == state.model.name
         self._save.disabled = self._clear.disabled = not there
         self._python.disabled = not there
+        self._tool.visible = there and not draft.has_tool_of(state.model)
         self._name.show(draft.name, state.problems.get(self._name.field), state.typed)
         labels = [("program.0.file", text("program.load")), ("program.0.name", text("program.name"))]
         self._problems.show(problems_html(state, text, labels))
@@ -77,10 +85,11 @@ class ProgramFilePanel:
         if not is_shown or self._program is None:
             self._script.show("")
             return
+        self._script_text = self._script_text or self._program.to_python()
         self._script.show(
             f'<div class="rl-code"><button type="button" data-rl-copy data-done="{esc(text("program.copied"))}">'
             f'{esc(text("program.copy"))}</button><pre tabindex="0" aria-label="{esc(text("program.script_name"))}">'
-            f"{esc(self._program.to_python())}</pre></div>"
+            f"{esc(self._script_text)}</pre></div>"
         )
 
     def _send(self, event: Any, kind: str) -> None:

@@ -55,16 +55,18 @@ class RecordingPanel:
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows the recording and the export under way."""
-        text, recording, export = self._text, state.recording, state.export
+        text, export = self._text, state.export
+        recording = state.recording if state.recording is not None else state.last_run
         if recording is not self._drawn:
             self._drawn = recording
             self._summary.show(summary_html(recording, text))
         for button in self._buttons.values():
-            button.disabled = recording is None or recording.run is None or export is not None
+            button.disabled = state.last_run is None or export is not None
         self._progress.show("" if export is None else progress_html(export.ending, export.share, text))
         self._record.handle.disabled = state.runs is None
         self._record.show(state.record and state.runs is not None)
-        where = text("record.memory") if state.runs is None else text("record.folder", folder=state.runs)
+        is_written = state.runs is not None and state.record
+        where = text("record.folder", folder=state.runs) if is_written else text("record.memory")
         if recording is not None and recording.file:
             where = text("record.file", file=recording.file)
         self._where.show(f'<p class="rl-note rl-path">{esc(where)}</p>')
