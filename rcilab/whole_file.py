@@ -7,8 +7,13 @@ import tempfile
 from pathlib import Path
 
 
-def write_whole(file: Path, text: str) -> None:
+def write_whole(file: Path, text: str, *, survives_power_loss: bool = True) -> None:
     """Writes a text file, and the folders it is in; nothing of it is left where that fails.
+
+    Args:
+        file: Where.
+        text: What.
+        survives_power_loss: Whether to wait until the disk has it; a killed process loses nothing in any case.
 
     Raises:
         OSError: It cannot be written.
@@ -18,8 +23,9 @@ def write_whole(file: Path, text: str) -> None:
     try:
         with os.fdopen(handle, "w", encoding="utf-8") as out:
             out.write(text)
-            out.flush()
-            os.fsync(out.fileno())
+            if survives_power_loss:
+                out.flush()
+                os.fsync(out.fileno())
         os.replace(temporary, file)
     except BaseException:
         Path(temporary).unlink(missing_ok=True)

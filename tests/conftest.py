@@ -14,19 +14,23 @@ settings.register_profile(
 settings.load_profile("rcilab")
 
 
+LIVE = ("browser", "workbench", "supervisor")
+"""In the names of files whose tests draw, or run control processes at 1 kHz: a core has no room for two of them."""
+
+
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
-    """Where tests run side by side (`pytest -n 2`), those in a browser run one after the other, in one process."""
+    """Where tests run side by side (`pytest -n 2`), the live ones run one after the other, in one process."""
     from xdist.scheduler import LoadScopeScheduling
 
-    class OneBrowserAtATime(LoadScopeScheduling):
-        """A file is a piece of work; all that drive a browser are one, as each drawing takes a core or more."""
+    class OneLiveTestAtATime(LoadScopeScheduling):
+        """A file is a piece of work; all that are live are one."""
 
         def _split_scope(self, nodeid: str) -> str:
             file = super()._split_scope(nodeid)
-            return "browser" if "browser" in file else file
+            return "live" if any(name in file for name in LIVE) else file
 
-    return OneBrowserAtATime(config, log)
+    return OneLiveTestAtATime(config, log)
 
 
 @pytest.fixture(scope="session", autouse=True)

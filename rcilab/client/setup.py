@@ -52,6 +52,10 @@ class RobotSetup:
         """Returns a set-up of these parts alone."""
         return RobotSetup(**{part: getattr(self, part) for part in SETUP_PARTS if part in parts})
 
+    def without(self, parts: Iterable[str]) -> RobotSetup:
+        """Returns a set-up that leaves these parts alone."""
+        return self.only(set(SETUP_PARTS) - set(parts))
+
     def updated(self, newer: RobotSetup) -> RobotSetup:
         """Returns this set-up with the parts of a newer one in it."""
         return replace(self, **{part: getattr(newer, part) for part in newer.parts})

@@ -55,6 +55,8 @@ class SetupDesk:
                 self.acknowledged = RobotSetup()
             if ticket.error is not None:
                 self._refusal = str(ticket.error)
+                # It may have taken some of it: what it has of these parts now, nobody knows.
+                self.acknowledged = self.acknowledged.without(setup.parts)
                 continue
             self._refusal = None
             self.acknowledged = self.acknowledged.updated(setup)

@@ -205,7 +205,7 @@ class Supervisor(Closing):
             block.motion[: len(rows)] = rows
             return self._ask("execute", kind="execute", rows=len(rows), duration=motion.duration)
 
-    def jog(self, kind: JogKind, values: ArrayLike) -> Ticket:
+    def jog(self, kind: JogKind, values: ArrayLike, *, goes_on: Ticket | None = None) -> Ticket:
         """Moves the arm as long as it is held: call it at least five times a second, and `release_jog` at the end.
 
         The first call begins a jog, the next ones go on with it, whatever direction they ask for: on-line re-planning
@@ -217,6 +217,7 @@ class Supervisor(Closing):
             kind: "joint", or "base" or "tool" for a twist of the tool in these axes.
             values: n joint velocities, [rad/s], or a twist of six numbers, linear first, [m/s, rad/s]; lowered to
                 what the limits allow.
+            goes_on: Ticket of the jog to go on with: where that has ended meanwhile, as by `stop`, none is begun.
 
         Returns:
             The ticket of the jog; it is done when the arm stands still and nobody jogs any more.
@@ -229,7 +230,10 @@ class Supervisor(Closing):
         with self._lock:
             block = self._require_block()
             is_under_way = self._jogging is not None and not self._jogging.done
+            if goes_on is not None and goes_on.done:
+                raise UsageError("this jog has ended; begin another one")
             if not is_under_way:
+                self._setup.require_given()
                 require_ready(self.status(), is_operator_overdue=self._is_operator_overdue())
             hold_jog(block.jog, block.words, command)
             if self._jogging is None or not is_under_way:
@@ -260,6 +264,7 @@ class Supervisor(Closing):
         with self._lock:
             self._require_block()
             require_ready(self.status(), is_operator_overdue=self._is_operator_overdue())
+            self._setup.require_given()
             return self._ask("start guiding", kind="start_guiding", space=space, type=kind)
 
     def stop_guiding(self) -> Ticket:

@@ -14,7 +14,7 @@ from rcilab.workbench import requests
 from rcilab.workbench.export_actions import Deliver, ExportActions
 from rcilab.workbench.goal_actions import GoalActions
 from rcilab.workbench.jog_actions import JogActions
-from rcilab.workbench.keepsake import Keepsake
+from rcilab.workbench.keepsake import Keepsake, Kept
 from rcilab.workbench.mailbox import Mailbox
 from rcilab.workbench.pose_actions import PoseActions
 from rcilab.workbench.program_actions import ProgramActions
@@ -106,13 +106,9 @@ class Conductor:
 
     def resume(self) -> None:
         """Brings back what a workbench had that ended here without being closed; before `start`."""
-        kept = self._keepsake.recall()
-        if kept is None or kept.model != self._store.state.model.name:
-            return
-        self._goal.pose(kept.q)
-        if kept.program is not None:
-            self._program.restore(kept.program)
-        self._store.say("good", message("notice.resumed"))
+        kept = self._keepsake.recall(self._store.state.model)
+        if kept is not None:
+            self._guard(lambda: self._resume(kept))
 
     def start(self) -> None:
         """Starts the thread."""
@@ -154,6 +150,12 @@ class Conductor:
         self._poses.tick()
         self._program.tick()
         self._keepsake.keep(self._store.state)
+
+    def _resume(self, kept: Kept) -> None:
+        self._goal.pose(kept.q)
+        if kept.program is not None and kept.program.model == self._store.state.model.name:
+            self._program.restore(kept.program)
+        self._store.say("good", message("notice.resumed"))
 
     def _type_field(self, request: requests.TypeField) -> None:
         if is_setup_field(request.field):

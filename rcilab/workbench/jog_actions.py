@@ -24,6 +24,7 @@ from rcilab.workbench.store import Store
 
 _LONGEST_LOOK = 100  # Cycles a preview goes on at most in one tick: a page that stood still does not jump.
 _SAME = 1e-9  # [rad]
+_FORGOTTEN = 2.0  # [s] A choice: so long a button that moves nothing any more is silent before it may move again.
 
 
 @dataclass
@@ -37,6 +38,10 @@ class _Press:
     is_robot: bool
     is_spent: bool = False
     """Whether it moves nothing any more, though it is still held: it was refused, or something ended the motion."""
+
+    def is_over(self, now: float) -> bool:
+        """Returns whether it was silent for so long that it is not held any more."""
+        return now - self.heard > (_FORGOTTEN if self.is_spent else HOLD_TIMEOUT)
 
 
 class JogActions:
@@ -76,7 +81,7 @@ class JogActions:
         if state.jog.step or not axis.exists(state.model):
             return
         press = self._press
-        if press is None or (press.page, press.axis) != (request.page, axis) or now - press.heard > HOLD_TIMEOUT:
+        if press is None or (press.page, press.axis) != (request.page, axis) or press.is_over(now):
             self.release()
             self._press = press = _Press(request.page, axis, now, state.jog.robot)
             press.is_spent = not (self._robot.begin() if press.is_robot else self._begin_preview(axis))
@@ -106,19 +111,20 @@ class JogActions:
 
     def tick(self, elapsed: float) -> None:
         """Lets go for a page that has gone silent or has the controls no more; goal and robot go on."""
-        state, press = self._store.state, self._press
+        state = self._store.state
         who = (state.target, state.model.name, state.plant, state.lease.holder)
         if who != self._who:
             self._who = who
             self._begin_anew()
-        elif press is not None and time.monotonic() - press.heard > HOLD_TIMEOUT:
+        press = self._press
+        is_held = press is not None and press.is_robot and not press.is_spent
+        # First: a jog that has ended stays ended, however long nothing was heard or done meanwhile.
+        if not self._robot.watch(press.axis if press is not None and is_held else None) and press is not None:
+            press.is_spent = True
+        if press is not None and press.is_over(time.monotonic()):
             self.release()
         if self._preview is not None:
             self._advance(self._preview, elapsed)
-        press = self._press
-        is_held = press is not None and press.is_robot and not press.is_spent
-        if not self._robot.watch(press.axis if press is not None and is_held else None) and press is not None:
-            press.is_spent = True
 
     def _begin_preview(self, axis: Axis) -> bool:
         state = self._store.state

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from rcilab.model import RobotModel
 
 _NOWHERE = 1e-9  # [rad] Less than that is no step.
+_FARTHEST = math.radians(20.0)  # A choice: a joint that turns more for a step of the tool swings the arm elsewhere.
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +40,14 @@ def take_step(model: RobotModel, q: JointVector, jog: JogState, axis: Axis) -> S
     joint = axis.joint
     if joint is None:
         reach = judge_pose(model, step_pose(model.forward(q), axis, jog.step, jog.frame), q)
-        return Step(None, message("jog.no_way", reason=reach.reason)) if reach.tone == "bad" else Step(reach.q)
+        if reach.tone == "bad":
+            return Step(None, message("jog.no_way", reason=reach.reason))
+        turns = np.abs(reach.q - q)
+        if turns.max() > _FARTHEST:
+            farthest = int(turns.argmax())
+            angle = f"{math.degrees(turns[farthest]):.0f}"
+            return Step(None, message("jog.far", joint=farthest + 1, angle=angle))
+        return Step(reach.q)
     limits, moved = model.limits.joint, np.array(q)
     low, high = limits.lower[joint] + POSITION_MARGIN, limits.upper[joint] - POSITION_MARGIN
     moved[joint] = min(max(q[joint] + math.radians(axis.sign * jog.step), low), high)

@@ -10,7 +10,9 @@ import numpy as np
 
 from rcilab.arrays import Array, JointVector, frozen
 from rcilab.motion.online import POSITION_MARGIN
+from rcilab.safety_box import SafetyBox, active_box
 from rcilab.safety_distance import ADVISED_DISTANCE
+from rcilab.workbench.setting_up import setup_obstacle
 from rcilab.workbench.telling import tell_status
 from rcilab.workbench.text import Message, message
 
@@ -18,6 +20,7 @@ if TYPE_CHECKING:
     from rcilab.model import RobotModel
     from rcilab.supervisor import SupervisorStatus
     from rcilab.supervisor.jog_command import JogKind
+    from rcilab.workbench.planning import Plan
     from rcilab.workbench.store import Store, UiState
 
 Frame = Literal["base", "tool"]
@@ -36,6 +39,7 @@ STILL = 1e-3  # [rad/s] A choice: below this a jogged joint stands.
 _AT_LIMIT = math.radians(0.05)  # [rad] A choice: closer than this to its limit a jogged joint has arrived there.
 _REACTION = 0.5  # [s] A choice: a jog that nobody renews any more, 0.3 s, and the way to rest are shorter.
 _AHEAD = 0.1  # [s] How far ahead distances are looked at.
+_FACE = 1e-3  # [m] A choice: the tool stands so far before a face of the safety box.
 _APPROACH = 1e-4  # [m/s] A choice: slower than this nothing comes nearer.
 STANDING = 0.02  # A choice: a smaller part of a jog than that is none.
 
@@ -45,7 +49,7 @@ _NO_JOG = {
     "stopping": "ready.moving",
     "fault": "ready.fault",
     "lost": "ready.lost",
-    "closed": "ready.starting",
+    "closed": "ready.closed",
 }
 
 
@@ -140,10 +144,7 @@ def safe_share(model: RobotModel, q: JointVector, kind: JogKind, values: Array) 
         kind: As for `Supervisor.jog`.
         values: Likewise.
     """
-    dq = values
-    if kind != "joint":
-        R = model.forward(q).rotation if kind == "tool" else np.eye(3)
-        dq = model.joint_velocity(q, np.concatenate([R @ values[:3], R @ values[3:]])).rates
+    dq = _rates(model, q, kind, values)
     found = model.clearance(np.stack([q, q + _AHEAD * dq]))
     now, ahead = found.distance
     closing = float(now - ahead) / _AHEAD  # [m/s]
@@ -151,6 +152,39 @@ def safe_share(model: RobotModel, q: JointVector, kind: JogKind, values: Array) 
     if closing <= _APPROACH:
         return 1.0, (first, second)
     return min(max(float(now) - ADVISED_DISTANCE, 0.0) / (closing * _REACTION), 1.0), (first, second)
+
+
+def box_share(model: RobotModel, q: JointVector, kind: JogKind, values: Array, box: SafetyBox | None) -> float:
+    """Returns the part of a jog, 0 to 1, that keeps the tool in the safety box: it slows down on its way to a face.
+
+    Args:
+        model: The arm.
+        q: Joint angles now, shape (n,), [rad].
+        kind: As for `Supervisor.jog`.
+        values: Likewise.
+        box: The safety box; one that is off bounds nothing.
+    """
+    bound = active_box(box)
+    if bound is None:
+        return 1.0
+    ahead = q + _AHEAD * _rates(model, q, kind, values)
+    now, then = (-bound.excess(model.forward(angles).position.tolist()) for angles in (q, ahead))
+    closing = (now - then) / _AHEAD  # [m/s]
+    return 1.0 if closing <= _APPROACH else min(max(now - _FACE, 0.0) / (closing * _REACTION), 1.0)
+
+
+def fastest_tool(plan: Plan) -> float:
+    """Returns the highest speed of the tool in a plan, as far as its path shows it, [m/s]."""
+    steps = np.sqrt(np.square(np.diff(plan.path, axis=0)).sum(axis=1))
+    return float(steps.max()) * (len(plan.path) - 1) / plan.motion.duration
+
+
+def _rates(model: RobotModel, q: JointVector, kind: JogKind, values: Array) -> Array:
+    """Returns the joint velocities of a jog, shape (n,), [rad/s]."""
+    if kind == "joint":
+        return values
+    R = model.forward(q).rotation if kind == "tool" else np.eye(3)
+    return model.joint_velocity(q, np.concatenate([R @ values[:3], R @ values[3:]])).rates
 
 
 def no_jog(state: UiState, status: SupervisorStatus) -> Message | None:
@@ -165,7 +199,7 @@ def no_jog(state: UiState, status: SupervisorStatus) -> Message | None:
         return message(_NO_JOG[status.phase])
     if not status.powered:
         return message("ready.power")
-    return None
+    return setup_obstacle(state, status)
 
 
 def change_jog(store: Store, **changes: Any) -> None:

@@ -10,14 +10,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from rcilab.arrays import JointVector, frozen
+from rcilab.arrays import JointVector, as_vector, frozen
 from rcilab.errors import RcilabError
 from rcilab.motion.program import Program
 from rcilab.whole_file import write_whole
 
 if TYPE_CHECKING:
+    from rcilab.model import RobotModel
     from rcilab.workbench.store import UiState
 
 _FORMAT, _VERSION = "rcilab workbench", 1
@@ -26,9 +25,8 @@ _PAUSE = 1.0  # [s] A choice: between two writings, while somebody drags.
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Kept:
-    """What came back."""
+    """What came back of one arm."""
 
-    model: str
     q: JointVector
     """The goal, shape (n,), [rad]."""
     program: Program | None = None
@@ -42,7 +40,7 @@ def keepsake_file(port: int) -> Path:
 
 
 class Keepsake:
-    """Writes the goal and the program down when they have changed. Owned by the conductor's thread.
+    """Writes goal and program of every arm down when they have changed. Owned by the conductor's thread.
 
     Nobody asked for this file, so where it cannot be written or read it is done without, silently.
 
@@ -52,24 +50,25 @@ class Keepsake:
 
     def __init__(self, file: Path | None) -> None:
         self._file = file
+        self._arms: dict[str, Any] = {}
         self._written: tuple[object, ...] | None = None
         self._next = 0.0
 
-    def recall(self) -> Kept | None:
-        """Returns what the workbench before kept, if it was not closed and the file can be understood."""
+    def recall(self, model: RobotModel) -> Kept | None:
+        """Returns what the workbench before kept of an arm, if it was not closed and the file can be understood."""
         if self._file is None:
             return None
         try:
             content: dict[str, Any] = json.loads(self._file.read_text(encoding="utf-8"))
             if (content["format"], content["version"]) != (_FORMAT, _VERSION):
                 return None
-            program = content["program"]
-            return Kept(
-                model=str(content["model"]),
-                q=frozen(content["q"]),
-                program=None if program is None else Program.from_json(program),
-            )
-        except (OSError, ValueError, KeyError, TypeError, RcilabError):
+            self._arms = dict(content["arms"])
+            own = self._arms.get(model.name)
+            if own is None:
+                return None
+            program = None if own["program"] is None else Program.from_json(own["program"])
+            return Kept(q=frozen(as_vector(own["q"], model.n, "q", "rad")), program=program)
+        except (OSError, ValueError, LookupError, TypeError, RecursionError, RcilabError):
             return None
 
     def keep(self, state: UiState) -> None:
@@ -79,18 +78,15 @@ class Keepsake:
         if self._file is None or content == self._written or now < self._next:
             return
         self._written, self._next = content, now + _PAUSE
-        program = state.program.draft.program(state.model) if state.program.draft.model == state.model.name else None
-        text = json.dumps(
-            {
-                "format": _FORMAT,
-                "version": _VERSION,
-                "model": state.model.name,
-                "q": np.asarray(state.goal.q).tolist(),
-                "program": None if program is None else program.to_json(),
-            }
-        )
+        draft = state.program.draft
+        program = draft.program(state.model) if draft.model == state.model.name else None
+        self._arms[state.model.name] = {
+            "q": state.goal.q.tolist(),
+            "program": None if program is None else program.to_json(),
+        }
+        text = json.dumps({"format": _FORMAT, "version": _VERSION, "arms": self._arms})
         with suppress(OSError):
-            write_whole(self._file, text)
+            write_whole(self._file, text, survives_power_loss=False)
 
     def drop(self) -> None:
         """Forgets it all: the workbench was closed by somebody who wanted that."""

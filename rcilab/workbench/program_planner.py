@@ -30,7 +30,7 @@ class Job:
     here: JointVector
     """Where the arm stands, [rad]."""
     rounds: int
-    box: SafetyBox
+    box: SafetyBox | None
     """The safety box to judge with."""
 
 

@@ -17,7 +17,7 @@ from rcilab.workbench.reach import Tone
 from rcilab.workbench.readiness import is_moving, obstacle
 from rcilab.workbench.run_keeper import RunKeeper
 from rcilab.workbench.session import Session
-from rcilab.workbench.setting_up import SetupState
+from rcilab.workbench.setting_up import SetupState, setup_obstacle
 from rcilab.workbench.store import Goal, Store, UiState
 from rcilab.workbench.telling import StartingError, tell_error, tell_incident
 from rcilab.workbench.text import Message, message
@@ -80,6 +80,10 @@ class RobotActions:
     def _guide(self) -> Ticket | None:
         """Frees the arm for a hand to guide it; a real one only when that is asked for twice."""
         state, now = self._store.state, time.monotonic()
+        unset = setup_obstacle(state, self._session.status())
+        if unset is not None:
+            self._store.say("warn", unset)
+            return None
         if state.target != "virtual" and now - self._asked_to_guide > _SECOND_THOUGHT:
             self._asked_to_guide = now
             self._store.say("warn", message("guide.sure", address=state.target, seconds=f"{_SECOND_THOUGHT:.0f}"))
@@ -118,7 +122,7 @@ class RobotActions:
         if state.target != "virtual":
             self._store.say("warn", message("plant.address", address=state.target))
             return
-        self._store.update(plant=plant, playing=False)
+        self._store.update(plant=plant, playing=False, **_unasked(state))
         self._powered, self._power_asked = False, float("-inf")
         self._end_recording()
         self._tickets, self._incident, self._phase = [], 0, ""
@@ -131,7 +135,7 @@ class RobotActions:
         self._powered, self._power_asked = False, float("-inf")
         self._end_recording()
         self._tickets, self._incident, self._phase = [], 0, ""
-        changes: dict[str, object] = {"target": target, "recording": None, "asked": None}
+        changes: dict[str, object] = {"target": target, "recording": None, "asked": None, **_unasked(state)}
         if model is not state.model:
             self._store.forget()
             self._placed, self._untouched = False, initial_goal(model, model.home)
@@ -255,6 +259,14 @@ class RobotActions:
         if self._recording:
             self._stopped = "the workbench was closed"
             self._end_recording()
+
+
+def _unasked(state: UiState) -> dict[str, object]:
+    """Returns the changes by which nothing that was asked, agreed or refused at one robot goes on at the next."""
+    return {
+        "setup": replace(state.setup, asked=None, refusal=None),
+        "jog": replace(state.jog, robot=False, asked=False, said=None),
+    }
 
 
 def _own_setup(state: UiState, target: str) -> RobotSetup | None:

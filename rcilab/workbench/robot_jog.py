@@ -17,11 +17,14 @@ from rcilab.workbench.goal_actions import GoalActions
 from rcilab.workbench.jog_step import take_step
 from rcilab.workbench.jogging import (
     FASTEST_JOINT,
+    FASTEST_TOOL,
     STANDING,
     STILL,
     Axis,
     at_limit,
+    box_share,
     change_jog,
+    fastest_tool,
     jog_velocity,
     no_jog,
     safe_share,
@@ -73,6 +76,11 @@ class RobotJog:
             return True  # It ended in the moment of the press; the next word begins another one.
         kind, values = jog_velocity(state.model, status.q_c, state.jog, axis)
         share, links = safe_share(state.model, status.q_c, kind, values)
+        room = box_share(state.model, status.q_c, kind, values, state.setup.wanted.box)
+        if room < STANDING:
+            self.let_go()
+            change_jog(self._store, said=message("jog.box"))
+            return False
         if share < STANDING:
             self.let_go()
             first, second = (message(f"link.{link_name(link).split()[0]}", number=link) for link in links)
@@ -80,7 +88,8 @@ class RobotJog:
             change_jog(self._store, said=message("jog.near", first=first, second=second, mm=mm))
             return False
         try:
-            self._ticket = self._session.supervisor().jog(kind, share * values)
+            goes_on = None if ticket is None or ticket.done else ticket
+            self._ticket = self._session.supervisor().jog(kind, min(share, room) * values, goes_on=goes_on)
         except RcilabError as error:
             change_jog(self._store, said=tell_error(error, status))
             return False
@@ -103,8 +112,10 @@ class RobotJog:
         if led.q is None:
             return
         share = state.jog.speed * FASTEST_JOINT / float(state.model.limits.joint.velocity.max())
-        # A straight line of the joints: the tool leaves its own by 0.03 mm in a step of 10 mm.
-        made = make_plan(state.model, status.q_c, led.q, share, "jerk_limited", state.setup.wanted.box)
+        box = state.setup.wanted.box
+        made = make_plan(state.model, status.q_c, led.q, share, "jerk_limited", box)
+        if isinstance(made, Plan) and (fast := fastest_tool(made) / FASTEST_TOOL) > 1.0:
+            made = make_plan(state.model, status.q_c, led.q, share / fast, "jerk_limited", box)
         if not isinstance(made, Plan):
             change_jog(self._store, said=made)
             return
@@ -113,9 +124,13 @@ class RobotJog:
             broken = message(f"condition.{report.violations[0].condition.id}")
             change_jog(self._store, said=message("jog.unsafe", condition=broken))
             return
+        try:
+            ticket = self._session.supervisor().execute(made.motion, report.certificate)
+        except RcilabError as error:
+            change_jog(self._store, said=tell_error(error, status))
+            return
         self._store.remember()
-        self._followed = None
-        self._ticket = self._session.supervisor().execute(made.motion, report.certificate)
+        self._followed, self._ticket = None, ticket
 
     def watch(self, axis: Axis | None) -> bool:
         """Has the goal follow the arm; returns False when the button that is held moves nothing any more.

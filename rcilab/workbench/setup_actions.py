@@ -73,12 +73,18 @@ class SetupActions:
         if isinstance(changed, SetupState) and name in INERTIA_NAMES:
             self._store.update(setup=changed)  # The moments stand as typed, also while no body has them yet.
             changed = with_inertia(changed)
+        untaken = None
+        if isinstance(changed, SetupState) and name == "mass":
+            made = with_inertia(changed)
+            changed, untaken = (changed, made) if isinstance(made, Message) else (made, None)
         if isinstance(changed, Message):
             self._complain(request.field, changed)
             return
-        related = INERTIA_NAMES if name in (*INERTIA_NAMES, "mass") else (name,)
+        related = {name, *INERTIA_NAMES} if name in (*INERTIA_NAMES, "mass") else {name}
         self._clear_problems(f"setup.{part}.{other}" for other in related)
         self._edit(changed, cast("SetupPart", part))
+        if untaken is not None:
+            self._complain("setup.load.ixx", untaken)
 
     def move(self, request: requests.MoveSetup) -> None:
         """Follows the handles of a part."""

@@ -10,15 +10,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from rcilab.client.setup import RobotSetup
 from rcilab.errors import ControlError, UsageError
 from rcilab.model import load_model
+from rcilab.safety_box import SafetyBox
 from rcilab.spatial import Pose
 from rcilab.supervisor import SupervisorStatus
 from rcilab.workbench import jog_actions, requests
 from rcilab.workbench.goal_actions import GoalActions, initial_goal
 from rcilab.workbench.jog_actions import JogActions
 from rcilab.workbench.jog_step import step_pose, take_step
-from rcilab.workbench.jogging import AXES, FASTEST_TOOL, Axis, JogState, jog_velocity, safe_share
+from rcilab.workbench.jogging import AXES, FASTEST_TOOL, STANDING, Axis, JogState, box_share, jog_velocity, safe_share
 from rcilab.workbench.lease import Lease
 from rcilab.workbench.store import Store, UiState
 from tests.workbench.opened import opened, wait
@@ -37,7 +39,7 @@ class FakeSupervisor:
         self.motion = None
         self.ticket = SimpleNamespace(done=False, error=None)
 
-    def jog(self, kind, values):
+    def jog(self, kind, values, *, goes_on=None):
         self.held = kind, np.array(values)
         return self.ticket
 
@@ -272,7 +274,7 @@ def test_a_jog_that_was_stopped_stays_stopped_though_the_button_is_still_held(jo
 
 
 def test_what_the_control_process_refuses_is_told(jog, store, robot, monkeypatch):
-    def refuse(*_):
+    def refuse(*_, **__):
         raise UsageError("nobody is at the controls")
 
     monkeypatch.setattr(robot, "jog", refuse)
@@ -357,3 +359,59 @@ def test_with_the_real_controller_the_goal_follows_the_arm_and_undo_brings_it_ba
         ask(requests.NamedPose(what="store", name="start"))
         wait(lambda: store.state.notice.text.code == "poses.file", "the bad file to be told")
         assert (tmp_path / "rcilab" / "poses.json").read_text() == "{"
+
+
+def test_a_step_that_would_swing_the_arm_is_refused(store):
+    model = load_model("xMate3")
+    q = np.radians([-134.2, -43.0, 90.4, 21.6, -83.6, 44.7])
+    led = take_step(model, q, JogState(step=1.0, frame="base"), Axis("pitch", 1))
+    if led.q is None:
+        assert led.said.code in ("jog.far", "jog.no_way")
+    else:
+        assert np.abs(led.q - q).max() < np.radians(20.0)
+
+
+@pytest.mark.parametrize("axis", ["joint.0", "joint.1", "x", "yaw"])
+def test_no_step_moves_the_tool_faster_than_the_reduced_speed(jog, store, session, robot, axis):
+    stretched = np.radians([0.0, 60.0, 0.0, 20.0, 0.0, 60.0, 0.0])
+    session.shown = replace(IDLE, q_c=stretched, q=stretched)
+    jog.set_jog(requests.SetJog(step=10.0, speed=1.0))
+    jog.press(requests.PressJog(page=1, axis=axis, sign=1))
+    motion = robot.motion
+    assert motion is not None, said(store)
+    tool = MODEL.forward_path(motion.q)[:, :3, 3]
+    speed = np.linalg.norm(np.diff(tool, axis=0), axis=1).max() * 1000.0
+    assert speed < 1.02 * FASTEST_TOOL
+
+
+def test_a_tool_that_is_jogged_slows_down_before_a_face_of_the_safety_box_and_goes_back_freely():
+    T = MODEL.forward(MODEL.home)
+    box = SafetyBox(size=(0.1, 1.0, 1.0), T_base_box=Pose(T.position))
+    twist = np.array([0.25, 0.0, 0.0, 0.0, 0.0, 0.0])
+    assert box_share(MODEL, MODEL.home, "base", twist, box) == pytest.approx((0.05 - 1e-3) / (0.25 * 0.5), rel=0.05)
+    near = SafetyBox(size=(0.1, 1.0, 1.0), T_base_box=Pose(T.position - [0.0495, 0.0, 0.0]))
+    assert box_share(MODEL, MODEL.home, "base", twist, near) < STANDING
+    assert box_share(MODEL, MODEL.home, "base", -twist, near) == 1.0
+    off = SafetyBox(size=near.size, T_base_box=near.T_base_box, active=False)
+    assert box_share(MODEL, MODEL.home, "base", twist, off) == 1.0
+
+
+def test_a_robot_that_was_not_told_its_set_up_is_neither_jogged_nor_stepped(jog, store, session, robot):
+    wanted = store.state.setup.wanted.updated(RobotSetup(tool=Pose([0.0, 0.0, 0.1])))
+    store.update(
+        target="rci://127.0.0.9:1337", setup=replace(store.state.setup, wanted=wanted, touched=frozenset({"tool"}))
+    )
+    hold(jog)
+    assert said(store) == "ready.setup_unsent"
+    assert robot.held is None
+
+
+def test_after_stop_a_gap_in_what_is_heard_begins_no_new_jog(jog, store, session, robot, monkeypatch):
+    monkeypatch.setattr(jog_actions, "HOLD_TIMEOUT", 0.0)
+    hold(jog)
+    robot.ticket.done, robot.ticket.error, robot.held = True, ControlError("stopped"), None
+    session.shown = replace(IDLE, code="idle.stopped")
+    jog.tick(0.03)
+    jog.tick(0.03)
+    hold(jog)
+    assert robot.held is None

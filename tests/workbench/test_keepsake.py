@@ -33,10 +33,14 @@ def state_with_all() -> UiState:
 
 def test_what_was_kept_is_recalled(tmp_path):
     Keepsake(tmp_path / "deep" / "kept.json").keep(state_with_all())
-    kept = Keepsake(tmp_path / "deep" / "kept.json").recall()
-    assert kept.model == MODEL.name
+    keepsake = Keepsake(tmp_path / "deep" / "kept.json")
+    kept = keepsake.recall(MODEL)
     assert np.array_equal(kept.q, GOAL)
     assert [w.type for w in kept.program.waypoints] == ["joint", "joint"]
+    other = load_model("xMate3")
+    assert keepsake.recall(other) is None
+    keepsake.keep(UiState(model=other, goal=initial_goal(other, other.home)))
+    assert np.array_equal(Keepsake(tmp_path / "deep" / "kept.json").recall(MODEL).q, GOAL), "each arm has its own"
 
 
 def test_nothing_is_written_again_while_nothing_has_changed(tmp_path):
@@ -47,17 +51,20 @@ def test_nothing_is_written_again_while_nothing_has_changed(tmp_path):
     assert not (tmp_path / "kept.json").exists()
 
 
-@pytest.mark.parametrize("text", ["", "{", "[]", "{}", '{"format": "rcilab workbench", "version": 2}', "\udcff"])
+SHORT = '{"format": "rcilab workbench", "version": 1, "arms": {"xMatePro7": {"q": [1], "program": null}}}'
+
+
+@pytest.mark.parametrize("text", [SHORT, "", "{", "[]", "{}", '{"format": "rcilab workbench", "version": 2}', "\udcff"])
 def test_a_file_that_nobody_understands_is_as_good_as_none(tmp_path, text):
     (tmp_path / "kept.json").write_text(text, errors="surrogateescape")
-    assert Keepsake(tmp_path / "kept.json").recall() is None
+    assert Keepsake(tmp_path / "kept.json").recall(MODEL) is None
 
 
 def test_where_nothing_can_be_written_the_page_goes_on(tmp_path):
     (tmp_path / "file").write_text("")
     keepsake = Keepsake(tmp_path / "file" / "kept.json")
     keepsake.keep(state_with_all())
-    assert keepsake.recall() is None
+    assert keepsake.recall(MODEL) is None
     keepsake.drop()
 
 
@@ -86,5 +93,5 @@ def test_the_next_workbench_at_the_port_has_goal_plan_and_program():
 def is_kept(file: Path) -> bool:
     if not os.path.exists(file):
         return False
-    content = json.loads(file.read_text())
-    return content["program"] is not None and np.allclose(content["q"], GOAL)
+    kept = json.loads(file.read_text())["arms"][MODEL.name]
+    return kept["program"] is not None and np.allclose(kept["q"], GOAL)

@@ -148,11 +148,16 @@
   const holds = (target) => target instanceof Element ? target.closest("div:has(> div > .rl-held) button") : null;
   let held = null;
   window.addEventListener("pointerdown", (event) => {
-    if (held && held.key) letGo();
+    if (held && !holds(event.target)) return;  // Another finger beside the one that holds a button.
+    letGo();
     held = event;
     watchHeld();
   }, true);
-  window.addEventListener("pointerup", () => { held = null; }, true);
+  for (const kind of ["pointerup", "pointercancel"]) {
+    window.addEventListener(kind, (event) => {
+      if (held && event.isTrusted && event.pointerId === held.pointerId) held = null;
+    }, true);
+  }
   window.addEventListener("pointermove", (event) => {
     if (held && !held.key && event.pointerId === held.pointerId && event.buttons === 0) letGo();
   }, true);

@@ -27,6 +27,7 @@ class SetupPanel:
 
     def __init__(self, text: Text, ask: Ask) -> None:
         self._text, self._ask = text, ask
+        self._is_program = False
 
     def build(self, gui: Any, state: UiState) -> None:
         """Adds the controls."""
@@ -47,7 +48,7 @@ class SetupPanel:
             )
             on_press(self._undo, ask, _press("undo"))
             self._again = gui.add_button(text("setup.check"), icon="clipboard-check", hint=text("setup.check_hint"))
-            on_press(self._again, ask, lambda page: requests.Plan(page=page))
+            on_press(self._again, ask, self._plan_again)
             choices = {text("setup.nothing"): "", **{text(f"setup.part.{part}"): part for part in SETUP_PARTS}}
             self._choices = {part: label for label, part in choices.items()}
             edited = gui.add_dropdown(
@@ -57,9 +58,13 @@ class SetupPanel:
                 edited, ask, lambda v, p: requests.SetSetup(page=p, name="edited", value=choices.get(v, ""))
             )
 
+    def _plan_again(self, page: int | None) -> requests.Request:
+        return requests.PlanProgram(page=page) if self._is_program else requests.Plan(page=page)
+
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows state and controller."""
         text, setup = self._text, state.setup
+        self._is_program = state.plan is not None and state.plan.program is not None
         pending, foreign = pending_parts(state, status), state.target != "virtual"
         question = setup.asked is setup.wanted and bool(pending)
         self._verdict.show(self._verdict_html(state, status))
