@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TypeAlias
+from typing import TypeAlias, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,8 +26,10 @@ Matrix: TypeAlias = Array
 
 def frozen(value: ArrayLike) -> Array:
     """Returns a read-only float64 copy of `value`, or itself where it is such a copy already."""
-    if isinstance(value, np.ndarray) and value.base is None and value.dtype == np.float64 and not value.flags.writeable:
-        return value
+    if isinstance(value, np.ndarray):
+        array = cast("Array", value)
+        if array.base is None and array.dtype == np.float64 and not array.flags.writeable:
+            return array
     return sealed(np.array(value, dtype=np.float64))
 
 
