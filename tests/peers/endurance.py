@@ -95,7 +95,7 @@ def run_motions(plant: str, count: int, *, warm_up: int = 10) -> None:
         state = robot.receive_fresh_state()
         assert (state.controller_mode, state.robot_mode) == (wire.OTHER, wire.ROBOT_IDLE)
         assert not state.errors
-        assert _threads() == threads
+        assert _threads() <= threads  # Those of earlier tests may end meanwhile.
         assert grown < GROWTH, f"{count} motions made the process grow by {grown} bytes"
 
 
