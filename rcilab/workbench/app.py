@@ -13,11 +13,11 @@ from rcilab.views.gate import Gate
 from rcilab.views.guarded_server import GuardedServer
 from rcilab.workbench import requests, security
 from rcilab.workbench.conductor import Conductor
-from rcilab.workbench.goal_actions import initial_goal
+from rcilab.workbench.goal.actions import initial_goal
 from rcilab.workbench.keepsake import Keepsake, keepsake_file
 from rcilab.workbench.live import LIVE_PATH, LiveChannel
 from rcilab.workbench.page import decorate
-from rcilab.workbench.replay import replayed, require_replayable
+from rcilab.workbench.run.replay import replayed, require_replayable
 from rcilab.workbench.session import Session
 from rcilab.workbench.store import Store, UiState
 from rcilab.workbench.telling import tell_error

@@ -11,17 +11,17 @@ from typing import Any
 
 from rcilab.errors import RcilabError
 from rcilab.workbench import requests
-from rcilab.workbench.export_actions import Deliver, ExportActions
-from rcilab.workbench.goal_actions import GoalActions
-from rcilab.workbench.jog_actions import JogActions
+from rcilab.workbench.goal.actions import GoalActions
+from rcilab.workbench.jog.actions import JogActions
+from rcilab.workbench.jog.pose_actions import PoseActions
 from rcilab.workbench.keepsake import Keepsake, Kept
 from rcilab.workbench.mailbox import Mailbox
-from rcilab.workbench.pose_actions import PoseActions
-from rcilab.workbench.program_actions import ProgramActions
-from rcilab.workbench.push_actions import PushActions
-from rcilab.workbench.robot_actions import RobotActions
+from rcilab.workbench.program.actions import ProgramActions
+from rcilab.workbench.run.actions import RobotActions
+from rcilab.workbench.run.export_actions import Deliver, ExportActions
+from rcilab.workbench.run.push_actions import PushActions
 from rcilab.workbench.session import Session
-from rcilab.workbench.setup_actions import SetupActions, is_setup_field
+from rcilab.workbench.setup.actions import SetupActions, is_setup_field
 from rcilab.workbench.store import Store
 from rcilab.workbench.telling import tell_error
 from rcilab.workbench.text import message

@@ -27,9 +27,9 @@ from rcilab.workbench.panels.target import TargetPanel
 from rcilab.workbench.panels.timeline import TimelinePanel
 from rcilab.workbench.panels.tool_jog import ToolJogPanel
 from rcilab.workbench.panels.waypoint import WaypointPanel
-from rcilab.workbench.program_marks import ProgramMarks
+from rcilab.workbench.program.marks import ProgramMarks
+from rcilab.workbench.scene.stage import Stage
 from rcilab.workbench.session import Session
-from rcilab.workbench.stage import Stage
 from rcilab.workbench.store import Store
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask

@@ -14,20 +14,20 @@ import numpy as np
 from rcilab.arrays import JointVector
 from rcilab.model import RobotModel
 from rcilab.spatial import Pose
-from rcilab.workbench.jogging import JogState
+from rcilab.workbench.goal.planning import Plan, PlannableLaw
+from rcilab.workbench.goal.reach import Reach, Tone
+from rcilab.workbench.jog.jogging import JogState
 from rcilab.workbench.lease import Lease
-from rcilab.workbench.planning import Plan, PlannableLaw
-from rcilab.workbench.program_draft import ProgramState
-from rcilab.workbench.pushing import Plant, PushState
-from rcilab.workbench.reach import Reach, Tone
-from rcilab.workbench.setting_up import SetupState
+from rcilab.workbench.program.draft import ProgramState
+from rcilab.workbench.run.pushing import Plant, PushState
+from rcilab.workbench.setup.wanted import SetupState
 from rcilab.workbench.text import Message
 
 if TYPE_CHECKING:
     from rcilab.motion import Motion
     from rcilab.recording.run import Run
     from rcilab.recording.tracking import Tracking
-    from rcilab.workbench.export_actions import Export
+    from rcilab.workbench.run.export_actions import Export
 
 _UNDO_DEPTH = 100
 

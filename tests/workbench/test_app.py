@@ -12,7 +12,7 @@ from rcilab.errors import InvalidValueError, ModelError, UsageError
 from rcilab.workbench import requests
 from rcilab.workbench.app import Workbench, WorkbenchConfig
 from rcilab.workbench.panels.target import planned_html
-from rcilab.workbench.readiness import obstacle
+from rcilab.workbench.run.readiness import obstacle
 from rcilab.workbench.text import Text
 from tests.workbench.opened import opened, told, wait
 

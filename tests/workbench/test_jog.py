@@ -17,10 +17,19 @@ from rcilab.safety_box import SafetyBox
 from rcilab.spatial import Pose
 from rcilab.supervisor import SupervisorStatus
 from rcilab.workbench import jog_actions, requests
-from rcilab.workbench.goal_actions import GoalActions, initial_goal
-from rcilab.workbench.jog_actions import JogActions
-from rcilab.workbench.jog_step import step_pose, take_step
-from rcilab.workbench.jogging import AXES, FASTEST_TOOL, STANDING, Axis, JogState, box_share, jog_velocity, safe_share
+from rcilab.workbench.goal.actions import GoalActions, initial_goal
+from rcilab.workbench.jog.actions import JogActions
+from rcilab.workbench.jog.jogging import (
+    AXES,
+    FASTEST_TOOL,
+    STANDING,
+    Axis,
+    JogState,
+    box_share,
+    jog_velocity,
+    safe_share,
+)
+from rcilab.workbench.jog.step import step_pose, take_step
 from rcilab.workbench.lease import Lease
 from rcilab.workbench.store import Store, UiState
 from tests.workbench.opened import opened, wait

@@ -15,9 +15,9 @@ from rcilab.model import load_model
 from rcilab.motion import Program, Waypoint
 from rcilab.workbench import requests
 from rcilab.workbench.app import Workbench, WorkbenchConfig
-from rcilab.workbench.goal_actions import initial_goal
+from rcilab.workbench.goal.actions import initial_goal
 from rcilab.workbench.keepsake import Keepsake, keepsake_file
-from rcilab.workbench.program_draft import draft_of
+from rcilab.workbench.program.draft import draft_of
 from rcilab.workbench.store import UiState
 from tests.waiting import wait_for
 

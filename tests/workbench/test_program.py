@@ -15,12 +15,12 @@ from rcilab.model import load_model
 from rcilab.motion import Motion, Program, Waypoint
 from rcilab.spatial import Pose
 from rcilab.workbench import program_planner, requests
-from rcilab.workbench.goal_actions import GoalActions, initial_goal
+from rcilab.workbench.goal.actions import GoalActions, initial_goal
 from rcilab.workbench.panels.program import read_row
 from rcilab.workbench.panels.program_list import list_html
-from rcilab.workbench.program_actions import ProgramActions
-from rcilab.workbench.program_draft import draft_of, number_at, tell_place, time_at
-from rcilab.workbench.readiness import obstacle
+from rcilab.workbench.program.actions import ProgramActions
+from rcilab.workbench.program.draft import draft_of, number_at, tell_place, time_at
+from rcilab.workbench.run.readiness import obstacle
 from rcilab.workbench.store import Store, UiState
 from rcilab.workbench.text import Text
 from tests.waiting import wait_for

@@ -16,11 +16,11 @@ from rcilab.model import load_model
 from rcilab.supervisor import SupervisorStatus
 from rcilab.workbench import push_actions, requests
 from rcilab.workbench.app import Workbench
-from rcilab.workbench.goal_actions import initial_goal
+from rcilab.workbench.goal.actions import initial_goal
 from rcilab.workbench.lease import Lease
-from rcilab.workbench.push_actions import PushActions
-from rcilab.workbench.pushing import SPRING, STRONGEST, place_of, spring_force
-from rcilab.workbench.robot_actions import RobotActions
+from rcilab.workbench.run.actions import RobotActions
+from rcilab.workbench.run.push_actions import PushActions
+from rcilab.workbench.run.pushing import SPRING, STRONGEST, place_of, spring_force
 from rcilab.workbench.store import Store, UiState
 from tests.workbench.opened import opened, told, wait
 

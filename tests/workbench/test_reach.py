@@ -10,7 +10,7 @@ import pytest
 from rcilab.model import load_model
 from rcilab.robots import RCI_ROBOT_NAMES
 from rcilab.spatial import Pose
-from rcilab.workbench.reach import NEAR_LIMIT, judge_joints, judge_pose, margin
+from rcilab.workbench.goal.reach import NEAR_LIMIT, judge_joints, judge_pose, margin
 
 
 @pytest.mark.parametrize("name", RCI_ROBOT_NAMES)

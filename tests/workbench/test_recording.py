@@ -15,10 +15,10 @@ from rcilab.recording.export import export_run
 from rcilab.recording.run_file import decode_run
 from rcilab.workbench import requests
 from rcilab.workbench.app import Workbench, WorkbenchConfig
-from rcilab.workbench.export_actions import ENDINGS
 from rcilab.workbench.panels.recording import progress_html, summary_html
-from rcilab.workbench.readiness import obstacle
-from rcilab.workbench.replay import replayed_pose, require_replayable
+from rcilab.workbench.run.export_actions import ENDINGS
+from rcilab.workbench.run.readiness import obstacle
+from rcilab.workbench.run.replay import replayed_pose, require_replayable
 from rcilab.workbench.text import Text
 from tests.recording.runs import some_run
 from tests.workbench.opened import told, wait

@@ -19,9 +19,9 @@ from rcilab.workbench import requests
 from rcilab.workbench.app import Workbench
 from rcilab.workbench.panels.check import CheckPanel
 from rcilab.workbench.panels.target import planned_html
-from rcilab.workbench.readiness import obstacle
-from rcilab.workbench.setting_up import SetupState, describe_held, describe_part, pending_parts, setup_obstacle
-from rcilab.workbench.setup_fields import FACE_NAMES, FIELD_NAMES, faces, read_field, with_field
+from rcilab.workbench.run.readiness import obstacle
+from rcilab.workbench.setup.fields import FACE_NAMES, FIELD_NAMES, faces, read_field, with_field
+from rcilab.workbench.setup.wanted import SetupState, describe_held, describe_part, pending_parts, setup_obstacle
 from rcilab.workbench.text import Message, Text
 from tests.workbench.opened import opened, told, wait
 

@@ -13,8 +13,8 @@ from rcilab.faults import Fault
 from rcilab.supervisor import SupervisorStatus
 from rcilab.supervisor.status import MESSAGES, Incident
 from rcilab.workbench.panels.status import status_values
-from rcilab.workbench.readiness import obstacle
-from rcilab.workbench.robot_actions import RobotActions
+from rcilab.workbench.run.actions import RobotActions
+from rcilab.workbench.run.readiness import obstacle
 from rcilab.workbench.session import Session
 from rcilab.workbench.store import Store
 from rcilab.workbench.telling import StartingError, phase_code, tell_error, tell_incident, tell_status
@@ -111,7 +111,7 @@ class Power:
 
 def test_the_virtual_arm_is_switched_on_however_late_its_control_process_comes(monkeypatch):
     store, side, now = Store(initial_state()), Power(), [100.0]
-    monkeypatch.setattr("rcilab.workbench.robot_actions.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("rcilab.workbench.run.actions.time.monotonic", lambda: now[0])
     robot = RobotActions(store, cast(Session, side))
     robot.watch()
     assert (store.state.notice, side.asked) == (None, 0), "nobody asked for anything"
@@ -140,7 +140,7 @@ def test_the_bar_and_the_reason_on_run_speak_of_the_same_death():
 
 def initial_state():
     from rcilab.model import load_model
-    from rcilab.workbench.goal_actions import initial_goal
+    from rcilab.workbench.goal.actions import initial_goal
     from rcilab.workbench.store import UiState
 
     model = load_model("xMatePro7")

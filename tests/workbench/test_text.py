@@ -15,7 +15,7 @@ from rcilab.errors import InvalidValueError
 from rcilab.faults import Fault
 from rcilab.state import ControllerMode, RobotMode
 from rcilab.supervisor.status import PHASES
-from rcilab.workbench.planning import LAWS
+from rcilab.workbench.goal.planning import LAWS
 from rcilab.workbench.text import LANGUAGES, Text, load_catalogue, message
 from rcilab.workbench.view_actions import QUALITIES
 from tests.catalogues import require_equal

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.workbench.setting_up import name_parts
+from rcilab.workbench.setup.wanted import name_parts
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, Html, esc
 

@@ -12,8 +12,8 @@ from rcilab.workbench import requests
 from rcilab.workbench.panels.jog import problems_html
 from rcilab.workbench.panels.program_list import list_html
 from rcilab.workbench.panels.target import planned_html
-from rcilab.workbench.program_draft import Draft, number_at, tell_place
-from rcilab.workbench.readiness import is_moving
+from rcilab.workbench.program.draft import Draft, number_at, tell_place
+from rcilab.workbench.run.readiness import is_moving
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, Html, Linked, NumberField, esc, on_press
 

@@ -14,7 +14,7 @@ from rcilab.workbench.widgets import Ask, Html, NumberField, esc, on_press
 if TYPE_CHECKING:
     from rcilab.model import RobotModel
     from rcilab.supervisor import SupervisorStatus
-    from rcilab.workbench.program_draft import Draft
+    from rcilab.workbench.program.draft import Draft
     from rcilab.workbench.store import UiState
 
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 from rcilab.errors import RcilabError
 from rcilab.motion.program import Waypoint
-from rcilab.workbench.program_draft import Draft, target_of
-from rcilab.workbench.program_fields import arm_angle_of
+from rcilab.workbench.program.draft import Draft, target_of
+from rcilab.workbench.program.fields import arm_angle_of
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import esc
 

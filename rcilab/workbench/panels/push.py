@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rcilab.workbench import requests
-from rcilab.workbench.pushing import DIRECTIONS, SPRING, STRONGEST, TOOL, WAYS, can_grab, is_guided, no_push
-from rcilab.workbench.readiness import is_moving
+from rcilab.workbench.run.pushing import DIRECTIONS, SPRING, STRONGEST, TOOL, WAYS, can_grab, is_guided, no_push
+from rcilab.workbench.run.readiness import is_moving
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, Html, Linked, esc, on_press
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rcilab.workbench import requests
-from rcilab.workbench.export_actions import ENDINGS
+from rcilab.workbench.run.export_actions import ENDINGS
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, Html, Linked, esc, on_press
 

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 from rcilab.workbench import requests
 from rcilab.workbench.panels.target import planned_html
-from rcilab.workbench.pushing import PLANTS
-from rcilab.workbench.readiness import describe_move, is_moving, obstacle
+from rcilab.workbench.run.pushing import PLANTS
+from rcilab.workbench.run.readiness import describe_move, is_moving, obstacle
 from rcilab.workbench.telling import phase_code, tell_status
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, Html, Linked, esc, on_press

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from rcilab.client.setup import SETUP_PARTS
 from rcilab.workbench import requests
-from rcilab.workbench.setting_up import (
+from rcilab.workbench.setup.wanted import (
     describe_held,
     describe_part,
     differing_tool,

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 from rcilab.client.setup import SETUP_PARTS
 from rcilab.workbench import requests
 from rcilab.workbench.panels.jog import problems_html
-from rcilab.workbench.setting_up import FORCE_AXES
-from rcilab.workbench.setup_fields import FIELD_NAMES, INERTIA_NAMES, POSE_NAMES, read_field
+from rcilab.workbench.setup.fields import FIELD_NAMES, INERTIA_NAMES, POSE_NAMES, read_field
+from rcilab.workbench.setup.wanted import FORCE_AXES
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, Html, Linked, NumberField, esc, shown
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.workbench.readiness import is_moving
+from rcilab.workbench.run.readiness import is_moving
 from rcilab.workbench.telling import phase_code, tell_status
 from rcilab.workbench.text import Text
 

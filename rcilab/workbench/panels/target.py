@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rcilab.workbench import requests
-from rcilab.workbench.goal_actions import POSE_FIELDS
+from rcilab.workbench.goal.actions import POSE_FIELDS
+from rcilab.workbench.goal.planning import LAWS
+from rcilab.workbench.goal.reach import margin
 from rcilab.workbench.panels.jog import problems_html, reach_html
-from rcilab.workbench.planning import LAWS
-from rcilab.workbench.reach import margin
-from rcilab.workbench.setting_up import name_parts
+from rcilab.workbench.setup.wanted import name_parts
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, Html, Linked, NumberField, esc, on_press, shown
 

@@ -20,7 +20,7 @@ from rcilab.views.plots import (
     recorded_curves,
 )
 from rcilab.workbench import requests
-from rcilab.workbench.program_draft import tell_place
+from rcilab.workbench.program.draft import tell_place
 from rcilab.workbench.text import Text
 from rcilab.workbench.view_actions import RATES
 from rcilab.workbench.widgets import Ask, Html, Linked, esc, on_press

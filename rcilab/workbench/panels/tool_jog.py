@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from rcilab.workbench import requests
-from rcilab.workbench.jogging import AXES, FRAMES
+from rcilab.workbench.jog.jogging import AXES, FRAMES
 from rcilab.workbench.panels.jog import add_jog_button
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, Linked

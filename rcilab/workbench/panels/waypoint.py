@@ -9,10 +9,10 @@ import numpy as np
 
 from rcilab.motion.program import Waypoint
 from rcilab.workbench import requests
-from rcilab.workbench.goal_actions import POSE_FIELDS
+from rcilab.workbench.goal.actions import POSE_FIELDS
 from rcilab.workbench.panels.jog import problems_html
-from rcilab.workbench.program_draft import TYPES, target_of
-from rcilab.workbench.program_fields import VIA_FIELDS, arm_angle_of
+from rcilab.workbench.program.draft import TYPES, target_of
+from rcilab.workbench.program.fields import VIA_FIELDS, arm_angle_of
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, Html, Linked, NumberField, esc, on_press, shown
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rcilab.workbench.setting_up import name_parts, setup_obstacle
+from rcilab.workbench.setup.wanted import name_parts, setup_obstacle
 from rcilab.workbench.store import UiState
 from rcilab.workbench.telling import tell_status
 from rcilab.workbench.text import Message, message

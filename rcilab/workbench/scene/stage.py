@@ -10,11 +10,11 @@ import numpy as np
 from rcilab.views.arm_view import ArmView
 from rcilab.views.viser_scene import ViserScene
 from rcilab.workbench import requests
-from rcilab.workbench.grip import Grip
-from rcilab.workbench.planning import PATH_POINTS
-from rcilab.workbench.readiness import is_moving
-from rcilab.workbench.replay import replayed_pose
-from rcilab.workbench.setup_stage import SetupStage, hides_target
+from rcilab.workbench.goal.planning import PATH_POINTS
+from rcilab.workbench.run.readiness import is_moving
+from rcilab.workbench.run.replay import replayed_pose
+from rcilab.workbench.scene.grip import Grip
+from rcilab.workbench.scene.setup_stage import SetupStage, hides_target
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import viser
 
     from rcilab.supervisor import SupervisorStatus
-    from rcilab.workbench.planning import Plan
+    from rcilab.workbench.goal.planning import Plan
     from rcilab.workbench.store import UiState
 
 TONE_COLORS = {"good": (38, 166, 91), "warn": (240, 150, 20), "bad": (214, 48, 38)}

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING
 from rcilab.errors import CertificateError, ConnectionLostError, ControlError, RcilabError
 from rcilab.model import load_model
 from rcilab.workbench import requests
-from rcilab.workbench.goal_actions import initial_goal
-from rcilab.workbench.pushing import PLANTS, TOOL, is_guided
-from rcilab.workbench.reach import Tone
-from rcilab.workbench.readiness import is_moving, obstacle
-from rcilab.workbench.run_keeper import RunKeeper
+from rcilab.workbench.goal.actions import initial_goal
+from rcilab.workbench.goal.reach import Tone
+from rcilab.workbench.run.keeper import RunKeeper
+from rcilab.workbench.run.pushing import PLANTS, TOOL, is_guided
+from rcilab.workbench.run.readiness import is_moving, obstacle
 from rcilab.workbench.session import Session
-from rcilab.workbench.setting_up import SetupState, setup_obstacle
+from rcilab.workbench.setup.wanted import SetupState, setup_obstacle
 from rcilab.workbench.store import Goal, Store, UiState
 from rcilab.workbench.telling import StartingError, tell_error, tell_incident
 from rcilab.workbench.text import Message, message

@@ -13,10 +13,10 @@ from rcilab.arrays import JointVector, frozen
 from rcilab.errors import KinematicsError
 from rcilab.spatial import Pose
 from rcilab.workbench import requests
+from rcilab.workbench.goal.planning import LAWS, Plan, make_plan
+from rcilab.workbench.goal.reach import judge_joints, judge_pose
 from rcilab.workbench.parse import parse_number
-from rcilab.workbench.planning import LAWS, Plan, make_plan
-from rcilab.workbench.reach import judge_joints, judge_pose
-from rcilab.workbench.readiness import is_moving
+from rcilab.workbench.run.readiness import is_moving
 from rcilab.workbench.session import Session
 from rcilab.workbench.store import Goal, Store
 from rcilab.workbench.text import Message, message

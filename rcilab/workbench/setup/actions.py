@@ -16,12 +16,11 @@ from rcilab.errors import RcilabError
 from rcilab.safety_box import SafetyBox
 from rcilab.spatial import Pose
 from rcilab.workbench import requests
+from rcilab.workbench.goal.planning import Plan, tool_path
+from rcilab.workbench.goal.reach import judge_joints, judge_pose
 from rcilab.workbench.parse import parse_number
-from rcilab.workbench.planning import Plan, tool_path
-from rcilab.workbench.reach import judge_joints, judge_pose
 from rcilab.workbench.session import Session
-from rcilab.workbench.setting_up import FORCE_AXES, SetupState, name_parts, pending_parts
-from rcilab.workbench.setup_fields import (
+from rcilab.workbench.setup.fields import (
     FARTHEST_FACE,
     FIELD_NAMES,
     INERTIA_NAMES,
@@ -33,6 +32,7 @@ from rcilab.workbench.setup_fields import (
     with_inertia,
     with_pose,
 )
+from rcilab.workbench.setup.wanted import FORCE_AXES, SetupState, name_parts, pending_parts
 from rcilab.workbench.store import Goal, Store
 from rcilab.workbench.telling import StartingError, tell_error
 from rcilab.workbench.text import Message, message

@@ -17,7 +17,7 @@ from rcilab.workbench.text import message
 
 if TYPE_CHECKING:
     from rcilab.recording.run_file import RunFile
-    from rcilab.workbench.planning import Plan
+    from rcilab.workbench.goal.planning import Plan
     from rcilab.workbench.store import UiState
 
 

@@ -13,9 +13,9 @@ import numpy as np
 from rcilab.errors import RcilabError
 from rcilab.kinematics.collision import link_name
 from rcilab.safety_distance import ADVISED_DISTANCE
-from rcilab.workbench.goal_actions import GoalActions
-from rcilab.workbench.jog_step import take_step
-from rcilab.workbench.jogging import (
+from rcilab.workbench.goal.actions import GoalActions
+from rcilab.workbench.goal.planning import Plan, make_plan
+from rcilab.workbench.jog.jogging import (
     FASTEST_JOINT,
     FASTEST_TOOL,
     STANDING,
@@ -29,8 +29,8 @@ from rcilab.workbench.jogging import (
     no_jog,
     safe_share,
 )
-from rcilab.workbench.planning import Plan, make_plan
-from rcilab.workbench.readiness import is_moving
+from rcilab.workbench.jog.step import take_step
+from rcilab.workbench.run.readiness import is_moving
 from rcilab.workbench.session import Session
 from rcilab.workbench.store import Goal, Store
 from rcilab.workbench.telling import tell_error

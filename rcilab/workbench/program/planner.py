@@ -11,8 +11,8 @@ from rcilab.model import RobotModel
 from rcilab.motion.program import Program
 from rcilab.safety_box import SafetyBox
 from rcilab.supervisor.layout import MOTION_TIME
-from rcilab.workbench.planning import Plan, picture
-from rcilab.workbench.program_draft import Draft
+from rcilab.workbench.goal.planning import Plan, picture
+from rcilab.workbench.program.draft import Draft
 from rcilab.workbench.text import Message, message
 
 _MOTION, _JUDGED = 0.75, 0.8

@@ -15,10 +15,10 @@ from rcilab.clock import CYCLE_TIME
 from rcilab.motion import Jog
 from rcilab.supervisor.jog_command import HOLD_TIMEOUT
 from rcilab.workbench import requests
-from rcilab.workbench.goal_actions import GoalActions
-from rcilab.workbench.jog_step import take_step
-from rcilab.workbench.jogging import FRAMES, SLOWEST, STEPS, STILL, Axis, at_limit, change_jog, inside, jog_velocity
-from rcilab.workbench.robot_jog import RobotJog
+from rcilab.workbench.goal.actions import GoalActions
+from rcilab.workbench.jog.jogging import FRAMES, SLOWEST, STEPS, STILL, Axis, at_limit, change_jog, inside, jog_velocity
+from rcilab.workbench.jog.robot_jog import RobotJog
+from rcilab.workbench.jog.step import take_step
 from rcilab.workbench.session import Session
 from rcilab.workbench.store import Store
 

@@ -13,7 +13,7 @@ from rcilab.dynamics.payload import Payload
 from rcilab.errors import InvalidValueError
 from rcilab.safety_box import SafetyBox
 from rcilab.spatial import Pose
-from rcilab.workbench.setting_up import SetupState
+from rcilab.workbench.setup.wanted import SetupState
 from rcilab.workbench.text import Message, message
 
 POSE_NAMES = ("x", "y", "z", "roll", "pitch", "yaw")

@@ -12,7 +12,7 @@ from rcilab.arrays import JointVector, Vector3
 from rcilab.client.held_push import HOLD_TIMEOUT, HeldPush
 from rcilab.client.world import World
 from rcilab.workbench import requests
-from rcilab.workbench.pushing import (
+from rcilab.workbench.run.pushing import (
     DIRECTIONS,
     STRONGEST,
     TOOL,

@@ -10,9 +10,9 @@ import numpy as np
 from rcilab.client.setup import RobotSetup
 from rcilab.clock import CYCLE_TIME
 from rcilab.errors import UsageError
-from rcilab.workbench.goal_actions import initial_goal
-from rcilab.workbench.planning import picture
-from rcilab.workbench.run_keeper import whole_recording
+from rcilab.workbench.goal.actions import initial_goal
+from rcilab.workbench.goal.planning import picture
+from rcilab.workbench.run.keeper import whole_recording
 
 if TYPE_CHECKING:
     from rcilab.arrays import JointVector

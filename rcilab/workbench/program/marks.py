@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rcilab.errors import RcilabError
-from rcilab.workbench.program_draft import target_of
+from rcilab.workbench.program.draft import target_of
 
 if TYPE_CHECKING:
     import viser

@@ -10,8 +10,8 @@ import numpy as np
 from rcilab.model import RobotModel
 from rcilab.motion.program import Floats, Program, Waypoint, WaypointType
 from rcilab.spatial import Pose
-from rcilab.workbench.planning import Plan
-from rcilab.workbench.reach import Tone
+from rcilab.workbench.goal.planning import Plan
+from rcilab.workbench.goal.reach import Tone
 from rcilab.workbench.text import Message, message
 
 TYPES: tuple[WaypointType, ...] = ("joint", "line", "arc")

@@ -14,10 +14,10 @@ from rcilab.errors import InvalidValueError, PlanningError, RcilabError, Version
 from rcilab.motion.program import Program, Waypoint
 from rcilab.motion.program_file import read_program
 from rcilab.workbench import requests
-from rcilab.workbench.goal_actions import GoalActions
+from rcilab.workbench.goal.actions import GoalActions
+from rcilab.workbench.goal.planning import Plan
 from rcilab.workbench.parse import parse_number
-from rcilab.workbench.planning import Plan
-from rcilab.workbench.program_draft import (
+from rcilab.workbench.program.draft import (
     MOST_ROUNDS,
     TYPES,
     Draft,
@@ -28,9 +28,9 @@ from rcilab.workbench.program_draft import (
     target_of,
     time_at,
 )
-from rcilab.workbench.program_fields import default_via, proposed
-from rcilab.workbench.program_planner import Job, ProgramPlanner
-from rcilab.workbench.readiness import is_moving
+from rcilab.workbench.program.fields import default_via, proposed
+from rcilab.workbench.program.planner import Job, ProgramPlanner
+from rcilab.workbench.run.readiness import is_moving
 from rcilab.workbench.session import Session
 from rcilab.workbench.store import Store
 from rcilab.workbench.text import Message, message

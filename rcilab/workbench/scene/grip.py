@@ -9,7 +9,7 @@ import numpy as np
 from rcilab.views.arm_view import ArmView
 from rcilab.views.viser_scene import ViserScene
 from rcilab.workbench import requests
-from rcilab.workbench.pushing import SPRING, TOOL, can_grab
+from rcilab.workbench.run.pushing import SPRING, TOOL, can_grab
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask
 

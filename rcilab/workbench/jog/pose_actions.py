@@ -9,7 +9,7 @@ from pathlib import Path
 from rcilab.errors import InvalidValueError, RcilabError
 from rcilab.motion.pose_book import LONGEST_NAME, PoseBook
 from rcilab.workbench import requests
-from rcilab.workbench.goal_actions import GoalActions
+from rcilab.workbench.goal.actions import GoalActions
 from rcilab.workbench.store import Store
 from rcilab.workbench.text import message
 

@@ -12,7 +12,7 @@ from rcilab.arrays import Array, JointVector, frozen
 from rcilab.motion.online import POSITION_MARGIN
 from rcilab.safety_box import SafetyBox, active_box
 from rcilab.safety_distance import ADVISED_DISTANCE
-from rcilab.workbench.setting_up import setup_obstacle
+from rcilab.workbench.setup.wanted import setup_obstacle
 from rcilab.workbench.telling import tell_status
 from rcilab.workbench.text import Message, message
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from rcilab.model import RobotModel
     from rcilab.supervisor import SupervisorStatus
     from rcilab.supervisor.jog_command import JogKind
-    from rcilab.workbench.planning import Plan
+    from rcilab.workbench.goal.planning import Plan
     from rcilab.workbench.store import Store, UiState
 
 Frame = Literal["base", "tool"]

@@ -15,7 +15,7 @@ from rcilab.views.arm_view import ArmView
 from rcilab.views.setup_view import BOX_COLOR, SetupView, outside_runs
 from rcilab.views.viser_scene import ViserScene
 from rcilab.workbench import requests
-from rcilab.workbench.setting_up import ON_FLANGE
+from rcilab.workbench.setup.wanted import ON_FLANGE
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask
 

@@ -1,0 +1,1 @@
+"""The list of waypoints: drafting, checking, planning and storing it."""

@@ -1,0 +1,1 @@
+"""What happens on the robot: readiness, execution, pushes, recordings and their exports."""

@@ -1,0 +1,1 @@
+"""What the 3D scene draws, and what is done with the mouse in it."""
