@@ -34,6 +34,11 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
             file = super()._split_scope(nodeid)
             return "live" if is_live(file) else file
 
+        def _assign_work_unit(self, node: object) -> None:
+            if "live" in self.workqueue:  # The longest, and before its process is made nice.
+                self.workqueue.move_to_end("live", last=False)
+            super()._assign_work_unit(node)
+
     return OneLiveTestAtATime(config, log)
 
 
