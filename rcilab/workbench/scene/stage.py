@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rcilab.posing.planning import PATH_POINTS
 from rcilab.views.arm_view import ArmView
 from rcilab.views.viser_scene import ViserScene
 from rcilab.workbench import requests
-from rcilab.workbench.goal.planning import PATH_POINTS
 from rcilab.workbench.run.readiness import is_moving
 from rcilab.workbench.run.replay import replayed_pose
 from rcilab.workbench.scene.grip import Grip
@@ -21,8 +21,8 @@ from rcilab.workbench.widgets import Ask
 if TYPE_CHECKING:
     import viser
 
+    from rcilab.posing.planning import Plan
     from rcilab.supervisor import SupervisorStatus
-    from rcilab.workbench.goal.planning import Plan
     from rcilab.workbench.store import UiState
 
 TONE_COLORS = {"good": (38, 166, 91), "warn": (240, 150, 20), "bad": (214, 48, 38)}
