@@ -17,13 +17,6 @@ from rcilab.notebook.scene import Scene, View
 from rcilab.notebook.target_panel import TargetPanel
 from rcilab.notebook.timeline import Timeline
 
-    "idle": "good",
-    "moving": "good",
-    "stopping": "warn",
-    "starting": "warn",
-    "connecting": "warn",
-}
-
 
 class Lab(Part):
     """Everything in one cell; Stop is always in sight.

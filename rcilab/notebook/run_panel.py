@@ -209,8 +209,8 @@ class RunPanel(Part):
         if plan is None:
             write(self._plan, "")
         else:
-            tone, word = ("good", "check.passed") if plan.report.ok else ("bad", "check.failed")
-            write(self._plan, verdict(tone, text(word), text("plan.ready", duration=f"{plan.motion.duration:.3f}")))
+            told, word = ("good", "check.passed") if plan.report.ok else ("bad", "check.failed")
+            write(self._plan, verdict(told, text(word), text("plan.ready", duration=f"{plan.motion.duration:.3f}")))
         self._show_progress(status, is_moving)
         write(self._health, "" if status is None else self._tell_health(status))
 

@@ -110,12 +110,13 @@ def _beyond(frame: Frame, y, top: float) -> str:  # type: ignore[no-untyped-def]
     if not math.isfinite(frame.upper):
         return ""
     upper, lower, width = float(y(frame.upper)), float(y(frame.lower)), WIDTH - LEFT - RIGHT
-    return "".join(
-        f'<rect x="{LEFT:g}" y="{a:.1f}" width="{width:g}" height="{max(b - a, 0.0):.1f}" fill="{_SOFT}" opacity=".14"/>'
-        for a, b in ((top, upper), (lower, top + _PANEL))
-    ) + "".join(
-        f'<path d="M{LEFT:g},{edge:.1f}h{width:g}" stroke="{_SOFT}" stroke-dasharray="2 3"/>' for edge in (upper, lower)
-    )
+    out = ""
+    for a, b in ((top, upper), (lower, top + _PANEL)):
+        size = f'width="{width:g}" height="{max(b - a, 0.0):.1f}"'
+        out += f'<rect x="{LEFT:g}" y="{a:.1f}" {size} fill="{_SOFT}" opacity=".14"/>'
+    for edge in (upper, lower):
+        out += f'<path d="M{LEFT:g},{edge:.1f}h{width:g}" stroke="{_SOFT}" stroke-dasharray="2 3"/>'
+    return out
 
 
 def _span(left: float, right: float, top: float) -> str:
