@@ -87,7 +87,7 @@ class FaultPanel(Part):
         ]
         picture = draw(self._panels(rows), list(range(self.model.n)), text("plot.time"), text("legend.limit"))
         told = head(text("fault.recorder")) + soft(text("fault.record_of", cycles=len(rows)))
-        write(self._record, f'{told}<div class="rl-plot">{picture}</div>{table(heads, cells, right=True)}')
+        write(self._record, f"{told}{picture}{table(heads, cells, right=True)}")
 
     def _last_rows(self) -> NDArray[Any] | None:
         """Returns the last cycles of an execution that was not allowed to end; None where none was."""

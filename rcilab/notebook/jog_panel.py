@@ -84,11 +84,11 @@ class JogPanel(Part):
         pose = self.model.forward(self.state.goal)
         numbers = np.round(np.concatenate((1e3 * pose.position, np.degrees(pose.rpy))), 1) + 0.0  # No -0.0.
         names = [self.text(f"target.{name}") for name in ("x", "y", "z", "roll", "pitch", "yaw")]
-        units = ["mm"] * 3 + ["°"] * 3
-        cells = [f"{name} <b>{number:.1f}</b> {unit}" for name, number, unit in zip(names, numbers, units, strict=True)]
+        units = [" mm"] * 3 + ["°"] * 3
+        cells = [f"{name} <b>{number:.1f}</b>{unit}" for name, number, unit in zip(names, numbers, units, strict=True)]
         psi = self.state.arm_angle
         if psi is not None:
-            cells.append(f"{self.text('jog.arm_angle')} <b>{round(math.degrees(psi), 1) + 0.0:.1f}</b> °")
+            cells.append(f"{self.text('jog.arm_angle')} <b>{round(math.degrees(psi), 1) + 0.0:.1f}</b>°")
         elif self.model.n == 7:
             cells.append(self.text("jog.no_arm_angle"))
         return f'<p class="rl-soft rl-num">{self.text("jog.tool")}: {", ".join(cells)}</p>'
@@ -129,19 +129,23 @@ class JogPanel(Part):
 
     def _slider(self, joint: int, low: float, high: float, continuous: bool) -> Any:
         return ipywidgets.FloatSlider(
-            description=self.text("jog.joint", joint=joint + 1),
+            tooltip=self.text("jog.joint", joint=joint + 1),
             min=low,
             max=high,
             step=_STEP_DEG,
             readout=False,
             continuous_update=continuous,
-            style={"description_width": "4.2em"},
             layout=ipywidgets.Layout(flex="1 1 auto", width="auto", min_width="150px"),
         )
 
     def _row(self, slider: Any, field: NumberField) -> Any:
         """Returns the slider between its limits, which is where a hand looks for them, and the number."""
-        field.box.tooltip = f"{slider.description}: {field.box.tooltip}"
-        side = {"width": "3em", "display": "flex", "justify_content": "center"}
-        ends = [ipywidgets.Label(f"{end:.0f}°", layout=ipywidgets.Layout(**side)) for end in (slider.min, slider.max)]
-        return ipywidgets.HBox([slider, *ends, field.row], layout=ipywidgets.Layout(align_items="center"))
+        name = slider.tooltip
+        field.box.tooltip = f"{name}: {field.box.tooltip}"
+        low, high = (_label(f"{end:.0f}°", "3.2em") for end in (slider.min, slider.max))
+        row = [_label(name, "4.4em"), low, slider, high, field.row]
+        return ipywidgets.HBox(row, layout=ipywidgets.Layout(align_items="center"))
+
+
+def _label(said: str, width: str) -> Any:
+    return ipywidgets.Label(said, layout=ipywidgets.Layout(width=width, display="flex", justify_content="center"))

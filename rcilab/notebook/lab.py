@@ -1,4 +1,4 @@
-"""JupyterLab on the lessons, on this machine only: it asks the network for nothing and opens with nothing in the way."""
+"""JupyterLab on the lessons, on this machine only: it asks the network for nothing, and nothing pops up."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ class Lab(Part):
         subject: object,
         *,
         view: View = "auto",
-        height: int = 460,
+        height: int = 440,
         language: str = "en",
         place: Place | None = None,
     ) -> None:
@@ -65,7 +65,7 @@ class Lab(Part):
         self.tabs = ipywidgets.Tab(
             children=[part.widget for part in panels.values()],
             titles=[text(f"tab.{name}") for name in panels],
-            layout=ipywidgets.Layout(flex="1 1 430px", min_width="410px"),
+            layout=ipywidgets.Layout(flex="1 1 410px", min_width="400px"),
         )
         self.stop = ipywidgets.Button(
             description=text("run.stop"), tooltip=text("run.stop_hint"), button_style="danger", icon="stop",
@@ -76,7 +76,7 @@ class Lab(Part):
         self._title = block(flex="1 1 auto")
         bar = ipywidgets.HBox([self._title, self.stop], layout=ipywidgets.Layout(align_items="center"))
         left = ipywidgets.VBox(
-            [self.scene.widget, self.timeline.widget], layout=ipywidgets.Layout(flex="1.25 1 430px", min_width="380px")
+            [self.scene.widget, self.timeline.widget], layout=ipywidgets.Layout(flex="1.4 1 360px", min_width="350px")
         )
         body = ipywidgets.HBox([left, self.tabs], layout=ipywidgets.Layout(flex_flow="row wrap", grid_gap="10px"))
         self.build([bar, body, self.plot.widget], width="100%")

@@ -10,7 +10,7 @@ import numpy as np
 from rcilab.clock import CYCLE_TIME
 from rcilab.notebook.look import block, soft, write
 from rcilab.notebook.part import Part
-from rcilab.notebook.svg_plot import WIDTH, Panel, draw, x_of
+from rcilab.notebook.svg_plot import Panel, draw, share_of
 from rcilab.recording.run import Run
 from rcilab.views.plots import (
     QUANTITIES,
@@ -60,19 +60,19 @@ class MotionPlot(Part):
         self._kinds = block()
         self._curves, self._cursor = block(), block()
         self._end = 1.0
-        plot = ipywidgets.VBox([self._curves, self._cursor])
-        plot.add_class("rl-plot")
-        self.build([ipywidgets.HBox([self.joint, self._kinds]), plot], width="100%")
+        self._name = f"rl-plot-{id(self)}"
+        bar = ipywidgets.HBox([self.joint, self._kinds], layout=ipywidgets.Layout(align_items="center"))
+        self.build([bar, self._curves, self._cursor], width="100%")
+        self._root.add_class(self._name)
         self.joint.observe(lambda _: self._draw(), names="value")
         self._ends.append(self.state.hear("run", self._draw))
         self.hear("plan", self._draw)
         self.hear("moment", self._point)
 
     @property
-    def svg(self) -> str:
-        """The picture as it is shown, to be saved or embedded; empty while there is nothing to show."""
-        text: str = self._curves.value
-        return text[text.find("<svg") : text.rfind("</svg>") + 6] if "<svg" in text else ""
+    def html(self) -> str:
+        """The pictures as they are shown, SVG with a legend; a sentence while there is nothing to show."""
+        return str(self._curves.value)
 
     def _draw(self) -> None:
         state = self.state
@@ -115,6 +115,5 @@ class MotionPlot(Part):
         if moment is None or self.state.plan is None:
             write(self._cursor, "")
             return
-        share = 100.0 * x_of(moment, self._end) / WIDTH
-        side = " rl-late" if share > 85.0 else ""
-        write(self._cursor, f'<div class="rl-cursor{side}" style="left:{share:.2f}%"><b>{moment:.3f} s</b></div>')
+        place = f"display:block;left:{100.0 * share_of(moment, self._end):.2f}%"
+        write(self._cursor, f"<style>.{self._name} .rl-cursor{{{place}}}</style>")

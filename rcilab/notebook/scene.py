@@ -26,6 +26,7 @@ VIEWS: tuple[View, ...] = ("auto", "meshcat", "viser", "static")
 
 _REACHED: Color = (70, 190, 130)
 _REFUSED: Color = (230, 80, 70)
+_ZOOM = 1.35
 _SAME_POSE = 1e-4  # [rad] Closer than this a ghost would only flicker in the arm.
 
 
@@ -67,7 +68,7 @@ class Scene(Part):
         self._frame, self._note = block(), block()
         self._picture: _LivePicture | None = None
         self._film: Preview | None = None
-        self.build([self._frame, self._note], flex="1 1 auto", min_width="300px")
+        self.build([self._frame, self._note], flex="0 0 auto", min_width="300px")
         if self.is_live:
             self._picture = _LivePicture(self, "viser" if view == "viser" else "meshcat")
             self._write_frame(f'src="{place.address(self._picture.url)}"')
@@ -170,7 +171,8 @@ class _LivePicture:
 
             self._meshcat = MeshcatScene()
         aim_camera(self._meshcat.visualizer)
-        self.url: str = self._meshcat.url
+        self._meshcat.visualizer["/Cameras/default/rotated/<object>"].set_property("zoom", _ZOOM)
+        self.url: str = self._meshcat.url + "?plain"
         return self._meshcat
 
     def _open_viser(self) -> Canvas:

@@ -9,6 +9,7 @@ import ipywidgets
 import numpy as np
 
 from rcilab.errors import KinematicsError
+from rcilab.kinematics.solutions import Solutions
 from rcilab.notebook.arc_circle import draw_circle
 from rcilab.notebook.look import block, head, soft, verdict, write
 from rcilab.notebook.number_field import NumberField
@@ -44,6 +45,7 @@ class TargetPanel(Part):
             description=text("target.branch"), tooltip=text("target.branch_hint"),
             layout=ipywidgets.Layout(width="22em"), style={"description_width": "8em"},
         )  # fmt: skip
+        self._solutions: Solutions | None = None
         self.branches.observe(self._on_branch, names="value")
         pairs = [
             ipywidgets.VBox(
@@ -102,7 +104,7 @@ class TargetPanel(Part):
             self._turn(change["new"])
 
     def _on_branch(self, change: Any) -> None:
-        solutions = self.state.reach.solutions
+        solutions = self._solutions
         if not self._writing and change["new"] is not None and solutions is not None:
             self.state.aim(self.state.target, near=solutions[change["new"]])
 
@@ -138,9 +140,19 @@ class TargetPanel(Part):
             return
         write(self._circle, draw_circle(arcs, psi, self.text))
 
+    def _solve(self) -> Solutions | None:
+        """Returns the branches at the goal, also where it was posed joint by joint; None out of reach."""
+        state = self.state
+        if state.reach.solutions is not None or state.reach.tone == "bad":
+            return state.reach.solutions
+        try:
+            return self.model.inverse(state.target, state.arm_angle, state.goal)
+        except KinematicsError:
+            return None
+
     def _show_branches(self) -> None:
         state, text = self.state, self.text
-        solutions = state.reach.solutions
+        solutions = self._solutions = self._solve()
         if solutions is None or not len(solutions):
             self.branches.layout.display = "none"
             code = "target.out_of_reach" if state.reach.tone == "bad" else "target.no_branches"

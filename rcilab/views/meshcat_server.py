@@ -20,7 +20,10 @@ from rcilab.errors import ConnectionLostError, DeadlineError
 
 _HOST = "127.0.0.1"
 _CONNECT = "viewer.connect();"
-_CONNECT_BESIDE = 'viewer.connect(new URL("../", location.href).href.replace(/^http/, "ws"));'
+_CONNECT_BESIDE = """viewer.connect(new URL("../", location.href.split("?")[0]).href.replace(/^http/, "ws"));
+if (location.search === "?plain") {
+  document.head.insertAdjacentHTML("beforeend", "<style>.dg { display: none }</style>");
+}"""
 _PATIENCE = 10.0  # [s] for the thread to answer; it does so in milliseconds
 
 
@@ -156,7 +159,7 @@ def _build_bridge() -> Any:
 
 
 def _front_page(zmqserver: Any) -> str:
-    """Returns meshcat's page with the websocket looked for one folder up."""
+    """Returns meshcat's page with the websocket looked for one folder up; with ?plain without meshcat's own menu."""
     page = (Path(zmqserver.VIEWER_ROOT) / zmqserver.VIEWER_HTML).read_text(encoding="utf-8")
     assert _CONNECT in page, "meshcat has another page; look how it connects"
     return page.replace(_CONNECT, _CONNECT_BESIDE)
