@@ -12,7 +12,7 @@ import pytest
 
 import rcilab
 from rcilab.notebook import FaultPanel, JogPanel, RunPanel
-from rcilab.notebook.robot_side import Outcome, SupervisedRobot
+from rcilab.notebook.robot_side import Outcome
 
 PRO7 = rcilab.load_model("xMatePro7")
 
@@ -158,10 +158,3 @@ def test_an_address_that_is_none_is_refused_beside_the_button() -> None:
         panel.connect.click()
         assert "rl-problem" in panel._outcome.value
         assert panel.state.robot is None
-
-
-def test_a_supervised_robot_may_be_closed_while_it_starts() -> None:
-    robot = SupervisedRobot(PRO7)
-    assert robot.status().phase in ("starting", "connecting", "idle")
-    robot.close()
-    assert robot.status().phase == "closed"
