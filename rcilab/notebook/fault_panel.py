@@ -32,7 +32,7 @@ class FaultPanel(Part):
         text = self.text
         self._now, self._told, self._record = block(), block(), block()
         self._set: tuple[Fault, ...] | None = None
-        self.fault = ipywidgets.Dropdown(
+        self.fault: Any = ipywidgets.Dropdown(
             description=text("fault.which"), options=[(fault.manual_name, fault) for fault in Fault],
             layout=ipywidgets.Layout(width="100%", max_width="40em"),
         )  # fmt: skip

@@ -51,7 +51,7 @@ class MotionPlot(Part):
         super().__init__(subject, language)
         self._quantities = quantities
         names = [self.text("timeline.all"), *(self.text("jog.joint", joint=j + 1) for j in range(self.model.n))]
-        self.joint = ipywidgets.Dropdown(
+        self.joint: Any = ipywidgets.Dropdown(
             description=self.text("timeline.joint"),
             options=[(name, number) for number, name in enumerate(names)],
             value=joint,

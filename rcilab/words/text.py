@@ -40,7 +40,7 @@ class Text:
     """
 
     def __init__(self, language: str, package: str) -> None:
-        self.language = require_language(language)
+        self.language: Language = require_language(language)
         self._entries = load_face(package, self.language)
 
     def __call__(self, code: str, **values: object) -> str:
