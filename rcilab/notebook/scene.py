@@ -84,6 +84,11 @@ class Scene(Part):
         """Address of the live scene on loopback; None when it is a film."""
         return None if self._picture is None else self._picture.url
 
+    def flush(self) -> None:
+        """Returns once everything that was drawn has been sent to every open page; meshcat only, else at once."""
+        if self._picture is not None:
+            self._picture.flush()
+
     def save(self, file: str) -> None:
         """Writes the scene as one HTML page that needs neither kernel nor network: the plan as a film, or the pose."""
         self._make_film().save(file)
@@ -147,6 +152,11 @@ class _LivePicture:
         self._path = plan
         if plan is not None:
             self._canvas.add_polyline("/path", plan.path, color=effort_colors(plan.effort))
+
+    def flush(self) -> None:
+        """Waits for meshcat's server."""
+        if self._meshcat is not None:
+            self._meshcat.flush()
 
     def close(self) -> None:
         """Stops serving."""

@@ -61,6 +61,10 @@ class MeshcatServer:
         """Returns the whole scene as one HTML page that needs no server."""
         return self._ask(self._bridge.scene_html)
 
+    def flush(self) -> None:
+        """Returns once every command so far has been passed on."""
+        self._ask(lambda: "")
+
     def close(self) -> None:
         """Stops serving; open pages keep what they show. Calling it again does nothing."""
         if self._thread.is_alive():
