@@ -13,9 +13,9 @@ import numpy as np
 
 from rcilab.arrays import JointVector
 from rcilab.model import RobotModel
+from rcilab.posing.planning import Plan, PlannableLaw
+from rcilab.posing.reach import Reach, Tone
 from rcilab.spatial import Pose
-from rcilab.workbench.goal.planning import Plan, PlannableLaw
-from rcilab.workbench.goal.reach import Reach, Tone
 from rcilab.workbench.jog.jogging import JogState
 from rcilab.workbench.lease import Lease
 from rcilab.workbench.program.draft import ProgramState

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rcilab.posing.reach import NEAR_LIMIT
 from rcilab.workbench import requests
-from rcilab.workbench.goal.reach import NEAR_LIMIT
 from rcilab.workbench.jog.jogging import FASTEST_JOINT, FASTEST_TOOL, FASTEST_TURN, STEPS, no_jog
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, Html, Linked, NumberField, esc, on_press, shown

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rcilab.posing.planning import LAWS
+from rcilab.posing.reach import margin
 from rcilab.workbench import requests
 from rcilab.workbench.goal.actions import POSE_FIELDS
-from rcilab.workbench.goal.planning import LAWS
-from rcilab.workbench.goal.reach import margin
 from rcilab.workbench.panels.jog import problems_html, reach_html
 from rcilab.workbench.setup.wanted import name_parts
 from rcilab.workbench.text import Text

@@ -13,10 +13,10 @@ from rcilab.arrays import JointVector, frozen
 from rcilab.errors import InvalidValueError, PlanningError, RcilabError, VersionMismatchError
 from rcilab.motion.program import Program, Waypoint
 from rcilab.motion.program_file import read_program
+from rcilab.posing.planning import Plan
+from rcilab.words.number import parse_number
 from rcilab.workbench import requests
 from rcilab.workbench.goal.actions import GoalActions
-from rcilab.workbench.goal.planning import Plan
-from rcilab.workbench.parse import parse_number
 from rcilab.workbench.program.draft import (
     MOST_ROUNDS,
     TYPES,

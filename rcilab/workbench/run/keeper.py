@@ -16,8 +16,8 @@ from rcilab.workbench.store import Recording, Store
 from rcilab.workbench.text import message
 
 if TYPE_CHECKING:
+    from rcilab.posing.planning import Plan
     from rcilab.recording.run_file import RunFile
-    from rcilab.workbench.goal.planning import Plan
     from rcilab.workbench.store import UiState
 
 

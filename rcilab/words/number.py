@@ -9,7 +9,7 @@ import math
 import re
 from dataclasses import dataclass
 
-from rcilab.workbench.text import Message, message
+from rcilab.words.text import Message, message
 
 _TWO_WAYS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
 """A comma that is a decimal comma to some and groups thousands for others, such as 1,000."""

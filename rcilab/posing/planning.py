@@ -13,7 +13,7 @@ from rcilab.clock import CYCLE_TIME
 from rcilab.errors import RcilabError
 from rcilab.model import RobotModel
 from rcilab.safety_box import SafetyBox, active_box
-from rcilab.workbench.text import Message, message
+from rcilab.words.text import Message, message
 
 if TYPE_CHECKING:
     from rcilab.conformance import Report
