@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-import math
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rcilab.arrays import Array, JointVector
+from rcilab.arrays import Array
 from rcilab.clock import CYCLE_TIME
 from rcilab.conformance.clearance_conditions import clearance_conditions
 from rcilab.conformance.condition import Condition
 from rcilab.conformance.conditions import START_POSITION_TOLERANCE
+from rcilab.conformance.rest import beyond_a_cycle
 from rcilab.conformance.start import StartState
 from rcilab.conformance.tool_signals import ToolSignals
 from rcilab.model import RobotModel
-from rcilab.motion.motion import Motion, MotionSample
+from rcilab.motion.motion import Motion
 from rcilab.safety_box import SafetyBox
 from rcilab.safety_distance import SafetyDistance
 from rcilab.state import Mode
@@ -70,10 +70,8 @@ class MotionSignals:
         if condition.stage == "throughout":
             return self._throughout(condition), 0.0
         if condition.stage == "end":
-            return self._rest(condition, self._motion.end()), self._motion.duration
-        if condition.order == 0:
-            return self._at_start(condition)[np.newaxis], 0.0
-        return self._rest(condition, self._motion.at(0.0)), 0.0
+            return self._rest(condition), self._motion.duration
+        return self._at_start(condition)[np.newaxis] if condition.order == 0 else self._rest(condition), 0.0
 
     def links(self, condition: Condition, row: int) -> LinkPair | None:
         """Returns between whom the distance in a row of a table is; None for anything that is no distance."""
@@ -145,24 +143,11 @@ class MotionSignals:
         before = tau[:, :1] if self._start.moving else np.zeros_like(tau[:, :1])
         return tau.T, (np.diff(np.concatenate((before, tau), axis=1)) / CYCLE_TIME).T
 
-    def _rest(self, condition: Condition, sample: MotionSample) -> Array:
-        """Returns velocity or acceleration at an end of the motion, shape (1, n), or its norm for the tool, (1, 1).
-
-        Rows that somebody else made tell rest from motion only as far as one cycle at the jerk limit goes.
-        """
-        dq, ddq = self._resolved(sample.dq, 1), self._resolved(sample.ddq, 2)
-        if condition.is_per_joint:
-            return (dq if condition.order == 1 else ddq)[np.newaxis]
-        model, q = self._model, sample.q
-        moved = model.velocity(q, dq) if condition.order == 1 else model.acceleration(q, dq, ddq)
-        part = moved[:3] if condition.signal == "translation" else moved[3:]
-        return np.array([[math.sqrt(float(part @ part))]])
-
-    def _resolved(self, value: JointVector, order: int) -> JointVector:
-        if self._motion.law != "samples":
-            return value
-        unresolved = self._model.limits.joint.jerk * CYCLE_TIME ** (3 - order)
-        return np.sign(value) * np.maximum(np.abs(value) - unresolved, 0.0)
+    def _rest(self, condition: Condition) -> Array:
+        """Returns what is left of velocity or acceleration at an end of the motion, shape (1, n) or (1, 1)."""
+        values = self._throughout(condition)
+        row = min(len(self._motion), len(values)) - 1 if condition.stage == "end" else condition.order
+        return beyond_a_cycle(values[row : row + 1], condition, self._model.limits)
 
 
 def _eventful_rows(jerk: Array, smooth: Array) -> NDArray[np.intp]:

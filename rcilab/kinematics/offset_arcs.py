@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from rcilab.arrays import Array
 from rcilab.kinematics.feasible_arcs import Arc, FeasibleArcs, Reason
 from rcilab.kinematics.offset_arm import ELBOW, OffsetGeometry, SelfMotion, wrapped
+from rcilab.kinematics.offset_settle import settle
 from rcilab.spatial import Pose
 
 _CUTS = 8  # Into how many a piece is cut at once; a choice.
@@ -39,7 +40,7 @@ def feasible_offset_arcs(
     Raises:
         UnreachableError: The pose is out of reach at every arm angle.
     """
-    starts, ends, codes = _pieces(arm, SelfMotion(arm, T_base_flange, None), lower, upper)
+    starts, ends, codes = _pieces(arm, T_base_flange, lower, upper)
     low = np.round(np.minimum(starts, ends) / _GRID) * _GRID
     high = np.round(np.maximum(starts, ends) / _GRID) * _GRID
     turns = tau * np.floor((low + pi) / tau)
@@ -65,9 +66,10 @@ def feasible_offset_arcs(
 
 
 def _pieces(
-    arm: OffsetGeometry, motion: SelfMotion, lower: Array, upper: Array
+    arm: OffsetGeometry, T_base_flange: Pose, lower: Array, upper: Array
 ) -> tuple[Array, Array, NDArray[np.int64]]:
     """Returns arm angles at the ends of pieces, and in each which joints are beyond their limits, as bits."""
+    motion, R, p = SelfMotion(arm, T_base_flange), T_base_flange.rotation, T_base_flange.position
     middles = np.array(arm.middles)
     bits = 1 << np.arange(7)
 
@@ -85,7 +87,9 @@ def _pieces(
         done.append((starts[~cut, ELBOW], ends[~cut, ELBOW], before[~cut]))
         shares = np.linspace(0.0, 1.0, _CUTS + 1)[:, None, None]
         between = (starts[cut] + shares * (ends - starts)[cut]).reshape(-1, 7)
-        found, settled = motion.settle(between)
+        found, settled = settle(
+            arm, np.broadcast_to(R, (len(between), 3, 3)), np.broadcast_to(p, (len(between), 3)), between
+        )
         whole = found.reshape(_CUTS + 1, -1, 7)
         good = (settled & (np.abs(found - between).max(axis=1) < 2.0 * _LONG)).reshape(_CUTS + 1, -1)
         both = good[:-1] & good[1:]
