@@ -39,7 +39,7 @@ _CELL = tau / _GRID
 _NEWTON = 6  # Steps, each of which halves the range of a root if Newton's method leaves it.
 _ROUNDING = 1e-13  # How far a polynomial may miss zero, by the sum of its coefficients, where two roots meet.
 _STEP = 1e-5  # [rad] Of joint 7, by which derivatives are formed.
-_NEAR = 0.05  # [rad] How far from psi joint 3 of a solution may be before it is settled.
+_NEAR, _FAR = 1e-4, 0.05  # [rad] How far from psi joint 3 may be at a root: every branch, and the nearest one.
 _SMALL = 1e-8  # [rad] What a joint may still have to turn so that a straight line is exact to rounding.
 _SAME = 1e-6  # [rad] Solutions that differ by less are one.
 _COLUMNS = 8  # At least, as many as the other arms have branches.
@@ -264,8 +264,9 @@ def _joint_angles(
     miss = wrapped(2.0 * (table[..., ELBOW] - psi)) / 2.0  # The twin is half a turn away.
     with np.errstate(invalid="ignore", divide="ignore"):
         rate = wrapped(table[:, 1, :, ELBOW] - table[:, 0, :, ELBOW]) / _STEP
-        step = np.clip(-miss[:, 0] / rate, -_NEAR, _NEAR)
-        branch, root = np.nonzero(np.abs(miss[:, 0]) < _NEAR)
+        step = np.clip(-miss[:, 0] / rate, -_FAR, _FAR)
+    size = np.nan_to_num(np.abs(miss[:, 0]), nan=pi)
+    branch, root = np.nonzero((size < _NEAR) | ((size == size.min(axis=0)) & (size < _FAR)))
     step = np.nan_to_num(step[branch, root])
     R, p, wanted = rotations[root], positions[root], psi[root]
     q = trace(arm, R, p, q7[root] + step)[0].reshape(4, len(root), 7)[branch, np.arange(len(root))]
@@ -290,11 +291,9 @@ def _joint_angles(
 
 
 def _are_new(rows: NDArray[np.intp], q: Array) -> NDArray[np.bool_]:
-    """Returns which solutions are no repetition of an earlier one at the same pose; both sorted by pose."""
+    """Returns which solutions are no repetition of one of the two before; sorted by pose and joint angles."""
     is_new = np.ones(len(rows), dtype=np.bool_)
-    for shift in range(1, 2 * DEGREE):
+    for shift in (1, 2):
         same = rows[shift:] == rows[:-shift]
-        if not same.any():
-            break
         is_new[shift:] &= ~(same & (np.abs(wrapped(q[shift:] - q[:-shift])).max(axis=1) < _SAME))
     return is_new
