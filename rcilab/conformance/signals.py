@@ -30,7 +30,8 @@ HOLD_SAMPLES = 3
 """Cycles judged after the last row, in which the controller repeats it: a third difference looks back that far."""
 
 _SMOOTH_JERK = 0.01
-"""Part of the jerk limits below which torques change smoothly. A choice: a tenth of what the torque rate allows."""
+"""Part of the jerk limits below which torques change smoothly, at speeds within the limits. A choice: a tenth of what
+the torque rate allows."""
 _SMOOTH_STEP = 16
 """[cycles] How far apart torques are computed where they change smoothly; straight lines between them. A choice."""
 
@@ -133,8 +134,9 @@ class MotionSignals:
     def _torques(self) -> tuple[Array, Array]:
         """Torques without gravity and their backward differences over a cycle, each of shape (N + 3, n)."""
         q, dq, ddq, jerk = self._differences
-        smooth = 0.0 if self._mode == "torque" else _SMOOTH_JERK
-        rows = _eventful_rows(jerk, smooth * self._model.limits.joint.jerk)
+        joint, smooth = self._model.limits.joint, 0.0 if self._mode == "torque" else _SMOOTH_JERK
+        is_eventful = (np.abs(jerk) > smooth * joint.jerk) | (np.abs(dq) > joint.velocity)
+        rows = _eventful_rows(np.asarray(is_eventful.any(axis=1), dtype=np.bool_))
         known = np.ascontiguousarray(self._model.rigid_body.motion_torques(q[rows], dq[rows], ddq[rows]).T)
         every = np.arange(len(q))
         tau = np.empty(q.T.shape)
@@ -150,11 +152,10 @@ class MotionSignals:
         return beyond_a_cycle(values[row : row + 1], condition, self._model.limits)
 
 
-def _eventful_rows(jerk: Array, smooth: Array) -> NDArray[np.intp]:
-    """Returns the rows between which torques run straight: all on either side of a jerk, and some in between."""
-    jerks: NDArray[np.bool_] = np.asarray((np.abs(jerk) > smooth).any(axis=1))
-    chosen = jerks.copy()
-    chosen[:-1] |= jerks[1:]
+def _eventful_rows(is_eventful: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Returns the rows between which torques run straight: all on either side of an event, and some in between."""
+    chosen = is_eventful.copy()
+    chosen[:-1] |= is_eventful[1:]
     chosen[::_SMOOTH_STEP] = True
     chosen[-1] = True
     return np.flatnonzero(chosen)
