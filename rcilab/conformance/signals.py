@@ -36,6 +36,10 @@ _SMOOTH_STEP = 16
 """[cycles] How far apart torques are computed where they change smoothly; straight lines between them. A choice."""
 
 
+_SURE = 0.8
+"""Part of a bound on torques up to which straight lines leave no doubt; rows beyond are computed. A choice."""
+
+
 class MotionSignals:
     """One motion's signals, each a table with a row a cycle.
 
@@ -133,10 +137,19 @@ class MotionSignals:
     @cached_property
     def _torques(self) -> tuple[Array, Array]:
         """Torques without gravity and their backward differences over a cycle, each of shape (N + 3, n)."""
-        q, dq, ddq, jerk = self._differences
+        _, dq, _, jerk = self._differences
         joint, smooth = self._model.limits.joint, 0.0 if self._mode == "torque" else _SMOOTH_JERK
         is_eventful = (np.abs(jerk) > smooth * joint.jerk) | (np.abs(dq) > joint.velocity)
-        rows = _eventful_rows(np.asarray(is_eventful.any(axis=1), dtype=np.bool_))
+        chosen = _eventful_rows(np.asarray(is_eventful.any(axis=1), dtype=np.bool_))
+        tau, rate = self._torques_at(chosen)
+        is_near = (np.abs(tau) > _SURE * joint.torque) | (np.abs(rate) > _SURE * joint.torque_rate)
+        more = chosen | _with_rows_before(np.asarray(is_near.any(axis=1), dtype=np.bool_))
+        return (tau, rate) if (more == chosen).all() else self._torques_at(more)
+
+    def _torques_at(self, chosen: NDArray[np.bool_]) -> tuple[Array, Array]:
+        """Returns torques computed in some rows, straight lines between them, and their differences over a cycle."""
+        q, dq, ddq, _ = self._differences
+        rows = np.flatnonzero(chosen)
         known = np.ascontiguousarray(self._model.rigid_body.motion_torques(q[rows], dq[rows], ddq[rows]).T)
         every = np.arange(len(q))
         tau = np.empty(q.T.shape)
@@ -152,13 +165,18 @@ class MotionSignals:
         return beyond_a_cycle(values[row : row + 1], condition, self._model.limits)
 
 
-def _eventful_rows(is_eventful: NDArray[np.bool_]) -> NDArray[np.intp]:
+def _eventful_rows(is_eventful: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Returns the rows between which torques run straight: all on either side of an event, and some in between."""
-    chosen = is_eventful.copy()
-    chosen[:-1] |= is_eventful[1:]
+    chosen = _with_rows_before(is_eventful)
     chosen[::_SMOOTH_STEP] = True
     chosen[-1] = True
-    return np.flatnonzero(chosen)
+    return chosen
+
+
+def _with_rows_before(rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    found = rows.copy()
+    found[:-1] |= rows[1:]
+    return found
 
 
 def _backward_differences(q: Array, start: StartState) -> tuple[Array, Array, Array, Array]:

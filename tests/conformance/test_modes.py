@@ -29,8 +29,6 @@ MODEL, PANDA = MODELS["xMatePro7"], MODELS["Panda"]
 NEAR = 1e-4
 """Share of a range around a bound in which check and monitor may disagree: a third difference over 1 ms makes 1e-3
 rad/s^3 of the 1e-12 rad to which the inverse is settled."""
-NEAR_TORQUE = 2e-3
-"""The same for the torques of a motion, between whose eventful rows `check` draws straight lines."""
 names = st.sampled_from(sorted(MODELS))
 seeds = st.integers(0, 2**32)
 
@@ -94,8 +92,7 @@ def expected(model: RobotModel, rows: Array, mode: Mode, start: StartState | Arr
         values, _ = signals.table(row)
         lower, upper = row.bounds(model.limits)
         width = np.where(np.isfinite(lower) & np.isfinite(upper), upper - lower, 1e-3)
-        hair = NEAR_TORQUE if row.id.startswith("joint.torque") else NEAR
-        close = np.minimum(np.abs(values - lower), np.abs(values - upper)) < hair * width
+        close = np.minimum(np.abs(values - lower), np.abs(values - upper)) < NEAR * width
         places = (np.argwhere(mask).tolist() for mask in (~((lower < values) & (values < upper)), close))
         # A velocity at the start is judged with the second command, an acceleration with the third.
         first = {"throughout": 0, "start": row.order, "end": len(rows) - 1}[row.stage]
