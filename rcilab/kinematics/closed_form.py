@@ -21,6 +21,7 @@ from rcilab.kinematics.offset_arcs import feasible_offset_arcs
 from rcilab.kinematics.offset_arm import ELBOW, OffsetGeometry, build_offset_geometry
 from rcilab.kinematics.offset_branch import follow_offset_branch
 from rcilab.kinematics.offset_settle import settle_beside
+from rcilab.kinematics.offset_singularity import held_singularity, held_singularity_path
 from rcilab.kinematics.singularity import find_singularity, singularity_path
 from rcilab.robots.description import RobotDescription
 from rcilab.spatial import Pose
@@ -215,12 +216,12 @@ class OffsetSeven:
         return q[:, ELBOW]
 
     def singularity_path(self, q: JointPath) -> Array:
-        """Returns zeros: at a given angle of joint 3 its maker refuses no pose for being singular."""
-        return np.zeros(len(q))
+        """Returns how near the arm is along a path to where joint 3, held, no longer decides the other joints."""
+        return held_singularity_path(self.geometry, q)
 
     def is_singular(self, q: Sequence[float]) -> bool:
-        """Returns False, as above."""
-        return False
+        """Returns whether the arm counts as there."""
+        return held_singularity(self.geometry, q) >= 1.0
 
     def batch(self, T_base_flange: Array, psi: Array) -> Array:
         """Returns the solutions at N poses, shape (N, M, 7)."""

@@ -42,6 +42,7 @@ _STEP = 1e-5  # [rad] Of joint 7, by which derivatives are formed.
 _NEAR, _FAR = 1e-4, 0.05  # [rad] How far from psi joint 3 may be at a root: every branch, and the nearest one.
 _SMALL = 1e-8  # [rad] What a joint may still have to turn so that a straight line is exact to rounding.
 _SAME = 1e-6  # [rad] Solutions that differ by less are one.
+_SPREAD = 64  # Solutions to take where there are endlessly many; a choice.
 _COLUMNS = 8  # At least, as many as the other arms have branches.
 _BLOCK = 512  # Poses worked on together, so that intermediate arrays stay in the cache; a choice.
 
@@ -92,8 +93,24 @@ def inverse_held(
         first = wrapped(np.array(beside) - middles) + middles
         q = np.concatenate((first[None], q[np.abs(wrapped(q - first)).max(axis=1) >= _SAME]))
     if not len(q):
-        SelfMotion(arm, T_base_flange)  # It refuses what is out of reach.
+        q = _without_a_crossing(arm, T_base_flange, psi)
     return [tuple(row) for row in q.tolist()]
+
+
+def _without_a_crossing(arm: OffsetGeometry, T_base_flange: Pose, psi: float) -> Array:
+    """Returns some solutions of a pose at which joint 3 stays as it is all along, as on an axis of symmetry.
+
+    Raises:
+        UnreachableError: The pose is out of reach at every angle of joint 3.
+    """
+    guesses = SelfMotion(arm, T_base_flange).starts
+    guesses = guesses[np.abs(wrapped(guesses[:, ELBOW] - psi)) < _SAME]
+    guesses = guesses[:: 1 + len(guesses) // _SPREAD]
+    guesses[:, ELBOW] = psi
+    count, middles = len(guesses), np.array(arm.middles)
+    rotations = np.broadcast_to(T_base_flange.rotation, (count, 3, 3))
+    q, good = settle(arm, rotations, np.broadcast_to(T_base_flange.position, (count, 3)), guesses)
+    return wrapped(q[good] - middles) + middles
 
 
 def inverse_held_batch(arm: OffsetGeometry, T_base_flange: Array, psi: Array) -> Array:
