@@ -47,6 +47,7 @@ _COLUMNS = 8  # At least, as many as the other arms have branches.
 _BLOCK = 512  # Poses worked on together, so that intermediate arrays stay in the cache; a choice.
 
 _HARMONICS = np.arange(DEGREE + 1)
+_ANGLES: Array = np.arange(_NODES, dtype=np.float64) * (tau / _NODES)
 
 
 def solve_held(arm: OffsetGeometry, rotations: Array, positions: Array, psi: Array) -> tuple[NDArray[np.intp], Array]:
@@ -147,7 +148,7 @@ def harmonics(arm: OffsetGeometry, rotations: Array, positions: Array, psi: Arra
 
     Its value at an angle t is the real part of the sum of c_k exp(i k t). Arguments as of `solve_held`.
     """
-    values = polynomial(arm, rotations, positions, psi, np.arange(_NODES) * (tau / _NODES))
+    values = polynomial(arm, rotations, positions, psi, _ANGLES)
     found = np.fft.rfft(values, axis=1)[:, : DEGREE + 1] * (2.0 / _NODES)
     found[:, 0] *= 0.5
     return found
@@ -209,14 +210,16 @@ def _roots(c: NDArray[np.complex128]) -> tuple[NDArray[np.intp], Array]:
     sizes = np.abs(table[0])
     flat, places = np.nonzero(np.maximum(sizes[:, 1:], sizes[:, :-1]) < _FLAT * np.abs(c).sum(axis=1, keepdims=True))
     if len(flat):
-        starts, fine = places * _CELL, _CELL / _FINER
+        starts: Array = places.astype(np.float64) * _CELL
+        fine = _CELL / _FINER
         t = starts[:, None] + fine * np.arange(_FINER + 1)
         again = np.stack(_evaluated(np.repeat(c[flat], _FINER + 1, axis=0), t.ravel())).reshape(2, *t.shape)
-        more = _steps(c, flat, starts, fine, again)
+        more_rows, more_low, more_high = _steps(c, flat, starts, fine, again)
         is_flat = np.zeros(sizes[:, 1:].shape, dtype=np.bool_)
         is_flat[flat, places] = True
         left = ~is_flat[rows, np.minimum((low / _CELL + 1e-6).astype(np.intp), _GRID - 1)]
-        rows, low, high = (np.concatenate((a[left], b)) for a, b in zip((rows, low, high), more, strict=True))
+        rows = np.concatenate((rows[left], more_rows))
+        low, high = np.concatenate((low[left], more_low)), np.concatenate((high[left], more_high))
     return rows, _settled(c[rows], low, high)
 
 
