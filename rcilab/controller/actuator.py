@@ -114,15 +114,14 @@ class Actuator:
     ) -> JointVector:
         model, settings = self._model, self._settings
         if law is Law.JOINT_IMPEDANCE:
-            q, dq, ddq = commanded.q, commanded.dq, commanded.ddq
-            return joint_impedance(model, q, dq, ddq, measured, settings.joint_stiffness, self._damper)
+            return joint_impedance(model, *commanded.arrays, measured, settings.joint_stiffness, self._damper)
         if law is Law.CARTESIAN_IMPEDANCE:
             return cartesian_impedance(
                 model,
                 tool_c.pose,
                 tool_c.twist,
                 tool_c.acceleration,
-                commanded.q,
+                commanded.arrays[0],
                 measured,
                 settings.cartesian_stiffness,
                 settings.desired_wrench,
