@@ -38,7 +38,7 @@ from rcilab.faults import Fault
 from rcilab.model import RobotModel
 from rcilab.protocols.rci import ForceFrame
 from rcilab.spatial import Pose, Rotation9
-from rcilab.state import ControllerMode, MotionGeneratorMode, RobotMode, RobotState
+from rcilab.state import ControllerMode, MotionGeneratorMode, RobotMode, RobotState, build_state
 
 _SETTLED_TORQUE = 1e-6  # [N m] A filtered torque this close to the true one takes its value, so that rest is rest.
 _STANDING = 1e-6  # [m/s] Below this the tool has no direction of its path.
@@ -107,15 +107,8 @@ class StateReporter:
         if body is None or not self._is_settled or not self._is_same(readings):
             body = self._body = self._compute(readings)
             self._readings, self._version = readings, readings.commanded.version
-        return RobotState(
-            message_id=message_id,
-            faults=faults,
-            success_rate=success_rate,
-            motion_generator_mode=motion_generator_mode,
-            controller_mode=controller_mode,
-            robot_mode=robot_mode,
-            **body,
-        )
+        modes = (motion_generator_mode, controller_mode, robot_mode)
+        return build_state((message_id, *body.values(), faults, success_rate, *modes))
 
     def _is_same(self, readings: Readings) -> bool:
         last = self._readings
@@ -128,6 +121,7 @@ class StateReporter:
         )
 
     def _compute(self, readings: Readings) -> dict[str, Any]:
+        """Returns the fields of a state between its number and its faults, in their order."""
         commanded, tool_c, measured, tool, tau_commanded, _, wrench = readings
         last, before, h = self._body, self._readings, CYCLE_TIME
         q_c, dq_c, ddq_c = commanded.arrays

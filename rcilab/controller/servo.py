@@ -95,7 +95,9 @@ def cartesian_impedance(
     # Rows of J, error and desired wrench in the axes of the springs, where the stiffness is diagonal.
     along = J if axes is None else _turned(J, axes)
     error = _pose_error(T_c, terms.pose)
-    wrench = np.array(stiffness6) * (error if axes is None else _turned(error, axes)) + desired_wrench6
+    if axes is not None:
+        error = _turned(np.array(error), axes).tolist()
+    wrench = np.array([k * e + w for k, e, w in zip(stiffness6, error, desired_wrench6, strict=True)])
     dq_c, force, free = _reference(model, terms, twist_c, acc_c, q_null, measured)
     tau = (damper or Damper()).torque(
         lambda: design_damping(terms.mass_inverse, along.T * stiffness6 @ along), along.T.dot(wrench), dq_c - dq
@@ -105,10 +107,10 @@ def cartesian_impedance(
     return tau
 
 
-def _pose_error(T_c: Pose, T: Pose) -> Array:
-    """Returns position and rotation vector from the measured to the commanded tool, base axes, shape (6,)."""
+def _pose_error(T_c: Pose, T: Pose) -> tuple[float, ...]:
+    """Returns position and rotation vector from the measured to the commanded tool, base axes, [m, rad]."""
     (r_c, (x, y, z)), (r, (px, py, pz)) = T_c.parts, T.parts
-    return np.array((x - px, y - py, z - pz, *turn_between(r, r_c)))
+    return x - px, y - py, z - pz, *turn_between(r, r_c)
 
 
 def _turned(rows: Array, axes: Matrix) -> Array:

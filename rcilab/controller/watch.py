@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from operator import gt
 
 from rcilab.arrays import frozen
 from rcilab.conformance.breach import describe_breaches
@@ -105,10 +106,12 @@ class Watch:
 
     def find_collision(self, thresholds: Sequence[float]) -> str | None:
         """Returns which outside torque is above its threshold, in words, or None."""
-        for joint, (torque, threshold) in enumerate(zip(self.tau_ext.tolist(), thresholds, strict=True), start=1):
-            if abs(torque) > threshold:
-                return f"joint {joint}: external torque {torque:.3g} N m is above its threshold {threshold:g} N m"
-        return None
+        torques: list[float] = self.tau_ext.tolist()
+        if not any(map(gt, map(abs, torques), thresholds)):
+            return None
+        joint = next(i for i, torque in enumerate(torques) if abs(torque) > thresholds[i])
+        torque, threshold = torques[joint], thresholds[joint]
+        return f"joint {joint + 1}: external torque {torque:.3g} N m is above its threshold {threshold:g} N m"
 
 
 def _widened(limits: Limits) -> Limits:

@@ -88,21 +88,23 @@ class ToolTerms:
     @property
     def mass_inverse(self) -> Matrix:
         """M^-1, shape (n, n), [1/(kg m^2)]."""
-        if self._mass_inverse is None:
+        found = self._mass_inverse
+        if found is None:
             model, data, _, q, _ = self._args
-            self._mass_inverse = pin.computeMinverse(model, data, q).copy()
-        return self._mass_inverse
+            found = self._mass_inverse = pin.computeMinverse(model, data, q).copy()
+        return found
 
     @property
     def drift(self) -> Array:
         """The tool's acceleration when the joints have none: dJ/dt dq, base axes, shape (6,), [m/s^2, rad/s^2]."""
-        if self._drift is None:
+        found = self._drift
+        if found is None:
             model, data, tool, q, dq = self._args
             pin.forwardKinematics(model, data, q, dq, np.zeros(len(q)))
             pin.updateFramePlacement(model, data, tool)
             acceleration = pin.getFrameClassicalAcceleration(model, data, tool, pin.LOCAL_WORLD_ALIGNED)
-            self._drift = acceleration.vector.copy()
-        return self._drift
+            found = self._drift = acceleration.vector.copy()
+        return found
 
 
 class RigidBody:
