@@ -72,6 +72,11 @@ class ToolMotion:
         dpsi = math.remainder(psi - self.psi, math.tau) / h
         self.psi, self.dpsi, self.ddpsi = psi, dpsi, (dpsi - self.dpsi) / h
 
+    def observe(self, q: Sequence[float], motion: ToolTerms) -> None:
+        """Takes what `coincide` would, from joints that were measured: nobody asks for the differences of those."""
+        self.pose, self.matrix, self.twist = motion.pose, motion.matrix, motion.twist
+        self.psi = self._arm_angle(q)
+
     def coincide(self, other: ToolMotion) -> None:
         """Takes over where another one is: the arm is exactly where it was told to be."""
         self.pose, self.matrix, self.twist, self.psi = other.pose, other.matrix, other.twist, other.psi

@@ -84,7 +84,7 @@ class Watch:
             if q == commanded.q and dq == commanded.dq:
                 self.tool.coincide(tool_c)
             else:
-                self.tool.update(q, self._model.rigid_body.tool_terms(measured.q, measured.dq))
+                self.tool.observe(q, self._model.rigid_body.tool_terms(measured.q, measured.dq))
         self.tau_ext, self.wrench = self._observer.step(measured)
 
     def judge(self, *, is_commanded: bool = True) -> tuple[tuple[Fault, ...], str]:
