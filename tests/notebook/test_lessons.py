@@ -1,4 +1,4 @@
-"""Every lesson runs from top to bottom without a display, its exercises wait for an answer, and its solutions are right.
+"""Every lesson runs from top to bottom without a display; its exercises wait for an answer, its solutions are right.
 
 A lesson is executed once: its cells as they are, and after them every exercise again with the solution that is folded
 below it. The Chinese lessons have the same code, so they need not run.
@@ -56,7 +56,9 @@ def run_lesson(path: Path) -> nbformat.NotebookNode:
     """Executes a copy of a lesson, and after it its solved exercises."""
     notebook = read(path)
     for cell in notebook.cells:
-        cell.source = re.sub(r"^\w+\.(close|end)\(\)\n?", "", cell.source, flags=re.M) if CHECK in cell.source else cell.source
+        cell.source = (
+            re.sub(r"^\w+\.(close|end)\(\)\n?", "", cell.source, flags=re.M) if CHECK in cell.source else cell.source
+        )
     notebook.cells += [nbformat.v4.new_code_cell(source) for source in solved(path)]
     environment = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")}
     client = NotebookClient(notebook, timeout=60, resources={"metadata": {"path": str(path.parent)}})
