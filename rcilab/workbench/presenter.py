@@ -67,10 +67,10 @@ class Presenter:
         self._server, self._store, self._session, self._live, self._ask = server, store, session, live, ask
         self._stage = Stage(server, ask)
         self._marks = ProgramMarks(server)
-        self._text = Text(store.state.language)
+        self._text = Text(store.state.language, store.state.units)
         self._panels: list[Panel] = []
         self._containers: list[Any] = []
-        self._built: tuple[str, str] | None = None
+        self._built: tuple[object, ...] | None = None
         self._ending = threading.Event()
         self._thread: threading.Thread | None = None
         self.errors: list[BaseException] = []
@@ -91,7 +91,7 @@ class Presenter:
     def show(self) -> None:
         """Shows one snapshot."""
         state, status = self._store.state, self._session.status()
-        if (state.language, state.model.name) != self._built:
+        if (state.language, state.units, state.model.name) != self._built:
             self._build(state)
         for panel in self._panels:
             panel.show(state, status)
@@ -100,12 +100,12 @@ class Presenter:
         self._live.publish(**status_values(state, status, self._text, self._timeline.end))
 
     def _build(self, state: UiState) -> None:
-        """Makes the panels anew: another language has other words, another arm other joints."""
+        """Makes the panels anew: another language or unit has other words, another arm other joints."""
         gui: Any = self._server.gui  # Icons are plain strings here, which viser's types do not allow.
         for container in self._containers:
             container.remove()
-        self._text = Text(state.language)
-        self._built = (state.language, state.model.name)
+        self._text = Text(state.language, state.units)
+        self._built = (state.language, state.units, state.model.name)
         gui.set_panel_label(self._text("panel.main"))
         tabs = gui.add_tab_group()
         self._panels = []

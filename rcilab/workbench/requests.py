@@ -276,7 +276,7 @@ class Play(Request):
 class SetView(Request):
     """Settings of the page."""
 
-    name: Literal["language", "quality", "plot_joint", "rate", "height", "loop"]
+    name: Literal["language", "angle", "length", "theme", "quality", "plot_joint", "rate", "height", "loop"]
     value: str | float | int
 
 

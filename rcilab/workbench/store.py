@@ -22,6 +22,7 @@ from rcilab.workbench.program.draft import ProgramState
 from rcilab.workbench.run.pushing import Plant, PushState
 from rcilab.workbench.setup.wanted import SetupState
 from rcilab.workbench.text import Message
+from rcilab.workbench.units import Units
 
 if TYPE_CHECKING:
     from rcilab.motion import Motion
@@ -118,6 +119,8 @@ class UiState:
     plot_joint: int = 0
     """Joint shown in the plots, from 1; 0 shows all."""
     language: str = "en"
+    units: Units = Units()
+    """What angles and lengths are shown and typed in; nothing is kept in them."""
     quality: str = "full"
     height: float = 800.0
     """Height of the newest page's window, [px]: the plots fill it."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from rcilab.language import LANGUAGES, Language, load_words, require_language
+from rcilab.workbench.units import Unit, Units
 
 __all__ = ["LANGUAGES", "Message", "Text", "load_catalogue", "message"]
 
@@ -29,18 +30,30 @@ def message(code: str, **values: object) -> Message:
 class Text:
     """The catalogue of one language, called with a key.
 
+    A value that stands before °, deg or mm in the catalogue is given in degrees or millimetres and shown in the units
+    of the page, as is the name {in_deg} or {in_mm}.
+
+    Args:
+        language: Which.
+        units: What angles and lengths are shown in.
+
     Raises:
         InvalidValueError: There is no catalogue for this language.
     """
 
-    def __init__(self, language: str) -> None:
+    def __init__(self, language: str, units: Units = Units()) -> None:
         self.language = require_language(language)
-        self._entries = load_catalogue(self.language)
+        self.units = units
+        self._entries = {code: units.adapt(entry) for code, entry in load_catalogue(self.language).items()}
 
     def __call__(self, code: str, **values: object) -> str:
         """Returns the words for a key; the key itself when the catalogue lacks it (a test keeps it complete)."""
         entry = self._entries.get(code)
-        return code if entry is None else entry.format(**values) if values else entry
+        return code if entry is None else entry.format(**self.units.values(values)) if values else entry
+
+    def unit(self, usual: str) -> Unit:
+        """Returns the unit that numbers of a field are shown and typed in, for "deg" or "mm"."""
+        return self.units.unit(usual)
 
     def has(self, code: str) -> bool:
         """Returns whether the catalogue knows a key."""
