@@ -32,8 +32,8 @@ class Parsed:
 def parse_number(typed: str, low: float, high: float, unit: str) -> Parsed:
     """Returns the number that somebody typed.
 
-    Accepts a decimal comma, a typographic minus and a unit behind the number, in which it then counts; where a comma may as well group
-    thousands, the answer asks which is meant.
+    Accepts a decimal comma, a typographic minus and a unit behind the number, in which it then counts; where a
+    comma may as well group thousands, the answer asks which is meant.
 
     Args:
         typed: As it stands in the field.

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from rcilab.language import LANGUAGES, Language, load_words, require_language
-from rcilab.workbench.units import Unit, Units
+from rcilab.workbench.units import USUAL, Unit, Units
 
 __all__ = ["LANGUAGES", "Message", "Text", "load_catalogue", "message"]
 
@@ -41,7 +41,7 @@ class Text:
         InvalidValueError: There is no catalogue for this language.
     """
 
-    def __init__(self, language: str, units: Units = Units()) -> None:
+    def __init__(self, language: str, units: Units = USUAL) -> None:
         self.language = require_language(language)
         self.units = units
         self._entries = {code: units.adapt(entry) for code, entry in load_catalogue(self.language).items()}

@@ -104,12 +104,12 @@ class Units:
         """
         if "°" in entry or "mm" in entry or "deg" in entry:
             named = entry.replace("{in_deg}", self.angle).replace("{in_mm}", self.length)
-            return named if self == Units() else _SPOKEN.sub(self._adapt, named)
+            return named if self == USUAL else _SPOKEN.sub(self._adapt, named)
         return entry
 
     def values(self, values: Mapping[str, object]) -> Mapping[str, object]:
         """Returns values that fill such an entry."""
-        return values if self == Units() else {name: _Value(value, self) for name, value in values.items()}
+        return values if self == USUAL else {name: _Value(value, self) for name, value in values.items()}
 
     def _adapt(self, found: re.Match[str]) -> str:
         said, usual, rate = found.groups()
@@ -118,6 +118,10 @@ class Units:
             return found.group()
         shown = said[:-1] + ":" + unit.name + "}" if said.startswith("{") else unit.restate(said)
         return f"{shown} {unit.name}{rate}"
+
+
+USUAL = Units()
+"""Degrees and millimetres."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,6 +20,8 @@ SI = Units(angle="rad", length="m")
 def test_every_unit_in_a_catalogue_stands_behind_a_number_or_is_a_place_to_fill(language):
     """What is not so would stay as it is when the units change, beside numbers that do not."""
     for code, entry in load_catalogue(language).items():
+        if code.startswith("unit."):
+            continue
         bare = re.sub(r"(\{\w+\}|\d)\s?(°|deg\b|mm\b)|\{in_deg\}|\{in_mm\}", "", entry)
         assert not re.search(r"°|\bdeg\b|\bmm\b|\bmillimet|\bdegrees?\b|\brad\b|毫米|弧度|\d\s?度", bare), (code, entry)
 
