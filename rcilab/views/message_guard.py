@@ -129,8 +129,9 @@ def _fitting(value: object, control: Any) -> object | None:
         is_known = isinstance(value, str) and (options is None or value in options)
         return value if is_known else None
     if isinstance(held, tuple):
-        is_alike = isinstance(value, list | tuple) and len(value) == len(held)
-        return value if is_alike and all(_is_alike(a, b) for a, b in zip(value, held, strict=True)) else None
+        if not isinstance(value, list | tuple) or len(value) != len(held):
+            return None
+        return value if all(_is_alike(a, b) for a, b in zip(value, held, strict=True)) else None
     return None
 
 
