@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from rcilab.language import LANGUAGES, Language
 from rcilab.words import text
 from rcilab.words.text import Message, load_face, message
+from rcilab.workbench.units import USUAL, Unit, Units
 
 __all__ = ["LANGUAGES", "Message", "Text", "load_catalogue", "message"]
 
@@ -16,12 +17,29 @@ _PAGE = "rcilab.workbench"
 class Text(text.Text):
     """The catalogue of the page in one language.
 
+    A value that stands before °, deg or mm in the catalogue is given in degrees or millimetres and shown in the units
+    of the page, as is the name {in_deg} or {in_mm}.
+
+    Args:
+        language: Which.
+        units: What angles and lengths are shown in.
+
     Raises:
         InvalidValueError: There is no catalogue for this language.
     """
 
-    def __init__(self, language: str) -> None:
+    def __init__(self, language: str, units: Units = USUAL) -> None:
         super().__init__(language, _PAGE)
+        self.units = units
+        self._entries = {code: units.adapt(entry) for code, entry in self._entries.items()}
+
+    def __call__(self, code: str, **values: object) -> str:
+        """Returns the words for a key; the key itself when the catalogues lack it (a test keeps them complete)."""
+        return super().__call__(code, **self.units.values(values))
+
+    def unit(self, usual: str) -> Unit:
+        """Returns the unit that numbers of a field are shown and typed in, for "deg" or "mm"."""
+        return self.units.unit(usual)
 
 
 def load_catalogue(language: Language) -> Mapping[str, str]:
