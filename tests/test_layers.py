@@ -40,6 +40,7 @@ LAYERS = [  # From the bottom. A part imports from lines below its own, and from
     {"recording"},
     {"client", "controller", "views"},
     {"supervisor"},
+    {"gallery"},
     {"workbench", "notebook"},
     {"bench"},
     {"doctor"},
