@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import radians
 
 import numpy as np
 
@@ -11,7 +10,7 @@ from rcilab.client.control_loop import Callback
 from rcilab.clock import CYCLE_TIME
 from rcilab.command import CartesianPosition, JointPosition
 from rcilab.faults import Fault
-from rcilab.gallery.commands import box_around_tool, soften_joint_1, torque_stream
+from rcilab.gallery.commands import LIVELY_ELBOW, box_around_tool, soften_joint_1, torque_stream
 from rcilab.gallery.recipe import Recipe, Scene
 from rcilab.protocols.world import NetworkFaults
 from rcilab.state import RobotState
@@ -80,11 +79,11 @@ def _ramp(direction: tuple[float, ...], slope: float, top: float) -> Push:
 
 
 def _sideways(scene: Scene) -> Callback:
-    return pushed(scene, _ramp((0.0, 1.0, 0.0, 0.0, 0.0, 0.0), 100.0, 40.0), tool=False)
+    return pushed(scene, _ramp((0.0, 1.0, 0.0, 0.0, 0.0, 0.0), 300.0, 40.0), tool=False)
 
 
 def _down(scene: Scene) -> Callback:
-    return pushed(scene, _ramp((0.0, 0.0, -1.0, 0.0, 0.0, 0.0), 100.0, 40.0), tool=False)
+    return pushed(scene, _ramp((0.0, 0.0, -1.0, 0.0, 0.0, 0.0), 300.0, 40.0), tool=False)
 
 
 def _elbow(scene: Scene) -> Callback:
@@ -146,7 +145,7 @@ ARM_RECIPES = (
     Recipe(
         fault=Fault.ACTUAL_CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION, group="position",
         mode="cartesian_impedance", prepare=_firm_tool, act=_elbow, needs_elbow=True,
-        pose=tuple(radians(angle) for angle in (0.0, 52.6, -129.3, 80.2, -118.4, 50.8, 0.0)),
+        pose=LIVELY_ELBOW,
     ),
     Recipe(
         fault=Fault.ACTUAL_JOINT_VELOCITY_LIMITS_VIOLATION, group="velocity", mode="torque", prepare=Scene.yielding,

@@ -8,7 +8,9 @@ from contextlib import suppress
 
 import numpy as np
 
+from rcilab.arrays import Array
 from rcilab.client.control_loop import Callback
+from rcilab.client.following import follow
 from rcilab.client.recorder import CycleLog, Recorder
 from rcilab.client.session import RobotSession
 from rcilab.closing import Closing
@@ -20,6 +22,7 @@ from rcilab.gallery.recipe import Recipe, Scene
 from rcilab.gallery.signals import Signals
 from rcilab.gallery.table import FAULTS
 from rcilab.model import RobotModel, load_model
+from rcilab.motion import plan_joint
 from rcilab.safety_box import SafetyBox
 from rcilab.spatial import IDENTITY
 from rcilab.state import RobotState
@@ -29,6 +32,7 @@ _CAPACITY = 4096  # [cycles] More than any recipe takes.
 _OPEN = SafetyBox(size=(20.0, 20.0, 20.0), T_base_box=IDENTITY, active=False)
 _CALM = 1.0  # [N, N m] A choice: far below any threshold that a recipe sets.
 _CALM_STATES = 500
+_NUDGE = 0.02  # [rad] How far the arm moves to show that it does again; a choice.
 _THERE = 1e-6  # [rad] What counts as standing where a recipe begins.
 _OPENED, _PLACED, _SHOWN = 0.4, 0.5, 0.8
 """Parts of the work: the controller is up, the arm stands where it begins, the fault has come. About what was seen."""
@@ -87,7 +91,7 @@ class Booth(Closing):
         progress(_OPENED)
         start = recipe.start(self.model.home)
         if np.abs(robot.receive_state().q_c - start).max() > _THERE:
-            robot.move_j(start, speed=1.0)
+            self._go(robot, start)
         scene = recipe.prepare(Scene(robot=robot, start=robot.receive_state(), limits=self.model.limits))
         progress(_PLACED)
         log = CycleLog(Recorder(self.model.n, _CAPACITY))
@@ -134,8 +138,15 @@ class Booth(Closing):
         done += self._recover(robot)
         self._widen(robot)
         robot.set_collision_behavior(self.model.limits.joint.collision_threshold)
-        robot.move_j(self.model.home, speed=1.0)
-        return [*done, "home"]
+        nudged = np.array(robot.receive_state().q_c)
+        nudged[-1] -= np.copysign(_NUDGE, nudged[-1])
+        self._go(robot, nudged)
+        return [*done, "move"]
+
+    def _go(self, robot: RobotSession, goal: Array) -> None:
+        """Moves the private arm: inside every limit, and unchecked for collisions, as nothing can be hurt."""
+        motion = plan_joint(self.model, robot.receive_state().q_c, goal)
+        robot.control(follow(motion.q))
 
     def _widen(self, robot: RobotSession) -> None:
         limits = self.model.limits.joint

@@ -21,6 +21,9 @@ from rcilab.safety_box import SafetyBox
 from rcilab.spatial import Pose
 from rcilab.state import RobotState
 
+LIVELY_ELBOW = tuple(radians(angle) for angle in (0.0, -28.6, 58.8, 56.4, -5.8, 113.8, 0.0))  # [rad]
+"""Where the elbow may turn fastest for what the joints may do, so that the arm angle passes its bound before them."""
+
 _PAUSE = 20  # [cycles] of standing still before, so that the plot shows where it began; a choice.
 _SOFT_LIMIT = 0.05  # [rad] from where the joint stands; a choice.
 _HALF_BOX = 0.03  # [m] A choice.
@@ -93,11 +96,11 @@ def box_around_tool(scene: Scene) -> Scene:
 
 
 def _soft_limit(scene: Scene) -> Callback:
-    return joint_stream(scene.start.q_c, 0, path(rise(0.2, 3.0, 400)))
+    return joint_stream(scene.start.q_c, 0, path(rise(1.0, 8.0, 400)))
 
 
 def _box(scene: Scene) -> Callback:
-    return tool_stream(scene.start.T_base_tool_c, _lift, path(rise(0.05, 1.0, 500)), scene.start.psi_c)
+    return tool_stream(scene.start.T_base_tool_c, _lift, path(rise(0.1, 1.5, 400)), scene.start.psi_c)
 
 
 def _elbow(scene: Scene) -> Callback:
@@ -112,11 +115,11 @@ def _elbow(scene: Scene) -> Callback:
 
 
 def _joint_velocity(scene: Scene) -> Callback:
-    return joint_stream(scene.start.q_c, 0, path(rise(0.5, 8.0, 500)))
+    return joint_stream(scene.start.q_c, 0, path(rise(3.0, 14.0, 400)))
 
 
 def _tool_velocity(scene: Scene) -> Callback:
-    return tool_stream(scene.start.T_base_tool_c, _spin, path(rise(0.5, 8.0, 500)), scene.start.psi_c)
+    return tool_stream(scene.start.T_base_tool_c, _spin, path(rise(0.9, 9.5, 400)), scene.start.psi_c)
 
 
 def _joint_acceleration(scene: Scene) -> Callback:
@@ -144,7 +147,7 @@ def _singular(scene: Scene) -> Callback:
     wrist = flange[:3, 3] - arm[-1].d * flange[:3, 2]
     outwards = wrist - np.array([0.0, 0.0, arm[0].d])
     outwards /= np.linalg.norm(outwards)
-    way = np.cumsum(np.minimum(np.maximum(np.arange(3000) - _PAUSE, 0) * 1e-8, 2e-6))
+    way = np.cumsum(np.minimum(np.maximum(np.arange(3000) - _PAUSE, 0) * 2e-8, 2e-6))
     return tool_stream(T, lambda value: (outwards * value, np.zeros(3)), way, scene.start.psi_c)
 
 
@@ -191,7 +194,7 @@ COMMAND_RECIPES = (
     Recipe(
         fault=Fault.COMMAND_CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION, group="position",
         mode="cartesian_position", act=_elbow, needs_elbow=True,
-        pose=tuple(radians(angle) for angle in (0.0, 39.9, 136.5, 55.5, -19.6, -61.3, 0.0)),
+        pose=LIVELY_ELBOW,
     ),
     Recipe(
         fault=Fault.COMMAND_JOINT_VELOCITY_LIMITS_VIOLATION, group="velocity", mode="joint_position",
@@ -215,7 +218,7 @@ COMMAND_RECIPES = (
     ),
     Recipe(
         fault=Fault.CARTESIAN_POSITION_MOTION_GENERATOR_INVALID_FRAME, group="command", mode="cartesian_position",
-        act=_singular, pose=(0.1, 0.5, 0.0, 0.08, 0.0, 1.0, 0.0),
+        act=_singular, pose=(0.1, 0.5, 0.0, 0.05, 0.0, 1.0, 0.0),
     ),
     Recipe(
         fault=Fault.COMMAND_TORQUE_DISCONTINUITY, group="command", mode="torque", act=_torque_rate,

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from rcilab.arrays import JointVector, frozen
 from rcilab.conformance.condition import Condition
+from rcilab.controller.fault_stop import FAULT_STOP, Offender
 from rcilab.faults import Fault
 from rcilab.gallery.recipe import Recipe
 from rcilab.gallery.signals import Signal
@@ -21,7 +22,7 @@ from rcilab.model import RobotModel
 if TYPE_CHECKING:
     from rcilab.motion import Motion
 
-Step: TypeAlias = Literal["release", "network", "recover", "refused", "power_off", "widen", "power_on", "home"]
+Step: TypeAlias = Literal["release", "network", "recover", "refused", "power_off", "widen", "power_on", "move"]
 """One step of the way out of a fault."""
 
 SECTION = "4.6"
@@ -102,6 +103,15 @@ class Exhibit:
         if np.isfinite(self.cycles["command"][:-1]).all():
             q[1:] = self.cycles["command"][:-1]
         return Motion.from_samples(q)
+
+    @property
+    def moved(self) -> Motion:
+        """What there is to see: the commanded joint angles where a command was wrong, otherwise the measured ones."""
+        from rcilab.motion import Motion
+
+        if FAULT_STOP[self.fault].offender is Offender.COMMAND:
+            return self.commanded
+        return Motion.from_samples(self.cycles["q"])
 
     def told(self, what: Literal["sent", "cause", "remedy"], language: Language = "en") -> str:
         """Returns what was done wrong, why the controller minds, or what to do about it, in our own words.

@@ -79,6 +79,13 @@ class Recipe:
     needs_elbow: bool = False
     """Whether it takes an arm of 7 axes."""
 
+    @property
+    def place(self) -> tuple[int, bool]:
+        """Where it hangs in its group: what is commanded beside what is measured of the same quantity."""
+        name = self.fault.name.removeprefix("ACTUAL_").removeprefix("COMMAND_")
+        first = min(fault for fault in Fault if fault.name.endswith(name))
+        return int(first), self.fault.name.startswith("ACTUAL_")
+
     def start(self, home: JointVector) -> JointVector:
         """Returns where the arm is to stand at the beginning, shape (n,), [rad]."""
         if self.pose is None:

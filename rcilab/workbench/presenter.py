@@ -8,11 +8,15 @@ import time
 import traceback
 from typing import TYPE_CHECKING, Any
 
+from rcilab.workbench.learn.state import exhibited
 from rcilab.workbench.live import LiveChannel
 from rcilab.workbench.panels import Panel
 from rcilab.workbench.panels.check import CheckPanel
 from rcilab.workbench.panels.health import HealthPanel
 from rcilab.workbench.panels.jog import JogPanel
+from rcilab.workbench.panels.learn import LearnPanel
+from rcilab.workbench.panels.learn_exhibit import LearnExhibitPanel
+from rcilab.workbench.panels.learn_lesson import LearnLessonPanel
 from rcilab.workbench.panels.poses import PosesPanel
 from rcilab.workbench.panels.program import ProgramPanel
 from rcilab.workbench.panels.program_file import ProgramFilePanel
@@ -48,6 +52,7 @@ _TABS = (
     ("tab.setup", "tool", SetupPanel, SetupNumbersPanel),
     ("tab.check", "clipboard-check", CheckPanel),
     ("tab.run", "player-play", RunPanel, RecordingPanel, PushPanel, HealthPanel),
+    ("tab.learn", "school", LearnLessonPanel, LearnPanel, LearnExhibitPanel),
     ("tab.settings", "settings", SettingsPanel),
 )
 
@@ -93,11 +98,12 @@ class Presenter:
         state, status = self._store.state, self._session.status()
         if (state.language, state.model.name) != self._built:
             self._build(state)
+        seen = exhibited(state)
         for panel in self._panels:
-            panel.show(state, status)
-        self._stage.show(state, status, self._text)
-        self._marks.show(state)
-        self._live.publish(**status_values(state, status, self._text, self._timeline.end))
+            panel.show(seen if panel is self._timeline else state, status)
+        self._stage.show(seen, status, self._text)
+        self._marks.show(seen)
+        self._live.publish(**status_values(seen, status, self._text, self._timeline.end))
 
     def _build(self, state: UiState) -> None:
         """Makes the panels anew: another language has other words, another arm other joints."""

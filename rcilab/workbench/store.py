@@ -14,9 +14,11 @@ import numpy as np
 from rcilab.arrays import JointVector
 from rcilab.model import RobotModel
 from rcilab.spatial import Pose
+from rcilab.workbench.check.state import CheckState
 from rcilab.workbench.goal.planning import Plan, PlannableLaw
 from rcilab.workbench.goal.reach import Reach, Tone
 from rcilab.workbench.jog.jogging import JogState
+from rcilab.workbench.learn.state import LearnState
 from rcilab.workbench.lease import Lease
 from rcilab.workbench.program.draft import ProgramState
 from rcilab.workbench.run.pushing import Plant, PushState
@@ -94,6 +96,8 @@ class UiState:
     no_plan: Message | None = None
     """Why there is no plan."""
     program: ProgramState = field(default_factory=ProgramState)
+    check: CheckState = field(default_factory=CheckState)
+    learn: LearnState = field(default_factory=LearnState)
     asked: Motion | None = None
     """The motion that a foreign robot is to make and that awaits a second yes."""
     recording: Recording | None = None
