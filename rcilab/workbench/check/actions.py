@@ -85,7 +85,7 @@ class CheckActions:
 
     def _answer(self, tone: str, answer: Any) -> None:
         plan = self._store.state.plan
-        self._set(tone=tone, answer=answer, about=None if plan is None else plan.report)
+        self._set(tone=tone, answer=answer, found=None, about=None if plan is None else plan.report)
 
     def _seek(self, plan: Plan, name: str) -> None:
         """Goes to the worst moment of a row, and has its joint in the plots."""
@@ -117,25 +117,25 @@ class CheckActions:
             self._answer("warn", message("check.overtaken"))
             return
         if result.plan is None:
-            words = {language: result.found.explain(language) for language in ("en", "zh")}
-            key = "check.already" if result.found.factor is not None else "check.none"
-            self._answer("good" if result.found.factor is not None else "bad", message(key, **words))
+            passes = result.found.factor is not None
+            self._answer("good" if passes else "bad", message("check.already" if passes else "check.none"))
+            self._set(found=result.found)
             return
-        slowed = Slowed(
-            before=state.plan, after=result.plan, speed=None if result.draft else state.speed, draft=result.draft
-        )
         facts = {
             "factor": f"{1.0 / result.scale:.3g}",
             "before": f"{before.motion.duration:.3f}",
             "after": f"{result.plan.motion.duration:.3f}",
         }
-        if result.draft is None:
-            speed = result.scale * state.speed
-            self._store.update(plan=result.plan, speed=speed, recording=None, place=0.0, playing=False)
-            said = message("check.slowed", **facts, from_=f"{100 * state.speed:.1f}", to=f"{100 * speed:.1f}")
-        else:
+        speed = state.speed if result.is_stretched or result.draft is not None else result.scale * state.speed
+        slowed = Slowed(before=state.plan, after=result.plan, speed=state.speed, draft=result.draft)
+        if result.draft is not None:
             self._program.exchange(result.draft, result.plan)
             said = message("check.slowed_program", **facts, scale=f"{100 * result.scale:.1f}")
+        else:
+            self._store.update(plan=result.plan, speed=speed, recording=None, place=0.0, playing=False)
+            said = message("check.slowed", **facts, from_=f"{100 * state.speed:.1f}", to=f"{100 * speed:.1f}")
+        if result.is_stretched:
+            said = message("check.stretched", **facts)
         self._set(slowed=slowed)
         self._answer("good", said)
 
@@ -144,7 +144,7 @@ class CheckActions:
         slowed = self._check.slowed
         if slowed is None:
             return
-        if slowed.speed is None:
+        if slowed.draft is not None:
             self._program.edit(requests.EditProgram(what="undo"))
             self._program.keep_plan(slowed.before)
         else:

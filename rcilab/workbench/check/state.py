@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 from rcilab.workbench.text import Message
 
 if TYPE_CHECKING:
-    from rcilab.conformance import Report
+    from rcilab.conformance import Report, SlowDown
     from rcilab.workbench.goal.planning import Plan
     from rcilab.workbench.program.draft import Draft
 
@@ -19,10 +19,10 @@ class Slowed:
 
     before: Plan
     after: Plan
-    speed: float | None = None
-    """Speed of the page before; None where a program was slowed down."""
+    speed: float
+    """Speed of the page before."""
     draft: Draft | None = None
-    """The slowed program."""
+    """The slowed program; None where no speed of a program was changed."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -38,6 +38,8 @@ class CheckState:
     tone: Literal["good", "warn", "bad"] = "good"
     about: Report | None = None
     """The report that `answer` is about."""
+    found: SlowDown | None = None
+    """What was found where the plan stays as it is: it says why in its own words."""
     slowed: Slowed | None = None
     explained: tuple[Report, str, str] | None = None
     """A report, a language, and the report in words."""

@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from rcilab.conformance import SlowDown
     from rcilab.workbench.goal.planning import PlannableLaw
 
-_TRIES = 6
-_FURTHER = 0.97
-"""By how much slower each further try is, where the speed that the factor asks for is not slow enough. Choices."""
+_TRIES = 2
+_FURTHER = 0.9
+"""By how much slower the next try is, where the speed that the factor asks for is not slow enough. Choices."""
 _FOUND = 0.5  # Part of the work when the factor is known; about what was seen.
 SLOWEST = 0.01
 
@@ -33,6 +33,8 @@ class Slower:
     """Of the speed, or of every speed of the program."""
     draft: Draft | None = None
     """The slowed program."""
+    is_stretched: bool = False
+    """Whether the same curve runs slower as a whole, because no speed is slow enough: speed does not bound the jerk."""
 
 
 class CheckWork:
@@ -130,7 +132,7 @@ def slow_program(plan: Plan, draft: Draft, rounds: int, tell: Callable[[float], 
 
     slowest = min((step.waypoint.speed for step in draft.steps), default=1.0)
     result = _slower(plan, make, SLOWEST / slowest, tell)
-    return replace(result, draft=drafts.get(result.scale))
+    return result if result.is_stretched else replace(result, draft=drafts.get(result.scale))
 
 
 def scaled(draft: Draft, scale: float) -> Draft:
@@ -151,11 +153,13 @@ def _slower(plan: Plan, make: Callable[[float], Plan | None], least: float, tell
     wanted = {row.id for row in found.report.rows if row.ok} if found.report is not None else set[str]()
     scale = 1.0 / found.factor
     for attempt in range(_TRIES):
-        if scale < least:
-            break
-        made = make(scale)
+        made = make(scale) if scale >= least else None
         tell(_FOUND + (1.0 - _FOUND) * (attempt + 1) / _TRIES)
         if made is not None and made.report.ok and all(row.ok for row in made.report.rows if row.id in wanted):
             return Slower(found=found, plan=made, scale=scale)
         scale *= _FURTHER
-    return Slower(found=found)
+    assert found.motion is not None
+    assert found.report is not None
+    whole = picture(plan.model, found.motion, found.report, plan.box)
+    whole = replace(whole, short=plan.short, program=plan.program, complete=True)
+    return Slower(found=found, plan=whole, scale=1.0 / found.factor, is_stretched=True)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import re
 import time
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
+from rcilab.language import Language
 from rcilab.workbench import requests
 from rcilab.workbench.panels.check_rows import rows_html
 from rcilab.workbench.run.readiness import is_moving
@@ -115,6 +116,8 @@ class CheckPanel:
         check, said = state.check, ""
         if check.answer is not None and check.about is plan.report:
             answer = esc(self._text.say(check.answer))
+            if check.found is not None:
+                answer += f" {esc(check.found.explain(cast(Language, self._text.language)))}"
             said += f'<p class="rl-verdict rl-{check.tone}" role="status">{answer}</p>'
         if check.explained is not None and check.explained[0] is plan.report:
             first, *rest = check.explained[2].splitlines()
