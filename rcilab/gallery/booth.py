@@ -118,7 +118,7 @@ class Booth(Closing):
             recipe=recipe,
             model=self.model,
             limits=scene.limits,
-            reported=fault.faults,
+            reported=tuple(bit for bit in fault.faults if isinstance(bit, Fault)),
             said=status.reason,
             cycles=rows,
             signal=signal,

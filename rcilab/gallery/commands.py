@@ -115,7 +115,7 @@ def _elbow(scene: Scene) -> Callback:
 
 
 def _joint_velocity(scene: Scene) -> Callback:
-    return joint_stream(scene.start.q_c, 0, path(rise(3.0, 14.0, 400)))
+    return joint_stream(scene.start.q_c, 0, path(rise(1.2, 14.0, 400)))
 
 
 def _tool_velocity(scene: Scene) -> Callback:

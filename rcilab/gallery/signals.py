@@ -166,7 +166,8 @@ class Signals:
 
     def _external(self) -> Array:
         """Returns outside joint torques, as the controller estimates them."""
-        observer, found = Observer(self._model), []
+        observer = Observer(self._model)
+        found: list[Array] = []
         for index, row in enumerate(self._rows):
             measured = Measurement(row["q"], row["dq"], row["tau"])
             if index == 0:

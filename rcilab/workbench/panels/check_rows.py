@@ -14,13 +14,15 @@ if TYPE_CHECKING:
     from rcilab.model import RobotModel
 
 TIGHT = 0.95  # A choice: from this share of a bound on, a row is amber.
+_MANY = 10.0  # A choice: from here on a share of the bound is told as a factor.
+_ORDER = {"bad": 0, "warn": 1, "good": 2}
 _SIGNS = {"good": "✓", "warn": "▲", "bad": "◆"}
 _AMBER = {True: "check.exceeded", False: "check.tight"}
 
 
 def rows_html(report: Report, model: RobotModel, chosen: str, text: Text) -> str:
-    """Returns every row, necessary ones first; each leads to its moment when it is clicked."""
-    rows = sorted(report.rows, key=lambda row: row.condition.necessity)
+    """Returns every row, what is broken or near first; each leads to its moment when it is clicked."""
+    rows = sorted(report.rows, key=lambda row: _ORDER[row_tone(row)])
     return f'<div class="rl-cards rl-pick">{"".join(row_html(row, model, chosen, text) for row in rows)}</div>'
 
 
@@ -44,12 +46,16 @@ def row_html(row: ConditionResult, model: RobotModel, chosen: str, text: Text) -
         f'<div class="rl-card rl-{tone}" role="button" tabindex="0" data-say="{esc(condition.id)}"{current} '
         f'title="{esc(text("check.row_hint"))}">'
         f'<div class="rl-line"><i class="rl-sign">{_SIGNS[tone]}</i><b>{esc(name)}</b>'
-        f'<span class="rl-badge">{esc(text("necessity." + condition.necessity))}</span>'
-        f'<span class="rl-word">{esc(word)}</span><span class="rl-share">{100.0 * row.ratio:.1f} %</span></div>'
+        f'<span class="rl-word">{esc(word)}</span><span class="rl-share">{_share(row.ratio)}</span></div>'
         f'<div class="rl-meter"><i style="width:{min(100.0, 100.0 * row.ratio):.1f}%"></i></div>'
-        f'<div class="rl-facts">{esc(" · ".join(facts))}</div>'
+        f'<div class="rl-facts"><span class="rl-badge">{esc(text("necessity." + condition.necessity))}</span> '
+        f"{esc(' · '.join(facts))}</div>"
         f'<div class="rl-source">{esc(condition.formula)} — {esc(condition.source)}{fault}</div></div>'
     )
+
+
+def _share(ratio: float) -> str:
+    return f"{100.0 * ratio:.1f} %" if ratio < _MANY else f"{ratio:.0f} ×"
 
 
 def row_tone(row: ConditionResult) -> str:
