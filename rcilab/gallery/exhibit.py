@@ -96,20 +96,25 @@ class Exhibit:
 
     @property
     def commanded(self) -> Motion:
-        """The joint angles that were sent, the wrong one too; in other modes those that the controller made of them."""
+        """The joint angles that the arm was told: those sent, the wrong one too; or what the controller made of poses.
+
+        While torques are commanded no angles are: the motion stands at the start.
+        """
         from rcilab.motion import Motion
 
         q = np.array(self.cycles["q_c"])
-        if np.isfinite(self.cycles["command"][:-1]).all():
+        if self.recipe.mode == "torque":
+            q[:] = q[0]
+        elif np.isfinite(self.cycles["command"][:-1]).all():
             q[1:] = self.cycles["command"][:-1]
         return Motion.from_samples(q)
 
     @property
     def moved(self) -> Motion:
-        """What there is to see: the commanded joint angles where a command was wrong, otherwise the measured ones."""
+        """Where to look for the arm: as commanded where a command of a place was wrong, otherwise as measured."""
         from rcilab.motion import Motion
 
-        if FAULT_STOP[self.fault].offender is Offender.COMMAND:
+        if FAULT_STOP[self.fault].offender is Offender.COMMAND and self.recipe.mode != "torque":
             return self.commanded
         return Motion.from_samples(self.cycles["q"])
 

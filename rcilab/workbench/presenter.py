@@ -101,7 +101,7 @@ class Presenter:
         seen = exhibited(state)
         for panel in self._panels:
             panel.show(seen if panel is self._timeline else state, status)
-        self._stage.show(seen, status, self._text)
+        self._stage.show(exhibited(state, scene=True), status, self._text)
         self._marks.show(seen)
         self._live.publish(**status_values(seen, status, self._text, self._timeline.end))
 

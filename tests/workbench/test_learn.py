@@ -74,8 +74,8 @@ def test_a_fault_is_shown_at_its_moment_and_the_plan_of_the_page_is_kept(bench: 
     assert show is not None
     assert show.exhibit.fault is Fault.COMMAND_JOINT_ACCELERATION_DISCONTINUITY
     assert bench.state.plan is own
-    seen = exhibited(bench.state)
-    assert seen.plan is show.plan
+    seen = exhibited(bench.state, scene=True)
+    assert seen.plan is show.scene
     assert [row.id for row in show.plan.report.rows if not row.ok and row.fault] == ["joint.jerk"]
     assert np.abs(seen.plan.motion.at(seen.place * seen.plan.motion.duration).q - show.exhibit.moved.q[-1]).max() < 1e-3
     for language in LANGUAGES:

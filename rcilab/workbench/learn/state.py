@@ -13,6 +13,7 @@ from rcilab.workbench.goal.planning import Plan, picture
 from rcilab.workbench.text import Message
 
 if TYPE_CHECKING:
+    from rcilab.motion import Motion
     from rcilab.workbench.store import Recording, UiState
 
 MOMENT = 0.9999
@@ -26,6 +27,8 @@ class Show:
     exhibit: Exhibit
     plan: Plan
     """What was commanded, the wrong command too. It is never one to execute."""
+    scene: Plan
+    """Where the arm is to be seen."""
     recording: Recording
     """What the arm did."""
     beside: object
@@ -61,13 +64,22 @@ def make_show(exhibit: Exhibit, beside: object) -> Show:
     from rcilab.conformance import check
     from rcilab.workbench.store import Recording
 
-    motion, rows = exhibit.moved, exhibit.cycles
-    report = check(motion, exhibit.model, distance=None)
-    recording = Recording(t=np.array(rows["t"]), q=rows["q"], q_c=rows["q_c"], dq=rows["dq"], delay=0)
-    return Show(exhibit=exhibit, plan=picture(exhibit.model, motion, report), recording=recording, beside=beside)
+    def draw(motion: Motion) -> Plan:
+        return picture(exhibit.model, motion, check(motion, exhibit.model, distance=None))
+
+    rows = exhibit.cycles
+    return Show(
+        exhibit=exhibit,
+        plan=draw(exhibit.commanded),
+        scene=draw(exhibit.moved),
+        recording=Recording(t=np.array(rows["t"]), q=rows["q"], q_c=rows["q_c"], dq=rows["dq"], delay=0),
+        beside=beside,
+    )
 
 
-def exhibited(state: UiState) -> UiState:
-    """Returns what timeline and scene are to draw: the fault on show, if there is one, in place of the plan."""
+def exhibited(state: UiState, *, scene: bool = False) -> UiState:
+    """Returns what timeline, or scene, are to draw: the fault on show, if there is one, in place of the plan."""
     show = state.learn.show
-    return state if show is None else replace(state, plan=show.plan, recording=show.recording)
+    if show is None:
+        return state
+    return replace(state, plan=show.scene if scene else show.plan, recording=show.recording)

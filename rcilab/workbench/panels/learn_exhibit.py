@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -102,12 +103,17 @@ def head_html(exhibit: Exhibit, text: Text) -> str:
     )  # fmt: skip
     place = text("check.joint", joint=exhibit.signal.axis) + " · " if exhibit.signal.axis else ""
     return (
-        f'<p class="rl-verdict rl-bad rl-big"><b>◆ {esc(exhibit.fault.manual_name)}</b> '
+        f'<p class="rl-verdict rl-bad rl-big"><b>◆ {_breakable(exhibit.fault.manual_name)}</b> '
         f"{esc(text('learn.reported', number=exhibit.fault.value))}{esc(also)}</p>"
         f'<p class="rl-note"><b>{esc(text("learn.done"))}</b> {esc(exhibit.told("sent", language))}</p>'
         f'<div class="rl-plot-title">{esc(text(f"condition.{row.id}"))} [{esc(unit or "1")}]</div>'
         f'<p class="rl-note rl-under">{esc(place)}{esc(facts)}</p>'
     )
+
+
+def _breakable(name: str) -> str:
+    """Returns a name that may be broken before every word in it."""
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", "<wbr>", esc(name))
 
 
 def body_html(exhibit: Exhibit, text: Text) -> str:
