@@ -80,7 +80,7 @@ def test_a_fault_is_shown_at_its_moment_and_the_plan_of_the_page_is_kept(bench: 
     assert np.abs(seen.plan.motion.at(seen.place * seen.plan.motion.duration).q - show.exhibit.moved.q[-1]).max() < 1e-3
     for language in LANGUAGES:
         said = head_html(show.exhibit, Text(language)) + body_html(show.exhibit, Text(language))
-        assert "kCommandJointAccelerationDiscontinuity" in said
+        assert "kCommandJointAccelerationDiscontinuity" in said.replace("<wbr>", "")
         assert "5000" in said
     bench.goal.pose(HOME - 0.1)
     bench.learn.tick()
@@ -88,14 +88,11 @@ def test_a_fault_is_shown_at_its_moment_and_the_plan_of_the_page_is_kept(bench: 
     assert exhibited(bench.state) is bench.state
 
 
-def test_who_cancels_sees_nothing_and_may_press_the_next(bench: Bench) -> None:
+def test_who_cancels_sees_nothing(bench: Bench) -> None:
     bench.press("provoke", fault=int(Fault.COLLISION))
     bench.press("cancel")
     bench.learn.tick()
     assert bench.state.learn.provoking is None
-    bench.provoke(Fault.COLLISION)
-    assert bench.state.learn.show is not None
-    bench.press("close")
     assert bench.state.learn.show is None
 
 
