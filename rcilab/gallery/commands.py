@@ -14,7 +14,7 @@ import numpy as np
 from rcilab.arrays import Array, frozen
 from rcilab.client.control_loop import Callback
 from rcilab.clock import CYCLE_TIME
-from rcilab.command import CartesianPosition, JointPosition, JointTorque
+from rcilab.command import CartesianPosition, Command, JointPosition, JointTorque
 from rcilab.faults import Fault
 from rcilab.gallery.recipe import Recipe, Scene
 from rcilab.safety_box import SafetyBox
@@ -26,6 +26,9 @@ LIVELY_ELBOW = tuple(radians(angle) for angle in (0.0, -28.6, 58.8, 56.4, -5.8, 
 
 _PAUSE = 20  # [cycles] of standing still before, so that the plot shows where it began; a choice.
 _SOFT_LIMIT = 0.05  # [rad] from where the joint stands; a choice.
+_HELD_LINK = 2
+_HOLD = 0.8  # Part of the collision threshold that something holds against at most; a choice.
+_TOLD = 4  # [cycles] How often that is told to the world; a choice.
 _HALF_BOX = 0.03  # [m] A choice.
 _PAST = 1.006  # Times the bound: past it by more than rounding.
 
@@ -147,7 +150,7 @@ def _singular(scene: Scene) -> Callback:
     wrist = flange[:3, 3] - arm[-1].d * flange[:3, 2]
     outwards = wrist - np.array([0.0, 0.0, arm[0].d])
     outwards /= np.linalg.norm(outwards)
-    way = np.cumsum(np.minimum(np.maximum(np.arange(3000) - _PAUSE, 0) * 2e-8, 2e-6))
+    way = np.cumsum(np.minimum(np.maximum(np.arange(3000) - _PAUSE, 0) * 1e-8, 1.5e-6))
     return tool_stream(T, lambda value: (outwards * value, np.zeros(3)), way, scene.start.psi_c)
 
 
@@ -157,12 +160,20 @@ def _torque_rate(scene: Scene) -> Callback:
 
 
 def _torque_range(scene: Scene) -> Callback:
-    """Swings back first, so that the arm is not too fast before the bound is passed."""
-    limits = scene.limits.joint
-    slope = 0.95 * limits.torque_rate[1] * CYCLE_TIME
-    swing = np.arange(0.0, 0.5 * limits.torque[1], slope)
-    rise = np.arange(0.0, 1.2 * limits.torque[1], slope)
-    return torque_stream(scene.robot.n, 1, np.concatenate((np.zeros(_PAUSE), -swing, -swing[::-1], rise)))
+    """Something holds link 2 meanwhile: left alone it would be too fast before the bound is passed."""
+    limits, robot = scene.limits.joint, scene.robot
+    tau = 0.95 * limits.torque_rate[1] * CYCLE_TIME * np.maximum(np.arange(200) - _PAUSE, 0)
+    axis = robot.model.rigid_body.link_jacobian(scene.start.q, _HELD_LINK, np.zeros(3))[3:, 1]
+    stream = torque_stream(robot.n, 1, tau)
+    strongest = _HOLD * limits.collision_threshold[1]
+
+    def callback(state: RobotState, t: float) -> Command:
+        cycle = round(t / CYCLE_TIME)
+        if cycle % _TOLD == 0 and tau[cycle] <= strongest:
+            robot.world.push((0.0, 0.0, 0.0, *(-tau[cycle] * axis).tolist()), link=_HELD_LINK)
+        return stream(state, t)
+
+    return callback
 
 
 def _spin(value: float) -> tuple[Array, Array]:

@@ -37,6 +37,7 @@ class CheckActions:
         if request.what == "cancel":
             self._work.cancel()
             self._set(doing=None)
+            self._program.cancel(requests.CancelProgram())
         elif request.what == "undo":
             self._undo()
         elif plan is None:

@@ -68,10 +68,11 @@ class CheckPanel:
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Draws the report of the current plan."""
         plan, check, now = state.plan, state.check, time.monotonic()
-        busy = check.doing is not None
+        planning = state.program.progress  # A program is checked where it is planned, and that takes the longest.
+        busy = check.doing is not None or planning is not None
         self._began = self._began if busy else now
         self._bar.visible = busy and now - self._began > _MOMENT
-        self._bar.value = round(100.0 * check.progress, 1)
+        self._bar.value = round(100.0 * (check.progress if planning is None else planning), 1)
         self._cancel.disabled = not busy
         self._undo.disabled = check.slowed is None or busy
         stale = () if plan is None else plan.stale_parts(state.model, state.setup.wanted.box)
