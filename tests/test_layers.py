@@ -41,6 +41,7 @@ LAYERS = [  # From the bottom. A part imports from lines below its own, and from
     {"recording"},
     {"client", "controller", "views", "posing"},
     {"supervisor"},
+    {"gallery"},
     {"workbench", "notebook"},
     {"bench"},
     {"doctor"},

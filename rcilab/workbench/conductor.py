@@ -11,10 +11,12 @@ from typing import Any
 
 from rcilab.errors import RcilabError
 from rcilab.workbench import requests
+from rcilab.workbench.check.actions import CheckActions
 from rcilab.workbench.goal.actions import GoalActions
 from rcilab.workbench.jog.actions import JogActions
 from rcilab.workbench.jog.pose_actions import PoseActions
 from rcilab.workbench.keepsake import Keepsake, Kept
+from rcilab.workbench.learn.actions import LearnActions
 from rcilab.workbench.lease import Presence
 from rcilab.workbench.lease_actions import LeaseActions
 from rcilab.workbench.mailbox import Mailbox
@@ -61,6 +63,8 @@ class Conductor:
         self._jog = JogActions(store, session, self._goal)
         self._poses = PoseActions(store, self._goal)
         self._program = ProgramActions(store, session, self._goal)
+        self._check = CheckActions(store, session, self._goal, self._program)
+        self._learn = LearnActions(store, session)
         self._view = ViewActions(store)
         self._lease = LeaseActions(store, session, presence or Presence())
         self._export = ExportActions(store, deliver)
@@ -97,6 +101,8 @@ class Conductor:
             requests.PlanProgram: self._program.plan,
             requests.CancelProgram: self._program.cancel,
             requests.LoadProgram: self._program.load,
+            requests.Check: self._check.press,
+            requests.Learn: self._learn.press,
             requests.Seek: self._view.seek,
             requests.Play: self._view.play,
             requests.SetView: self._view.set_view,
@@ -133,6 +139,8 @@ class Conductor:
         self._jog.release()
         self._push.close()
         self._program.close()
+        self._check.close()
+        self._learn.close()
         self.robot.close()
         self._export.close()
         self._keepsake.drop()
@@ -162,6 +170,8 @@ class Conductor:
         self._poses.tick()
         self._folder.tick()
         self._program.tick()
+        self._check.tick()
+        self._learn.tick()
         self._keepsake.keep(self._store.state)
 
     def _resume(self, kept: Kept) -> None:

@@ -8,12 +8,16 @@ import time
 import traceback
 from typing import TYPE_CHECKING, Any
 
+from rcilab.workbench.learn.state import exhibited
 from rcilab.workbench.live import LiveChannel
 from rcilab.workbench.page import dress
 from rcilab.workbench.panels import Panel
 from rcilab.workbench.panels.check import CheckPanel
 from rcilab.workbench.panels.health import HealthPanel
 from rcilab.workbench.panels.jog import JogPanel
+from rcilab.workbench.panels.learn import LearnPanel
+from rcilab.workbench.panels.learn_exhibit import LearnExhibitPanel
+from rcilab.workbench.panels.learn_lesson import LearnLessonPanel
 from rcilab.workbench.panels.poses import PosesPanel
 from rcilab.workbench.panels.program import ProgramPanel
 from rcilab.workbench.panels.program_file import ProgramFilePanel
@@ -50,6 +54,7 @@ _TABS = (
     ("tab.setup", "tool", SetupPanel, SetupNumbersPanel),
     ("tab.check", "clipboard-check", CheckPanel),
     ("tab.run", "player-play", RunPanel, RecordingPanel, PushPanel, HealthPanel),
+    ("tab.learn", "school", LearnLessonPanel, LearnPanel, LearnExhibitPanel),
     ("tab.settings", "settings", SettingsPanel, RunsFolderPanel),
 )
 
@@ -99,11 +104,12 @@ class Presenter:
         if state.theme != self._theme:
             self._theme = state.theme
             dress(self._server, state.theme)
+        seen = exhibited(state)
         for panel in self._panels:
-            panel.show(state, status)
-        self._stage.show(state, status, self._text)
-        self._marks.show(state)
-        self._live.publish(**status_values(state, status, self._text, self._timeline.end))
+            panel.show(seen if panel is self._timeline else state, status)
+        self._stage.show(exhibited(state, scene=True), status, self._text)
+        self._marks.show(seen)
+        self._live.publish(**status_values(seen, status, self._text, self._timeline.end))
 
     def _build(self, state: UiState) -> None:
         """Makes the panels anew: another language, unit or theme has other words, another arm other joints."""

@@ -257,6 +257,26 @@ class LoadProgram(Request):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Check(Request):
+    """Something for the Check tab."""
+
+    what: Literal["row", "slow", "undo", "explain", "again", "cancel"]
+    row: str = ""
+    """Id of a condition."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Learn(Request):
+    """Something for the Learn tab."""
+
+    what: Literal["provoke", "cancel", "close", "moment", "script", "lesson", "skip", "leave"]
+    fault: int = -1
+    """Number of a fault."""
+    name: str = ""
+    """Of a lesson."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Seek(Request):
     """Go to a place in the planned motion."""
 

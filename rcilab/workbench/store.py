@@ -16,7 +16,9 @@ from rcilab.model import RobotModel
 from rcilab.posing.planning import Plan, PlannableLaw
 from rcilab.posing.reach import Reach, Tone
 from rcilab.spatial import Pose
+from rcilab.workbench.check.state import CheckState
 from rcilab.workbench.jog.jogging import JogState
+from rcilab.workbench.learn.state import LearnState
 from rcilab.workbench.lease import Lease
 from rcilab.workbench.program.draft import ProgramState
 from rcilab.workbench.run.pushing import Plant, PushState
@@ -112,6 +114,8 @@ class UiState:
     no_plan: Message | None = None
     """Why there is no plan."""
     program: ProgramState = field(default_factory=ProgramState)
+    check: CheckState = field(default_factory=CheckState)
+    learn: LearnState = field(default_factory=LearnState)
     asked: Motion | None = None
     """The motion that a foreign robot is to make and that awaits a second yes."""
     recording: Recording | None = None

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from rcilab.workbench import requests
+from rcilab.workbench.learn.state import exhibited
 from rcilab.workbench.store import Store
 from rcilab.workbench.text import LANGUAGES, message
 from rcilab.workbench.units import ANGLES, LENGTHS
@@ -34,7 +35,7 @@ class ViewActions:
 
     def play(self, request: requests.Play) -> None:
         """Starts the preview, from the beginning when it stands at the end, or holds it."""
-        state = self._store.state
+        state = exhibited(self._store.state)
         playing = not state.playing if request.playing is None else request.playing
         if state.plan is None:
             self._store.say("warn", message("ready.no_plan"))
@@ -45,7 +46,7 @@ class ViewActions:
 
     def advance(self, elapsed: float) -> None:
         """Moves a playing preview on by `elapsed`, [s]."""
-        state = self._store.state
+        state = exhibited(self._store.state)
         if not state.playing or state.plan is None:
             return
         place = state.place + elapsed * state.rate / max(state.plan.motion.duration, 1e-3)

@@ -161,6 +161,17 @@ class ProgramActions:
         draft = draft_of(program, self._store.state.model)
         self._change(draft, draft.steps[0].key)
 
+    def exchange(self, draft: Draft, plan: Plan) -> None:
+        """Takes a changed program that has been planned already; undo brings the old one back."""
+        self._open()
+        self._change(draft, self._program.selected)
+        self.keep_plan(plan)
+
+    def keep_plan(self, plan: Plan) -> None:
+        """Takes the plan of the program as it is."""
+        self._store.update(plan=plan, no_plan=None, recording=None, place=0.0, playing=False, asked=None)
+        self._set(planned=self._draft, answer=None)
+
     def tick(self) -> None:
         """Shows how far the planning is, and what came of it; follows the choice of another arm."""
         self._open()
