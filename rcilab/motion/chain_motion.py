@@ -15,7 +15,7 @@ from rcilab.motion.chain import Chain, Rows
 from rcilab.motion.chain_bounds import ColumnLimits, chain_bounds, column_limits
 from rcilab.motion.hermite import quintic
 from rcilab.motion.slowdown import spread
-from rcilab.motion.time_law import TimeLaw, fastest_squares, smooth_law
+from rcilab.motion.time_law import FastestLaw, TimeLaw, smooth_law
 
 _ROUNDS = 12
 """How often to slow down in places, and then as often as a whole. Seen: 1 to 4 in places."""
@@ -48,11 +48,11 @@ def plan_chain(chain: Chain, limits: Limits) -> tuple[Array, list[float]]:
     # From full deceleration to full acceleration.
     reversal = 2.0 * float(chain.speed.max()) * float((bounds.acceleration[finite] / bounds.jerk[finite]).max())
     cycles = max(2, math.ceil(reversal / CYCLE_TIME))
-    slowdown = np.ones(len(chain.knots))
+    fastest, slowdown = FastestLaw(allowed), np.ones(len(chain.knots))
     squares = np.zeros(len(chain.knots))
     worst = 0.0
     for round_ in range(2 * _ROUNDS):
-        before, squares = squares, fastest_squares(allowed.slowed(slowdown))
+        before, squares = squares, fastest.slowed(slowdown)
         law = smooth_law(chain.knots, squares, cycles)
         interval = chain.interval(law.s)
         changed = np.abs(squares - before) > _CHANGE * squares
