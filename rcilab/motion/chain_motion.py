@@ -25,8 +25,9 @@ _INSTANTS = (0.25, 0.5, 0.75)
 """Where in a cycle the curve is looked at, besides its start, in cycles."""
 _CHANGE = 1e-9
 """By what part of itself a square of s' has changed that is not rounding."""
-_HASTE = 1.001
-"""To slow down by the square of what was found, and this much more, so that few rounds do. A choice."""
+_HASTE = 1.002
+"""To slow down by the square of what was found, and this much more, also where it was closely under a limit, so that
+few rounds do, and places that were good stay so when the cycles fall elsewhere. A choice."""
 
 
 def plan_chain(chain: Chain, limits: Limits) -> tuple[Array, list[float]]:
@@ -68,7 +69,7 @@ def plan_chain(chain: Chain, limits: Limits) -> tuple[Array, list[float]]:
             return coefficients, corners
         worst = float(law.s[excess.argmax()])
         if round_ < _ROUNDS:
-            factor = np.where(excess > 1.0, excess * excess * _HASTE, 1.0)
+            factor = np.maximum(excess * excess * _HASTE, 1.0)
             slowdown *= spread(factor, law.s, chain.knots, cycles + 3)
         else:
             slowdown *= float(excess.max()) * _HASTE
