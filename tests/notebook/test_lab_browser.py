@@ -16,6 +16,7 @@ from typing import Any
 import nbformat
 import numpy as np
 import pytest
+from jupyter_client.blocking.client import BlockingKernelClient
 
 import rcilab
 
@@ -46,8 +47,8 @@ def find_chromium() -> str | None:
 
 
 @pytest.fixture(scope="module")
-def jupyter(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """Address of a notebook with one cell in a JupyterLab that `rcilab lab` has opened."""
+def jupyter(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, Path]]:
+    """Address of a notebook with one cell in a JupyterLab that `rcilab lab` has opened, and its runtime folder."""
     folder = tmp_path_factory.mktemp("lab")
     (folder / "notes").mkdir()
     kernel = {"kernelspec": {"name": "python3", "display_name": "Python 3", "language": "python"}}
@@ -62,7 +63,7 @@ def jupyter(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
         process = subprocess.Popen(command, env=environment, stdout=log, stderr=log)
     try:
         server = wait_for_server(folder / "runtime", process, folder / "log")
-        yield f"{server['url']}lab/tree/lab.ipynb?token={server['token']}"
+        yield f"{server['url']}lab/tree/lab.ipynb?token={server['token']}", folder / "runtime"
     finally:
         process.terminate()
         process.wait(15)
@@ -81,7 +82,7 @@ def wait_for_server(runtime: Path, process: subprocess.Popen[bytes], log: Path) 
 
 
 @pytest.fixture(scope="module")
-def page(jupyter: str) -> Iterator[Any]:
+def page(jupyter: tuple[str, Path]) -> Iterator[Any]:
     path = find_chromium()
     if path is None:
         reason = "no Chromium found: install it (Debian: apt install chromium) to run the browser tests"
@@ -103,7 +104,7 @@ def page(jupyter: str) -> Iterator[Any]:
 
         context.route("**/*", guard)
         tab = context.new_page()
-        tab.goto(jupyter)
+        tab.goto(jupyter[0])
         yield tab
         context.close()
         browser.close()
@@ -158,12 +159,12 @@ def test_a_person_runs_the_lab_moves_a_slider_executes_and_stops(page: Any) -> N
     wait_for(page, lambda: shows(page, PRO7.home), "the arm at home in the scene")
     assert page.locator(".Toastify__toast").count() == 0  # Nothing has popped up.
 
-    handle = page.locator(".rl-root .noUi-handle:visible").first
+    handle = page.locator(".widget-tab .noUi-handle:visible").first
     handle.focus()
-    for _ in range(20):
+    for _ in range(60):
         page.keyboard.press("ArrowRight")
     goal = PRO7.home.copy()
-    goal[0] = np.radians(10.0)
+    goal[0] = np.radians(30.0)
     wait_for(page, lambda: shows(page, goal), "the arm where the slider put it")
 
     page.get_by_role("tab", name="Run", exact=True).click()
@@ -171,8 +172,8 @@ def test_a_person_runs_the_lab_moves_a_slider_executes_and_stops(page: Any) -> N
     button(page, "Power on").click()
     page.locator(".rl-chip", has_text=re.compile("^ready$")).wait_for()
     page.get_by_role("tab", name="Plan", exact=True).click()
-    field = page.locator(".rl-root input[type=text]:visible").first
-    field.fill("2")
+    field = page.locator(".widget-tab input[type=text]:visible").first
+    field.fill("1")
     field.press("Enter")
     button(page, "Plan there").click()
     page.locator(".rl-chip", has_text="Passed").wait_for()
@@ -183,3 +184,27 @@ def test_a_person_runs_the_lab_moves_a_slider_executes_and_stops(page: Any) -> N
     button(page, "Stop").first.click()
     page.get_by_text("Stopped before its end").wait_for()
     assert not shows(page, goal)
+
+
+@pytest.mark.browser
+def test_a_tab_that_is_closed_stops_the_arm(page: Any, jupyter: tuple[str, Path]) -> None:
+    page.get_by_role("tab", name="Plan", exact=True).click()
+    button(page, "Plan there").click()
+    page.get_by_role("tab", name="Run", exact=True).click()
+    button(page, "Execute").click()
+    page.locator(".rl-chip", has_text=re.compile("^moving$")).wait_for()
+    page.close()
+    client = BlockingKernelClient(connection_file=str(next(jupyter[1].glob("kernel-*.json"))))
+    client.load_connection_file()
+    client.start_channels()
+    told = {"phase": "lab.state.status.phase", "left": "lab.state.plan.motion.duration - lab.state.status.motion_time"}
+    deadline = time.monotonic() + 20.0
+    while True:
+        reply = client.execute_interactive("", user_expressions=told, timeout=30)
+        phase, left = (reply["content"]["user_expressions"][name]["data"]["text/plain"] for name in told)
+        if phase == "'idle'":
+            break
+        assert time.monotonic() < deadline, "the arm goes on although nobody is there"
+        time.sleep(0.2)
+    client.stop_channels()
+    assert float(left) > 2.0  # It was to go on so long.
