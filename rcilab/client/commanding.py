@@ -79,6 +79,9 @@ def _torques(model: RobotModel) -> Commander:
 
 
 def _reference(rows: JointPath, k: int) -> tuple[Array, Array, Array]:
-    """Returns where row k is, how fast and how accelerated, by central differences; beyond the ends it stands."""
-    before, now, after = rows[max(k - 1, 0)], rows[k], rows[min(k + 1, len(rows) - 1)]
-    return now, (after - before) / (2.0 * CYCLE_TIME), (after - 2.0 * now + before) / CYCLE_TIME**2
+    """Returns where row k is, how fast and how accelerated, by backward differences; before row 0 it stood there.
+
+    So the first torque is that of an arm at rest: nothing, as the torque rate has it.
+    """
+    now, before, far = rows[k], rows[max(k - 1, 0)], rows[max(k - 2, 0)]
+    return now, (now - before) / CYCLE_TIME, (now - 2.0 * before + far) / CYCLE_TIME**2
