@@ -144,6 +144,11 @@ class SupervisorStatus:
     """How the control process is scheduled."""
     memory_locked: bool = False
     """Whether the control process's memory is kept from being paged out."""
+    round_trip: float | None = None
+    """From a command to the state that shows it as commanded, the controller's play-out included, as the newest motion
+    of joint angles had it, [s]; None as long as there was none."""
+    answer_time: float | None = None
+    """From a state's arrival to the answer, median of the newest motion's last second, [s]."""
     late_cycles: int = 0
     """Cycles handled more than 1 ms late since the connection was made, with or without a motion; see `Lateness`."""
     lost_cycles: int = 0

@@ -21,6 +21,7 @@ from rcilab.supervisor.launch import require_plant
 from rcilab.supervisor.layout import OPERATOR_TIMEOUT, ControlBlock, Word
 from rcilab.supervisor.pace_desk import PaceDesk
 from rcilab.supervisor.ring import RingReader
+from rcilab.supervisor.round_trip import RoundTrip
 from rcilab.supervisor.settings import build_settings
 from rcilab.supervisor.setup_desk import SetupDesk, standard_setup
 from rcilab.supervisor.snapshot import Snapshot
@@ -166,6 +167,7 @@ class Supervisor(ArmRequests, Closing):
                 setup_times=self._setup.times,
                 **fields,
                 **self._read_pace(shown),
+                **self._round_trip.read_fields(),
             )
 
     def reconnect(self) -> Ticket:
@@ -232,7 +234,7 @@ class Supervisor(ArmRequests, Closing):
         address = None if self._target == VIRTUAL else self._target
         self._keeper = ProcessKeeper(block, self.model.name, self._plant, address, auto_restart=self._auto_restart)
         self._desk = TicketDesk(block)
-        self._pace = PaceDesk(block)
+        self._pace, self._round_trip = PaceDesk(block), RoundTrip(block)
         self._reader, self._ring = StatusReader(block), RingReader(block)
         self._is_closing.clear()
         self._block = block

@@ -13,6 +13,8 @@ from rcilab.workbench.panels import Panel
 from rcilab.workbench.panels.check import CheckPanel
 from rcilab.workbench.panels.health import HealthPanel
 from rcilab.workbench.panels.jog import JogPanel
+from rcilab.workbench.panels.lab import LabPanel
+from rcilab.workbench.panels.mode import ModePanel
 from rcilab.workbench.panels.poses import PosesPanel
 from rcilab.workbench.panels.program import ProgramPanel
 from rcilab.workbench.panels.program_file import ProgramFilePanel
@@ -27,6 +29,7 @@ from rcilab.workbench.panels.target import TargetPanel
 from rcilab.workbench.panels.timeline import TimelinePanel
 from rcilab.workbench.panels.tool_jog import ToolJogPanel
 from rcilab.workbench.panels.waypoint import WaypointPanel
+from rcilab.workbench.panels.where import WherePanel
 from rcilab.workbench.program.marks import ProgramMarks
 from rcilab.workbench.scene.stage import Stage
 from rcilab.workbench.session import Session
@@ -47,7 +50,7 @@ _TABS = (
     ("tab.program", "list-numbers", ProgramPanel, WaypointPanel, ProgramFilePanel),
     ("tab.setup", "tool", SetupPanel, SetupNumbersPanel),
     ("tab.check", "clipboard-check", CheckPanel),
-    ("tab.run", "player-play", RunPanel, RecordingPanel, PushPanel, HealthPanel),
+    ("tab.run", "player-play", RunPanel, WherePanel, ModePanel, RecordingPanel, PushPanel, LabPanel, HealthPanel),
     ("tab.settings", "settings", SettingsPanel),
 )
 
