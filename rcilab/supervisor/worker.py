@@ -38,7 +38,7 @@ from rcilab.motion import plan_stop
 from rcilab.protocols.rci import STATE_SIZE
 from rcilab.realtime import enter_realtime
 from rcilab.spatial import Pose
-from rcilab.state import ControllerMode, Mode, RobotState
+from rcilab.state import ControllerMode, Mode, RobotMode, RobotState
 from rcilab.supervisor.failure import pack_failure
 from rcilab.supervisor.guiding import HandGuide
 from rcilab.supervisor.jogging import HeldJog
@@ -130,6 +130,9 @@ class Worker:
     def _show_state(self, state: RobotState) -> None:
         """Keeps the phase in step with what the robot reports while nothing moves."""
         phase = self._publisher.snapshot.phase
+        if state.robot_mode is RobotMode.USER_STOPPED and self._publisher.snapshot.powered:
+            self._publisher.update(powered=False)  # The emergency stop, or the gate, has taken it.
+            self._say_ready()
         with suppress(InvalidValueError):  # A controller may report no pose before it is ready.
             flange = self._model.pose(state.q_c, "flange")
             self._publisher.show_tool(flange.inverse() @ Pose.from_matrix(state.T_base_tool_c))

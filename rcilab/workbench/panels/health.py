@@ -75,9 +75,10 @@ def histogram_html(late: Lateness, text: Text) -> str:
         upper = "∞" if math.isinf(high) else f"{high:g}"
         word = f" {esc(text('health.too_late'))}" if low >= _LATE and count else ""
         tone = "rl-bad" if word else "rl-good"
+        bar = f'<div class="rl-meter"><i style="width:{share:.0f}%"></i></div>'
         rows.append(
-            f'<tr><th>{low:g}–{upper}</th><td class="{tone}"><div class="rl-meter"><i style="width:{share:.0f}%"></i>'
-            f"</div></td><td>{count}{word}</td></tr>"
+            f'<tr><th style="width:26%">{low:g}–{upper}</th><td class="{tone}" style="width:48%">{bar}</td>'
+            f"<td>{count}{word}</td></tr>"
         )
     return (
         f'<p class="rl-note">{esc(text("health.histogram"))}</p>'

@@ -34,6 +34,8 @@ def obstacle(state: UiState, status: SupervisorStatus) -> Message | None:
         return message("ready.busy")
     if status.code == "moving.guided":
         return message("ready.guided")
+    if status.code == "moving.held":
+        return message("ready.held")
     if status.phase == "crashed" or (status.phase == "lost" and state.target == "virtual"):
         return tell_status(status)
     if status.phase in _NOT_IDLE:
