@@ -34,6 +34,7 @@ class ArmRequests:
     model: RobotModel
     """The arm, with the tool and the load that the controller was told of last."""
     _lock: threading.RLock
+    _block: ControlBlock | None
     _setup: SetupDesk
     _pace: PaceDesk
     _jogging: Ticket | None

@@ -158,6 +158,7 @@ class RobotActions:
             changes |= {"plot_joint": 0, "problems": {}}
             changes |= {"push": replace(state.push, link=TOOL)}  # The other arm may have no such link.
             changes |= {"setup": SetupState()}  # Nor may it bear the same load.
+            changes |= {"drive": replace(state.drive, control=None, refusal=None, typed_address="", world=None)}
         # First: from here on no state of the old arm is shown on the new one.
         self._session.open(model, target, state.plant, _own_setup(state, target) if model is state.model else None)
         self._store.update(place=0.0, playing=False, **changes)

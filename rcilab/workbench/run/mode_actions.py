@@ -106,7 +106,6 @@ class ModeActions:
         state, status = self._store.state, self._session.status()
         if state.model.name != self._arm:
             self._arm, self._ticket, self._wish = state.model.name, None, None
-            self._store.update(drive=replace(state.drive, control=None, refusal=None))
         self._collect()
         state = self._store.state
         if state.target == "virtual" and state.drive.refusal is None and status.phase == "idle":
