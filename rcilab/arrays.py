@@ -35,7 +35,7 @@ def frozen(value: ArrayLike) -> Array:
 
 def sealed(array: Array) -> Array:
     """Makes an array read-only that nobody else writes to, and returns it: `frozen` needs no copy of it."""
-    array.flags.writeable = False
+    array.setflags(write=False)
     return array
 
 

@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from enum import IntEnum
 
+from rcilab.errors import InvalidValueError
+
 
 class Fault(IntEnum):
     """One error bit of the robot state; the value is the bit's place on the wire."""
@@ -51,6 +53,22 @@ class Fault(IntEnum):
 
 
 FAULT_COUNT = len(Fault)
+
+
+def find_fault(name: Fault | str) -> Fault:
+    """Returns a fault by its name, as the manual prints it or as the member is called, in any case.
+
+    Raises:
+        InvalidValueError: There is no such fault; the message lists those that exist.
+    """
+    if isinstance(name, Fault):
+        return name
+    wanted = name.replace("_", "").lower()
+    for fault in Fault:
+        if wanted in (fault.manual_name.lower(), fault.manual_name[1:].lower()):
+            return fault
+    known = ", ".join(fault.manual_name for fault in Fault)
+    raise InvalidValueError("fault", name, f"is unknown; known: {known}")
 
 
 def faults_from_bits(bits: Iterable[int]) -> tuple[Fault, ...]:

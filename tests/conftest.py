@@ -18,6 +18,10 @@ LIVE = ("browser", "workbench", "supervisor")
 """In the names of files whose tests draw, or run control processes at 1 kHz: a core has no room for two of them."""
 
 
+def is_live(file: str) -> bool:
+    return any(name in file for name in LIVE)
+
+
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
     """Where tests run side by side (`pytest -n 2`), the live ones run one after the other, in one process."""
@@ -28,9 +32,20 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
 
         def _split_scope(self, nodeid: str) -> str:
             file = super()._split_scope(nodeid)
-            return "live" if any(name in file for name in LIVE) else file
+            return "live" if is_live(file) else file
+
+        def _assign_work_unit(self, node: object) -> None:
+            if "live" in self.workqueue:  # The longest, and before its process is made nice.
+                self.workqueue.move_to_end("live", last=False)
+            super()._assign_work_unit(node)
 
     return OneLiveTestAtATime(config, log)
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Tests beside a live one leave it the core that it needs: it waits for a person's eyes, they only compute."""
+    if "PYTEST_XDIST_WORKER" in os.environ and not is_live(item.nodeid.split("::")[0]) and os.nice(0) == 0:
+        os.nice(10)
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from rcilab.arrays import Array
+from rcilab.bench.fastest import fastest_straight, slowest_alone
 from rcilab.bench.measure import Measurement, cost_by_length, summarise, time_calls
 from rcilab.conformance.check import check
 from rcilab.conformance.clearance_path import clearance_path
@@ -65,8 +66,23 @@ def bench_inverse_batch() -> Measurement:
     poses = model.forward_path(_random_q(model, count))
     times = time_calls(model.inverse_batch, [poses] * 20, warm_up=2)
     growth = _growth(model.inverse_batch, {n: poses[:n] for n in (10, 100, 1000, count)})
-    note = f"{_ROBOT}, time a pose in batches of {count}, limits judged; whole batches: {growth}"
+    one, many = _panda_inverse(count)
+    note = (
+        f"{_ROBOT}, time a pose in batches of {count}, limits judged; whole batches: {growth}; Panda, whose offsets make "
+        f"it a polynomial of degree 16: {one:.0f} us single, {many:.1f} us a pose"
+    )
     return summarise("inverse_batch", np.array(times) / count, "us", 2.0, note)
+
+
+def _panda_inverse(count: int) -> tuple[float, float]:
+    """Returns what every solution of a Panda's inverse costs at a held elbow: alone, and one of many, [us]."""
+    model = load_model("Panda")
+    q = _random_q(model, count)
+    poses = model.forward_path(q)
+    some = [(model.forward(row), float(row[2])) for row in q[:200]]
+    one = np.median(time_calls(lambda case: model.inverse(case[0], psi=case[1]), some))
+    many = np.median(time_calls(lambda psi: model.inverse_batch(poses, psi), [q[:, 2]] * 3, warm_up=1)) / count
+    return 1e6 * float(one), 1e6 * float(many)
 
 
 def bench_feasible_arcs() -> Measurement:
@@ -75,6 +91,9 @@ def bench_feasible_arcs() -> Measurement:
     poses = [model.forward(q) for q in _random_q(model, 500)]
     arcs = np.mean([len(model.feasible_arcs(pose).arcs) for pose in poses])
     note = f"{_ROBOT}, 500 reachable poses, {arcs:.1f} arcs on average"
+    panda = load_model("Panda")
+    others = time_calls(panda.feasible_arcs, [panda.forward(q) for q in _random_q(panda, 30)])
+    note += f"; Panda, searched along its self-motion: {1e3 * float(np.median(others)):.1f} ms"
     return summarise("feasible_arcs", time_calls(model.feasible_arcs, poses), "us", 300.0, note)
 
 
@@ -88,7 +107,12 @@ def bench_plan_joint() -> Measurement:
         lambda case: plan_joint(model, case[0], case[1], speed=case[2]).q,
         [(motion.duration, [(motion.start, motion.q[-1], motion.speed)] * 5) for motion in some],
     )
-    note = f"{_ROBOT}, 200 random pairs; with every 1 ms sample of q {growth}"
+    straight, alone = _ratios(model, ends)
+    note = (
+        f"{_ROBOT}, 200 random pairs, {straight.max():.4f} times as long as the fastest straight motion at most; against "
+        f"the slowest joint by itself, which a straight motion cannot always match, {np.median(alone):.4f} (median), "
+        f"{alone.max():.3f} at most; with every 1 ms sample of q {growth}"
+    )
     return summarise("plan_joint", times, "ms", 1.0, note)
 
 
@@ -225,6 +249,15 @@ def motion_of(model: RobotModel, duration: float, start: Array | None = None) ->
     if duration <= fastest:
         return plan_joint(model, near, near + (far - near) * duration / fastest, speed=1.0)
     return plan_joint(model, near, far, speed=fastest / duration)
+
+
+def _ratios(model: RobotModel, ends: Array) -> tuple[Array, Array]:
+    """Returns how much longer motions at full speed last than the fastest straight one, and than one joint needs."""
+    limits = model.limits.joint
+    durations = [plan_joint(model, start, goal, speed=1.0).duration for start, goal in ends]
+    bounds = np.array([(fastest_straight(limits, b - a), slowest_alone(limits, b - a)) for a, b in ends])
+    straight, alone = np.array(durations) / bounds.T
+    return straight, alone
 
 
 def _random_q(model: RobotModel, count: int) -> Array:

@@ -23,7 +23,7 @@ BENCHES = (
     *("check", "check_full", "check_joint_rows"),
     *("controller_ideal", "controller_mujoco", "controller_cartesian", "controller_impedance", "client_answer"),
     *("jog", "plan_line", "plan_arc", "replan"),
-    *("drag", "import", "start", "state_period", "control_loop"),
+    *("drag", "lab_slider", "lab_shown", "import", "start", "state_period", "control_loop"),
 )
 """In the order they run; the slow ones last."""
 COMPARE = "compare"
@@ -110,6 +110,10 @@ def _bench(name: str, seconds: float) -> Callable[[], Measurement]:
         from rcilab.bench import start
 
         return {"import": start.bench_import, "start": start.bench_start}[name]
+    if name.startswith("lab_"):
+        from rcilab.bench import notebook
+
+        return notebook.bench_lab_shown if name == "lab_shown" else notebook.bench_lab_slider
     if name in ("drag", "control_loop"):
         from rcilab.bench import page
 

@@ -53,7 +53,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--patience",
         type=float,
         metavar="S",
-        help="lock-step: how long to wait for a command (60; 0.05 with a bad network)",
+        help="lock-step: how long to wait for a command (60; 0.05 with --corrupt)",
     )
     parser.add_argument(
         "--lost-limit",

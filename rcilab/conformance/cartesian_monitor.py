@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import TypeAlias
 
-from rcilab.conformance.breach import Breach, faults_of
+from rcilab.conformance.breach import Breach, are_inside, faults_of
 from rcilab.conformance.condition import Condition
 from rcilab.conformance.spans import spans
 from rcilab.conformance.tool_conditions import TOOL_CONDITIONS
@@ -48,7 +48,10 @@ class CartesianMonitor:
         self, limits: Limits, box: SafetyBox | None = None, rows: Sequence[Condition] = TOOL_CONDITIONS
     ) -> None:
         self._box = active_box(box)
-        self._rows = [(row, *(float(bound[0]) for bound in row.bounds(limits))) for row in rows]
+        self._rows = list(rows)
+        bounds = [row.bounds(limits) for row in rows]
+        self._lower = [float(lower[0]) for lower, _ in bounds]
+        self._upper = [float(upper[0]) for _, upper in bounds]
         self.reset(IDENTITY)
 
     def reset(self, pose: Pose, psi: float | None = None) -> None:
@@ -89,16 +92,14 @@ class CartesianMonitor:
         self._pose, self.twist, self.acceleration = pose, twist, acceleration
         self.arm_angle = _arm_angle_differences(self.arm_angle, psi, times)
         self._values = self._signals()
-        for value, (_, low, high) in zip(self._values, self._rows, strict=True):
-            if not low < value < high:
-                return faults_of(self.broken())
-        return ()
+        is_fine = are_inside(self._values, self._lower, self._upper)
+        return () if is_fine else faults_of(self.broken())
 
     def broken(self) -> list[Breach]:
         """Returns what the last step broke."""
         return [
             Breach(row, 0, value, low if value <= low else high)
-            for value, (row, low, high) in zip(self._values, self._rows, strict=True)
+            for value, row, low, high in zip(self._values, self._rows, self._lower, self._upper, strict=True)
             if not low < value < high
         ]
 

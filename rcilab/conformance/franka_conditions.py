@@ -148,9 +148,9 @@ FRANKA_ELBOW_SIGN = Condition(
 FRANKA_TOOL_CONDITIONS: tuple[Condition, ...] = (
     replace(
         CARTESIAN_FRAME,
-        formula="T_c proper",
+        formula="T_c proper, reachable, not singular at q_3",
         fault=FrankaError.CARTESIAN_POSITION_MOTION_GENERATOR_INVALID_FRAME_FLAG,
-        source=f"{_PAGE}, Cartesian trajectory, necessary",
+        source=f"{_PAGE}, Cartesian trajectory, necessary (singular: ours)",
     ),
     *(_tool_row(row) for row in TOOL_CONDITIONS if row is not CARTESIAN_POSITION),
     FRANKA_ELBOW_SIGN,

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from rcilab.clock import CYCLE_TIME
-from rcilab.conformance.breach import Breach, faults_of
+from rcilab.conformance.breach import Breach, are_inside, faults_of
 from rcilab.conformance.condition import Condition
 from rcilab.conformance.measured_conditions import ACCELERATION_CUTOFF, MEASURED_CONDITIONS
 from rcilab.errors import InvalidValueError
@@ -94,10 +94,8 @@ class MeasuredMonitor:
         velocity = (0.0, 0.0) if twist is None else _norms(twist)
         acceleration = _norms(self.tool_acceleration)
         self._values = [*q, outside, speed, *dq, *velocity, *self.acceleration, *acceleration]
-        for value, low, high in zip(self._values, self._lower, self._upper, strict=True):
-            if not low < value < high:
-                return faults_of(self.broken())
-        return ()
+        is_fine = are_inside(self._values, self._lower, self._upper)
+        return () if is_fine else faults_of(self.broken())
 
     def broken(self) -> list[Breach]:
         """Returns what the last step broke."""

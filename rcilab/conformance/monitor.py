@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from rcilab.conformance.breach import Breach, faults_of
+from rcilab.conformance.breach import Breach, are_inside, faults_of
 from rcilab.conformance.condition import Condition
 from rcilab.conformance.conditions import JOINT_CONDITIONS
 from rcilab.conformance.spans import spans
@@ -80,10 +80,8 @@ class JointMonitor:
         ddq = [(new - old) / second for new, old in zip(dq, self.dq, strict=True)]
         jerk = [(new - old) / third for new, old in zip(ddq, self.ddq, strict=True)]
         self.q, self.dq, self.ddq, self.jerk = q, dq, ddq, jerk
-        for value, low, high in zip([*q, *dq, *ddq, *jerk], self._lower, self._upper, strict=True):
-            if not low < value < high:
-                return faults_of(self.broken())
-        return ()
+        is_fine = are_inside([*q, *dq, *ddq, *jerk], self._lower, self._upper)
+        return () if is_fine else faults_of(self.broken())
 
     def broken(self) -> list[Breach]:
         """Returns what the last step broke."""

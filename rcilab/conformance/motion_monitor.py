@@ -19,6 +19,7 @@ from rcilab.conformance.condition_tables import condition_table
 from rcilab.conformance.frame import find_frame_error
 from rcilab.conformance.measured_monitor import MeasuredMonitor
 from rcilab.conformance.monitor import JointMonitor
+from rcilab.conformance.rest_monitor import RestMonitor
 from rcilab.conformance.start import StartState, as_start
 from rcilab.conformance.tool_signals import commands_before
 from rcilab.conformance.torque_monitor import TorqueMonitor
@@ -35,8 +36,7 @@ class Monitor:
     """Judges one command a cycle by the rows that `check` judges a whole motion by, in the same mode.
 
     Owned by the thread that runs the cycle. It is used alike for every arm: an xMate is judged by the manual's table,
-    a Panda by Franka's. What only a whole motion has, its rest at both ends and the torques that the manual
-    recommends to bound, is left to `check`.
+    a Panda by Franka's. A motion's rest is judged with the first commands and with the one that says `finished`.
 
     Args:
         model: The arm with its tool and load.
@@ -65,10 +65,12 @@ class Monitor:
         self._clearance = None if distance is None else ClearanceMonitor(model, distance)
         self._measured = MeasuredMonitor(limits, box)
         self._torques = self._tool = self._joints = None
+        torques = TorqueMonitor(limits.joint, sorted(_throughout(rows, "torque"), key=lambda row: -row.order))
         if self.mode == "torque":
-            self._torques = TorqueMonitor(limits.joint, _throughout(rows, "torque"))
+            self._torques = torques
         else:
-            self._joints = JointMonitor(limits.joint, _throughout(rows, "joint"))
+            self._joints, self._needed = JointMonitor(limits.joint, _throughout(rows, "joint")), torques
+            self._rest = RestMonitor(limits, [row for row in rows if row.stage != "throughout" and row.order > 0])
         self._is_cartesian = self.mode.startswith("cartesian")
         if self._is_cartesian:
             tool_rows = _throughout(table.cartesian, "arm_angle", "translation", "rotation")
@@ -95,11 +97,13 @@ class Monitor:
         self._start, self._is_first = state, not state.moving
         self._q = state.q.tolist()
         self._measured.reset(state.q.tolist())
+        tau = model.rigid_body.motion_torque(state.q, state.dq, state.ddq).tolist() if state.moving else [0.0] * model.n
         if self._joints is not None:
             self._joints.reset(state.q.tolist(), state.dq.tolist(), state.ddq.tolist())
+            self._needed.reset(tau)
+            self._rest.reset(state.moving)
         if self._torques is not None:
-            tau = model.rigid_body.motion_torque(state.q, state.dq, state.ddq)
-            self._torques.reset(tau.tolist() if state.moving else [0.0] * model.n)
+            self._torques.reset(tau)
         if self._clearance is not None:
             self._clearance.reset(state.q)
         if self._tool is not None:
@@ -165,7 +169,8 @@ class Monitor:
     def _step_joints(self, command: Command, cycles: int) -> list[Breach]:
         q = self._numbers(command.q if isinstance(command, JointPosition) else None, "q", command)
         away = [new - old for new, old in zip(q, self._start.q.tolist(), strict=True)]
-        return self._at_start({"joint": away}) + self._judge_joints(q, cycles)
+        found = self._at_start({"joint": away}) + self._judge_joints(q, cycles)
+        return found + self._rest.step(self._difference, cycles, is_last=command.finished)
 
     def _step_pose(self, monitor: CartesianMonitor, command: Command, cycles: int, side: int | None) -> list[Breach]:
         if not isinstance(command, CartesianPosition):
@@ -188,7 +193,8 @@ class Monitor:
         self._q = q
         if self._inverse.is_singular(q):
             found.append(self._improper(float(self._inverse.singularity_path(np.array([q]))[0])))
-        return found + self._judge_elbow(q) + self._judge_joints(q, cycles)
+        found += self._judge_elbow(q) + self._judge_joints(q, cycles)
+        return found + self._rest.step(self._difference, cycles, is_last=command.finished)
 
     def _judge_joints(self, q: list[float], cycles: int) -> list[Breach]:
         assert self._joints is not None
@@ -196,10 +202,24 @@ class Monitor:
         found = self._joints.broken()
         if not math.isfinite(sum(q)):
             return found
+        state = self._joints
+        self._needed.step(
+            self._model.rigid_body.motion_torque(*map(np.array, (q, state.dq, state.ddq))).tolist(), cycles
+        )
+        found += self._needed.broken()
         if self._box.is_active:
             self._box.step(self._model.forward(q).parts[1])
             found += self._box.broken()
         return found + self._distances(q)
+
+    def _difference(self, row: Condition) -> Sequence[float]:
+        """Returns the last velocities or accelerations of what a row judges: the joints', or the tool's norm."""
+        if row.is_per_joint:
+            assert self._joints is not None
+            return self._joints.dq if row.order == 1 else self._joints.ddq
+        assert self._tool is not None
+        moved = self._tool.twist if row.order == 1 else self._tool.acceleration
+        return [math.hypot(*(moved[:3] if row.signal == "translation" else moved[3:]))]
 
     def _on_side(self, side: int | None) -> list[float]:
         """Returns the last joint angles, mirrored at the elbow's flip where the other side is asked for."""

@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-import math
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rcilab.arrays import Array, JointVector
+from rcilab.arrays import Array
 from rcilab.clock import CYCLE_TIME
 from rcilab.conformance.clearance_conditions import clearance_conditions
 from rcilab.conformance.condition import Condition
 from rcilab.conformance.conditions import START_POSITION_TOLERANCE
+from rcilab.conformance.rest import beyond_a_cycle
 from rcilab.conformance.start import StartState
 from rcilab.conformance.tool_signals import ToolSignals
 from rcilab.model import RobotModel
-from rcilab.motion.motion import Motion, MotionSample
+from rcilab.motion.motion import Motion
 from rcilab.safety_box import SafetyBox
 from rcilab.safety_distance import SafetyDistance
 from rcilab.state import Mode
@@ -30,9 +30,14 @@ HOLD_SAMPLES = 3
 """Cycles judged after the last row, in which the controller repeats it: a third difference looks back that far."""
 
 _SMOOTH_JERK = 0.01
-"""Part of the jerk limits below which torques change smoothly. A choice: a tenth of what the torque rate allows."""
+"""Part of the jerk limits below which torques change smoothly, at speeds within the limits. A choice: a tenth of what
+the torque rate allows."""
 _SMOOTH_STEP = 16
 """[cycles] How far apart torques are computed where they change smoothly; straight lines between them. A choice."""
+
+
+_SURE = 0.8
+"""Part of a bound on torques up to which straight lines leave no doubt; rows beyond are computed. A choice."""
 
 
 class MotionSignals:
@@ -70,10 +75,8 @@ class MotionSignals:
         if condition.stage == "throughout":
             return self._throughout(condition), 0.0
         if condition.stage == "end":
-            return self._rest(condition, self._motion.end()), self._motion.duration
-        if condition.order == 0:
-            return self._at_start(condition)[np.newaxis], 0.0
-        return self._rest(condition, self._motion.at(0.0)), 0.0
+            return self._rest(condition), self._motion.duration
+        return self._at_start(condition)[np.newaxis] if condition.order == 0 else self._rest(condition), 0.0
 
     def links(self, condition: Condition, row: int) -> LinkPair | None:
         """Returns between whom the distance in a row of a table is; None for anything that is no distance."""
@@ -134,9 +137,19 @@ class MotionSignals:
     @cached_property
     def _torques(self) -> tuple[Array, Array]:
         """Torques without gravity and their backward differences over a cycle, each of shape (N + 3, n)."""
-        q, dq, ddq, jerk = self._differences
-        smooth = 0.0 if self._mode == "torque" else _SMOOTH_JERK
-        rows = _eventful_rows(jerk, smooth * self._model.limits.joint.jerk)
+        _, dq, _, jerk = self._differences
+        joint, smooth = self._model.limits.joint, 0.0 if self._mode == "torque" else _SMOOTH_JERK
+        is_eventful = (np.abs(jerk) > smooth * joint.jerk) | (np.abs(dq) > joint.velocity)
+        chosen = _eventful_rows(np.asarray(is_eventful.any(axis=1), dtype=np.bool_))
+        tau, rate = self._torques_at(chosen)
+        is_near = (np.abs(tau) > _SURE * joint.torque) | (np.abs(rate) > _SURE * joint.torque_rate)
+        more = chosen | _with_rows_before(np.asarray(is_near.any(axis=1), dtype=np.bool_))
+        return (tau, rate) if (more == chosen).all() else self._torques_at(more)
+
+    def _torques_at(self, chosen: NDArray[np.bool_]) -> tuple[Array, Array]:
+        """Returns torques computed in some rows, straight lines between them, and their differences over a cycle."""
+        q, dq, ddq, _ = self._differences
+        rows = np.flatnonzero(chosen)
         known = np.ascontiguousarray(self._model.rigid_body.motion_torques(q[rows], dq[rows], ddq[rows]).T)
         every = np.arange(len(q))
         tau = np.empty(q.T.shape)
@@ -145,34 +158,25 @@ class MotionSignals:
         before = tau[:, :1] if self._start.moving else np.zeros_like(tau[:, :1])
         return tau.T, (np.diff(np.concatenate((before, tau), axis=1)) / CYCLE_TIME).T
 
-    def _rest(self, condition: Condition, sample: MotionSample) -> Array:
-        """Returns velocity or acceleration at an end of the motion, shape (1, n), or its norm for the tool, (1, 1).
-
-        Rows that somebody else made tell rest from motion only as far as one cycle at the jerk limit goes.
-        """
-        dq, ddq = self._resolved(sample.dq, 1), self._resolved(sample.ddq, 2)
-        if condition.is_per_joint:
-            return (dq if condition.order == 1 else ddq)[np.newaxis]
-        model, q = self._model, sample.q
-        moved = model.velocity(q, dq) if condition.order == 1 else model.acceleration(q, dq, ddq)
-        part = moved[:3] if condition.signal == "translation" else moved[3:]
-        return np.array([[math.sqrt(float(part @ part))]])
-
-    def _resolved(self, value: JointVector, order: int) -> JointVector:
-        if self._motion.law != "samples":
-            return value
-        unresolved = self._model.limits.joint.jerk * CYCLE_TIME ** (3 - order)
-        return np.sign(value) * np.maximum(np.abs(value) - unresolved, 0.0)
+    def _rest(self, condition: Condition) -> Array:
+        """Returns what is left of velocity or acceleration at an end of the motion, shape (1, n) or (1, 1)."""
+        values = self._throughout(condition)
+        row = min(len(self._motion), len(values)) - 1 if condition.stage == "end" else condition.order
+        return beyond_a_cycle(values[row : row + 1], condition, self._model.limits)
 
 
-def _eventful_rows(jerk: Array, smooth: Array) -> NDArray[np.intp]:
-    """Returns the rows between which torques run straight: all on either side of a jerk, and some in between."""
-    jerks: NDArray[np.bool_] = np.asarray((np.abs(jerk) > smooth).any(axis=1))
-    chosen = jerks.copy()
-    chosen[:-1] |= jerks[1:]
+def _eventful_rows(is_eventful: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Returns the rows between which torques run straight: all on either side of an event, and some in between."""
+    chosen = _with_rows_before(is_eventful)
     chosen[::_SMOOTH_STEP] = True
     chosen[-1] = True
-    return np.flatnonzero(chosen)
+    return chosen
+
+
+def _with_rows_before(rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    found = rows.copy()
+    found[:-1] |= rows[1:]
+    return found
 
 
 def _backward_differences(q: Array, start: StartState) -> tuple[Array, Array, Array, Array]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rcilab.clock import CYCLE_TIME
-from rcilab.conformance.breach import Breach, faults_of
+from rcilab.conformance.breach import Breach, are_inside, faults_of
 from rcilab.conformance.condition import Condition
 from rcilab.conformance.tool_conditions import TORQUE_CONDITIONS
 from rcilab.errors import InvalidValueError
@@ -67,10 +67,8 @@ class TorqueMonitor:
         new = list(tau[: self._n])
         self.dtau = [(value - old) / h for value, old in zip(new, self.tau, strict=True)]
         self.tau = new
-        for value, low, high in zip([*self.dtau, *new], self._lower, self._upper, strict=True):
-            if not low < value < high:
-                return faults_of(self.broken())
-        return ()
+        is_fine = are_inside([*self.dtau, *new], self._lower, self._upper)
+        return () if is_fine else faults_of(self.broken())
 
     def broken(self) -> list[Breach]:
         """Returns what the last step broke."""

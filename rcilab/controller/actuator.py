@@ -96,7 +96,8 @@ class Actuator:
             self._law, self._damper = law, Damper()
         match law:
             case Law.POSITION:
-                return Setpoint(Drive.POSITION, commanded.q, commanded.dq, commanded.ddq)
+                arrays = commanded.arrays
+                return Setpoint(Drive.POSITION, commanded.q, commanded.dq, commanded.ddq, arrays=arrays)
             case Law.BRAKED:
                 return Setpoint(Drive.BRAKED, commanded.q, commanded.dq, commanded.ddq)
             case Law.TORQUE:
@@ -107,22 +108,21 @@ class Actuator:
                 box = guiding_box(self._settings)
                 if box is not None:
                     torque = torque + wall_torque(self._model, measured, box, self._settings.cartesian_stiffness)
-                return Setpoint(Drive.TORQUE, commanded.q, commanded.dq, commanded.ddq, tau=torque.tolist())
+                return Setpoint(Drive.TORQUE, commanded.q, commanded.dq, commanded.ddq, tau=torque)
 
     def _compliance(
         self, law: Law, commanded: CommandedMotion, tool_c: ToolMotion, measured: Measurement
     ) -> JointVector:
         model, settings = self._model, self._settings
         if law is Law.JOINT_IMPEDANCE:
-            q, dq, ddq = commanded.q, commanded.dq, commanded.ddq
-            return joint_impedance(model, q, dq, ddq, measured, settings.joint_stiffness, self._damper)
+            return joint_impedance(model, *commanded.arrays, measured, settings.joint_stiffness, self._damper)
         if law is Law.CARTESIAN_IMPEDANCE:
             return cartesian_impedance(
                 model,
                 tool_c.pose,
                 tool_c.twist,
                 tool_c.acceleration,
-                commanded.q,
+                commanded.arrays[0],
                 measured,
                 settings.cartesian_stiffness,
                 settings.desired_wrench,

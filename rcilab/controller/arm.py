@@ -118,5 +118,6 @@ class Arm:
     def _move_tool(self) -> None:
         commanded, tool = self.commanded, self.tool_c
         if commanded.version != self._tool_version or not tool.is_at_rest:
-            tool.update(commanded.q, commanded.dq)
+            q, dq, _ = commanded.arrays
+            tool.update(commanded.q, self.model.rigid_body.tool_motion(q, dq))
             self._tool_version = commanded.version

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from rcilab.arrays import JointVector, sealed
 from rcilab.clock import CYCLE_TIME
 from rcilab.limits import JointLimits
 from rcilab.motion.differences import derivatives_from_differences, differences_from_derivatives
@@ -36,7 +37,17 @@ class CommandedMotion:
         self._acceleration: list[float] = limits.acceleration.tolist()
         self._jerk: list[float] = limits.jerk.tolist()
         self.version = 0
+        self._arrays: tuple[JointVector, JointVector, JointVector] | None = None
+        self._arrays_version = -1
         self.place(q)
+
+    @property
+    def arrays(self) -> tuple[JointVector, JointVector, JointVector]:
+        """q, dq and ddq as read-only arrays, made once a cycle for all who compute with them."""
+        if self._arrays is None or self._arrays_version != self.version:
+            q, dq, ddq = sealed(np.array((self.q, self.dq, self.ddq)))
+            self._arrays, self._arrays_version = (q, dq, ddq), self.version
+        return self._arrays
 
     def place(self, q: Sequence[float]) -> None:
         """Puts the commanded angles somewhere, at rest: while the brakes or a person's hand decide where the arm is."""

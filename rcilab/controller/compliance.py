@@ -43,8 +43,8 @@ class Damping(NamedTuple):
             spring: Torque of the springs alone, shape (n,), [N m].
             speed_error: Wanted minus measured joint velocities, shape (n,), [rad/s].
         """
-        tau = spring + self.damper @ speed_error
-        return tau if self.slowing is None else tau - self.slowing @ spring
+        tau = spring + self.damper.dot(speed_error)
+        return tau if self.slowing is None else tau - self.slowing.dot(spring)
 
 
 def design_damping(mass_inverse: Matrix, stiffness: Matrix, slowest: float = SLOWEST_DAMPING) -> Damping:

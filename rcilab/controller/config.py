@@ -52,7 +52,7 @@ class ControllerConfig:
     """Cycles by which commands are played late, to absorb jitter; None: 10, and 2 for torques, or 0 in lock-step."""
     patience: float | None = None
     """How long lock-step waits for a command before it counts as lost, [s]; None: 60, so that a client may stand still
-    for a while, or 0.05 while the network is bad on purpose."""
+    for a while, or 0.05 while the network spoils datagrams on purpose."""
     lost_limit: int | None = MOST_LOST
     """Lost cycles in a row that are an instability, 10 to 20; None: any number is bridged."""
     auto_limit: bool = False

@@ -1,7 +1,7 @@
 """The controller's sockets behind a network that can be bad: an `Endpoint` that loses, delays and spoils.
 
 Where nothing is wrong everything takes the direct way. Time is the machine's own here, in lock-step too: the simulated
-millisecond waits for a command, however late it is.
+millisecond waits for a command, however late it is, but not for one that is known to be lost.
 """
 
 from __future__ import annotations
@@ -18,6 +18,9 @@ from rcilab.protocols.world import Direction, NetworkFaults
 class FaultyNetwork:
     """Stands between a controller and its sockets. Owned by the thread that runs the controller.
 
+    Attributes:
+        has_lost: Whether the newest state, or a command since, is lost: it may be that nothing answers this state.
+
     Args:
         endpoint: The sockets.
         clock: What delays are measured with.
@@ -32,6 +35,7 @@ class FaultyNetwork:
         self._states = DelayedDatagrams(states, "states")
         self._answers = SlowStream(states)
         self._drop_reason: str | None = None
+        self.has_lost = False
 
     @property
     def faults(self) -> tuple[NetworkFaults, NetworkFaults]:
@@ -51,21 +55,23 @@ class FaultyNetwork:
         if self.is_clean:
             return self._endpoint.poll(timeout, guests)
         deadline = self._clock.now() + timeout
+        had_lost = self.has_lost
         while True:
             self._send_what_is_due()
             now = self._clock.now()
             due = min(deadline, self._commands.next_due, self._states.next_due, self._answers.next_due)
             arrivals = self._let_through(self._endpoint.poll(due - now, guests))
-            if arrivals or self._clock.now() >= deadline:
+            if arrivals or self.has_lost is not had_lost or self._clock.now() >= deadline:
                 self._send_what_is_due()
                 return arrivals
 
     def send_state(self, datagram: bytes) -> None:
         """Sends a state on its way."""
         if self._states.is_clean:
+            self.has_lost = False
             self._endpoint.send_state(datagram)
         else:
-            self._states.put(datagram, self._clock.now())
+            self.has_lost = not self._states.put(datagram, self._clock.now())
             self._send_what_is_due()
 
     def send_frame(self, frame: bytes) -> None:
@@ -107,7 +113,7 @@ class FaultyNetwork:
         passed: list[Arrival] = []
         for arrival in arrivals:
             if isinstance(arrival, DatagramArrived):
-                self._commands.put(arrival.datagram, now)
+                self.has_lost |= not self._commands.put(arrival.datagram, now)
                 continue
             if isinstance(arrival, ClientJoined | ClientLeft):
                 self._answers.begin()

@@ -69,7 +69,7 @@ def wall_torque(model: RobotModel, measured: Measurement, box: SafetyBox, stiffn
     """
     terms = model.rigid_body.tool_terms(measured.q, measured.dq)
     r, centre = box.T_base_box.parts
-    x, y, z = (a - b for a, b in zip(terms.position, centre, strict=True))
+    x, y, z = (a - b for a, b in zip(terms.pose.parts[1], centre, strict=True))
     outside = [0.0, 0.0, 0.0]
     for axis, half in enumerate(edge / 2.0 for edge in box.size):
         along = r[axis] * x + r[3 + axis] * y + r[6 + axis] * z
@@ -88,8 +88,8 @@ def _held(model: RobotModel, terms: ToolTerms, kind: rci.DragType, T_held: Pose)
     """Returns stiffness and error of what a Cartesian drag holds, the error of shape (3,) in base axes."""
     cartesian = model.limits.cartesian
     if kind is rci.DragType.ROTATION:
-        return cartesian.translation_stiffness, np.subtract(T_held.position, terms.position)
-    return cartesian.rotation_stiffness, np.array(turn_between(terms.rotation, T_held.parts[0]))
+        return cartesian.translation_stiffness, T_held.position - terms.pose.position
+    return cartesian.rotation_stiffness, np.array(turn_between(terms.pose.parts[0], T_held.parts[0]))
 
 
 def _limit_springs(q: JointVector, limits: JointLimits) -> tuple[Array, JointVector]:

@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.arrays import JointVector, frozen
+from rcilab.arrays import JointVector, frozen, sealed
 from rcilab.clock import CYCLE_TIME
 from rcilab.controller.plant import Drive, Measurement, Setpoint
 from rcilab.controller.push import Push
@@ -96,7 +96,7 @@ class IdealPlant:
         stays = not any(setpoint.dq) and not any(setpoint.ddq) and last.q.tolist() == list(setpoint.q)
         if stays:
             return last if self._rests else self._rest_at(last.q)
-        return self._measure(*frozen((setpoint.q, setpoint.dq, setpoint.ddq)))
+        return self._measure(*setpoint.as_arrays())
 
     def _rest_at(self, q: JointVector) -> Measurement:
         measurement = self._measure(q, self._zeros, self._zeros)
@@ -107,9 +107,8 @@ class IdealPlant:
         tau = self._body.full_torque(q, dq, ddq)
         if self._push.is_active:
             tau -= self._push.torque(q)
-        tau.flags.writeable = False
         self._rests = False
-        self._measurement = Measurement(q, dq, tau)
+        self._measurement = Measurement(q, dq, sealed(tau))
         return self._measurement
 
     def _fall(self, tau_c: JointVector) -> Measurement:
@@ -126,10 +125,8 @@ class IdealPlant:
         dq = dq + h * ddq
         q = q + h * dq
         tau = tau_c + gravity(q)
-        for array in (q, dq, tau):
-            array.flags.writeable = False
         self._rests = False
-        self._measurement = Measurement(q, dq, tau)
+        self._measurement = Measurement(sealed(q), sealed(dq), sealed(tau))
         return self._measurement
 
     def _acceleration(

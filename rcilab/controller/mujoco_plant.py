@@ -41,6 +41,7 @@ FRICTION_KNOWN = 0.9  # Share of the friction that the drives compensate; no dri
 PEAK_TORQUE = 4.0  # Times the manual's torque limit, what a drive adds at most; a choice, see above
 BRAKE_TIME = 0.02  # [s] time constant of the brakes; a choice
 
+_BACK, _AHEAD = KP * TIMESTEP, 1.0 - KD * TIMESTEP  # [1/s], [1]
 _BRAKES_HOLD = 1e-4  # [rad/s] below this closed brakes hold
 _STILL_SPEED = 1e-7  # [rad/s] below this a resting arm is said to rest
 _STILL_ERROR = 1e-9  # [rad] nearer than this to its setpoint a resting arm is said to be there
@@ -122,9 +123,10 @@ class MuJoCoPlant:
         self._let_rotors_be_felt(setpoint.drive is not Drive.TORQUE)
         dq, bias = self._dq.copy(), self._bias.copy()
         drive_torque = self._drive_torque(setpoint)
-        np.clip(drive_torque, -self._peak, self._peak, out=drive_torque)
+        np.minimum(drive_torque, self._peak, out=drive_torque)  # np.clip takes three times as long as both together.
+        np.maximum(drive_torque, -self._peak, out=drive_torque)
         compensated = self._robot.rigid_body.gravity(self._q) if setpoint.drive is Drive.TORQUE else bias
-        motor = drive_torque + compensated + FRICTION_KNOWN * self._friction * dq
+        motor = drive_torque + compensated + self._known_friction * dq
         self._applied[:] = motor
         if self._push.is_active:
             self._applied += self._push.torque(self._q)
@@ -143,16 +145,15 @@ class MuJoCoPlant:
             return np.zeros(self._n) if setpoint.tau is None else np.array(setpoint.tau, dtype=np.float64)
         if setpoint.drive is Drive.BRAKED:
             return self._times_inertia(dq * (-1.0 / BRAKE_TIME))
-        # The setpoint is where the arm is to be at the end of this millisecond; q and dq are those of its beginning.
-        ddq_c = np.array(setpoint.ddq)
-        dq_c = np.array(setpoint.dq)
-        error = np.array(setpoint.q) - TIMESTEP * dq_c - q
-        speed_error = dq_c - TIMESTEP * ddq_c - dq
-        return self._times_inertia(ddq_c + KD * speed_error + KP * error)
+        # The setpoint is where the arm is to be at the end of this millisecond; q and dq are those of its beginning:
+        # ddq_c + KD (dq_c - h ddq_c - dq) + KP (q_c - h dq_c - q), with the two steps back taken out of the brackets.
+        q_c, dq_c, ddq_c = setpoint.as_arrays()
+        return self._times_inertia(KP * (q_c - q) + KD * (dq_c - dq) - _BACK * dq_c + _AHEAD * ddq_c)
 
     def _settle(self, setpoint: Setpoint) -> None:
         """Lets an arm that has come to rest be at rest: its last 1e-7 rad/s would otherwise never end."""
-        speed = np.abs(self._dq).max()
+        speeds: list[float] = self._dq.tolist()
+        speed = max(map(abs, speeds))
         if setpoint.drive is Drive.BRAKED:
             if speed < _BRAKES_HOLD:
                 self._come_to_rest(self._q.tolist())
@@ -219,6 +220,7 @@ class MuJoCoPlant:
         self._peak: Array = PEAK_TORQUE * torque
         self._rotors: Array = ARMATURE_PER_TORQUE * torque
         self._friction: Array = self._share_of_friction * DAMPING_PER_TORQUE * torque
+        self._known_friction = FRICTION_KNOWN * self._friction
         self._product = np.zeros(model.n)
         self._rotors_are_felt = True
         self._still_for = 0

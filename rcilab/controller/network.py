@@ -83,11 +83,14 @@ class DelayedDatagrams:
         """Whether nothing is wrong and nothing under way, so that datagrams may take the direct way."""
         return not self._waiting and self.faults.spares_datagrams
 
-    def put(self, datagram: bytes, now: float) -> None:
-        """Sends a datagram on its way."""
+    def put(self, datagram: bytes, now: float) -> bool:
+        """Sends a datagram on its way; returns whether it will arrive, be it spoiled."""
+        arrives = False
         for copy, due in self._impairment.apply(datagram, now):
             if len(self._waiting) < MOST_HELD:
                 heapq.heappush(self._waiting, (due, next(self._order), copy))
+                arrives = True
+        return arrives
 
     def take(self, now: float) -> list[bytes]:
         """Returns the datagrams that have arrived by `now`, [s], in their order of arrival."""

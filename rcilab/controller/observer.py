@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rcilab.arrays import Array, JointVector, frozen
+from rcilab.arrays import Array, JointVector, frozen, sealed
 from rcilab.clock import CYCLE_TIME
 from rcilab.controller.plant import Measurement
 from rcilab.model import RobotModel
@@ -66,25 +66,21 @@ class Observer:
             return self._answer
         step = _GAIN * (self._raw - tau_ext)
         is_there = _is_tiny(step, _GAIN * _NOTHING)
-        self._answer = self._answered(self._raw if is_there else _read_only(tau_ext + step), measured)
+        self._answer = self._answered(self._raw if is_there else sealed(tau_ext + step), measured)
         return self._answer
 
     def _unexplained(self, measured: Measurement, ddq: JointVector) -> JointVector:
         raw = self._body.full_torque(measured.q, measured.dq, ddq)
         raw -= measured.tau
-        return self._zeros if _is_tiny(raw, _NOTHING) else _read_only(raw)
+        return self._zeros if _is_tiny(raw, _NOTHING) else sealed(raw)
 
     def _answered(self, tau_ext: JointVector, measured: Measurement) -> tuple[JointVector, Array]:
         if tau_ext is self._zeros:
             return self._none
-        J = self._body.tool_jacobian(measured.q)
-        return tau_ext, _read_only(self._body.tool_solver.solve(J @ J.T + _DAMPING, J @ tau_ext))
+        J = self._body.tool_terms(measured.q, measured.dq).jacobian
+        return tau_ext, sealed(self._body.tool_solver.solve(J.dot(J.T) + _DAMPING, J.dot(tau_ext)))
 
 
 def _is_tiny(vector: Array, bound: float) -> bool:
-    return all(-bound < value < bound for value in vector.tolist())
-
-
-def _read_only(array: Array) -> Array:
-    array.flags.writeable = False
-    return array
+    values = vector.tolist()
+    return -bound < min(values) and max(values) < bound

@@ -10,11 +10,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
+import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.arrays import Array, JointVector
+from rcilab.arrays import Array, JointVector, sealed
 from rcilab.dynamics.payload import Payload
 from rcilab.model import RobotModel
 from rcilab.safety_box import SafetyBox
@@ -32,8 +33,7 @@ class Drive(Enum):
     """`tau` acts at the joints, on top of the compensation of gravity and friction: M ddq + C dq = tau."""
 
 
-@dataclass(frozen=True, slots=True)
-class Setpoint:
+class Setpoint(NamedTuple):
     """What the drives shall do for one millisecond. All vectors are n plain floats; the arm is at them at its end."""
 
     drive: Drive
@@ -45,6 +45,15 @@ class Setpoint:
     """Commanded joint accelerations, [rad/s^2]."""
     tau: Sequence[float] | Array | None = None
     """Commanded joint torques without gravity and friction, [N m], for TORQUE."""
+    arrays: tuple[JointVector, JointVector, JointVector] | None = None
+    """q, dq and ddq once more, from whoever has them as arrays already."""
+
+    def as_arrays(self) -> tuple[JointVector, JointVector, JointVector]:
+        """Returns q, dq and ddq as read-only arrays."""
+        if self.arrays is not None:
+            return self.arrays
+        q, dq, ddq = sealed(np.array((self.q, self.dq, self.ddq), dtype=np.float64))
+        return q, dq, ddq
 
 
 @dataclass(frozen=True, slots=True, eq=False)

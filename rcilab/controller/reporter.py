@@ -26,7 +26,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rcilab.arrays import Array, JointVector, Matrix, frozen
+from rcilab.arrays import Array, JointVector, frozen
 from rcilab.clock import CYCLE_TIME
 from rcilab.controller.commanded import CommandedMotion
 from rcilab.controller.drive_model import DriveModel
@@ -38,7 +38,7 @@ from rcilab.faults import Fault
 from rcilab.model import RobotModel
 from rcilab.protocols.rci import ForceFrame
 from rcilab.spatial import Pose, Rotation9
-from rcilab.state import ControllerMode, MotionGeneratorMode, RobotMode, RobotState
+from rcilab.state import ControllerMode, MotionGeneratorMode, RobotMode, RobotState, build_state
 
 _SETTLED_TORQUE = 1e-6  # [N m] A filtered torque this close to the true one takes its value, so that rest is rest.
 _STANDING = 1e-6  # [m/s] Below this the tool has no direction of its path.
@@ -72,7 +72,7 @@ class StateReporter:
 
     def __init__(self, model: RobotModel, settings: Settings) -> None:
         self._zeros = frozen(np.zeros(model.n))
-        self._zeros6 = frozen(np.zeros(6))
+        self._no_rates = frozen(np.zeros(2 * model.n))
         self._drive_model = DriveModel(model)
         self._path = (0.0, 0.0, 0.0)
         self.configure(model, settings)
@@ -82,11 +82,14 @@ class StateReporter:
         self._model = model
         self._T_tool_force = model.T_flange_tool.inverse() @ settings.T_flange_force
         self._force_frame = settings.force_frame
+        at_tool = not any(self._T_tool_force.parts[1])
+        self._is_wrench_at_tool = at_tool and self._force_frame is ForceFrame.WORLD
         self._gain = low_pass_gain(settings.torque_report_filter)
         self._body: dict[str, Any] | None = None
         self._readings: Readings | None = None
         self._version = -1
         self._is_settled = False
+        self._sensed = self._filtered = self._no_rates
 
     def report(
         self,
@@ -104,15 +107,8 @@ class StateReporter:
         if body is None or not self._is_settled or not self._is_same(readings):
             body = self._body = self._compute(readings)
             self._readings, self._version = readings, readings.commanded.version
-        return RobotState(
-            message_id=message_id,
-            faults=faults,
-            success_rate=success_rate,
-            motion_generator_mode=motion_generator_mode,
-            controller_mode=controller_mode,
-            robot_mode=robot_mode,
-            **body,
-        )
+        modes = (motion_generator_mode, controller_mode, robot_mode)
+        return build_state((message_id, *body.values(), faults, success_rate, *modes))
 
     def _is_same(self, readings: Readings) -> bool:
         last = self._readings
@@ -125,36 +121,29 @@ class StateReporter:
         )
 
     def _compute(self, readings: Readings) -> dict[str, Any]:
+        """Returns the fields of a state between its number and its faults, in their order."""
         commanded, tool_c, measured, tool, tau_commanded, _, wrench = readings
         last, before, h = self._body, self._readings, CYCLE_TIME
-        q_c, dq_c, ddq_c = frozen((commanded.q, commanded.dq, commanded.ddq))
+        q_c, dq_c, ddq_c = commanded.arrays
         if tau_commanded is not None:
             tau_c = frozen(tau_commanded)
         else:
             tau_c = self._model.rigid_body.full_torque(q_c, dq_c, ddq_c)
-        tau, ddq, dtau, dtau_c = measured.tau, self._zeros, self._zeros, self._zeros
-        tau_filtered = tau
-        drive = self._drive_model
-        if last is not None and before is not None:
-            if measured is not before.measured:
-                ddq = (measured.dq - before.measured.dq) / h
-                dtau = (tau - before.measured.tau) / h
-            if (tau_commanded is None) == (before.tau_c is None):
-                dtau_c = (tau_c - last["tau_c"]) / h
-            tau_filtered = self._low_pass(last["tau_filtered"], tau, commanded.is_at_rest)
-        motor_tau = motor_filtered = drive.motor_tau(tau, measured.dq, ddq)
-        if last is not None:
-            motor_filtered = self._low_pass(last["motor_tau_filtered"], motor_tau, commanded.is_at_rest)
+        dtau_c = self._zeros
+        if last is not None and before is not None and (tau_commanded is None) == (before.tau_c is None):
+            dtau_c = (tau_c - last["tau_c"]) / h
+        is_new = before is None or measured is not before.measured
+        # What is done alike to several vectors is done to all of them at once.
+        sensed = np.concatenate((measured.dq, measured.tau))
+        rates = (sensed - self._sensed) / h if is_new and last is not None else self._no_rates
+        self._sensed = sensed
+        theta, dtheta, motor_tau = self._drive_model.motor_side(np.concatenate((measured.q, sensed, rates)))
+        torques = np.concatenate((measured.tau, motor_tau))
+        filtered = self._filtered = torques if last is None else self._low_pass(torques, commanded.is_at_rest)
         self._is_settled = (
-            commanded.is_at_rest
-            and tool_c.is_at_rest
-            and tau_filtered is tau
-            and motor_filtered is motor_tau
-            and before is not None
-            and measured is before.measured
-            and not dtau_c.any()
+            commanded.is_at_rest and tool_c.is_at_rest and filtered is torques and not is_new and not dtau_c.any()
         )
-        T_base_tool_c = _matrix(tool_c.pose)
+        n = len(q_c)
         tool_velocity_c, tool_acceleration_c = frozen((tool_c.twist, tool_c.acceleration))
         return {
             "q": measured.q,
@@ -162,33 +151,35 @@ class StateReporter:
             "dq": measured.dq,
             "dq_c": dq_c,
             "ddq_c": ddq_c,
-            "T_base_tool": T_base_tool_c if tool.pose is tool_c.pose else _matrix(tool.pose),
-            "T_base_tool_c": T_base_tool_c,
+            "T_base_tool": tool.matrix,
+            "T_base_tool_c": tool_c.matrix,
             "tool_velocity_c": tool_velocity_c,
             "tool_acceleration_c": tool_acceleration_c,
             "psi": tool.psi,
             "psi_c": tool_c.psi,
             "dpsi_c": tool_c.dpsi,
             "ddpsi_c": tool_c.ddpsi,
-            "tau": tau,
-            "tau_filtered": tau_filtered,
+            "tau": measured.tau,
+            "tau_filtered": filtered[:n],
             "tau_c": tau_c,
             "dtau_c": dtau_c,
             "tau_ext_in_base": wrench,
             "tau_ext_in_stiff": self._in_force_frame(wrench, tool.pose, tool_c.twist[:3]),
-            "theta": drive.theta(measured.q, tau),
-            "dtheta": drive.dtheta(measured.dq, dtau),
+            "theta": theta,
+            "dtheta": dtheta,
             "motor_tau": motor_tau,
-            "motor_tau_filtered": motor_filtered,
+            "motor_tau_filtered": filtered[n:],
         }
 
-    def _low_pass(self, last: JointVector, tau: JointVector, may_settle: bool) -> JointVector:
+    def _low_pass(self, torques: Array, may_settle: bool) -> Array:
         if self._gain == 1.0:
-            return tau
-        missing = tau - last
+            return torques
+        missing = torques - self._filtered
         if may_settle and max(missing.max(), -missing.min()) * (1.0 - self._gain) < _SETTLED_TORQUE:
-            return tau
-        return last + self._gain * missing
+            return torques
+        missing *= self._gain
+        missing += self._filtered
+        return missing
 
     def _in_force_frame(self, wrench: Array, T_base_tool: Pose, velocity: Sequence[float]) -> Array:
         """Returns a wrench on the tool (base axes, tool's origin) at the force frame's origin, in its type's axes."""
@@ -196,12 +187,12 @@ class StateReporter:
         if speed > _STANDING:
             x, y, z = velocity
             self._path = (x / speed, y / speed, z / speed)
-        if not wrench.any():
-            return self._zeros6
+        fx, fy, fz, mx, my, mz = wrench.tolist()
+        if self._is_wrench_at_tool or not (fx or fy or fz or mx or my or mz):
+            return wrench
         r, (x, y, z) = (T_base_tool @ self._T_tool_force).parts
         tx, ty, tz = T_base_tool.parts[1]
         ax, ay, az = tx - x, ty - y, tz - z
-        fx, fy, fz, mx, my, mz = wrench.tolist()
         mx, my, mz = mx + ay * fz - az * fy, my + az * fx - ax * fz, mz + ax * fy - ay * fx
         if self._force_frame is ForceFrame.WORLD:
             return frozen((fx, fy, fz, mx, my, mz))
@@ -235,7 +226,3 @@ def _path_axes(x: tuple[float, float, float], r: Rotation9) -> Rotation9:
         ay, cz * ax - cx * az, cy,
         az, cx * ay - cy * ax, cz,
     )  # fmt: skip
-
-
-def _matrix(pose: Pose) -> Matrix:
-    return np.array(pose.as_row_major()).reshape(4, 4)

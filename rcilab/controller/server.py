@@ -57,7 +57,7 @@ PRIORITY = 80  # Under SCHED_FIFO; above the client's process, whose clock this 
 LEAD_TIME = 0.0005  # [s] Before its state is due a cycle begins: longer than nearly all of them take; a choice.
 RESEND_TIME = 0.02  # [s] In lock-step a state is sent again after this time until the first command has come.
 PATIENCE = 60.0  # [s] In lock-step, for the next command; then its cycle is lost, and each following one at 1 kHz.
-BAD_NETWORK_PATIENCE = 0.05  # [s] The same where the network loses datagrams on purpose: below any client's own.
+SPOILED_PATIENCE = 0.05  # [s] The same where the network spoils datagrams on purpose: below any client's own.
 FAREWELL = 20  # [cycles] In which a client learns of the end from the error bit of its states.
 SLIP = 20  # [cycles] A motion that took so much longer than it should is worth a line.
 GRACE = 2.0  # [s] For the arm to come to rest when the controller shall end.
@@ -105,6 +105,7 @@ class ControllerServer:
         self.cycle.limit_table = config.limit_table
         self.missed = 0
         self.misfits = 0
+        self._is_out_of_patience = False
         self._log = log if log is not None else _to_stderr
         self._clock = SystemClock()
         self._requests: deque[bytes] = deque()
@@ -241,7 +242,7 @@ class ControllerServer:
                 return
 
     def _await_command(self) -> None:
-        """Serves the sockets until a command is there, the motion is over or patience is."""
+        """Serves the sockets until a command is there or lost on its way, the motion is over or patience is."""
         cycle = self.cycle
         is_first = not cycle.playout.is_playing
         deadline = self._clock.now() + self._patience
@@ -250,20 +251,24 @@ class ControllerServer:
             self._poll(0.0 if len(cycle.playout) else RESEND_TIME if is_first else remaining)
             self._look_for_parent()
             if len(cycle.playout) or not cycle.wants_commands or self._is_ending:
+                self._is_out_of_patience = False
+                return
+            if self._network.has_lost:
                 return
             if is_first:
                 self._send_state()
             elif self._clock.now() >= deadline:
+                self._is_out_of_patience = True
                 return
 
     @property
     def _patience(self) -> float:
         """How long lock-step waits for the next command, [s]."""
-        if self.cycle.playout.lost_in_row:
+        if self._is_out_of_patience:
             return CYCLE_TIME
         if self.config.patience is not None:
             return self.config.patience
-        return PATIENCE if self._network.is_clean else BAD_NETWORK_PATIENCE
+        return SPOILED_PATIENCE if any(faults.corrupt for faults in self._network.faults) else PATIENCE
 
     def _step(self, due: float) -> None:
         """Lives through a cycle and sends its state when it is due, or at once when that is over."""

@@ -15,7 +15,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from rcilab.arrays import Array, JointVector, Matrix
 from rcilab.controller.compliance import DAMPING_RATIO, Damper, design_damping
@@ -26,14 +25,16 @@ from rcilab.spatial import Pose, turn_between
 
 NULL_FREQUENCY = 5.0  # [rad/s] of the spring that holds the elbow of a 7-axis arm; soft, a choice
 NULL_DAMPING = 2.0 * DAMPING_RATIO * NULL_FREQUENCY  # [1/s]
-_DAMPED_INVERSE = 1e-4  # [1/kg] keeps feed-forward finite at a singularity; off it, below 0.1 % of it are lost
+_DAMPED_INVERSE = 1e-4 * np.eye(
+    6
+)  # [1/kg] keeps feed-forward finite at a singularity; off it, below 0.1 % of it are lost
 
 
 def joint_impedance(
     model: RobotModel,
-    q_c: Sequence[float],
-    dq_c: Sequence[float],
-    ddq_c: Sequence[float],
+    q_c: JointVector,
+    dq_c: JointVector,
+    ddq_c: JointVector,
     measured: Measurement,
     stiffness: Sequence[float],
     damper: Damper | None = None,
@@ -42,9 +43,9 @@ def joint_impedance(
 
     Args:
         model: The arm as the controller knows it.
-        q_c: Commanded joint angles, n numbers, [rad].
-        dq_c: Their velocities, [rad/s].
-        ddq_c: Their accelerations, [rad/s^2].
+        q_c: Commanded joint angles, shape (n,), [rad].
+        dq_c: Their velocities, shape (n,), [rad/s].
+        ddq_c: Their accelerations, shape (n,), [rad/s^2].
         measured: Where the arm is.
         stiffness: n numbers, [N m/rad].
         damper: The one of the cycles before; None designs another.
@@ -54,16 +55,16 @@ def joint_impedance(
     tau = (damper or Damper()).torque(
         lambda: design_damping(body.mass_inverse(q), np.diag(K)), K * (q_c - q), dq_c - dq
     )
-    tau += body.motion_torque(q, dq, np.array(ddq_c))
+    tau += body.motion_torque(q, dq, ddq_c)
     return tau
 
 
 def cartesian_impedance(
     model: RobotModel,
     T_c: Pose,
-    twist_c: ArrayLike,
-    acc_c: ArrayLike,
-    q_null: Sequence[float],
+    twist_c: Sequence[float],
+    acc_c: Sequence[float],
+    q_null: JointVector,
     measured: Measurement,
     stiffness6: Sequence[float],
     desired_wrench6: Sequence[float] = (0.0,) * 6,
@@ -81,7 +82,7 @@ def cartesian_impedance(
         T_c: Commanded pose of the tool in base.
         twist_c: Its velocity, base axes, linear first, shape (6,), [m/s, rad/s].
         acc_c: Its acceleration, shape (6,), [m/s^2, rad/s^2].
-        q_null: Joint angles whose arm angle a 7-axis arm keeps, n numbers, [rad]. Others have no choice.
+        q_null: Joint angles whose arm angle a 7-axis arm keeps, shape (n,), [rad]. Others have no choice.
         measured: Where the arm is.
         stiffness6: Three translations [N/m], three rotations [N m/rad].
         desired_wrench6: Force and moment that the arm exerts on its surroundings in addition, [N, N m].
@@ -93,21 +94,23 @@ def cartesian_impedance(
     J = terms.jacobian
     # Rows of J, error and desired wrench in the axes of the springs, where the stiffness is diagonal.
     along = J if axes is None else _turned(J, axes)
-    error = _pose_error(T_c, terms)
-    wrench = np.array(stiffness6) * (error if axes is None else _turned(error, axes)) + desired_wrench6
-    dq_c, ddq_c = _joint_reference(model, terms, twist_c, acc_c, q_null, measured)
+    error = _pose_error(T_c, terms.pose)
+    if axes is not None:
+        error = _turned(np.array(error), axes).tolist()
+    wrench = np.array([k * e + w for k, e, w in zip(stiffness6, error, desired_wrench6, strict=True)])
+    dq_c, force, free = _reference(model, terms, twist_c, acc_c, q_null, measured)
     tau = (damper or Damper()).torque(
-        lambda: design_damping(terms.mass_inverse, along.T * stiffness6 @ along), wrench @ along, dq_c - dq
+        lambda: design_damping(terms.mass_inverse, along.T * stiffness6 @ along), along.T.dot(wrench), dq_c - dq
     )
-    tau += body.motion_torque(q, dq, ddq_c)
+    tau += J.T.dot(force)
+    tau += body.motion_torque(q, dq, free)
     return tau
 
 
-def _pose_error(T_c: Pose, terms: ToolTerms) -> Array:
-    """Returns position and rotation vector from the measured to the commanded tool, base axes, shape (6,)."""
-    r, (x, y, z) = T_c.parts
-    px, py, pz = terms.position
-    return np.array((x - px, y - py, z - pz, *turn_between(terms.rotation, r)))
+def _pose_error(T_c: Pose, T: Pose) -> tuple[float, ...]:
+    """Returns position and rotation vector from the measured to the commanded tool, base axes, [m, rad]."""
+    (r_c, (x, y, z)), (r, (px, py, pz)) = T_c.parts, T.parts
+    return x - px, y - py, z - pz, *turn_between(r, r_c)
 
 
 def _turned(rows: Array, axes: Matrix) -> Array:
@@ -115,31 +118,36 @@ def _turned(rows: Array, axes: Matrix) -> Array:
     return np.concatenate((axes.T @ rows[:3], axes.T @ rows[3:]))
 
 
-def _joint_reference(
+def _reference(
     model: RobotModel,
     terms: ToolTerms,
-    twist: ArrayLike,
-    acc: ArrayLike,
-    q_null: Sequence[float],
+    twist: Sequence[float],
+    acc: Sequence[float],
+    q_null: JointVector,
     measured: Measurement,
-) -> tuple[JointVector, JointVector]:
-    """Returns joint velocities and accelerations, each of shape (n,), that move the tool as commanded.
+) -> tuple[JointVector, Array, JointVector]:
+    """Returns what moves the tool as commanded: joint velocities, force at the tool, and accelerations besides.
 
-    Of all that do, they are those of least kinetic energy (Khatib's dynamically consistent inverse), and on a 7-axis
-    arm the accelerations besides are those of a damped spring at `q_null`, as far as the tool does not feel it.
+    Of all that do, they are those of least kinetic energy. With Khatib's inertia at the tool, L = (J M^-1 J^T)^-1,
+
+        dq_c = M^-1 J^T L twist        M ddq_c = J^T L (acc - dJ/dt dq - J free) + M free
+
+    so that L times an acceleration is a force, which needs no joint accelerations on its way. On a 7-axis arm `free` is
+    the acceleration of a damped spring at `q_null`, of which the tool feels nothing.
+
+    Returns:
+        dq_c, shape (n,), [rad/s]; the force, shape (6,), [N, N m]; `free`, shape (n,), [rad/s^2].
     """
-    wanted = np.array((twist, acc))
-    if wanted.any():
-        wanted[1] -= terms.drift
-    elif model.n == 6:
-        return np.zeros(6), np.zeros(6)
     J = terms.jacobian
-    back = terms.mass_inverse @ J.T
-    compliance = J @ back
-    compliance.flat[::7] += _DAMPED_INVERSE
-    free: Array | float = 0.0
+    wanted = np.array((twist, acc))
+    felt = wanted[1]
+    if any(twist) or any(acc):
+        felt -= terms.drift
     if model.n == 7:
         free = NULL_FREQUENCY**2 * (q_null - measured.q) - NULL_DAMPING * measured.dq
-        wanted[1] -= J @ free
-    dq_c, ddq_c = (back @ model.rigid_body.tool_solver.solve(compliance, wanted.T)).T
-    return dq_c, ddq_c + free
+        felt -= J.dot(free)
+    else:
+        free = np.zeros(model.n)
+    back = terms.mass_inverse.dot(J.T)
+    L_wanted = model.rigid_body.tool_solver.solve(J.dot(back) + _DAMPED_INVERSE, wanted.T)
+    return back.dot(L_wanted[:, 0]), L_wanted[:, 1], free

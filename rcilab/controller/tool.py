@@ -7,8 +7,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from rcilab.arrays import Matrix
 from rcilab.clock import CYCLE_TIME
-from rcilab.dynamics.rigid_body import Twist
+from rcilab.dynamics.rigid_body import ToolTerms, Twist
 from rcilab.errors import SingularError
 from rcilab.kinematics.arm_angle import arm_angle
 from rcilab.kinematics.inverse import build_geometry
@@ -26,6 +27,7 @@ class ToolMotion:
 
     Attributes:
         pose: Pose of the tool in base.
+        matrix: The same as a homogeneous transform, shape (4, 4), [m].
         twist: Its velocity in base axes, linear first, [m/s, rad/s]: Jacobian times joint velocity.
         acceleration: The twist's backward difference over one cycle, [m/s^2, rad/s^2].
         psi: Arm angle, [rad].
@@ -41,6 +43,7 @@ class ToolMotion:
         self._body = model.rigid_body
         self._geometry = build_geometry(model.description)
         self.pose: Pose
+        self.matrix: Matrix
         self.twist = self.acceleration = _REST
         self.psi = self.dpsi = self.ddpsi = 0.0
         self.place(q)
@@ -52,14 +55,15 @@ class ToolMotion:
 
     def place(self, q: Sequence[float]) -> None:
         """Puts the arm somewhere, at rest."""
-        self.pose, _ = self._body.tool_motion(np.array(q), np.zeros(len(q)))
+        motion = self._body.tool_motion(np.array(q), np.zeros(len(q)))
+        self.pose, self.matrix = motion.pose, motion.matrix
         self.twist = self.acceleration = _REST
         self.psi, self.dpsi, self.ddpsi = self._arm_angle(q), 0.0, 0.0
 
-    def update(self, q: Sequence[float], dq: Sequence[float]) -> None:
-        """Takes joint angles and velocities of this cycle, n plain floats each, [rad], [rad/s]."""
+    def update(self, q: Sequence[float], motion: ToolTerms) -> None:
+        """Takes the joints of this cycle, n plain floats, [rad], and how the tool moves with them."""
         h = CYCLE_TIME
-        self.pose, twist = self._body.tool_motion(np.array(q), np.array(dq))
+        self.pose, self.matrix, twist = motion.pose, motion.matrix, motion.twist
         a, b, c, d, e, f = twist
         p, r, s, t, u, v = self.twist
         self.acceleration = ((a - p) / h, (b - r) / h, (c - s) / h, (d - t) / h, (e - u) / h, (f - v) / h)
@@ -68,9 +72,14 @@ class ToolMotion:
         dpsi = math.remainder(psi - self.psi, math.tau) / h
         self.psi, self.dpsi, self.ddpsi = psi, dpsi, (dpsi - self.dpsi) / h
 
+    def observe(self, q: Sequence[float], motion: ToolTerms) -> None:
+        """Takes what `coincide` would, from joints that were measured: nobody asks for the differences of those."""
+        self.pose, self.matrix, self.twist = motion.pose, motion.matrix, motion.twist
+        self.psi = self._arm_angle(q)
+
     def coincide(self, other: ToolMotion) -> None:
         """Takes over where another one is: the arm is exactly where it was told to be."""
-        self.pose, self.twist, self.psi = other.pose, other.twist, other.psi
+        self.pose, self.matrix, self.twist, self.psi = other.pose, other.matrix, other.twist, other.psi
 
     def _arm_angle(self, q: Sequence[float]) -> float:
         if self._geometry.n != 7:

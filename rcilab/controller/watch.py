@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from operator import gt
 
 from rcilab.arrays import frozen
 from rcilab.conformance.breach import describe_breaches
@@ -83,7 +84,7 @@ class Watch:
             if q == commanded.q and dq == commanded.dq:
                 self.tool.coincide(tool_c)
             else:
-                self.tool.update(q, dq)
+                self.tool.observe(q, self._model.rigid_body.tool_terms(measured.q, measured.dq))
         self.tau_ext, self.wrench = self._observer.step(measured)
 
     def judge(self, *, is_commanded: bool = True) -> tuple[tuple[Fault, ...], str]:
@@ -105,10 +106,12 @@ class Watch:
 
     def find_collision(self, thresholds: Sequence[float]) -> str | None:
         """Returns which outside torque is above its threshold, in words, or None."""
-        for joint, (torque, threshold) in enumerate(zip(self.tau_ext.tolist(), thresholds, strict=True), start=1):
-            if abs(torque) > threshold:
-                return f"joint {joint}: external torque {torque:.3g} N m is above its threshold {threshold:g} N m"
-        return None
+        torques: list[float] = self.tau_ext.tolist()
+        if not any(map(gt, map(abs, torques), thresholds)):
+            return None
+        joint = next(i for i, torque in enumerate(torques) if abs(torque) > thresholds[i])
+        torque, threshold = torques[joint], thresholds[joint]
+        return f"joint {joint + 1}: external torque {torque:.3g} N m is above its threshold {threshold:g} N m"
 
 
 def _widened(limits: Limits) -> Limits:

@@ -16,7 +16,7 @@ from rcilab.dynamics.payload import Payload
 from rcilab.dynamics.symmetric_solver import SymmetricSolver
 from rcilab.robots.description import Link, RobotDescription
 from rcilab.robots.upright import upright_flange, upright_joints
-from rcilab.spatial import IDENTITY, Pose, Rotation9
+from rcilab.spatial import IDENTITY, Pose
 
 GRAVITY = 9.81  # [m/s^2] along -z of the base; the figure the vendor's dynamics library computes with.
 
@@ -50,20 +50,61 @@ class TorqueTerms:
         return f"<TorqueTerms: full = {full} N m; .inertial, .coriolis, .gravity, .friction>"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
 class ToolTerms:
-    """What a control law at the tool needs to know of the arm in one state. Arrays are not to be written to."""
+    """What there is to know of the tool of an arm in one state; arrays are not to be written to.
 
-    mass_inverse: Matrix
-    """M^-1, shape (n, n), [1/(kg m^2)]."""
-    jacobian: Matrix
-    """At the tool, linear rows first, base axes, shape (6, n)."""
-    drift: Array
-    """The tool's acceleration when the joints have none: dJ/dt dq, base axes, shape (6,), [m/s^2, rad/s^2]."""
-    rotation: Rotation9
-    """Orientation of the tool in base, row-major."""
-    position: tuple[float, float, float]
-    """Origin of the tool in base, [m]."""
+    Whoever acts in one cycle asks the same value: what follows from angles and velocities is computed once. What a law
+    needs in addition is computed when it is asked for first, so it belongs to the thread of its `RigidBody`.
+
+    Attributes:
+        matrix: Pose of the tool in base as a homogeneous transform, shape (4, 4), [m].
+        pose: The same.
+        twist: Its velocity in base axes, linear first, [m/s, rad/s].
+        jacobian: At the tool, linear rows first, base axes, shape (6, n).
+
+    Args:
+        model: The arm as pinocchio has it.
+        data: Its memory.
+        tool: Number of the tool's frame.
+        q: Joint angles, shape (n,), [rad]; an array that nobody writes to any more.
+        dq: Joint velocities, shape (n,), [rad/s]; likewise.
+    """
+
+    __slots__ = ("_args", "_drift", "_mass_inverse", "jacobian", "matrix", "pose", "twist")
+
+    def __init__(self, model: pin.Model, data: pin.Data, tool: int, q: JointVector, dq: JointVector) -> None:
+        self._args = (model, data, tool, q, dq)
+        self.jacobian: Matrix = pin.computeFrameJacobian(model, data, q, tool, pin.LOCAL_WORLD_ALIGNED)
+        self.matrix: Matrix = pin.updateFramePlacement(model, data, tool).homogeneous
+        self.pose = _pose(self.matrix)
+        self.twist: Twist = tuple(self.jacobian.dot(dq).tolist())
+        self._mass_inverse: Matrix | None = None
+        self._drift: Array | None = None
+
+    def is_at(self, q: JointVector, dq: JointVector) -> bool:
+        """Returns whether it is that of these very arrays."""
+        return self._args[3] is q and self._args[4] is dq
+
+    @property
+    def mass_inverse(self) -> Matrix:
+        """M^-1, shape (n, n), [1/(kg m^2)]."""
+        found = self._mass_inverse
+        if found is None:
+            model, data, _, q, _ = self._args
+            found = self._mass_inverse = pin.computeMinverse(model, data, q).copy()
+        return found
+
+    @property
+    def drift(self) -> Array:
+        """The tool's acceleration when the joints have none: dJ/dt dq, base axes, shape (6,), [m/s^2, rad/s^2]."""
+        found = self._drift
+        if found is None:
+            model, data, tool, q, dq = self._args
+            pin.forwardKinematics(model, data, q, dq, np.zeros(len(q)))
+            pin.updateFramePlacement(model, data, tool)
+            acceleration = pin.getFrameClassicalAcceleration(model, data, tool, pin.LOCAL_WORLD_ALIGNED)
+            found = self._drift = acceleration.vector.copy()
+        return found
 
 
 class RigidBody:
@@ -98,8 +139,7 @@ class RigidBody:
         self._weightless = pin.Model(model)
         self._weightless.gravity.linear = np.zeros(3)
         self.tool_solver = SymmetricSolver(6)
-        self._zeros = np.zeros(description.n)
-        self._tool_terms: tuple[JointVector, JointVector, ToolTerms] | None = None
+        self._tool_terms: ToolTerms | None = None
 
     def torque(self, q: JointVector, dq: JointVector, ddq: JointVector) -> TorqueTerms:
         """Returns the torques and their terms; every argument of shape (n,), [rad], [rad/s], [rad/s^2]."""
@@ -189,42 +229,28 @@ class RigidBody:
         """Returns the Jacobian at the tool, linear rows first, base axes, shape (6, n)."""
         return pin.computeFrameJacobian(self._model, self._data, q, self._tool, pin.LOCAL_WORLD_ALIGNED)
 
-    def tool_motion(self, q: JointVector, dq: JointVector) -> tuple[Pose, Twist]:
-        """Returns the pose of the tool in base and its twist at the tool's origin, base axes.
-
-        Args:
-            q: Joint angles, shape (n,), [rad].
-            dq: Joint velocities, shape (n,), [rad/s].
-        """
-        model, data, tool = self._model, self._data, self._tool
-        pin.forwardKinematics(model, data, q, dq)
-        pose = pin.updateFramePlacement(model, data, tool)
-        twist = pin.getFrameVelocity(model, data, tool, pin.LOCAL_WORLD_ALIGNED)
-        rotation = tuple(pose.rotation.ravel().tolist())
-        return Pose.from_parts(rotation, tuple(pose.translation.tolist())), tuple(twist.vector.tolist())
+    def tool_motion(self, q: JointVector, dq: JointVector) -> ToolTerms:
+        """Returns what there is to know of the tool in one state; see `ToolTerms` for the arguments."""
+        return ToolTerms(self._model, self._data, self._tool, q, dq)
 
     def tool_terms(self, q: JointVector, dq: JointVector) -> ToolTerms:
-        """Returns what a control law at the tool needs, all at once.
+        """Returns the `tool_motion` of the arm as it is, for all that acts in one cycle.
 
-        The last answer is kept, and given again when the very same arrays come: laws that act in one cycle share it.
+        The last answer is kept, and given again when the very same arrays come.
 
         Args:
             q: Joint angles, shape (n,), [rad]; an array that nobody writes to any more.
             dq: Joint velocities, shape (n,), [rad/s]; likewise.
         """
-        last = self._tool_terms
-        if last is not None and last[0] is q and last[1] is dq:
-            return last[2]
-        model, data = self._model, self._data
-        inverse = pin.computeMinverse(model, data, q).copy()
-        J = pin.computeFrameJacobian(model, data, q, self._tool, pin.LOCAL_WORLD_ALIGNED)
-        pin.forwardKinematics(model, data, q, dq, self._zeros)
-        pose = pin.updateFramePlacement(model, data, self._tool)
-        drift = pin.getFrameClassicalAcceleration(model, data, self._tool, pin.LOCAL_WORLD_ALIGNED).vector.copy()
-        rotation = tuple(pose.rotation.ravel().tolist())
-        terms = ToolTerms(inverse, J, drift, rotation, tuple(pose.translation.tolist()))
-        self._tool_terms = (q, dq, terms)
+        terms = self._tool_terms
+        if terms is None or not terms.is_at(q, dq):
+            terms = self._tool_terms = self.tool_motion(q, dq)
         return terms
+
+
+def _pose(matrix: Matrix) -> Pose:
+    (a, b, c, x), (d, e, f, y), (g, h, i, z), _ = matrix.tolist()
+    return Pose.from_parts((a, b, c, d, e, f, g, h, i), (x, y, z))
 
 
 def _kind(axis: Vector3) -> pin.JointModel:

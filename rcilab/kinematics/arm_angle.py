@@ -19,6 +19,7 @@ from rcilab.errors import SingularError
 Vec: TypeAlias = tuple[float, float, float]
 
 _VERTICAL = 1e-9  # sin of the angle between SW and the vertical below which psi has no reference direction.
+_NO_REFERENCE = "arm angle: shoulder and wrist are above each other, so no direction around that line is the upper one"
 _STRETCHED = 1e-12  # Elbow distance from SW, relative to the arm's length, below which psi has no elbow to measure.
 
 
@@ -44,9 +45,12 @@ def arm_angle(upper: float, fore: float, q: Sequence[float]) -> float:
     length = sqrt(wx * wx + wy * wy + wz * wz)
     if length == 0.0:
         raise SingularError("arm angle: the wrist is on the shoulder, so there is no shoulder-wrist line")
-    u = (wx / length, wy / length, wz / length)
-    reference, across = reference_frame(u)
-    along, side = _dot((ex, ey, ez), reference), _dot((ex, ey, ez), across)
+    # The elbow in the directions of `reference_frame`, written out: this runs every cycle.
+    horizontal = hypot(wx, wy)
+    if horizontal < _VERTICAL * length:
+        raise SingularError(_NO_REFERENCE)
+    cx, cy = wx / horizontal, wy / horizontal
+    along, side = (horizontal * ez - wz * (cx * ex + cy * ey)) / length, cy * ex - cx * ey
     if hypot(along, side) < _STRETCHED * (upper + fore):
         raise SingularError("arm angle: the arm is stretched (q4 = 0), the elbow is on the shoulder-wrist line")
     return atan2(side, along)
@@ -81,12 +85,6 @@ def reference_frame(u: Vec) -> tuple[Vec, Vec]:
     """
     horizontal = hypot(u[0], u[1])
     if horizontal < _VERTICAL:
-        raise SingularError(
-            "arm angle: shoulder and wrist are above each other, so no direction around that line is the upper one"
-        )
+        raise SingularError(_NO_REFERENCE)
     cx, cy = u[0] / horizontal, u[1] / horizontal
     return (-u[2] * cx, -u[2] * cy, horizontal), (cy, -cx, 0.0)
-
-
-def _dot(a: Vec, b: Vec) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

@@ -14,12 +14,14 @@ from rcilab.errors import KinematicsError
 from rcilab.kinematics.arm_angle import arm_angle, arm_angle_path
 from rcilab.kinematics.branch import Loss, follow_branch
 from rcilab.kinematics.feasible_arcs import FeasibleArcs, feasible_arcs
+from rcilab.kinematics.held_elbow import inverse_held, inverse_held_batch
 from rcilab.kinematics.inverse import Angles, ArmGeometry, build_geometry, inverse_seven, inverse_six
 from rcilab.kinematics.inverse_batch import inverse_batch
 from rcilab.kinematics.offset_arcs import feasible_offset_arcs
-from rcilab.kinematics.offset_arm import ELBOW, OffsetGeometry, SelfMotion, build_offset_geometry
-from rcilab.kinematics.offset_batch import inverse_offset_batch
-from rcilab.kinematics.offset_branch import follow_offset_branch, settle_beside
+from rcilab.kinematics.offset_arm import ELBOW, OffsetGeometry, build_offset_geometry
+from rcilab.kinematics.offset_branch import follow_offset_branch
+from rcilab.kinematics.offset_settle import settle_beside
+from rcilab.kinematics.offset_singularity import held_singularity, held_singularity_path
 from rcilab.kinematics.singularity import find_singularity, singularity_path
 from rcilab.robots.description import RobotDescription
 from rcilab.spatial import Pose
@@ -202,8 +204,8 @@ class OffsetSeven:
         )
 
     def at(self, T_base_flange: Pose, near: Sequence[float] | None) -> PoseInverse:
-        """Returns the self-motion at a pose."""
-        return SelfMotion(self.geometry, T_base_flange, near)
+        """Returns the inverse at a pose, which is not looked at yet."""
+        return _OffsetPose(self.geometry, T_base_flange, near)
 
     def arm_angle(self, q: Sequence[float]) -> float:
         """Returns the angle of joint 3, [rad]."""
@@ -214,16 +216,16 @@ class OffsetSeven:
         return q[:, ELBOW]
 
     def singularity_path(self, q: JointPath) -> Array:
-        """Returns zeros: at a given angle of joint 3 its maker refuses no pose for being singular."""
-        return np.zeros(len(q))
+        """Returns how near the arm is along a path to where joint 3, held, no longer decides the other joints."""
+        return held_singularity_path(self.geometry, q)
 
     def is_singular(self, q: Sequence[float]) -> bool:
-        """Returns False, as above."""
-        return False
+        """Returns whether the arm counts as there."""
+        return held_singularity(self.geometry, q) >= 1.0
 
     def batch(self, T_base_flange: Array, psi: Array) -> Array:
         """Returns the solutions at N poses, shape (N, M, 7)."""
-        return inverse_offset_batch(self.geometry, T_base_flange, np.broadcast_to(psi, (len(T_base_flange),)))
+        return inverse_held_batch(self.geometry, T_base_flange, np.broadcast_to(psi, (len(T_base_flange),)))
 
     def follow(
         self, rotations: Array, positions: Array, psi: Array | None, start: JointVector
@@ -253,3 +255,11 @@ class _SixAxisPose(_SphericalPose):
     def branches(self, psi: float) -> list[Angles]:
         del psi  # The arm has none.
         return inverse_six(self._arm, self._pose, self._near)
+
+
+class _OffsetPose:
+    def __init__(self, arm: OffsetGeometry, pose: Pose, near: Sequence[float] | None) -> None:
+        self._arm, self._pose, self._near = arm, pose, near
+
+    def branches(self, psi: float) -> list[Angles]:
+        return inverse_held(self._arm, self._pose, psi, self._near)

@@ -109,7 +109,8 @@ class FeasibleArcs:
         It is `INSIDE` the range, or in the middle of a narrower one, unless the angle asked for is possible itself.
         """
         found: float | None = None
-        for start, end in _joined([(arc.start, arc.end) for arc in self.arcs if arc.ok or arc.branches]):
+        stands = (arc for arc in self.arcs if arc.ok or arc.branches or arc.reasons == ("singularity",))
+        for start, end in _joined([(arc.start, arc.end) for arc in stands]):
             middle, half = 0.5 * (start + end), 0.5 * (end - start)
             offset = remainder(psi - middle, tau)
             inner = max(half - INSIDE, 0.0)

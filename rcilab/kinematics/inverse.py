@@ -120,7 +120,7 @@ def inverse_seven(
     side = hypot(vx, vy)
     q3 = atan2(vy, vx) if side > _AXIS_LOST else guess[2]
     q4 = atan2(side, vz)
-    rotation = _turn_zy(_turn_zy((1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), q1, q2), q3, q4)
+    rotation = _turn_zy((c1 * c2, -s1, c1 * s2, s1 * c2, c1, s1 * s2, -s2, 0.0, c2), q3, q4)
     q5, q6, q7 = _wrist(rotation, r, guess[4])
     # Each angle and its twin; two half turns are none.
     twins_1, twins_3 = (_wrap(q1), _wrap(q1 + pi)), (_wrap(q3), _wrap(q3 + pi))

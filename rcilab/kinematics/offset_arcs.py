@@ -6,6 +6,7 @@ those between two branches, are cut into shorter ones until the place is known w
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import pi, tau
 
 import numpy as np
@@ -14,13 +15,18 @@ from numpy.typing import NDArray
 from rcilab.arrays import Array
 from rcilab.kinematics.feasible_arcs import Arc, FeasibleArcs, Reason
 from rcilab.kinematics.offset_arm import ELBOW, OffsetGeometry, SelfMotion, wrapped
+from rcilab.kinematics.offset_settle import settle
+from rcilab.kinematics.offset_singularity import held_singularity_path
 from rcilab.spatial import Pose
 
 _CUTS = 8  # Into how many a piece is cut at once; a choice.
 _ROUNDS = 4  # How often: a piece of 0.1 rad then is 2e-5 rad long.
 _LONG = 0.1  # [rad] Between two branches a piece is not straight: cut it once in any case.
+_SLIVER = 1e-4  # [rad] What is not worth an arc of its own.
 _GRID = 1e-9  # [rad] Ends of pieces that differ by less meet.
-_NOWHERE = 255
+_SINGULAR = 1 << 7
+"""What stands for a singularity beside the bits of the joints."""
+_NOWHERE = 1 << 8
 """In place of a set of joints: no branch is there."""
 
 
@@ -39,7 +45,7 @@ def feasible_offset_arcs(
     Raises:
         UnreachableError: The pose is out of reach at every arm angle.
     """
-    starts, ends, codes = _pieces(arm, SelfMotion(arm, T_base_flange, None), lower, upper)
+    starts, ends, codes = _pieces(arm, T_base_flange, lower, upper)
     low = np.round(np.minimum(starts, ends) / _GRID) * _GRID
     high = np.round(np.maximum(starts, ends) / _GRID) * _GRID
     turns = tau * np.floor((low + pi) / tau)
@@ -49,7 +55,8 @@ def feasible_offset_arcs(
     high, codes = np.concatenate((np.minimum(high, pi), high[over] - tau)), np.concatenate((codes, codes[over]))
     breaks = np.unique(np.concatenate((low, high, (-pi, pi))))
     best = np.full(len(breaks) - 1, _NOWHERE)
-    for code in sorted(set(codes.tolist()), key=lambda code: (-code.bit_count(), -code)):
+    # What is wrong in the branch in which least is; of two alike a singularity, as that one has joint angles.
+    for code in sorted(set(codes.tolist()), key=lambda code: (-code.bit_count(), code & _SINGULAR, -code)):
         change = np.zeros(len(breaks))
         chosen = codes == code
         np.add.at(change, np.searchsorted(breaks, low[chosen]), 1.0)
@@ -57,23 +64,27 @@ def feasible_offset_arcs(
         best[np.cumsum(change)[:-1] > 0.5] = code
     first = np.flatnonzero(np.concatenate(([True], best[1:] != best[:-1])))
     begins = breaks[first].tolist()
-    arcs = [
-        _arc(start, end, int(best[i]), outside_box)
-        for start, end, i in zip(begins, [*begins[1:], pi], first.tolist(), strict=True)
-    ]
+    arcs: list[Arc] = []
+    for start, end, i in zip(begins, [*begins[1:], pi], first.tolist(), strict=True):
+        if arcs and end - start < _SLIVER and best[i] and not arcs[-1].ok:  # What cutting left between two reasons.
+            arcs[-1] = replace(arcs[-1], end=end)
+        else:
+            arcs.append(_arc(start, end, int(best[i]), outside_box))
     return FeasibleArcs(arcs=tuple(arcs))
 
 
 def _pieces(
-    arm: OffsetGeometry, motion: SelfMotion, lower: Array, upper: Array
+    arm: OffsetGeometry, T_base_flange: Pose, lower: Array, upper: Array
 ) -> tuple[Array, Array, NDArray[np.int64]]:
-    """Returns arm angles at the ends of pieces, and in each which joints are beyond their limits, as bits."""
+    """Returns arm angles at both ends of pieces, and what is wrong in each: joints beyond their limits, singular."""
+    motion, R, p = SelfMotion(arm, T_base_flange), T_base_flange.rotation, T_base_flange.position
     middles = np.array(arm.middles)
     bits = 1 << np.arange(7)
 
     def broken(q: Array) -> NDArray[np.int64]:
         angle = wrapped(q - middles) + middles
-        return np.asarray(((angle <= lower) | (angle >= upper)) @ bits, dtype=np.int64)
+        beyond = np.asarray(((angle <= lower) | (angle >= upper)) @ bits, dtype=np.int64)
+        return beyond + _SINGULAR * (held_singularity_path(arm, q) >= 1.0)
 
     starts, ends = motion.starts, motion.ends
     done: list[tuple[Array, Array, NDArray[np.int64]]] = []
@@ -85,7 +96,9 @@ def _pieces(
         done.append((starts[~cut, ELBOW], ends[~cut, ELBOW], before[~cut]))
         shares = np.linspace(0.0, 1.0, _CUTS + 1)[:, None, None]
         between = (starts[cut] + shares * (ends - starts)[cut]).reshape(-1, 7)
-        found, settled = motion.settle(between)
+        found, settled = settle(
+            arm, np.broadcast_to(R, (len(between), 3, 3)), np.broadcast_to(p, (len(between), 3)), between
+        )
         whole = found.reshape(_CUTS + 1, -1, 7)
         good = (settled & (np.abs(found - between).max(axis=1) < 2.0 * _LONG)).reshape(_CUTS + 1, -1)
         both = good[:-1] & good[1:]
@@ -102,6 +115,8 @@ def _arc(start: float, end: float, code: int, outside: bool) -> Arc:
         reasons.append("reach")
     if joints:
         reasons.append("joint limits")
+    if code != _NOWHERE and code & _SINGULAR:
+        reasons.append("singularity")
     if outside:
         reasons.append("safety box")
     return Arc(start=start, end=end, reasons=tuple(reasons), joints=joints, branches=())

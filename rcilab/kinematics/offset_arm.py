@@ -1,4 +1,4 @@
-"""The inverse of an arm with offsets at elbow and wrist, as the Panda has them: all joint angles for one pose.
+"""An arm with offsets at elbow and wrist, as the Panda has them: all joint angles for one pose, by joint 7.
 
 Axes 1 to 3 meet in the shoulder S, axes 5 and 6 in the wrist W; axis 7 passes W at a distance, and the elbow stands off
 the line of both arms. For a given angle of joint 7 everything else follows in closed form (He and Liu, IEEE Robotics
@@ -6,13 +6,11 @@ and Automation Letters 6(4), 2021): W is known, the triangle of shoulder, elbow 
 the plane of that triangle through axis 5 two of joint 6, and the shoulder two groups of joints 1 to 3.
 
 But the arm angle of such an arm is its maker's: the elbow of the Panda is joint 3. So the self-motion of the arm at a
-pose is traced by joint 7, every crossing of the wanted joint 3 is found on it, and Newton's method settles each to
-rounding, joint 3 held.
+pose is traced by joint 7; `held_elbow.py` finds where joint 3 is at a given angle.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from math import atan2, degrees, hypot, pi, tau
 
@@ -36,12 +34,6 @@ _TRACE = 360
 _PARTS, _HUNTS = 16, 4  # An end of a branch is looked for in 16 parts of a piece, four times over.
 _DENSE = 6  # Angles put next to it; a choice.
 _REACH_TOLERANCE = 1e-9  # [m] A pose that rounding put this far out of reach counts as on its end.
-_AROUND = 2.0  # Lengths of a piece, in which Newton's method is started around a crossing; a choice.
-_ROUNDS = 12  # Of Newton's method; from a crossing it takes 3 to 5.
-_LONGEST = 0.5  # [rad] Of its steps.
-_SETTLED = 1e-13  # [m] and [rad] A choice: some hundred times the rounding of the arm's length.
-_GOOD = 1e-10  # [m] and [rad] What counts as the pose at the end.
-_SAME = 1e-6  # [rad] Solutions that differ by less are one.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -110,16 +102,14 @@ class SelfMotion:
     Args:
         arm: From `build_offset_geometry`.
         T_base_flange: Pose of the flange in base.
-        near: Joint angles, [rad], whose neighbourhood is looked at first; None where there are none.
 
     Raises:
         UnreachableError: The pose is out of reach at every arm angle.
     """
 
-    def __init__(self, arm: OffsetGeometry, T_base_flange: Pose, near: Sequence[float] | None) -> None:
+    def __init__(self, arm: OffsetGeometry, T_base_flange: Pose) -> None:
         self._arm = arm
         self._rotation, self._position = T_base_flange.rotation, T_base_flange.position
-        self._near = near
         angles = np.linspace(-pi, pi, _TRACE, endpoint=False, dtype=np.float64)
         table, beyond = trace(arm, self._rotation, self._position, angles)
         exists = np.isfinite(table[..., 0])
@@ -130,30 +120,6 @@ class SelfMotion:
         exists = np.isfinite(table[..., 0])
         self.starts, self.ends = _segments(table, exists, beyond > 0.0)
         """Ends of short pieces of the self-motion, each of shape (m, 7), [rad]; each end within half a turn."""
-
-    def branches(self, psi: float) -> list[tuple[float, ...]]:
-        """Returns every solution at an arm angle, [rad], without regard to joint limits; empty where there is none."""
-        at_start = wrapped(self.starts[:, ELBOW] - psi)
-        step = (self.ends - self.starts)[:, ELBOW]
-        # Where joint 3 turns back, two crossings may lie within one piece: look around there, too.
-        close = (np.abs(at_start) <= _AROUND * np.abs(step)) & (np.abs(at_start) < _QUARTER) & (step != 0.0)
-        share = np.clip(-at_start[close] / step[close], 0.0, 1.0)[:, None]
-        guesses = self.starts[close] + share * (self.ends - self.starts)[close]
-        if self._near is not None:
-            guesses = np.concatenate((np.array(self._near)[None], guesses))
-        if not len(guesses):
-            return []
-        guesses[:, ELBOW] = psi
-        q, settled = settle(self._arm, *self._targets(len(guesses)), guesses)
-        middles = np.array(self._arm.middles)
-        found = wrapped(q[settled] - middles) + middles
-        is_same = np.abs(wrapped(found[:, None] - found)).max(axis=2) < _SAME
-        is_new = ~np.tril(is_same, -1).any(axis=1)
-        return [tuple(row) for row in found[is_new].tolist()]
-
-    def settle(self, guesses: Array) -> tuple[Array, NDArray[np.bool_]]:
-        """Returns the solutions next to guesses of shape (m, 7), [rad], joint 3 held, and which there are."""
-        return settle(self._arm, *self._targets(len(guesses)), guesses)
 
     def _with_ends(self, angles: Array, exists: NDArray[np.bool_]) -> Array:
         """Returns the angles of joint 7, and more of them where branches end, the closer to the end the denser.
@@ -176,17 +142,14 @@ class SelfMotion:
         more = last[:, None] + inward[:, None] * np.linspace(0.0, 1.0, _DENSE, endpoint=False) ** 2
         return np.unique(np.concatenate((angles, wrapped(more.ravel()))))
 
-    def _targets(self, count: int) -> tuple[Array, Array]:
-        return np.broadcast_to(self._rotation, (count, 3, 3)), np.broadcast_to(self._position, (count, 3))
-
 
 def trace(arm: OffsetGeometry, rotation: Array, position: Array, q7: Array) -> tuple[Array, Array]:
     """Returns joint angles in closed form for given angles of joint 7.
 
     Args:
         arm: From `build_offset_geometry`.
-        rotation: Flange in base, shape (3, 3).
-        position: Flange in base, shape (3,), [m].
+        rotation: Flange in base, shape (3, 3), or (K, 3, 3) for a pose each.
+        position: Flange in base, shape (3,) or (K, 3), [m].
         q7: Angles of joint 7, shape (K,), [rad].
 
     Returns:
@@ -194,8 +157,9 @@ def trace(arm: OffsetGeometry, rotation: Array, position: Array, q7: Array) -> t
         or negative, joint 2 positive; and how far the wrist is out of reach, shape (K,), [m], below zero within.
     """
     c7, s7 = np.cos(q7)[:, None], np.sin(q7)[:, None]
-    x6, y6, z6 = c7 * rotation[:, 0] - s7 * rotation[:, 1], -rotation[:, 2], s7 * rotation[:, 0] + c7 * rotation[:, 1]
-    to_shoulder = np.array((0.0, 0.0, arm.shoulder)) - (position - arm.hand * rotation[:, 2] - arm.wrist * x6)
+    x7, y7, z7 = rotation[..., 0], rotation[..., 1], rotation[..., 2]
+    x6, y6, z6 = c7 * x7 - s7 * y7, -z7, s7 * x7 + c7 * y7
+    to_shoulder = np.array((0.0, 0.0, arm.shoulder)) - (position - arm.hand * z7 - arm.wrist * x6)
     shortest, longest = arm.reach
     square = (to_shoulder * to_shoulder).sum(axis=1)
     distance = np.sqrt(square)
@@ -210,7 +174,7 @@ def trace(arm: OffsetGeometry, rotation: Array, position: Array, q7: Array) -> t
     # Shoulder from wrist in the plane of the triangle: off the forearm and along it.
     off = arm.elbow * (1.0 - c4) - arm.upper * s4
     along = arm.elbow * s4 - arm.upper * c4 - arm.fore
-    vx, vy, vz = (to_shoulder * x6).sum(axis=1), to_shoulder @ y6, (to_shoulder * z6).sum(axis=1)
+    vx, vy, vz = ((to_shoulder * axis).sum(axis=1) for axis in (x6, y6, z6))
     rest = vx * vx + vy * vy - along * along
     exists = (rest >= -_REACH_TOLERANCE) & (beyond <= _REACH_TOLERANCE)
     side = np.sqrt(np.maximum(rest, 0.0)) * np.array((1.0, -1.0))[None, :, None]  # (2, 2, K)
@@ -230,36 +194,6 @@ def trace(arm: OffsetGeometry, rotation: Array, position: Array, q7: Array) -> t
     shape = side.shape
     columns = (q1, q2, q3, np.broadcast_to(q4, shape), q5, q6, np.broadcast_to(q7, shape))
     return np.where(exists[..., None], np.stack(columns, axis=-1), np.nan), beyond
-
-
-def settle(arm: OffsetGeometry, rotations: Array, positions: Array, q: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Returns joint angles next to guesses that put the flange at poses, joint 3 held, by Newton's method.
-
-    Args:
-        arm: From `build_offset_geometry`.
-        rotations: Flange in base, shape (M, 3, 3).
-        positions: Flange in base, shape (M, 3), [m].
-        q: Guesses, shape (M, 7), [rad].
-
-    Returns:
-        Joint angles, shape (M, 7), [rad], and which of them are solutions, shape (M,).
-    """
-    q = np.array(q)
-    free = [joint for joint in range(7) if joint != ELBOW]
-    error = np.full(len(q), np.inf)
-    active = np.arange(len(q))
-    for _ in range(_ROUNDS):
-        J, miss = _differential(arm.chain, q[active], rotations[active], positions[active])
-        error[active] = np.abs(miss).max(axis=1)
-        step = _solved(J[:, :, free], miss)
-        step *= np.minimum(1.0, _LONGEST / np.maximum(np.abs(step).max(axis=1, keepdims=True), 1e-300))
-        before = error[active]
-        q[active[:, None], free] += step
-        active = active[before > _SETTLED**0.5]
-        if not len(active):
-            break
-    _, miss = _differential(arm.chain, q, rotations, positions)
-    return q, np.abs(miss).max(axis=1) < _GOOD
 
 
 def wrapped(angle: Array) -> Array:
@@ -290,41 +224,6 @@ def _segments(table: Array, exists: NDArray[np.bool_], is_beyond: NDArray[np.boo
     other[:, 1] *= -1.0
     starts = np.concatenate((starts, turned))
     return starts, starts + np.concatenate((steps, other))
-
-
-def _differential(chain: Chain, q: Array, rotations: Array, positions: Array) -> tuple[Array, Array]:
-    """Returns Jacobians of the flange, shape (M, 6, 7), and what is missing to poses, shape (M, 6), base axes."""
-    count = len(q)
-    one, zero = np.ones(count), np.zeros(count)
-    x, y, z = np.stack((one, zero, zero)), np.stack((zero, one, zero)), np.stack((zero, zero, one))
-    p = np.zeros((3, count))
-    axes: list[tuple[Array, Array]] = []
-    for (offset, d, a, ca, sa), angle in zip(chain, q.T, strict=True):
-        axes.append((z, p))
-        c, s = np.cos(angle + offset), np.sin(angle + offset)
-        u, v = c * x + s * y, c * y - s * x
-        p = p + d * z + a * u
-        x, y, z = u, ca * v + sa * z, ca * z - sa * v
-    J = np.empty((6, len(chain), count))
-    for column, (axis, origin) in enumerate(axes):
-        J[:3, column] = _cross(axis, p - origin)
-        J[3:, column] = axis
-    miss = np.empty((6, count))
-    miss[:3] = positions.T - p
-    miss[3:] = 0.5 * sum(_cross(now, rotations[:, :, i].T) for i, now in enumerate((x, y, z)))
-    return np.moveaxis(J, 2, 0), miss.T
-
-
-def _solved(J: Array, miss: Array) -> Array:
-    try:
-        return np.asarray(np.linalg.solve(J, miss[..., None])[..., 0], dtype=np.float64)
-    except np.linalg.LinAlgError:  # One of them is exactly singular.
-        inverse = np.asarray(np.linalg.pinv(J, rcond=1e-9), dtype=np.float64)
-        return (inverse @ miss[..., None])[..., 0]
-
-
-def _cross(a: Array, b: Array) -> Array:
-    return np.stack((a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]))
 
 
 def _unreachable(arm: OffsetGeometry, beyond: Array) -> UnreachableError:

@@ -6,25 +6,19 @@ before; between them the joint angles are guessed by straight lines, and Newton'
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from rcilab.arrays import Array, JointPath, JointVector
 from rcilab.errors import KinematicsError, SingularError, UnreachableError
 from rcilab.kinematics.branch import Loss
-from rcilab.kinematics.forward import forward
-from rcilab.kinematics.jacobian import tool_jacobian
-from rcilab.kinematics.offset_arm import ELBOW, OffsetGeometry, SelfMotion, no_solution, settle
+from rcilab.kinematics.held_elbow import inverse_held
+from rcilab.kinematics.offset_arm import ELBOW, OffsetGeometry, no_solution
+from rcilab.kinematics.offset_settle import settle, settle_beside
 from rcilab.spatial import Pose
 
 _KNOTS = 48  # Rows that are settled one by one; a choice: a few ms, and guesses good to a hundredth of a radian.
 _TURN = 0.15  # [rad] Of a joint from knot to knot, beyond which rows between them are settled first.
-_ROUNDS = 12  # Beside the stretched arm two solutions meet, and the first steps only halve what is missing.
-_SETTLED = 1e-12  # [m] and [rad]
-_CLOSE = 1e-7  # [rad] A step that leaves nothing to settle, as each squares what is missing.
 _JUMP = 0.6  # [rad] From row to row: beyond it the arm does not follow but changes branches.
-_FREE = [joint for joint in range(7) if joint != ELBOW]
 
 
 def follow_offset_branch(
@@ -106,49 +100,11 @@ class _March:
         return settle_beside(self._arm, self._rotations[row], self._positions[row], psi, guess)
 
 
-def settle_beside(
-    arm: OffsetGeometry, rotation: Array, position: Array, psi: float, guess: Sequence[float]
-) -> list[float] | None:
-    """Returns the joint angles of one pose next to a guess, 7 plain floats, [rad], or None where there are none.
-
-    Args:
-        arm: From `build_offset_geometry`.
-        rotation: Flange in base, shape (3, 3).
-        position: Flange in base, shape (3,), [m].
-        psi: Arm angle, [rad].
-        guess: Joint angles close by, 7 plain floats, [rad].
-    """
-    q = [*guess]
-    q[ELBOW] = psi
-    for _ in range(_ROUNDS):
-        J, _ = tool_jacobian(arm.chain, q)
-        miss = _miss(forward(arm.chain, q), rotation, position)
-        try:
-            step = np.linalg.solve(J[:, _FREE], miss)
-        except np.linalg.LinAlgError:
-            return None
-        if np.abs(step).max() > 2.0 * _JUMP:
-            return None
-        for joint, turn in zip(_FREE, step.tolist(), strict=True):
-            q[joint] += turn
-        if np.abs(step).max() < _CLOSE:
-            break
-    missing = np.abs(_miss(forward(arm.chain, q), rotation, position)).max()
-    return q if missing < _SETTLED else None
-
-
-def _miss(now: Pose, rotation: Array, position: Array) -> Array:
-    """Returns what is missing to a pose as a small twist, base axes, shape (6,)."""
-    turn = rotation @ now.rotation.T
-    w = 0.5 * np.array((turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]))
-    return np.concatenate((position - now.position, w))
-
-
 def _reason(arm: OffsetGeometry, rotation: Array, position: Array, psi: float) -> KinematicsError:
     T = np.eye(4)
     T[:3, :3], T[:3, 3] = rotation, position
     try:
-        found = SelfMotion(arm, Pose.from_matrix(T), None).branches(psi)
+        found = inverse_held(arm, Pose.from_matrix(T), psi, None)
     except UnreachableError as error:
         return error
     if not found:

@@ -41,9 +41,9 @@ class ReachingArm(MovingArm):
     def inverse(self, T: Pose | ArrayLike, psi: float | None = None, near: ArrayLike | None = None) -> Solutions:
         """Returns every analytic solution inside the joint limits (GetJointPos); `.nearest(q)` is the vendor's answer.
 
-        The xMates have 8 solutions at an arm angle. The Panda has offsets, and up to 16 or none; they are found along
-        its self-motion at the pose and settled by Newton's method, which takes milliseconds. Where two of them are
-        about to meet, one may be taken for both; the one next to `near` is always found.
+        The xMates have 8 solutions at an arm angle. The Panda has offsets, and up to 16 or none: the roots of a
+        polynomial, which take some ten times as long. Where two of them are about to meet, one may be taken for both;
+        the one next to `near` is always found.
 
         Args:
             T: Pose of the tool in base: a `Pose` or a homogeneous matrix, shape (4, 4).

@@ -51,10 +51,12 @@ def sample_workspace(
         box: Only samples with the tool in it are kept; all when absent or not active.
 
     Raises:
-        InvalidValueError: `count` is no whole number from 1 to 1 000 000, or the box is none.
+        InvalidValueError: `count` is no whole number from 1 to 1 000 000, `seed` none from 0 on, or the box is none.
     """
     if not isinstance(count, int | np.integer) or not 1 <= count <= _MOST:
         raise InvalidValueError("count", described(count), f"must be a whole number from 1 to {_MOST}")
+    if not isinstance(seed, int | np.integer) or seed < 0:
+        raise InvalidValueError("seed", described(seed), "must be a whole number, 0 or more")
     q = np.random.default_rng(seed).uniform(lower, upper, (count, arm.n))
     position = arm.position_path(q)
     if (bound := active_box(box)) is not None:

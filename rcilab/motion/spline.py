@@ -10,6 +10,9 @@ from rcilab.errors import InvalidValueError
 from rcilab.motion.motion import Motion, standing
 from rcilab.motion.piecewise import PiecewisePolynomial
 
+LONGEST = 7200.0
+"""How long a motion through samples may last, [s]. A choice: its rows then take 400 MB, as of one that is planned."""
+
 
 def motion_through(times: ArrayLike, q: ArrayLike) -> Motion:
     """Returns the motion through joint angles at given times, with continuous acceleration.
@@ -23,7 +26,7 @@ def motion_through(times: ArrayLike, q: ArrayLike) -> Motion:
         q: Joint angles, shape (N, n), N >= 1, [rad].
 
     Raises:
-        InvalidValueError: Not finite, not N times and N rows, or the times do not increase.
+        InvalidValueError: Not finite, not N times and N rows, the times do not increase, or go on for too long.
     """
     rows = as_path(q, None, "q", "rad")
     t = as_vector(times, len(rows), "times", "s")
@@ -31,6 +34,9 @@ def motion_through(times: ArrayLike, q: ArrayLike) -> Motion:
     if late.size:
         i = int(late[0]) + 1
         raise InvalidValueError(f"times at row {i} (from 0)", float(t[i]), f"must be later than {t[i - 1]:g} [s]")
+    if (whole := float(t[-1] - t[0])) > LONGEST:
+        unit = "are the times in s, and the rate in samples a second?"
+        raise InvalidValueError("duration", whole, f"s is more than {LONGEST:g} s, the longest motion; {unit}")
     if len(rows) == 1:
         return standing(rows[0], law="samples")
     knots, angles, bends = _spline(t - t[0], rows)

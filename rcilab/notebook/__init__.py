@@ -1,1 +1,52 @@
-"""..."""
+"""The lab inside a notebook: parts that combine freely, and `Lab`, all of them in one cell.
+
+from rcilab.notebook import JogPanel, Lab, MotionPlot, Scene
+jog = JogPanel(model)          # a part shows itself as the last line of a cell
+Scene(jog)                     # given another part, it looks at the same arm
+Lab(model)                     # everything
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rcilab.notebook.fault_panel import FaultPanel as FaultPanel
+    from rcilab.notebook.jog_panel import JogPanel as JogPanel
+    from rcilab.notebook.lab_widget import Lab as Lab
+    from rcilab.notebook.motion_plot import MotionPlot as MotionPlot
+    from rcilab.notebook.plan_panel import PlanPanel as PlanPanel
+    from rcilab.notebook.report_view import ReportView as ReportView
+    from rcilab.notebook.run_panel import RunPanel as RunPanel
+    from rcilab.notebook.scene import Scene as Scene
+    from rcilab.notebook.target_panel import TargetPanel as TargetPanel
+    from rcilab.notebook.timeline import Timeline as Timeline
+
+_HOMES = {
+    "FaultPanel": "fault_panel",
+    "JogPanel": "jog_panel",
+    "Lab": "lab_widget",
+    "MotionPlot": "motion_plot",
+    "PlanPanel": "plan_panel",
+    "ReportView": "report_view",
+    "RunPanel": "run_panel",
+    "Scene": "scene",
+    "TargetPanel": "target_panel",
+    "Timeline": "timeline",
+}
+
+__all__ = sorted(_HOMES)  # pyright: ignore[reportUnsupportedDunderAll]
+
+
+def __getattr__(name: str) -> object:
+    """Loads a part on first use."""
+    if name not in _HOMES:
+        raise AttributeError(f"module 'rcilab.notebook' has no name {name!r}; it has: {', '.join(__all__)}")
+    value = getattr(import_module(f"rcilab.notebook.{_HOMES[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return __all__

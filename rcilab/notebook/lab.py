@@ -1,13 +1,16 @@
-"""JupyterLab on the lessons, on this machine only."""
+"""JupyterLab on the lessons, on this machine only: it asks the network for nothing, and nothing pops up."""
 
 from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 
 from rcilab.errors import UsageError
 from rcilab.notebook.installed import require_installed
+
+_CONFIG_PATH = "JUPYTER_CONFIG_PATH"
 
 
 def lab_command(
@@ -28,6 +31,7 @@ def lab_command(
     if not directory.is_dir():
         raise UsageError(f"there is no directory {directory}: name one that holds notebooks")
     command = [sys.executable, "-m", "jupyterlab", str(directory), "--ServerApp.ip=127.0.0.1"]
+    command.append("--LabApp.extension_manager=readonly")  # The other kind asks PyPI what there is.
     if port is not None:
         command += [f"--ServerApp.port={port}", "--ServerApp.port_retries=0"]
     if not browser:
@@ -35,6 +39,19 @@ def lab_command(
     if allow_root:
         command.append("--allow-root")
     return command
+
+
+def lab_environment(environment: Mapping[str, str]) -> dict[str, str]:
+    """Returns what JupyterLab is started in: defaults of ours below the settings that a person has made.
+
+    Without them it asks at the first start whether it may fetch news, over whatever is being shown.
+
+    Args:
+        environment: Of this process.
+    """
+    ours = str(Path(__file__).parent / "assets" / "jupyter")
+    others = environment.get(_CONFIG_PATH)
+    return {**environment, _CONFIG_PATH: ours if not others else f"{others}{os.pathsep}{ours}"}
 
 
 def find_notebooks() -> Path:
@@ -46,4 +63,4 @@ def find_notebooks() -> Path:
 def open_lab(command: list[str]) -> int:
     """Becomes JupyterLab: this process is replaced, so that Ctrl-C reaches it and nothing is left behind."""
     sys.stdout.flush()
-    os.execv(command[0], command)
+    os.execve(command[0], command, lab_environment(os.environ))

@@ -18,6 +18,7 @@ from rcilab.errors import UsageError
 from rcilab.model import RobotModel, require_model
 from rcilab.motion.motion import Motion
 from rcilab.notebook.installed import require_installed
+from rcilab.notebook.place import find_place
 from rcilab.robots.upright import upright_joints
 from rcilab.views.arm_view import ArmView
 
@@ -27,8 +28,6 @@ _HOLD = 1.0  # [s] The arm rests at the goal before the motion starts again.
 _REPETITIONS = 1000  # For as long as anybody looks.
 _MIDDLE = (0.2, 0.0, 0.5)  # [m] What the camera turns about.
 _CAMERA_POSITION = (0.7, -1.0, 0.35)  # [m] seen from there
-_FAR_AWAY = ("JUPYTERHUB_SERVICE_PREFIX", "BINDER_SERVICE_HOST", "COLAB_RELEASE_TAG")
-"""Set where the kernel's loopback is not the browser's."""
 
 
 class Preview(Closing):
@@ -60,6 +59,7 @@ class Preview(Closing):
         self._model = model
         self._height = height
         self._live = live
+        self._place = find_place()
         self._arm = ArmView(self._scene, "arm", model, quality="fine" if live else "coarse")
         self._arm.show(pose)
         self._moving = False
@@ -67,15 +67,15 @@ class Preview(Closing):
             ArmView(self._scene, "goal", model, "plan").show(what.goal)
             self._animate(what)
         self._markup = ""
-        _aim_camera(self._scene.visualizer)
+        aim_camera(self._scene.visualizer)
         if not live:
             self._markup = self._scene.as_html()
             self._scene.close()
 
     @property
     def url(self) -> str | None:
-        """Address of the viewer, to open it in a window of its own; None when it is not live."""
-        return self._scene.url if self._live else None
+        """Where the browser finds the viewer, to open it in a window of its own; None when it is not live."""
+        return self._place.address(self._scene.url) if self._live else None
 
     def show(self, q: ArrayLike) -> None:
         """Puts the arm into a pose, shape (n,), [rad]; an animation ends.
@@ -143,19 +143,19 @@ def preview(
     Args:
         motion: What to play; or joint angles, shape (n,), [rad], to show the arm standing there.
         model: The arm.
-        live: Served by the kernel (True) or part of the notebook (False); None serves it, unless the kernel runs on a
-            hub, whose loopback the browser cannot reach.
+        live: Served by the kernel (True) or part of the notebook (False); None serves it wherever the browser can
+            reach the kernel, see `rcilab.notebook.place`.
         height: Height in the notebook, [px].
 
     Raises:
         InvalidValueError: The pose is not n finite numbers.
     """
     if live is None:
-        live = not any(name in os.environ for name in _FAR_AWAY)
+        live = find_place().way != "static"
     return Preview(motion, model, live=live, height=height)
 
 
-def _aim_camera(visualizer: Any) -> None:
+def aim_camera(visualizer: Any) -> None:
     """Looks at the middle of the arm. meshcat 0.3's camera always turns about the origin, so the arm goes there."""
     T_viewer_base = np.eye(4)
     T_viewer_base[:3, 3] = -np.array(_MIDDLE)

@@ -40,7 +40,7 @@ class PreviewPage(Closing):
     def __init__(self, motion: Motion, model: RobotModel, *, port: int = 0) -> None:
         require_motion(motion)
         require_model(model)
-        bound = _bind(port)
+        bound = bind_loopback(port)
         self.port: int = bound.getsockname()[1]
         self._motion = motion
         self._door = GuardedServer(bound, Gate(host=LOOPBACK, port=self.port))
@@ -115,7 +115,12 @@ def serve_preview(motion: Motion, model: RobotModel, *, port: int = 0) -> Previe
     return PreviewPage(motion, model, port=port)
 
 
-def _bind(port: int) -> socket.socket:
+def bind_loopback(port: int) -> socket.socket:
+    """Returns a socket that listens on loopback.
+
+    Raises:
+        UsageError: The port is taken.
+    """
     try:
         return listen(LOOPBACK, port)
     except OSError as error:

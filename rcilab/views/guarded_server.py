@@ -3,13 +3,12 @@
 viser 1.1 binds every interface by default, takes the next port when the wanted one is busy, answers a websocket from
 any Origin (so any web page in the operator's browser could press our buttons), opens a public tunnel when a client
 asks for it, and writes whatever a client sends into its handles, NaN and callback lists included. Everything that
-stands against this is in this file and in `gate`, and the tests try each door.
+stands against this is in this file, in `gate` and in `message_guard`, and the tests try each door.
 """
 
 from __future__ import annotations
 
 import logging
-import math
 import socket
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -20,6 +19,7 @@ from urllib.parse import urlsplit
 from rcilab.closing import Closing
 from rcilab.views import loop_event
 from rcilab.views.gate import COOKIE, Gate
+from rcilab.views.message_guard import LARGEST_MESSAGE, MessageGuard
 
 if TYPE_CHECKING:
     import viser
@@ -79,7 +79,7 @@ class GuardedServer(Closing):
         sockets = self.viser._websock_server  # What is called on it below has no public spelling in viser 1.1.
         sockets.unregister_handler(_messages.ShareUrlRequest)
         sockets.unregister_handler(_messages.ShareUrlDisconnect)
-        _guard_updates(sockets)
+        MessageGuard(self.viser)
 
     def close(self) -> None:
         """Stops serving."""
@@ -107,7 +107,9 @@ class GuardedServer(Closing):
             # A browser opens connections ahead of need and drops them unused; that is no error worth a traceback.
             quiet = logging.getLogger("rcilab.page")
             quiet.setLevel(logging.CRITICAL)
-            return original(route, sock=bound, process_request=process, **{**options, "logger": quiet})
+            return original(
+                route, sock=bound, process_request=process, **{**options, "logger": quiet, "max_size": LARGEST_MESSAGE}
+            )
 
         serving.serve = serve
         try:
@@ -152,15 +154,6 @@ class GuardedServer(Closing):
         return Response(HTTPStatus.OK.value, "OK", headers, body)
 
 
-def is_finite(value: object) -> bool:
-    """Returns whether every number in a value, however nested, is finite."""
-    if isinstance(value, float):
-        return math.isfinite(value)
-    if isinstance(value, list | tuple):
-        return all(is_finite(item) for item in value)
-    return True
-
-
 def _refusal(reason: str) -> Any:
     from websockets.datastructures import Headers
     from websockets.http11 import Response
@@ -168,26 +161,6 @@ def _refusal(reason: str) -> Any:
     body = f"403: {reason}\n".encode()
     headers = Headers({"Content-Type": "text/plain; charset=utf-8", "Content-Length": str(len(body))})
     return Response(HTTPStatus.FORBIDDEN.value, "Forbidden", headers, body)
-
-
-def _guard_updates(sockets: Any) -> None:
-    """Lets a client change the value of a control and nothing else about it, and only to finite numbers.
-
-    Without this a client can erase a control's Python callbacks (`updates={"update_cb": []}`) and send NaN.
-    """
-    from viser import _messages
-
-    handlers = sockets._incoming_handlers.pop(_messages.GuiUpdateMessage)
-
-    async def guarded(client_id: Any, message: Any) -> None:
-        if set(message.updates) != {"value"} or not is_finite(message.updates["value"]):
-            return
-        for handler in handlers:
-            outcome = handler(client_id, message)
-            if outcome is not None:
-                await outcome
-
-    sockets.register_handler(_messages.GuiUpdateMessage, guarded)
 
 
 @contextmanager

@@ -118,6 +118,10 @@ class MeshcatScene:
         """Changes are sent at once: meshcat has no batches, and its page draws at its own rate."""
         yield
 
+    def flush(self) -> None:
+        """Returns once everything that was drawn has been sent to every open page."""
+        self._server.flush()
+
     def as_html(self) -> str:
         """Returns the scene as one page that needs neither server nor network."""
         return self._server.get_scene()

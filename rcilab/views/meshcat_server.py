@@ -3,6 +3,7 @@
 meshcat's own server prints a 127.0.0.1 address and listens on every interface, and no option changes that. This one
 runs meshcat's scene tree and page in a thread of ours, with the web port bound to 127.0.0.1 and without the ZeroMQ
 detour: drawing commands are handed over in memory. Tornado refuses websockets of foreign origin by itself (403).
+Its page looks for the websocket beside itself, so that it works below a path of a proxy; meshcat's own looks at /.
 """
 
 from __future__ import annotations
@@ -12,11 +13,17 @@ import threading
 import warnings
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
+from pathlib import Path
 from typing import Any
 
 from rcilab.errors import ConnectionLostError, DeadlineError
 
 _HOST = "127.0.0.1"
+_CONNECT = "viewer.connect();"
+_CONNECT_BESIDE = """viewer.connect(new URL("../", location.href.split("?")[0]).href.replace(/^http/, "ws"));
+if (location.search === "?plain") {
+  document.head.insertAdjacentHTML("beforeend", "<style>.dg { display: none }</style>");
+}"""
 _PATIENCE = 10.0  # [s] for the thread to answer; it does so in milliseconds
 
 
@@ -53,6 +60,10 @@ class MeshcatServer:
     def get_scene(self) -> str:
         """Returns the whole scene as one HTML page that needs no server."""
         return self._ask(self._bridge.scene_html)
+
+    def flush(self) -> None:
+        """Returns once every command so far has been passed on."""
+        self._ask(lambda: "")
 
     def close(self) -> None:
         """Stops serving; open pages keep what they show. Calling it again does nothing."""
@@ -120,6 +131,13 @@ def _build_bridge() -> Any:
         def on_message(self, message: str | bytes) -> None:
             pass  # Pages answer only to picture requests, which this server never makes.
 
+    class Front(tornado.web.RequestHandler):
+        """The page itself."""
+
+        def get(self) -> None:
+            self.set_header("Cache-Control", "no-store")
+            self.finish(_front_page(zmqserver))
+
     class Bridge(zmqserver.ZMQWebSocketBridge):
         def __init__(self) -> None:
             self.websocket_pool = set()
@@ -129,7 +147,12 @@ def _build_bridge() -> Any:
 
         def make_app(self) -> tornado.web.Application:
             static = {"path": zmqserver.VIEWER_ROOT, "default_filename": zmqserver.VIEWER_HTML}
-            routes = [(r"/static/(.*)", zmqserver.StaticFileHandlerNoCache, static), (r"/", Page, {"bridge": self})]
+            front = (r"/static/(?:index\.html)?", Front)
+            routes = [
+                front,
+                (r"/static/(.*)", zmqserver.StaticFileHandlerNoCache, static),
+                (r"/", Page, {"bridge": self}),
+            ]
             return tornado.web.Application(routes, log_function=lambda handler: None)
 
         def scene_html(self) -> str:
@@ -137,6 +160,13 @@ def _build_bridge() -> Any:
             return self.zmq_socket.last.decode("utf-8")
 
     return Bridge()
+
+
+def _front_page(zmqserver: Any) -> str:
+    """Returns meshcat's page with the websocket looked for one folder up; with ?plain without meshcat's own menu."""
+    page = (Path(zmqserver.VIEWER_ROOT) / zmqserver.VIEWER_HTML).read_text(encoding="utf-8")
+    assert _CONNECT in page, "meshcat has another page; look how it connects"
+    return page.replace(_CONNECT, _CONNECT_BESIDE)
 
 
 class _Reply:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
@@ -13,11 +15,12 @@ from rcilab.clock import CYCLE_TIME
 
 if TYPE_CHECKING:
     from rcilab.limits import JointLimits
+    from rcilab.model import RobotModel
     from rcilab.motion import Motion
 
-Quantity = Literal["q", "dq", "ddq", "jerk"]
+Quantity = Literal["q", "dq", "ddq", "jerk", "tau"]
 QUANTITIES: tuple[Quantity, ...] = ("q", "dq", "ddq", "jerk")
-
+"""What a motion has of every joint; a torque takes an arm and its load as well."""
 
 _WIDENED = 3  # Points that a marked violation reaches to both sides: one bad cycle is still some pixels wide.
 _FARTHEST = 3.0  # Multiple of the limit that a plot reaches at most; `rcilab.check` gives the number beyond.
@@ -48,7 +51,7 @@ class Frame:
     lower: float
     """The limit, in the unit of the curves."""
     violated: NDArray[np.bool_]
-    """Where a planned curve is outside its limits, widened to what an eye can see, boolean."""
+    """Where a curve is outside its limits, widened to what an eye can see, boolean."""
     bound: float
     """The plot reaches from -bound to bound; a curve far beyond its limit leaves it, so that the limit stays seen."""
     end: float
@@ -70,25 +73,36 @@ def decimate(curves: Curves, edges: Array) -> Array:
     """
     buckets, signals = len(edges) - 1, curves.values.shape[1]
     thin = np.full((2 * buckets, signals), np.nan)
-    starts = np.searchsorted(curves.t, edges[:-1], side="left")
-    ends = np.append(starts[1:], np.searchsorted(curves.t, edges[-1], side="right"))
-    last = int(np.searchsorted(edges, curves.t[-1], side="right")) - 1 if len(curves.t) else -1
-    for bucket in range(min(buckets, last + 1)):
-        a, b = starts[bucket], ends[bucket]
-        if a == b:
-            if a > 0:
-                thin[2 * bucket : 2 * bucket + 2] = curves.values[a - 1]
-            continue
-        part = curves.values[a:b]
-        low, high = part.argmin(axis=0), part.argmax(axis=0)
-        smallest, largest = part.min(axis=0), part.max(axis=0)
-        thin[2 * bucket] = np.where(low <= high, smallest, largest)
-        thin[2 * bucket + 1] = np.where(low <= high, largest, smallest)
+    ends = np.searchsorted(curves.t, edges, side="left")
+    ends[-1] = np.searchsorted(curves.t, edges[-1], side="right")
+    counts = np.diff(ends)
+    full = np.flatnonzero(counts)
+    if not full.size:
+        return thin
+    starts, values = ends[full], curves.values[ends[0] : ends[-1]]
+    places = starts - ends[0]
+    smallest, largest = np.minimum.reduceat(values, places), np.maximum.reduceat(values, places)
+    rising = _first(values, smallest, places, counts[full]) <= _first(values, largest, places, counts[full])
+    thin[2 * full] = np.where(rising, smallest, largest)
+    thin[2 * full + 1] = np.where(rising, largest, smallest)
+    last = int(np.searchsorted(edges, curves.t[-1], side="right")) - 1
+    empty = np.flatnonzero((counts == 0) & (ends[:-1] > 0) & (np.arange(buckets) <= last))
+    thin[2 * empty] = thin[2 * empty + 1] = curves.values[ends[empty] - 1]
     return thin
 
 
-def plan_curves(motion: Motion, quantity: Quantity) -> Curves:
-    """Returns a planned signal, one column a joint."""
+def _first(values: Array, wanted: Array, places: NDArray[np.intp], counts: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Returns the row in which every bucket first has its wanted value."""
+    rows = np.arange(len(values))[:, np.newaxis]
+    is_it = values == np.repeat(wanted, counts, axis=0)
+    return np.minimum.reduceat(np.where(is_it, rows, len(values)), places)
+
+
+def plan_curves(motion: Motion, quantity: Quantity, model: RobotModel | None = None) -> Curves:
+    """Returns a planned signal, one column a joint; the torque that it takes `model` with its load."""
+    if quantity == "tau":
+        assert model is not None
+        return Curves(t=motion.times, values=model.torque(motion.q, motion.dq, motion.ddq).full)
     return Curves(t=motion.times, values=getattr(motion, quantity))
 
 
@@ -104,27 +118,31 @@ def recorded_curves(t: Array, q: Array, q_c: Array, dq: Array, quantity: Quantit
     """
     if quantity in ("q", "dq"):
         return Curves(t=t, values=q if quantity == "q" else dq)
-    order = 2 if quantity == "ddq" else 3
-    values = np.zeros_like(q_c)
-    if len(q_c) > order:
-        # A lost cycle makes a gap: differences across it would be no derivative, so they are left at zero.
+    return Curves(t=t, values=backward_differences(t, q_c, 2 if quantity == "ddq" else 3))
+
+
+def backward_differences(t: Array, values: Array, order: int) -> Array:
+    """Returns the derivative of a signal as the controller computes it; zero where a cycle before is missing."""
+    found = np.zeros_like(values)
+    if len(values) > order:
+        # A lost cycle makes a gap: differences across it would be no derivative.
         steps = np.rint(np.diff(t) / CYCLE_TIME)
         whole = np.ones(len(t) - order, dtype=bool)
         for shift in range(order):
             whole &= steps[shift : len(steps) - order + 1 + shift] == 1.0
-        values[order:][whole] = np.diff(q_c, n=order, axis=0)[whole] / CYCLE_TIME**order
-    return Curves(t=t, values=values)
+        found[order:][whole] = np.diff(values, n=order, axis=0)[whole] / CYCLE_TIME**order
+    return found
 
 
 def bounds_of(limits: JointLimits, quantity: Quantity) -> tuple[Array, Array]:
     """Returns lower and upper limit of a signal, each of shape (n,)."""
     if quantity == "q":
         return limits.lower, limits.upper
-    upper = {"dq": limits.velocity, "ddq": limits.acceleration, "jerk": limits.jerk}[quantity]
+    upper = {"dq": limits.velocity, "ddq": limits.acceleration, "jerk": limits.jerk, "tau": limits.torque}[quantity]
     return -upper, upper
 
 
-def build_error_frame(t: Array, errors: Array, last: float, buckets: int = 240) -> Frame:
+def build_error_frame(t: Array, errors: Array, last: float, buckets: int = 240, least: float = _LEAST_ERROR) -> Frame:
     """Returns what a plot of errors shows: no limits, and an axis that reaches as far as the largest of them.
 
     Args:
@@ -132,6 +150,7 @@ def build_error_frame(t: Array, errors: Array, last: float, buckets: int = 240) 
         errors: One column a curve, in the unit to be shown, shape (N, k).
         last: Where the other plots end, [s], so that this one fits below them.
         buckets: Number of buckets the time is cut into.
+        least: Smallest range of the axis, for its ticks to be readable, in the unit to be shown.
     """
     edges = np.linspace(0.0, last, buckets + 1)
     times = np.repeat(edges[:-1], 2)
@@ -148,7 +167,7 @@ def build_error_frame(t: Array, errors: Array, last: float, buckets: int = 240) 
         upper=np.nan,
         lower=np.nan,
         violated=np.zeros(len(times), dtype=bool),
-        bound=max(1.12 * largest, _LEAST_ERROR),
+        bound=max(1.12 * largest, least),
         end=float(end),
     )
 
@@ -159,20 +178,59 @@ def last_time(*curves: Curves | None) -> float:
 
 
 def build_frame(
-    plan: Curves | None, actual: Curves | None, limits: JointLimits, quantity: Quantity, joint: int, buckets: int = 240
+    plan: Curves | None,
+    actual: Curves | None,
+    limits: JointLimits,
+    quantity: Quantity,
+    joint: int,
+    buckets: int = 240,
+    factor: float = math.degrees(1.0),
 ) -> Frame:
-    """Returns what a plot of one quantity shows.
+    """Returns what a plot of one quantity of the joints shows.
 
     Args:
         plan: Planned curves of all joints, or None.
         actual: Recorded curves of all joints, or None.
         limits: The arm's limits.
         quantity: Which signal.
-        joint: The joint to show in its own unit, [deg] and its derivatives, from 1; 0 shows all, each in percent of
-            its limit (of its range, with 0 in the middle, for q).
+        joint: The joint to show in its own unit, from 1; 0 shows all, each in percent of its limit (of its range, with
+            0 in the middle, for q).
         buckets: Number of buckets the time is cut into.
+        factor: How many of the unit to be shown one SI unit is; degrees as a rule.
     """
     low, high = bounds_of(limits, quantity)
+
+    def shown(values: Array) -> Array:
+        return factor * values[:, joint - 1 : joint] if joint else 100.0 * (2.0 * values - low - high) / (high - low)
+
+    lower, upper = (factor * float(low[joint - 1]), factor * float(high[joint - 1])) if joint else (-100.0, 100.0)
+    return _frame(plan, actual, shown, lower, upper, buckets)
+
+
+def build_tool_frame(
+    plan: Curves | None, actual: Curves | None, limit: float | None, factor: float, buckets: int = 240
+) -> Frame:
+    """Returns what a plot of a signal of the tool or the elbow shows.
+
+    Args:
+        plan: Planned, one column, or None.
+        actual: Recorded, likewise.
+        limit: Its largest value, in the unit of the curves; None where it has none.
+        factor: How many of the unit to be shown one SI unit is.
+        buckets: Number of buckets the time is cut into.
+    """
+    upper = np.nan if limit is None else factor * limit
+    return _frame(plan, actual, lambda values: factor * values, np.nan, upper, buckets)
+
+
+def _frame(
+    plan: Curves | None,
+    actual: Curves | None,
+    shown: Callable[[Array], Array],
+    lower: float,
+    upper: float,
+    buckets: int,
+) -> Frame:
     last = last_time(plan, actual)
     end = _round_end(last)
     edges = np.linspace(0.0, last, buckets + 1)
@@ -184,21 +242,18 @@ def build_frame(
     def thin(curves: Curves | None) -> tuple[Array, ...]:
         if curves is None or not len(curves.t):
             return ()
-        if joint:
-            shown = Curves(t=curves.t, values=np.degrees(curves.values[:, joint - 1 : joint]))
-        else:
-            shown = Curves(t=curves.t, values=100.0 * (2.0 * curves.values - low - high) / (high - low))
-        return tuple(np.append(column, np.nan) for column in decimate(shown, edges).T)
+        return tuple(
+            np.append(column, np.nan) for column in decimate(Curves(t=curves.t, values=shown(curves.values)), edges).T
+        )
 
-    lower, upper = (-100.0, 100.0)
-    if joint:
-        lower, upper = float(np.degrees(low[joint - 1])), float(np.degrees(high[joint - 1]))
     planned, recorded = thin(plan), thin(actual)
-    curves = np.nan_to_num(np.array(planned)) if planned else np.zeros((1, len(t)))
+    curves = np.nan_to_num(np.array((*planned, *recorded))) if planned or recorded else np.zeros((1, len(t)))
     outside = ((curves > upper) | (curves < lower)).any(axis=0)
     violated = np.convolve(outside, np.ones(2 * _WIDENED + 1), mode="same") > 0.5
     violated[-2:] = False  # The last two points span the empty rest of the axis.
-    limit = max(abs(upper), abs(lower))
+    farthest = float(np.abs(curves).max())
+    bounds = [abs(bound) for bound in (upper, lower) if np.isfinite(bound)]
+    limit = max(bounds) if bounds else max(farthest, _LEAST_ERROR)
     return Frame(
         t=t,
         end=float(t[-1]),
@@ -207,7 +262,7 @@ def build_frame(
         upper=upper,
         lower=lower,
         violated=violated,
-        bound=min(1.12 * max(limit, float(np.abs(curves).max())), _FARTHEST * limit),
+        bound=min(1.12 * max(limit, farthest), _FARTHEST * limit),
     )
 
 

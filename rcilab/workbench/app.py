@@ -15,8 +15,9 @@ from rcilab.workbench import requests, security
 from rcilab.workbench.conductor import Conductor
 from rcilab.workbench.goal.actions import initial_goal
 from rcilab.workbench.keepsake import Keepsake, keepsake_file
-from rcilab.workbench.live import LIVE_PATH, LiveChannel
-from rcilab.workbench.page import decorate
+from rcilab.workbench.lease import Presence
+from rcilab.workbench.live import LIVE_PATH, Heard, LiveChannel
+from rcilab.workbench.page import decorate, introduce
 from rcilab.workbench.run.replay import replayed, require_replayable
 from rcilab.workbench.session import Session
 from rcilab.workbench.store import Store, UiState
@@ -27,7 +28,6 @@ if TYPE_CHECKING:
 
     from rcilab.recording.run import Run
 
-_BRAND = (11, 111, 194)
 _BEAT = 0.4  # [s] A choice: the control process stops a motion when it has heard of nobody for 2 s.
 
 
@@ -81,7 +81,8 @@ class Workbench:
         self.store = Store(replace(state, runs=config.runs))
         self.session = Session(lambda error: self.store.say("bad", tell_error(error, self.session.status())))
         keepsake = Keepsake(keepsake_file(self.port) if config.port else None)  # Any free port is nobody's own.
-        self.conductor = Conductor(self.store, self.session, self._deliver, keepsake)
+        self._presence = Presence()
+        self.conductor = Conductor(self.store, self.session, self._deliver, keepsake, self._presence)
         self.server: viser.ViserServer
         self._stopped = threading.Event()
         self._opened = False
@@ -98,19 +99,20 @@ class Workbench:
         from rcilab.workbench.presenter import Presenter
 
         ask = self.conductor.ask
-        live = LiveChannel(
-            on_stop=self.session.stop,
-            on_here=self.session.heartbeat,
-            on_seek=lambda place: ask(requests.Seek(place=place)),
-            on_size=lambda height: ask(requests.SetView(name="height", value=height)),
+        self.live = live = LiveChannel(
+            Heard(
+                stop=self.session.stop,
+                here=self._here,
+                seek=lambda place: ask(requests.Seek(place=place)),
+                size=lambda height: ask(requests.SetView(name="height", value=height)),
+                take=lambda page: ask(requests.TakeControls(page=page)),
+                answer=lambda page, yes: ask(requests.AnswerControls(page=page, yes=yes)),
+            )
         )
         gate = Gate(host=self._config.host, port=self.port, token=self._config.token, title="this workbench")
         self._door = GuardedServer(self._bound, gate, decorate=decorate, routes={LIVE_PATH: live.serve})
         self.server = self._door.viser
         self._opened = True
-        self.server.gui.configure_theme(
-            brand_color=_BRAND, show_logo=False, show_share_button=False, control_width="medium"
-        )
         self._follow_pages()
         if self._config.replay is None:
             self.conductor.resume()
@@ -146,13 +148,21 @@ class Workbench:
         @self.server.on_client_connect
         async def _(client: viser.ClientHandle) -> None:
             ask(requests.PageCame(page=client.client_id))
+            introduce(client, self.live.introduce(client.client_id))
 
         @self.server.on_client_disconnect
         async def _(client: viser.ClientHandle) -> None:
             ask(requests.PageWent(page=client.client_id))
+            self.live.forget(client.client_id)
+
+    def _here(self, page: int) -> None:
+        """Hears that a page is there; only that of the operator counts for the robot side."""
+        self._presence.heard(page)
+        if self.store.state.lease.holder == page:
+            self.session.heartbeat()
 
     def _beat(self, live: LiveChannel) -> None:
-        """Asks the pages, all the time, whether somebody is there to press Stop; each answer goes to the robot side."""
+        """Asks the pages, all the time, whether somebody is there to press Stop."""
         while not self._stopped.wait(_BEAT):
             live.beat()
 

@@ -11,14 +11,19 @@ from typing import Any
 
 from rcilab.errors import RcilabError
 from rcilab.workbench import requests
+from rcilab.workbench.check.actions import CheckActions
 from rcilab.workbench.goal.actions import GoalActions
 from rcilab.workbench.jog.actions import JogActions
 from rcilab.workbench.jog.pose_actions import PoseActions
 from rcilab.workbench.keepsake import Keepsake, Kept
+from rcilab.workbench.learn.actions import LearnActions
+from rcilab.workbench.lease import Presence
+from rcilab.workbench.lease_actions import LeaseActions
 from rcilab.workbench.mailbox import Mailbox
 from rcilab.workbench.program.actions import ProgramActions
 from rcilab.workbench.run.actions import RobotActions
 from rcilab.workbench.run.export_actions import Deliver, ExportActions
+from rcilab.workbench.run.folder_actions import FolderActions
 from rcilab.workbench.run.mode_actions import ModeActions
 from rcilab.workbench.run.push_actions import PushActions
 from rcilab.workbench.run.where_actions import WhereActions
@@ -41,6 +46,7 @@ class Conductor:
         session: The robot side.
         deliver: Sends a file to a page.
         keepsake: Where goal and program are written down for the case of a crash; None: nowhere.
+        presence: When pages were last heard of.
     """
 
     def __init__(
@@ -49,6 +55,7 @@ class Conductor:
         session: Session,
         deliver: Deliver = lambda page, name, content: None,
         keepsake: Keepsake | None = None,
+        presence: Presence | None = None,
     ) -> None:
         self._store, self._session = store, session
         self._keepsake = keepsake or Keepsake(None)
@@ -62,8 +69,12 @@ class Conductor:
         self._jog = JogActions(store, session, self._goal)
         self._poses = PoseActions(store, self._goal)
         self._program = ProgramActions(store, session, self._goal)
+        self._check = CheckActions(store, session, self._goal, self._program)
+        self._learn = LearnActions(store, session)
         self._view = ViewActions(store)
+        self._lease = LeaseActions(store, session, presence or Presence())
         self._export = ExportActions(store, deliver)
+        self._folder = FolderActions(store)
         self._mailbox: Mailbox[requests.Request] = Mailbox()
         self._thread: threading.Thread | None = None
         self._ending = threading.Event()
@@ -101,14 +112,19 @@ class Conductor:
             requests.PlanProgram: self._program.plan,
             requests.CancelProgram: self._program.cancel,
             requests.LoadProgram: self._program.load,
+            requests.Check: self._check.press,
+            requests.Learn: self._learn.press,
             requests.Seek: self._view.seek,
             requests.Play: self._view.play,
             requests.SetView: self._view.set_view,
+            requests.ShowPlot: self._view.show_plot,
             requests.Export: self._export.export,
+            requests.ClearRuns: self._folder.clear,
             requests.SetRecording: self._view.set_recording,
-            requests.TakeControls: self._view.take_controls,
-            requests.PageCame: self._view.page_came,
-            requests.PageWent: self._view.page_went,
+            requests.TakeControls: self._lease.take_controls,
+            requests.AnswerControls: self._lease.answer,
+            requests.PageCame: self._lease.page_came,
+            requests.PageWent: self._lease.page_went,
         }
 
     def ask(self, request: requests.Request) -> None:
@@ -135,6 +151,8 @@ class Conductor:
         self._push.close()
         self._world.close()
         self._program.close()
+        self._check.close()
+        self._learn.close()
         self.robot.close()
         self._export.close()
         self._keepsake.drop()
@@ -143,13 +161,15 @@ class Conductor:
         """Carries out one request; what goes wrong becomes a sentence on the page."""
         lease = self._store.state.lease
         if not isinstance(request, requests.Harmless) and not lease.allows(request.page) and not _is_stop(request):
-            self._store.say("warn", message("notice.watching", page=lease.number(lease.holder)))
+            code = "lease.free" if lease.holder is None else "notice.watching"
+            self._store.say("warn", message(code, page=lease.number(lease.holder)))
             return
         self._guard(lambda: self._actions[type(request)](request))
 
     def tick(self, elapsed: float) -> None:
         """Does what time asks for: the preview plays on, the robot is looked at, a plan completed."""
         self._view.advance(elapsed)
+        self._lease.tick()
         event = self.robot.watch()
         if event == "placed":
             self._goal.plan()
@@ -162,7 +182,10 @@ class Conductor:
         self._setup.tick()
         self._jog.tick(elapsed)
         self._poses.tick()
+        self._folder.tick()
         self._program.tick()
+        self._check.tick()
+        self._learn.tick()
         self._keepsake.keep(self._store.state)
 
     def _resume(self, kept: Kept) -> None:

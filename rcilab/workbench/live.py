@@ -1,4 +1,4 @@
-"""A second websocket beside viser's: status to the page's bar, Stop and seeking back from it.
+"""A second websocket beside viser's: status to the page's bar; Stop, seeking, signs of life and answers back from it.
 
 It does not depend on which tab or panel is shown, so Stop stays reachable whatever the page looks like.
 """
@@ -6,9 +6,12 @@ It does not depend on which tab or panel is shown, so Stop stays reachable whate
 from __future__ import annotations
 
 import asyncio
+import hmac
 import json
 import math
+import secrets
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 LIVE_PATH = "/rcilab/live"
@@ -16,67 +19,102 @@ LIVE_PATH = "/rcilab/live"
 _LARGEST_MESSAGE = 4096  # [bytes] A page sends a few words; anything longer is not ours.
 
 
+@dataclass(frozen=True, kw_only=True)
+class Heard:
+    """What is called when a page says something; each must return at once."""
+
+    stop: Callable[[], None]
+    """Somebody pressed Stop or Esc."""
+    here: Callable[[int], None]
+    """A page has answered a beat: somebody who could press Stop is there."""
+    seek: Callable[[float], None]
+    """A place in the motion was clicked in a plot, 0 to 1."""
+    size: Callable[[float], None]
+    """Height of a page's window, [px], when it opens and when it changes."""
+    take: Callable[[int], None]
+    """A page wants the controls."""
+    answer: Callable[[int, bool], None]
+    """A page was asked for the controls."""
+
+
 class LiveChannel:
     """Sends one JSON object to every page when it changes, and hears the few things the bar can say.
 
+    A page says which of viser's clients it is by a key that only this client was given.
+
     Args:
-        on_stop: Called when somebody presses Stop or Esc. It must return at once.
-        on_seek: Called with the place in the motion that was clicked in a plot, 0 to 1.
-        on_here: Called when a page has answered a beat: somebody who could press Stop is connected.
-        on_size: Called with the height of a page's window, [px], when it opens and when it changes.
+        heard: What to do.
     """
 
-    def __init__(
-        self,
-        on_stop: Callable[[], None],
-        on_here: Callable[[], None],
-        on_seek: Callable[[float], None],
-        on_size: Callable[[float], None],
-    ) -> None:
-        self._on_stop, self._on_here, self._on_seek, self._on_size = on_stop, on_here, on_seek, on_size
-        self._pages: set[Any] = set()  # Owned by the event loop.
+    def __init__(self, heard: Heard) -> None:
+        self._heard = heard
+        self._pages: dict[Any, int | None] = {}  # Connection -> client id. Owned by the event loop.
+        self._keys: dict[int, str] = {}
         self._loop: asyncio.AbstractEventLoop | None = None
         self._latest: dict[str, Any] = {}
+
+    def introduce(self, page: int) -> str:
+        """Returns the key of a client that has just connected; the page brings it along on its live connection."""
+        return self._keys.setdefault(page, secrets.token_urlsafe(16))
+
+    def forget(self, page: int) -> None:
+        """Drops the key of a client that has gone."""
+        self._keys.pop(page, None)
 
     async def serve(self, page: Any) -> None:
         """Serves one page until it goes; runs on the server's event loop."""
         self._loop = asyncio.get_running_loop()
-        self._pages.add(page)
+        self._pages[page] = None
         try:
             await page.send(json.dumps(self._latest))
             async for message in page:
-                self.hear(message)
+                self._pages[page] = self.hear(message, self._pages[page])
         except Exception as error:
             from websockets.exceptions import ConnectionClosed
 
             if not isinstance(error, ConnectionClosed):
                 raise
         finally:
-            self._pages.discard(page)
+            self._pages.pop(page, None)
 
-    def hear(self, message: str | bytes) -> None:
-        """Acts on one message of a page; anything that is not one of ours is ignored."""
-        if len(message) > _LARGEST_MESSAGE:
-            return
-        try:
-            said = json.loads(message)
-        except ValueError:
-            return
-        if not isinstance(said, dict):
-            return
-        if said.get("kind") == "stop":
-            self._on_stop()
-        elif said.get("kind") == "here":
-            self._on_here()
-        elif said.get("kind") == "seek":
-            self._pass_on(said.get("place"), 0.0, 1.0, self._on_seek)
-        elif said.get("kind") == "size":
-            self._pass_on(said.get("height"), 200.0, 4000.0, self._on_size)
+    def hear(self, message: str | bytes, page: int | None = None) -> int | None:
+        """Acts on one message; anything that is not one of ours is ignored.
 
-    @staticmethod
-    def _pass_on(number: object, low: float, high: float, act: Callable[[float], None]) -> None:
-        if isinstance(number, int | float) and not isinstance(number, bool) and math.isfinite(number):
-            act(min(max(float(number), low), high))
+        Args:
+            message: As it came.
+            page: Client id of the page it came from, as far as it is known.
+
+        Returns:
+            The client id from now on.
+        """
+        said = _decode(message)
+        kind = said.get("kind")
+        if kind == "hello":
+            return self._greet(said)
+        if kind == "stop":
+            self._heard.stop()
+        elif kind == "seek":
+            _pass_on(said.get("place"), 0.0, 1.0, self._heard.seek)
+        elif kind == "size":
+            _pass_on(said.get("height"), 200.0, 4000.0, self._heard.size)
+        elif page not in self._keys:
+            pass  # Nobody that we know.
+        elif kind == "here":
+            self._heard.here(page)
+        elif kind == "take":
+            self._heard.take(page)
+        elif kind == "answer" and isinstance(said.get("yes"), bool):
+            self._heard.answer(page, said["yes"])
+        return page
+
+    def _greet(self, said: dict[str, Any]) -> int | None:
+        page, key = said.get("page"), said.get("key")
+        if not isinstance(page, int) or not isinstance(key, str) or page not in self._keys:
+            return None
+        if not hmac.compare_digest(key.encode(errors="replace"), self._keys[page].encode()):
+            return None
+        self._heard.here(page)
+        return page
 
     def publish(self, **values: Any) -> None:
         """Shows new values; only those that changed travel. For one thread, the presenter's."""
@@ -96,3 +134,19 @@ class LiveChannel:
         from websockets.asyncio.server import broadcast
 
         broadcast(self._pages, message)
+
+
+def _decode(message: str | bytes) -> dict[str, Any]:
+    """Returns what a page says; nothing where that is not one of ours."""
+    if len(message) > _LARGEST_MESSAGE:
+        return {}
+    try:
+        said = json.loads(message)
+    except (ValueError, RecursionError):
+        return {}
+    return said if isinstance(said, dict) else {}
+
+
+def _pass_on(number: object, low: float, high: float, act: Callable[[float], None]) -> None:
+    if isinstance(number, int | float) and not isinstance(number, bool) and abs(number) < math.inf:
+        act(min(max(float(number), low), high))

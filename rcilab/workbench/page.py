@@ -2,7 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from importlib.resources import files
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import viser
+
+_BRAND = (11, 111, 194)
 
 
 def decorate(index: bytes) -> bytes:
@@ -13,7 +20,22 @@ def decorate(index: bytes) -> bytes:
     """
     assets = files("rcilab.workbench") / "assets"
     style = (assets / "page.css").read_bytes()
-    script = b"\n".join((assets / name).read_bytes() for name in ("page.js", "rows.js"))
+    script = b"\n".join((assets / name).read_bytes() for name in ("page.js", "names.js", "rows.js", "pick.js"))
     head = b"<style>" + style + b"</style><script>" + script + b"</script></head>"
     page = index.replace(b"<title>Viser</title>", b"<title>rcilab workbench</title>", 1)
     return page.replace(b"</head>", head, 1)
+
+
+def introduce(client: viser.ClientHandle, key: str) -> None:
+    """Tells a page which of the server's clients it is, and the key that proves it on its live connection."""
+    from viser import _messages
+
+    call = f"window.rcilabPage?.({client.client_id}, {json.dumps(key)});"
+    client.gui._websock_interface.queue_message(_messages.RunJavascriptMessage(source=call))
+
+
+def dress(server: viser.ViserServer, theme: str) -> None:
+    """Colours the page light or dark."""
+    server.gui.configure_theme(
+        brand_color=_BRAND, show_logo=False, show_share_button=False, control_width="medium", dark_mode=theme == "dark"
+    )

@@ -8,12 +8,17 @@ import time
 import traceback
 from typing import TYPE_CHECKING, Any
 
+from rcilab.workbench.learn.state import exhibited
 from rcilab.workbench.live import LiveChannel
+from rcilab.workbench.page import dress
 from rcilab.workbench.panels import Panel
 from rcilab.workbench.panels.check import CheckPanel
 from rcilab.workbench.panels.health import HealthPanel
 from rcilab.workbench.panels.jog import JogPanel
 from rcilab.workbench.panels.lab import LabPanel
+from rcilab.workbench.panels.learn import LearnPanel
+from rcilab.workbench.panels.learn_exhibit import LearnExhibitPanel
+from rcilab.workbench.panels.learn_lesson import LearnLessonPanel
 from rcilab.workbench.panels.mode import ModePanel
 from rcilab.workbench.panels.poses import PosesPanel
 from rcilab.workbench.panels.program import ProgramPanel
@@ -21,6 +26,7 @@ from rcilab.workbench.panels.program_file import ProgramFilePanel
 from rcilab.workbench.panels.push import PushPanel
 from rcilab.workbench.panels.recording import RecordingPanel
 from rcilab.workbench.panels.run import RunPanel
+from rcilab.workbench.panels.runs_folder import RunsFolderPanel
 from rcilab.workbench.panels.settings import SettingsPanel
 from rcilab.workbench.panels.setup import SetupPanel
 from rcilab.workbench.panels.setup_numbers import SetupNumbersPanel
@@ -51,7 +57,8 @@ _TABS = (
     ("tab.setup", "tool", SetupPanel, SetupNumbersPanel),
     ("tab.check", "clipboard-check", CheckPanel),
     ("tab.run", "player-play", RunPanel, WherePanel, ModePanel, RecordingPanel, PushPanel, LabPanel, HealthPanel),
-    ("tab.settings", "settings", SettingsPanel),
+    ("tab.learn", "school", LearnLessonPanel, LearnPanel, LearnExhibitPanel),
+    ("tab.settings", "settings", SettingsPanel, RunsFolderPanel),
 )
 
 
@@ -70,10 +77,11 @@ class Presenter:
         self._server, self._store, self._session, self._live, self._ask = server, store, session, live, ask
         self._stage = Stage(server, ask)
         self._marks = ProgramMarks(server)
-        self._text = Text(store.state.language)
+        self._text = Text(store.state.language, store.state.units)
         self._panels: list[Panel] = []
         self._containers: list[Any] = []
-        self._built: tuple[str, str] | None = None
+        self._built: tuple[object, ...] | None = None
+        self._theme = ""
         self._ending = threading.Event()
         self._thread: threading.Thread | None = None
         self.errors: list[BaseException] = []
@@ -94,21 +102,25 @@ class Presenter:
     def show(self) -> None:
         """Shows one snapshot."""
         state, status = self._store.state, self._session.status()
-        if (state.language, state.model.name) != self._built:
+        if _looks(state) != self._built:
             self._build(state)
+        if state.theme != self._theme:
+            self._theme = state.theme
+            dress(self._server, state.theme)
+        seen = exhibited(state)
         for panel in self._panels:
-            panel.show(state, status)
-        self._stage.show(state, status, self._text)
-        self._marks.show(state)
-        self._live.publish(**status_values(state, status, self._text, self._timeline.end))
+            panel.show(seen if panel is self._timeline else state, status)
+        self._stage.show(exhibited(state, scene=True), status, self._text)
+        self._marks.show(seen)
+        self._live.publish(**status_values(seen, status, self._text, self._timeline.end))
 
     def _build(self, state: UiState) -> None:
-        """Makes the panels anew: another language has other words, another arm other joints."""
+        """Makes the panels anew: another language, unit or theme has other words, another arm other joints."""
         gui: Any = self._server.gui  # Icons are plain strings here, which viser's types do not allow.
         for container in self._containers:
             container.remove()
-        self._text = Text(state.language)
-        self._built = (state.language, state.model.name)
+        self._text = Text(state.language, state.units)
+        self._built = _looks(state)
         gui.set_panel_label(self._text("panel.main"))
         tabs = gui.add_tab_group()
         self._panels = []
@@ -140,3 +152,8 @@ class Presenter:
                 self.errors.append(error)
                 traceback.print_exc(file=sys.stderr)
             self._ending.wait(max(0.0, deadline - time.monotonic()))
+
+
+def _looks(state: UiState) -> tuple[object, ...]:
+    """Returns what the panels are built for."""
+    return state.language, state.units, state.theme, state.model.name

@@ -306,6 +306,26 @@ class LoadProgram(Request):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Check(Request):
+    """Something for the Check tab."""
+
+    what: Literal["row", "slow", "undo", "explain", "again", "cancel"]
+    row: str = ""
+    """Id of a condition."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Learn(Request):
+    """Something for the Learn tab."""
+
+    what: Literal["provoke", "cancel", "close", "moment", "script", "lesson", "skip", "leave"]
+    fault: int = -1
+    """Number of a fault."""
+    name: str = ""
+    """Of a lesson."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Seek(Request):
     """Go to a place in the planned motion."""
 
@@ -325,8 +345,16 @@ class Play(Request):
 class SetView(Request):
     """Settings of the page."""
 
-    name: Literal["language", "quality", "plot_joint", "rate", "height", "loop"]
+    name: Literal["language", "angle", "length", "theme", "quality", "plot_joint", "rate", "height", "loop"]
     value: str | float | int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ShowPlot(Request):
+    """Show or hide one of the plots."""
+
+    name: str
+    on: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -345,8 +373,24 @@ class SetRecording(Request):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ClearRuns(Request):
+    """Delete recorded runs but for the newest ones."""
+
+    what: Literal["choose", "ask", "confirm", "cancel"]
+    keep: int
+    """How many stay."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class TakeControls(Request):
     """This page wants the controls."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AnswerControls(Request):
+    """The page that holds the controls was asked for them."""
+
+    yes: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -359,5 +403,5 @@ class PageWent(Request):
     """A page has gone."""
 
 
-Harmless: TypeAlias = PageCame | PageWent | TakeControls | Seek | Play | SetView | Export
+Harmless: TypeAlias = PageCame | PageWent | TakeControls | AnswerControls | Seek | Play | SetView | ShowPlot | Export
 """What a watching page may ask for as well: nothing of it moves a goal or a robot."""

@@ -7,28 +7,33 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from rcilab.arrays import JointVector
 from rcilab.model import RobotModel
+from rcilab.posing.planning import Plan, PlannableLaw
+from rcilab.posing.reach import Reach, Tone
 from rcilab.spatial import Pose
-from rcilab.workbench.goal.planning import Plan, PlannableLaw
-from rcilab.workbench.goal.reach import Reach, Tone
+from rcilab.workbench.check.state import CheckState
 from rcilab.workbench.jog.jogging import JogState
+from rcilab.workbench.learn.state import LearnState
 from rcilab.workbench.lease import Lease
 from rcilab.workbench.program.draft import ProgramState
 from rcilab.workbench.run.driving import DriveState
 from rcilab.workbench.run.pushing import Plant, PushState
 from rcilab.workbench.setup.wanted import SetupState
 from rcilab.workbench.text import Message
+from rcilab.workbench.units import USUAL, Units
 
 if TYPE_CHECKING:
     from rcilab.motion import Motion
     from rcilab.recording.run import Run
     from rcilab.recording.tracking import Tracking
     from rcilab.workbench.run.export_actions import Export
+
+Theme = Literal["light", "dark"]
 
 _UNDO_DEPTH = 100
 
@@ -67,6 +72,8 @@ class Recording:
     """Commanded, [rad], shape (N, n)."""
     dq: np.ndarray
     """Measured, [rad/s], shape (N, n)."""
+    tau: np.ndarray | None = None
+    """Measured, [N m], shape (N, n); None where it was not kept."""
     delay: int
     """Cycles between a command and the state that shows it: the controller's play-out, and its answer."""
     run: Run | None = None
@@ -75,6 +82,19 @@ class Recording:
     """How far the arm was from its plan, once it stands still."""
     file: str = ""
     """Where it is on disk; "" where it is not."""
+
+
+@dataclass(frozen=True, slots=True)
+class RunsFolder:
+    """What the folder of recorded runs holds, and what is to be cleared away."""
+
+    count: int = 0
+    size: int = 0
+    """[bytes]."""
+    keep: int = 20
+    """How many of the newest ones are to stay."""
+    asked: bool = False
+    """Whether deleting awaits a second yes."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -96,6 +116,8 @@ class UiState:
     no_plan: Message | None = None
     """Why there is no plan."""
     program: ProgramState = field(default_factory=ProgramState)
+    check: CheckState = field(default_factory=CheckState)
+    learn: LearnState = field(default_factory=LearnState)
     asked: Motion | None = None
     """The motion that a foreign robot is to make and that awaits a second yes."""
     recording: Recording | None = None
@@ -105,6 +127,7 @@ class UiState:
     """Whether every cycle of a motion is written to a file as well."""
     runs: Path | None = None
     """Folder of these files; None: there is none."""
+    folder: RunsFolder = RunsFolder()
     export: Export | None = None
     """What is being written for a page."""
     speed: float = 0.5
@@ -119,8 +142,13 @@ class UiState:
     rate: float = 1.0
     plot_joint: int = 0
     """Joint shown in the plots, from 1; 0 shows all."""
+    plots: frozenset[str] = frozenset({"q", "dq", "ddq", "jerk", "error", "tool"})
+    """Which plots are shown; those of errors once there are some."""
     language: str = "en"
+    units: Units = USUAL
+    """What angles and lengths are shown and typed in; nothing is kept in them."""
     quality: str = "full"
+    theme: Theme = "light"
     height: float = 800.0
     """Height of the newest page's window, [px]: the plots fill it."""
     lease: Lease = field(default_factory=Lease)

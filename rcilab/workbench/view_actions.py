@@ -1,19 +1,29 @@
-"""What only changes how the page looks, and who is there to see it. Owned by the conductor's thread."""
+"""What only changes how the page looks. Owned by the conductor's thread."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from rcilab.workbench import requests
+from rcilab.workbench.learn.state import exhibited
 from rcilab.workbench.store import Store
 from rcilab.workbench.text import LANGUAGES, message
+from rcilab.workbench.units import ANGLES, LENGTHS
+
+if TYPE_CHECKING:
+    from rcilab.model import RobotModel
 
 QUALITIES = ("full", "light")
+THEMES = ("light", "dark")
 RATES = (0.1, 0.25, 0.5, 1.0, 2.0)
+PLOTS = ("q", "dq", "ddq", "jerk", "tau", "speed", "acceleration", "psi", "error", "tool")
+"""In the order they stand below each other."""
 
 
 class ViewActions:
-    """Timeline, settings, pages that come and go."""
+    """Timeline and settings."""
 
     def __init__(self, store: Store) -> None:
         self._store = store
@@ -25,7 +35,7 @@ class ViewActions:
 
     def play(self, request: requests.Play) -> None:
         """Starts the preview, from the beginning when it stands at the end, or holds it."""
-        state = self._store.state
+        state = exhibited(self._store.state)
         playing = not state.playing if request.playing is None else request.playing
         if state.plan is None:
             self._store.say("warn", message("ready.no_plan"))
@@ -36,7 +46,7 @@ class ViewActions:
 
     def advance(self, elapsed: float) -> None:
         """Moves a playing preview on by `elapsed`, [s]."""
-        state = self._store.state
+        state = exhibited(self._store.state)
         if not state.playing or state.plan is None:
             return
         place = state.place + elapsed * state.rate / max(state.plan.motion.duration, 1e-3)
@@ -50,32 +60,30 @@ class ViewActions:
         known = {
             "language": value in LANGUAGES,
             "quality": value in QUALITIES,
+            "theme": value in THEMES,
             "rate": value in RATES,
             "height": isinstance(value, float),
             "loop": isinstance(value, bool),
             "plot_joint": isinstance(value, int) and 0 <= value <= self._store.state.model.n,
         }
-        if known.get(request.name, False):
+        if request.name == "angle" and value in ANGLES:
+            self._store.update(units=replace(self._store.state.units, angle=value))
+        elif request.name == "length" and value in LENGTHS:
+            self._store.update(units=replace(self._store.state.units, length=value))
+        elif known.get(request.name, False):
             self._store.update(**{request.name: value})
+
+    def show_plot(self, request: requests.ShowPlot) -> None:
+        """Shows or hides a plot."""
+        plots = self._store.state.plots
+        if request.name in PLOTS:
+            self._store.update(plots=plots | {request.name} if request.on else plots - {request.name})
 
     def set_recording(self, request: requests.SetRecording) -> None:
         """Has the next motions written to files, or not."""
         self._store.update(record=request.on)
 
-    def page_came(self, request: requests.PageCame) -> None:
-        """Notes a page; the first one gets the controls."""
-        if request.page is not None:
-            self._store.update(lease=self._store.state.lease.arrive(request.page))
 
-    def page_went(self, request: requests.PageWent) -> None:
-        """Notes that a page has gone."""
-        if request.page is not None:
-            self._store.update(lease=self._store.state.lease.leave(request.page))
-
-    def take_controls(self, request: requests.TakeControls) -> None:
-        """Hands the controls to the page that asks."""
-        if request.page is None or self._store.state.lease.allows(request.page):
-            return
-        lease = self._store.state.lease.take(request.page)
-        self._store.update(lease=lease)
-        self._store.say("warn", message("notice.taken", page=lease.number(request.page)))
+def has_plot(model: RobotModel, name: str) -> bool:
+    """Returns whether there is anything to plot for an arm: only 7-axis arms have an arm angle."""
+    return name != "psi" or model.n == 7

@@ -9,6 +9,7 @@ from typing import Any, TypeAlias
 
 from rcilab.workbench.requests import Request, TypeField
 from rcilab.workbench.text import Message
+from rcilab.workbench.units import Unit
 
 Ask: TypeAlias = Callable[[Request], None]
 
@@ -63,10 +64,12 @@ class NumberField:
         handle: From `gui.add_text`.
         ask: Takes requests.
         field: Name of the field in `TypeField`. It may be exchanged; what was typed before is asked for at once.
+        unit: What the number is shown and typed in, from `Text.unit`; None for a number that has one unit only.
     """
 
-    def __init__(self, handle: Any, ask: Ask, field: str) -> None:
+    def __init__(self, handle: Any, ask: Ask, field: str, unit: Unit | None = None) -> None:
         self._handle, self._ask, self.field = handle, ask, field
+        self._unit = unit or Unit("", 1.0)
         self._typed: tuple[float, str, int | None, str] | None = None
         self._counted = 0
 
@@ -79,7 +82,7 @@ class NumberField:
         """Commits what was typed, or writes the state's number; called at the display's rate.
 
         Args:
-            text: The state's number as it is to be shown.
+            text: The state's number as it is to be shown, in degrees or millimetres where it has a unit of the page.
             problem: What is wrong with the typed number; it is then left as it is.
             counted: `UiState.typed`.
         """
@@ -89,13 +92,14 @@ class NumberField:
                 return
             self._typed = None
             self._counted = counted
-            self._ask(TypeField(page=typed[2], field=typed[3], text=typed[1]))
+            self._ask(TypeField(page=typed[2], field=typed[3], text=self._unit.complete(typed[1])))
             self._waiting = time.monotonic()
             return
         if problem is not None or time.monotonic() - getattr(self, "_waiting", 0.0) < 0.2:
             return  # The answer to what was just typed is still on its way, or it was no.
-        if self._handle.value != text:
-            self._handle.value = text
+        said = self._unit.restate(text)
+        if self._handle.value != said:
+            self._handle.value = said
 
 
 class Html:

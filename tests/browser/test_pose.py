@@ -26,6 +26,8 @@ def test_dragging_a_joint_slider_poses_the_candidate_and_not_the_robot(page):
 
 def test_arrow_keys_on_a_slider_pose_the_candidate(page):
     before = float(page.state.goal.q[3])
+    value = lambda: float(page.slider(4).get_attribute("aria-valuenow"))  # noqa: E731
+    page.wait(lambda: abs(value() - np.degrees(before)) < 0.06, "the slider to stand where the goal is")
     page.slider(4).focus()
     for _ in range(5):
         page.tab.keyboard.press("ArrowRight")

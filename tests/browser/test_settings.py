@@ -9,6 +9,7 @@ import time
 import numpy as np
 
 from browser.page import BenchPage, close_toasts
+from rcilab.workbench.units import USUAL
 
 
 def test_the_language_changes_everywhere_and_back(page):
@@ -36,7 +37,7 @@ def test_another_arm_stands_there_without_a_restart(page):
     page.wait(lambda: page.shows("live", page.status.q), "the first arm in the scene", 30)
 
 
-def test_the_second_page_watches_until_it_takes_the_controls(page, chromium):
+def test_the_second_page_watches_asks_for_the_controls_and_is_given_them(page, chromium):
     context = chromium.new_context(viewport={"width": 960, "height": 620})
     other = BenchPage(context.new_page(), page.bench)
     other.tab.goto(f"{page.bench.url}?fixedDpr=0.4")
@@ -47,11 +48,43 @@ def test_the_second_page_watches_until_it_takes_the_controls(page, chromium):
     other.type_joint(1, "33")
     other.wait(lambda: "holds the controls" in other.toast(), "to be told that it only watches")
     assert np.array_equal(page.state.goal.q, before)
-    other.open_tab("Settings")
-    other.button("Take the controls").click()
+    assert page.tab.locator("#rl-take").is_hidden()
+    other.button("Ask for the controls").first.click()
+    question = page.tab.get_by_role("alertdialog", name="Page 2 asks for the controls")
+    question.wait_for()
+    assert other.tab.get_by_role("alertdialog").count() == 0
+    question.get_by_role("button", name="Keep them").click()
+    other.wait(lambda: "was told no" in other.toast(), "the answer")
+    other.button("Ask for the controls").first.click()
+    question.get_by_role("button", name="Hand over").click()
     other.wait(lambda: page.chip("controls") == "page 2 of 2", "the first page to see who has the controls")
+    page.tab.locator("#rl-take").wait_for()
     context.close()
     page.wait(lambda: page.state.lease.pages == (page.state.lease.holder,), "the controls back with the first page")
+
+
+def test_units_and_theme_change_everywhere_and_a_typed_number_keeps_its_sign(page):
+    page.open_tab("Settings")
+    change(page, "Angles", "radians (rad)", lambda: page.state.units.angle == "rad")
+    change(page, "Theme", "dark", lambda: page.state.theme == "dark")
+    page.wait(lambda: page.tab.evaluate("document.documentElement.dataset.rlTheme") == "dark", "a dark page")
+    page.open_tab("Jog")
+    page.tab.get_by_text("Joint angles [rad]").wait_for()
+    field = page.joint_field(2)
+    page.wait(lambda: field.input_value() == f"{page.state.goal.q[1]:.4f}", "the angle in radians")
+    field.fill("0.5")
+    page.wait(lambda: abs(page.state.goal.q[1] - 0.5) < 1e-9, "0.5 rad")
+    field.press("ControlOrMeta+a")
+    field.press_sequentially("-0.25", delay=60)  # viser's own number boxes make +0.25 of it.
+    page.wait(lambda: abs(page.state.goal.q[1] + 0.25) < 1e-9, "-0.25 rad")
+    field.fill("9")
+    page.wait(lambda: any("outside -2.09 rad to 2.09 rad" in said for said in page.alerts()), "why 9 is refused")
+    field.fill("10 deg")
+    page.wait(lambda: abs(page.state.goal.q[1] - np.radians(10.0)) < 1e-9, "a number with its own unit")
+    page.wait(lambda: page.alerts() == [], "no complaint any more")
+    page.open_tab("Settings")
+    change(page, "Angles", "degrees (deg)", lambda: page.state.units == USUAL)
+    change(page, "Theme", "light", lambda: page.state.theme == "light")
 
 
 def test_a_page_of_a_foreign_origin_gets_no_websocket(page, chromium):
@@ -93,3 +126,15 @@ def choose(page: BenchPage, label: str, option: str) -> None:
                 return  # Taken; nothing is found when the labels are in another language by now.
             time.sleep(0.1)
     raise AssertionError(f"{label} did not take {option}")
+
+
+def change(page: BenchPage, label: str, option: str, changed) -> None:
+    """Chooses, and again when the page was just being built anew and the choice went down with the old controls."""
+    for _ in range(3):
+        choose(page, label, option)
+        deadline = time.monotonic() + 6.0
+        while time.monotonic() < deadline:
+            if changed():
+                return
+            page.tab.wait_for_timeout(100)
+    raise AssertionError(f"{label} did not change to {option}")

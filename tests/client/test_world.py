@@ -257,3 +257,13 @@ def test_something_else_at_that_port_is_no_world():
         with World(*listener.getsockname()) as world, pytest.raises(ConnectionLostError, match="no JSON"):
             world.status()
         thread.join()
+
+
+def test_what_a_bad_network_loses_in_lockstep_is_lost_at_once_and_the_same_every_time(robot):
+    lost = []
+    for _ in range(2):
+        robot.world.set_network(NetworkFaults(loss=0.2, seed=3), direction="commands")
+        hold(robot, lambda k: None, cycles=100)
+        robot.world.set_network()
+        lost.append(robot.world.status().lost)
+    assert lost[0] == lost[1] > 10

@@ -42,3 +42,11 @@ def test_the_rotor_is_the_one_that_the_mujoco_arm_moves_with() -> None:
     drive, zeros, ddq = DriveModel(model), np.zeros(7), np.full(7, 5.0)
     felt = drive.motor_tau(zeros, zeros, ddq) * drive.ratio
     assert felt == pytest.approx(ARMATURE_PER_TORQUE * model.limits.joint.torque * ddq)
+
+
+def test_all_at_once_is_each_for_itself() -> None:
+    drive, (q, dq, tau, ddq, dtau) = DriveModel(load_model("xMate3")), np.random.default_rng(3).normal(size=(5, 6))
+    theta, dtheta, motor_tau = drive.motor_side(np.concatenate((q, dq, tau, ddq, dtau)))
+    assert theta == pytest.approx(drive.theta(q, tau))
+    assert dtheta == pytest.approx(drive.dtheta(dq, dtau))
+    assert motor_tau == pytest.approx(drive.motor_tau(tau, dq, ddq))

@@ -35,12 +35,12 @@ def run(plant: Plant, measured: Measurement, law: Law, cycles: int) -> Measureme
 
 
 def joints(model: RobotModel, q: Array, stiffness: list[float]) -> Law:
-    zeros = [0.0] * model.n
-    return lambda measured: joint_impedance(model, q.tolist(), zeros, zeros, measured, stiffness)
+    zeros = np.zeros(model.n)
+    return lambda measured: joint_impedance(model, q, zeros, zeros, measured, stiffness)
 
 
 def tool(model: RobotModel, T: Pose, stiffness: list[float], **more: object) -> Law:
-    q = model.home.tolist()
+    q = model.home
     return lambda measured: cartesian_impedance(model, T, STILL, STILL, q, measured, stiffness, **more)  # type: ignore[arg-type]
 
 
@@ -111,7 +111,7 @@ def test_the_greatest_stiffness_is_stable_also_with_a_long_tool(make: Maker, nam
     rest, T_c = plant.reset(q), load_model(name, tool=Pose([0.2, 0.0, 0.5])).forward(q)
     laws: list[Law] = [
         joints(model, q, model.limits.joint.stiffness.tolist()),
-        lambda measured: cartesian_impedance(model, T_c, STILL, STILL, q.tolist(), measured, STIFF),
+        lambda measured: cartesian_impedance(model, T_c, STILL, STILL, q, measured, STIFF),
     ]
     for law in laws:
         plant.push([20.0, -30.0, 10.0, 1.0, 2.0, -1.0])
@@ -127,7 +127,7 @@ def test_a_spring_is_damped_with_seven_tenths_of_critical() -> None:
     model = load_model("xMatePro7")
     plant, stiffness = IdealPlant(model), [800.0] * 4 + [80.0] * 3
     zeros = [0.0] * 7
-    error = np.full(7, 1e-3)
+    error, still = np.full(7, 1e-3), np.zeros(7)
     measured, lowest = plant.reset(model.home + error), 1.0
     M = model.rigid_body.mass_matrix(model.home)
     root = np.diag(np.sqrt(stiffness))
@@ -136,7 +136,7 @@ def test_a_spring_is_damped_with_seven_tenths_of_critical() -> None:
     )  # One mode: its swing is that of a single mass.
     start = slowest @ error
     for _ in range(1500):
-        tau = joint_impedance(model, model.home.tolist(), zeros, zeros, measured, stiffness)
+        tau = joint_impedance(model, model.home, still, still, measured, stiffness)
         measured = plant.step(Setpoint(Drive.TORQUE, zeros, zeros, zeros, tau))
         lowest = min(lowest, float(slowest @ (measured.q - model.home) / start))
     assert lowest == pytest.approx(-math.exp(-math.pi * 0.7 / math.sqrt(1.0 - 0.49)), rel=0.05)  # 4.6 % overshoot
@@ -152,8 +152,8 @@ def test_an_untouched_arm_follows_its_reference() -> None:
         q, dq, ddq = (model.home + amplitude * s for s in (1 - math.cos(w * t), 0.0, 0.0))
         dq, ddq = amplitude * w * math.sin(w * t), amplitude * w * w * math.cos(w * t)
         worst = max(worst, float(np.abs(measured.q - q).max()))
-        tau = joint_impedance(model, q.tolist(), dq.tolist(), ddq.tolist(), measured, stiffness)
-        measured = plant.step(Setpoint(Drive.TORQUE, q.tolist(), dq.tolist(), ddq.tolist(), tau))
+        tau = joint_impedance(model, q, dq, ddq, measured, stiffness)
+        measured = plant.step(Setpoint(Drive.TORQUE, q, dq, ddq, tau))
     assert worst < 2e-3  # [rad] Half a millisecond of the motion, whose torque arrives at its end.
 
 
@@ -169,7 +169,7 @@ def test_an_untouched_tool_follows_its_reference() -> None:
         T_c = Pose.from_parts(T.parts[0], tuple((T.position + out[:3]).tolist()))  # type: ignore[arg-type]
         if k > 1500:  # It began at speed, from rest.
             worst = max(worst, float(np.abs(offset(T_c, model.forward(measured.q))).max()))
-        tau = cartesian_impedance(model, T_c, speed, acc, model.home.tolist(), measured, SOFT)
+        tau = cartesian_impedance(model, T_c, speed, acc, model.home, measured, SOFT)
         measured = plant.step(Setpoint(Drive.TORQUE, [0.0] * 6, [0.0] * 6, [0.0] * 6, tau))
     assert worst < 3e-4  # [m, rad]
 
@@ -181,7 +181,7 @@ def test_the_elbow_of_a_seven_axis_arm_is_led_softly_and_the_tool_does_not_feel_
     q_null = np.array(model.inverse(T_c, psi=0.3).nearest(model.home))
     measured, worst = plant.reset(model.home), 0.0
     for _ in range(2500):
-        tau = cartesian_impedance(model, T_c, STILL, STILL, q_null.tolist(), measured, STIFF)
+        tau = cartesian_impedance(model, T_c, STILL, STILL, q_null, measured, STIFF)
         measured = plant.step(Setpoint(Drive.TORQUE, [0.0] * 7, [0.0] * 7, [0.0] * 7, tau))
         worst = max(worst, float(np.abs(offset(model.forward(measured.q), T_c)).max()))
     assert model.arm_angle(measured.q) == pytest.approx(0.3, abs=0.01)

@@ -94,8 +94,8 @@ def test_all_terms_at_once_are_those_of_the_single_questions(name):
         model.jacobian(q),
         atol=1e-12,
     )
-    np.testing.assert_allclose(terms.position, model.forward(q).position, atol=1e-12)
-    np.testing.assert_allclose(terms.rotation, model.forward(q).rotation.ravel(), atol=1e-12)
+    assert terms.pose.is_close(model.forward(q), 1e-12)
+    np.testing.assert_allclose(terms.twist, model.jacobian(q) @ dq, atol=1e-12)
     slope = (model.jacobian(q + step * dq) - model.jacobian(q - step * dq)) / (2.0 * step)
     np.testing.assert_allclose(terms.drift, slope @ dq, atol=1e-8)
     np.testing.assert_allclose(body.acceleration(q, dq, torque.full), ddq, atol=1e-9)
@@ -110,9 +110,10 @@ def test_all_terms_at_once_are_those_of_the_single_questions(name):
 def test_the_motion_of_the_tool_is_that_of_forward_kinematics_and_jacobian(name, tool):
     model, rng = load_model(name, tool=tool), np.random.default_rng(5)
     for q, dq in rng.normal(size=(50, 2, model.n)):
-        pose, twist = model.rigid_body.tool_motion(q, dq)
-        assert pose.is_close(model.forward(q), 1e-14)
-        assert np.allclose(twist, model.jacobian(q) @ dq, rtol=0, atol=1e-12)
+        motion = model.rigid_body.tool_motion(q, dq)
+        assert motion.pose.is_close(model.forward(q), 1e-14)
+        assert np.array_equal(motion.matrix, motion.pose.matrix)
+        assert np.allclose(motion.twist, model.jacobian(q) @ dq, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("error", [1e-10, 3e-10])

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from rcilab.errors import KinematicsError, ModelError, UnreachableError
 from rcilab.kinematics.offset_arm import build_offset_geometry, trace
+from rcilab.kinematics.offset_singularity import held_singularity_path
 from rcilab.model import load_model
 from rcilab.robots.description import CraigRow, rows_from_craig
 from rcilab.robots.panda import CRAIG, ELBOW_FLIP
@@ -159,11 +160,12 @@ def test_the_arcs_hold_exactly_the_elbows_that_have_a_solution():
     for q in configurations(6, seed=7):
         T = PANDA.forward(q)
         arcs = PANDA.feasible_arcs(T)
-        assert arcs.at(q[2]).ok or min(abs(q[2] - end) for arc in arcs.arcs for end in (arc.start, arc.end)) < 1e-3
+        near_end = min(abs(q[2] - end) for arc in arcs.arcs for end in (arc.start, arc.end)) < 1e-3
+        assert arcs.at(q[2]).reasons in ((), ("singularity",)) or near_end
         assert sum(arc.end - arc.start for arc in arcs.arcs) == pytest.approx(math.tau, abs=1e-6)
         for psi in rng.uniform(-math.pi, math.pi, 8):
             arc = arcs.at(psi)
-            if min(psi - arc.start, arc.end - psi) < 1e-2:
+            if min(psi - arc.start, arc.end - psi) < 1e-2 or arc.reasons == ("singularity",):
                 continue
             try:
                 possible = len(PANDA.inverse(T, psi=psi)) > 0
@@ -172,6 +174,16 @@ def test_the_arcs_hold_exactly_the_elbows_that_have_a_solution():
             assert possible == arc.ok, (psi, arc)
             looked_at += 1
     assert looked_at > 30
+
+
+def test_arcs_name_singularities_where_two_solutions_are_about_to_meet():
+    found = [PANDA.feasible_arcs(PANDA.forward(q)) for q in configurations(6, seed=7)]
+    singular = [(row, arc) for row, arcs in enumerate(found) for arc in arcs.arcs if arc.reasons == ("singularity",)]
+    assert singular
+    for row, arc in singular:
+        T = PANDA.forward(configurations(6, seed=7)[row])
+        solutions = PANDA.inverse(T, psi=(arc.start + arc.end) / 2.0)
+        assert held_singularity_path(ARM, np.array(list(solutions))).max() > 0.99
 
 
 def test_another_table_is_refused():

@@ -64,6 +64,12 @@ def test_a_count_that_is_none_or_out_of_range_is_refused(count):
         load_model("xMatePro7").sample_workspace(count)
 
 
+@pytest.mark.parametrize("seed", [-1, "many", 2.5, None])
+def test_a_seed_that_is_none_is_refused(seed):
+    with pytest.raises(InvalidValueError, match=r"seed: .* must be a whole number, 0 or more"):
+        load_model("xMatePro7").sample_workspace(10, seed=seed)
+
+
 @pytest.mark.parametrize("name", ROBOT_NAMES)
 @settings(max_examples=25)
 @given(seed=st.integers(0, 2**32 - 1))

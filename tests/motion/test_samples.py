@@ -172,3 +172,12 @@ def test_a_bad_sample_is_for_check_to_find():
 def test_times_that_do_not_increase_are_refused():
     with pytest.raises(InvalidValueError, match=r"times at row 2 \(from 0\): 0.1 must be later than 0.1 \[s\]"):
         motion_through([0.0, 0.1, 0.1], np.zeros((3, 6)))
+
+
+def test_samples_that_go_on_for_hours_are_refused_before_they_fill_the_memory(tmp_path):
+    with pytest.raises(
+        InvalidValueError, match=r"duration: 1000000000\.0 s is more than 7200 s, .* are the times in s"
+    ):
+        Motion.load_samples(file_of(tmp_path, "t,q1\n0,0.1\n1e9,0.2\n"))
+    with pytest.raises(InvalidValueError, match="duration"):
+        Motion.load_samples(file_of(tmp_path, "0.1\n0.2\n"), rate_hz=1e-6)

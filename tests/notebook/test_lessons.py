@@ -1,8 +1,15 @@
-"""The lessons run from top to bottom without a display, and their exercises can be solved."""
+"""Every lesson runs from top to bottom without a display; its exercises wait for an answer, its solutions are right.
+
+A lesson is executed once: its cells as they are, and after them every exercise again with the solution that is folded
+below it. The Chinese lessons have the same code, so they need not run.
+"""
 
 from __future__ import annotations
 
+import ast
 import os
+import re
+from functools import cache
 from pathlib import Path
 
 import nbformat
@@ -10,32 +17,62 @@ import pytest
 from nbclient import NotebookClient
 
 NOTEBOOKS = Path(__file__).parents[2] / "notebooks"
-LESSONS = sorted(NOTEBOOKS.glob("*.ipynb"))
+ALL = sorted(NOTEBOOKS.glob("*.ipynb"))
+CHINESE = [path for path in ALL if path.name.endswith(".zh.ipynb")]
+LESSONS = [path for path in ALL if path not in CHINESE]
+EXERCISES = 2  # A lesson.
+LONGEST_FUNCTION = 30  # Lines; a screen.
+CHECK = "# check\n"  # What of an exercise's cell comes after this line is not for the student to change.
+SOLUTION = re.compile(r"<details>.*?```python\n(.*?)```\n</details>", re.DOTALL)
 
-ANSWERS = {
-    "01_first_motion.ipynb": {"speed = 0.5  # <- change me": "speed = 0.13", "number = 0  # <- change me": "number = 2"}
-}
+
+def read(path: Path) -> nbformat.NotebookNode:
+    return nbformat.read(path, as_version=4)
 
 
-def run_lesson(path: Path, answers: dict[str, str]) -> nbformat.NotebookNode:
-    """Executes a copy of a lesson with some of its lines replaced."""
-    notebook = nbformat.read(path, as_version=4)
+def code(path: Path) -> list[str]:
+    return [cell.source for cell in read(path).cells if cell.cell_type == "code"]
+
+
+def text(path: Path) -> str:
+    return "\n".join(cell.source for cell in read(path).cells if cell.cell_type == "markdown")
+
+
+def exercises(path: Path) -> list[str]:
+    return [source for source in code(path) if CHECK in source]
+
+
+def solved(path: Path) -> list[str]:
+    """Returns the exercises of a lesson with the folded solutions in the place of what is to be changed."""
+    solutions = SOLUTION.findall(text(path))
+    return [
+        solution + CHECK + exercise.split(CHECK)[1]
+        for exercise, solution in zip(exercises(path), solutions, strict=True)
+    ]
+
+
+@cache
+def run_lesson(path: Path) -> nbformat.NotebookNode:
+    """Executes a copy of a lesson, and after it its solved exercises."""
+    notebook = read(path)
     for cell in notebook.cells:
-        for line, answer in answers.items():
-            cell.source = cell.source.replace(line, answer)
+        cell.source = (
+            re.sub(r"^\w+\.(close|end)\(\)\n?", "", cell.source, flags=re.M) if CHECK in cell.source else cell.source
+        )
+    notebook.cells += [nbformat.v4.new_code_cell(source) for source in solved(path)]
     environment = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")}
     client = NotebookClient(notebook, timeout=60, resources={"metadata": {"path": str(path.parent)}})
     return client.execute(env=environment)
 
 
-def printed(notebook: nbformat.NotebookNode) -> list[str]:
-    return [
+def printed(notebook: nbformat.NotebookNode, stream: str = "stdout") -> str:
+    return "".join(
         output.text
         for cell in notebook.cells
         if cell.cell_type == "code"
         for output in cell.outputs
-        if output.output_type == "stream"
-    ]
+        if output.output_type == "stream" and output.name == stream
+    )
 
 
 def shown(notebook: nbformat.NotebookNode, kind: str) -> list[str]:
@@ -48,30 +85,53 @@ def shown(notebook: nbformat.NotebookNode, kind: str) -> list[str]:
     ]
 
 
-@pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem)
+def test_there_are_eleven_lessons_in_two_languages() -> None:
+    assert [path.name[:3] for path in LESSONS] == [f"{number:02}_" for number in range(1, 12)]
+    assert [path.name for path in CHINESE] == [path.name.replace(".ipynb", ".zh.ipynb") for path in LESSONS]
+
+
+@pytest.mark.parametrize("path", ALL, ids=lambda path: path.stem)
 def test_a_lesson_is_committed_without_output(path: Path) -> None:
-    notebook = nbformat.read(path, as_version=4)
+    notebook = read(path)
     nbformat.validate(notebook)
+    assert set(notebook.metadata) == {"kernelspec", "language_info"}
     cells = [cell for cell in notebook.cells if cell.cell_type == "code"]
     assert [cell.execution_count for cell in cells] == [None] * len(cells)
     assert all(cell.outputs == [] for cell in cells)
+    assert all(cell.metadata == {} for cell in notebook.cells)
     assert notebook.cells[0].cell_type == "markdown"
 
 
-def test_the_first_lesson_runs_and_its_exercises_can_be_solved() -> None:
-    path = NOTEBOOKS / "01_first_motion.ipynb"
-    notebook = run_lesson(path, ANSWERS[path.name])
-    errors = [o for c in notebook.cells if c.cell_type == "code" for o in c.outputs if o.get("name") == "stderr"]
-    assert errors == []
-    text = "".join(printed(notebook))
-    assert "refused: ConformanceError" in text
-    assert text.count("right - ") == 2
+@pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem)
+def test_no_function_is_longer_than_a_screen(path: Path) -> None:
+    for source in code(path):
+        for node in ast.walk(ast.parse(source)):
+            if isinstance(node, ast.FunctionDef):
+                assert node.end_lineno is not None
+                assert node.end_lineno - node.lineno < LONGEST_FUNCTION
+
+
+@pytest.mark.parametrize("path", CHINESE, ids=lambda path: path.stem)
+def test_a_chinese_lesson_has_the_code_of_the_english_one(path: Path) -> None:
+    english = NOTEBOOKS / path.name.replace(".zh.", ".")
+    assert code(path) == code(english)
+    assert [cell.cell_type for cell in read(path).cells] == [cell.cell_type for cell in read(english).cells]
+    assert SOLUTION.findall(text(path)) == SOLUTION.findall(text(english))
+
+
+@pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem)
+def test_a_lesson_runs_and_its_exercises_can_be_solved(path: Path) -> None:
+    assert len(exercises(path)) == EXERCISES
+    notebook = run_lesson(path)
+    assert printed(notebook, "stderr") == ""
+    assert re.findall("✗ not yet|✓ right", printed(notebook)) == ["✗ not yet"] * EXERCISES + ["✓ right"] * EXERCISES
+    assert shown(notebook, "image/png") or shown(notebook, "text/html")
+
+
+def test_the_first_lesson_shows_what_it_talks_about() -> None:
+    notebook = run_lesson(LESSONS[0])
+    assert "refused: ConformanceError" in printed(notebook)
     frames = "".join(shown(notebook, "text/html"))
     assert frames.count('<iframe src="http://127.0.0.1:') == 3  # The arm, the motion in meshcat, the motion in viser.
     assert len(shown(notebook, "image/png")) == 3  # Plan, broken plan, plan against actual.
     assert len(shown(notebook, "application/vnd.jupyter.widget-view+json")) == 1
-
-
-def test_an_exercise_left_as_it_is_says_not_yet() -> None:
-    path = NOTEBOOKS / "01_first_motion.ipynb"
-    assert "".join(printed(run_lesson(path, {}))).count("not yet - ") == 2

@@ -93,9 +93,14 @@ def test_static_it_is_whole_and_needs_nobody(tmp_path: Path) -> None:
     assert any(command["type"] == "set_animation" for command in commands(page))
 
 
-def test_on_a_hub_it_is_static(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_on_a_hub_it_is_static_unless_a_proxy_leads_to_the_kernel(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("JUPYTERHUB_SERVICE_PREFIX", "/user/somebody/")
+    monkeypatch.setattr("rcilab.notebook.place.find_spec", lambda name: None)
     assert preview(PRO7.home, PRO7).url is None
+    monkeypatch.setattr("rcilab.notebook.place.find_spec", lambda name: object())
+    with preview(PRO7.home, PRO7) as scene:
+        assert scene.url is not None
+        assert scene.url.startswith("/user/somebody/proxy/")
 
 
 def test_showing_a_pose_ends_the_animation(live: Preview) -> None:

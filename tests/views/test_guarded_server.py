@@ -14,7 +14,8 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 from rcilab.views.gate import Gate
-from rcilab.views.guarded_server import GuardedServer, is_finite, listen
+from rcilab.views.guarded_server import GuardedServer, listen
+from rcilab.views.message_guard import is_orderly
 
 PROTOCOL = f"viser-v{viser.__version__}"
 
@@ -87,5 +88,5 @@ def test_a_taken_port_is_refused_and_nothing_stays_open() -> None:
     ("value", "finite"),
     [(1.0, True), (float("nan"), False), ([0.0, float("inf")], False), ("nan", True), ([[1], (2.0,)], True)],
 )
-def test_is_finite_looks_into_everything(value, finite):
-    assert is_finite(value) is finite
+def test_a_message_is_looked_into_to_the_end(value, finite):
+    assert is_orderly(value) is finite

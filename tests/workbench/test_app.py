@@ -183,6 +183,10 @@ def test_a_watching_page_may_look_but_not_touch(bench, ask):
     ask(requests.MoveJoint(page=1, joint=0, angle=0.1))
     assert bench.store.state.goal.q[0] == pytest.approx(0.1)
     ask(requests.TakeControls(page=2))
+    assert (bench.store.state.lease.holder, bench.store.state.lease.asking) == (1, 2)
+    ask(requests.AnswerControls(page=2, yes=True))
+    assert bench.store.state.lease.holder == 1
+    ask(requests.AnswerControls(page=1, yes=True))
     assert bench.store.state.lease.holder == 2
     for page in (1, 2):
         ask(requests.PageWent(page=page))

@@ -9,9 +9,9 @@ import pytest
 
 from rcilab.errors import CertificateError
 from rcilab.model import load_model
-from rcilab.workbench import goal_actions
+from rcilab.posing.planning import Plan, make_plan
+from rcilab.workbench.goal import actions as goal_actions
 from rcilab.workbench.goal.actions import GoalActions, initial_goal
-from rcilab.workbench.goal.planning import Plan, make_plan
 from rcilab.workbench.store import Store, UiState
 
 MODEL = load_model("xMatePro7")

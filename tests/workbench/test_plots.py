@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from rcilab.model import load_model
 from rcilab.motion import Motion, plan_joint
 from rcilab.views.plots import QUANTITIES, Curves, bounds_of, build_frame, decimate, plan_curves, recorded_curves
-from rcilab.workbench.panels.timeline import plot_contents
+from rcilab.workbench.panels.plot_contents import plot_contents
 
 MODEL = load_model("xMatePro7")
 LIMITS = MODEL.limits.joint

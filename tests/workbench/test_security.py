@@ -17,7 +17,7 @@ from rcilab.errors import UsageError
 from rcilab.views.gate import Gate
 from rcilab.views.guarded_server import GuardedServer
 from rcilab.workbench import security
-from rcilab.workbench.live import LIVE_PATH, LiveChannel
+from rcilab.workbench.live import LIVE_PATH, Heard, LiveChannel
 from rcilab.workbench.page import decorate
 from rcilab.workbench.security import bind, check_host
 
@@ -55,7 +55,18 @@ class Door:
     def __init__(self) -> None:
         self.stops = threading.Event()
         self.seeks: list[float] = []
-        self.live = LiveChannel(self.stops.set, lambda: None, self.seeks.append, lambda height: None)
+        self.here: list[int] = []
+        self.asked: list[object] = []
+        self.live = LiveChannel(
+            Heard(
+                stop=self.stops.set,
+                here=self.here.append,
+                seek=self.seeks.append,
+                size=lambda height: None,
+                take=self.asked.append,
+                answer=lambda page, yes: self.asked.append((page, yes)),
+            )
+        )
         bound = bind("127.0.0.1", 0)
         self.port = bound.getsockname()[1]
         self.guard = GuardedServer(
@@ -196,6 +207,22 @@ def test_published_values_reach_every_page_and_the_next_one_too(door):
         assert json.loads(first.recv(timeout=10)) == {"language": "zh"}
         with door.connect("/rcilab/live") as second:
             assert json.loads(second.recv(timeout=10))["language"] == "zh"
+
+
+def test_only_a_page_that_brings_its_key_is_somebody(door):
+    key = door.live.introduce(5)
+    words = [{"kind": "here"}, {"kind": "take"}, {"kind": "answer", "yes": True}]
+    with door.connect("/rcilab/live") as page:
+        page.recv(timeout=10)
+        for hello in ({"page": 5, "key": "guessed"}, {"page": 5}, {"page": "5", "key": key}, {"page": 6, "key": key}):
+            for said in ({"kind": "hello", **hello}, *words):
+                page.send(json.dumps(said))
+        for said in ({"kind": "hello", "page": 5, "key": key}, *words, {"kind": "answer", "yes": 1}):
+            page.send(json.dumps(said))
+        wait_until(lambda: len(door.asked) >= 2)
+    assert door.here == [5, 5]
+    assert door.asked == [5, (5, True)]
+    door.live.forget(5)
 
 
 def test_viser_is_left_as_it_was(door):

@@ -45,6 +45,7 @@ class CartesianGenerator:
         self._q = q
         self._psi = model.arm_angle(q) if self._has_psi else 0.0
         limits = terms.limits.arm_angle
+        self._is_told = False  # Whether this motion's commands have had an arm angle.
         self._smallest_psi = 2.0 * CYCLE_TIME * limits.velocity if limits is not None else 0.0
         pose = model.forward(q)
         self._follower = Follower(model)
@@ -78,6 +79,7 @@ class CartesianGenerator:
                 values = self._stream.predict(1, values, playback.steps)
         self._stream.take(values)
         self._psi = remainder(values[7], tau) if packet is None or is_lost else self._arm_angle(packet)
+        self._is_told |= packet is not None and packet.psi_valid
         try:
             pose = Pose.from_parts(rotation_from_wxyz(values[3:7]), (values[0], values[1], values[2]))
             pose, psi = self._filter.step(pose, self._psi)
@@ -116,5 +118,6 @@ class CartesianGenerator:
             return 0.0
         if packet.psi_valid:
             return packet.psi_c
-        passes_zero = packet.psi_c == 0.0 and abs(self._psi) <= self._smallest_psi
+        # The vendor's client marks an arm angle of exactly zero as none: it is meant where one was told before.
+        passes_zero = self._is_told and packet.psi_c == 0.0 and abs(self._psi) <= self._smallest_psi
         return 0.0 if passes_zero else self._psi

@@ -7,7 +7,7 @@ from itertools import product
 from math import pi, remainder, tau
 
 from rcilab.errors import SingularError
-from rcilab.kinematics.inverse import build_geometry, inverse_seven, inverse_six
+from rcilab.kinematics.inverse import Angles, build_geometry, inverse_seven, inverse_six
 from rcilab.kinematics.singularity import find_singularity
 from rcilab.model import RobotModel
 from rcilab.spatial import IDENTITY, Pose
@@ -48,22 +48,24 @@ class Follower:
             branches = inverse_seven(self._geometry, flange, psi, near, self._near_flips(near))
         else:
             branches = inverse_six(self._geometry, flange, near)
-        best: list[float] = []
-        least = float("inf")
+        branch = branches[0] if len(branches) == 1 else self._nearest(branches, near)
+        q = [here + remainder(angle - here, tau) for angle, here in zip(branch, near, strict=True)]
+        singularity = find_singularity(self._geometry, q)
+        if singularity is not None:
+            raise SingularError(singularity)
+        return q
+
+    def _nearest(self, branches: list[Angles], near: Sequence[float]) -> Angles:
+        best, least = branches[0], float("inf")
         bends, here_bends = self._bends, [near[i] for i in self._bends]
         for branch in branches:
             # Where the arm bends it cannot turn round and round, so a look there tells most branches off.
             if sum([(branch[i] - here) ** 2 for i, here in zip(bends, here_bends, strict=True)]) >= least:
                 continue
-            turns = [remainder(angle - here, tau) for angle, here in zip(branch, near, strict=True)]
-            distance = sum([turn * turn for turn in turns])
+            distance = sum([remainder(angle - here, tau) ** 2 for angle, here in zip(branch, near, strict=True)])
             if distance < least:
-                least, best = distance, turns
-        q = [here + turn for here, turn in zip(near, best, strict=True)]
-        singularity = find_singularity(self._geometry, q)
-        if singularity is not None:
-            raise SingularError(singularity)
-        return q
+                least, best = distance, branch
+        return best
 
     def _near_flips(self, near: Sequence[float]) -> list[tuple[float, ...]]:
         """Returns the branches that a step from `near` may end on: those of its own sides, and of both next to zero."""

@@ -13,7 +13,7 @@ import numpy as np
 from rcilab.errors import DecodeError, InvalidValueError
 from rcilab.faults import FAULT_COUNT, Fault
 from rcilab.protocols.rci.layout import Field, Layout
-from rcilab.state import ControllerMode, MotionGeneratorMode, RobotMode, RobotState
+from rcilab.state import ControllerMode, MotionGeneratorMode, RobotMode, RobotState, build_state
 
 STATE = Layout(
     "robot state",
@@ -153,37 +153,36 @@ def decode_state(data: bytes, n: int) -> RobotState:
         modes = _MOTION_MODES[motion_mode], _CONTROLLER_MODES[controller_mode], _ROBOT_MODES[robot_mode]
     except KeyError:
         raise _unknown_mode(motion_mode, controller_mode) from None
-    return RobotState(
-        message_id=_ID.unpack_from(data)[0],
-        q=x[_Q : _Q + n],
-        q_c=x[_Q_C : _Q_C + n],
-        dq=x[_DQ : _DQ + n],
-        dq_c=x[_DQ_C : _DQ_C + n],
-        ddq_c=x[_DDQ_C : _DDQ_C + n],
-        T_base_tool=x[_POSE : _POSE + 16].reshape(4, 4),
-        T_base_tool_c=x[_POSE_C : _POSE_C + 16].reshape(4, 4),
-        tool_velocity_c=x[_VELOCITY : _VELOCITY + 6],
-        tool_acceleration_c=x[_ACCELERATION : _ACCELERATION + 6],
-        psi=psi,
-        psi_c=psi_c,
-        dpsi_c=dpsi_c,
-        ddpsi_c=ddpsi_c,
-        tau=x[_TAU : _TAU + n],
-        tau_filtered=x[_TAU_FILTERED : _TAU_FILTERED + n],
-        tau_c=x[_TAU_C : _TAU_C + n],
-        dtau_c=x[_DTAU_C : _DTAU_C + n],
-        tau_ext_in_base=x[_EXT_BASE : _EXT_BASE + 6],
-        tau_ext_in_stiff=x[_EXT_STIFF : _EXT_STIFF + 6],
-        theta=x[_THETA : _THETA + n],
-        dtheta=x[_DTHETA : _DTHETA + n],
-        motor_tau=x[_MOTOR_TAU : _MOTOR_TAU + n],
-        motor_tau_filtered=x[_MOTOR_TAU_FILTERED : _MOTOR_TAU_FILTERED + n],
-        faults=() if bits == _NO_FAULTS else tuple(f for f, bit in zip(_FAULTS, bits, strict=True) if bit),
-        success_rate=success_rate,
-        motion_generator_mode=modes[0],
-        controller_mode=modes[1],
-        robot_mode=modes[2],
+    values = (
+        _ID.unpack_from(data)[0],
+        x[_Q : _Q + n],
+        x[_Q_C : _Q_C + n],
+        x[_DQ : _DQ + n],
+        x[_DQ_C : _DQ_C + n],
+        x[_DDQ_C : _DDQ_C + n],
+        x[_POSE : _POSE + 16].reshape(4, 4),
+        x[_POSE_C : _POSE_C + 16].reshape(4, 4),
+        x[_VELOCITY : _VELOCITY + 6],
+        x[_ACCELERATION : _ACCELERATION + 6],
+        psi,
+        psi_c,
+        dpsi_c,
+        ddpsi_c,
+        x[_TAU : _TAU + n],
+        x[_TAU_FILTERED : _TAU_FILTERED + n],
+        x[_TAU_C : _TAU_C + n],
+        x[_DTAU_C : _DTAU_C + n],
+        x[_EXT_BASE : _EXT_BASE + 6],
+        x[_EXT_STIFF : _EXT_STIFF + 6],
+        x[_THETA : _THETA + n],
+        x[_DTHETA : _DTHETA + n],
+        x[_MOTOR_TAU : _MOTOR_TAU + n],
+        x[_MOTOR_TAU_FILTERED : _MOTOR_TAU_FILTERED + n],
+        () if bits == _NO_FAULTS else tuple(f for f, bit in zip(_FAULTS, bits, strict=True) if bit),
+        success_rate,
+        *modes,
     )
+    return build_state(values)
 
 
 def _unknown_mode(motion_mode: int, controller_mode: int) -> DecodeError:

@@ -1,7 +1,7 @@
 // The bar of the workbench. It speaks to Python over its own websocket, so that Stop works whatever viser shows.
 (() => {
   "use strict";
-  let live = null, said = {}, bar, chips, stop, toast, notice = null, greeted = false, hideTimer = 0;
+  let live = null, said = {}, bar, chips, stop, take, question, toast, me = null, notice = null, greeted = false, hideTimer = 0;
 
   const send = (message) => {
     if (live && live.readyState === WebSocket.OPEN) { live.send(JSON.stringify(message)); return true; }
@@ -32,12 +32,24 @@
     stop.type = "button";
     stop.addEventListener("pointerdown", pressStop);  // Not only on release: a stop should not wait for the finger.
     stop.addEventListener("click", pressStop);
-    bar.appendChild(stop);
+    take = document.createElement("button");
+    take.id = "rl-take";
+    take.type = "button";
+    take.hidden = true;
+    take.addEventListener("click", () => send({ kind: "take" }));
+    bar.append(take, stop);
+    question = document.createElement("div");
+    question.id = "rl-question";
+    question.hidden = true;
+    question.setAttribute("role", "alertdialog");
+    question.append(...["p", "button", "button"].map((kind) => document.createElement(kind)));
+    question.children[1].addEventListener("click", () => send({ kind: "answer", yes: true }));
+    question.children[2].addEventListener("click", () => send({ kind: "answer", yes: false }));
     chips = bar.querySelector("#rl-chips");
     toast = document.createElement("div");
     toast.id = "rl-toast";
     toast.setAttribute("role", "alert");
-    document.body.append(bar, toast);
+    document.body.append(bar, question, toast);
     label();
     connect();
     requestAnimationFrame(follow);
@@ -51,6 +63,31 @@
     stop.appendChild(key);
     stop.title = said.stopHint || "";
     stop.setAttribute("aria-label", said.stop || "Stop");
+  };
+
+  // Which of the server's clients this page is; the key proves it. Python calls this as soon as viser is connected.
+  window.rcilabPage = (page, key) => { me = { page, key }; greet(); };
+  const greet = () => { if (me) { send({ kind: "hello", ...me }); hold(); } };
+
+  // Who holds the controls: the others can ask for them, and the holder is asked.
+  const hold = () => {
+    if (!take) return;
+    take.hidden = !me || !said.take || said.holder === me.page;
+    take.textContent = said.take || "";
+    const asked = said.question && me && said.question.page === me.page ? said.question : null;
+    question.hidden = !asked;
+    if (!asked) return;
+    [asked.text, asked.yes, asked.no].forEach((words, i) => { question.children[i].textContent = words; });
+    question.setAttribute("aria-label", asked.text);
+  };
+
+  // Said once to everybody who opens the page for the first time: what Esc does, and what it is not.
+  const sayOnce = () => {
+    try {
+      if (localStorage.getItem("rcilab.stop")) return;
+      localStorage.setItem("rcilab.stop", "said");
+    } catch { /* A browser that keeps nothing is told each time. */ }
+    show({ tone: "info", text: said.stopHint });
   };
 
   const draw = (list) => {
@@ -81,14 +118,17 @@
       if (greeted || notice !== null) show(news.notice);  // What was said before this page came is no news to it.
       notice = news.notice.serial;
     }
+    if (!greeted && said.stopHint) sayOnce();
     greeted = true;
+    if ("holder" in news || "take" in news || "question" in news) hold();
+    if (news.theme) document.documentElement.dataset.rlTheme = news.theme;
     if (news.language) document.documentElement.lang = news.language;
   };
 
   const connect = () => {
     const scheme = location.protocol === "https:" ? "wss://" : "ws://";
     live = new WebSocket(scheme + location.host + "/rcilab/live");
-    live.onopen = () => { greeted = false; bar.classList.remove("rl-lost"); size(); };
+    live.onopen = () => { greeted = false; bar.classList.remove("rl-lost"); size(); greet(); };
     live.onmessage = hear;
     live.onclose = () => {
       bar.classList.add("rl-lost");

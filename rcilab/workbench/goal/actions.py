@@ -11,11 +11,11 @@ import numpy as np
 
 from rcilab.arrays import JointVector, frozen
 from rcilab.errors import KinematicsError
+from rcilab.posing.planning import LAWS, Plan, make_plan
+from rcilab.posing.reach import judge_joints, judge_pose
 from rcilab.spatial import Pose
+from rcilab.words.number import parse_number
 from rcilab.workbench import requests
-from rcilab.workbench.goal.planning import LAWS, Plan, make_plan
-from rcilab.workbench.goal.reach import judge_joints, judge_pose
-from rcilab.workbench.parse import parse_number
 from rcilab.workbench.run.readiness import is_moving
 from rcilab.workbench.session import Session
 from rcilab.workbench.store import Goal, Store

@@ -18,9 +18,9 @@ from rcilab.workbench.text import Message, message
 
 if TYPE_CHECKING:
     from rcilab.model import RobotModel
+    from rcilab.posing.planning import Plan
     from rcilab.supervisor import SupervisorStatus
     from rcilab.supervisor.jog_command import JogKind
-    from rcilab.workbench.goal.planning import Plan
     from rcilab.workbench.store import Store, UiState
 
 Frame = Literal["base", "tool"]

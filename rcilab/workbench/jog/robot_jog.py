@@ -12,9 +12,9 @@ import numpy as np
 
 from rcilab.errors import RcilabError
 from rcilab.kinematics.collision import link_name
+from rcilab.posing.planning import Plan, make_plan
 from rcilab.safety_distance import ADVISED_DISTANCE
 from rcilab.workbench.goal.actions import GoalActions
-from rcilab.workbench.goal.planning import Plan, make_plan
 from rcilab.workbench.jog.jogging import (
     FASTEST_JOINT,
     FASTEST_TOOL,

@@ -10,8 +10,8 @@ import numpy as np
 
 from rcilab.arrays import JointVector, frozen
 from rcilab.motion.online import POSITION_MARGIN
+from rcilab.posing.reach import judge_pose
 from rcilab.spatial import Pose
-from rcilab.workbench.goal.reach import judge_pose
 from rcilab.workbench.jog.jogging import AXES, Axis, Frame, JogState, at_limit
 from rcilab.workbench.text import Message, message
 

@@ -2,108 +2,126 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+import re
+import time
+from typing import TYPE_CHECKING, Any, cast
 
+from rcilab.language import Language
+from rcilab.workbench import requests
+from rcilab.workbench.panels.check_rows import rows_html
+from rcilab.workbench.run.readiness import is_moving
 from rcilab.workbench.setup.wanted import name_parts
 from rcilab.workbench.text import Text
-from rcilab.workbench.widgets import Ask, Html, esc
+from rcilab.workbench.widgets import Ask, Html, esc, on_press
 
 if TYPE_CHECKING:
-    from rcilab.conformance import Report
+    from rcilab.posing.planning import Plan
     from rcilab.supervisor import SupervisorStatus
     from rcilab.workbench.store import UiState
 
-_AMBER = {True: "check.exceeded", False: "check.tight"}
-_TIGHT = 0.95  # A choice: from this share of a bound on, a row is amber.
+_MOMENT = 0.5  # [s] A choice: what takes longer gets a bar and a way to end it.
+_SAID = re.compile(r"[0-9]+:([a-z_.]{1,60})")
 
 
 class CheckPanel:
-    """Every condition with its worst value, bound, joint, time and source."""
+    """Verdict, slow-down, explanation; every condition with its worst value, bound, joint, time and source."""
 
     def __init__(self, text: Text, ask: Ask) -> None:
-        del ask
-        self._text = text
-        self._drawn: tuple[Report, tuple[str, ...]] | None = None
+        self._text, self._ask = text, ask
+        self._drawn: tuple[object, ...] = ()
+        self._began = 0.0
 
     def build(self, gui: Any, state: UiState) -> None:
-        """Adds the report."""
+        """Adds the controls and the report."""
+        text, ask = self._text, self._ask
         self._verdict = Html(gui)
+        self._again = gui.add_button(text("check.again"), icon="refresh", visible=False, hint=text("setup.check_hint"))
+        on_press(self._again, ask, lambda page: requests.Check(page=page, what="again"))
+        self._tools = gui.add_folder(text("check.tools"))
+        with self._tools:
+            gui.add_html('<i class="rl-buttons rl-bare"></i>')
+            self._slow = gui.add_button(text("check.slow"), icon="gauge", hint=text("check.slow_hint"))
+            on_press(self._slow, ask, lambda page: requests.Check(page=page, what="slow"))
+            self._undo = gui.add_button(
+                text("check.undo"), icon="arrow-back-up", color="gray", hint=text("check.undo_hint")
+            )
+            on_press(self._undo, ask, lambda page: requests.Check(page=page, what="undo"))
+            self._explain = gui.add_button(
+                text("check.explain"), icon="message-2", color="gray", hint=text("check.explain_hint")
+            )
+            on_press(self._explain, ask, lambda page: requests.Check(page=page, what="explain"))
+            self._cancel = gui.add_button(text("check.cancel"), icon="x", color="gray")
+            on_press(self._cancel, ask, lambda page: requests.Check(page=page, what="cancel"))
+        self._bar = gui.add_progress_bar(0.0, visible=False, animated=True)
+        self._answer = Html(gui)
+        gui.add_html('<i class="rl-saybridge"></i>')
+        bridge = gui.add_text(text("check.rows"), "")  # Not shown: pick.js writes into it which row was clicked.
+
+        @bridge.on_update
+        async def _(event: Any) -> None:
+            found = _SAID.fullmatch(event.target.value)
+            if event.client_id is not None and found is not None:
+                ask(requests.Check(page=event.client_id, what="row", row=found[1]))
+
         self._table = Html(gui)
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Draws the report of the current plan."""
-        text = self._text
-        if state.plan is None:
-            self._drawn = None
-            reason = text.say(state.no_plan) if state.no_plan else text("check.nothing")
+        plan, check, now = state.plan, state.check, time.monotonic()
+        planning = state.program.progress  # A program is checked where it is planned, and that takes the longest.
+        busy = check.doing is not None or planning is not None
+        self._began = self._began if busy else now
+        self._bar.visible = busy and now - self._began > _MOMENT
+        self._bar.value = round(100.0 * (check.progress if planning is None else planning), 1)
+        self._cancel.disabled = not busy
+        self._undo.disabled = check.slowed is None or busy
+        stale = () if plan is None else plan.stale_parts(state.model, state.setup.wanted.box)
+        self._again.visible = bool(stale)
+        self._slow.disabled = plan is None or busy or bool(stale) or is_moving(status)
+        self._explain.disabled = plan is None or busy
+        if self._tools.visible is (plan is None):
+            self._tools.visible = plan is not None
+        wanted = (plan, stale, check.answer, check.explained, check.row, state.no_plan)
+        if wanted == self._drawn:
+            return
+        self._drawn = wanted
+        if plan is None:
+            reason = self._text.say(state.no_plan) if state.no_plan else self._text("check.nothing")
             self._verdict.show(f'<p class="rl-note">{esc(reason)}</p>')
+            self._answer.show("")
             self._table.show("")
             return
-        stale = state.plan.stale_parts(state.model, state.setup.wanted.box)
-        report = state.plan.report
-        if (report, stale) == self._drawn:
-            return
-        self._drawn = report, stale
+        self._verdict.show(self._headline(plan, stale))
+        self._answer.show(self._answers(state, plan))
+        self._table.show(rows_html(plan.report, plan.model, check.row, self._text))
+
+    def _headline(self, plan: Plan, stale: tuple[str, ...]) -> str:
+        text, report = self._text, plan.report
         unheeded = sum(not row.ok for row in report.rows if row.condition.necessity == "recommended")
-        if report.ok:
-            code = "check.passed_unheeded" if unheeded else "check.passed_long"
-            headline = ("good", "check.passed", text(code, count=unheeded))
-        else:
-            headline = ("bad", "check.failed", text("check.failed_long", count=len(report.violations)))
         if stale:
-            headline = ("warn", "setup.stale", text("setup.stale_why", what=text.say(name_parts(stale))))
-        tone, word, rest = headline
-        self._verdict.show(
-            f'<p class="rl-verdict rl-{tone} rl-big"><b>{esc(text(word))}</b> {esc(rest)}</p>'
-            f'<p class="rl-note">{esc(text("check.note"))}</p>'
-        )
-        rows = "".join(self._row(row) for row in report.rows)
-        from rcilab.conformance.explain import explain_violation
-
-        language = "zh" if text.language == "zh" else "en"
-        sentences = "".join(
-            f"<li>{esc(explain_violation(violation, language))}</li>" for violation in report.violations[:8]
-        )
-        self._table.show(
-            f'<div class="rl-cards">{rows}</div>' + (f'<ul class="rl-list">{sentences}</ul>' if sentences else "")
-        )
-
-    def _row(self, row: Any) -> str:
-        text, condition = self._text, row.condition
-        broken = not row.ok
-        tone = (
-            ("bad" if condition.necessity == "necessary" else "warn")
-            if broken
-            else "warn"
-            if row.ratio > _TIGHT
-            else "good"
-        )
-        word = text("check.kept" if tone == "good" else "check.broken" if tone == "bad" else _AMBER[broken])
-        name = text(f"condition.{condition.id}")
-        width = min(100.0, 100.0 * row.ratio)
-        facts = [f"{_number(row.value)} / {_number(row.bound)} {pretty_unit(condition.unit)}"]
-        facts += [text("check.joint", joint=row.joint)] if row.joint else []
-        if row.links is not None:
-            from rcilab.conformance.explain import explain_place
-
-            facts.append(explain_place(row, "zh" if text.language == "zh" else "en"))
-        facts.append(f"t = {row.time:.3f} s")
-        fault = "" if condition.fault is None else f"<br>{esc(text('check.raises', fault=condition.fault.manual_name))}"
+            headline = ("warn", "▲ ", "setup.stale", text("setup.stale_why", what=text.say(name_parts(stale))))
+        elif report.ok:
+            code = "check.passed_unheeded" if unheeded else "check.passed_long"
+            headline = ("good", "", "check.passed", text(code, count=unheeded))
+        else:
+            headline = ("bad", "", "check.failed", text("check.failed_long", count=len(report.violations)))
+        tone, sign, word, rest = headline
+        note = text("check.note") if plan.complete else text("check.incomplete")
         return (
-            f'<div class="rl-card rl-{tone}"><div class="rl-line"><b>{esc(name)}</b>'
-            f'<span class="rl-badge">{esc(text("necessity." + condition.necessity))}</span>'
-            f'<span class="rl-word">{esc(word)}</span><span class="rl-share">{100.0 * row.ratio:.1f} %</span></div>'
-            f'<div class="rl-meter"><i style="width:{width:.1f}%"></i></div>'
-            f'<div class="rl-facts">{esc(" · ".join(facts))}</div>'
-            f'<div class="rl-source">{esc(condition.formula)} — {esc(condition.source)}{fault}</div></div>'
+            f'<p class="rl-verdict rl-{tone} rl-big"><b>{sign}{esc(text(word))}</b> {esc(rest)}</p>'
+            f'<p class="rl-note">{esc(note)}</p>'
         )
 
-
-def pretty_unit(unit: str) -> str:
-    """Returns a unit with raised digits."""
-    return unit.replace("^2", "²").replace("^3", "³")
-
-
-def _number(value: float) -> str:
-    size = abs(value)
-    return f"{value:.0f}" if size >= 1000.0 else f"{value:.4g}" if size >= 1e-3 or size == 0.0 else f"{value:.1e}"
+    def _answers(self, state: UiState, plan: Plan) -> str:
+        """Returns what came of the slow-down, and the report in words, as far as they are about this plan."""
+        check, said = state.check, ""
+        if check.answer is not None and check.about is plan.report:
+            answer = esc(self._text.say(check.answer))
+            if check.found is not None:
+                answer += f" {esc(check.found.explain(cast(Language, self._text.language)))}"
+            said += f'<p class="rl-verdict rl-{check.tone}" role="status">{answer}</p>'
+        if check.explained is not None and check.explained[0] is plan.report:
+            first, *rest = check.explained[2].splitlines()
+            lines = "".join(f"<li>{esc(line.removeprefix('- '))}</li>" for line in rest)
+            said += f'<div class="rl-words"><p>{esc(first)}</p><ul class="rl-list">{lines}</ul></div>'
+        return said

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rcilab.posing.reach import NEAR_LIMIT
 from rcilab.workbench import requests
-from rcilab.workbench.goal.reach import NEAR_LIMIT
 from rcilab.workbench.jog.jogging import FASTEST_JOINT, FASTEST_TOOL, FASTEST_TURN, STEPS, no_jog
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, Html, Linked, NumberField, esc, on_press, shown
@@ -59,20 +59,23 @@ class JogPanel:
         self._fields: list[NumberField] = []
         self._margins: list[Html] = []
         source = state.model.limits.source("joint.lower")
-        angles = np.degrees(state.goal.q)
+        factor, _ = text.units.from_si("rad")
+        step, digits = (0.1, 3) if text.units.angle == "deg" else (0.001, 5)
+        angles = factor * state.goal.q
         gui.add_html('<i class="rl-joints rl-held"></i>')
         for joint in range(state.model.n):
-            low, high = float(np.degrees(limits.lower[joint])), float(np.degrees(limits.upper[joint]))
-            hint = text("jog.limit_hint", joint=joint + 1, low=f"{low:.0f}", high=f"{high:.0f}", source=source)
+            low, high = (float(factor * bound[joint]) for bound in (limits.lower, limits.upper))
+            ends = [f"{math.degrees(bound[joint]):.0f}" for bound in (limits.lower, limits.upper)]
+            hint = text("jog.limit_hint", joint=joint + 1, low=ends[0], high=ends[1], source=source)
             add_jog_button(gui, self._ask, f"J{joint + 1}", f"joint.{joint}", -1)
-            value = round(float(np.clip(angles[joint], low, high)), 3)
+            value = round(float(np.clip(angles[joint], low, high)), digits)
             slider = gui.add_slider(
-                f"J{joint + 1}", round(low, 3), round(high, 3), 0.1, value, marks=((0.0, ""),), hint=hint
+                f"J{joint + 1}", round(low, digits), round(high, digits), step, value, marks=((0.0, ""),), hint=hint
             )
-            self._sliders.append(Linked(slider, self._ask, _joint_request(joint)))
+            self._sliders.append(Linked(slider, self._ask, _joint_request(joint, factor)))
             add_jog_button(gui, self._ask, f"J{joint + 1}", f"joint.{joint}", 1)
-            box = gui.add_text("", shown(angles[joint]), hint=text("jog.type_hint"))
-            self._fields.append(NumberField(box, self._ask, f"joint.{joint}"))
+            box = gui.add_text("", "", hint=text("jog.type_hint"))
+            self._fields.append(NumberField(box, self._ask, f"joint.{joint}", text.unit("deg")))
             self._margins.append(Html(gui))
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:
@@ -84,10 +87,11 @@ class JogPanel:
         self._step.show(self._steps[jog.step])
         self._speed.show(round(100.0 * jog.speed))
         self._pace.show(pace_html(jog.speed, self._text))
-        for joint, angle in enumerate(np.degrees(state.goal.q)):
-            self._sliders[joint].show(round(float(angle), 3))
+        factor, digits = self._text.units.from_si("rad")[0], 3 if self._text.units.angle == "deg" else 5
+        for joint, angle in enumerate(state.goal.q):
+            self._sliders[joint].show(round(float(factor * angle), digits))
             field = self._fields[joint]
-            field.show(shown(angle), state.problems.get(field.field), state.typed)
+            field.show(shown(math.degrees(angle)), state.problems.get(field.field), state.typed)
             ends = float(limits.lower[joint]), float(limits.upper[joint])
             self._margins[joint].show(margin_html(float(state.goal.q[joint]), *ends, self._text))
         fields = [(field.field, f"J{number}") for number, field in enumerate(self._fields, start=1)]
@@ -128,7 +132,7 @@ def margin_html(angle: float, low: float, high: float, text: Text) -> str:
     tone, sign = ("bad", "◆ ") if left < 1e-3 else ("warn", "▲ ") if left < NEAR_LIMIT else ("good", "")
     share = 100.0 * min(left / (0.5 * (high - low)), 1.0)
     said = sign + text("jog.left", angle=f"{math.degrees(left):.0f}" if tone == "good" else f"{math.degrees(left):.1f}")
-    ends = [f"{math.degrees(bound):.0f}" for bound in (low, high)]
+    ends = [text.unit("deg").restate(f"{math.degrees(bound):.0f}") for bound in (low, high)]
     return (
         f'<div class="rl-margin rl-{tone}"><span>{ends[0]}</span><i class="rl-meter"><i style="width:{share:.0f}%">'
         f"</i></i><b>{esc(said)}</b><span>{ends[1]}</span></div>"
@@ -162,8 +166,8 @@ def reach_html(state: UiState, text: Text) -> str:
     )
 
 
-def _joint_request(joint: int):  # type: ignore[no-untyped-def]
+def _joint_request(joint: int, factor: float):  # type: ignore[no-untyped-def]
     def make(angle: float, page: int | None) -> requests.Request:
-        return requests.MoveJoint(page=page, joint=joint, angle=float(np.radians(angle)))
+        return requests.MoveJoint(page=page, joint=joint, angle=angle / factor)
 
     return make

@@ -58,7 +58,7 @@ def list_html(state: UiState, draft: Draft, running: int | None, text: Text) -> 
 def _start_row(draft: Draft, arm: RobotModel, running: bool, text: Text) -> str:
     assert draft.start is not None
     look, name = " rl-running" if running else "", esc(text("program.start"))
-    position = _millimetres(tuple(arm.forward(draft.start).position.tolist()))
+    position = _lengths(tuple(arm.forward(draft.start).position.tolist()), text)
     return (
         f'<div class="rl-step rl-start{look}" role="presentation"><span>0</span><span>{name}</span>'
         f"<span>{position}</span></div>"
@@ -70,25 +70,26 @@ def _cells(waypoint: Waypoint, arm: RobotModel, text: Text) -> tuple[str, ...]:
     psi = arm_angle_of(waypoint, arm)
     return (
         kind,
-        _where(waypoint, arm),
+        _where(waypoint, arm, text),
         f"{100.0 * waypoint.speed:.3g}",
-        "–" if waypoint.blend == 0.0 else f"{1000.0 * waypoint.blend:.3g}",
-        "–" if psi is None else f"{round(math.degrees(psi))}°",
+        "–" if waypoint.blend == 0.0 else text.unit("mm").restate(f"{1000.0 * waypoint.blend:.3g}"),
+        "–" if psi is None else text.units.angle_of(psi, 0).removesuffix(" rad"),
         "–" if waypoint.dwell == 0.0 else f"{waypoint.dwell:.3g}",
     )
 
 
-def _where(waypoint: Waypoint, arm: RobotModel) -> str:
+def _where(waypoint: Waypoint, arm: RobotModel, text: Text) -> str:
     try:
         target = target_of(waypoint, arm)
     except RcilabError:
         return "?"
     if target is not None:
-        return _millimetres(tuple(target.position.tolist()))
+        return _lengths(tuple(target.position.tolist()), text)
     if waypoint.type == "circle":
-        return f"{math.degrees(math.tau if waypoint.angle is None else waypoint.angle):.0f}°"
+        return text.units.angle_of(math.tau if waypoint.angle is None else waypoint.angle, 0)
     return "ψ"
 
 
-def _millimetres(position: tuple[float, ...]) -> str:
-    return " ".join(f"<b>{round(1000.0 * number):d}</b>" for number in position)
+def _lengths(position: tuple[float, ...], text: Text) -> str:
+    said = (text.unit("mm").restate(f"{round(1000.0 * number):d}") for number in position)
+    return " ".join(f"<b>{number}</b>" for number in said)

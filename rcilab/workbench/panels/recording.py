@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from rcilab.workbench import requests
 from rcilab.workbench.run.export_actions import ENDINGS
 from rcilab.workbench.text import Text
@@ -102,11 +100,12 @@ def progress_html(ending: str, share: float, text: Text) -> str:
 
 
 def _rows(tracking: Tracking, text: Text) -> str:
-    rms, largest = np.degrees(tracking.joint_rms), np.degrees(tracking.joint_max)
-    rows = [(f"J{j + 1}", f"{rms[j]:.4f}°", f"{largest[j]:.4f}°") for j in range(len(rms))]
-    mm = [f"{1000.0 * value:.3f} mm" for value in (tracking.position_rms, tracking.position_max)]
-    turn = [f"{np.degrees(value):.4f}°" for value in (tracking.rotation_rms, tracking.rotation_max)]
-    rows += [(text("record.tool"), mm[0], mm[1]), (text("record.turn"), turn[0], turn[1])]
+    units = text.units
+    pairs = zip(tracking.joint_rms, tracking.joint_max, strict=True)
+    rows = [(f"J{j}", *(units.angle_of(value, 4) for value in pair)) for j, pair in enumerate(pairs, start=1)]
+    away = [units.length_of(value, 3) for value in (tracking.position_rms, tracking.position_max)]
+    turn = [units.angle_of(value, 4) for value in (tracking.rotation_rms, tracking.rotation_max)]
+    rows += [(text("record.tool"), away[0], away[1]), (text("record.turn"), turn[0], turn[1])]
     return "".join(f"<tr><td>{esc(name)}</td><td>{a}</td><td>{b}</td></tr>" for name, a, b in rows)
 
 

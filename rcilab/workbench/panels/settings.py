@@ -1,22 +1,32 @@
-"""Settings: which arm, which language, how much the graphics may cost, who holds the controls."""
+"""Settings: which arm, which language and units, how the page looks, who holds the controls."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from rcilab.robots import RCI_ROBOT_NAMES
 from rcilab.workbench import requests
 from rcilab.workbench.text import LANGUAGES, Text
-from rcilab.workbench.view_actions import QUALITIES
+from rcilab.workbench.units import ANGLES, LENGTHS
+from rcilab.workbench.view_actions import QUALITIES, THEMES
 from rcilab.workbench.widgets import Ask, Html, Linked, esc, on_press
 
 if TYPE_CHECKING:
     from rcilab.supervisor import SupervisorStatus
     from rcilab.workbench.store import UiState
 
+_CHOICES: tuple[tuple[Any, tuple[str, ...], str, Callable[[UiState], str]], ...] = (
+    ("angle", ANGLES, "unit", lambda state: state.units.angle),
+    ("length", LENGTHS, "unit", lambda state: state.units.length),
+    ("theme", THEMES, "theme", lambda state: state.theme),
+    ("quality", QUALITIES, "quality", lambda state: state.quality),
+)
+"""What `SetView` calls it, what there is to choose, how the catalogue begins, what is chosen."""
+
 
 class SettingsPanel:
-    """A thin one."""
+    """Choices that last as long as the workbench does; nothing is stored in display units."""
 
     def __init__(self, text: Text, ask: Ask) -> None:
         self._text, self._ask = text, ask
@@ -33,32 +43,37 @@ class SettingsPanel:
         self._language = Linked(
             language, ask, lambda v, p: requests.SetView(page=p, name="language", value=codes.get(v, ""))
         )
-        labels = {text(f"quality.{quality}"): quality for quality in QUALITIES}
-        self._qualities = {quality: label for label, quality in labels.items()}
-        quality = gui.add_dropdown(
-            text("settings.quality"),
-            tuple(labels),
-            initial_value=self._qualities[state.quality],
-            hint=text("settings.quality_hint"),
-        )
-        self._quality = Linked(
-            quality, ask, lambda v, p: requests.SetView(page=p, name="quality", value=labels.get(v, ""))
-        )
+        self._choices: list[tuple[Linked, Callable[[UiState], str]]] = []
+        for name, values, begins, chosen in _CHOICES:
+            labels = {text(f"{begins}.{value}"): value for value in values}
+            self._choices.append((self._choice(gui, name, labels), self._labelled(labels, chosen)))
         with gui.add_folder(text("settings.controls")):
             self._who = Html(gui)
-            take = gui.add_button(
-                text("settings.take"), icon="hand-grab", color="gray", hint=text("settings.take_hint")
+            self._take = gui.add_button(
+                text("lease.ask"), icon="hand-grab", color="gray", hint=text("settings.take_hint")
             )
-            on_press(take, ask, lambda page: requests.TakeControls(page=page))
+            on_press(self._take, ask, lambda page: requests.TakeControls(page=page))
         gui.add_html(
             f'<p class="rl-note">{esc(text("settings.limits", source=state.model.limits.source("joint.velocity")))}</p>'
         )
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows the state."""
+        text, lease = self._text, state.lease
         self._model.show(state.model.name)
         self._language.show(LANGUAGES[state.language])
-        self._quality.show(self._qualities[state.quality])
-        lease = state.lease
-        who = self._text("settings.who", holder=lease.number(lease.holder), pages=len(lease.pages))
-        self._who.show(f'<p class="rl-note">{esc(who)}</p>')
+        for choice, chosen in self._choices:
+            choice.show(chosen(state))
+        self._take.label = text("lease.take" if lease.holder is None else "lease.ask")
+        who = text("settings.who", holder=lease.number(lease.holder), pages=len(lease.pages))
+        self._who.show(f'<p class="rl-note">{esc(text("settings.free") if lease.holder is None else who)}</p>')
+
+    def _choice(self, gui: Any, name: Any, labels: dict[str, str]) -> Linked:
+        hint = self._text(f"settings.{name}_hint")
+        handle = gui.add_dropdown(self._text(f"settings.{name}"), tuple(labels), hint=hint)
+        return Linked(handle, self._ask, lambda v, p: requests.SetView(page=p, name=name, value=labels.get(v, "")))
+
+    @staticmethod
+    def _labelled(labels: dict[str, str], chosen: Callable[[UiState], str]) -> Callable[[UiState], str]:
+        names = {value: label for label, value in labels.items()}
+        return lambda state: names[chosen(state)]

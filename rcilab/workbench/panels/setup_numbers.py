@@ -41,6 +41,7 @@ class SetupNumbersPanel:
         self._folders: dict[str, Any] = {}
         self._fields: dict[str, list[NumberField]] = {}
         self._problems: dict[str, Html] = {}
+        self._rows: dict[str, dict[str, str]] = {}
         self._seen: dict[str, Linked] = {}
         for part in SETUP_PARTS:
             folder = gui.add_folder(text(f"setup.part.{part}"), visible=state.setup.edited == part)
@@ -76,17 +77,20 @@ class SetupNumbersPanel:
                 number = read_field(setup, part, name)
                 said = f"{number + 0.0:.6g}" if part == "load" and name in INERTIA_NAMES else shown(number)
                 field.show(said, state.problems.get(field.field), state.typed)
-                labels.append((field.field, self._label(name)))
+                labels.append((field.field, f"{self._rows[part][name]}: {self._label(name)}"))
             self._problems[part].show(problems_html(state, self._text, labels))
 
     def _build_numbers(self, gui: Any, part: str) -> None:
         text = self._text
         self._fields[part] = []
+        self._rows[part] = {name: text(f"setup.row.{row}") for row, names in _ROWS[part] for name in names}
         for row, names in _ROWS[part]:
             gui.add_html(f'<p class="rl-rowname">{esc(text(f"setup.row.{row}"))}</p>')
             for name in names:
                 box = gui.add_text(self._label(name), "", hint=text("target.type_hint"))
-                self._fields[part].append(NumberField(box, self._ask, f"setup.{part}.{name}"))
+                unit = None if name == "mass" or name in INERTIA_NAMES else "deg" if name in POSE_NAMES[3:] else "mm"
+                field = f"setup.{part}.{name}"
+                self._fields[part].append(NumberField(box, self._ask, field, text.unit(unit) if unit else None))
         self._problems[part] = Html(gui)
 
     def _build_axes(self, gui: Any, ask: Ask) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from rcilab.workbench.lease import PATIENCE, Lease
 from rcilab.workbench.run.readiness import is_moving
 from rcilab.workbench.telling import phase_code, tell_status
 from rcilab.workbench.text import Text
@@ -31,6 +32,10 @@ def status_values(state: UiState, status: SupervisorStatus, text: Text, cursor_e
         "lost": text("bar.lost"),
         "chips": _chips(state, status, text),
         "cursor": _cursor(state, status, cursor_end),
+        "theme": state.theme,
+        "holder": state.lease.holder,
+        "take": text("lease.take" if state.lease.holder is None else "lease.ask"),
+        "question": _question(state, text),
     }
     if state.notice is not None:
         notice = state.notice
@@ -56,9 +61,24 @@ def _chips(state: UiState, status: SupervisorStatus, text: Text) -> list[dict[st
         _chip(text, "mode", mode),
         _chip(text, "rate", f"{status.rate_hz:.0f} Hz" if connected else "—"),
         _chip(text, "success", f"{100.0 * status.success_rate:.0f} %" if connected else "—"),
-        _chip(text, "controls", text("bar.holder", holder=lease.number(lease.holder), pages=len(lease.pages))),
+        _chip(text, "controls", _holder(lease, text)),
         _chip(text, "faults", faults, "bad" if status.faults else "", wide=True),
     ]
+
+
+def _holder(lease: Lease, text: Text) -> str:
+    if lease.holder is None:
+        return text("bar.free", pages=len(lease.pages))
+    return text("bar.holder", holder=lease.number(lease.holder), pages=len(lease.pages))
+
+
+def _question(state: UiState, text: Text) -> dict[str, Any] | None:
+    """Returns what the page that holds the controls is asked, or None."""
+    lease = state.lease
+    if lease.asking is None or lease.holder is None:
+        return None
+    asked = text("lease.question", page=lease.number(lease.asking), seconds=f"{PATIENCE:.0f}")
+    return {"page": lease.holder, "text": asked, "yes": text("lease.yes"), "no": text("lease.no")}
 
 
 def _chip(text: Text, name: str, value: str, tone: str = "", *, wide: bool = False, hint: str = "") -> dict[str, Any]:

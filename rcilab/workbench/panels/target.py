@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rcilab.posing.planning import LAWS
+from rcilab.posing.reach import margin
 from rcilab.workbench import requests
 from rcilab.workbench.goal.actions import POSE_FIELDS
-from rcilab.workbench.goal.planning import LAWS
-from rcilab.workbench.goal.reach import margin
 from rcilab.workbench.panels.jog import problems_html, reach_html
 from rcilab.workbench.setup.wanted import name_parts
 from rcilab.workbench.text import Text
@@ -37,7 +37,7 @@ class TargetPanel:
             for index in (0, 3, 1, 4, 2, 5):
                 name = POSE_FIELDS[index]
                 box = gui.add_text(text(f"target.{name}"), "", hint=text("target.type_hint"))
-                self._fields.append(NumberField(box, ask, f"pose.{name}"))
+                self._fields.append(NumberField(box, ask, f"pose.{name}", text.unit("mm" if index < 3 else "deg")))
         self._problems = Html(gui)
         self._reach = Html(gui)
         self._psi: Linked | None = None
@@ -45,9 +45,11 @@ class TargetPanel:
         if state.model.n == 7:
             with gui.add_folder(text("target.psi_title")):
                 gui.add_html('<i class="rl-rows"></i>')
-                slider = gui.add_slider("ψ", -180.0, 180.0, 1.0, 0.0, hint=text("target.psi_hint"))
-                self._psi = Linked(slider, ask, lambda v, p: requests.SetArmAngle(page=p, psi=math.radians(v)))
-                self._psi_field = NumberField(gui.add_text("", ""), ask, "psi")
+                factor, _ = text.units.from_si("rad")
+                end, step = (180.0, 1.0) if text.units.angle == "deg" else (3.14, 0.01)
+                slider = gui.add_slider("ψ", -end, end, step, 0.0, hint=text("target.psi_hint"))
+                self._psi = Linked(slider, ask, lambda v, p: requests.SetArmAngle(page=p, psi=v / factor))
+                self._psi_field = NumberField(gui.add_text("", ""), ask, "psi", text.unit("deg"))
         with gui.add_folder(text("target.branches")):
             self._branches = Html(gui)
             self._choice = gui.add_button_group(
@@ -85,9 +87,9 @@ class TargetPanel:
             field.show(shown(numbers[name]), state.problems.get(field.field), state.typed)
             labels.append((field.field, self._text(f"target.{name}")))
         if self._psi is not None and self._psi_field is not None and goal.psi is not None:
-            degrees = math.degrees(goal.psi)
-            self._psi.show(float(round(degrees)))
-            self._psi_field.show(shown(degrees), state.problems.get("psi"), state.typed)
+            is_deg = self._text.units.angle == "deg"
+            self._psi.show(float(round(math.degrees(goal.psi))) if is_deg else round(goal.psi, 2))
+            self._psi_field.show(shown(math.degrees(goal.psi)), state.problems.get("psi"), state.typed)
             labels.append(("psi", "ψ"))
         self._problems.show(problems_html(state, self._text, labels))
         self._reach.show(reach_html(state, self._text))
@@ -113,8 +115,8 @@ class TargetPanel:
             least = margin(state.model, q)
             chosen = float(np.abs(np.angle(np.exp(1j * (q - state.goal.q)))).max()) < 1e-6
             mark = ' class="rl-chosen"' if chosen else ""
-            away = math.degrees(float(np.abs(q - here).max()))
-            cells = (f"{number}", f"{math.degrees(least.angle):.1f}°", f"J{least.joint}", f"{away:.1f}°")
+            left, away = (text.units.angle_of(angle) for angle in (least.angle, float(np.abs(q - here).max())))
+            cells = (f"{number}", left, f"J{least.joint}", away)
             rows.append(f"<tr{mark}>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>")
         heads = "".join(
             f"<th>{esc(text(f'target.head.{name}'))}</th>" for name in ("number", "margin", "worst", "away")

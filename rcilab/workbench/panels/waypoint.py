@@ -94,7 +94,11 @@ class WaypointPanel:
 
     def _field(self, gui: Any, name: str) -> None:
         box = gui.add_text(self._text(f"program.field.{name}"), "", hint=self._text(f"program.hint.{_hint_of(name)}"))
-        self._fields[name] = NumberField(box, self._ask, f"program.0.{name}")
+        unit = "mm" if name in ("blend", *POSE_FIELDS[:3], *VIA_FIELDS) else "deg"
+        is_plain = name in ("speed", "dwell")
+        self._fields[name] = NumberField(
+            box, self._ask, f"program.0.{name}", None if is_plain else self._text.unit(unit)
+        )
 
     def _button(self, gui: Any, what: Any, source: Any, icon: str) -> None:
         name = self._text(f"program.{what}_{source}")

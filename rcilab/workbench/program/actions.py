@@ -13,10 +13,10 @@ from rcilab.arrays import JointVector, frozen
 from rcilab.errors import InvalidValueError, PlanningError, RcilabError, VersionMismatchError
 from rcilab.motion.program import Program, Waypoint
 from rcilab.motion.program_file import read_program
+from rcilab.posing.planning import Plan
+from rcilab.words.number import parse_number
 from rcilab.workbench import requests
 from rcilab.workbench.goal.actions import GoalActions
-from rcilab.workbench.goal.planning import Plan
-from rcilab.workbench.parse import parse_number
 from rcilab.workbench.program.draft import (
     MOST_ROUNDS,
     TYPES,
@@ -160,6 +160,17 @@ class ProgramActions:
         self._open()
         draft = draft_of(program, self._store.state.model)
         self._change(draft, draft.steps[0].key)
+
+    def exchange(self, draft: Draft, plan: Plan) -> None:
+        """Takes a changed program that has been planned already; undo brings the old one back."""
+        self._open()
+        self._change(draft, self._program.selected)
+        self.keep_plan(plan)
+
+    def keep_plan(self, plan: Plan) -> None:
+        """Takes the plan of the program as it is."""
+        self._store.update(plan=plan, no_plan=None, recording=None, place=0.0, playing=False, asked=None)
+        self._set(planned=self._draft, answer=None)
 
     def tick(self) -> None:
         """Shows how far the planning is, and what came of it; follows the choice of another arm."""

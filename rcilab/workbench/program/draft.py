@@ -9,9 +9,9 @@ import numpy as np
 
 from rcilab.model import RobotModel
 from rcilab.motion.program import Floats, Program, Waypoint, WaypointType
+from rcilab.posing.planning import Plan
+from rcilab.posing.reach import Tone
 from rcilab.spatial import Pose
-from rcilab.workbench.goal.planning import Plan
-from rcilab.workbench.goal.reach import Tone
 from rcilab.workbench.text import Message, message
 
 TYPES: tuple[WaypointType, ...] = ("joint", "line", "arc")

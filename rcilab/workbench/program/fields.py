@@ -14,8 +14,8 @@ from rcilab.model import RobotModel
 from rcilab.motion.joint import MIN_SPEED
 from rcilab.motion.program import LARGEST_BLEND, LONGEST_DWELL, Waypoint
 from rcilab.spatial import Pose
+from rcilab.words.number import parse_number
 from rcilab.workbench.goal.actions import FURTHEST, POSE_FIELDS
-from rcilab.workbench.parse import parse_number
 from rcilab.workbench.program.draft import Draft, target_of
 from rcilab.workbench.text import Message
 

@@ -9,9 +9,9 @@ from rcilab.arrays import JointVector
 from rcilab.errors import RcilabError
 from rcilab.model import RobotModel
 from rcilab.motion.program import Program
+from rcilab.posing.planning import Plan, picture
 from rcilab.safety_box import SafetyBox
 from rcilab.supervisor.layout import MOTION_TIME
-from rcilab.workbench.goal.planning import Plan, picture
 from rcilab.workbench.program.draft import Draft
 from rcilab.workbench.text import Message, message
 

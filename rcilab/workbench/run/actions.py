@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 
 from rcilab.errors import CertificateError, ConnectionLostError, ControlError, RcilabError
 from rcilab.model import load_model
+from rcilab.posing.reach import Tone
 from rcilab.workbench import requests
 from rcilab.workbench.goal.actions import initial_goal
-from rcilab.workbench.goal.reach import Tone
 from rcilab.workbench.run.keeper import RunKeeper
 from rcilab.workbench.run.pushing import PLANTS, TOOL, is_guided
 from rcilab.workbench.run.readiness import is_moving, obstacle

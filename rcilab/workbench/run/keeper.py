@@ -18,8 +18,8 @@ from rcilab.workbench.text import message
 
 if TYPE_CHECKING:
     from rcilab.motion import Motion
+    from rcilab.posing.planning import Plan
     from rcilab.recording.run_file import RunFile
-    from rcilab.workbench.goal.planning import Plan
     from rcilab.workbench.store import UiState
 
 
@@ -103,11 +103,19 @@ class RunKeeper:
 
 def as_recording(cycles: NDArray[np.void], delay: int) -> Recording:
     """Returns what the plots need of a run that goes on."""
-    return Recording(t=cycles["t"], q=cycles["q"], q_c=cycles["q_c"], dq=cycles["dq"], delay=delay)
+    return Recording(t=cycles["t"], q=cycles["q"], q_c=cycles["q_c"], dq=cycles["dq"], tau=cycles["tau"], delay=delay)
 
 
 def whole_recording(run: Run, file: str = "") -> Recording:
     """Returns a finished run for plots, table and export."""
     return Recording(
-        t=run.t, q=run.q, q_c=run.q_c, dq=run.dq, delay=run.delay, run=run, tracking=run.tracking, file=file
+        t=run.t,
+        q=run.q,
+        q_c=run.q_c,
+        dq=run.dq,
+        tau=run.tau,
+        delay=run.delay,
+        run=run,
+        tracking=run.tracking,
+        file=file,
     )

@@ -13,8 +13,8 @@ from rcilab.client.setup import RobotSetup
 from rcilab.errors import PlanningError, RcilabError
 from rcilab.motion.pacing import SLOWEST_PACE
 from rcilab.state import MODES, Mode
+from rcilab.words.number import parse_number
 from rcilab.workbench import requests
-from rcilab.workbench.parse import parse_number
 from rcilab.workbench.run.driving import control_field, is_control_pending
 from rcilab.workbench.run.readiness import is_moving
 from rcilab.workbench.session import Session

@@ -10,8 +10,8 @@ import numpy as np
 from rcilab.client.setup import RobotSetup
 from rcilab.clock import CYCLE_TIME
 from rcilab.errors import UsageError
+from rcilab.posing.planning import picture
 from rcilab.workbench.goal.actions import initial_goal
-from rcilab.workbench.goal.planning import picture
 from rcilab.workbench.run.keeper import whole_recording
 
 if TYPE_CHECKING:

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rcilab.posing.planning import PATH_POINTS
 from rcilab.views.arm_view import ArmView
+from rcilab.views.effort import effort_colors
 from rcilab.views.viser_scene import ViserScene
 from rcilab.workbench import requests
-from rcilab.workbench.goal.planning import PATH_POINTS
 from rcilab.workbench.run.readiness import is_moving
 from rcilab.workbench.run.replay import replayed_pose
 from rcilab.workbench.scene.grip import Grip
@@ -21,8 +22,8 @@ from rcilab.workbench.widgets import Ask
 if TYPE_CHECKING:
     import viser
 
+    from rcilab.posing.planning import Plan
     from rcilab.supervisor import SupervisorStatus
-    from rcilab.workbench.goal.planning import Plan
     from rcilab.workbench.store import UiState
 
 TONE_COLORS = {"good": (38, 166, 91), "warn": (240, 150, 20), "bad": (214, 48, 38)}
@@ -180,7 +181,7 @@ class Stage:
             self._plan = plan
             self._path.visible = plan is not None
             if plan is not None and moved:
-                colors = _effort_colors(plan.effort).astype(np.uint8)
+                colors = effort_colors(plan.effort).astype(np.uint8)
                 self._path.points = np.stack([plan.path[:-1], plan.path[1:]], axis=1).astype(np.float32)
                 self._path.colors = np.stack([colors[:-1], colors[1:]], axis=1)
         if plan is None or is_moving(status):
@@ -205,14 +206,6 @@ class Stage:
 def _above(position: np.ndarray) -> tuple[float, float, float]:
     x, y, z = (float(number) for number in position)
     return x, y, z + 0.75 * _GIZMO_SCALE
-
-
-def _effort_colors(effort: np.ndarray) -> np.ndarray:
-    """Returns colours from blue-green (little of the velocity limit used) over amber to red (all of it), (N, 3)."""
-    stops = np.array([0.0, 0.6, 0.9, 1.0])
-    colors = np.array([[20, 150, 160], [60, 175, 90], [240, 150, 20], [214, 48, 38]], dtype=float)
-    shares = np.clip(effort, 0.0, 1.0)
-    return np.stack([np.interp(shares, stops, colors[:, channel]) for channel in range(3)], axis=1)
 
 
 def _backdrop() -> np.ndarray:

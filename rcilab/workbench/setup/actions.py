@@ -13,12 +13,12 @@ import numpy as np
 
 from rcilab.client.setup import SETUP_PARTS, RobotSetup, SetupPart
 from rcilab.errors import RcilabError
+from rcilab.posing.planning import Plan, tool_path
+from rcilab.posing.reach import judge_joints, judge_pose
 from rcilab.safety_box import SafetyBox
 from rcilab.spatial import Pose
+from rcilab.words.number import parse_number
 from rcilab.workbench import requests
-from rcilab.workbench.goal.planning import Plan, tool_path
-from rcilab.workbench.goal.reach import judge_joints, judge_pose
-from rcilab.workbench.parse import parse_number
 from rcilab.workbench.session import Session
 from rcilab.workbench.setup.fields import (
     FARTHEST_FACE,

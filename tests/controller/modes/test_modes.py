@@ -58,6 +58,20 @@ def test_an_arm_angle_passes_zero_although_the_vendors_client_cannot_say_zero(ma
     assert hand.state.psi_c == pytest.approx(-0.2, abs=1e-9)
 
 
+def test_poses_without_an_arm_angle_hold_one_that_is_nearly_zero(make_hand) -> None:
+    hand = make_hand()
+    hand.start(1, 2)
+    hand.shift((0, 0, 0), 0.2, psi=1e-4)
+    hand.ask(rci.StopMove())
+    hand.rest()
+    hand.start(1, 2)
+    T, psi = hand.state.T_base_tool_c.copy(), hand.state.psi_c
+    for _ in range(5):
+        assert hand.pose(T).faults == ()
+    assert hand.state.psi_c == pytest.approx(psi, abs=1e-12)
+    assert psi == pytest.approx(1e-4, abs=1e-9)
+
+
 @PLANTS
 def test_a_turn_of_the_tool_is_followed_through_the_tool_that_was_set(make_hand, plant: str) -> None:
     hand = make_hand(plant=plant)

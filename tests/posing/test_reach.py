@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from rcilab.model import load_model
+from rcilab.posing.reach import NEAR_LIMIT, judge_joints, judge_pose, margin
 from rcilab.robots import RCI_ROBOT_NAMES
 from rcilab.spatial import Pose
-from rcilab.workbench.goal.reach import NEAR_LIMIT, judge_joints, judge_pose, margin
 
 
 @pytest.mark.parametrize("name", RCI_ROBOT_NAMES)

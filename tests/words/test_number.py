@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rcilab.workbench.parse import parse_number
+from rcilab.words.number import parse_number
 from rcilab.workbench.text import Text
 
 

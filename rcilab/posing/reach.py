@@ -13,7 +13,7 @@ from rcilab.errors import UnreachableError
 from rcilab.kinematics.solutions import Solutions
 from rcilab.model import RobotModel
 from rcilab.spatial import Pose
-from rcilab.workbench.text import Message, message
+from rcilab.words.text import Message, message
 
 Tone = Literal["good", "warn", "bad"]
 

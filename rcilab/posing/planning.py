@@ -14,7 +14,7 @@ from rcilab.errors import RcilabError
 from rcilab.model import RobotModel
 from rcilab.safety_box import SafetyBox, active_box
 from rcilab.state import Mode
-from rcilab.workbench.text import Message, message
+from rcilab.words.text import Message, message
 
 if TYPE_CHECKING:
     from rcilab.conformance import Report

@@ -9,10 +9,15 @@ import math
 import re
 from dataclasses import dataclass
 
-from rcilab.workbench.text import Message, message
+from rcilab.words.text import Message, message
 
 _TWO_WAYS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
 """A comma that is a decimal comma to some and groups thousands for others, such as 1,000."""
+_UNITS: dict[str, dict[str, float]] = {
+    "deg": {"deg": 1.0, "°": 1.0, "rad": math.degrees(1.0)},
+    "mm": {"mm": 1.0, "m": 1000.0},
+}
+"""What may stand behind a number, and how many of the field's own unit it is; longer names first."""
 _LONGEST = 40  # Characters; nobody types a longer number on purpose.
 
 
@@ -27,8 +32,8 @@ class Parsed:
 def parse_number(typed: str, low: float, high: float, unit: str) -> Parsed:
     """Returns the number that somebody typed.
 
-    Accepts a decimal comma, a typographic minus and the unit behind the number; where a comma may as well group
-    thousands, the answer asks which is meant.
+    Accepts a decimal comma, a typographic minus and a unit behind the number, in which it then counts; where a
+    comma may as well group thousands, the answer asks which is meant.
 
     Args:
         typed: As it stands in the field.
@@ -38,11 +43,11 @@ def parse_number(typed: str, low: float, high: float, unit: str) -> Parsed:
     """
     shown = typed.strip()
     shown = shown if len(shown) <= _LONGEST else shown[: _LONGEST - 1] + "…"
-    plain = (
-        typed.strip()[: 10 * _LONGEST].replace("−", "-").replace("–", "-").removesuffix("°").removesuffix(unit).strip()
-    )
+    plain = typed.strip()[: 10 * _LONGEST].replace("−", "-").replace("–", "-")
+    behind = next((name for name in _UNITS.get(unit, {unit: 1.0}) if name and plain.endswith(name)), "")
+    plain = plain.removesuffix(behind).strip()
     if not plain:
-        return Parsed(None, message("parse.empty", low=_short(low), high=_short(high), unit=unit))
+        return Parsed(None, message("parse.empty", bounds=_bounds(low, high, unit)))
     if _TWO_WAYS.fullmatch(plain):
         return Parsed(
             None, message("parse.two_ways", typed=shown, point=plain.replace(",", "."), whole=plain.replace(",", ""))
@@ -57,9 +62,15 @@ def parse_number(typed: str, low: float, high: float, unit: str) -> Parsed:
         return Parsed(None, message("parse.garbage", typed=shown, unit=unit))
     if not math.isfinite(value):
         return Parsed(None, message("parse.not_finite", typed=shown, unit=unit))
+    value *= _UNITS.get(unit, {}).get(behind, 1.0)
     if not low <= value <= high:
-        return Parsed(None, message("parse.range", typed=shown, low=_short(low), high=_short(high), unit=unit))
+        return Parsed(None, message("parse.range", typed=shown, bounds=_bounds(low, high, unit)))
     return Parsed(value)
+
+
+def _bounds(low: float, high: float, unit: str) -> Message:
+    code = f"parse.bounds.{unit}" if unit in _UNITS else "parse.bounds"
+    return message(code, low=_short(low), high=_short(high), unit=unit)
 
 
 def _short(number: float) -> str:

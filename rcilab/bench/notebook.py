@@ -1,0 +1,82 @@
+"""What a notebook makes a person wait for: the lab in its cell, and the arm behind a slider."""
+
+from __future__ import annotations
+
+import ast
+import queue
+import subprocess
+from typing import Any
+
+from rcilab.bench.measure import Measurement, summarise
+from rcilab.errors import DeadlineError, RcilabError
+
+_KERNELS = 3
+_SLIDES = 200
+_PATIENCE = 60.0  # [s]
+_MAKE = """
+import time, rcilab
+model = rcilab.load_model("xMatePro7")
+"""
+_SHOW = """
+begin = time.perf_counter()
+from rcilab.notebook import Lab
+from IPython.display import display
+lab = Lab(model)
+display(lab)
+lab.scene.flush()
+time.perf_counter() - begin
+"""
+_SLIDE = f"""
+def slide(angle):
+    begin = time.perf_counter()
+    lab.jog.sliders[3].set_state({{"value": angle}})
+    lab.scene.flush()
+    return time.perf_counter() - begin
+[slide(0.25 * step) for step in range({_SLIDES})]
+"""
+
+
+def bench_lab_shown() -> Measurement:
+    """`Lab(model)` in a fresh kernel, from its import to all of it sent to the browser."""
+    times = [_ask_kernel(_SHOW) for _ in range(_KERNELS)]
+    return summarise("lab_shown", times, "s", 2.0, f"{_KERNELS} fresh kernels, the model loaded; imports included")
+
+
+def bench_lab_slider() -> Measurement:
+    """From a slider's message in the kernel to the new pose on its way to the inline scene, with all of `Lab` open."""
+    times = _ask_kernel(_SHOW, _SLIDE)
+    note = f"{_SLIDES} messages of a joint slider; scene, target, arm-angle circle and tables follow each"
+    return summarise("lab_slider", times, "ms", 50.0, note)
+
+
+def _ask_kernel(*cells: str) -> Any:
+    """Returns the value of the last cell, run after the others in a kernel of its own."""
+    from jupyter_client.manager import start_new_kernel
+
+    manager, client = start_new_kernel(startup_timeout=_PATIENCE, stderr=subprocess.DEVNULL)
+    try:
+        value = None
+        for cell in (_MAKE, *cells):
+            value = _run(client, cell)
+        return value
+    finally:
+        client.stop_channels()
+        manager.shutdown_kernel(now=True)
+
+
+def _run(client: Any, code: str) -> Any:
+    request, value = client.execute(code), None
+    while True:
+        try:
+            said = client.get_iopub_msg(timeout=_PATIENCE)
+        except queue.Empty as error:
+            raise DeadlineError(f"bench: the kernel was silent for {_PATIENCE:g} s") from error
+        if said["parent_header"].get("msg_id") != request:
+            continue
+        content = said["content"]
+        if said["msg_type"] == "error":
+            raise RcilabError(f"bench: the notebook failed with {content['ename']}: {content['evalue']}")
+        if said["msg_type"] == "execute_result":
+            value = ast.literal_eval(content["data"]["text/plain"])
+        if said["msg_type"] == "status" and content["execution_state"] == "idle":
+            return value

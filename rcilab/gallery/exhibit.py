@@ -1,0 +1,177 @@
+"""What the gallery shows of one fault: what was sent, what the controller reported, why, and how to go on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rcilab.arrays import JointVector, frozen
+from rcilab.conformance.condition import Condition
+from rcilab.controller.fault_stop import FAULT_STOP, Offender
+from rcilab.faults import Fault
+from rcilab.gallery.recipe import Recipe
+from rcilab.gallery.signals import Signal
+from rcilab.gallery.words import say
+from rcilab.language import Language
+from rcilab.limits import Limits
+from rcilab.model import RobotModel
+
+if TYPE_CHECKING:
+    from rcilab.motion import Motion
+
+Step: TypeAlias = Literal["release", "network", "recover", "refused", "power_off", "widen", "power_on", "move"]
+"""One step of the way out of a fault."""
+
+SECTION = "4.6"
+"""Where the manual lists its faults, with causes and remedies."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Exhibit:
+    """A fault that a controller has really reported, with the cycles that led to it."""
+
+    fault: Fault
+    recipe: Recipe
+    model: RobotModel
+    limits: Limits
+    """What the arm was judged by, narrowed limits included."""
+    reported: tuple[Fault, ...]
+    """Every error bit that was set in that cycle, in wire order."""
+    said: str
+    """The controller's own words and numbers."""
+    cycles: NDArray[np.void]
+    """Recorded cycles from the first command on, see `rcilab.cycle_file.cycle_dtype`; the last one shows the fault."""
+    signal: Signal
+    """What broke its condition, cycle by cycle."""
+    way_out: tuple[Step, ...]
+    """What was done to get out of it, in this order; afterwards the arm moved again."""
+
+    @property
+    def sample(self) -> int:
+        """The row of `cycles` in which the fault was reported."""
+        return len(self.cycles) - 1
+
+    @property
+    def time(self) -> float:
+        """When it was reported, since the first command, [s]."""
+        return float(self.cycles["t"][-1])
+
+    @property
+    def q(self) -> JointVector:
+        """Where the arm was then, measured, shape (n,), [rad]."""
+        return frozen(self.cycles["q"][-1])
+
+    @property
+    def condition(self) -> Condition:
+        """The condition that was broken: formula, unit, source."""
+        return self.signal.condition
+
+    @property
+    def value(self) -> float:
+        """What broke it, in the condition's unit."""
+        return self.signal.value
+
+    @property
+    def bound(self) -> float:
+        """The bound that it passed."""
+        return self.signal.bound
+
+    @property
+    def place(self) -> str:
+        """Whose value it is: "joint 1", "tool", "elbow", "network"."""
+        return self.condition.place(self.signal.axis)
+
+    @property
+    def source(self) -> str:
+        """Where condition and bound come from."""
+        return self.condition.source
+
+    @property
+    def section(self) -> str:
+        """Section of the manual that names the fault, its cause and its remedy."""
+        return SECTION
+
+    @property
+    def commanded(self) -> Motion:
+        """The joint angles that the arm was told: those sent, the wrong one too; or what the controller made of poses.
+
+        While torques are commanded no angles are: the motion stands at the start.
+        """
+        from rcilab.motion import Motion
+
+        q = np.array(self.cycles["q_c"])
+        if self.recipe.mode == "torque":
+            q[:] = q[0]
+        elif np.isfinite(self.cycles["command"][:-1]).all():
+            q[1:] = self.cycles["command"][:-1]
+        return Motion.from_samples(q)
+
+    @property
+    def moved(self) -> Motion:
+        """Where to look for the arm: as commanded where a command of a place was wrong, otherwise as measured."""
+        from rcilab.motion import Motion
+
+        if FAULT_STOP[self.fault].offender is Offender.COMMAND and self.recipe.mode != "torque":
+            return self.commanded
+        return Motion.from_samples(self.cycles["q"])
+
+    def told(self, what: Literal["sent", "cause", "remedy"], language: Language = "en") -> str:
+        """Returns what was done wrong, why the controller minds, or what to do about it, in our own words.
+
+        Raises:
+            InvalidValueError: There is no such language.
+        """
+        return say(language, f"{what}.{self.fault.name}")
+
+    def tell_way_out(self, language: Language = "en") -> tuple[str, ...]:
+        """Returns the steps that led out of it, in words.
+
+        Raises:
+            InvalidValueError: There is no such language.
+        """
+        return tuple(say(language, f"step.{step}") for step in self.way_out)
+
+    @property
+    def script(self) -> str:
+        """Python that does the same."""
+        return script(self.fault, self.model.name)
+
+    def explain(self, language: Language = "en") -> str:
+        """Returns all of it in a few lines.
+
+        Raises:
+            InvalidValueError: There is no such language.
+        """
+        row = self.condition
+        number = say(
+            language, "number", value=f"{self.value:.4g}", bound=f"{self.bound:.4g}", unit=row.unit,
+            time=f"{self.time:.3f}",
+        )  # fmt: skip
+        return "\n".join(
+            (
+                f"{self.fault.manual_name}: {self.told('cause', language)}",
+                f"  {say(language, 'head.sent')} {self.told('sent', language)}",
+                f"  {say(language, 'head.condition')} {row.formula}; {self.place}: {number} [{row.source}]",
+                f"  {say(language, 'head.remedy')} {self.told('remedy', language)}",
+                f"  {say(language, 'head.way_out')} {' → '.join(self.tell_way_out(language))}",
+            )
+        )
+
+    def __str__(self) -> str:
+        return self.explain()
+
+    def __repr__(self) -> str:
+        return f"<Exhibit {self.fault.manual_name} at t = {self.time:.3f} s: {self.said}>"
+
+
+def script(fault: Fault, model: str) -> str:
+    """Returns Python that provokes a fault on a private virtual controller and prints what came of it."""
+    return (
+        "from rcilab import gallery\n\n"
+        f'exhibit = gallery.provoke("{fault.manual_name}", model="{model}")\n'
+        "print(exhibit)\n"
+        'print(exhibit.cycles[["t", "q"]][-3:])  # The flight recorder: the last cycles up to the fault.\n'
+    )

@@ -1,0 +1,125 @@
+"""What a cell has made ends when the cell runs again, when it is interrupted, and with the kernel.
+
+A notebook has no window to close: a cell that is run again would leave its server, its process and its threads behind.
+JupyterLab and VS Code name the cell with every run; where nobody does (nbclient), its text is its name.
+"""
+
+from __future__ import annotations
+
+import atexit
+import hashlib
+import signal
+import sys
+import threading
+import weakref
+from contextlib import suppress
+from typing import Any, Protocol
+
+
+class Owned(Protocol):
+    """What a cell may own."""
+
+    def close(self) -> None:
+        """Ends it; may be called twice."""
+        ...
+
+    def halt(self) -> None:
+        """Brings to rest what it moves; from any thread, without waiting."""
+        ...
+
+
+class Cells:
+    """Who was made by which cell. There is one for the kernel; tests make their own.
+
+    Args:
+        shell: IPython's shell; None outside of IPython, where everything ends with the process.
+    """
+
+    def __init__(self, shell: Any) -> None:
+        self._shell = shell
+        self._owned: dict[str, list[weakref.ref[Owned]]] = {}
+        self._keep: dict[int, Owned] = {}  # An output may be the only one to hold a part.
+        self._running = threading.Event()
+        if shell is not None:
+            shell.events.register("pre_run_cell", self.begin)
+            shell.events.register("post_run_cell", self.end)
+            _hear_idle_interrupts(shell, self.halt)
+
+    @property
+    def is_running(self) -> bool:
+        """Whether a cell runs at this moment."""
+        return self._running.is_set()
+
+    def adopt(self, thing: Owned) -> None:
+        """Ties something to the cell that is running now."""
+        self._owned.setdefault(self._current(), []).append(weakref.ref(thing))
+        self._keep[id(thing)] = thing
+
+    def forget(self, thing: Owned) -> None:
+        """Lets go of what has been closed."""
+        self._keep.pop(id(thing), None)
+
+    def begin(self, info: Any) -> None:
+        """A cell is about to run: what its last run has made ends."""
+        self._running.set()
+        for reference in reversed(self._owned.pop(_name(info.cell_id, info.raw_cell), [])):
+            thing = reference()
+            if thing is not None:
+                thing.close()
+
+    def end(self, result: Any) -> None:
+        """A cell has ended; if somebody interrupted it, everything that moves comes to rest."""
+        self._running.clear()
+        if isinstance(result.error_in_exec, KeyboardInterrupt):
+            self.halt()
+
+    def halt(self) -> None:
+        """Brings to rest whatever any cell moves."""
+        for thing in list(self._keep.values()):
+            thing.halt()
+
+    def close(self) -> None:
+        """Ends everything."""
+        self._owned.clear()
+        for thing in reversed(list(self._keep.values())):
+            with suppress(Exception):  # The process ends: what cannot be closed must not keep the others open.
+                thing.close()
+
+    def _current(self) -> str:
+        parent = self._shell.get_parent() if hasattr(self._shell, "get_parent") else {}
+        content = parent.get("content", {}).get("code", "")
+        return _name(parent.get("metadata", {}).get("cellId"), content)
+
+
+def kernel_cells() -> Cells:
+    """Returns the kernel's own."""
+    global _kernel_cells
+    if _kernel_cells is None:
+        shell = None
+        if "IPython" in sys.modules:
+            from IPython.core.getipython import get_ipython
+
+            shell = get_ipython()
+        _kernel_cells = Cells(shell)
+        atexit.register(_kernel_cells.close)
+    return _kernel_cells
+
+
+_kernel_cells: Cells | None = None
+
+
+def _name(cell_id: str | None, code: str | None) -> str:
+    return cell_id or hashlib.sha256((code or "").encode()).hexdigest()
+
+
+def _hear_idle_interrupts(shell: Any, act: Any) -> None:
+    """An interrupt while no cell runs is dropped by ipykernel; here it stops what moves in the background.
+
+    ipykernel puts its own handler in place while it handles a message, and the saved one back afterwards.
+    """
+    kernel = getattr(shell, "kernel", None)
+    if kernel is None or not hasattr(kernel, "saved_sigint_handler"):
+        return
+    kernel.saved_sigint_handler = lambda number, frame: act()
+    if threading.current_thread() is threading.main_thread() and signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, kernel.saved_sigint_handler)

@@ -1,0 +1,151 @@
+"""Sliders and typed numbers that pose the arm joint by joint: degrees for the hand, radians for the code."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import ipywidgets
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rcilab.arrays import JointVector, frozen
+from rcilab.notebook.look import block, verdict, write
+from rcilab.notebook.number_field import NumberField
+from rcilab.notebook.part import Part
+
+_STEP_DEG = 0.5
+
+
+class JogPanel(Part):
+    """One slider and one number a joint, and the pose of the tool. It poses the goal; it never moves a robot.
+
+    Args:
+        subject: A model, a session, or another part to look at the same arm as.
+        q: Where to begin, shape (n,), [rad]; the arm's home, or the goal of the other part, when absent.
+        continuous: Whether a slider reports while it is dragged, or once when it is let go.
+        language: "en" or "zh".
+
+    Raises:
+        InvalidValueError: The subject is none, or q is not n angles inside the limits.
+    """
+
+    def __init__(
+        self, subject: object, q: ArrayLike | None = None, *, continuous: bool = True, language: str = "en"
+    ) -> None:
+        super().__init__(subject, language)
+        limits = self.model.limits.joint
+        low, high = np.degrees(limits.lower), np.degrees(limits.upper)
+        self._before: list[JointVector] = []
+        self._writing = False
+        self.sliders = [self._slider(j, float(low[j]), float(high[j]), continuous) for j in range(self.model.n)]
+        self.fields = [
+            NumberField(
+                self.text, "", "deg", round(float(low[j]), 6), round(float(high[j]), 6), self._taker(j), digits=2
+            )
+            for j in range(self.model.n)
+        ]
+        rows: list[Any] = []
+        for slider, field in zip(self.sliders, self.fields, strict=True):
+            slider.observe(self._on_slider, names="value")
+            rows += [self._row(slider, field), field.said]
+        buttons = [self._button(name) for name in ("home", "zero", "arm", "undo")]
+        self._pose, self._reach = block(), block()
+        self.build([*rows, ipywidgets.HBox(buttons), self._pose, self._reach], min_width="360px")
+        if q is not None:
+            self.state.pose(q)
+        self.hear("goal", self._show)
+
+    @property
+    def q(self) -> JointVector:
+        """Joint angles of the goal, shape (n,), read-only, [rad]. Can be set; everything follows."""
+        return self.state.goal
+
+    @q.setter
+    def q(self, q: ArrayLike) -> None:
+        self._remember()
+        self.state.pose(q)
+
+    def _show(self) -> None:
+        state = self.state
+        self._writing = True
+        try:
+            for slider, field, angle in zip(self.sliders, self.fields, np.degrees(state.goal).tolist(), strict=True):
+                if abs(slider.value - angle) > 1e-9:
+                    slider.value = angle
+                field.show(angle)
+        finally:
+            self._writing = False
+        write(self._pose, self._tell_pose())
+        tone = state.reach.tone
+        write(self._reach, verdict(tone, self.text(f"reach.tone.{tone}"), self.text.say(state.reach.reason)))
+
+    def _tell_pose(self) -> str:
+        pose = self.model.forward(self.state.goal)
+        numbers = np.round(np.concatenate((1e3 * pose.position, np.degrees(pose.rpy))), 1) + 0.0  # No -0.0.
+        names = [self.text(f"target.{name}") for name in ("x", "y", "z", "roll", "pitch", "yaw")]
+        units = [" mm"] * 3 + ["°"] * 3
+        cells = [f"{name} <b>{number:.1f}</b>{unit}" for name, number, unit in zip(names, numbers, units, strict=True)]
+        psi = self.state.arm_angle
+        if psi is not None:
+            cells.append(f"{self.text('jog.arm_angle')} <b>{round(math.degrees(psi), 1) + 0.0:.1f}</b>°")
+        elif self.model.n == 7:
+            cells.append(self.text("jog.no_arm_angle"))
+        return f'<p class="rl-soft rl-num">{self.text("jog.tool")}: {", ".join(cells)}</p>'
+
+    def _on_slider(self, change: Any) -> None:
+        if not self._writing:
+            self._move(self.sliders.index(change["owner"]), math.radians(change["new"]))
+
+    def _taker(self, joint: int) -> Any:
+        return lambda degrees: self._move(joint, math.radians(degrees))
+
+    def _move(self, joint: int, angle: float) -> None:
+        limits = self.model.limits.joint
+        q = np.array(self.state.goal)
+        q[joint] = min(max(angle, limits.lower[joint]), limits.upper[joint])
+        self.state.pose(frozen(q))
+
+    def _on_button(self, name: str) -> None:
+        if name == "undo":
+            if self._before:
+                self.state.pose(self._before.pop())
+            return
+        self._remember()
+        named = {"home": self.model.home, "zero": np.zeros(self.model.n), "arm": self.state.here}
+        self.state.pose(named[name])
+
+    def _remember(self) -> None:
+        self._before = [*self._before[-19:], self.state.goal]
+
+    def _button(self, name: str) -> Any:
+        button = ipywidgets.Button(
+            description=self.text(f"jog.{name}"),
+            tooltip=self.text(f"jog.{name}_hint"),
+            layout=ipywidgets.Layout(width="auto"),
+        )
+        button.on_click(lambda _: self._on_button(name))
+        return button
+
+    def _slider(self, joint: int, low: float, high: float, continuous: bool) -> Any:
+        return ipywidgets.FloatSlider(
+            tooltip=self.text("jog.joint", joint=joint + 1),
+            min=low,
+            max=high,
+            step=_STEP_DEG,
+            readout=False,
+            continuous_update=continuous,
+            layout=ipywidgets.Layout(flex="1 1 auto", width="auto", min_width="150px"),
+        )
+
+    def _row(self, slider: Any, field: NumberField) -> Any:
+        """Returns the slider between its limits, which is where a hand looks for them, and the number."""
+        name = slider.tooltip
+        field.box.tooltip = f"{name}: {field.box.tooltip}"
+        low, high = (_label(f"{end:.0f}°", "3.2em") for end in (slider.min, slider.max))
+        row = [_label(name, "4.4em"), low, slider, high, field.row]
+        return ipywidgets.HBox(row, layout=ipywidgets.Layout(align_items="center"))
+
+
+def _label(said: str, width: str) -> Any:
+    return ipywidgets.Label(said, layout=ipywidgets.Layout(width=width, display="flex", justify_content="center"))

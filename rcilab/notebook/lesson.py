@@ -1,0 +1,32 @@
+"""What the lessons share: the language they are read in, and the word on an exercise."""
+
+from __future__ import annotations
+
+import os
+
+from rcilab.language import Language
+
+_SESSION = "JPY_SESSION_NAME"
+"""Where Jupyter's server leaves the name of a kernel's notebook."""
+
+_WORDS: dict[Language, tuple[str, str]] = {"en": ("not yet", "right"), "zh": ("还没有", "正确")}
+
+
+def language() -> Language:
+    """Returns the language of the notebook that runs here: Chinese when it is named `*.zh.ipynb`, else English.
+
+    A lesson has the same code in both languages, so it asks: `print(report.explain(language()))`. Where the name of
+    the notebook is not known, it is English.
+    """
+    return "zh" if ".zh.ipynb" in os.environ.get(_SESSION, "") else "en"
+
+
+def answer(is_right: bool, fact: str) -> None:
+    """Prints whether an exercise is solved, in the reader's language, and the number that decided it.
+
+    Args:
+        is_right: Whether it is.
+        fact: What was found, in symbols and units, so that it needs no translation: "T = 1.952 s".
+    """
+    word = _WORDS[language()][bool(is_right)]
+    print(f"{'✓' if is_right else '✗'} {word}: {fact}")

@@ -1,0 +1,119 @@
+"""The plan as curves against the limits, what broke one shaded, what happened beside it, and a cursor."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import ipywidgets
+import numpy as np
+
+from rcilab.clock import CYCLE_TIME
+from rcilab.notebook.look import block, soft, write
+from rcilab.notebook.part import Part
+from rcilab.notebook.svg_plot import Panel, draw, share_of
+from rcilab.recording.run import Run
+from rcilab.views.plots import (
+    QUANTITIES,
+    Curves,
+    Quantity,
+    build_error_frame,
+    build_frame,
+    last_time,
+    plan_curves,
+    recorded_curves,
+)
+
+_BUCKETS = 200  # Of time; each shows its smallest and largest value, so no spike is lost.
+_UNITS: dict[Quantity, str] = {"q": "deg", "dq": "deg/s", "ddq": "deg/s²", "jerk": "deg/s³"}
+
+
+class MotionPlot(Part):
+    """Position, velocity, acceleration and jerk of the plan, thinned out so that no extreme value is lost.
+
+    Grey lies beyond a limit; where the plan breaks one it is shaded red. After an execution the plan is dashed over
+    what happened, with the difference below. The cursor is where `Timeline` looks.
+
+    Args:
+        subject: A model, a session, or another part to look at the same arm as.
+        joint: The joint to show in its own unit, from 1; 0 shows all of them in percent of their limits.
+        quantities: Which rows there are.
+        language: "en" or "zh".
+    """
+
+    def __init__(
+        self,
+        subject: object,
+        *,
+        joint: int = 0,
+        quantities: tuple[Quantity, ...] = QUANTITIES,
+        language: str = "en",
+    ) -> None:
+        super().__init__(subject, language)
+        self._quantities = quantities
+        names = [self.text("timeline.all"), *(self.text("jog.joint", joint=j + 1) for j in range(self.model.n))]
+        self.joint: Any = ipywidgets.Dropdown(
+            description=self.text("timeline.joint"),
+            options=[(name, number) for number, name in enumerate(names)],
+            value=joint,
+            layout=ipywidgets.Layout(width="22em"),
+        )
+        self._kinds = block()
+        self._curves, self._cursor = block(), block()
+        self._end = 1.0
+        self._name = f"rl-plot-{id(self)}"
+        bar = ipywidgets.HBox([self.joint, self._kinds], layout=ipywidgets.Layout(align_items="center"))
+        self.build([bar, self._curves, self._cursor], width="100%")
+        self._root.add_class(self._name)
+        self.joint.observe(lambda _: self._draw(), names="value")
+        self._ends.append(self.state.hear("run", self._draw))
+        self.hear("plan", self._draw)
+        self.hear("moment", self._point)
+
+    @property
+    def html(self) -> str:
+        """The pictures as they are shown, SVG with a legend; a sentence while there is nothing to show."""
+        return str(self._curves.value)
+
+    def _draw(self) -> None:
+        state = self.state
+        plan = None if state.plan is None else state.plan.motion
+        if plan is None:
+            write(self._curves, soft(self.text("timeline.nothing")))
+            write(self._kinds, "")
+            self._point()
+            return
+        joint, limits, run = int(self.joint.value), self.model.limits.joint, state.run
+        times = None if run is None else run.t - run.delay * CYCLE_TIME
+        panels: list[Panel] = []
+        for quantity in self._quantities:
+            planned = plan_curves(plan, quantity)
+            actual = None
+            if run is not None and times is not None and len(times):
+                recorded = recorded_curves(run.t, run.q, run.q_c, run.dq, quantity)
+                actual = Curves(t=times, values=recorded.values)
+            frame = build_frame(planned, actual, limits, quantity, joint, _BUCKETS)
+            unit = _UNITS[quantity] if joint else self.text("plot.percent")
+            panels.append(Panel(title=self.text(f"plot.{quantity}"), unit=unit, frame=frame))
+        if run is not None and times is not None and len(times):
+            panels.append(self._error(run, times, last_time(plan_curves(plan, "q"), Curves(t=times, values=run.q))))
+        joints = [joint - 1] if joint else list(range(self.model.n))
+        self._end = panels[0].frame.end
+        write(self._curves, draw(panels, joints, self.text("plot.time"), self.text("legend.limit")))
+        delay = 0 if run is None else run.delay
+        write(self._kinds, "" if run is None else soft(self.text("plot.kinds", delay=delay)))
+        self._point()
+
+    def _error(self, run: Run, times: Any, last: float) -> Panel:
+        joint = int(self.joint.value)
+        errors = np.degrees(np.nan_to_num(run.error))
+        chosen = errors[:, joint - 1 : joint] if joint else errors
+        frame = build_error_frame(times, chosen, last, _BUCKETS)
+        return Panel(title=self.text("plot.error"), unit="deg", frame=frame)
+
+    def _point(self) -> None:
+        moment = self.state.moment
+        if moment is None or self.state.plan is None:
+            write(self._cursor, "")
+            return
+        place = f"display:block;left:{100.0 * share_of(moment, self._end):.2f}%"
+        write(self._cursor, f"<style>.{self._name} .rl-cursor{{{place}}}</style>")

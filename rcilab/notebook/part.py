@@ -1,0 +1,80 @@
+"""What every part of the notebook's lab is: it looks at a shared state, shows itself, and ends with its cell."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import ipywidgets
+
+from rcilab.closing import Closing
+from rcilab.model import RobotModel
+from rcilab.notebook.cells import kernel_cells
+from rcilab.notebook.look import close_tree, style_sheet
+from rcilab.notebook.state import LabState, Topic, state_of
+from rcilab.words.text import Text
+
+_PACKAGE = "rcilab.notebook"
+
+
+class Part(Closing):
+    """A part: shows itself as the last line of a cell, combines with others, ends when its cell runs again.
+
+    Args:
+        subject: A model, a session, or another part to look at the same arm as.
+        language: "en" or "zh".
+
+    Raises:
+        InvalidValueError: The subject is none of these, or the language is unknown.
+    """
+
+    def __init__(self, subject: object, language: str = "en") -> None:
+        self.text = Text(language, _PACKAGE)
+        self.state: LabState = state_of(subject)
+        self._ends: list[Callable[[], None]] = []
+        self._root: Any = None
+        self._closed = False
+        kernel_cells().adopt(self)
+
+    @property
+    def model(self) -> RobotModel:
+        """The arm."""
+        return self.state.model
+
+    @property
+    def widget(self) -> Any:
+        """The ipywidgets widget, to be put into boxes of your own."""
+        return self._root
+
+    def hear(self, topic: Topic, act: Callable[[], None]) -> None:
+        """Follows a topic of the state until this part is closed; called once at once."""
+        self._ends.append(self.state.hear(topic, act))
+        act()
+
+    def build(self, children: Sequence[Any], **layout: str) -> None:
+        """Takes the widgets that this part is made of, one below the other."""
+        self._root = ipywidgets.VBox([style_sheet(), *children], layout=ipywidgets.Layout(**layout))
+        self._root.add_class("rl-root")
+
+    def halt(self) -> None:
+        """Brings to rest what this part moves; most move nothing."""
+
+    def close(self) -> None:
+        """Takes the part away and ends what it started. May be called twice."""
+        if self._closed:
+            return
+        self._closed = True
+        for end in self._ends:
+            end()
+        self.end()
+        close_tree(self._root)
+        kernel_cells().forget(self)
+
+    def end(self) -> None:
+        """Ends what a part has of its own: servers, threads, processes."""
+
+    def _repr_mimebundle_(self, **options: Any) -> Any:
+        return self._root._repr_mimebundle_(**options)
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} of {self.model.name}{', closed' if self._closed else ''}>"

@@ -1,0 +1,107 @@
+"""Plan: from where the arm stands to the goal, how fast and by which law, and whether it may run."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import ipywidgets
+
+from rcilab.notebook.look import block, soft, verdict, write
+from rcilab.notebook.number_field import NumberField
+from rcilab.notebook.part import Part
+from rcilab.notebook.state import WAYS
+from rcilab.posing.planning import LAWS
+
+_SLOWEST = 1.0  # [%]
+
+
+class PlanPanel(Part):
+    """Way, speed and law; "Plan there" plans and checks. Nothing on it moves a robot.
+
+    Args:
+        subject: A model, a session, or another part to look at the same arm as.
+        language: "en" or "zh".
+    """
+
+    def __init__(self, subject: object, *, language: str = "en") -> None:
+        super().__init__(subject, language)
+        state, text = self.state, self.text
+        wide = ipywidgets.Layout(width="24em")
+        self.way = ipywidgets.Dropdown(
+            description=text("plan.way"), options=[(text(f"way.{way}"), way) for way in WAYS], value=state.way,
+            layout=wide,
+        )  # fmt: skip
+        self.law = ipywidgets.Dropdown(
+            description=text("target.law"), options=[(text(f"law.{law}"), law) for law in LAWS], value=state.law,
+            tooltip=text("target.law_hint"), layout=wide,
+        )  # fmt: skip
+        self.speed = ipywidgets.FloatSlider(
+            description=text("target.speed"), min=_SLOWEST, max=100.0, step=1.0, value=100.0 * state.speed,
+            readout=False, tooltip=text("target.speed_hint"), layout=ipywidgets.Layout(width="19em"),
+        )  # fmt: skip
+        self._speed_field = NumberField(text, "", "%", _SLOWEST, 100.0, self._set_speed)
+        self.plan = ipywidgets.Button(
+            description=text("target.plan"), icon="check", button_style="primary", tooltip=text("target.plan_hint")
+        )
+        self.slow_down = ipywidgets.Button(
+            description=text("plan.slow_down"), tooltip=text("plan.slow_down_hint"),
+            layout=ipywidgets.Layout(width="auto", display="none"),
+        )  # fmt: skip
+        self._said = block()
+        self.build([
+            self.way,
+            ipywidgets.HBox([self.speed, self._speed_field.row], layout=ipywidgets.Layout(align_items="center")),
+            self._speed_field.said,
+            self.law,
+            block(soft(text("target.law_hint"))),
+            ipywidgets.HBox([self.plan, self.slow_down]),
+            self._said,
+        ], min_width="360px")  # fmt: skip
+        self.way.observe(self._on_way, names="value")
+        self.law.observe(self._on_law, names="value")
+        self.speed.observe(lambda change: self._set_speed(change["new"]), names="value")
+        self.plan.on_click(lambda _: self.state.make_plan())
+        self.slow_down.on_click(lambda _: self._slow_down())
+        self._speed_field.show(100.0 * state.speed)
+        self._ends.append(state.hear("goal", self._show))
+        self.hear("plan", self._show)
+
+    def _set_speed(self, percent: float) -> None:
+        self.state.speed = percent / 100.0
+        if self.speed.value != percent:
+            self.speed.value = percent
+        self._speed_field.show(percent)
+
+    def _on_way(self, change: Any) -> None:
+        self.state.way = change["new"]
+        self.law.disabled = change["new"] == "line"
+
+    def _on_law(self, change: Any) -> None:
+        self.state.law = change["new"]
+
+    def _slow_down(self) -> None:
+        plan = self.state.plan
+        if plan is not None:
+            found = plan.report.slow_down()
+            if found.motion is not None:
+                self.state.take_motion(found.motion)
+
+    def _show(self) -> None:
+        state, text = self.state, self.text
+        plan = state.plan
+        self.slow_down.layout.display = "none" if plan is None or plan.report.ok else None
+        if plan is None:
+            said = "" if state.no_plan is None else verdict("warn", "▲", text.say(state.no_plan))
+            write(self._said, said or soft(text("check.nothing")))
+            return
+        report = plan.report
+        tone, word = ("good", "check.passed") if report.ok else ("bad", "check.failed")
+        said = text("plan.ready", duration=f"{plan.motion.duration:.3f}")
+        if not report.ok:
+            said += " " + text("check.failed_long", count=len(report.violations))
+        elif plan.short is not None:
+            tone, word = "warn", "target.not_there"
+            said += " " + text("target.leads_short", short=text.say(plan.short))
+        if not state.is_goal_of_plan and plan.short is None:
+            said += " " + text("plan.moved")
+        write(self._said, verdict(tone, text(word), said))

@@ -1,0 +1,81 @@
+"""The judgement of the plan in the controller's own terms: every condition, its worst value, its bound, its source."""
+
+from __future__ import annotations
+
+from rcilab.conformance.explain import explain_place, explain_violation
+from rcilab.conformance.report import ConditionResult, Report
+from rcilab.notebook.look import Tone, block, esc, soft, verdict, write
+from rcilab.notebook.part import Part
+
+_TIGHT = 0.95  # A choice: from this share of a bound on, a row is amber.
+_LISTED = 8
+
+
+class ReportView(Part):
+    """Verdict first, then what is broken in sentences, then every condition as a bar against its bound.
+
+    Args:
+        subject: A model, a session, or another part to look at the same arm as.
+        report: A report of yours to show; the report of the plan when absent.
+        language: "en" or "zh".
+    """
+
+    def __init__(self, subject: object, report: Report | None = None, *, language: str = "en") -> None:
+        super().__init__(subject, language)
+        self._own = report
+        self._verdict, self._rows = block(), block()
+        self.build([self._verdict, self._rows], min_width="360px")
+        self.hear("plan", self._show)
+
+    @property
+    def report(self) -> Report | None:
+        """What is shown; None while there is nothing to judge."""
+        if self._own is not None:
+            return self._own
+        return None if self.state.plan is None else self.state.plan.report
+
+    def _show(self) -> None:
+        text, report = self.text, self.report
+        if report is None:
+            reason = self.state.no_plan
+            write(self._verdict, soft(text("check.nothing") if reason is None else text.say(reason)))
+            write(self._rows, "")
+            return
+        unheeded = sum(not row.ok for row in report.rows if row.condition.necessity == "recommended")
+        if report.ok:
+            code = "check.passed_unheeded" if unheeded else "check.passed_long"
+            said = verdict("good", text("check.passed"), text(code, count=unheeded))
+        else:
+            said = verdict("bad", text("check.failed"), text("check.failed_long", count=len(report.violations)))
+        write(self._verdict, said + soft(text("check.note")))
+        broken = "".join(
+            f"<li>{esc(explain_violation(violation, text.language))}</li>" for violation in report.violations[:_LISTED]
+        )
+        cards = "".join(self._card(row) for row in sorted(report.rows, key=lambda row: (row.ok, -row.ratio)))
+        write(self._rows, f'<div class="rl-scroll">{f"<ul>{broken}</ul>" if broken else ""}{cards}</div>')
+
+    def _card(self, row: ConditionResult) -> str:
+        text, condition = self.text, row.condition
+        tone: Tone = "good" if row.ok and row.ratio <= _TIGHT else "warn"
+        word = "check.kept" if tone == "good" else "check.tight" if row.ok else "check.exceeded"
+        if not row.ok and condition.necessity == "necessary":
+            tone, word = "bad", "check.broken"
+        unit = condition.unit.replace("^2", "²").replace("^3", "³")
+        facts = [f"{_number(row.value)} / {_number(row.bound)} {unit}"]
+        facts += [text("check.joint", joint=row.joint)] if row.joint else []
+        facts += [explain_place(row, text.language)] if row.links is not None else []
+        facts.append(f"t = {row.time:.3f} s")
+        fault = "" if condition.fault is None else "; " + text("check.raises", fault=condition.fault.manual_name)
+        return (
+            f'<div class="rl-card rl-{tone}"><div class="rl-row"><b>{esc(text(f"condition.{condition.id}"))}</b>'
+            f'<span class="rl-soft">{esc(text("necessity." + condition.necessity))}</span>'
+            f'<span class="rl-push">{esc(text(word))}</span><span class="rl-num">{100.0 * row.ratio:.1f} %</span></div>'
+            f'<div class="rl-meter"><i style="width:{min(100.0, 100.0 * row.ratio):.1f}%"></i></div>'
+            f'<div class="rl-num">{esc(" · ".join(facts))}</div>'
+            f'<div class="rl-soft">{esc(condition.formula)} — {esc(condition.source + fault)}</div></div>'
+        )
+
+
+def _number(value: float) -> str:
+    size = abs(value)
+    return f"{value:.0f}" if size >= 1000.0 else f"{value:.4g}" if size >= 1e-3 or size == 0.0 else f"{value:.1e}"

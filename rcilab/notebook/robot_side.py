@@ -1,0 +1,319 @@
+"""The robot of a notebook: a control process of our own, or a session that the notebook has already.
+
+Both are asked and looked at in the same way, and neither makes anybody wait. What moves is brought to rest when the
+kernel goes: the control process notices within 0.5 s, however the kernel ended.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol
+
+from numpy.typing import NDArray
+
+from rcilab.client.session import RobotSession
+from rcilab.errors import ConnectionLostError, RcilabError, UsageError
+from rcilab.recording.live import LiveRecording, RunFacts
+from rcilab.recording.run import Run
+from rcilab.recording.setup import Setup
+from rcilab.supervisor import Supervisor, SupervisorStatus, Ticket
+from rcilab.supervisor.supervisor import VIRTUAL
+
+if TYPE_CHECKING:
+    from rcilab.model import RobotModel
+    from rcilab.posing.planning import Plan
+
+_FRESH = 0.04  # [s] A state that is younger is not asked for again.
+_LOST_LOOK = 1.0  # [s] Between two looks at a connection that is lost.
+_WAIT = 0.2  # [s] For a state that was asked for.
+_POWER_LOOK = 1.0  # [s] Between two questions after motor power; the state does not tell it.
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Outcome:
+    """What came of something that was asked for."""
+
+    what: str
+    """"execute", "power_on", "power_off", "recover" or "connect"."""
+    run: Run | None = None
+    error: RcilabError | None = None
+
+    @property
+    def record(self) -> NDArray[Any] | None:
+        """The last cycles, as the flight recorder kept them; None where nothing moved."""
+        record = getattr(self.error, "record", None)
+        return record if record is not None else None if self.run is None else self.run.cycles
+
+
+class RobotSide(Protocol):
+    """What a notebook asks of a robot. No method waits for it."""
+
+    name: str
+    """Where it is."""
+    is_virtual: bool
+    """Whether nothing but numbers moves."""
+
+    def status(self) -> SupervisorStatus:
+        """Returns how it stands."""
+        ...
+
+    def power(self, on: bool) -> None:
+        """Switches motor power."""
+        ...
+
+    def recover(self) -> None:
+        """Clears the controller's faults."""
+        ...
+
+    def execute(self, plan: Plan) -> None:
+        """Streams a checked motion."""
+        ...
+
+    def stop(self) -> None:
+        """Brings a running motion to rest; from any thread."""
+        ...
+
+    def beat(self) -> None:
+        """Says that somebody is at the notebook."""
+        ...
+
+    def outcomes(self) -> list[Outcome]:
+        """Returns what has ended since the last call; to be called several times a second."""
+        ...
+
+    def close(self) -> None:
+        """Brings a running motion to rest and ends what was started."""
+        ...
+
+
+class SupervisedRobot:
+    """A control process of our own; it, and a virtual controller, end with this object.
+
+    Args:
+        model: The arm.
+        target: "virtual", or the address of a controller, rci://HOST:PORT.
+        plant: What a virtual controller moves: "ideal" or "mujoco".
+
+    Raises:
+        InvalidValueError: The address or the plant is none.
+        ModelError: The arm does not speak the RCI.
+    """
+
+    def __init__(self, model: RobotModel, target: str = VIRTUAL, plant: str = "ideal") -> None:
+        self.name = target
+        self.is_virtual = target == VIRTUAL
+        self._model, self._plant = model, plant
+        self._supervisor = Supervisor(model, target, plant)
+        self._tickets: list[tuple[str, Ticket]] = []
+        self._done: list[Outcome] = []
+        self._live: LiveRecording | None = None
+        self._reader: Any = None
+        self._opened = threading.Event()
+        self._opener = threading.Thread(target=self._open, name="rcilab-notebook-open", daemon=True)
+        self._opener.start()
+
+    def status(self) -> SupervisorStatus:
+        """Returns how it stands; "starting" until the processes are there."""
+        if not self._opened.is_set() and self._opener.is_alive():
+            return SupervisorStatus(phase="starting", code="starting", target=self.name)
+        return self._supervisor.status()
+
+    def power(self, on: bool) -> None:
+        """Switches motor power."""
+        act = self._supervisor.power_on if on else self._supervisor.power_off
+        self._tickets.append(("power_on" if on else "power_off", act()))
+
+    def recover(self) -> None:
+        """Clears the controller's faults; where the connection is lost, makes a new one."""
+        lost = self.status().phase in ("lost", "crashed")
+        act = self._supervisor.reconnect if lost else self._supervisor.recover
+        self._tickets.append(("recover", act()))
+
+    def execute(self, plan: Plan) -> None:
+        """Streams a checked motion; every cycle of it is kept."""
+        certificate = plan.report.require().certificate
+        assert certificate is not None  # A report that is ok has one.
+        self._reader = self._supervisor.open_reader()
+        self._reader.drain()
+        setup = Setup(
+            target=self.name,
+            plant=self._plant if self.is_virtual else "",
+            mode="joint_position",
+            started_ns=time.time_ns(),
+        )
+        self._live = LiveRecording(RunFacts(plan=plan.motion, model=self._model, setup=setup))
+        self._tickets.append(("execute", self._supervisor.execute(plan.motion, certificate)))
+
+    def stop(self) -> None:
+        """Brings a running motion to rest."""
+        try:
+            self._supervisor.stop()
+        except RcilabError:  # Nothing is connected: nothing of ours moves.
+            return
+
+    def beat(self) -> None:
+        """Says that somebody is at the notebook."""
+        if self._opened.is_set():
+            self._supervisor.set_operator_present(True)
+
+    def outcomes(self) -> list[Outcome]:
+        """Returns what has ended since the last call, and keeps the cycles of what goes on."""
+        if self._live is not None:
+            self._live.add(self._reader.drain())
+        done, self._done = self._done, []
+        for entry in list(self._tickets):
+            what, ticket = entry
+            if not ticket.done:
+                continue
+            self._tickets.remove(entry)
+            run = None
+            if what == "execute" and self._live is not None:
+                live, self._live = self._live, None
+                live.add(self._reader.drain())
+                run = live.finish(None if ticket.error is None else str(ticket.error))
+            done.append(Outcome(what=what, run=run, error=ticket.error))
+        return done
+
+    def close(self) -> None:
+        """Brings a running motion to rest and ends the processes."""
+        self._opener.join()
+        self._supervisor.close()
+
+    def _open(self) -> None:
+        try:
+            self._supervisor.start()
+        except RcilabError as error:
+            self._done.append(Outcome(what="connect", error=error))
+            return
+        self._opened.set()
+
+
+class SessionRobot:
+    """A session that the notebook has: its motions run in the kernel. The session stays open when this ends.
+
+    Args:
+        session: From `connect` or `simulate`.
+    """
+
+    def __init__(self, session: RobotSession) -> None:
+        self.name = session.address
+        self._session = session
+        self.is_virtual = _has_world(session)
+        self._worker: threading.Thread | None = None
+        self._what = ""
+        self._done: list[Outcome] = []
+        self._time: tuple[float, float] = (0.0, 0.0)
+        self._powered: bool | None = None
+        self._power_seen = float("-inf")
+        self._last = SupervisorStatus(phase="connecting", code="connecting", target=self.name)
+        self._looked = float("-inf")
+
+    def status(self) -> SupervisorStatus:
+        """Returns how it stands, by a state of this moment; by the last one while another cell moves the arm."""
+        age = time.monotonic() - self._looked
+        if age > (_LOST_LOOK if self._last.phase == "lost" else _FRESH):
+            self._last = self._look()
+            self._looked = time.monotonic()
+        return self._last
+
+    def _look(self) -> SupervisorStatus:
+        is_moving = self._is_busy and self._what == "execute"
+        try:
+            state = self._session.state if is_moving else self._session.receive_state(_WAIT, max_age=_FRESH)
+            if not is_moving:
+                self._ask_power()
+        except ConnectionLostError as error:
+            return SupervisorStatus(phase="lost", code="lost.silent", message=str(error), target=self.name)
+        except UsageError:  # Another cell moves the arm, or the session was closed.
+            return self._last
+        phase = "fault" if state.faults else "moving" if is_moving else "idle"
+        return SupervisorStatus(
+            phase=phase,
+            code=phase,
+            target=self.name,
+            address=self.name,
+            q=state.q,
+            q_c=state.q_c,
+            dq=state.dq,
+            robot_mode=state.robot_mode,
+            controller_mode=state.controller_mode,
+            faults=state.faults,
+            powered=self._powered,
+            success_rate=state.success_rate,
+            rate_hz=1000.0,
+            message_id=state.message_id,
+            motion_time=self._time[0] if self._time[1] else None,
+            motion_duration=self._time[1] or None,
+        )
+
+    def power(self, on: bool) -> None:
+        """Switches motor power."""
+        self._do("power_on" if on else "power_off", self._session.power_on if on else self._session.power_off)
+
+    def recover(self) -> None:
+        """Clears the controller's faults."""
+        self._do("recover", self._session.recover)
+
+    def execute(self, plan: Plan) -> None:
+        """Streams a checked motion in a thread of the kernel."""
+        certificate = plan.report.require().certificate
+        self._do("execute", lambda: self._session.execute(plan.motion, certificate, progress=self._on_progress))
+
+    def stop(self) -> None:
+        """Brings a running motion to rest, also one that a cell has started."""
+        self._session.stop()
+
+    def beat(self) -> None:
+        """Does nothing: who looks after a session stops it by himself."""
+
+    def outcomes(self) -> list[Outcome]:
+        """Returns what has ended since the last call."""
+        done, self._done = self._done, []
+        return done
+
+    def close(self) -> None:
+        """Brings to rest what was started here; the session stays."""
+        worker = self._worker
+        if worker is not None and worker.is_alive():
+            self._session.stop()
+            worker.join()
+
+    @property
+    def _is_busy(self) -> bool:
+        return self._worker is not None and self._worker.is_alive()
+
+    def _do(self, what: str, act: Callable[[], object]) -> None:
+        if self._is_busy:
+            raise UsageError(f"no {what} now: {self._what} is still under way; stop it, or wait")
+
+        def work() -> None:
+            error: RcilabError | None = None
+            run: object = None
+            try:
+                run = act()
+            except RcilabError as failure:
+                error = failure
+            self._power_seen = float("-inf")
+            self._done.append(Outcome(what=what, run=run if isinstance(run, Run) else None, error=error))
+
+        self._what = what
+        self._worker = threading.Thread(target=work, name="rcilab-notebook-robot", daemon=True)
+        self._worker.start()
+
+    def _ask_power(self) -> None:
+        if time.monotonic() - self._power_seen > _POWER_LOOK and not self._is_busy:
+            self._powered = self._session.motor_state()
+            self._power_seen = time.monotonic()
+
+    def _on_progress(self, t: float, duration: float) -> None:
+        self._time = (t, duration)
+
+
+def _has_world(session: RobotSession) -> bool:
+    try:
+        return session.world is not None
+    except UsageError:
+        return False

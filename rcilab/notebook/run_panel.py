@@ -1,0 +1,283 @@
+"""Run: which robot, power, Execute and Stop, how well the milliseconds are kept, and what came of it."""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Callable
+from typing import Any
+
+import ipywidgets
+import numpy as np
+
+from rcilab.errors import RcilabError
+from rcilab.notebook.heart import Heart
+from rcilab.notebook.look import PHASE_TONES, block, head, problem, soft, table, verdict, write
+from rcilab.notebook.part import Part
+from rcilab.notebook.ready import describe_move, obstacle
+from rcilab.notebook.robot_side import Outcome, RobotSide, SessionRobot, SupervisedRobot
+from rcilab.supervisor import SupervisorStatus
+from rcilab.supervisor.supervisor import VIRTUAL
+
+_LOOK = 0.1  # [s] Between two looks at the robot.
+_TARGETS = ("ideal", "mujoco", "address")
+
+
+class RunPanel(Part):
+    """Everything that moves a robot is here, and nothing on it moves one by a drag.
+
+    With a model it connects to a virtual controller of its own, or to an address; a control process outside of the
+    kernel keeps the milliseconds. With a session it uses that one. A robot that is not virtual is moved only after the
+    question has been answered. A motion is brought to rest when the page is gone, the kernel is interrupted, restarted
+    or dead, or the cell is run again.
+
+    Args:
+        subject: A model, a session, or another part to look at the same arm as.
+        language: "en" or "zh".
+    """
+
+    def __init__(self, subject: object, *, language: str = "en") -> None:
+        super().__init__(subject, language)
+        text = self.text
+        self._heart = Heart()
+        self._ending = threading.Event()
+        self._watcher: threading.Thread | None = None
+        self.target = ipywidgets.Dropdown(
+            description=text("run.robot"), options=[(text(f"robot.{name}"), name) for name in _TARGETS],
+            layout=ipywidgets.Layout(width="24em"),
+        )  # fmt: skip
+        self.address = ipywidgets.Text(
+            description=text("run.address"), placeholder="rci://192.168.0.160:1337", tooltip=text("run.address_hint"),
+            layout=ipywidgets.Layout(width="24em", display="none"),
+        )  # fmt: skip
+        self.connect = self._button("run.connect", self._on_connect, icon="plug")
+        self.disconnect = self._button("run.disconnect", self._on_disconnect)
+        self.power_on = self._button("run.power_on", lambda: self._robot.power(True), icon="power-off")
+        self.power_off = self._button("run.power_off", lambda: self._robot.power(False))
+        self.recover = self._button("run.recover", lambda: self._robot.recover())
+        self.execute = self._button("run.execute", self._on_execute, icon="play", style="success")
+        self.stop = self._button("run.stop", self.halt, icon="stop", style="danger")
+        self.stop.add_class("rl-stop")
+        self.yes = self._button("run.confirm", self._move, style="danger")
+        self.no = self._button("run.cancel", self._forget_question)
+        self.progress = ipywidgets.FloatProgress(
+            min=0.0, max=1.0, layout=ipywidgets.Layout(width="100%", visibility="hidden")
+        )
+        self._said, self._where, self._plan, self._question = block(), block(), block(), block()
+        self._health, self._outcome = block(), block()
+        self._answers = ipywidgets.HBox([self.yes, self.no], layout=ipywidgets.Layout(display="none"))
+        self._choice = ipywidgets.VBox([self.target, self.address])
+        self.build([
+            self._heart.widget,
+            self._choice,
+            ipywidgets.HBox([self.connect, self.disconnect]),
+            self._said,
+            self._where,
+            ipywidgets.HBox([self.power_on, self.power_off, self.recover]),
+            self._plan,
+            ipywidgets.HBox([self.execute, self.stop]),
+            self._question,
+            self._answers,
+            self.progress,
+            self._outcome,
+            self._health,
+        ], min_width="360px")  # fmt: skip
+        self.target.observe(lambda _: self._show(), names="value")
+        if self.state.session is not None:
+            self._take(SessionRobot(self.state.session))
+        self._ends.append(self.state.hear("plan", self._on_plan))
+        self._ends.append(self.state.hear("goal", self._show))
+        self.hear("robot", self._show)
+
+    def halt(self) -> None:
+        """Brings the robot to rest; from any thread, without waiting."""
+        robot = self.state.robot
+        if robot is not None:
+            robot.stop()
+
+    def end(self) -> None:
+        """Brings a motion to rest and ends the processes that were started here."""
+        self._release()
+
+    @property
+    def _robot(self) -> RobotSide:
+        robot = self.state.robot
+        assert robot is not None  # The buttons that ask it are disabled without one.
+        return robot
+
+    def _on_connect(self) -> None:
+        choice = str(self.target.value)
+        typed = self.address.value.strip()
+        if choice == "address" and not typed:
+            write(self._said, problem(self.text("run.address_needed")))
+            return
+        target, plant = (typed, "ideal") if choice == "address" else (VIRTUAL, choice)
+        self._release()
+        self._take(SupervisedRobot(self.model, target, plant))
+        self.state.tell("robot")
+
+    def _on_disconnect(self) -> None:
+        self._release()
+        self.state.tell("robot")
+
+    def _take(self, robot: RobotSide) -> None:
+        self.state.robot = robot
+        self._heart.start()
+        self._ending.clear()
+        self._watcher = threading.Thread(target=self._watch, args=(robot,), name="rcilab-notebook-watch", daemon=True)
+        self._watcher.start()
+
+    def _release(self) -> None:
+        self._ending.set()
+        watcher, self._watcher = self._watcher, None
+        if watcher is not None and watcher is not threading.current_thread():
+            watcher.join()
+        robot, self.state.robot = self.state.robot, None
+        if robot is not None:
+            last = robot.status().q_c
+            if last is not None:
+                self.state.leave_arm(last)
+            robot.close()
+        self._heart.stop()
+
+    def _watch(self, robot: RobotSide) -> None:
+        """The watching thread: shows the robot, says that somebody is here, stops when nobody is any more."""
+        while not self._ending.wait(_LOOK):
+            if self._heart.is_gone:
+                robot.stop()
+            elif self._heart.was_seen:
+                robot.beat()
+            for outcome in robot.outcomes():
+                self._take_in(outcome)
+            self.state.tell("robot")
+
+    def _take_in(self, outcome: Outcome) -> None:
+        if outcome.what == "execute":
+            self.state.take_run(outcome.run, outcome.error)
+        self._write_outcome(outcome)
+
+    def _on_plan(self) -> None:
+        self._forget_question()
+        self._show()
+
+    def _on_execute(self) -> None:
+        reason = obstacle(self.state)
+        if reason is not None:
+            write(self._said, problem(self.text.say(reason)))
+            return
+        if self._robot.is_virtual:
+            self._move()
+            return
+        question = describe_move(self.state, self._robot.name)
+        write(self._question, verdict("warn", "▲", self.text.say(question)))
+        self._answers.layout.display = None
+
+    def _move(self) -> None:
+        self._forget_question()
+        reason, plan = obstacle(self.state), self.state.plan
+        if reason is None and plan is not None:
+            self.state.look_at(None)
+            write(self._outcome, "")
+            self._robot.execute(plan)
+
+    def _forget_question(self) -> None:
+        write(self._question, "")
+        self._answers.layout.display = "none"
+
+    def _show(self) -> None:
+        state, text = self.state, self.text
+        status = state.status
+        phase = "closed" if status is None else status.phase
+        is_moving = phase in ("moving", "stopping")
+        self._choice.layout.display = "none" if status is not None else None
+        self.address.layout.display = None if self.target.value == "address" else "none"
+        self.connect.layout.display = "none" if status is not None else None
+        is_own = isinstance(state.robot, SupervisedRobot)
+        self.disconnect.layout.display = None if is_own else "none"
+        reason = obstacle(state)
+        self.execute.disabled = reason is not None
+        powered = None if status is None else status.powered
+        self.power_on.disabled = is_moving or powered is not False
+        self.power_off.disabled = is_moving or powered is not True
+        self.recover.disabled = phase not in ("fault", "lost", "crashed")
+        name = "" if state.robot is None else text("run.at", name=self._name_robot(state.robot))
+        write(
+            self._said, verdict(PHASE_TONES.get(phase, "none" if status is None else "bad"), _phase(status, text), name)
+        )
+        write(self._where, "" if reason is None or is_moving else soft(text.say(reason)))
+        plan = state.plan
+        if plan is None:
+            write(self._plan, "")
+        else:
+            told, word = ("good", "check.passed") if plan.report.ok else ("bad", "check.failed")
+            write(self._plan, verdict(told, text(word), text("plan.ready", duration=f"{plan.motion.duration:.3f}")))
+        self._show_progress(status, is_moving)
+        write(self._health, "" if status is None else self._tell_health(status))
+
+    def _name_robot(self, robot: RobotSide) -> str:
+        return self.text("run.virtual") if robot.name == VIRTUAL else robot.name
+
+    def _show_progress(self, status: SupervisorStatus | None, is_moving: bool) -> None:
+        shown = is_moving and status is not None and bool(status.motion_duration)
+        self.progress.layout.visibility = "visible" if shown else "hidden"
+        if shown and status is not None and status.motion_duration:
+            share = (status.motion_time or 0.0) / status.motion_duration
+            self.progress.value = min(max(share, 0.0), 1.0) if math.isfinite(share) else 0.0
+
+    def _tell_health(self, status: SupervisorStatus) -> str:
+        text = self.text
+        mode, control = status.robot_mode, status.controller_mode
+        rows = [
+            ("mode", "—" if mode is None else text(f"robot_mode.{mode.name}")),
+            ("control", "—" if control is None else text(f"controller_mode.{control.name}")),
+            ("power", {None: "—", True: text("run.on"), False: text("run.off")}[status.powered]),
+            ("success", f"{100.0 * status.success_rate:.1f} %"),
+            ("rate", f"{status.rate_hz:.0f} Hz"),
+        ]
+        late = status.lateness
+        if late.cycles:
+            late_value = text("run.late_value", late=status.late_cycles, lost=status.lost_cycles, cycles=late.cycles)
+            rows.append(("late", late_value))
+            rows.append(("lateness", f"{late.p50:.0f} / {late.p99:.0f} / {late.p999:.0f} / {late.max:.0f} µs"))
+            rows.append(("scheduling", text(f"scheduling.{status.scheduling}")))
+        return head(text("run.health")) + table([], [[text(f"health.{name}"), value] for name, value in rows])
+
+    def _write_outcome(self, outcome: Outcome) -> None:
+        text, error, run = self.text, outcome.error, outcome.run
+        said = ""
+        if error is not None:
+            faults = ", ".join(getattr(fault, "manual_name", str(fault)) for fault in getattr(error, "faults", ()))
+            said = verdict("bad", "✗", text("run.faulted", faults=faults) if faults else str(error))
+            if outcome.what == "execute" and not faults:
+                said = verdict("warn", "▲", text("run.stopped"))
+        elif run is not None and len(run.q):
+            largest = float(np.degrees(np.abs(np.nan_to_num(run.error)).max()))
+            said = verdict("good", "✓", text("run.arrived", cycles=len(run.t), error=f"{largest:.3f}"))
+        write(self._outcome, said)
+
+    def _button(self, code: str, act: Callable[[], object], *, icon: str = "", style: str = "") -> Any:
+        hint = f"{code}_hint"
+        button = ipywidgets.Button(
+            description=self.text(code),
+            tooltip=self.text(hint) if self.text.has(hint) else self.text(code),
+            icon=icon,
+            button_style=style,
+            layout=ipywidgets.Layout(width="auto"),
+        )
+
+        def press(_: object) -> None:
+            try:
+                act()
+            except RcilabError as error:
+                write(self._outcome, problem(str(error)))
+
+        button.on_click(press)
+        return button
+
+
+def _phase(status: SupervisorStatus | None, text: Any) -> str:
+    if status is None:
+        return text("phase.closed")
+    if status.phase == "idle" and status.powered is False:
+        return text("phase.unpowered")
+    return text(f"phase.{status.phase}")

@@ -1,0 +1,202 @@
+"""The arm in 3D inside a cell: live in meshcat or viser where the browser reaches the kernel, else as a film."""
+
+from __future__ import annotations
+
+import html
+import warnings
+from typing import Any, Literal
+
+import numpy as np
+
+from rcilab.arrays import JointVector
+from rcilab.errors import InvalidValueError
+from rcilab.notebook.installed import require_installed
+from rcilab.notebook.look import block, soft, write
+from rcilab.notebook.part import Part
+from rcilab.notebook.place import Place, find_place
+from rcilab.notebook.preview import Preview, aim_camera
+from rcilab.posing.planning import Plan
+from rcilab.views.arm_view import ArmView
+from rcilab.views.effort import effort_colors
+from rcilab.views.scene import Color
+from rcilab.views.scene import Scene as Canvas
+
+View = Literal["auto", "meshcat", "viser", "static"]
+VIEWS: tuple[View, ...] = ("auto", "meshcat", "viser", "static")
+
+_REACHED: Color = (70, 190, 130)
+_REFUSED: Color = (230, 80, 70)
+_ZOOM = 1.35
+_SAME_POSE = 1e-4  # [rad] Closer than this a ghost would only flicker in the arm.
+
+
+class Scene(Part):
+    """The arm, its goal as a green ghost, and the moment of the plan that is looked at as a blue one.
+
+    With a robot the solid arm is where the robot is; without one it follows the goal, and the time of the plan.
+
+    Args:
+        subject: A model, a session, or another part to look at the same arm as.
+        view: "meshcat" or "viser", served on loopback; "static", a film inside the notebook; "auto" takes meshcat
+            where the browser can reach the kernel (see `rcilab.notebook.place`), else the film.
+        height: [px]
+        language: "en" or "zh".
+        place: Where the browser is; found out when absent.
+
+    Raises:
+        InvalidValueError: The subject, the view or the language is none.
+        UsageError: meshcat is not installed.
+    """
+
+    def __init__(
+        self,
+        subject: object,
+        *,
+        view: View = "auto",
+        height: int = 420,
+        language: str = "en",
+        place: Place | None = None,
+    ) -> None:
+        if view not in VIEWS:
+            raise InvalidValueError("view", view, f"is unknown; known: {', '.join(VIEWS)}")
+        require_installed("meshcat", "Scene")
+        super().__init__(subject, language)
+        place = place or find_place()
+        self.height = height
+        reachable = place.way == "loopback" or (place.way == "proxy" and view != "viser")
+        self.is_live = view != "static" and reachable
+        self._frame, self._note = block(), block()
+        self._picture: _LivePicture | None = None
+        self._film: Preview | None = None
+        self.build([self._frame, self._note], flex="0 0 auto", min_width="300px")
+        if self.is_live:
+            self._picture = _LivePicture(self, "viser" if view == "viser" else "meshcat")
+            self._write_frame(f'src="{place.address(self._picture.url)}"')
+            for topic in ("goal", "moment", "robot"):
+                self.hear(topic, self._picture.draw)
+            self.hear("plan", self._picture.draw_path)
+        else:
+            write(self._note, soft(self.text("scene.asked" if view == "static" else "scene.static")))
+            self.hear("plan", self._show_film)
+
+    @property
+    def url(self) -> str | None:
+        """Address of the live scene on loopback; None when it is a film."""
+        return None if self._picture is None else self._picture.url
+
+    def flush(self) -> None:
+        """Returns once everything that was drawn has been sent to every open page; meshcat only, else at once."""
+        if self._picture is not None:
+            self._picture.flush()
+
+    def save(self, file: str) -> None:
+        """Writes the scene as one HTML page that needs neither kernel nor network: the plan as a film, or the pose."""
+        self._make_film().save(file)
+
+    def end(self) -> None:
+        """Stops the server."""
+        if self._picture is not None:
+            self._picture.close()
+
+    def _write_frame(self, source: str) -> None:
+        title = html.escape(self.text("scene.title", model=self.model.name))
+        write(self._frame, f'<iframe class="rl-frame" title="{title}" {source} height="{self.height}"></iframe>')
+
+    def _show_film(self) -> None:
+        self._write_frame(f'srcdoc="{html.escape(self._make_film().html())}"')
+
+    def _make_film(self) -> Preview:
+        plan = self.state.plan
+        return Preview(self.state.goal if plan is None else plan.motion, self.model, live=False, height=self.height)
+
+
+class _LivePicture:
+    """What the served page shows; drawn by whoever changes the state, one at a time."""
+
+    def __init__(self, part: Scene, view: Literal["meshcat", "viser"]) -> None:
+        self._state = part.state
+        self._door: Any = None
+        self._meshcat: Any = None
+        canvas = self._open_viser() if view == "viser" else self._open_meshcat()
+        self._canvas = canvas
+        model = part.model
+        self._arm = ArmView(canvas, "arm", model, axes_length=0.12)
+        self._goal = ArmView(canvas, "goal", model, "candidate")
+        self._ghost = ArmView(canvas, "plan", model, "plan")
+        self._shown = {"goal": True, "plan": True}
+        self._tint = _REACHED
+        self._path: Plan | None = None
+
+    def draw(self) -> None:
+        """Puts the three arms where they belong now."""
+        state, status = self._state, self._state.status
+        moment = None if state.moment is None or state.plan is None else state.plan.motion.at(state.moment).q
+        robot = None if status is None else status.q
+        solid = state.goal if robot is None and moment is None else moment if robot is None else robot
+        assert solid is not None
+        self._arm.show(solid)
+        self._see("goal", self._goal, state.goal, solid)
+        self._see("plan", self._ghost, None if robot is None else moment, solid)
+        tint = _REFUSED if state.reach.tone == "bad" else _REACHED
+        if tint != self._tint:
+            self._tint = tint
+            self._goal.set_look(color=tint)
+
+    def draw_path(self) -> None:
+        """Draws the way of the tool, coloured by how hard the joints are driven."""
+        plan = self._state.plan
+        if plan is self._path:
+            return
+        if self._path is not None:
+            self._canvas.remove("/path")
+        self._path = plan
+        if plan is not None:
+            self._canvas.add_polyline("/path", plan.path, color=effort_colors(plan.effort))
+
+    def flush(self) -> None:
+        """Waits for meshcat's server."""
+        if self._meshcat is not None:
+            self._meshcat.flush()
+
+    def close(self) -> None:
+        """Stops serving."""
+        if self._door is not None:
+            self._door.close()
+        if self._meshcat is not None:
+            self._meshcat.close()
+
+    def _see(self, name: str, arm: ArmView, q: JointVector | None, solid: JointVector) -> None:
+        visible = q is not None and float(np.abs(q - solid).max()) > _SAME_POSE
+        if visible:
+            assert q is not None
+            arm.show(q)
+        if visible != self._shown[name]:
+            self._shown[name] = visible
+            arm.set_visible(visible)
+
+    def _open_meshcat(self) -> Canvas:
+        with warnings.catch_warnings():  # meshcat 0.3 loads pyzmq's old event loop, which says that it is old.
+            warnings.simplefilter("ignore", DeprecationWarning)
+            from rcilab.views.meshcat_scene import MeshcatScene
+
+            self._meshcat = MeshcatScene()
+        aim_camera(self._meshcat.visualizer)
+        self._meshcat.visualizer["/Cameras/default/rotated/<object>"].set_property("zoom", _ZOOM)
+        self.url: str = self._meshcat.url + "?plain"
+        return self._meshcat
+
+    def _open_viser(self) -> Canvas:
+        from rcilab.notebook.viser_link import LOOPBACK, bind_loopback
+        from rcilab.views.gate import Gate
+        from rcilab.views.guarded_server import GuardedServer
+        from rcilab.views.viser_scene import ViserScene
+        from rcilab.views.viser_stage import set_stage
+
+        bound = bind_loopback(0)
+        port = int(bound.getsockname()[1])
+        self._door = GuardedServer(bound, Gate(host=LOOPBACK, port=port))
+        server = self._door.viser
+        server.gui.configure_theme(show_logo=False, show_share_button=False)
+        set_stage(server, quality="light")
+        self.url = f"http://{LOOPBACK}:{port}/"
+        return ViserScene(server, shadows=False)

@@ -1,0 +1,231 @@
+"""What the parts of a notebook's lab share: the arm, the goal, the plan, the moment that is looked at, the robot.
+
+A part is given a model, a session or another part; parts of the same state move together. Everything is computed by
+the library's own calls; here is only who hears of it.
+"""
+
+from __future__ import annotations
+
+import threading
+import weakref
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING, Literal
+
+from numpy.typing import ArrayLike
+
+from rcilab.arrays import JointVector, as_vector, frozen
+from rcilab.client.session import RobotSession
+from rcilab.conformance.check import check
+from rcilab.errors import InvalidValueError, KinematicsError, RcilabError
+from rcilab.model import RobotModel, require_model
+from rcilab.motion.cartesian import plan_line
+from rcilab.motion.motion import Motion, require_motion
+from rcilab.posing.planning import Plan, PlannableLaw, make_plan, picture
+from rcilab.posing.reach import Reach, judge_joints, judge_pose
+from rcilab.spatial import Pose
+from rcilab.words.text import Message, message
+
+if TYPE_CHECKING:
+    from rcilab.notebook.robot_side import RobotSide
+    from rcilab.recording.run import Run
+    from rcilab.supervisor import SupervisorStatus
+
+Topic = Literal["goal", "plan", "moment", "robot", "run"]
+"""goal: where the arm is wanted; plan: a motion and its judgement; moment: what time of it is looked at; robot: its
+status; run: what came of an execution."""
+Way = Literal["joint", "line"]
+WAYS: tuple[Way, ...] = ("joint", "line")
+
+
+class LabState:
+    """One arm and what is wanted of it. Safe to use from any thread: one change at a time, each heard by everybody.
+
+    Args:
+        model: The arm.
+        session: A session to execute in; None leaves it to `RunPanel` to connect.
+    """
+
+    def __init__(self, model: RobotModel, session: RobotSession | None = None) -> None:
+        self.model = require_model(model)
+        self.session = session
+        self.lock = threading.RLock()
+        self.robot: RobotSide | None = None
+        self.goal: JointVector = frozen(model.home)
+        self.target: Pose = model.forward(self.goal)
+        self.reach: Reach = judge_joints(model, self.goal)
+        self.plan: Plan | None = None
+        self.no_plan: Message | None = None
+        self.moment: float | None = None
+        """Time of the plan that is looked at, [s]; None looks at the arm as it is."""
+        self.run: Run | None = None
+        self.error: RcilabError | None = None
+        """Why the last execution did not reach its end; None when it did."""
+        self.speed = 0.5
+        self.law: PlannableLaw = "jerk_limited"
+        self.way: Way = "joint"
+        self._rest: JointVector = self.goal  # Where the arm stands as long as no robot says otherwise.
+        self._hearers: dict[Topic, list[Callable[[], None]]] = {}
+
+    def hear(self, topic: Topic, act: Callable[[], None]) -> Callable[[], None]:
+        """Calls `act` at every change of a topic; returns what ends that."""
+        with self.lock:
+            self._hearers.setdefault(topic, []).append(act)
+
+        def end() -> None:
+            with self.lock:
+                if act in self._hearers[topic]:
+                    self._hearers[topic].remove(act)
+
+        return end
+
+    def tell(self, *topics: Topic) -> None:
+        """Tells everybody that something has changed."""
+        with self.lock:
+            for topic in topics:
+                for act in list(self._hearers.get(topic, ())):
+                    act()
+
+    @property
+    def status(self) -> SupervisorStatus | None:
+        """How the robot stands; None while none is connected."""
+        return None if self.robot is None else self.robot.status()
+
+    @property
+    def here(self) -> JointVector:
+        """Where a plan begins: at the robot's commanded angles, without a robot where the arm was left, [rad]."""
+        status = self.status
+        return self._rest if status is None or status.q_c is None else frozen(status.q_c)
+
+    def start_from(self, q: ArrayLike) -> None:
+        """Says where the arm stands while no robot is connected, shape (n,), [rad]."""
+        with self.lock:
+            self._rest = frozen(as_vector(q, self.model.n, "q", "rad"))
+            self.plan, self.no_plan, self.moment = None, None, None
+            self.tell("plan", "moment", "goal")
+
+    def pose(self, q: ArrayLike) -> None:
+        """Wants the arm at joint angles, shape (n,), [rad]; the plan stays until somebody plans anew."""
+        angles = as_vector(q, self.model.n, "q", "rad")
+        limits = self.model.limits.joint
+        for joint, (angle, low, high) in enumerate(zip(angles, limits.lower, limits.upper, strict=True), start=1):
+            if not low <= angle <= high:
+                raise InvalidValueError(
+                    f"q of joint {joint}", float(angle), f"must be from {low:.4f} to {high:.4f} rad"
+                )
+        with self.lock:
+            self.goal = frozen(angles)
+            self.target = self.model.forward(self.goal)
+            self.reach = judge_joints(self.model, self.goal)
+            self._look_away()
+            self.tell("goal")
+
+    def aim(self, target: Pose, *, psi: float | None = None, near: ArrayLike | None = None) -> None:
+        """Wants the tool at a pose; the arm takes the nearest branch, or comes as near as it can.
+
+        Args:
+            target: Pose of the tool in base.
+            psi: Arm angle to take, [rad]; None keeps the present one.
+            near: Joint angles that choose the branch, shape (n,), [rad]; the present goal when absent.
+        """
+        around = self.goal if near is None else as_vector(near, self.model.n, "near", "rad")
+        with self.lock:
+            self.reach = judge_pose(self.model, target, around, psi)
+            self.goal, self.target = self.reach.q, target
+            self._look_away()
+            self.tell("goal")
+
+    @property
+    def arm_angle(self) -> float | None:
+        """Arm angle of the goal, [rad]; None where there is none."""
+        if self.model.n != 7:
+            return None
+        try:
+            return self.model.arm_angle(self.goal)
+        except KinematicsError:
+            return None
+
+    def make_plan(self) -> None:
+        """Plans from where the arm stands to the goal and judges it, collisions too."""
+        made = self._line() if self.way == "line" else self._joint()
+        self.show(made.completed() if isinstance(made, Plan) else made)
+
+    def take_motion(self, motion: Motion) -> None:
+        """Takes a motion that was planned elsewhere; it is judged as any other."""
+        require_motion(motion)
+        report = check(motion, self.model)
+        self.show(replace(picture(self.model, motion, report), complete=True))
+
+    def show(self, made: Plan | Message) -> None:
+        """Shows a plan, or why there is none."""
+        with self.lock:
+            self.plan, self.no_plan = (made, None) if isinstance(made, Plan) else (None, made)
+            self.run, self.moment = None, None
+            self.tell("plan", "moment")
+
+    def take_run(self, run: Run | None, error: RcilabError | None = None) -> None:
+        """Shows what came of an execution beside its plan: the run, and why it did not reach its end."""
+        with self.lock:
+            self.run, self.error = run, error
+            self.tell("run")
+
+    def look_at(self, moment: float | None) -> None:
+        """Looks at a time of the plan, [s]; None looks at the arm as it is."""
+        with self.lock:
+            if self.plan is None:
+                moment = None
+            elif moment is not None:
+                moment = min(max(moment, 0.0), self.plan.motion.duration)
+            if moment != self.moment:
+                self.moment = moment
+                self.tell("moment")
+
+    def leave_arm(self, q: ArrayLike) -> None:
+        """Says where the robot stood when it was disconnected; what is planned stays."""
+        with self.lock:
+            self._rest = frozen(as_vector(q, self.model.n, "q", "rad"))
+
+    @property
+    def is_goal_of_plan(self) -> bool:
+        """Whether the plan still leads to the goal: nobody has moved it since."""
+        return self.plan is not None and bool(abs(self.plan.motion.goal - self.goal).max() < 1e-6)
+
+    def _look_away(self) -> None:
+        if self.moment is not None:
+            self.moment = None
+            self.tell("moment")
+
+    def _joint(self) -> Plan | Message:
+        made = make_plan(self.model, self.here, self.goal, self.speed, self.law)
+        return replace(made, short=self.reach.short) if isinstance(made, Plan) else made
+
+    def _line(self) -> Plan | Message:
+        try:
+            motion = plan_line(self.model, self.here, self.model.forward(self.goal), speed=self.speed)
+            return picture(self.model, motion, check(motion, self.model, start=self.here, distance=None))
+        except RcilabError as error:
+            return message("plan.failed", error=str(error))
+
+
+_of_session: weakref.WeakValueDictionary[int, LabState] = weakref.WeakValueDictionary()
+"""By the id of a session, which a state keeps alive for as long as it lives itself."""
+
+
+def state_of(subject: object) -> LabState:
+    """Returns what a part looks at.
+
+    Args:
+        subject: A model, a session (all parts of one session share its state), another part, or a state.
+
+    Raises:
+        InvalidValueError: It is none of them.
+    """
+    if isinstance(subject, LabState):
+        return subject
+    if isinstance(subject, RobotSession):
+        shared = _of_session.get(id(subject))
+        if shared is None:
+            shared = _of_session[id(subject)] = LabState(subject.model, subject)
+        return shared
+    shared = getattr(subject, "state", None)
+    return shared if isinstance(shared, LabState) else LabState(require_model(subject))

@@ -1,0 +1,146 @@
+"""Curves as SVG: drawn once by the kernel, laid out by the browser; colours follow the notebook.
+
+Every panel has a cursor over it. They lie where one line of style says, so that moving them costs no new picture.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rcilab.arrays import Array
+from rcilab.notebook.look import esc
+from rcilab.notebook.plot import JOINT_COLORS
+from rcilab.views.plots import Frame
+
+_WIDTH, _HEIGHT = 420.0, 168.0  # Units of a panel; the browser scales it to its place.
+_LEFT, _RIGHT, _TOP, _BOTTOM = 40.0, 6.0, 20.0, 20.0
+_ACROSS, _HIGH = _WIDTH - _LEFT - _RIGHT, _HEIGHT - _TOP - _BOTTOM
+_INK = "var(--jp-ui-font-color1, var(--vscode-editor-foreground, #1d2a3c))"
+_SOFT = "var(--jp-ui-font-color2, var(--vscode-descriptionForeground, #51607a))"
+_LINE = "var(--jp-border-color2, var(--vscode-panel-border, #d5dbe4))"
+_BAD = "#d1392b"
+_BLACK = 6  # The last colour of the palette is black: in a dark notebook it takes the colour of the text.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Panel:
+    """One picture: a signal over time."""
+
+    title: str
+    unit: str
+    frame: Frame
+
+
+def draw(panels: Sequence[Panel], joints: Sequence[int], time: str, limit: str) -> str:
+    """Returns the pictures side by side as the room allows, and the legend.
+
+    Args:
+        panels: All have the same time axis.
+        joints: Which joint each curve is, from 0: its colour and its name in the legend.
+        time: What the time axis is called.
+        limit: What a limit is called.
+    """
+    pictures = "".join(
+        f'<div class="rl-panel">{_picture(panel, joints, time, limit)}<div class="rl-cursor"></div></div>'
+        for panel in panels
+    )
+    names = "".join(
+        f'<span><i style="background:{_color(joint)}"></i>J{joint + 1}</span>' for joint in joints
+    )  # fmt: skip
+    return f'<div class="rl-legend">{names}</div><div class="rl-panels">{pictures}</div>'
+
+
+def share_of(t: float, end: float) -> float:
+    """Returns where a time is across a panel, 0 to 1."""
+    return (_LEFT + _ACROSS * t / end) / _WIDTH
+
+
+def _picture(panel: Panel, joints: Sequence[int], time: str, limit: str) -> str:
+    frame = panel.frame
+    middle, half, bottom, right = _TOP + _HIGH / 2.0, _HIGH / 2.0, _TOP + _HIGH, _WIDTH - _RIGHT
+
+    def y(values: Array | float) -> Array:
+        return middle - half * np.asarray(values) / frame.bound
+
+    x = _LEFT + _ACROSS * frame.t / frame.end
+    out = [
+        f'<svg viewBox="0 0 {_WIDTH:g} {_HEIGHT:g}" role="img" aria-label="{esc(panel.title)}" font-size="10.5">',
+        f'<text x="{_LEFT:g}" y="13" fill="{_INK}" font-weight="600">{esc(panel.title)} '
+        f'<tspan fill="{_SOFT}" font-weight="400">[{esc(panel.unit)}]</tspan></text>',
+    ]
+    for tick in _ticks(-frame.bound, frame.bound, 4):
+        out.append(
+            f'<path d="M{_LEFT:g},{y(tick):.1f}H{right:g}" stroke="{_LINE}" stroke-width=".7"/>'
+            f'<text x="{_LEFT - 4:g}" y="{y(tick) + 3.5:.1f}" text-anchor="end" fill="{_SOFT}">{_number(tick)}</text>'
+        )
+    for tick in _ticks(0.0, frame.end, 6):
+        at = _LEFT + _ACROSS * tick / frame.end
+        side = "end" if at > right - 12.0 else "middle"
+        name = f"{tick:g} {time}" if side == "end" else f"{tick:g}"
+        out.append(f'<text x="{at:.1f}" y="{bottom + 13:g}" text-anchor="{side}" fill="{_SOFT}">{esc(name)}</text>')
+    out.append(_beyond(frame, y, limit))
+    out += [_span(float(x[a]), float(x[b])) for a, b in _spans(frame.violated)]
+    for curve, joint in zip(frame.actual, joints, strict=False):
+        out.append(_curve(x, y(curve), _color(joint), 'stroke-width="4" opacity=".38"'))
+    dash = ' stroke-dasharray="6 3"' if frame.actual else ""
+    for curve, joint in zip(frame.plan, joints, strict=False):
+        out.append(_curve(x, y(curve), _color(joint), f'stroke-width="1.5"{dash}'))
+    frame_line = f'<rect x="{_LEFT:g}" y="{_TOP:g}" width="{_ACROSS:g}" height="{_HIGH:g}" fill="none" '
+    out.append(f'{frame_line}stroke="{_LINE}"/></svg>')
+    return "".join(out)
+
+
+def _beyond(frame: Frame, y: Callable[[float], Array], limit: str) -> str:
+    """Returns grey beyond both limits."""
+    if not math.isfinite(frame.upper):
+        return ""
+    upper, lower = float(y(frame.upper)), float(y(frame.lower))
+    out = ""
+    for a, b in ((_TOP, upper), (lower, _TOP + _HIGH)):
+        size = f'width="{_ACROSS:g}" height="{max(b - a, 0.0):.1f}"'
+        out += f'<rect x="{_LEFT:g}" y="{a:.1f}" {size} fill="{_SOFT}" opacity=".14"/>'
+    for edge in (upper, lower):
+        out += f'<path d="M{_LEFT:g},{edge:.1f}h{_ACROSS:g}" stroke="{_SOFT}" stroke-dasharray="2 3"/>'
+    place = f'x="{_WIDTH - _RIGHT - 4:g}" y="{upper + 11.0:.1f}" text-anchor="end"'
+    return out + f'<text {place} fill="{_SOFT}" font-size="9.5">{esc(limit)}</text>'
+
+
+def _span(left: float, right: float) -> str:
+    return (
+        f'<rect class="rl-violation" x="{left:.1f}" y="{_TOP:g}" width="{max(right - left, 2.0):.1f}" '
+        f'height="{_HIGH:g}" fill="{_BAD}" opacity=".22"/>'
+    )
+
+
+def _spans(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], flags, [False])).astype(np.int8)))
+    return [(int(a), int(b) - 1) for a, b in edges.reshape(-1, 2)]
+
+
+def _curve(x: Array, y: Array, color: str, style: str) -> str:
+    """Returns a line; what leaves the panel runs along its edge."""
+    known = np.isfinite(y)
+    inside = np.clip(y[known], _TOP, _TOP + _HIGH)
+    points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x[known].tolist(), inside.tolist(), strict=True))
+    return f'<polyline points="{points}" fill="none" stroke="{color}" stroke-linejoin="round" {style}/>'
+
+
+def _color(joint: int) -> str:
+    place = joint % len(JOINT_COLORS)
+    return _INK if place == _BLACK else JOINT_COLORS[place]
+
+
+def _ticks(low: float, high: float, count: int) -> list[float]:
+    rough = (high - low) / count
+    power = 10.0 ** math.floor(math.log10(rough))
+    step = next(power * m for m in (1.0, 2.0, 2.5, 5.0, 10.0) if power * m >= rough - 1e-12)
+    return [round(k * step, 9) + 0.0 for k in range(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1)]
+
+
+def _number(value: float) -> str:
+    return f"{value:.0f}" if abs(value) >= 1000.0 else f"{value:g}"

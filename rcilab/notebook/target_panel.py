@@ -1,0 +1,177 @@
+"""Target: the pose of the tool in numbers, the branches that reach it, and the circle of the arm angle."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import ipywidgets
+import numpy as np
+
+from rcilab.errors import KinematicsError
+from rcilab.kinematics.solutions import Solutions
+from rcilab.notebook.arc_circle import draw_circle
+from rcilab.notebook.look import block, head, soft, verdict, write
+from rcilab.notebook.number_field import NumberField
+from rcilab.notebook.part import Part
+from rcilab.posing.reach import margin
+from rcilab.spatial import Pose
+
+_NAMES = ("x", "y", "z", "roll", "pitch", "yaw")
+_FURTHEST = 3000.0  # [mm] A choice: no arm of ours reaches half as far.
+_WHOLE_TURN = 360.0  # [deg]
+
+
+class TargetPanel(Part):
+    """Where the tool shall be. The arm takes the nearest branch; the others, and every elbow, can be chosen.
+
+    Args:
+        subject: A model, a session, or another part to look at the same arm as.
+        language: "en" or "zh".
+    """
+
+    def __init__(self, subject: object, *, language: str = "en") -> None:
+        super().__init__(subject, language)
+        text = self.text
+        self.fields = [
+            NumberField(
+                text, text(f"target.{name}"), "mm" if index < 3 else "deg",
+                *((-_FURTHEST, _FURTHEST) if index < 3 else (-_WHOLE_TURN, _WHOLE_TURN)), self._taker(index),
+            )
+            for index, name in enumerate(_NAMES)
+        ]  # fmt: skip
+        self._reach, self._table, self._circle = block(), block(), block()
+        self.branches = ipywidgets.Dropdown(
+            description=text("target.branch"), tooltip=text("target.branch_hint"),
+            layout=ipywidgets.Layout(width="22em"), style={"description_width": "8em"},
+        )  # fmt: skip
+        self._solutions: Solutions | None = None
+        self.branches.observe(self._on_branch, names="value")
+        pairs = [
+            ipywidgets.VBox(
+                [
+                    ipywidgets.HBox([self.fields[i].row, self.fields[i + 3].row]),
+                    self.fields[i].said,
+                    self.fields[i + 3].said,
+                ]
+            )
+            for i in range(3)
+        ]
+        rows: list[Any] = [block(head(text("target.pose"))), *pairs, self._reach]
+        self.psi: Any = None
+        if self.model.n == 7:
+            rows += self._arm_angle_rows()
+        rows += [block(head(text("target.branches"))), self._table, self.branches]
+        self._writing = False
+        self.build(rows, min_width="360px")
+        self.hear("goal", self._show)
+
+    def _arm_angle_rows(self) -> list[Any]:
+        text = self.text
+        self.psi = ipywidgets.FloatSlider(
+            description="ψ", min=-180.0, max=180.0, step=1.0, readout=False, tooltip=text("target.psi_hint"),
+            layout=ipywidgets.Layout(width="16em"), style={"description_width": "1.5em"},
+        )  # fmt: skip
+        self.psi.observe(self._on_psi, names="value")
+        self._psi_field = NumberField(text, "", "deg", -180.0, 180.0, self._turn)
+        side = ipywidgets.VBox([
+            ipywidgets.HBox([self.psi, self._psi_field.row], layout=ipywidgets.Layout(align_items="center")),
+            self._psi_field.said,
+            block(soft(text("target.psi_hint"))),
+        ])  # fmt: skip
+        row = ipywidgets.HBox(
+            [self._circle, side], layout=ipywidgets.Layout(align_items="center", flex_flow="row wrap")
+        )
+        return [block(head(text("target.psi_title"))), row]
+
+    def _taker(self, index: int) -> Any:
+        def take(value: float) -> None:
+            target = self.state.target
+            position, rpy = np.array(target.position), np.array(target.rpy)
+            if index < 3:
+                position[index] = value / 1000.0
+            else:
+                rpy[index - 3] = math.radians(value)
+            self.state.aim(Pose.from_rpy(position, rpy))
+
+        return take
+
+    def _turn(self, degrees: float) -> None:
+        self.state.aim(self.state.target, psi=math.radians(degrees))
+
+    def _on_psi(self, change: Any) -> None:
+        if not self._writing:
+            self._turn(change["new"])
+
+    def _on_branch(self, change: Any) -> None:
+        solutions = self._solutions
+        if not self._writing and change["new"] is not None and solutions is not None:
+            self.state.aim(self.state.target, near=solutions[change["new"]])
+
+    def _show(self) -> None:
+        state, text = self.state, self.text
+        self._writing = True
+        try:
+            values = (*(1e3 * state.target.position), *np.degrees(state.target.rpy))
+            for field, value in zip(self.fields, values, strict=True):
+                field.show(float(value))
+            tone = state.reach.tone
+            said = verdict(tone, text(f"reach.tone.{tone}"), text.say(state.reach.reason))
+            if state.reach.short is not None:
+                said += soft(text("target.leads_short", short=text.say(state.reach.short)))
+            write(self._reach, said)
+            if self.psi is not None:
+                self._show_arm_angle()
+            self._show_branches()
+        finally:
+            self._writing = False
+
+    def _show_arm_angle(self) -> None:
+        psi = self.state.arm_angle
+        if psi is not None:
+            degrees = math.degrees(psi)
+            if abs(self.psi.value - degrees) > 1e-6:
+                self.psi.value = degrees
+            self._psi_field.show(degrees)
+        try:
+            arcs = self.model.feasible_arcs(self.model.forward(self.state.goal))
+        except KinematicsError as error:
+            write(self._circle, soft(str(error)))
+            return
+        write(self._circle, draw_circle(arcs, psi, self.text))
+
+    def _solve(self) -> Solutions | None:
+        """Returns the branches at the goal, also where it was posed joint by joint; None out of reach."""
+        state = self.state
+        if state.reach.solutions is not None or state.reach.tone == "bad":
+            return state.reach.solutions
+        try:
+            return self.model.inverse(state.target, state.arm_angle, state.goal)
+        except KinematicsError:
+            return None
+
+    def _show_branches(self) -> None:
+        state, text = self.state, self.text
+        solutions = self._solutions = self._solve()
+        if solutions is None or not len(solutions):
+            self.branches.layout.display = "none"
+            code = "target.out_of_reach" if state.reach.tone == "bad" else "target.no_branches"
+            write(self._table, soft(text(code)))
+            return
+        here, rows, chosen = state.here, [], None
+        for number, q in enumerate(solutions):
+            least = margin(self.model, q)
+            away = math.degrees(float(np.abs(q - here).max()))
+            rows.append(
+                text("target.way", number=number + 1, margin=f"{math.degrees(least.angle):.1f}", joint=least.joint,
+                     away=f"{away:.1f}")
+            )  # fmt: skip
+            if float(np.abs(np.angle(np.exp(1j * (q - state.goal)))).max()) < 1e-6:
+                chosen = number
+        options = [(row, number) for number, row in enumerate(rows)]
+        if tuple(options) != self.branches.options:
+            self.branches.options = options
+        self.branches.value = chosen
+        self.branches.layout.display = None
+        others = len(solutions.all) - len(solutions)
+        write(self._table, soft(text("target.forbidden", count=others)) if others else "")

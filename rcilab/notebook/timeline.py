@@ -1,0 +1,119 @@
+"""One moment of the plan, for everything that looks at it: scene and plots move together. No robot moves."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import ipywidgets
+
+from rcilab.notebook.look import block, write
+from rcilab.notebook.part import Part
+
+_INTERVAL = 50  # [ms] between two pictures; more than a software-rendered scene shows.
+_RATES = (1.0, 0.5, 0.25, 0.1)
+
+
+class Timeline(Part):
+    """Play, pause and a slider over the milliseconds of the plan.
+
+    Args:
+        subject: A model, a session, or another part to look at the same arm as.
+        language: "en" or "zh".
+    """
+
+    def __init__(self, subject: object, *, language: str = "en") -> None:
+        super().__init__(subject, language)
+        self.play = ipywidgets.Play(
+            min=0,
+            max=1,
+            interval=_INTERVAL,
+            step=_INTERVAL,
+            show_repeat=False,
+            tooltip=self.text("timeline.play_hint"),
+            layout=ipywidgets.Layout(flex="0 0 auto"),
+        )
+        self.slider = ipywidgets.IntSlider(
+            description=self.text("timeline.moment"),
+            min=0,
+            max=1,
+            readout=False,
+            tooltip=self.text("timeline.scrub_hint"),
+            layout=ipywidgets.Layout(flex="1 1 auto", min_width="160px"),
+        )
+        self.rate = ipywidgets.Dropdown(
+            description=self.text("timeline.rate"),
+            options=[(f"{rate:g} ×", rate) for rate in _RATES],
+            value=1.0,
+            layout=ipywidgets.Layout(width="9.5em"),
+            style={"description_width": "4em"},
+        )
+        self.live = ipywidgets.Button(
+            description=self.text("timeline.live"),
+            tooltip=self.text("timeline.live_hint"),
+            layout=ipywidgets.Layout(width="auto"),
+        )
+        self._clock = block(width="9em")
+        self._link = ipywidgets.jslink((self.play, "value"), (self.slider, "value"))
+        row = ipywidgets.HBox(
+            [self.play, self.slider, self._clock, self.rate, self.live],
+            layout=ipywidgets.Layout(align_items="center", flex_flow="row wrap"),
+        )
+        self.build([row], width="100%")
+        self._writing = False
+        self.slider.observe(self._on_slider, names="value")
+        self.rate.observe(self._on_rate, names="value")
+        self.live.on_click(lambda _: self._look_away())
+        self.hear("plan", self._on_plan)
+        self.hear("moment", self._show)
+
+    @property
+    def moment(self) -> float | None:
+        """Time of the plan that is looked at, [s]; None looks at the arm as it is. Can be set."""
+        return self.state.moment
+
+    @moment.setter
+    def moment(self, moment: float | None) -> None:
+        self.state.look_at(moment)
+
+    def end(self) -> None:
+        """Unties play button and slider."""
+        self._link.close()
+
+    def _on_plan(self) -> None:
+        plan = self.state.plan
+        last = 1 if plan is None else max(round(1000.0 * plan.motion.duration), 1)
+        self._writing = True
+        try:
+            for control in (self.play, self.slider):
+                control.disabled = plan is None
+                control.value = 0
+                control.max = last
+        finally:
+            self._writing = False
+        self._show()
+
+    def _on_rate(self, change: Any) -> None:
+        self.play.step = max(round(_INTERVAL * change["new"]), 1)
+
+    def _on_slider(self, change: Any) -> None:
+        if not self._writing:
+            self.state.look_at(change["new"] / 1000.0)
+
+    def _look_away(self) -> None:
+        self.play.playing = False
+        self.state.look_at(None)
+
+    def _show(self) -> None:
+        plan, moment = self.state.plan, self.state.moment
+        self.live.disabled = moment is None
+        if plan is None:
+            write(self._clock, "")
+            return
+        if moment is not None and self.slider.value != round(1000.0 * moment):
+            self._writing = True
+            try:
+                self.slider.value = round(1000.0 * moment)
+            finally:
+                self._writing = False
+        shown = f"{moment or 0.0:.3f} / {plan.motion.duration:.3f} s"
+        write(self._clock, f'<span class="rl-num rl-soft">{shown}</span>')

@@ -1,0 +1,140 @@
+"""What a page may say to a viser server: finite numbers, in range, of the right kind, of bounded size; nothing else.
+
+viser 1.1 writes whatever a client sends into its handles: NaN, numbers outside a slider's range, choices that are on no
+list, strings and uploads of any size, and even its list of Python callbacks (`updates={"update_cb": []}`). A page of
+ours sends none of that, but a script in its place could. What is not in order is dropped without an answer.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import viser
+
+LARGEST_MESSAGE = 16 * 1024 * 1024  # [bytes] A choice; pictures of the scene that a page renders for Python are less.
+LARGEST_UPLOAD = 8 * 1024 * 1024  # [bytes] A choice: no program or run that we read is as large.
+LONGEST_TEXT = 10_000  # Characters; the longest text we ask for has some dozens.
+
+_UPLOADS = 2  # At a time and page.
+_MOST_PARTS = 256
+_DEEPEST = 8
+
+
+class MessageGuard:
+    """Looks at every message of every page before viser does.
+
+    Args:
+        server: A viser server that nobody has connected to yet.
+    """
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        from viser import _messages
+
+        self._kinds = _messages
+        self._gui: Any = server.gui
+        self._uploads: dict[str, list[int]] = {}  # Transfer -> client, declared and received bytes.
+        sockets: Any = server._websock_server  # Neither this nor what is replaced has a public spelling in viser 1.1.
+        handle = sockets._handle_incoming_message
+
+        async def guarded(client_id: int, message: Any) -> None:
+            if self.admits(client_id, message):
+                await handle(client_id, message)
+
+        sockets._handle_incoming_message = guarded
+        sockets.on_client_disconnect(self._forget)
+
+    def admits(self, client: int, message: Any) -> bool:
+        """Returns whether viser may see a message; a number out of range is moved into it."""
+        kinds = self._kinds
+        if isinstance(message, kinds.FileTransferPart):
+            return self._admits_part(message)
+        if not is_orderly(vars(message)):
+            return False
+        if isinstance(message, kinds.GuiUpdateMessage):
+            return self._admits_update(message)
+        return not isinstance(message, kinds.FileTransferStartUpload) or self._admits_upload(client, message)
+
+    def _admits_update(self, message: Any) -> bool:
+        """Lets a client change the value of a control, and nothing else about it."""
+        handle = self._gui._gui_input_handle_from_uuid.get(message.uuid)
+        if handle is None or set(message.updates) != {"value"}:
+            return False
+        value = _fitting(message.updates["value"], handle._impl)
+        if value is None:
+            return False
+        message.updates = {"value": value}
+        return True
+
+    def _admits_upload(self, client: int, message: Any) -> bool:
+        under_way = sum(owner == client for owner, _, _ in self._uploads.values())
+        is_sound = (
+            0 <= message.size_bytes <= LARGEST_UPLOAD
+            and 0 <= message.part_count <= _MOST_PARTS
+            and message.transfer_uuid not in self._uploads
+            and under_way < _UPLOADS
+        )
+        if is_sound and message.part_count:
+            self._uploads[message.transfer_uuid] = [client, message.size_bytes, 0]
+        return is_sound
+
+    def _admits_part(self, message: Any) -> bool:
+        upload = self._uploads.get(message.transfer_uuid)
+        if upload is None or not isinstance(message.content, bytes):
+            return False
+        upload[2] += len(message.content)
+        if upload[2] > upload[1]:  # More than was announced: viser keeps what has come until the page goes.
+            return False
+        if upload[2] == upload[1]:
+            del self._uploads[message.transfer_uuid]
+        return True
+
+    def _forget(self, connection: Any) -> None:
+        gone = connection.client_id
+        self._uploads = {name: upload for name, upload in self._uploads.items() if upload[0] != gone}
+        self._gui._drop_uploads_from_client(gone)  # viser forgets a client that never said where its camera was.
+
+
+def is_orderly(value: object, depth: int = 0) -> bool:
+    """Returns whether every number in a value, however nested, is finite, and no text endless."""
+    if isinstance(value, float):
+        return math.isfinite(value)
+    if isinstance(value, str):
+        return len(value) <= LONGEST_TEXT
+    if isinstance(value, int):
+        return abs(value) < 2**63
+    if depth > _DEEPEST:
+        return False
+    if isinstance(value, dict):
+        return all(is_orderly(item, depth + 1) for pair in value.items() for item in pair)
+    if isinstance(value, list | tuple):
+        return len(value) <= LONGEST_TEXT and all(is_orderly(item, depth + 1) for item in value)
+    return True
+
+
+def _fitting(value: object, control: Any) -> object | None:
+    """Returns a value as a control of viser may hold it, or None."""
+    held, props = control.value, control.props
+    if isinstance(held, bool):
+        return value if isinstance(value, bool) else None
+    if isinstance(held, int | float):
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            return None
+        low, high = getattr(props, "min", None), getattr(props, "max", None)
+        value = value if low is None else max(value, low)
+        return value if high is None else min(value, high)
+    if isinstance(held, str):
+        options = getattr(props, "options", None)
+        is_known = isinstance(value, str) and (options is None or value in options)
+        return value if is_known else None
+    if isinstance(held, tuple):
+        if not isinstance(value, list | tuple) or len(value) != len(held):
+            return None
+        return value if all(_is_alike(a, b) for a, b in zip(value, held, strict=True)) else None
+    return None
+
+
+def _is_alike(a: object, b: object) -> bool:
+    numbers = int | float
+    return isinstance(a, numbers) if isinstance(b, numbers) else isinstance(a, str) and isinstance(b, str)

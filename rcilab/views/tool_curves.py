@@ -1,0 +1,43 @@
+"""Curves of the tool and the elbow along joint angles: speed, acceleration, arm angle."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from rcilab.arrays import Array, JointPath
+from rcilab.kinematics.closed_form import build_closed_form
+from rcilab.views.plots import Curves, backward_differences
+
+if TYPE_CHECKING:
+    from rcilab.limits import Limits
+    from rcilab.model import RobotModel
+
+ToolQuantity = Literal["speed", "acceleration", "psi"]
+TOOL_QUANTITIES: tuple[ToolQuantity, ...] = ("speed", "acceleration", "psi")
+
+
+def tool_curves(model: RobotModel, t: Array, q: JointPath, quantity: ToolQuantity) -> Curves:
+    """Returns one column: speed of the tool, [m/s], its acceleration, [m/s^2], or the arm angle, [rad].
+
+    The first two as the controller computes them: the lengths of backward differences of the tool's places.
+
+    Args:
+        model: The arm with its tool.
+        t: [s], shape (N,).
+        q: Joint angles, shape (N, n), [rad].
+        quantity: Which; only 7-axis arms have an arm angle.
+    """
+    if quantity == "psi":
+        values = build_closed_form(model.description).arm_angle_path(q)
+        return Curves(t=t, values=np.asarray(values)[:, np.newaxis])
+    places = model.position_path(q)
+    rates = backward_differences(t, places, 1 if quantity == "speed" else 2)
+    return Curves(t=t, values=np.sqrt((rates * rates).sum(axis=1))[:, np.newaxis])
+
+
+def tool_limit(limits: Limits, quantity: ToolQuantity) -> float | None:
+    """Returns the largest value that is allowed, in SI units; None where there is no bound."""
+    tool = limits.cartesian
+    return {"speed": tool.translation_velocity, "acceleration": tool.translation_acceleration, "psi": None}[quantity]

@@ -1,0 +1,64 @@
+"""Words of a face of the program: one catalogue a language, found by key, filled with values."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+from types import MappingProxyType
+
+from rcilab.language import Language, load_words, require_language
+
+SHARED = "rcilab.words"
+"""Whose catalogue every face has."""
+
+
+@dataclass(frozen=True)
+class Message:
+    """Something to say, before it is known in which language."""
+
+    code: str
+    """Key in the catalogues."""
+    values: Mapping[str, object] = field(default_factory=dict)
+    """What the sentence is filled with."""
+
+
+def message(code: str, **values: object) -> Message:
+    """Returns a message by its key and the values that fill it."""
+    return Message(code, MappingProxyType(values))
+
+
+class Text:
+    """The catalogue of one language, called with a key.
+
+    Args:
+        language: "en" or "zh".
+        package: Whose own words there are beside the shared ones, such as rcilab.workbench.
+
+    Raises:
+        InvalidValueError: There is no catalogue for this language.
+    """
+
+    def __init__(self, language: str, package: str) -> None:
+        self.language: Language = require_language(language)
+        self._entries = load_face(package, self.language)
+
+    def __call__(self, code: str, **values: object) -> str:
+        """Returns the words for a key; the key itself when the catalogue lacks it (a test keeps it complete)."""
+        entry = self._entries.get(code)
+        return code if entry is None else entry.format(**values) if values else entry
+
+    def has(self, code: str) -> bool:
+        """Returns whether the catalogue knows a key."""
+        return code in self._entries
+
+    def say(self, said: Message) -> str:
+        """Returns a message in this language; messages among its values are translated first."""
+        values = {k: self.say(v) if isinstance(v, Message) else v for k, v in said.values.items()}
+        return self(said.code, **values)
+
+
+@lru_cache
+def load_face(package: str, language: Language) -> Mapping[str, str]:
+    """Returns all entries of one language that a face of the program has: the shared ones and its own."""
+    return MappingProxyType({**load_words(SHARED, language), **load_words(package, language)})

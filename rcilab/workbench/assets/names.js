@@ -1,0 +1,49 @@
+// Names for controls that viser leaves without one: its sliders say aria-label="" and the labels of its text boxes point
+// nowhere. A name is the label of the row, with the heading above where there is one; a box without a label is that of
+// the control before it. Folders open with a mouse only: they become buttons. All of it again whenever viser redraws.
+(() => {
+  "use strict";
+  const PAUSE = 200;  // [ms] A choice: between two looks, whatever changes meanwhile.
+  const labelOf = (box) => {
+    const label = box && box.querySelector("label");
+    return label ? label.textContent.trim() : "";
+  };
+  const lineOf = (control) => {
+    let box = control.closest(".mantine-Flex-root");
+    while (box && box.parentElement && box.parentElement.children.length < 2) box = box.parentElement;
+    return box;
+  };
+  const headingOf = (line) => {
+    for (let box = line && line.previousElementSibling; box; box = box.previousElementSibling) {
+      const heading = box.querySelector(".rl-rowname");
+      if (heading) return heading.textContent.trim();
+    }
+    return "";
+  };
+  const nameOf = (control) => {
+    const line = lineOf(control);
+    let name = labelOf(control.closest(".mantine-Flex-root"));
+    for (let box = line; box && !name; box = box.previousElementSibling) name = labelOf(box);
+    const heading = headingOf(line);
+    return heading && name ? `${heading}: ${name}` : name;
+  };
+  const hasName = (control) => {
+    const labelled = (control.getAttribute("aria-labelledby") || "").split(/\s+/).some((id) => id && document.getElementById(id));
+    return labelled || (control.labels && control.labels.length > 0 && [...control.labels].some((label) => label.textContent.trim()));
+  };
+  const sweep = () => {
+    document.querySelectorAll('#root [role="slider"], #root input:not([type="hidden"]):not([type="file"]), #root textarea').forEach((control) => {
+      if (control.dataset.rlName === undefined && (hasName(control) || control.getAttribute("aria-label"))) return;
+      const name = nameOf(control);
+      if (name && control.getAttribute("aria-label") !== name) control.setAttribute("aria-label", name);
+      if (name) control.dataset.rlName = "";
+    });
+  };
+  let timer = 0;
+  const later = () => { if (!timer) timer = setTimeout(() => { timer = 0; sweep(); }, PAUSE); };
+  const watch = () => {
+    new MutationObserver(later).observe(document.body, { childList: true, subtree: true, characterData: true, attributes: true, attributeFilter: ["aria-label"] });
+    later();
+  };
+  if (document.body) watch(); else document.addEventListener("DOMContentLoaded", watch);
+})();

@@ -1,0 +1,165 @@
+"""Slow-downs and explanations are worked out beside the conductor's thread: each judges a motion several times."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from rcilab.errors import RcilabError
+from rcilab.posing.planning import Plan, make_plan, picture
+from rcilab.workbench.program.draft import Draft
+
+if TYPE_CHECKING:
+    from rcilab.conformance import SlowDown
+    from rcilab.posing.planning import PlannableLaw
+
+_TRIES = 2
+_FURTHER = 0.9
+"""By how much slower the next try is, where the speed that the factor asks for is not slow enough. Choices."""
+_FOUND = 0.5  # Part of the work when the factor is known; about what was seen.
+SLOWEST = 0.01
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Slower:
+    """What a slow-down came to."""
+
+    found: SlowDown
+    plan: Plan | None = None
+    """The slowed plan; None when none passes."""
+    scale: float = 1.0
+    """Of the speed, or of every speed of the program."""
+    draft: Draft | None = None
+    """The slowed program."""
+    is_stretched: bool = False
+    """Whether the same curve runs slower as a whole, because no speed is slow enough: speed does not bound the jerk."""
+
+
+class CheckWork:
+    """One job at a time. Owned by the conductor's thread, which asks for the result at every tick."""
+
+    def __init__(self) -> None:
+        self._job: _Job | None = None
+
+    @property
+    def progress(self) -> float | None:
+        """How much is done, 0 to 1; None where nothing is being worked out."""
+        return None if self._job is None else self._job.progress
+
+    @property
+    def is_done(self) -> bool:
+        """Whether there is something to take."""
+        return self._job is not None and self._job.done.is_set()
+
+    def start(self, about: Any, run: Callable[[Callable[[float], None]], Any]) -> None:
+        """Begins; what was being worked out is dropped.
+
+        Args:
+            about: What it is about; comes back with the result.
+            run: Does it; it is given what takes how much is done, and ends it where nobody wants it any more.
+        """
+        self.cancel()
+        job = self._job = _Job(about, run)
+        threading.Thread(target=job.run, name="check", daemon=True).start()
+
+    def cancel(self) -> None:
+        """Drops what is being worked out, at once; its thread ends when it comes to know."""
+        if self._job is not None:
+            self._job.unwanted.set()
+        self._job = None
+
+    def take(self) -> tuple[Any, Any]:
+        """Returns what it was about and what came of it, once it is done; a failure of ours is raised."""
+        job, self._job = self._job, None
+        assert job is not None
+        if isinstance(job.result, Exception) and not isinstance(job.result, RcilabError):
+            raise job.result
+        return job.about, job.result
+
+
+class _Cancelled(Exception):
+    """Nobody wants the result any more."""
+
+
+class _Job:
+    """One job in its thread."""
+
+    def __init__(self, about: Any, run: Callable[[Callable[[float], None]], Any]) -> None:
+        self.about, self._run = about, run
+        self.progress = 0.0
+        self.unwanted, self.done = threading.Event(), threading.Event()
+        self.result: Any = None
+
+    def run(self) -> None:
+        try:
+            self.result = self._run(self._tell)
+        except Exception as error:
+            self.result = error
+        self.done.set()
+
+    def _tell(self, share: float) -> None:
+        if self.unwanted.is_set():
+            raise _Cancelled
+        self.progress = share
+
+
+def slow_to_goal(plan: Plan, speed: float, law: PlannableLaw, tell: Callable[[float], None]) -> Slower:
+    """Returns the plan to the same goal at the largest speed that passes, planned anew."""
+
+    def make(scale: float) -> Plan | None:
+        made = make_plan(plan.model, plan.motion.start, plan.motion.goal, scale * speed, law, plan.box)
+        return replace(made, short=plan.short).completed() if isinstance(made, Plan) else None
+
+    return _slower(plan, make, SLOWEST / speed, tell)
+
+
+def slow_program(plan: Plan, draft: Draft, rounds: int, tell: Callable[[float], None]) -> Slower:
+    """Returns the plan of the same program with every speed scaled by the largest factor that passes."""
+    from rcilab.conformance import check
+    from rcilab.motion import plan_program
+
+    drafts: dict[float, Draft] = {}
+
+    def make(scale: float) -> Plan | None:
+        drafts[scale] = slower = scaled(draft, scale)
+        program = slower.program(plan.model)
+        assert program is not None
+        motion = plan_program(plan.model, program, start=plan.motion.start, rounds=rounds)
+        report = check(motion, plan.model, start=plan.motion.start, box=plan.box, distance=None)
+        return replace(picture(plan.model, motion, report, plan.box), program=program).completed()
+
+    slowest = min((step.waypoint.speed for step in draft.steps), default=1.0)
+    result = _slower(plan, make, SLOWEST / slowest, tell)
+    return result if result.is_stretched else replace(result, draft=drafts.get(result.scale))
+
+
+def scaled(draft: Draft, scale: float) -> Draft:
+    """Returns a program with every speed scaled."""
+    steps = tuple(
+        replace(step, waypoint=replace(step.waypoint, speed=scale * step.waypoint.speed)) for step in draft.steps
+    )
+    return replace(draft, steps=steps)
+
+
+def _slower(plan: Plan, make: Callable[[float], Plan | None], least: float, tell: Callable[[float], None]) -> Slower:
+    tell(0.05)
+    recommended = plan.report.ok
+    found = plan.completed().report.slow_down(recommended=recommended)
+    tell(_FOUND)
+    if found.factor is None or found.factor <= 1.0:
+        return Slower(found=found)
+    wanted = {row.id for row in found.report.rows if row.ok} if found.report is not None else set[str]()
+    scale = 1.0 / found.factor
+    for attempt in range(_TRIES):
+        made = make(scale) if scale >= least else None
+        tell(_FOUND + (1.0 - _FOUND) * (attempt + 1) / _TRIES)
+        if made is not None and made.report.ok and all(row.ok for row in made.report.rows if row.id in wanted):
+            return Slower(found=found, plan=made, scale=scale)
+        scale *= _FURTHER
+    assert found.motion is not None
+    assert found.report is not None
+    whole = picture(plan.model, found.motion, found.report, plan.box)
+    whole = replace(whole, short=plan.short, program=plan.program, complete=True)
+    return Slower(found=found, plan=whole, scale=1.0 / found.factor, is_stretched=True)

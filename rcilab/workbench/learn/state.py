@@ -1,0 +1,85 @@
+"""The Learn tab as a value: the fault on show, the one being provoked, the lesson and how far it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rcilab.faults import Fault
+from rcilab.gallery import Exhibit
+from rcilab.posing.planning import Plan, picture
+from rcilab.workbench.text import Message
+
+if TYPE_CHECKING:
+    from rcilab.motion import Motion
+    from rcilab.workbench.store import Recording, UiState
+
+MOMENT = 0.9999
+"""Where the timeline stands at the fault: at the end, as far as a translucent arm is drawn."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Show:
+    """A fault on show, as timeline and scene draw it."""
+
+    exhibit: Exhibit
+    plan: Plan
+    """What was commanded, the wrong command too. It is never one to execute."""
+    scene: Plan
+    """Where the arm is to be seen."""
+    recording: Recording
+    """What the arm did."""
+    beside: object
+    """The motion that was planned on the page when it opened; another one closes the show."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class LessonState:
+    """How far somebody is in a lesson."""
+
+    name: str
+    step: int = 0
+    """From 0; the number of steps when it is over."""
+    skipped: frozenset[int] = frozenset()
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class LearnState:
+    """Everything of the Learn tab."""
+
+    provoking: Fault | None = None
+    progress: float = 0.0
+    """Of what is being provoked, 0 to 1."""
+    show: Show | None = None
+    is_script_shown: bool = False
+    problem: Message | None = None
+    """Why the last one did not come."""
+    lesson: LessonState | None = None
+
+
+def make_show(exhibit: Exhibit, beside: object) -> Show:
+    """Returns a fault as timeline and scene draw it."""
+    from rcilab.conformance import check
+    from rcilab.workbench.store import Recording
+
+    def draw(motion: Motion) -> Plan:
+        return picture(exhibit.model, motion, check(motion, exhibit.model, distance=None))
+
+    rows = exhibit.cycles
+    return Show(
+        exhibit=exhibit,
+        plan=draw(exhibit.commanded),
+        scene=draw(exhibit.moved),
+        recording=Recording(t=np.array(rows["t"]), q=rows["q"], q_c=rows["q_c"], dq=rows["dq"], delay=0),
+        beside=beside,
+    )
+
+
+def exhibited(state: UiState, *, scene: bool = False) -> UiState:
+    """Returns what timeline, or scene, are to draw: the fault on show, if there is one, in place of the plan."""
+    show = state.learn.show
+    if show is None:
+        return state
+    return replace(state, plan=show.scene if scene else show.plan, recording=show.recording)

@@ -1,0 +1,82 @@
+"""The rows of the pre-flight report as HTML: condition, necessity, worst value, bound, unit, source, joint, time."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, cast
+
+from rcilab.conformance.explain import explain_place
+from rcilab.language import Language
+from rcilab.workbench.text import Text
+from rcilab.workbench.widgets import esc
+
+if TYPE_CHECKING:
+    from rcilab.conformance import ConditionResult, Report
+    from rcilab.model import RobotModel
+
+TIGHT = 0.95  # A choice: from this share of a bound on, a row is amber.
+_MANY = 10.0  # A choice: from here on a share of the bound is told as a factor.
+_ORDER = {"bad": 0, "warn": 1, "good": 2}
+_SIGNS = {"good": "✓", "warn": "▲", "bad": "◆"}
+_AMBER = {True: "check.exceeded", False: "check.tight"}
+
+
+def rows_html(report: Report, model: RobotModel, chosen: str, text: Text) -> str:
+    """Returns every row, what is broken or near first; each leads to its moment when it is clicked."""
+    rows = sorted(report.rows, key=lambda row: _ORDER[row_tone(row)])
+    return f'<div class="rl-cards rl-pick">{"".join(row_html(row, model, chosen, text) for row in rows)}</div>'
+
+
+def row_html(row: ConditionResult, model: RobotModel, chosen: str, text: Text) -> str:
+    """Returns one row."""
+    condition, tone = row.condition, row_tone(row)
+    word = text("check.kept" if tone == "good" else "check.broken" if tone == "bad" else _AMBER[not row.ok])
+    facts = [f"{number(row.value)} / {number(row.bound)} {pretty_unit(condition.unit)}"]
+    if row.links is not None:
+        facts.append(explain_place(row, cast(Language, text.language)))
+    elif row.joint:
+        facts.append(text("check.joint", joint=row.joint))
+    facts.append(f"t = {row.time:.3f} s")
+    if condition.signal == "torque":
+        facts.append(load_words(model, text))
+    name, fault = text(f"condition.{condition.id}"), ""
+    if condition.fault is not None:
+        fault = f"<br>{esc(text('check.raises', fault=condition.fault.manual_name))}"
+    current = ' aria-current="true"' if condition.id == chosen else ""
+    return (
+        f'<div class="rl-card rl-{tone}" role="button" tabindex="0" data-say="{esc(condition.id)}"{current} '
+        f'title="{esc(text("check.row_hint"))}">'
+        f'<div class="rl-line"><i class="rl-sign">{_SIGNS[tone]}</i><b>{esc(name)}</b>'
+        f'<span class="rl-word">{esc(word)}</span><span class="rl-share">{_share(row.ratio)}</span></div>'
+        f'<div class="rl-meter"><i style="width:{min(100.0, 100.0 * row.ratio):.1f}%"></i></div>'
+        f'<div class="rl-facts"><span class="rl-badge">{esc(text("necessity." + condition.necessity))}</span> '
+        f"{esc(' · '.join(facts))}</div>"
+        f'<div class="rl-source">{esc(condition.formula)} — {esc(condition.source)}{fault}</div></div>'
+    )
+
+
+def _share(ratio: float) -> str:
+    return f"{100.0 * ratio:.1f} %" if ratio < _MANY else f"{ratio:.0f} ×"
+
+
+def row_tone(row: ConditionResult) -> str:
+    """Returns good, warn (near a bound, or a recommendation that is not met) or bad."""
+    if not row.ok:
+        return "bad" if row.condition.necessity == "necessary" else "warn"
+    return "warn" if row.ratio > TIGHT and row.condition.stage == "throughout" else "good"
+
+
+def load_words(model: RobotModel, text: Text) -> str:
+    """Returns which load the torques of a row were computed with."""
+    mass = model.load.mass
+    return text("check.load", mass=f"{mass:g}") if mass > 0.0 else text("check.no_load")
+
+
+def pretty_unit(unit: str) -> str:
+    """Returns a unit with raised digits."""
+    return unit.replace("^2", "²").replace("^3", "³")
+
+
+def number(value: float) -> str:
+    """Returns a number with four digits, without an exponent where it can be read without."""
+    size = abs(value)
+    return f"{value:.0f}" if size >= 1000.0 else f"{value:.4g}" if size >= 1e-3 or size == 0.0 else f"{value:.1e}"

@@ -1,0 +1,175 @@
+"""Learn: one provoked fault at its moment: the curve that broke its bound, cause, remedy, the way out, the script."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from rcilab.language import Language
+from rcilab.workbench import requests
+from rcilab.workbench.panels.check_rows import number, pretty_unit
+from rcilab.workbench.text import Text
+from rcilab.workbench.widgets import Ask, Html, esc, on_press
+
+if TYPE_CHECKING:
+    from rcilab.gallery import Exhibit
+    from rcilab.supervisor import SupervisorStatus
+    from rcilab.workbench.store import UiState
+
+_HEIGHT = 150  # [px]
+_AROUND = 0.06  # Part of the recorded time that the plot goes on behind the fault, so that its mark is whole.
+
+
+class LearnExhibitPanel:
+    """What the gallery shows of a fault; not there while nothing is on show."""
+
+    def __init__(self, text: Text, ask: Ask) -> None:
+        self._text, self._ask = text, ask
+        self._drawn: tuple[object, ...] = ()
+
+    def build(self, gui: Any, state: UiState) -> None:
+        """Adds controls and an empty plot."""
+        text, ask = self._text, self._ask
+        self._back = gui.add_button(text("learn.close"), icon="arrow-left", color="gray", visible=False)
+        on_press(self._back, ask, lambda page: requests.Learn(page=page, what="close"))
+        self._head = Html(gui)
+        data, series, bands = _contents(np.array([0.0, 1.0]), np.zeros(2), -1.0, 1.0)
+        self._plot = gui.add_uplot(
+            data, series, bands=bands, height=_HEIGHT, legend={"show": False}, visible=False,
+            scales={"x": {"time": False, "range": (0.0, 1.0)}, "y": {"range": (-1.2, 1.2)}},
+            cursor={"drag": {"x": False, "y": False}}, padding=(6, 12, 0, 0), axes=_axes(),
+        )  # fmt: skip
+        self._body = Html(gui)
+        self._moment = gui.add_button(
+            text("learn.moment"),
+            icon="player-skip-forward",
+            color="gray",
+            hint=text("learn.moment_hint"),
+            visible=False,
+        )
+        on_press(self._moment, ask, lambda page: requests.Learn(page=page, what="moment"))
+        self._python = gui.add_button(text("learn.script"), icon="brand-python", color="gray", visible=False)
+        on_press(self._python, ask, lambda page: requests.Learn(page=page, what="script"))
+        self._script = Html(gui)
+
+    def show(self, state: UiState, status: SupervisorStatus) -> None:
+        """Draws the fault on show."""
+        learn, text = state.learn, self._text
+        exhibit = None if learn.show is None or learn.provoking is not None else learn.show.exhibit
+        wanted = (exhibit, learn.is_script_shown)
+        if wanted == self._drawn:
+            return
+        self._drawn = wanted
+        for part in (self._back, self._plot, self._moment, self._python):
+            part.visible = exhibit is not None
+        if exhibit is None:
+            for part in (self._head, self._body, self._script):
+                part.show("")
+            return
+        self._head.show(head_html(exhibit, text))
+        self._draw(exhibit)
+        self._body.show(body_html(exhibit, text))
+        code = f"<pre>{esc(exhibit.script)}</pre>"
+        copy = f'<button type="button" data-rl-copy data-done="{esc(text("program.copied"))}">'
+        copy += f"{esc(text('program.copy'))}</button>"
+        self._script.show(f'<div class="rl-code">{copy}{code}</div>' if learn.is_script_shown else "")
+
+    def _draw(self, exhibit: Exhibit) -> None:
+        signal, t = exhibit.signal, np.array(exhibit.cycles["t"])
+        data, series, bands = _contents(t, signal.values, signal.lower, signal.upper)
+        low, high = float(np.nanmin(data[1:])), float(np.nanmax(data[1:]))
+        margin = 0.12 * (high - low or 1.0)
+        self._plot.data = data
+        self._plot.series = series
+        self._plot.scales = {
+            "x": {"time": False, "range": (0.0, float(t[-1]) * (1.0 + _AROUND))},
+            "y": {"range": (low - margin, high + margin)},
+        }
+        del bands
+
+
+def head_html(exhibit: Exhibit, text: Text) -> str:
+    """Returns which fault it is, what was done, and what broke which bound."""
+    language, row = cast(Language, text.language), exhibit.condition
+    others = [fault.manual_name for fault in exhibit.reported if fault is not exhibit.fault]
+    also = f" {text('learn.also', faults=', '.join(others))}" if others else ""
+    unit = pretty_unit(row.unit)
+    facts = text(
+        "learn.number", value=number(exhibit.value), bound=number(exhibit.bound), unit=unit,
+        time=f"{exhibit.time:.3f}", sample=exhibit.sample,
+    )  # fmt: skip
+    place = text("check.joint", joint=exhibit.signal.axis) + " · " if exhibit.signal.axis else ""
+    return (
+        f'<p class="rl-verdict rl-bad rl-big"><b>◆ {_breakable(exhibit.fault.manual_name)}</b> '
+        f"{esc(text('learn.reported', number=exhibit.fault.value))}{esc(also)}</p>"
+        f'<p class="rl-note"><b>{esc(text("learn.done"))}</b> {esc(exhibit.told("sent", language))}</p>'
+        f'<div class="rl-plot-title">{esc(text(f"condition.{row.id}"))} [{esc(unit or "1")}]</div>'
+        f'<p class="rl-note rl-under">{esc(place)}{esc(facts)}</p>'
+    )
+
+
+def _breakable(name: str) -> str:
+    """Returns a name that may be broken before every word in it."""
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", "<wbr>", esc(name))
+
+
+def body_html(exhibit: Exhibit, text: Text) -> str:
+    """Returns legend, cause, remedy, condition and the way out."""
+    language, row = cast(Language, text.language), exhibit.condition
+    steps = "".join(f"<li>{esc(step)}</li>" for step in exhibit.tell_way_out(language))
+    executed = f'<span class="rl-dim">{esc(text("learn.executed"))}</span>'
+    legend = "".join(
+        f'<span class="rl-sign-{sign}">{esc(text(f"learn.legend.{sign}"))}</span>' for sign in ("limit", "fault")
+    )
+    rows = (
+        ("learn.cause", esc(exhibit.told("cause", language))),
+        ("learn.remedy", esc(exhibit.told("remedy", language))),
+        ("learn.condition", f"{esc(row.formula)}<br><span class='rl-dim'>{esc(row.source)}</span>"),
+        ("learn.manual", esc(text("learn.section", section=exhibit.section, number=exhibit.fault.value))),
+        (
+            "learn.way_out",
+            f'<ol class="rl-steps-out">{steps}</ol>{executed}',
+        ),
+        ("learn.said", f"<code>{esc(exhibit.said)}</code>"),
+    )
+    table = "".join(f"<tr><th>{esc(text(key))}</th><td>{cell}</td></tr>" for key, cell in rows)
+    return f'<div class="rl-legend">{legend}</div><table class="rl-table rl-facts-table rl-exhibit">{table}</table>'
+
+
+def _contents(t: Any, values: Any, lower: float, upper: float) -> tuple[Any, Any, Any]:
+    """Returns data, series and bands: bounds, what is beyond them, the curve, the sample with the fault."""
+    seen = np.where(np.isfinite(values), values, np.nan)
+    least = float(np.nanmin(seen))
+    floor = lower if math.isfinite(lower) and least < 0.0 else math.nan
+    top = 1.25 * max(abs(upper), float(np.nanmax(np.abs(seen))), 1e-9)
+
+    def level(value: float) -> Any:
+        return np.full(len(t), value)
+
+    mark = np.full(len(t), np.nan)
+    mark[-1] = seen[-1]
+    hidden: Any = {"width": 0, "points": {"show": False}}
+    edge: Any = {"stroke": "#d1392b", "width": 1.2, "dash": (5, 4), "points": {"show": False}}
+    curve: Any = {"stroke": "#0b6fc2", "width": 2, "points": {"show": False}}
+    fault: Any = {"stroke": "#d1392b", "width": 0, "points": {"show": True, "size": 11, "fill": "#d1392b"}}
+    data = (
+        t,
+        level(top if upper >= 0.0 else 0.0),
+        level(upper),
+        level(floor),
+        level(-top if floor < 0 else math.nan),
+        seen,
+        mark,
+    )
+    series = ({}, hidden, edge, edge, hidden, curve, fault)
+    tint = "rgba(209,57,43,0.10)"
+    return data, series, ({"series": (1, 2), "fill": tint}, {"series": (3, 4), "fill": tint})
+
+
+def _axes() -> tuple[Any, ...]:
+    font = "11px system-ui, sans-serif"
+    x: Any = {"font": font, "size": 22, "gap": 2, "ticks": {"size": 3}}
+    return x, {"font": font, "size": 52, "gap": 3, "space": 26, "ticks": {"size": 3}}

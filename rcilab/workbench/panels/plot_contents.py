@@ -1,0 +1,97 @@
+"""What one plot is made of, in uPlot's words: data, looks of the curves, bands of limits and violations, axes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rcilab.workbench.text import Text
+from rcilab.workbench.widgets import esc
+
+if TYPE_CHECKING:
+    from rcilab.views.plots import Frame
+    from rcilab.workbench.store import Theme
+
+COLORS = ("#0b6fc2", "#e07b00", "#1a9850", "#c2357a", "#7b52c7", "#8a6d3b", "#008b9a")
+"""One colour a joint, told apart on white by people with common colour blindness; the number stands in the legend."""
+_DARK_COLORS = ("#5aaef2", "#ffab40", "#5fd38d", "#ff7eb6", "#b79bff", "#d9bd82", "#3fd0e0")
+_BROKEN = 4  # Joints from here on, from 0, are drawn with gaps: seven colours are too many for some eyes.
+_GAPS = (9, 3)
+_INK = {"light": "#111827", "dark": "#f3f6fa"}
+_AXIS = {"light": ("#51607a", "#e6ebf2"), "dark": ("#a9b6c8", "#3a4452")}
+_EDGE = {"light": "#d1392b", "dark": "#ff7b70"}
+
+
+def joint_color(joint: int, theme: Theme) -> str:
+    """Returns the colour of a joint, from 0."""
+    colors = COLORS if theme == "light" else _DARK_COLORS
+    return colors[joint % len(colors)]
+
+
+def plot_contents(
+    frame: Frame, joint: int, n: int, theme: Theme = "light", *, is_tool: bool = False
+) -> tuple[tuple[np.ndarray, ...], tuple[Any, ...], tuple[Any, ...]]:
+    """Returns data, series and bands of one plot: limits as tinted bands, violations as columns, then curves.
+
+    The number of series never changes, whatever is shown: viser sends data and series one after the other, and uPlot
+    fails when they do not fit each other in between. Unused curves hold NaN.
+
+    Args:
+        frame: What to show.
+        joint: The joint it belongs to, from 1; 0 for all.
+        n: Number of joints.
+        theme: Of the page.
+        is_tool: Whether the one curve is no joint's.
+    """
+    t, nothing = frame.t, np.full(len(frame.t), np.nan)
+
+    def level(value: float) -> np.ndarray:
+        return np.full(len(t), value)
+
+    hidden: Any = {"width": 0, "points": {"show": False}}
+    edge: Any = {"stroke": _EDGE[theme], "width": 1, "dash": (5, 4), "points": {"show": False}}
+    data = [
+        t,
+        level(frame.bound),
+        level(frame.upper),
+        level(frame.lower),
+        level(-frame.bound),
+        np.where(frame.violated, frame.bound, -frame.bound),
+    ]
+    series: list[Any] = [{}, hidden, edge, edge, hidden, hidden]
+    pale, strong = "rgba(209,57,43,0.10)", "rgba(209,57,43,0.40)"
+    bands = tuple({"series": pair, "fill": fill} for pair, fill in (((1, 2), pale), ((3, 4), pale), ((5, 4), strong)))
+    for curves, is_actual in ((frame.plan, False), (frame.actual, True)):
+        for index in range(n):
+            shown = joint - 1 if joint else index
+            plain = is_tool or (joint and is_actual)
+            look: Any = {"width": 2, "dash": (2, 5)} if is_actual else {"width": 1.5}
+            if not is_actual and not is_tool and shown >= _BROKEN:
+                look = {"width": 1.5, "dash": _GAPS}
+            data.append(curves[index] if index < len(curves) else nothing)
+            color = _INK[theme] if plain else joint_color(shown, theme)
+            series.append({"stroke": color, "points": {"show": False}, "pxAlign": 0, **look})
+    return tuple(data), tuple(series), bands
+
+
+def plot_axes(theme: Theme, *, last: bool, space: int) -> tuple[Any, ...]:
+    """Returns the axes of a plot; only the last one of a column says the time."""
+    ink, grid = _AXIS[theme]
+    look = {"font": "11px system-ui, sans-serif", "stroke": ink, "grid": {"stroke": grid, "width": 1}}
+    ticks = {"size": 3, "stroke": grid, "width": 1}
+    x: Any = {**look, "size": 22, "gap": 2, "ticks": ticks} if last else {"show": False}
+    return x, {**look, "size": 46, "gap": 3, "space": space, "ticks": ticks}
+
+
+def legend_html(joint: int, n: int, text: Text, theme: Theme, *, has_actual: bool) -> str:
+    """Returns which colour and dash is which joint, and what dots, dashes and areas mean."""
+    joints = [joint - 1] if joint else range(n)
+    swatches = "".join(
+        f'<span><i class="rl-swatch{" rl-broken" if i >= _BROKEN else ""}" style="color:{joint_color(i, theme)}"></i>'
+        f"J{i + 1}</span>"
+        for i in joints
+    )
+    signs = ("actual", "limit", "violation") if has_actual else ("limit", "violation")
+    rest = "".join(f'<span class="rl-sign-{sign}">{esc(text("legend." + sign))}</span>' for sign in signs)
+    return f'<div class="rl-legend">{swatches}{rest}</div>'

@@ -1,0 +1,188 @@
+"""The plots of the timeline: those that were chosen, one below the other on one time axis, with one cursor."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING, Any, cast
+
+from rcilab.clock import CYCLE_TIME
+from rcilab.views.plots import (
+    Curves,
+    Frame,
+    Quantity,
+    build_error_frame,
+    build_frame,
+    build_tool_frame,
+    last_time,
+    plan_curves,
+    recorded_curves,
+)
+from rcilab.views.tool_curves import TOOL_QUANTITIES, ToolQuantity, tool_curves, tool_limit
+from rcilab.workbench.panels.plot_contents import legend_html, plot_axes, plot_contents
+from rcilab.workbench.text import Text
+from rcilab.workbench.view_actions import PLOTS, has_plot
+from rcilab.workbench.widgets import Html, esc
+
+if TYPE_CHECKING:
+    from rcilab.workbench.store import Recording, UiState
+
+_REDRAW_TIME = 0.25  # [s] A choice: plots are redrawn at most so often while something is dragged or moves.
+_LEISURE = 8.0  # A choice: and take at most an eighth of the time, however long the motion is.
+_SI = {
+    "q": "rad", "dq": "rad/s", "ddq": "rad/s^2", "jerk": "rad/s^3", "tau": "N m", "speed": "m/s",
+    "acceleration": "m/s^2", "psi": "rad", "error": "rad", "tool": "m",
+}  # fmt: skip
+_ERRORS = ("error", "tool")
+"""There once a motion has been executed."""
+_OTHER_HEIGHT = 46 + 62 + 170 + 30  # [px] Bar, window head, strip and choices, legend.
+_TITLE, _TIMES = 20, 26  # [px] A plot's title, and the times below the last one.
+
+
+class Plots:
+    """Owned by the timeline panel."""
+
+    def __init__(self, text: Text) -> None:
+        self._text = text
+        self._drawn: tuple[object, ...] = ()
+        self._next = 0.0
+        self._visible: tuple[str, ...] = ()
+        self._planned: dict[str, Curves] = {}
+        self._plan: object = None
+        self.end = 1.0
+        """Where the time axis ends, [s]."""
+
+    def build(self, gui: Any, state: UiState) -> None:
+        """Adds a plot of every kind; those that were not chosen stay hidden."""
+        self._plots: dict[str, Any] = {}
+        self._titles: dict[str, Html] = {}
+        empty = build_frame(None, None, state.model.limits.joint, "q", 0)
+        data, series, bands = plot_contents(empty, 0, state.model.n, state.theme)
+        self._visible = _wanted(state)
+        for name in PLOTS:
+            self._titles[name] = Html(gui)
+            self._plots[name] = gui.add_uplot(
+                data,
+                series,
+                bands=bands,
+                height=_height(state, len(self._visible)),
+                legend={"show": False},
+                scales={"x": {"time": False, "range": (0.0, 1.0)}, "y": {"range": (-112.0, 112.0)}},
+                cursor={"drag": {"x": False, "y": False}, "sync": {"key": "rcilab"}},
+                padding=(6, 12, 6, 0),  # Below: half of a tick's number that stands at the very end of the axis.
+                axes=_axes(name, state, self._visible),
+                visible=name in self._visible,
+            )
+        self._legend = Html(gui)
+
+    def show(self, state: UiState) -> None:
+        """Redraws the plots when plan, recording or choice have changed."""
+        if state.plan is not self._plan:
+            self._plan, self._planned = state.plan, {}
+        visible = _wanted(state)
+        if visible != self._visible:
+            self._arrange(state, visible)
+        height = _height(state, len(visible))
+        for name in visible:
+            if self._plots[name].height != height:
+                self._plots[name].height = height
+        wanted = (state.plan, state.recording, state.plot_joint, state.model, visible)
+        now = time.monotonic()
+        if wanted != self._drawn and now >= self._next:
+            self._drawn = wanted
+            for name in visible:
+                self._draw(state, name)
+            has_actual = state.recording is not None
+            self._legend.show(
+                legend_html(state.plot_joint, state.model.n, self._text, state.theme, has_actual=has_actual)
+            )
+            self._next = now + max(_REDRAW_TIME, _LEISURE * (time.monotonic() - now))
+
+    def _arrange(self, state: UiState, visible: tuple[str, ...]) -> None:
+        for name, plot in self._plots.items():
+            if plot.visible != (name in visible):
+                plot.visible = name in visible
+            if name not in visible:
+                self._titles[name].show("")
+        for name in {*self._visible[-1:], *visible[-1:]}:
+            self._plots[name].axes = _axes(name, state, visible)
+        self._visible = visible
+
+    def _draw(self, state: UiState, name: str) -> None:
+        factor, unit = self._text.units.from_si(_SI[name])
+        joint = 0 if name in (*TOOL_QUANTITIES, "tool") else state.plot_joint
+        if name in _ERRORS:
+            frame = self._error_frame(state, name, factor)
+        elif name in TOOL_QUANTITIES:
+            frame = self._tool_frame(state, cast("ToolQuantity", name), factor)
+        else:
+            frame = self._joint_frame(state, cast("Quantity", name), factor)
+            unit = unit if joint else self._text("plot.percent")
+        if name not in _ERRORS:
+            self.end = frame.end
+        title = self._text(f"plot.{name}") + (f" · J{joint}" if joint else "") + f" [{unit}]"
+        self._titles[name].show(f'<div class="rl-plot-title">{esc(title)}</div>')
+        reach = (0.0 if name in ("speed", "acceleration", "tool") else -frame.bound, frame.bound)
+        is_tool = name in (*TOOL_QUANTITIES, "tool")
+        data, series, _ = plot_contents(frame, joint, state.model.n, state.theme, is_tool=is_tool)
+        plot = self._plots[name]
+        if plot.series != series:
+            plot.series = series
+        plot.data = data
+        scale = {"x": {"time": False, "range": (0.0, frame.end)}, "y": {"range": reach}}
+        if plot.scales != scale:
+            plot.scales = scale
+
+    def _joint_frame(self, state: UiState, name: Quantity, factor: float) -> Frame:
+        plan, recording, actual = state.plan, state.recording, None
+        if plan is not None and name not in self._planned:
+            self._planned[name] = plan_curves(plan.motion, name, state.model)
+        if recording is not None and name == "tau":
+            actual = None if recording.tau is None else Curves(t=_times(recording), values=recording.tau)
+        elif recording is not None:
+            actual = recorded_curves(_times(recording), recording.q, recording.q_c, recording.dq, name)
+        return build_frame(
+            self._planned.get(name), actual, state.model.limits.joint, name, state.plot_joint, factor=factor
+        )
+
+    def _tool_frame(self, state: UiState, name: ToolQuantity, factor: float) -> Frame:
+        plan, recording, actual = state.plan, state.recording, None
+        if plan is not None and name not in self._planned:
+            self._planned[name] = tool_curves(state.model, plan.motion.times, plan.motion.q, name)
+        if recording is not None:  # Measured twice differentiated is noise: the acceleration is that of the commands.
+            q = recording.q_c if name == "acceleration" else recording.q
+            actual = tool_curves(state.model, _times(recording), q, name)
+        return build_tool_frame(self._planned.get(name), actual, tool_limit(state.model.limits, name), factor)
+
+    def _error_frame(self, state: UiState, name: str, factor: float) -> Frame:
+        """Returns measured against planned of a finished motion: of the joints, or of the tool."""
+        recording, joint = state.recording, state.plot_joint
+        assert recording is not None
+        assert recording.tracking is not None
+        t, tracking = _times(recording), recording.tracking
+        last = last_time(*(plan_curves(p.motion, "q") for p in (state.plan,) if p is not None), Curves(t=t, values=t))
+        if name == "tool":
+            return build_error_frame(t, factor * tracking.position[:, None], last, least=factor * 1e-5)
+        errors = tracking.joint if not joint else tracking.joint[:, joint - 1 : joint]
+        return build_error_frame(t, factor * errors, last, least=factor * 1.7e-4)
+
+
+def _wanted(state: UiState) -> tuple[str, ...]:
+    finished = state.recording is not None and state.recording.tracking is not None
+    return tuple(
+        name
+        for name in PLOTS
+        if name in state.plots and has_plot(state.model, name) and (finished or name not in _ERRORS)
+    )
+
+
+def _times(recording: Recording) -> Any:
+    return recording.t - recording.delay * CYCLE_TIME  # So that plan and actual lie on each other.
+
+
+def _height(state: UiState, rows: int) -> int:
+    spare = state.height - _OTHER_HEIGHT - _TIMES - _TITLE * rows
+    return max(72, min(int(spare / max(rows, 1)), 260)) // 4 * 4
+
+
+def _axes(name: str, state: UiState, visible: tuple[str, ...]) -> tuple[Any, ...]:
+    return plot_axes(state.theme, last=name == (visible or PLOTS)[-1], space=16 if name in _ERRORS else 28)

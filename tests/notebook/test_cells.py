@@ -1,0 +1,145 @@
+"""Who ends what, and when: fifty re-runs leave nothing behind, an interrupt stops what moves."""
+
+from __future__ import annotations
+
+import gc
+import os
+import threading
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from ipywidgets.widgets.widget import _instances
+
+import rcilab
+from rcilab.notebook import cells, part
+from rcilab.notebook.cells import Cells
+from rcilab.notebook.lab_widget import Lab
+from rcilab.notebook.place import Place
+from rcilab.notebook.run_panel import RunPanel
+from rcilab.notebook.scene import Scene
+from rcilab.notebook.timeline import Timeline
+
+PRO7 = rcilab.load_model("xMatePro7")
+HERE = Place(way="loopback")
+
+
+class Shell:
+    """As much of ipykernel's shell as `Cells` needs: a cell at a time, by its id or by its text."""
+
+    def __init__(self) -> None:
+        self.events = self
+        self.kernel = SimpleNamespace(saved_sigint_handler=None)
+        self._hooks: dict[str, Any] = {}
+        self._parent: dict[str, Any] = {}
+
+    def register(self, event: str, hook: Any) -> None:
+        self._hooks[event] = hook
+
+    def get_parent(self) -> dict[str, Any]:
+        return self._parent
+
+    def run(self, act: Any, cell_id: str | None, code: str = "", error: BaseException | None = None) -> Any:
+        self._parent = {"content": {"code": code}, "metadata": {} if cell_id is None else {"cellId": cell_id}}
+        self._hooks["pre_run_cell"](SimpleNamespace(cell_id=cell_id, raw_cell=code))
+        made = act()
+        self._hooks["post_run_cell"](SimpleNamespace(error_in_exec=error))
+        return made
+
+
+class Thing:
+    """Something that a cell owns."""
+
+    def __init__(self, owner: Cells) -> None:
+        self.closed = self.halted = 0
+        owner.adopt(self)
+
+    def close(self) -> None:
+        self.closed += 1
+
+    def halt(self) -> None:
+        self.halted += 1
+
+
+@pytest.fixture
+def shell() -> Shell:
+    return Shell()
+
+
+@pytest.fixture
+def owner(shell: Shell) -> Cells:
+    return Cells(shell)
+
+
+def test_a_cell_that_runs_again_ends_what_it_made_and_nothing_else(shell: Shell, owner: Cells) -> None:
+    first = shell.run(lambda: Thing(owner), "a")
+    other = shell.run(lambda: Thing(owner), "b")
+    second = shell.run(lambda: Thing(owner), "a")
+    assert (first.closed, other.closed, second.closed) == (1, 0, 0)
+
+
+def test_where_nobody_names_cells_their_text_does(shell: Shell, owner: Cells) -> None:
+    first = shell.run(lambda: Thing(owner), None, "Lab(model)")
+    other = shell.run(lambda: Thing(owner), None, "Scene(model)")
+    shell.run(lambda: Thing(owner), None, "Lab(model)")
+    assert (first.closed, other.closed) == (1, 0)
+
+
+def test_an_interrupted_cell_stops_everything_that_moves_and_closes_nothing(shell: Shell, owner: Cells) -> None:
+    thing = shell.run(lambda: Thing(owner), "a")
+    shell.run(lambda: None, "b", error=KeyboardInterrupt())
+    assert (thing.halted, thing.closed) == (1, 0)
+    shell.run(lambda: None, "b", error=ValueError())
+    assert thing.halted == 1
+
+
+def test_an_interrupt_while_no_cell_runs_stops_it_too(shell: Shell, owner: Cells) -> None:
+    thing = shell.run(lambda: Thing(owner), "a")
+    shell.kernel.saved_sigint_handler(2, None)
+    assert thing.halted == 1
+
+
+def test_the_end_of_the_kernel_ends_everything(shell: Shell, owner: Cells) -> None:
+    things = [shell.run(lambda: Thing(owner), name) for name in "abc"]
+    owner.close()
+    assert [thing.closed for thing in things] == [1, 1, 1]
+
+
+def test_fifty_re_runs_leave_no_thread_no_socket_no_widget_and_no_process(
+    shell: Shell, owner: Cells, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(part, "kernel_cells", lambda: owner)
+    monkeypatch.setattr(cells, "_kernel_cells", owner)
+
+    def run_cell() -> None:
+        scene = Scene(PRO7, place=HERE)
+        Timeline(scene)
+        RunPanel(scene)
+
+    def count() -> tuple[int, ...]:
+        gc.collect()
+        return threading.active_count(), len(os.listdir("/proc/self/fd")), len(_instances), len(children())
+
+    def run_everything(times: int) -> None:
+        shell.run(lambda: Lab(PRO7, place=HERE), "lab")
+        for _ in range(times):
+            shell.run(run_cell, "cell")
+        shell.run(lambda: Lab(PRO7, place=HERE), "lab")
+        shell.run(lambda: RunPanel(PRO7), "robot").connect.click()
+        assert shell.run(lambda: RunPanel(PRO7), "robot").state.robot is None
+
+    run_everything(1)  # What is opened once and for all, as by a library at its first use, is open from here on.
+    once = count()
+    run_everything(50)
+    assert count() == once
+    owner.close()
+    assert (threading.active_count(), children()) == (1, [])
+
+
+def children() -> list[str]:
+    """Processes of ours, whichever thread started them."""
+    found: list[str] = []
+    for task in os.listdir("/proc/self/task"):
+        with open(f"/proc/self/task/{task}/children", encoding="ascii") as file:
+            found += file.read().split()
+    return found

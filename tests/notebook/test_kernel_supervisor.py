@@ -1,0 +1,117 @@
+"""In a real kernel: a cell that runs again replaces what it made, and whatever ends the kernel stops the arm."""
+
+from __future__ import annotations
+
+import ast
+import os
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from jupyter_client.blocking.client import BlockingKernelClient
+from jupyter_client.manager import KernelManager, start_new_kernel
+
+MAKE = """
+import os, threading, time, rcilab
+from ipywidgets.widgets.widget import _instances
+from rcilab.notebook import JogPanel, RunPanel, Scene
+model = rcilab.load_model("xMatePro7")
+"""
+PARTS = "scene = Scene(model); jog = JogPanel(scene)"
+COUNT = "len(_instances), threading.active_count(), len(os.listdir('/proc/self/fd'))"
+CONNECT = """
+panel = RunPanel(model)
+def until(condition):
+    end = time.monotonic() + 30.0
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+panel.connect.click()
+until(lambda: not panel.power_on.disabled)
+panel.power_on.click()
+until(lambda: panel.state.status.powered)
+"""
+MOVE = """
+panel.state.error = None
+sign = 1.0 if panel.state.here[0] < 0.0 else -1.0
+panel.state.speed = 0.05
+panel.state.pose(model.home + 0.5 * sign)
+panel.state.make_plan()
+panel._show()
+panel.execute.click()
+until(lambda: panel.state.status.phase == "moving" and (panel.state.status.motion_time or 0.0) > 0.02)
+"""
+STANDS = """
+until(lambda: panel.state.error is not None)
+panel.state.status.phase, panel.state.status.motion_time < panel.state.plan.motion.duration - 1.0
+"""
+
+
+class Kernel:
+    """A kernel that is asked as a notebook asks it."""
+
+    def __init__(self, manager: KernelManager, client: BlockingKernelClient) -> None:
+        self.manager, self.client = manager, client
+
+    def run(self, code: str) -> Any:
+        """Runs a cell and returns its value."""
+        return self.value_of(self.client.execute(code))
+
+    def value_of(self, message: str) -> Any:
+        value: Any = None
+        while True:
+            reply = self.client.get_iopub_msg(timeout=60)
+            if reply["parent_header"].get("msg_id") != message:
+                continue
+            content = reply["content"]
+            if reply["msg_type"] == "error":
+                raise AssertionError("\n".join(content["traceback"]))
+            if reply["msg_type"] == "execute_result":
+                value = ast.literal_eval(content["data"]["text/plain"])
+            if reply["msg_type"] == "status" and content["execution_state"] == "idle":
+                return value
+
+
+@pytest.fixture(scope="module")
+def kernel() -> Iterator[Kernel]:
+    manager, client = start_new_kernel(startup_timeout=60)
+    yield Kernel(manager, client)
+    client.stop_channels()
+    manager.shutdown_kernel(now=True)
+
+
+def test_a_cell_that_runs_again_leaves_no_widget_no_thread_and_no_socket(kernel: Kernel) -> None:
+    kernel.run(MAKE)
+    kernel.run(PARTS)
+    kernel.run(PARTS)
+    once = kernel.run(COUNT)
+    for _ in range(5):
+        kernel.run(PARTS)
+    assert kernel.run(COUNT) == once
+    assert once[0] > 50
+
+
+def test_an_interrupt_stops_the_arm_whether_a_cell_runs_or_not(kernel: Kernel) -> None:
+    kernel.run(MAKE + CONNECT)
+    kernel.run(MOVE)
+    kernel.manager.interrupt_kernel()
+    assert kernel.run(STANDS) == ("idle", True)
+    kernel.run(MOVE)
+    sleeping = kernel.client.execute("time.sleep(60)")
+    time.sleep(0.3)
+    kernel.manager.interrupt_kernel()
+    with pytest.raises(AssertionError, match="KeyboardInterrupt"):
+        kernel.value_of(sleeping)
+    assert kernel.run(STANDS) == ("idle", True)
+
+
+def test_a_kernel_that_is_killed_takes_the_control_process_with_it(kernel: Kernel) -> None:
+    kernel.run(MOVE)
+    pids = kernel.run("panel.state.status.worker_pid, panel.state.status.controller_pid")
+    assert all(os.path.exists(f"/proc/{pid}") for pid in pids)
+    kernel.manager.provisioner.process.kill()  # type: ignore[union-attr]  # Nothing in the kernel can act any more.
+    deadline = time.monotonic() + 10.0
+    while any(os.path.exists(f"/proc/{pid}") for pid in pids):
+        assert time.monotonic() < deadline, f"{pids} outlive the kernel"
+        time.sleep(0.02)

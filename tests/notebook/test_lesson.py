@@ -1,0 +1,31 @@
+"""What the lessons share."""
+
+from __future__ import annotations
+
+import pytest
+
+from rcilab.notebook.lesson import answer, language
+
+SESSION = "JPY_SESSION_NAME"
+
+
+@pytest.mark.parametrize(
+    ("name", "found"),
+    [("/home/me/05_s_curves_and_limits.zh.ipynb", "zh"), ("05_s_curves_and_limits.ipynb", "en"), ("", "en")],
+)
+def test_the_name_of_the_notebook_decides_the_language(monkeypatch, name: str, found: str) -> None:
+    monkeypatch.setenv(SESSION, name)
+    assert language() == found
+
+
+def test_without_a_notebook_it_is_english(monkeypatch) -> None:
+    monkeypatch.delenv(SESSION, raising=False)
+    assert language() == "en"
+
+
+def test_an_answer_is_told_in_the_readers_language(monkeypatch, capsys) -> None:
+    monkeypatch.setenv(SESSION, "01_first_motion.zh.ipynb")
+    answer(True, "T = 1.952 s")
+    monkeypatch.setenv(SESSION, "01_first_motion.ipynb")
+    answer(False, "T = 0.700 s")
+    assert capsys.readouterr().out == "✓ 正确: T = 1.952 s\n✗ not yet: T = 0.700 s\n"

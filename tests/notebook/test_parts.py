@@ -1,0 +1,265 @@
+"""What the parts do, by their controls and without a browser: set as a hand would, read as an eye would."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Callable, Iterator
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import rcilab
+import rcilab.notebook
+from rcilab.errors import InvalidValueError
+from rcilab.language import LANGUAGES, load_words
+from rcilab.notebook import (
+    FaultPanel,
+    JogPanel,
+    Lab,
+    MotionPlot,
+    PlanPanel,
+    ReportView,
+    RunPanel,
+    Scene,
+    TargetPanel,
+    Timeline,
+)
+from rcilab.notebook.place import Place
+from rcilab.words.text import load_face
+from tests.catalogues import require_equal
+
+PRO7 = rcilab.load_model("xMatePro7")
+XMATE3 = rcilab.load_model("xMate3")
+GOAL = PRO7.home + np.array([0.5, -0.4, 0.3, -0.6, 0.4, -0.5, 0.6])
+
+
+@pytest.fixture(scope="module")
+def lab() -> Iterator[Lab]:
+    with Lab(PRO7, place=Place(way="loopback")) as made:
+        yield made
+
+
+@pytest.fixture
+def fresh(lab: Lab) -> Lab:
+    lab.state.start_from(PRO7.home)
+    lab.jog.q = PRO7.home
+    return lab
+
+
+def wait_for(condition: Callable[[], bool], what: str) -> None:
+    deadline = time.monotonic() + 30.0
+    while not condition():
+        assert time.monotonic() < deadline, what
+        time.sleep(0.02)
+
+
+def text_of(widget: Any) -> str:
+    return re.sub(r"<[^>]*>", "", widget.value)
+
+
+def test_both_languages_say_the_same_things() -> None:
+    require_equal(lambda language: load_words("rcilab.notebook", language), LANGUAGES)
+    for language in LANGUAGES:
+        own, shared = (load_words(package, language).keys() for package in ("rcilab.notebook", "rcilab.words"))
+        assert not own & shared
+
+
+def test_every_key_in_the_code_has_words() -> None:
+    sources = Path(str(files("rcilab.notebook"))).glob("*.py")
+    pattern = r"""(?:\btext|message|_button)\(\s*["']([a-z_]+\.[a-z_.]+)["']"""
+    written = {key for path in sources for key in re.findall(pattern, path.read_text(encoding="utf-8"))}
+    assert len(written) > 60
+    assert sorted(written - load_face("rcilab.notebook", "en").keys()) == []
+
+
+def test_the_names_of_the_architecture_are_there() -> None:
+    assert set(rcilab.notebook.__all__) == {
+        "FaultPanel", "JogPanel", "Lab", "MotionPlot", "PlanPanel", "ReportView", "RunPanel", "Scene", "TargetPanel",
+        "Timeline",
+    }  # fmt: skip
+
+
+def test_a_slider_moves_the_goal_and_its_ends_are_the_limits(fresh: Lab) -> None:
+    slider = fresh.jog.sliders[3]
+    slider.value = 30.0
+    assert np.degrees(fresh.jog.q[3]) == pytest.approx(30.0)
+    assert fresh.jog.fields[3].box.value == "30.00"
+    assert slider.max == pytest.approx(np.degrees(PRO7.limits.joint.upper[3]))
+
+
+def test_a_typed_number_counts_and_a_bad_one_is_answered_below_the_field(fresh: Lab) -> None:
+    field = fresh.jog.fields[0]
+    for typed, sentence in (
+        ("far", "is not a number"),
+        ("1e999", "not a finite"),
+        ("500", "outside"),
+        ("nan", "finite"),
+    ):
+        field.box.value = typed
+        assert sentence in text_of(field.said), typed
+        assert fresh.jog.q[0] == PRO7.home[0]
+    field.box.value = "-0,25"
+    assert np.degrees(fresh.jog.q[0]) == pytest.approx(-0.25)
+    assert not field.problem
+
+
+def test_undo_goes_back_to_the_pose_before_a_button(fresh: Lab) -> None:
+    fresh.jog.q = GOAL
+    fresh.jog._on_button("zero")
+    assert not fresh.jog.q.any()
+    fresh.jog._on_button("undo")
+    np.testing.assert_array_equal(fresh.jog.q, GOAL)
+
+
+def test_a_typed_target_is_reached_as_the_library_reaches_it(fresh: Lab) -> None:
+    fresh.jog.q = GOAL
+    height = 1000.0 * PRO7.forward(GOAL).position[2]
+    fresh.target.fields[2].box.value = f"{height - 20.0:.1f}"
+    wanted = PRO7.closest(fresh.state.target, GOAL).q
+    np.testing.assert_allclose(fresh.state.goal, wanted, atol=1e-12)
+    assert PRO7.forward(fresh.state.goal).position[2] == pytest.approx(fresh.state.target.position[2])
+
+
+def test_branches_and_the_arm_angle_keep_the_tool_where_it_is(fresh: Lab) -> None:
+    fresh.jog.q = GOAL
+    pose = PRO7.forward(GOAL)
+    assert len(fresh.target.branches.options) > 1
+    fresh.target.branches.value = next(
+        number for _, number in fresh.target.branches.options if number != fresh.target.branches.value
+    )
+    assert np.abs(fresh.state.goal - GOAL).max() > 0.1
+    assert PRO7.forward(fresh.state.goal).is_close(pose, 1e-6)
+    fresh.target.psi.value = fresh.target.psi.value + 5.0
+    assert PRO7.forward(fresh.state.goal).is_close(pose, 1e-6)
+
+
+def test_a_target_out_of_reach_is_said_and_the_nearest_pose_taken(fresh: Lab) -> None:
+    fresh.target.fields[0].box.value = "2500"
+    assert fresh.state.reach.tone == "bad"
+    assert "Not reachable" in text_of(fresh.target._reach)
+
+
+def test_the_circle_is_the_librarys(fresh: Lab) -> None:
+    fresh.jog.q = GOAL
+    arcs = PRO7.feasible_arcs(PRO7.forward(GOAL)).arcs
+    assert fresh.target._circle.value.count("<title>") == len(arcs)
+
+
+def test_plan_check_and_plot_show_the_same_motion_as_the_library(fresh: Lab) -> None:
+    fresh.jog.q = GOAL
+    fresh.plan.speed.value = 40.0
+    fresh.plan.plan.click()
+    plan = fresh.state.plan
+    assert plan is not None
+    np.testing.assert_array_equal(plan.motion.q, rcilab.plan_joint(PRO7, PRO7.home, GOAL, speed=0.4).q)
+    assert plan.report.ok
+    assert fresh.report.report is plan.report
+    assert fresh.plot.html.count("<svg") == 4
+    assert "Passed" in text_of(fresh.plan._said)
+
+
+def test_a_goal_that_was_moved_is_told_beside_the_plan(fresh: Lab) -> None:
+    fresh.jog.q = GOAL
+    fresh.plan.plan.click()
+    fresh.jog.sliders[0].value = 1.0
+    assert "has been moved" in text_of(fresh.plan._said)
+
+
+def test_what_breaks_a_limit_is_shaded_explained_and_slowed_down_to_fit(fresh: Lab) -> None:
+    fast = rcilab.Motion.from_samples(rcilab.plan_joint(PRO7, PRO7.home, GOAL, speed=1.0).q[::2])
+    fresh.state.take_motion(fast)
+    assert 'class="rl-violation"' in fresh.plot.html
+    assert "Not safe" in text_of(fresh.report._verdict)
+    assert "rl-bad" in fresh.report._rows.value
+    fresh.plan.slow_down.click()
+    assert fresh.state.plan is not None
+    assert fresh.state.plan.report.ok
+
+
+def test_a_straight_line_is_planned_or_refused_in_words(fresh: Lab) -> None:
+    fresh.plan.way.value = "line"
+    fresh.jog.q = PRO7.home + 0.1
+    fresh.plan.plan.click()
+    fresh.plan.way.value = "joint"
+    said = text_of(fresh.plan._said)
+    assert "Passed" in said or "No plan" in said
+
+
+def test_the_timeline_moves_cursor_and_arm_together(fresh: Lab) -> None:
+    fresh.jog.q = GOAL
+    fresh.plan.plan.click()
+    assert fresh.state.plan is not None
+    fresh.timeline.slider.value = 300
+    assert fresh.state.moment == pytest.approx(0.3)
+    assert "left:" in fresh.plot._cursor.value
+    picture = fresh.scene._picture
+    assert picture is not None
+    np.testing.assert_allclose(picture._arm._shown, fresh.state.plan.motion.at(0.3).q)
+    fresh.timeline.live.click()
+    assert fresh.state.moment is None
+    np.testing.assert_allclose(picture._arm._shown, GOAL)
+
+
+def test_parts_that_are_given_each_other_share_an_arm() -> None:
+    with JogPanel(XMATE3) as jog, MotionPlot(jog) as plot, ReportView(plot) as report, PlanPanel(jog) as plan:
+        jog.q = XMATE3.home + 0.2
+        plan.plan.click()
+        assert report.report is not None
+        assert plot.html.count("<svg") == 4
+        with JogPanel(XMATE3) as other:
+            assert other.state is not jog.state
+
+
+def test_a_six_axis_arm_has_no_arm_angle() -> None:
+    with TargetPanel(XMATE3) as target:
+        assert target.psi is None
+
+
+def test_where_nothing_is_live_a_film_is_shown_and_said() -> None:
+    with Scene(XMATE3, place=Place(way="static")) as scene:
+        assert scene.url is None
+        assert "srcdoc=" in scene._frame.value
+        assert "jupyter-server-proxy" in text_of(scene._note)
+        before = scene._frame.value
+        scene.state.take_motion(rcilab.plan_joint(XMATE3, XMATE3.home, XMATE3.home + 0.3))
+        assert "set_animation" in scene._make_film().html() or scene._frame.value != before
+
+
+def test_behind_a_proxy_the_frame_goes_through_it() -> None:
+    with Scene(XMATE3, place=Place(way="proxy", base="/user/ann/")) as scene:
+        assert 'src="/user/ann/proxy/' in scene._frame.value
+
+
+def test_a_viser_frame_shows_the_same_arm() -> None:
+    with Scene(XMATE3, view="viser", place=Place(way="loopback")) as scene:
+        assert scene.url is not None
+        assert scene.url.startswith("http://127.0.0.1:")
+        scene.state.pose(XMATE3.home + 0.1)
+
+
+@pytest.mark.parametrize("part", [JogPanel, Scene, MotionPlot, Timeline, RunPanel, FaultPanel])
+def test_what_is_no_arm_is_refused_in_words(part: Any) -> None:
+    with pytest.raises(InvalidValueError, match="load_model"):
+        part("xMatePro7")
+
+
+def test_every_part_shows_itself_in_chinese_and_closes_twice() -> None:
+    for part in (JogPanel, TargetPanel, PlanPanel, ReportView, MotionPlot, Timeline, RunPanel, FaultPanel):
+        made = part(XMATE3, language="zh")
+        assert "application/vnd.jupyter.widget-view+json" in made._repr_mimebundle_()
+        made.close()
+        made.close()
+    with pytest.raises(InvalidValueError, match="language"):
+        JogPanel(XMATE3, language="xx")
+
+
+def test_a_fault_is_told_with_its_cause_and_remedy() -> None:
+    with FaultPanel(PRO7) as panel:
+        panel.fault.value = rcilab.Fault.COLLISION
+        told = text_of(panel._told)
+        assert "kCollision" in told
+        assert rcilab.Fault.COLLISION.cause in told

@@ -1,0 +1,160 @@
+"""RunPanel drives what moves: a control process of its own, or a session that the notebook has."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import rcilab
+from rcilab.notebook import FaultPanel, JogPanel, RunPanel
+from rcilab.notebook.robot_side import Outcome
+
+PRO7 = rcilab.load_model("xMatePro7")
+
+
+def wait_for(condition: Callable[[], Any], what: str) -> None:
+    deadline = time.monotonic() + 30.0
+    while not condition():
+        assert time.monotonic() < deadline, what
+        time.sleep(0.02)
+
+
+def phase(panel: RunPanel) -> str:
+    status = panel.state.status
+    return "closed" if status is None else status.phase
+
+
+def power_on(panel: RunPanel) -> None:
+    wait_for(lambda: phase(panel) == "idle" and not panel.power_on.disabled, "a robot that can be powered")
+    panel.power_on.click()
+    wait_for(lambda: panel.state.status is not None and panel.state.status.powered, "motor power")
+
+
+def test_power_execute_stop_and_what_came_of_it_in_a_process_of_its_own() -> None:
+    with RunPanel(PRO7) as panel, JogPanel(panel) as jog, FaultPanel(panel) as faults:
+        assert panel.execute.disabled
+        panel.connect.click()
+        power_on(panel)
+        assert panel.execute.disabled
+        jog.q = PRO7.home + 0.1
+        panel.state.speed = 0.3
+        panel.state.make_plan()
+        assert not panel.execute.disabled
+        panel.execute.click()
+        wait_for(lambda: panel.state.run is not None, "the run")
+        run = panel.state.run
+        assert run is not None
+        np.testing.assert_allclose(run.q[-1], jog.q, atol=1e-6)
+        wait_for(lambda: "Arrived" in panel._outcome.value, "the outcome in words")
+        assert panel.execute.disabled  # The plan begins elsewhere now.
+
+        jog.q = PRO7.home - 0.6
+        panel.state.make_plan()
+        panel.execute.click()
+        wait_for(lambda: phase(panel) == "moving" and (panel.state.status.motion_time or 0.0) > 0.05, "a motion")
+        panel.stop.click()
+        wait_for(lambda: panel.state.error is not None, "the end of the motion")
+        wait_for(lambda: "Stopped before its end" in panel._outcome.value, "the outcome in words")
+        status = panel.state.status
+        assert status is not None
+        assert status.q_c is not None
+        assert np.abs(status.q_c - jog.q).max() > 0.05
+        assert "rl-panels" in faults._record.value  # The flight recorder has its last cycles.
+        pids = status.worker_pid, status.controller_pid
+    for pid in pids:
+        assert pid is not None
+        assert not os.path.exists(f"/proc/{pid}")
+
+
+def test_a_page_that_falls_silent_stops_the_arm(monkeypatch: pytest.MonkeyPatch) -> None:
+    with rcilab.simulate(PRO7) as robot, RunPanel(robot) as panel:
+        power_on(panel)
+        panel.state.pose(PRO7.home + 0.3)
+        panel.state.speed = 0.05
+        panel.state.make_plan()
+        panel._heart._on_beat({})  # A browser was there.
+        panel.execute.click()
+        wait_for(lambda: phase(panel) == "moving", "a motion")
+        monkeypatch.setattr("rcilab.notebook.heart.SILENCE", -1.0)  # And is not any more.
+        wait_for(lambda: panel.state.run is not None, "the run")
+        run = panel.state.run
+        assert run is not None
+        assert run.stopped
+    assert repr(robot).endswith("closed>")
+
+
+def test_a_session_is_driven_in_its_own_words_and_left_open() -> None:
+    with rcilab.simulate(PRO7) as robot:
+        with RunPanel(robot) as panel:
+            assert panel.connect.layout.display == "none"
+            power_on(panel)
+            panel.state.pose(PRO7.home + 0.05)
+            panel.state.make_plan()
+            panel.execute.click()
+            wait_for(lambda: panel.state.run is not None, "the run")
+            with JogPanel(robot) as jog:
+                assert jog.state is panel.state
+        np.testing.assert_allclose(robot.state.q_c, PRO7.home + 0.05, atol=1e-9)
+
+
+class Real:
+    """A robot that is not virtual, as RunPanel sees it."""
+
+    name, is_virtual = "rci://192.168.0.160:1337", False
+
+    def __init__(self, q: Any) -> None:
+        from rcilab.supervisor import SupervisorStatus
+
+        self.executed: list[Any] = []
+        self._status = SupervisorStatus(phase="idle", code="idle", q=q, q_c=q, powered=True)
+
+    def status(self) -> Any:
+        return self._status
+
+    def execute(self, plan: Any) -> None:
+        self.executed.append(plan)
+
+    def outcomes(self) -> list[Outcome]:
+        return []
+
+    def stop(self) -> None: ...
+    def beat(self) -> None: ...
+    def close(self) -> None: ...
+
+
+def test_a_robot_is_moved_after_an_explicit_yes_only_and_by_no_drag() -> None:
+    with RunPanel(PRO7) as panel, JogPanel(panel) as jog:
+        robot = Real(PRO7.home)
+        panel._take(robot)  # type: ignore[arg-type]
+        jog.sliders[0].value = 20.0
+        panel.state.make_plan()
+        assert robot.executed == []
+        panel.execute.click()
+        assert robot.executed == []
+        assert "192.168.0.160" in panel._question.value
+        assert panel._answers.layout.display is None
+        panel.no.click()
+        assert panel._question.value == ""
+        panel.execute.click()
+        jog.sliders[0].value = 25.0
+        panel.state.make_plan()  # Another plan: the question was about the one before.
+        assert panel._question.value == ""
+        panel.execute.click()
+        panel.yes.click()
+        assert len(robot.executed) == 1
+
+
+def test_an_address_that_is_none_is_refused_beside_the_button() -> None:
+    with RunPanel(PRO7) as panel:
+        panel.target.value = "address"
+        panel.connect.click()
+        assert "rl-problem" in panel._said.value
+        panel.address.value = "nonsense"
+        panel.connect.click()
+        assert "rl-problem" in panel._outcome.value
+        assert panel.state.robot is None

@@ -1,0 +1,205 @@
+"""A script in the place of a page: what it sends over the raw websocket arrives in order, or not at all."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+
+import msgspec
+import pytest
+import viser
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import connect
+
+from rcilab.views.gate import Gate
+from rcilab.views.guarded_server import GuardedServer, listen
+from rcilab.views.message_guard import LARGEST_MESSAGE, LARGEST_UPLOAD, LONGEST_TEXT
+
+NAN, INF = float("nan"), float("inf")
+
+
+class Page:
+    """A server with one control of each kind, and a client that speaks viser's protocol."""
+
+    def __init__(self) -> None:
+        bound = listen("127.0.0.1", 0)
+        self.port = bound.getsockname()[1]
+        self.guard = GuardedServer(bound, Gate(host="127.0.0.1", port=self.port))
+        server = self.guard.viser
+        self.heard: list[object] = []
+        gui = server.gui
+        self.slider = gui.add_slider("slider", 0.0, 1.0, 0.1, 0.5)
+        self.text = gui.add_text("text", "start")
+        self.choice = gui.add_dropdown("choice", ("a", "b"))
+        self.box = gui.add_checkbox("box", False)
+        self.upload = gui.add_upload_button("upload")
+        self.gizmo = server.scene.add_transform_controls("/gizmo")
+        self.last = gui.add_number("last", 0)
+        self.uploads: list[object] = []
+        for handle in (self.slider, self.text, self.choice, self.box):
+            handle.on_update(self._hear)
+        self.gizmo.on_update(self._hear)
+        self.upload.on_upload(self._receive)
+
+    async def _hear(self, event) -> None:
+        self.heard.append(event)
+
+    async def _receive(self, event) -> None:
+        self.uploads.append(event.target.value)
+
+    def open(self):
+        return connect(
+            f"ws://127.0.0.1:{self.port}/",
+            additional_headers={"Origin": f"http://127.0.0.1:{self.port}"},
+            subprotocols=[f"viser-v{viser.__version__}"],
+            compression=None,
+            max_size=None,
+        )
+
+    def enter(self, link) -> None:
+        """Waits for the server's first words and says where the camera is: from then on a client is connected."""
+        link.recv(timeout=20)
+        self.send(
+            link, "ViewerCameraMessage", wxyz=(1.0, 0.0, 0.0, 0.0), position=(1.0, 0.0, 0.0), fov=1.0, near=0.1,
+            far=10.0, image_height=10, image_width=10, look_at=(0.0, 0.0, 0.0), up_direction=(0.0, 0.0, 1.0),
+        )  # fmt: skip
+
+    def update(self, link, handle, value: object) -> None:
+        self.send(link, "GuiUpdateMessage", uuid=handle._impl.uuid, updates={"value": value})
+
+    def send(self, link, kind: str, **fields: object) -> None:
+        link.send(msgspec.msgpack.encode({"type": kind, **fields}))
+
+    def settle(self, link) -> None:
+        """Waits until all that was sent before has been dealt with."""
+        wanted = self.last.value + 1
+        self.update(link, self.last, wanted)
+        wait_until(lambda: self.last.value == wanted)
+
+
+def wait_until(condition: Callable[[], bool], timeout: float = 20.0) -> None:
+    end = time.monotonic() + timeout
+    while not condition():
+        assert time.monotonic() < end, "it did not happen in time"
+        time.sleep(0.01)
+
+
+@pytest.fixture(scope="module")
+def page() -> Iterator[Page]:
+    opened = Page()
+    yield opened
+    opened.guard.close()
+
+
+@pytest.fixture
+def link(page):
+    with page.open() as opened:
+        page.enter(opened)
+        wait_until(lambda: page.guard.viser.get_clients())
+        page.settle(opened)
+        page.heard.clear()
+        yield opened
+
+
+def test_what_is_no_value_of_a_control_never_reaches_it(page, link):
+    for value in (NAN, INF, -INF, "0.5", [0.5], None, True, {"a": 1}, 2**63):
+        page.update(link, page.slider, value)
+    for value in (1, None, ["x"], "x" * (LONGEST_TEXT + 1)):
+        page.update(link, page.text, value)
+    for value in ("c", 0, None):
+        page.update(link, page.choice, value)
+    for value in (1, "true", None):
+        page.update(link, page.box, value)
+    page.send(link, "GuiUpdateMessage", uuid="nobody", updates={"value": 1})
+    page.send(link, "GuiUpdateMessage", uuid=page.slider._impl.uuid, updates={"update_cb": []})
+    page.send(link, "GuiUpdateMessage", uuid=page.slider._impl.uuid, updates={"value": 0.7, "update_cb": []})
+    page.settle(link)
+    assert (page.slider.value, page.text.value, page.choice.value, page.box.value) == (0.5, "start", "a", False)
+    assert page.heard == []
+    assert len(page.slider._impl.update_cb) == 1
+
+
+def test_a_number_out_of_range_is_moved_into_it(page, link):
+    page.update(link, page.slider, 77)
+    page.settle(link)
+    assert page.slider.value == 1.0
+    page.update(link, page.slider, 0.5)
+    page.settle(link)
+    assert page.slider.value == 0.5
+
+
+def test_handles_in_the_scene_are_never_dragged_to_nowhere(page, link):
+    for position in ((NAN, 0.0, 0.0), (INF, 0.0, 0.0)):
+        page.send(
+            link,
+            "TransformControlsUpdateMessage",
+            name="/gizmo",
+            wxyz=(1.0, 0.0, 0.0, 0.0),
+            position=position,
+            owner="",
+        )
+    page.settle(link)
+    assert page.heard == []
+    assert tuple(page.gizmo.position) == (0.0, 0.0, 0.0)
+
+
+def start_upload(page, link, name: str, size: int, parts: int) -> None:
+    page.send(
+        link, "FileTransferStartUpload", source_component_uuid=page.upload._impl.uuid, transfer_uuid=name,
+        filename="program.json", mime_type="application/json", part_count=parts, size_bytes=size,
+    )  # fmt: skip
+
+
+def send_part(page, link, name: str, index: int, content: bytes) -> None:
+    page.send(
+        link, "FileTransferPart", source_component_uuid=page.upload._impl.uuid, transfer_uuid=name, part_index=index,
+        content=content,
+    )  # fmt: skip
+
+
+def test_an_upload_is_bounded_before_it_is_kept(page, link):
+    states = page.guard.viser.gui._current_file_upload_states
+    start_upload(page, link, "huge", LARGEST_UPLOAD + 1, 4)
+    send_part(page, link, "huge", 0, b"x" * 1000)
+    start_upload(page, link, "split", 1000, 10**6)
+    send_part(page, link, "never announced", 0, b"x" * 1000)
+    start_upload(page, link, "more than said", 1000, 3)
+    send_part(page, link, "more than said", 0, b"x" * 600)
+    send_part(page, link, "more than said", 1, b"x" * 600)
+    page.settle(link)
+    assert set(states) == {"more than said"}
+    assert states["more than said"]["transferred_bytes"] == 600
+    start_upload(page, link, "good", 7, 2)
+    send_part(page, link, "good", 0, b"half")
+    send_part(page, link, "good", 1, b"end")
+    wait_until(lambda: [file.content for file in page.uploads] == [b"halfend"])
+    start_upload(page, link, "second", 10, 1)
+    start_upload(page, link, "third", 10, 1)
+    page.settle(link)
+    assert set(states) == {"more than said", "second"}
+
+
+def test_a_page_that_goes_leaves_no_upload_behind(page):
+    states = page.guard.viser.gui._current_file_upload_states
+    with page.open() as link:
+        link.recv(timeout=20)
+        page.settle(link)
+        start_upload(page, link, "left", 100, 2)
+        page.settle(link)
+    wait_until(lambda: not states)
+    with page.open() as link:
+        link.recv(timeout=20)
+        page.settle(link)
+        start_upload(page, link, "left", 100, 2)
+        page.settle(link)
+        assert set(states) == {"left"}
+
+
+def test_a_message_without_an_end_costs_its_sender_the_connection(page):
+    with page.open() as link:
+        with suppress(ConnectionClosed):
+            link.send(b"x" * (LARGEST_MESSAGE + 1))
+        with pytest.raises(ConnectionClosed):
+            deque((link.recv(timeout=20) for _ in range(10_000)), maxlen=0)

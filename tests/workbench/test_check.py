@@ -1,0 +1,201 @@
+"""The Check tab without a browser: a row leads to its moment, a slow-down is found, taken back, and explained."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from rcilab.model import load_model
+from rcilab.motion import Program, Waypoint
+from rcilab.posing.planning import Plan
+from rcilab.spatial import Pose
+from rcilab.workbench import requests
+from rcilab.workbench.check.actions import CheckActions
+from rcilab.workbench.check.work import scaled, slow_to_goal
+from rcilab.workbench.goal.actions import GoalActions, initial_goal
+from rcilab.workbench.panels.check_rows import row_tone, rows_html
+from rcilab.workbench.program.actions import ProgramActions
+from rcilab.workbench.program.draft import Draft, number_at
+from rcilab.workbench.store import Store, UiState
+from rcilab.workbench.text import Text
+from tests.waiting import wait_for
+
+MODEL = load_model("xMatePro7")
+HOME = np.array(MODEL.home)
+
+
+class Bench:
+    """A page's check on an arm that stands at home."""
+
+    def __init__(self, model=MODEL) -> None:
+        session = SimpleNamespace(status=lambda: SimpleNamespace(phase="idle", q_c=HOME))
+        self.store = Store(UiState(model=model, goal=initial_goal(model, HOME)))
+        self.goal = GoalActions(self.store, session)
+        self.program = ProgramActions(self.store, session, self.goal)
+        self.program.tick()
+        self.check = CheckActions(self.store, session, self.goal, self.program)
+
+    @property
+    def state(self) -> UiState:
+        return self.store.state
+
+    @property
+    def plan(self) -> Plan:
+        assert self.state.plan is not None
+        return self.state.plan
+
+    def plan_far(self) -> None:
+        """A motion at full speed that asks for more torque than the manual recommends."""
+        self.store.update(speed=1.0)
+        self.goal.pose(HOME + np.array([1.0, 0.8, 0.0, -0.6, 0.0, 0.0, 0.0]))
+        self.store.update(plan=self.plan.completed())
+        assert self.plan.report.ok
+        assert broken(self.plan)
+
+    def press(self, what, row: str = "") -> None:
+        self.check.press(requests.Check(what=what, row=row))
+
+    def settle(self) -> None:
+        def done() -> bool:
+            self.check.tick()
+            return self.state.check.doing is None
+
+        wait_for(done, 30.0, "the work beside")
+
+
+def broken(plan: Plan) -> set[str]:
+    return {row.id for row in plan.report.rows if not row.ok}
+
+
+@pytest.fixture
+def bench() -> Bench:
+    found = Bench()
+    found.plan_far()
+    return found
+
+
+def test_a_row_leads_to_its_worst_moment_and_its_joint(bench: Bench) -> None:
+    row = next(row for row in bench.plan.report.rows if row.id == "joint.velocity")
+    bench.press("row", row.id)
+    assert bench.state.place * bench.plan.motion.duration == pytest.approx(row.time)
+    assert bench.state.plot_joint == row.joint
+    bench.press("row", "no.such")
+    assert bench.state.check.sought == 1
+
+
+def test_a_slow_down_changes_the_speed_until_it_passes_and_can_be_taken_back(bench: Bench) -> None:
+    fast = bench.plan
+    bench.press("slow")
+    bench.settle()
+    assert broken(bench.plan) == set()
+    assert bench.plan.complete
+    assert bench.plan.motion.duration > fast.motion.duration
+    answer = bench.state.check.answer
+    assert answer is not None
+    assert answer.code in ("check.slowed", "check.stretched")
+    bench.press("undo")
+    assert bench.plan is fast
+    assert bench.state.speed == 1.0
+    assert bench.state.check.slowed is None
+
+
+def test_what_passes_already_stays_and_says_so(bench: Bench) -> None:
+    bench.press("slow")
+    bench.settle()
+    slow = bench.plan
+    bench.press("slow")
+    bench.settle()
+    assert bench.plan is slow
+    answer = bench.state.check.answer
+    assert answer is not None
+    assert answer.code == "check.already"
+
+
+def test_a_way_into_the_floor_is_mended_by_no_slow_down() -> None:
+    bench = Bench()
+    bench.goal.pose(HOME + np.array([0.0, 1.4, 0.0, 0.9, 0.0, 0.0, 0.0]))
+    bench.store.update(plan=bench.plan.completed())
+    assert not bench.plan.report.ok
+    bench.press("slow")
+    bench.settle()
+    answer, found = bench.state.check.answer, bench.state.check.found
+    assert answer is not None
+    assert found is not None
+    assert answer.code == "check.none"
+    assert found.obstacle == "position"
+
+
+def test_where_a_lower_speed_does_it_the_plan_is_made_anew_with_that(bench: Bench) -> None:
+    slower = slow_to_goal(bench.plan, 1.0, "s_profile", lambda share: None)
+    assert slower.plan is not None
+    assert not slower.is_stretched
+    assert slower.plan.motion.speed == pytest.approx(slower.scale)
+    assert broken(slower.plan) == set()
+
+
+def planned_program(bench: Bench) -> Draft:
+    place = MODEL.forward(HOME)
+    waypoints = (
+        Waypoint.joint(HOME + np.array([1.0, 0.8, 0.0, -0.6, 0.0, 0.0, 0.0]), speed=1.0),
+        Waypoint.line(Pose(place.position, place.wxyz), speed=0.5),
+    )
+    bench.program.restore(Program(model=MODEL.name, start=MODEL.home, waypoints=waypoints))
+    bench.program.plan(requests.PlanProgram())
+
+    def planned() -> bool:
+        bench.program.tick()
+        return bench.state.plan is not None and bench.state.plan.program is not None
+
+    wait_for(planned, 30.0, "the program's plan")
+    return bench.state.program.draft
+
+
+def test_a_program_is_slowed_as_a_whole_and_stays_that_program(bench: Bench) -> None:
+    draft, fast = planned_program(bench), bench.plan
+    assert broken(fast)
+    bench.press("slow")
+    bench.settle()
+    assert broken(bench.plan) < broken(fast)
+    assert bench.plan.program is fast.program
+    assert number_at(bench.plan, bench.plan.motion.duration) == number_at(fast, fast.motion.duration) == 2
+    bench.press("undo")
+    assert bench.plan is fast
+    assert bench.state.program.planned is bench.state.program.draft is draft
+
+
+def test_a_program_that_is_exchanged_for_a_slower_one_can_be_had_back(bench: Bench) -> None:
+    draft, fast = planned_program(bench), bench.plan
+    slow = scaled(draft, 0.5)
+    assert [step.waypoint.speed for step in slow.steps] == [0.5, 0.25]
+    bench.program.exchange(slow, fast)
+    assert bench.state.program.planned is bench.state.program.draft is slow
+    bench.program.edit(requests.EditProgram(what="undo"))
+    assert bench.state.program.draft is draft
+
+
+def test_what_is_cancelled_changes_nothing(bench: Bench) -> None:
+    fast = bench.plan
+    bench.press("slow")
+    bench.press("cancel")
+    bench.settle()
+    assert bench.plan is fast
+    assert bench.state.check.answer is None
+
+
+def test_the_report_is_told_in_words(bench: Bench) -> None:
+    bench.press("explain")
+    bench.settle()
+    explained = bench.state.check.explained
+    assert explained is not None
+    assert explained[0] is bench.plan.report
+    assert explained[2] == bench.plan.report.explain("en")
+
+
+def test_rows_say_what_they_are_beside_every_colour(bench: Bench) -> None:
+    html = rows_html(bench.plan.report, MODEL, "joint.torque", Text("en"))
+    assert html.count('role="button"') == len(bench.plan.report.rows)
+    assert html.count("aria-current") == 1
+    assert "no load set" in html
+    assert {row_tone(row) for row in bench.plan.report.rows} >= {"good", "warn"}

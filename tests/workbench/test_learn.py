@@ -1,0 +1,157 @@
+"""The Learn tab without a browser: a fault beside the page, its show, and lessons that watch."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from rcilab.faults import Fault
+from rcilab.gallery import FAULTS
+from rcilab.model import load_model
+from rcilab.workbench import requests
+from rcilab.workbench.goal.actions import GoalActions, initial_goal
+from rcilab.workbench.learn.actions import LearnActions
+from rcilab.workbench.learn.lessons import LESSONS
+from rcilab.workbench.learn.state import exhibited
+from rcilab.workbench.panels.learn_exhibit import body_html, head_html
+from rcilab.workbench.panels.learn_lesson import steps_html
+from rcilab.workbench.store import Recording, Store, UiState
+from rcilab.workbench.text import LANGUAGES, Text, load_catalogue
+from tests.waiting import wait_for
+
+MODEL = load_model("xMatePro7")
+HOME = np.array(MODEL.home)
+
+
+class Bench:
+    """A page's Learn tab on an arm that does what it is told to."""
+
+    def __init__(self, model=MODEL) -> None:
+        q = np.array(model.home)
+        self.status = SimpleNamespace(phase="idle", code="idle", q_c=q, tau_ext=None)
+        session = SimpleNamespace(status=lambda: self.status)
+        self.store = Store(UiState(model=model, goal=initial_goal(model, q)))
+        self.goal = GoalActions(self.store, session)
+        self.learn = LearnActions(self.store, session)
+
+    @property
+    def state(self) -> UiState:
+        return self.store.state
+
+    def press(self, what, **values) -> None:
+        self.learn.press(requests.Learn(what=what, **values))
+
+    def provoke(self, fault: Fault) -> None:
+        self.press("provoke", fault=int(fault))
+
+        def shown() -> bool:
+            self.learn.tick()
+            return self.state.learn.provoking is None
+
+        wait_for(shown, 30.0, f"{fault.name} on show")
+
+    def step(self) -> int:
+        self.learn.tick()
+        assert self.state.learn.lesson is not None
+        return self.state.learn.lesson.step
+
+
+@pytest.fixture
+def bench() -> Iterator[Bench]:
+    found = Bench()
+    yield found
+    found.learn.close()
+
+
+def test_a_fault_is_shown_at_its_moment_and_the_plan_of_the_page_is_kept(bench: Bench) -> None:
+    bench.goal.pose(HOME + 0.1)
+    own = bench.state.plan
+    bench.provoke(Fault.COMMAND_JOINT_ACCELERATION_DISCONTINUITY)
+    show = bench.state.learn.show
+    assert show is not None
+    assert show.exhibit.fault is Fault.COMMAND_JOINT_ACCELERATION_DISCONTINUITY
+    assert bench.state.plan is own
+    seen = exhibited(bench.state, scene=True)
+    assert seen.plan is show.scene
+    assert [row.id for row in show.plan.report.rows if not row.ok and row.fault] == ["joint.jerk"]
+    assert np.abs(seen.plan.motion.at(seen.place * seen.plan.motion.duration).q - show.exhibit.moved.q[-1]).max() < 1e-3
+    for language in LANGUAGES:
+        said = head_html(show.exhibit, Text(language)) + body_html(show.exhibit, Text(language))
+        assert "kCommandJointAccelerationDiscontinuity" in said.replace("<wbr>", "")
+        assert "5000" in said
+    bench.goal.pose(HOME - 0.1)
+    bench.learn.tick()
+    assert bench.state.learn.show is None, "another plan is to be seen"
+    assert exhibited(bench.state) is bench.state
+
+
+def test_who_cancels_sees_nothing(bench: Bench) -> None:
+    bench.press("provoke", fault=int(Fault.COLLISION))
+    bench.press("cancel")
+    bench.learn.tick()
+    assert bench.state.learn.provoking is None
+    assert bench.state.learn.show is None
+
+
+def test_an_arm_of_six_axes_is_told_that_it_has_no_elbow() -> None:
+    bench = Bench(load_model("xMate7"))
+    bench.press("provoke", fault=int(Fault.ACTUAL_CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION))
+    problem = bench.state.learn.problem
+    assert problem is not None
+    assert problem.code == "learn.no_elbow"
+
+
+def test_every_button_step_and_lesson_has_words() -> None:
+    known = set(load_catalogue("en"))
+    wanted = {f"learn.fault.{fault.name}" for fault in FAULTS}
+    wanted |= {f"lesson.{name}" for name in LESSONS}
+    wanted |= {f"lesson.{name}.{step.name}" for name, steps in LESSONS.items() for step in steps}
+    assert sorted(wanted - known) == []
+
+
+def test_the_first_lesson_ticks_itself_off(bench: Bench) -> None:
+    bench.press("lesson", name="first")
+    assert bench.step() == 0
+    bench.goal.pose(HOME + 0.3)
+    assert bench.step() == 1
+    assert bench.step() == 1
+    bench.store.update(place=0.4)
+    assert bench.step() == 2
+    bench.store.update(plan=bench.state.plan.completed())
+    bench.step()
+    assert bench.step() == 3
+    bench.status.phase = "moving"
+    bench.step()
+    bench.step()
+    bench.status.phase = "idle"
+    none = np.zeros((1, 7))
+    bench.store.update(last_run=Recording(t=np.zeros(1), q=none, q_c=none, dq=none, delay=0, run=SimpleNamespace()))
+    assert bench.step() == 5
+    assert "That was it" in steps_html(bench.state.learn.lesson, Text("en"))
+    bench.press("leave")
+    assert bench.state.learn.lesson is None
+
+
+def test_a_step_can_be_skipped_and_says_so(bench: Bench) -> None:
+    bench.press("lesson", name="push")
+    bench.press("skip")
+    assert bench.step() == 1
+    assert 'aria-label="skipped"' in steps_html(bench.state.learn.lesson, Text("en"))
+
+
+def test_the_elbow_lesson_sees_the_elbow_turn(bench: Bench) -> None:
+    bench.goal.pose(HOME + 0.3)
+    bench.press("lesson", name="elbow")
+    bench.press("skip")
+    assert bench.step() == 1
+    assert bench.state.goal.psi is not None
+    bench.goal.set_arm_angle(requests.SetArmAngle(psi=bench.state.goal.psi + 0.25))
+    assert bench.step() == 2
+    bench.step()
+    others = bench.state.goal.reach.solutions
+    far = next(k for k, q in enumerate(others) if np.abs(q - bench.state.goal.q).max() > 0.5)
+    bench.goal.choose_branch(requests.ChooseBranch(index=far))
+    assert bench.step() == 3
