@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
+from dataclasses import replace
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from numpy.typing import ArrayLike
@@ -14,7 +15,9 @@ from rcilab.client.control_loop import Callback
 from rcilab.client.filters import CommandFilter, LowPass, RateLimiter
 from rcilab.client.following import Progress, follow, follow_poses, report_progress
 from rcilab.client.start_check import describe_start_mismatch, require_motion
+from rcilab.client.streaming import MotionStream
 from rcilab.errors import UsageError
+from rcilab.motion.pacing import PacedMotion, as_planned, require_pace
 from rcilab.recording.run import Run
 from rcilab.spatial import Pose
 from rcilab.state import Mode, RobotState, require_mode
@@ -28,17 +31,34 @@ if TYPE_CHECKING:
 
 RateLimit: TypeAlias = Literal["manual", "sdk"]
 
+PACE_LEADS = (100, 300, 1000)  # Cycles from now on which another pace begins: what planning it may take.
+HANDING_OVER = 30  # Cycles between the rows of now and the first of others.
+
 
 class Motions(RciCommands):
     """The motions of a session; see `RobotSession`."""
 
-    def execute(self, motion: Motion, certificate: Certificate | None = None, progress: Progress | None = None) -> Run:
-        """Streams a motion and returns what became of it. Checks it first.
+    _paced: tuple[PacedMotion, MotionStream, Mode] | None = None
+    """What `execute` streams just now."""
+
+    def execute(
+        self,
+        motion: Motion,
+        certificate: Certificate | None = None,
+        progress: Progress | None = None,
+        *,
+        mode: Mode = "joint_position",
+    ) -> Run:
+        """Streams a motion and returns what became of it. Checks it first, by the conditions of the mode.
+
+        From another thread, `pause`, `resume` and `set_pace` change how fast it runs. In torque mode the arm follows
+        softly, see `rcilab.client.commanding`.
 
         Args:
             motion: The motion; it must begin at the commanded angles of the arm, `state.q_c`.
-            certificate: From an earlier `check(motion, model)`; then only its freshness is verified.
+            certificate: From an earlier `check(motion, model, mode=mode)`; then only its freshness is verified.
             progress: Told how far it is, about 20 times a second.
+            mode: How the arm is commanded: the same way as joint angles, as poses of the tool, or as torques.
 
         Raises:
             ConformanceError: The motion breaks a condition; nothing moved.
@@ -48,16 +68,64 @@ class Motions(RciCommands):
             ConnectionLostError: The controller is gone.
         """
         require_motion(motion, certificate)
+        require_mode(mode)
         with self._turn("execute"):
             state = self.receive_state()
             mismatch = describe_start_mismatch(motion.q[0], state.q_c)
             if mismatch is not None:
                 raise UsageError(mismatch)
             if certificate is None:
-                self._require_allowed(motion, state)
+                self._require_allowed(motion, state, mode)
             else:
-                certificate.verify(motion, self.model, state.q_c, self.safety_box)
-            return self._run(follow(motion.q, report_progress(motion, progress)), "joint_position", motion)
+                certificate.verify(motion, self.model, state.q_c, self.safety_box, mode=mode)
+            stream = MotionStream(motion.q, mode, self.model, report_progress(motion, progress))
+            self._paced = as_planned(motion), stream, mode
+            try:
+                filters = [RateLimiter(self.model.limits)] if mode == "torque" else []
+                run = self._run(stream, mode, motion, filters)
+                return replace(run, plan=self._paced[0].as_motion())
+            finally:
+                self._paced = None
+
+    def pause(self) -> None:
+        """Holds the motion that `execute` runs in another thread, along its way and within all limits.
+
+        Raises:
+            UsageError: No such motion runs.
+            PlanningError: It arrives before it could be held.
+        """
+        self._change_pace(0.0)
+
+    def resume(self, pace: float = 1.0) -> None:
+        """Goes on with a motion that is held; see `set_pace`."""
+        self.set_pace(pace)
+
+    def set_pace(self, pace: float) -> None:
+        """Runs the motion of `execute`, in another thread, at part of its planned speed, judged as the motion was.
+
+        Args:
+            pace: 0.1 to 1.
+
+        Raises:
+            InvalidValueError: The pace is out of range.
+            UsageError: No such motion runs.
+            PlanningError: There is no way within the limits to change from here; the motion goes on as it is.
+        """
+        self._change_pace(require_pace(pace))
+
+    def _change_pace(self, pace: float) -> None:
+        from rcilab.conformance.pacing import plan_pace
+
+        if self._paced is None:
+            raise UsageError("no motion of execute() runs whose pace could change")
+        paced, stream, mode = self._paced
+        for lead in PACE_LEADS:
+            changed = plan_pace(paced, stream.cycle + lead, pace, self.model, mode)
+            first = min(stream.cycle + HANDING_OVER, changed.changed)  # What was to change before goes along.
+            if stream.switch(first, changed.q[first:], holds=changed.holds):
+                self._paced = changed, stream, mode
+                return
+        raise UsageError("this machine is too busy to change the pace of the motion in time; it goes on as it is")
 
     def control(
         self,

@@ -1,6 +1,7 @@
-"""What is fixed to the arm and where its tool may be: the four settings of the RCI that belong together.
+"""What is fixed to the arm, where its tool may be, and how it follows: the settings of the RCI that stay for a while.
 
-Tool (`setCoor`), load (`setLoad`), safety box (`setCartesianLimit`) and force-control frame (`setFcCoor`).
+Tool (`setCoor`), load (`setLoad`), safety box (`setCartesianLimit`), force-control frame (`setFcCoor`), and the
+parameters of the modes (`ControlSettings`).
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
+from rcilab.client.control_settings import ControlSettings, give_control
 from rcilab.dynamics.payload import Payload
 from rcilab.errors import InvalidValueError
 from rcilab.protocols.rci import ForceFrame
@@ -19,9 +21,11 @@ if TYPE_CHECKING:
     from rcilab.client.settings import RciSettings
     from rcilab.model import RobotModel
 
-SetupPart: TypeAlias = Literal["box", "tool", "load", "force"]
+SetupPart: TypeAlias = Literal["box", "tool", "load", "force", "control"]
 
 SETUP_PARTS: tuple[SetupPart, ...] = ("box", "tool", "load", "force")
+"""The parts that have a place in space."""
+_ALL_PARTS: tuple[SetupPart, ...] = (*SETUP_PARTS, "control")
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -42,19 +46,21 @@ class RobotSetup:
     """Pose of the tool in the flange frame."""
     load: Payload | None = None
     force: ForceControlFrame | None = None
+    control: ControlSettings | None = None
+    """Parameters of the modes."""
 
     @property
     def parts(self) -> tuple[SetupPart, ...]:
         """Names of what is not None."""
-        return tuple(part for part in SETUP_PARTS if getattr(self, part) is not None)
+        return tuple(part for part in _ALL_PARTS if getattr(self, part) is not None)
 
     def only(self, parts: Iterable[str]) -> RobotSetup:
         """Returns a set-up of these parts alone."""
-        return RobotSetup(**{part: getattr(self, part) for part in SETUP_PARTS if part in parts})
+        return RobotSetup(**{part: getattr(self, part) for part in _ALL_PARTS if part in parts})
 
     def without(self, parts: Iterable[str]) -> RobotSetup:
         """Returns a set-up that leaves these parts alone."""
-        return self.only(set(SETUP_PARTS) - set(parts))
+        return self.only(set(_ALL_PARTS) - set(parts))
 
     def updated(self, newer: RobotSetup) -> RobotSetup:
         """Returns this set-up with the parts of a newer one in it."""
@@ -99,3 +105,5 @@ def give_setup(settings: RciSettings, setup: RobotSetup) -> None:
         settings.set_cartesian_limit(setup.box)
     if setup.force is not None:
         settings.set_fc_coor(setup.force.T_flange_force, setup.force.type)
+    if setup.control is not None:
+        give_control(settings, setup.control)

@@ -13,6 +13,7 @@ from rcilab.clock import CYCLE_TIME
 from rcilab.errors import RcilabError
 from rcilab.model import RobotModel
 from rcilab.safety_box import SafetyBox, active_box
+from rcilab.state import Mode
 from rcilab.words.text import Message, message
 
 if TYPE_CHECKING:
@@ -44,6 +45,8 @@ class Plan:
     """How far short of the target it ends, in words; None when it leads there."""
     program: Program | None = None
     """The program that the motion goes through; None where it leads to the goal."""
+    mode: Mode = "joint_position"
+    """How it was judged to be commanded."""
     complete: bool = False
     """Whether collisions were looked for, too. While somebody drags they are not: it would halve the rate."""
 
@@ -52,13 +55,14 @@ class Plan:
         """Joint angles it must be executed from, [rad]."""
         return self.motion.start
 
-    def completed(self) -> Plan:
-        """Returns this plan with a report on all conditions, collisions too: what may be executed."""
+    def completed(self, mode: Mode = "joint_position") -> Plan:
+        """Returns this plan with a report on all conditions of a mode, collisions too: what may be executed."""
         from rcilab.conformance import check
 
-        if self.complete:
+        if self.complete and self.mode == mode:
             return self
-        return replace(self, report=check(self.motion, self.model, box=self.box), complete=True)
+        report = check(self.motion, self.model, box=self.box, mode=mode)
+        return replace(self, report=report, mode=mode, complete=True)
 
     def stale_parts(self, model: RobotModel, box: SafetyBox | None) -> tuple[str, ...]:
         """Returns what has changed since the plan was judged, as certificates name it: tool, load, safety box.

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from rcilab.arrays import JointVector
 from rcilab.client.start_check import describe_start_mismatch, require_motion
 from rcilab.errors import CertificateError, UsageError
+from rcilab.state import Mode, require_mode
 from rcilab.supervisor.layout import MOTION_ROWS, MOTION_TIME, OPERATOR_TIMEOUT
 from rcilab.supervisor.status import SupervisorStatus
 
@@ -25,6 +26,7 @@ def require_admissible(
     *,
     is_operator_overdue: bool,
     box: SafetyBox | None = None,
+    mode: Mode = "joint_position",
 ) -> None:
     """Returns if the motion may begin now.
 
@@ -35,6 +37,7 @@ def require_admissible(
         status: Where the arm is and what it does.
         is_operator_overdue: Whether somebody ought to be at the controls and is not.
         box: The safety box that the controller was told.
+        mode: How the arm is to be commanded.
 
     Raises:
         InvalidValueError: It is no motion, or the certificate is something else, such as a report.
@@ -42,13 +45,14 @@ def require_admissible(
         UsageError: The arm is moving, no controller is connected, nobody is at the controls, or the motion is too long.
     """
     require_motion(motion, certificate)
+    require_mode(mode)
     q_c = require_ready(status, is_operator_overdue=is_operator_overdue)
     if certificate is None:
         raise CertificateError("the motion has not been checked: check(motion, model) first", ["certificate"])
     mismatch = describe_start_mismatch(motion.q[0], q_c)
     if mismatch is not None:
         raise CertificateError(mismatch, ["start state"])
-    certificate.verify(motion, model, q_c, box)
+    certificate.verify(motion, model, q_c, box, mode=mode)
     if len(motion.q) > MOTION_ROWS:
         raise UsageError(
             f"the motion takes {motion.duration:.1f} s, {MOTION_TIME:g} s at most can be handed over; split it"

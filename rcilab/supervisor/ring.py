@@ -33,6 +33,11 @@ class RingReader:
             if self._words[Word.CYCLES] - (count - 1) < RING_CYCLES:
                 return row
 
+    def last(self, count: int) -> NDArray[np.void]:
+        """Returns a copy of the newest rows, at most `count`, oldest first; does not move the reader."""
+        end = self._words[Word.CYCLES]
+        return self._copy(max(end - count, 0), end)
+
     def drain(self) -> NDArray[np.void]:
         """Returns a copy of every row since the last call, oldest first."""
         count = self._words[Word.CYCLES]

@@ -13,7 +13,7 @@ from rcilab.client.setup import RobotSetup
 from rcilab.cycle_file import cycle_dtype
 from rcilab.faults import Fault
 from rcilab.spatial import Pose
-from rcilab.state import ControllerMode, RobotMode
+from rcilab.state import ControllerMode, Mode, RobotMode
 
 __all__ = ["MESSAGES", "PHASES", "Incident", "Lateness", "Phase", "SupervisorStatus", "cycle_dtype"]
 
@@ -42,9 +42,11 @@ MESSAGES: dict[str, str] = {
     "idle.stopped": "The motion was stopped on request; the arm stands still.",
     "idle.operator": "The motion was stopped: nobody was at the controls for {seconds:g} s.",
     "idle.failed": "The last request failed: {error}",
+    "idle.held": "The motion was given up: it was held for more than {seconds:g} s.",
     "idle.guided": "Hand guiding has ended; the arm stands still.",
     "idle.jogged": "The arm stands where it was jogged to.",
     "moving": "The arm is moving.",
+    "moving.held": "The motion is held; it can go on.",
     "moving.jog": "The arm is moved by hand: it follows what is held.",
     "moving.guided": "Hand guiding: the arm is weightless and goes where it is pushed.",
     "stopping": "The arm is being brought to rest.",
@@ -142,6 +144,11 @@ class SupervisorStatus:
     """How the control process is scheduled."""
     memory_locked: bool = False
     """Whether the control process's memory is kept from being paged out."""
+    round_trip: float | None = None
+    """From a command to the state that shows it as commanded, the controller's play-out included, as the newest motion
+    of joint angles had it, [s]; None as long as there was none."""
+    answer_time: float | None = None
+    """From a state's arrival to the answer, median of the newest motion's last second, [s]."""
     late_cycles: int = 0
     """Cycles handled more than 1 ms late since the connection was made, with or without a motion; see `Lateness`."""
     lost_cycles: int = 0
@@ -150,7 +157,13 @@ class SupervisorStatus:
     motion_time: float | None = None
     """Time since the first command of the running (or last) motion, [s]; None before the first one."""
     motion_duration: float | None = None
-    """How long that motion is planned to take, [s]."""
+    """How long that motion is planned to take, at the pace it has, [s]."""
+    motion_place: float | None = None
+    """Where in its plan that motion is, [s]; behind `motion_time` when it ran slower or was held."""
+    pace: float = 1.0
+    """Part of its planned speed that it runs at, or comes to; 0 when it is held."""
+    mode: Mode = "joint_position"
+    """How the arm is commanded in it."""
     controller_pid: int | None = None
     """Process id of the virtual controller; None when it is not ours or not running."""
     worker_pid: int | None = None

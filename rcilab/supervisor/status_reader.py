@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from rcilab.clock import CYCLE_TIME
 from rcilab.errors import InvalidValueError
 from rcilab.faults import faults_from_bits
 from rcilab.spatial import Pose
@@ -49,6 +50,12 @@ class StatusReader:
             "motion_duration": shown.motion_duration,
             **self._read_arm(),
         }
+
+    def read_cycle(self) -> int:
+        """Returns the newest cycle of the motion under way; 0 as long as it has not begun."""
+        row = self._ring.newest()
+        t = 0.0 if row is None else float(row["t"][0])
+        return round(t / CYCLE_TIME) if t == t else 0  # NaN outside of a motion.
 
     def _read_arm(self) -> dict[str, Any]:
         row = self._ring.newest()

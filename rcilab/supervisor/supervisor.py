@@ -8,22 +8,22 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from rcilab.client.address import parse_address
 from rcilab.client.setup import RobotSetup, require_setup
+from rcilab.clock import CYCLE_TIME
 from rcilab.closing import Closing
 from rcilab.errors import ConnectionLostError, RcilabError, UsageError
-from rcilab.supervisor.admission import require_admissible, require_ready
-from rcilab.supervisor.guiding import GuideKind, GuideSpace, require_guidable
-from rcilab.supervisor.jog_command import JogKind, build_jog, hold_jog, release_jog
+from rcilab.supervisor.arm_requests import ArmRequests
 from rcilab.supervisor.keeper import ANSWER_TIMEOUT, ProcessKeeper
 from rcilab.supervisor.launch import require_plant
 from rcilab.supervisor.layout import OPERATOR_TIMEOUT, ControlBlock, Word
+from rcilab.supervisor.pace_desk import PaceDesk
 from rcilab.supervisor.ring import RingReader
+from rcilab.supervisor.round_trip import RoundTrip
 from rcilab.supervisor.settings import build_settings
 from rcilab.supervisor.setup_desk import SetupDesk, standard_setup
-from rcilab.supervisor.setup_letter import pack_setup
 from rcilab.supervisor.snapshot import Snapshot
 from rcilab.supervisor.status import MESSAGES, Incident, Phase, SupervisorStatus
 from rcilab.supervisor.status_reader import StatusReader
@@ -31,9 +31,7 @@ from rcilab.supervisor.ticket import Ticket
 from rcilab.supervisor.ticket_desk import TicketDesk
 
 if TYPE_CHECKING:
-    from rcilab.conformance import Certificate
     from rcilab.model import RobotModel
-    from rcilab.motion import Motion
 
 __all__ = ["Supervisor", "Ticket"]
 
@@ -41,12 +39,12 @@ VIRTUAL = "virtual"
 _TICK = 0.02  # [s] between two looks of the watching thread.
 
 
-class Supervisor(Closing):
+class Supervisor(ArmRequests, Closing):
     """Runs motions in a process of its own, so that nothing the page does can disturb a cycle.
 
-    All methods may be called from any thread. Requests return a `Ticket` at once; nothing here waits for the robot
-    except `start()`, `restart()` and `close()`. The processes belong to a `ProcessKeeper`, the requests under way to a
-    `TicketDesk`; a thread of this object looks after both.
+    What moves the arm is in `ArmRequests`. All methods may be called from any thread. Requests return a `Ticket` at
+    once; nothing here waits for the robot except `start()`, `restart()` and `close()`. The processes belong to a
+    `ProcessKeeper`, the requests under way to a `TicketDesk`; a thread of this object looks after both.
 
     Args:
         model: The arm.
@@ -168,141 +166,9 @@ class Supervisor(Closing):
                 setup=self._setup.acknowledged,
                 setup_times=self._setup.times,
                 **fields,
+                **self._read_pace(shown),
+                **self._round_trip.read_fields(),
             )
-
-    def power_on(self) -> Ticket:
-        """Asks for motor power."""
-        return self._ask("power on", kind="power", on=True)
-
-    def power_off(self) -> Ticket:
-        """Asks for motor power to be taken away."""
-        return self._ask("power off", kind="power", on=False)
-
-    def execute(self, motion: Motion, certificate: Certificate) -> Ticket:
-        """Streams a checked motion; the ticket is done when the arm stands still again.
-
-        Args:
-            motion: The motion.
-            certificate: From `check(motion, model).certificate`.
-
-        Raises:
-            CertificateError: The certificate is missing, or does not fit the motion, the model, or where the arm is.
-            UsageError: The arm is moving, no controller is connected, nobody is at the controls, the motion takes more
-                than 300 s, or the controller has not taken the set-up it was told last.
-        """
-        require_admissible(
-            motion,
-            certificate,
-            self.model,
-            self.status(),
-            is_operator_overdue=self._is_operator_overdue(),
-            box=self._setup.wanted.box,
-        )
-        rows = motion.q
-        with self._lock:
-            block = self._require_block()
-            self._setup.require_given()
-            block.motion[: len(rows)] = rows
-            return self._ask("execute", kind="execute", rows=len(rows), duration=motion.duration)
-
-    def jog(self, kind: JogKind, values: ArrayLike, *, goes_on: Ticket | None = None) -> Ticket:
-        """Moves the arm as long as it is held: call it at least five times a second, and `release_jog` at the end.
-
-        The first call begins a jog, the next ones go on with it, whatever direction they ask for: on-line re-planning
-        inside every limit of the joints. A jog that is not renewed for 0.3 s comes to rest. It is a motion like any
-        other, so the first movement comes when the controller shows its mode, 0.2 to 1 s after the first call; at rest
-        it listens for another second.
-
-        Args:
-            kind: "joint", or "base" or "tool" for a twist of the tool in these axes.
-            values: n joint velocities, [rad/s], or a twist of six numbers, linear first, [m/s, rad/s]; lowered to
-                what the limits allow.
-            goes_on: Ticket of the jog to go on with: where that has ended meanwhile, as by `stop`, none is begun.
-
-        Returns:
-            The ticket of the jog; it is done when the arm stands still and nobody jogs any more.
-
-        Raises:
-            InvalidValueError: The kind is unknown, or the values are not as many finite numbers as it needs.
-            UsageError: Another motion is under way, no controller is connected, or nobody is at the controls.
-        """
-        command = build_jog(kind, values, self.model.n)
-        with self._lock:
-            block = self._require_block()
-            is_under_way = self._jogging is not None and not self._jogging.done
-            if goes_on is not None and goes_on.done:
-                raise UsageError("this jog has ended; begin another one")
-            if not is_under_way:
-                self._setup.require_given()
-                require_ready(self.status(), is_operator_overdue=self._is_operator_overdue())
-            hold_jog(block.jog, block.words, command)
-            if self._jogging is None or not is_under_way:
-                self._jogging = self._ask("jog", kind="jog")
-            return self._jogging
-
-    def release_jog(self) -> None:
-        """Brings a jog to rest at once."""
-        with self._lock:
-            if self._block is not None:
-                release_jog(self._block.words)
-
-    def start_guiding(self, space: GuideSpace = "joint", kind: GuideKind = "free") -> Ticket:
-        """Frees the arm for a hand to guide it (startDrag), until `stop_guiding` or `stop`; done once it is free.
-
-        The phase is "moving" meanwhile and the code "moving.guided". It ends like a motion when nobody is at the
-        controls any more, and by itself when the controller leaves it, as on a fault.
-
-        Args:
-            space: In joint space every joint is free, and `kind` has no effect.
-            kind: What stays free in Cartesian space.
-
-        Raises:
-            InvalidValueError: There is no such space or kind.
-            UsageError: The arm is moving, no controller is connected, or nobody is at the controls.
-        """
-        require_guidable(space, kind)
-        with self._lock:
-            self._require_block()
-            require_ready(self.status(), is_operator_overdue=self._is_operator_overdue())
-            self._setup.require_given()
-            return self._ask("start guiding", kind="start_guiding", space=space, type=kind)
-
-    def stop_guiding(self) -> Ticket:
-        """Ends hand guiding (stopDrag); done once the arm stands still."""
-        return self._ask("stop guiding", kind="stop_guiding")
-
-    def stop(self) -> Ticket:
-        """Brings a running motion to rest within the limits, or ends guiding; done when the arm stands still."""
-        with self._lock:
-            block = self._require_block()
-            release_jog(block.words)
-            block.words[Word.STOPS_ASKED] += 1
-            return self._ask("stop", kind="stop", number=block.words[Word.STOPS_ASKED])
-
-    def set_up(self, setup: RobotSetup) -> Ticket:
-        """Tells the controller a tool, a load, a safety box, a force-control frame; done once it has taken all of it.
-
-        From now on motions are checked with it, and it is told again at every new connection.
-
-        Args:
-            setup: What to tell; parts that are None stay.
-
-        Raises:
-            InvalidValueError: It is no set-up, or the load is heavier than the arm is rated for.
-            UsageError: The arm is moving, or no controller is connected.
-        """
-        model = require_setup(setup).applied_to(self.model)
-        with self._lock:
-            self._require_block()
-            require_ready(self.status(), is_operator_overdue=False)
-            ticket = self._ask("set up", kind="set_up", setup=pack_setup(setup))
-            self._setup.follow(ticket, setup)
-            self.model = model
-            return ticket
-
-    def recover(self) -> Ticket:
-        """Asks the controller to clear its faults (automatic error recovery)."""
-        return self._ask("recover", kind="recover")
 
     def reconnect(self) -> Ticket:
         """Drops the connection to the controller and makes a new one.
@@ -355,6 +221,7 @@ class Supervisor(Closing):
         return self
 
     def _ask(self, what: str, **letter: Any) -> Ticket:
+        """Sends a request to the control process."""
         with self._lock:
             self._require_block()
             if self._keeper.worker_pid is None:
@@ -367,6 +234,7 @@ class Supervisor(Closing):
         address = None if self._target == VIRTUAL else self._target
         self._keeper = ProcessKeeper(block, self.model.name, self._plant, address, auto_restart=self._auto_restart)
         self._desk = TicketDesk(block)
+        self._pace, self._round_trip = PaceDesk(block), RoundTrip(block)
         self._reader, self._ring = StatusReader(block), RingReader(block)
         self._is_closing.clear()
         self._block = block
@@ -443,6 +311,21 @@ class Supervisor(Closing):
         self._keeper.end()
         self._desk.fail_all(reason)
         self._connecting, self._crash = None, None
+
+    def _motion_cycle(self) -> int | None:
+        with self._lock:
+            self._require_block()
+            shown = self._reader.read_snapshot()
+            if shown.phase != "moving" or shown.motion_duration is None or shown.code not in ("moving", "moving.held"):
+                return None
+            return self._reader.read_cycle()
+
+    def _read_pace(self, shown: Snapshot) -> dict[str, Any]:
+        paced = self._pace.paced
+        if paced is None or shown.motion_time is None:
+            return {}
+        place = paced.place_at(round(shown.motion_time / CYCLE_TIME))
+        return {"motion_place": place, "pace": paced.pace, "mode": self._pace.mode}
 
     def _is_operator_overdue(self) -> bool:
         with self._lock:

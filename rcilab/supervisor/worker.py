@@ -21,7 +21,7 @@ from rcilab.awake import awake_cores
 from rcilab.client.address import parse_address
 from rcilab.client.commands import RciCommands
 from rcilab.client.control_loop import Callback, ControlLoop
-from rcilab.client.following import follow
+from rcilab.client.filters import RateLimiter
 from rcilab.client.link import Link
 from rcilab.client.opening import await_first_state, require_arm_there
 from rcilab.client.punctual import PRIORITY
@@ -29,14 +29,16 @@ from rcilab.client.recorder import CycleLog
 from rcilab.client.recovery import recover
 from rcilab.client.setup import give_setup
 from rcilab.client.start_check import describe_start_mismatch
+from rcilab.client.streaming import MotionStream
 from rcilab.client.transport import SocketTransport
+from rcilab.clock import CYCLE_TIME
 from rcilab.errors import ConnectionLostError, ControlError, InvalidValueError, ModelError, RcilabError, UsageError
 from rcilab.model import load_model
 from rcilab.motion import plan_stop
 from rcilab.protocols.rci import STATE_SIZE
 from rcilab.realtime import enter_realtime
 from rcilab.spatial import Pose
-from rcilab.state import ControllerMode, RobotState
+from rcilab.state import ControllerMode, Mode, RobotMode, RobotState
 from rcilab.supervisor.failure import pack_failure
 from rcilab.supervisor.guiding import HandGuide
 from rcilab.supervisor.jogging import HeldJog
@@ -48,6 +50,7 @@ from rcilab.supervisor.setup_letter import parse_setup
 from rcilab.supervisor.status import MESSAGES, Phase
 
 SILENCE = 0.3  # [s] without a state while idle before the connection counts as lost; a choice below half a second.
+LONGEST_PAUSE = 120_000  # Cycles that a motion is held for before it is given up; a choice: every cycle is recorded.
 _LOOK = 0.02  # [s] Longest wait in the idle loop.
 
 
@@ -80,6 +83,9 @@ class Worker:
         self._model = load_model(self._settings.name, tool=self._settings.T_flange_tool)
         self._jog: HeldJog | None = None
         self._guide: HandGuide | None = None
+        self._stream: MotionStream | None = None
+        self._mode: Mode = "joint_position"
+        self._softly: str | None = None  # Why a motion in torques is being brought to rest.
 
     def run(self) -> int:
         """Lives until asked to end or until the supervisor is gone; returns the exit code."""
@@ -124,6 +130,9 @@ class Worker:
     def _show_state(self, state: RobotState) -> None:
         """Keeps the phase in step with what the robot reports while nothing moves."""
         phase = self._publisher.snapshot.phase
+        if state.robot_mode is RobotMode.USER_STOPPED and self._publisher.snapshot.powered:
+            self._publisher.update(powered=False)  # The emergency stop, or the gate, has taken it.
+            self._say_ready()
         with suppress(InvalidValueError):  # A controller may report no pose before it is ready.
             flange = self._model.pose(state.q_c, "flange")
             self._publisher.show_tool(flange.inverse() @ Pose.from_matrix(state.T_base_tool_c))
@@ -239,15 +248,21 @@ class Worker:
 
     def _do_execute(self, request: dict[str, Any]) -> None:
         link = self._require_link()
-        rows = self._block.motion[: request["rows"]].copy()
+        rows = self._block.motion[: request["rows"]]
+        mode: Mode = request["mode"]
         self._record(link.poll(_LOOK))
         if link.latest is not None:
             mismatch = describe_start_mismatch(rows[0], link.latest.q_c)
             if mismatch is not None:
                 raise UsageError(mismatch)
+            self._model.rigid_body.motion_torque(link.latest.q, link.latest.dq, link.latest.dq)  # Loads it now.
         self._publisher.begin_motion(request["duration"])
         self._say("moving", "moving")
-        self._move(link, follow(rows, self._publisher.on_cycle), "idle.arrived")
+        self._stream, self._softly = MotionStream(rows, mode, self._model, self._publisher.on_cycle), None
+        try:
+            self._move(link, self._stream, "idle.arrived", mode)
+        finally:
+            self._stream = None
 
     def _do_jog(self, request: dict[str, Any]) -> None:
         link = self._require_link()
@@ -261,20 +276,30 @@ class Worker:
         finally:
             self._jog = None
 
-    def _move(self, link: Link, callback: Callback, arrived: str) -> None:
+    def _move(self, link: Link, callback: Callback, arrived: str, mode: Mode = "joint_position") -> None:
         """Runs a motion; what it says at its end tells why it ended."""
+        self._mode = mode
         loop = ControlLoop(
-            link, self._commands, self._settings.limits, ControllerMode.JOINT_POSITION, self._log, watch=self._watch
+            link,
+            self._commands,
+            self._settings.limits,
+            ControllerMode[mode.upper()],
+            self._log,
+            watch=self._watch,
+            model=self._model,
+            filters=[RateLimiter(self._settings.limits)] if mode == "torque" else [],
         )
         try:
             with awake_cores():
-                reason = loop.run(callback)
+                reason = loop.run(callback) or self._softly
         finally:
             gc.collect()
         if reason is None:
             self._say("idle", arrived)
         elif reason == "idle.operator":
             self._say("idle", reason, seconds=OPERATOR_TIMEOUT)
+        elif reason == "idle.held":
+            self._say("idle", reason, seconds=LONGEST_PAUSE * CYCLE_TIME)
         else:
             self._say("idle", "idle.stopped")
         if reason is not None:
@@ -291,9 +316,14 @@ class Worker:
             reason, self._is_ending = "idle.stopped", True
         elif self._inbox.waiting:
             reason = self._answer_while_moving()
-        if reason is not None:
+        elif self._stream is not None and self._stream.held > LONGEST_PAUSE:
+            reason = "idle.held"
+        if reason is not None and self._softly is None:
             self._say("stopping", "stopping.operator" if reason == "idle.operator" else "stopping")
-        return reason
+            if self._stream is not None and self._mode == "torque":
+                self._softly = reason
+                self._stream.stop()
+        return None if self._softly else reason
 
     def _answer_while_moving(self) -> str | None:
         request = self._inbox.take()
@@ -302,6 +332,9 @@ class Worker:
         if request["kind"] in ("stop", "end"):
             self._deferred.append(request)
             return "idle.stopped"
+        if request["kind"] == "pace" and self._stream is not None and self._softly is None:
+            self._change_pace(request, self._stream)
+            return None
         if self._jog is not None:  # It comes to rest at once, and then has no reason to go on.
             self._deferred.append(request)
             self._jog.is_wanted = False
@@ -309,6 +342,20 @@ class Worker:
         error = UsageError("the arm is moving; stop it first, or wait until it has arrived")
         self._outbox.post({"id": request["id"], "failure": pack_failure(error)})
         return None
+
+    def _change_pace(self, request: dict[str, Any], stream: MotionStream) -> None:
+        """Goes on with rows that lie ready in the block."""
+        rows = self._block.motion[request["place"] : request["place"] + request["rows"]]
+        reply: dict[str, Any] = {"id": request["id"]}
+        if stream.switch(request["first"], rows, holds=request["holds"]):
+            self._publisher.update(motion_duration=request["duration"])
+            self._say("moving", "moving.held" if request["holds"] else "moving")
+        else:
+            reply["failure"] = pack_failure(UsageError("the change of pace came too late; ask again"))
+        self._outbox.post(reply)
+
+    def _do_pace(self, request: dict[str, Any]) -> None:
+        raise UsageError("no motion runs whose pace could change")
 
     def _is_operator_gone(self) -> bool:
         beat = self._words[Word.OPERATOR_BEAT]

@@ -24,7 +24,10 @@ from rcilab.workbench.program.actions import ProgramActions
 from rcilab.workbench.run.actions import RobotActions
 from rcilab.workbench.run.export_actions import Deliver, ExportActions
 from rcilab.workbench.run.folder_actions import FolderActions
+from rcilab.workbench.run.mode_actions import ModeActions
 from rcilab.workbench.run.push_actions import PushActions
+from rcilab.workbench.run.where_actions import WhereActions
+from rcilab.workbench.run.world_actions import WorldActions
 from rcilab.workbench.session import Session
 from rcilab.workbench.setup.actions import SetupActions, is_setup_field
 from rcilab.workbench.store import Store
@@ -58,6 +61,9 @@ class Conductor:
         self._keepsake = keepsake or Keepsake(None)
         self._goal = GoalActions(store, session)
         self.robot = RobotActions(store, session)
+        self._mode = ModeActions(store, session)
+        self._where = WhereActions(store, session, self.robot)
+        self._world = WorldActions(store, session)
         self._push = PushActions(store, session)
         self._setup = SetupActions(store, session)
         self._jog = JogActions(store, session, self._goal)
@@ -84,7 +90,12 @@ class Conductor:
             requests.Plan: self._goal.plan,
             requests.SetSpeed: self._goal.set_speed,
             requests.SetLaw: self._goal.set_law,
-            requests.Drive: self.robot.drive,
+            requests.Drive: self._drive,
+            requests.SetDrive: self._mode.set_drive,
+            requests.PressControl: self._mode.press,
+            requests.SetNetwork: self._world.set_network,
+            requests.PressSafety: self._world.press_safety,
+            requests.ChooseDestination: self._where.choose,
             requests.ChooseRobot: self.robot.choose_robot,
             requests.SetJog: self._jog.set_jog,
             requests.HoldJog: self._jog.hold,
@@ -138,6 +149,7 @@ class Conductor:
             self._thread.join(10.0)
         self._jog.release()
         self._push.close()
+        self._world.close()
         self._program.close()
         self._check.close()
         self._learn.close()
@@ -165,6 +177,8 @@ class Conductor:
             self._goal.catch_up()
         self._goal.settle()
         self._push.tick()
+        self._mode.tick()
+        self._world.tick()
         self._setup.tick()
         self._jog.tick(elapsed)
         self._poses.tick()
@@ -180,9 +194,19 @@ class Conductor:
             self._program.restore(kept.program)
         self._store.say("good", message("notice.resumed"))
 
+    def _drive(self, request: requests.Drive) -> None:
+        if request.what == "pause":
+            self._mode.pause()
+        elif request.what == "resume":
+            self._mode.resume()
+        else:
+            self.robot.drive(request)
+
     def _type_field(self, request: requests.TypeField) -> None:
         if is_setup_field(request.field):
             self._setup.type_field(request)
+        elif request.field.startswith("control."):
+            self._mode.type_field(request)
         elif request.field.startswith("program."):
             self._program.type_field(request)
         else:
@@ -220,6 +244,10 @@ def _coalescing_key(request: requests.Request) -> str | None:
         return f"{type(request).__name__}.{request.page}"
     if isinstance(request, requests.PullArm) and request.phase == "update":
         return f"pull.{request.page}"
+    if isinstance(request, requests.SetNetwork) and request.name is not None:
+        return f"network.{request.name}.{request.page}"
+    if isinstance(request, requests.SetDrive) and request.pace is not None:
+        return f"pace.{request.page}"
     if isinstance(
         request, requests.Seek | requests.SetSpeed | requests.SetArmAngle | requests.HoldPush | requests.HoldJog
     ):

@@ -15,9 +15,11 @@ from rcilab.workbench.panels import Panel
 from rcilab.workbench.panels.check import CheckPanel
 from rcilab.workbench.panels.health import HealthPanel
 from rcilab.workbench.panels.jog import JogPanel
+from rcilab.workbench.panels.lab import LabPanel
 from rcilab.workbench.panels.learn import LearnPanel
 from rcilab.workbench.panels.learn_exhibit import LearnExhibitPanel
 from rcilab.workbench.panels.learn_lesson import LearnLessonPanel
+from rcilab.workbench.panels.mode import ModePanel
 from rcilab.workbench.panels.poses import PosesPanel
 from rcilab.workbench.panels.program import ProgramPanel
 from rcilab.workbench.panels.program_file import ProgramFilePanel
@@ -33,6 +35,7 @@ from rcilab.workbench.panels.target import TargetPanel
 from rcilab.workbench.panels.timeline import TimelinePanel
 from rcilab.workbench.panels.tool_jog import ToolJogPanel
 from rcilab.workbench.panels.waypoint import WaypointPanel
+from rcilab.workbench.panels.where import WherePanel
 from rcilab.workbench.program.marks import ProgramMarks
 from rcilab.workbench.scene.stage import Stage
 from rcilab.workbench.session import Session
@@ -53,7 +56,7 @@ _TABS = (
     ("tab.program", "list-numbers", ProgramPanel, WaypointPanel, ProgramFilePanel),
     ("tab.setup", "tool", SetupPanel, SetupNumbersPanel),
     ("tab.check", "clipboard-check", CheckPanel),
-    ("tab.run", "player-play", RunPanel, RecordingPanel, PushPanel, HealthPanel),
+    ("tab.run", "player-play", RunPanel, WherePanel, ModePanel, RecordingPanel, PushPanel, LabPanel, HealthPanel),
     ("tab.learn", "school", LearnLessonPanel, LearnPanel, LearnExhibitPanel),
     ("tab.settings", "settings", SettingsPanel, RunsFolderPanel),
 )

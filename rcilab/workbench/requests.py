@@ -135,8 +135,57 @@ class Drive(Request):
     """Something for the robot: what the buttons of the Run tab say."""
 
     what: Literal[
-        "execute", "confirm", "cancel", "stop", "recover", "power_on", "power_off", "reconnect", "guide", "unguide"
-    ]
+        "execute", "confirm", "cancel", "stop", "recover", "power_on", "power_off", "reconnect", "guide", "unguide",
+        "pause", "resume", "disconnect",
+    ]  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetDrive(Request):
+    """How to drive the arm; what is None stays."""
+
+    mode: str | None = None
+    """One of `rcilab.state.MODES`."""
+    pace: float | None = None
+    """Part of the planned speed, 0.1 to 1."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PressControl(Request):
+    """A button of the modes' parameters."""
+
+    what: Literal["send", "reset"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetNetwork(Request):
+    """The network of our own controller; what is None stays."""
+
+    name: str | None = None
+    """One of `NETWORK_LAB`."""
+    value: float = 0.0
+    """[1] or [s]."""
+    direction: str | None = None
+    pulled: bool | None = None
+    """Whether the cable is out."""
+    clear: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PressSafety(Request):
+    """A safety button of our own controller."""
+
+    button: Literal["none", "estop", "gstop"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ChooseDestination(Request):
+    """Where motions go; an address is asked for once more."""
+
+    where: str
+    """One of `DESTINATIONS`."""
+    address: str = ""
+    answer: Literal["", "yes", "no"] = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -31,6 +31,7 @@ class Session:
         self._ready: Supervisor | None = None  # Only what start() has built; requests go here.
         self._generation = 0
         self._worker: threading.Thread | None = None
+        self._is_apart = False  # Nobody wants a connection.
 
     def open(self, model: RobotModel, target: str, plant: str = "ideal", setup: RobotSetup | None = None) -> None:
         """Closes what is open and starts a supervisor for this arm, destination and plant; returns at once."""
@@ -38,12 +39,23 @@ class Session:
             self._generation += 1
             generation, previous = self._generation, self._worker
             self._ready = self._shown = None
+            self._is_apart = False
             self._worker = threading.Thread(
                 target=self._exchange,
                 args=(generation, previous, model, target, plant, setup),
                 name="session",
                 daemon=True,
             )
+            self._worker.start()
+
+    def disconnect(self) -> None:
+        """Closes what is open and starts nothing; returns at once, `status` is "closed" from then on."""
+        with self._lock:
+            self._generation += 1
+            previous = self._worker
+            self._ready = self._shown = None
+            self._worker = threading.Thread(target=self._let_go, args=(previous,), name="session", daemon=True)
+            self._is_apart = True
             self._worker.start()
 
     def close(self) -> None:
@@ -65,7 +77,7 @@ class Session:
             return shown.status()
         from rcilab.supervisor import SupervisorStatus
 
-        if self._worker is None:
+        if self._worker is None or self._is_apart:
             return SupervisorStatus()  # Nobody has asked for a connection.
         return SupervisorStatus(phase="starting", code="starting", message="Starting the control process.")
 
@@ -102,6 +114,13 @@ class Session:
         if ready is not None:
             with suppress(RcilabError):  # Closed in the meantime.
                 ready.set_operator_present(True)
+
+    def _let_go(self, previous: threading.Thread | None) -> None:
+        if previous is not None:
+            previous.join()
+        old, self._current = self._current, None
+        if old is not None:
+            old.close()
 
     def _exchange(
         self,

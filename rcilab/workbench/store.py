@@ -21,6 +21,7 @@ from rcilab.workbench.jog.jogging import JogState
 from rcilab.workbench.learn.state import LearnState
 from rcilab.workbench.lease import Lease
 from rcilab.workbench.program.draft import ProgramState
+from rcilab.workbench.run.driving import DriveState
 from rcilab.workbench.run.pushing import Plant, PushState
 from rcilab.workbench.setup.wanted import SetupState
 from rcilab.workbench.text import Message
@@ -106,6 +107,7 @@ class UiState:
     plant: Plant = "ideal"
     """What the virtual controller moves."""
     push: PushState = field(default_factory=PushState)
+    drive: DriveState = field(default_factory=DriveState)
     jog: JogState = field(default_factory=JogState)
     goal: Goal
     setup: SetupState = field(default_factory=SetupState)

@@ -90,4 +90,6 @@ def _tell_loss(code: str, status: SupervisorStatus) -> Message:
     if status.target == "virtual":
         return message("incident.lost.virtual")
     known = code if code in _LOST else "lost.unreachable"
-    return message(f"incident.{known}", address=status.target)
+    from rcilab.supervisor.keeper import ANSWER_TIMEOUT
+
+    return message(f"incident.{known}", address=status.target, seconds=f"{ANSWER_TIMEOUT:g}")

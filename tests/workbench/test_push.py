@@ -14,10 +14,11 @@ import pytest
 from rcilab.errors import UsageError
 from rcilab.model import load_model
 from rcilab.supervisor import SupervisorStatus
-from rcilab.workbench import push_actions, requests
+from rcilab.workbench import requests
 from rcilab.workbench.app import Workbench
 from rcilab.workbench.goal.actions import initial_goal
 from rcilab.workbench.lease import Lease
+from rcilab.workbench.run import push_actions
 from rcilab.workbench.run.actions import RobotActions
 from rcilab.workbench.run.push_actions import PushActions
 from rcilab.workbench.run.pushing import SPRING, STRONGEST, place_of, spring_force

@@ -173,9 +173,11 @@ class GoalActions:
     def settle(self) -> None:
         """Looks for collisions, too, once the goal has stood still for a moment."""
         state = self._store.state
-        if state.plan is None or state.plan.complete or time.monotonic() - self._planned < SETTLED:
+        if state.plan is None or time.monotonic() - self._planned < SETTLED:
             return
-        self._store.update(plan=state.plan.completed())
+        judged = state.plan.completed(state.drive.mode)
+        if judged is not state.plan:
+            self._store.update(plan=judged)
 
     def catch_up(self) -> None:
         """Plans what was put off while the arm was moving."""

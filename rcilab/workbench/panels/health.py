@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import time
 from typing import TYPE_CHECKING, Any
 
 from rcilab.workbench.text import Text
@@ -9,7 +11,11 @@ from rcilab.workbench.widgets import Ask, Html, esc
 
 if TYPE_CHECKING:
     from rcilab.supervisor import SupervisorStatus
+    from rcilab.supervisor.status import Lateness
     from rcilab.workbench.store import UiState
+
+_PERIOD = 0.3  # [s] between two looks: as fast as one reads, and cheap.
+_LATE = 1000.0  # [us] From here on a cycle counts as late.
 
 
 class HealthPanel:
@@ -17,16 +23,22 @@ class HealthPanel:
 
     def __init__(self, text: Text, ask: Ask) -> None:
         self._text = text
+        self._shown = 0.0
 
     def build(self, gui: Any, state: UiState) -> None:
         """Adds the table."""
         with gui.add_folder(self._text("run.health")):
             self._health = Html(gui)
+            self._histogram = Html(gui)
         gui.add_html(f'<p class="rl-note">{esc(self._text("stop.note"))}</p>')
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows the robot."""
+        if time.monotonic() - self._shown < _PERIOD:
+            return
+        self._shown = time.monotonic()
         self._health.show(health_html(status, self._text))
+        self._histogram.show(histogram_html(status.lateness, self._text))
 
 
 def health_html(status: SupervisorStatus, text: Text) -> str:
@@ -42,7 +54,33 @@ def health_html(status: SupervisorStatus, text: Text) -> str:
         ("rate", f"{status.rate_hz:.0f} Hz"),
         ("late", text("run.late_value", late=status.late_cycles, lost=status.lost_cycles, cycles=late.cycles)),
         ("lateness", f"{late.p50:.0f} / {late.p99:.0f} / {late.p999:.0f} / {late.max:.0f} µs"),
+        ("round_trip", "—" if status.round_trip is None else f"{1000.0 * status.round_trip:.0f} ms"),
+        ("answer", "—" if status.answer_time is None else f"{1e6 * status.answer_time:.0f} µs"),
         ("scheduling", text(f"scheduling.{status.scheduling}")),
     ]
     body = "".join(f"<tr><th>{esc(text(f'health.{name}'))}</th><td>{esc(value)}</td></tr>" for name, value in rows)
     return f'<table class="rl-table rl-facts-table">{body}</table>'
+
+
+def histogram_html(late: Lateness, text: Text) -> str:
+    """Returns how many cycles were how late, as bars of logarithmic length; a word stands beside those too late."""
+    if not late.cycles:
+        return ""
+    most = math.log10(1.0 + float(late.histogram.max()))
+    rows: list[str] = []
+    for low, high, count in zip(late.edges[:-1], late.edges[1:], late.histogram, strict=True):
+        if count == 0 and (low >= late.max or high <= late.p50 / 4.0):
+            continue
+        share = 100.0 * math.log10(1.0 + float(count)) / most
+        upper = "∞" if math.isinf(high) else f"{high:g}"
+        word = f" {esc(text('health.too_late'))}" if low >= _LATE and count else ""
+        tone = "rl-bad" if word else "rl-good"
+        bar = f'<div class="rl-meter"><i style="width:{share:.0f}%"></i></div>'
+        rows.append(
+            f'<tr><th style="width:26%">{low:g}–{upper}</th><td class="{tone}" style="width:48%">{bar}</td>'
+            f"<td>{count}{word}</td></tr>"
+        )
+    return (
+        f'<p class="rl-note">{esc(text("health.histogram"))}</p>'
+        f'<table class="rl-table rl-facts-table rl-histogram">{"".join(rows)}</table>'
+    )

@@ -7,7 +7,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rcilab.workbench import requests
-from rcilab.workbench.run.pushing import DIRECTIONS, SPRING, STRONGEST, TOOL, WAYS, can_grab, is_guided, no_push
+from rcilab.workbench.run.pushing import (
+    DIRECTIONS,
+    SPRING,
+    STRONGEST,
+    TOOL,
+    WAYS,
+    can_grab,
+    gives_way,
+    is_guided,
+    no_push,
+)
 from rcilab.workbench.run.readiness import is_moving
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, Html, Linked, esc, on_press
@@ -81,9 +91,10 @@ class PushPanel:
         self._guide.disabled = is_moving(status) or status.phase != "idle" or not status.powered
         self._unguide.disabled = not guided
         self._button.disabled = reason is not None
-        if reason is None and state.plant == "ideal" and not guided:
+        soft = gives_way(status)
+        if reason is None and state.plant == "ideal" and not soft:
             said = text("push.ideal")
-        elif reason is None and not guided:
+        elif reason is None and not soft:
             said = text("push.stiff")
         else:
             said = text("push.free") if reason is None else text.say(reason)

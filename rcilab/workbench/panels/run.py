@@ -1,14 +1,13 @@
-"""Run: where to, power, Execute, Recover, and what the controller says."""
+"""Run: Execute, pause, pace, power, Recover, and what the controller says."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from rcilab.motion.pacing import SLOWEST_PACE
 from rcilab.workbench import requests
 from rcilab.workbench.panels.target import planned_html
-from rcilab.workbench.run.pushing import PLANTS
 from rcilab.workbench.run.readiness import describe_move, is_moving, obstacle
-from rcilab.workbench.telling import phase_code, tell_status
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, Html, Linked, esc, on_press
 
@@ -42,6 +41,17 @@ class RunPanel:
         self._cancel = gui.add_button(text("run.cancel"), color="gray", visible=False)
         on_press(self._cancel, ask, _drive("cancel"))
         self._reason = Html(gui)
+        self._pause = gui.add_button(
+            text("run.pause"), icon="player-pause", color="orange", visible=False, hint=text("run.pause_hint")
+        )
+        on_press(self._pause, ask, _drive("pause"))
+        self._resume = gui.add_button(text("run.resume"), icon="player-play", color="blue", visible=False)
+        on_press(self._resume, ask, _drive("resume"))
+        pace = gui.add_slider(
+            text("run.pace"), 100.0 * SLOWEST_PACE, 100.0, 5.0, 100.0 * state.drive.pace, hint=text("run.pace_hint")
+        )
+        self._pace = Linked(pace, ask, lambda v, p: requests.SetDrive(page=p, pace=float(v) / 100.0))
+        self._way = Html(gui)
         self._buttons: dict[str, Any] = {}
         with gui.add_folder(text("run.robot")):
             gui.add_html('<i class="rl-buttons"></i>')
@@ -52,21 +62,6 @@ class RunPanel:
                 on_press(button, ask, _drive(what))
                 self._buttons[what] = button
             self._faults = Html(gui)
-        with gui.add_folder(text("run.where")):
-            self._where = Html(gui)
-            typed = state.target if state.target != "virtual" else ""
-            self._address = gui.add_text(text("run.address"), typed, hint=text("run.address_hint"))
-            connect = gui.add_button(text("run.connect"), icon="plug-connected", color="gray")
-            on_press(connect, ask, lambda page: requests.ChooseRobot(page=page, target=self._address.value))
-            virtual = gui.add_button(
-                text("run.virtual"), icon="device-desktop", color="gray", hint=text("run.virtual_hint")
-            )
-            on_press(virtual, ask, lambda page: requests.ChooseRobot(page=page, target="virtual"))
-            plants = {text(f"plant.{plant}"): plant for plant in PLANTS}
-            self._plants = {plant: label for label, plant in plants.items()}
-            chosen = self._plants[state.plant]
-            plant = gui.add_dropdown(text("plant.title"), tuple(plants), initial_value=chosen, hint=text("plant.hint"))
-            self._plant = Linked(plant, ask, lambda v, p: requests.ChooseRobot(page=p, plant=plants.get(v)))
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows the robot."""
@@ -79,26 +74,29 @@ class RunPanel:
         self._execute.visible = question is None
         self._agree.visible = self._cancel.visible = question is not None
         self._reason.show("" if reason is None else f'<p class="rl-note rl-why">{esc(text.say(reason))}</p>')
+        self._pause.visible, self._resume.visible = status.code == "moving", status.code == "moving.held"
+        self._pause.disabled = status.motion_place is None
+        self._pace.show(round(100.0 * state.drive.pace, 1))
+        self._way.show(way_html(status, text))
         self._plan.disabled = moving
         self._buttons["recover"].disabled = status.phase not in ("fault", "crashed", "lost")
         self._buttons["power_on"].disabled = moving or status.powered is not False
         self._buttons["power_off"].disabled = moving or status.powered is not True
-        tone = {"idle": "good", "moving": "good", "stopping": "warn", "starting": "warn", "connecting": "warn"}.get(
-            status.phase, "bad"
-        )
-        self._plant.show(self._plants[state.plant])
-        self._plant.handle.disabled = moving or state.target != "virtual"
-        where = text(f"where.{state.plant}") if state.target == "virtual" else state.target
-        address = f'<br><span class="rl-dim">{esc(status.address)}</span>' if status.address else ""
-        self._where.show(
-            f'<p class="rl-verdict rl-{tone}"><b>{esc(where)}</b> {esc(text(phase_code(status)))}{address}</p>'
-            + (f'<p class="rl-note">{esc(text.say(tell_status(status)))}</p>' if tone == "bad" else "")
-        )
         self._faults.show(faults_html(status, text))
 
 
 def _drive(what: Any):  # type: ignore[no-untyped-def]
     return lambda page: requests.Drive(page=page, what=what)
+
+
+def way_html(status: SupervisorStatus, text: Text) -> str:
+    """Returns how far a motion is and how fast it runs; nothing while none does."""
+    if status.code not in ("moving", "moving.held") or status.motion_place is None or not status.motion_duration:
+        return ""
+    said = text("run.way", place=f"{status.motion_place:.1f}", pace=f"{100.0 * status.pace:.0f}")
+    if status.code == "moving.held":
+        said = text("run.held", place=f"{status.motion_place:.1f}")
+    return f'<p class="rl-note" role="status">{esc(said)}</p>'
 
 
 def faults_html(status: SupervisorStatus, text: Text) -> str:

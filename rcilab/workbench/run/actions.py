@@ -60,6 +60,12 @@ class RobotActions:
         if request.what == "stop":
             self._session.stop()
             return
+        if request.what == "disconnect":
+            if is_moving(self._session.status()):
+                self._store.say("warn", message("notice.moving"))
+            else:
+                self.disconnect()
+            return
         status = self._session.status()
         if request.what != "reconnect" and status.phase in ("starting", "connecting", "lost", "crashed"):
             self._store.say("warn", obstacle(self._store.state, status) or message("ready.starting"))
@@ -128,6 +134,15 @@ class RobotActions:
         self._tickets, self._incident, self._phase = [], 0, ""
         self._session.open(state.model, state.target, plant, _own_setup(state, state.target))
 
+    def disconnect(self) -> None:
+        """Lets go of the controller, and ends our own; goal and plan stay, for the preview."""
+        state = self._store.state
+        self._end_recording()
+        self._tickets, self._incident, self._phase = [], 0, ""
+        self._powered, self._power_asked = False, float("-inf")
+        self._session.disconnect()
+        self._store.update(asked=None, playing=False, **_unasked(state))
+
     def open(self, name: str, target: str) -> None:
         """Connects to a destination with an arm; goal, plan and undo stay unless it is another arm."""
         state = self._store.state
@@ -143,6 +158,7 @@ class RobotActions:
             changes |= {"plot_joint": 0, "problems": {}}
             changes |= {"push": replace(state.push, link=TOOL)}  # The other arm may have no such link.
             changes |= {"setup": SetupState()}  # Nor may it bear the same load.
+            changes |= {"drive": replace(state.drive, control=None, refusal=None, typed_address="", world=None)}
         # First: from here on no state of the old arm is shown on the new one.
         self._session.open(model, target, state.plant, _own_setup(state, target) if model is state.model else None)
         self._store.update(place=0.0, playing=False, **changes)
@@ -188,8 +204,9 @@ class RobotActions:
 
     def _execute(self, *, is_agreed: bool) -> None:
         state = self._store.state
-        if state.plan is not None and not state.plan.complete:
-            state = self._store.update(plan=state.plan.completed())
+        mode = state.drive.mode
+        if state.plan is not None and (not state.plan.complete or state.plan.mode != mode):
+            state = self._store.update(plan=state.plan.completed(mode))
         reason = obstacle(state, self._session.status())
         if reason is not None:
             self._store.say("warn", reason)
@@ -203,7 +220,7 @@ class RobotActions:
         supervisor = self._session.supervisor()
         supervisor.drain()
         try:
-            ticket = supervisor.execute(state.plan.motion, certificate)
+            ticket = supervisor.execute(state.plan.motion, certificate, mode)
         except CertificateError as error:
             self._store.say("warn", tell_error(error))
             return
@@ -250,7 +267,10 @@ class RobotActions:
 
     def _end_recording(self) -> None:
         self._recording = False
-        self._keeper.finish(self._stopped)
+        paced = None
+        with suppress(RcilabError):  # Its supervisor has gone.
+            paced = self._session.supervisor().paced
+        self._keeper.finish(self._stopped, paced.as_motion() if paced is not None and paced.changed else None)
 
     def close(self) -> None:
         """Ends a recording, so that its file has an end: the arm is about to be stopped where it still moves."""
@@ -266,9 +286,12 @@ def _unasked(state: UiState) -> dict[str, object]:
     return {
         "setup": replace(state.setup, asked=None, refusal=None),
         "jog": replace(state.jog, robot=False, asked=False, said=None),
+        "drive": replace(state.drive, typed_address="", refusal=None, world=None),
     }
 
 
 def _own_setup(state: UiState, target: str) -> RobotSetup | None:
     """Returns what our own controller is told at once; a foreign one is told nothing that was not agreed to."""
-    return state.setup.wanted.only(state.setup.touched) if target == "virtual" else None
+    if target != "virtual":
+        return None
+    return replace(state.setup.wanted.only(state.setup.touched), control=state.drive.control)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,6 +17,7 @@ from rcilab.workbench.store import Recording, Store
 from rcilab.workbench.text import message
 
 if TYPE_CHECKING:
+    from rcilab.motion import Motion
     from rcilab.posing.planning import Plan
     from rcilab.recording.run_file import RunFile
     from rcilab.workbench.store import UiState
@@ -37,7 +39,7 @@ class RunKeeper:
         """Begins a recording; with "record every cycle" also in a file."""
         state = self._store.state
         plant = state.plant if state.target == "virtual" else ""
-        setup = Setup(target=state.target, plant=plant, mode="joint_position", started_ns=time.time_ns())
+        setup = Setup(target=state.target, plant=plant, mode=state.drive.mode, started_ns=time.time_ns())
         facts = RunFacts(plan=plan.motion, model=state.model, setup=setup)
         self._live = LiveRecording(facts, self._open(state, plan, setup))
 
@@ -54,8 +56,13 @@ class RunKeeper:
         if cycles is not None and (before is None or len(cycles) > len(before)):
             self._store.update(recording=as_recording(cycles, self._live.delay))
 
-    def finish(self, stopped: str | None) -> None:
-        """Ends the recording; from here on it can be exported."""
+    def finish(self, stopped: str | None, plan: Motion | None = None) -> None:
+        """Ends the recording; from here on it can be exported.
+
+        Args:
+            stopped: Why the motion did not reach its end; None: it did.
+            plan: What was asked of the arm in the end, where that is not what was planned: another pace.
+        """
         if self._live is None:
             return
         live, self._live = self._live, None
@@ -66,6 +73,7 @@ class RunKeeper:
             self._complain(error)
             run = live.finish(stopped)  # Its file is given up now; the run in memory is whole.
         if run is not None:
+            run = run if plan is None else replace(run, plan=plan)
             recording = whole_recording(run, self._file)
             self._store.update(recording=recording, last_run=recording)
 

@@ -101,6 +101,12 @@ def is_guided(status: SupervisorStatus) -> bool:
     return status.code == "moving.guided"
 
 
+def gives_way(status: SupervisorStatus) -> bool:
+    """Returns whether forces move the arm: it is guided, or a motion runs in torques or under an impedance."""
+    is_soft = status.mode in ("joint_impedance", "cartesian_impedance", "torque")
+    return is_guided(status) or (status.code in ("moving", "moving.held") and is_soft)
+
+
 def can_grab(state: UiState, status: SupervisorStatus) -> bool:
     """Returns whether a drag on the arm pulls it; otherwise it turns the camera."""
-    return state.push.grab and status.world_address is not None and (state.plant == "mujoco" or is_guided(status))
+    return state.push.grab and status.world_address is not None and (state.plant == "mujoco" or gives_way(status))

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rcilab.workbench.run.driving import control_obstacle
 from rcilab.workbench.setup.wanted import name_parts, setup_obstacle
 from rcilab.workbench.store import UiState
 from rcilab.workbench.telling import tell_status
@@ -33,6 +34,8 @@ def obstacle(state: UiState, status: SupervisorStatus) -> Message | None:
         return message("ready.busy")
     if status.code == "moving.guided":
         return message("ready.guided")
+    if status.code == "moving.held":
+        return message("ready.held")
     if status.phase == "crashed" or (status.phase == "lost" and state.target == "virtual"):
         return tell_status(status)
     if status.phase in _NOT_IDLE:
@@ -52,6 +55,9 @@ def obstacle(state: UiState, status: SupervisorStatus) -> Message | None:
     unset = setup_obstacle(state, status)
     if unset is not None:
         return unset
+    untold = control_obstacle(state, status)
+    if untold is not None:
+        return untold
     if not state.plan.report.ok:
         return message("ready.violations", count=len(state.plan.report.violations))
     if status.q_c is None or float(np.abs(status.q_c - state.plan.starts_at).max()) > _SAME_PLACE:

@@ -1,0 +1,123 @@
+"""Mode: which of the five, and the parameters that have an effect in it, each with its unit and range."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from rcilab.client.control_settings import ControlPart, ControlSettings, Range, control_ranges, standard_control
+from rcilab.state import MODES, Mode
+from rcilab.workbench import requests
+from rcilab.workbench.panels.jog import problems_html
+from rcilab.workbench.run.driving import PARTS_OF_MODE, is_control_pending
+from rcilab.workbench.run.readiness import is_moving
+from rcilab.workbench.text import Text
+from rcilab.workbench.widgets import Ask, Html, Linked, NumberField, esc, on_press
+
+if TYPE_CHECKING:
+    from rcilab.supervisor import SupervisorStatus
+    from rcilab.workbench.store import UiState
+
+_AXES = ("x", "y", "z", "a", "b", "c")
+_FILTERS = ("joint", "cartesian", "torque")
+
+
+class ModePanel:
+    """A group of the Run tab; what is typed goes to our own controller at once, to a foreign one when it is sent."""
+
+    def __init__(self, text: Text, ask: Ask) -> None:
+        self._text, self._ask = text, ask
+
+    def build(self, gui: Any, state: UiState) -> None:
+        """Adds the controls."""
+        text, ask = self._text, self._ask
+        with gui.add_folder(text("mode.title")):
+            names: dict[str, Mode] = {text(f"mode.{mode}"): mode for mode in MODES}
+            self._names = {mode: label for label, mode in names.items()}
+            mode = gui.add_dropdown(
+                text("mode.choose"), tuple(names), initial_value=self._names[state.drive.mode], hint=text("mode.hint")
+            )
+            self._mode = Linked(mode, ask, lambda v, p: requests.SetDrive(page=p, mode=names.get(v)))
+            self._note = Html(gui)
+        self._folders: dict[ControlPart, Any] = {}
+        self._fields: dict[ControlPart, list[NumberField]] = {}
+        self._labels: dict[str, str] = {}
+        self._problems: dict[ControlPart, Html] = {}
+        for part, ranges in control_ranges(state.model.limits).items():
+            visible = part in PARTS_OF_MODE[state.drive.mode]
+            closed = part not in ("joint_stiffness", "cartesian_stiffness")
+            folder = gui.add_folder(self._title(part, ranges), visible=visible, expand_by_default=not closed)
+            with folder:
+                gui.add_html('<i class="rl-pairs"></i>')
+                self._fields[part] = [self._build_field(gui, part, place) for place in range(len(ranges))]
+                self._problems[part] = Html(gui)
+            self._folders[part] = folder
+        with gui.add_folder(text("control.title")):
+            self._held = Html(gui)
+            self._send = gui.add_button(text("control.send"), icon="send", color="blue", hint=text("control.send_hint"))
+            on_press(self._send, ask, lambda page: requests.PressControl(page=page, what="send"))
+            reset = gui.add_button(text("control.reset"), icon="restore", color="gray", hint=text("control.reset_hint"))
+            on_press(reset, ask, lambda page: requests.PressControl(page=page, what="reset"))
+
+    def show(self, state: UiState, status: SupervisorStatus) -> None:
+        """Follows mode and parameters."""
+        text, drive = self._text, state.drive
+        self._mode.show(self._names[drive.mode])
+        self._mode.handle.disabled = is_moving(status)
+        self._note.show(f'<p class="rl-note">{esc(text(f"mode.{drive.mode}_note"))}</p>')
+        wanted = drive.wanted_control(state.model)
+        for part, folder in self._folders.items():
+            visible = part in PARTS_OF_MODE[drive.mode]
+            if folder.visible != visible:
+                folder.visible = visible
+            for field, number in zip(self._fields[part], getattr(wanted, part), strict=True):
+                field.show(f"{number:g}", state.problems.get(field.field), state.typed)
+            labels = [(field.field, self._labels[field.field]) for field in self._fields[part]]
+            self._problems[part].show(problems_html(state, text, labels))
+        self._send.visible = state.target != "virtual"
+        self._send.disabled = not is_control_pending(state, status) or status.phase != "idle"
+        self._held.show(held_html(state, status, text))
+
+    def _build_field(self, gui: Any, part: ControlPart, place: int) -> NumberField:
+        name = f"control.{part}.{place}"
+        self._labels[name] = label = _label(self._text, part, place)
+        return NumberField(gui.add_text(label, "", hint=self._text("target.type_hint")), self._ask, name)
+
+    def _title(self, part: ControlPart, ranges: tuple[Range, ...]) -> str:
+        return f"{self._text(f'control.{part}')} {said_ranges(ranges)}"
+
+
+def said_ranges(ranges: tuple[Range, ...]) -> str:
+    """Returns units and ranges in brackets: one for all, or one for each that differs."""
+    found = dict.fromkeys(f"{item.low:g}…{item.high:g} {item.unit}" for item in ranges)
+    return f"[{', '.join(found)}]"
+
+
+def held_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
+    """Returns what the controller has of the parameters of this mode: as it acknowledged them."""
+    if state.drive.refusal is not None:
+        why = text("ready.control_refused", error=text.say(state.drive.refusal))
+        return f'<p class="rl-problem" role="alert">{esc(why)}</p>'
+    held = status.setup.control
+    own = standard_control(state.model.limits) if state.target == "virtual" else ControlSettings()
+    rows: list[str] = []
+    for part in PARTS_OF_MODE[state.drive.mode]:
+        numbers = getattr(held, part) if held is not None and getattr(held, part) is not None else getattr(own, part)
+        said = text("control.own") if numbers is None else _shown(numbers)
+        rows.append(f"<tr><th>{esc(text(f'control.{part}'))}</th><td>{esc(said)}</td></tr>")
+    pending = (
+        f'<p class="rl-note rl-why">{esc(text("control.pending"))}</p>' if is_control_pending(state, status) else ""
+    )
+    title = f'<p class="rl-note">{esc(text("control.held"))}</p>'
+    return f'{title}<table class="rl-table rl-facts-table">{"".join(rows)}</table>{pending}'
+
+
+def _shown(numbers: tuple[float, ...]) -> str:
+    return f"{numbers[0]:g}" if len(set(numbers)) == 1 else " / ".join(f"{number:g}" for number in numbers)
+
+
+def _label(text: Text, part: ControlPart, place: int) -> str:
+    if part in ("joint_stiffness", "collision_thresholds"):
+        return text("control.joint", number=place + 1)
+    if part == "filters":
+        return text(f"control.filter.{_FILTERS[place]}")
+    return text("control.filter.report") if part == "report_filter" else text(f"control.axis.{_AXES[place]}")

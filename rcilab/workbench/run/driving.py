@@ -1,0 +1,114 @@
+"""How the arm is driven from the page: mode, parameters, pace, and what is done to the virtual controller."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Literal
+
+from rcilab.client.control_settings import ControlPart, ControlSettings, control_ranges, standard_control
+from rcilab.protocols.world import Direction, NetworkFaults, WorldStatus
+from rcilab.state import Mode
+from rcilab.workbench.text import Message, message
+
+if TYPE_CHECKING:
+    from rcilab.model import RobotModel
+    from rcilab.supervisor import SupervisorStatus
+    from rcilab.workbench.store import UiState
+
+Destination = Literal["preview", "ideal", "mujoco", "address"]
+
+DESTINATIONS: tuple[Destination, ...] = ("preview", "ideal", "mujoco", "address")
+PARTS_OF_MODE: dict[Mode, tuple[ControlPart, ...]] = {
+    "joint_position": ("collision_thresholds", "filters", "report_filter"),
+    "cartesian_position": ("collision_thresholds", "filters", "report_filter"),
+    "joint_impedance": ("joint_stiffness", "collision_thresholds", "filters", "report_filter"),
+    "cartesian_impedance": (
+        "cartesian_stiffness",
+        "desired_wrench",
+        "collision_thresholds",
+        "filters",
+        "report_filter",
+    ),
+    "torque": ("collision_thresholds", "filters", "report_filter"),
+}
+"""What of the parameters has an effect in a mode."""
+CABLE_PULLED = NetworkFaults(loss=1.0, tcp_delay=10.0)
+"""No datagram comes through, and TCP says nothing."""
+NETWORK_LAB: dict[str, tuple[float, str]] = {
+    "loss": (0.3, "%"),
+    "delay": (0.05, "ms"),
+    "jitter": (0.05, "ms"),
+    "reorder": (0.3, "%"),
+    "duplicate": (0.3, "%"),
+}
+"""The sliders: largest value, [1] or [s], and the unit on the page. Choices: what is beyond ends any motion."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class DriveState:
+    """What the operator has set in the Run tab."""
+
+    mode: Mode = "joint_position"
+    control: ControlSettings | None = None
+    """Parameters as the operator wants them, all of them; None: nobody has touched them."""
+    refusal: Message | None = None
+    """Why the controller did not take them."""
+    pace: float = 1.0
+    """Part of the planned speed to run at."""
+    pulled: bool = False
+    """Whether the cable of the virtual controller is pulled."""
+    network: NetworkFaults = field(default_factory=NetworkFaults)
+    direction: Direction = "both"
+    world: WorldStatus | None = None
+    """What our own controller says of itself; None: it is not ours, or does not answer."""
+    typed_address: str = ""
+    """The address that waits for a second yes."""
+
+    def wanted_control(self, model: RobotModel) -> ControlSettings:
+        """Returns the parameters to show: those typed, or what a controller wakes up with."""
+        return self.control if self.control is not None else standard_control(model.limits)
+
+    def with_number(self, model: RobotModel, part: ControlPart, place: int, value: float) -> DriveState:
+        """Returns the state with another number among the parameters."""
+        control = self.wanted_control(model)
+        numbers = list(getattr(control, part))
+        numbers[place] = value
+        return replace(self, control=replace(control, **{part: tuple(numbers)}), refusal=None)
+
+
+def control_field(model: RobotModel, name: str) -> tuple[ControlPart, int] | None:
+    """Returns part and place of a typed field, such as control.joint_stiffness.0; None: there is no such field."""
+    _, part, place = (*name.split("."), "", "")[:3]
+    for known, ranges in control_ranges(model.limits).items():
+        if part == known and place in map(str, range(len(ranges))):
+            return known, int(place)
+    return None
+
+
+def is_control_pending(state: UiState, status: SupervisorStatus) -> bool:
+    """Returns whether the controller has not taken the parameters yet."""
+    control = state.drive.control
+    return control is not None and status.setup.control is not control
+
+
+def control_obstacle(state: UiState, status: SupervisorStatus) -> Message | None:
+    """Returns why nothing may run with these parameters, or None when the controller has them."""
+    if not is_control_pending(state, status):
+        return None
+    if state.drive.refusal is not None:
+        return message("ready.control_refused", error=state.drive.refusal)
+    if state.target == "virtual":
+        return message("ready.control_pending")
+    return message("ready.control_unsent", address=state.target)
+
+
+def destination(state: UiState, status: SupervisorStatus) -> Destination:
+    """Returns where motions go just now."""
+    if status.phase == "closed":
+        return "preview"
+    return state.plant if state.target == "virtual" else "address"
+
+
+def is_ours(status: SupervisorStatus) -> bool:
+    """Returns whether the controller is our own, which lets the world in."""
+    return status.world_address is not None

@@ -1,0 +1,56 @@
+"""Drive the arm as a person: an impedance mode, a pause, the network lab, another destination and back."""
+
+from __future__ import annotations
+
+import threading
+
+import pytest
+
+from browser.test_settings import choose
+from rcilab.workbench import requests
+
+
+@pytest.fixture
+def heard(page):
+    """The page, taken for present: a busy machine may keep it silent for 2 s, which ends a motion."""
+    ending = threading.Event()
+
+    def beat() -> None:
+        while not ending.wait(0.3):
+            page.bench.session.heartbeat()
+
+    thread = threading.Thread(target=beat)
+    thread.start()
+    yield page
+    ending.set()
+    thread.join()
+
+
+def test_a_soft_motion_is_held_gone_on_with_and_a_spoiled_network_is_noticed(heard):
+    page = heard
+    page.bench.conductor.ask(requests.SetSpeed(speed=0.02))
+    page.plan_to(1, -50.0 if page.status.q_c[0] > 0 else 50.0)
+    page.open_tab("Run")
+    choose(page, "Follow", "joint impedance")
+    page.wait(lambda: page.state.drive.mode == "joint_impedance", "the mode")
+    field = page.tab.get_by_text("Joint stiffness").first
+    assert "N·m/rad" in field.inner_text()
+    page.wait(lambda: page.button("Execute").is_enabled(), "Execute to be pressable")
+    page.button("Execute").click()
+    page.wait(lambda: page.status.code == "moving" and (page.status.motion_time or 0.0) > 0.1, "the arm on its way")
+    page.button("Pause").click()
+    page.wait(lambda: page.status.code == "moving.held", "the pause")
+    page.wait(lambda: "Held at" in page.tab.get_by_role("status").first.inner_text(), "the page to say so")
+    page.button("Go on").dispatch_event("click")
+    page.wait(lambda: page.status.code == "moving", "the way on")
+    place = page.status.motion_place
+    page.wait(lambda: page.status.motion_place > place + 0.1, "the arm on its way again")
+    page.button("Stop").click()
+    page.wait(lambda: page.status.phase == "idle", "rest")
+    page.tab.get_by_text("Network lab").first.click()
+    page.button("Pull the cable").click()
+    page.wait(lambda: page.status.phase == "lost", "the client to notice")
+    page.button("Plug the cable in").click()
+    page.wait(lambda: page.status.phase == "idle", "states again")
+    page.tab.get_by_text("Network lab").first.click()
+    page.bench.conductor.ask(requests.SetDrive(mode="joint_position"))

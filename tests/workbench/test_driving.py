@@ -1,0 +1,202 @@
+"""Modes, parameters, pauses, the lab and destinations without a browser: what is asked for happens at the robot."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from rcilab.client.control_settings import control_ranges, standard_control
+from rcilab.controller.settings import default_settings
+from rcilab.model import load_model
+from rcilab.state import MODES
+from rcilab.supervisor.lateness import LatenessHistogram, summarise
+from rcilab.workbench import requests
+from rcilab.workbench.app import Workbench
+from rcilab.workbench.panels.health import histogram_html
+from rcilab.workbench.panels.mode import said_ranges
+from rcilab.workbench.run.driving import PARTS_OF_MODE, control_field
+from rcilab.workbench.text import Text, load_catalogue
+from tests.workbench.opened import opened, told, wait
+
+MODEL = load_model("xMatePro7")
+
+
+@pytest.fixture(scope="module")
+def bench() -> Iterator[Workbench]:
+    with opened() as found:
+        yield found
+
+
+@pytest.fixture
+def idle(bench):
+    bench.conductor.ask(requests.SetDrive(mode="joint_position", pace=1.0))
+    wait(lambda: bench.session.status().phase == "idle" and bool(bench.session.status().powered), "a powered arm")
+    return bench
+
+
+def plan(bench, speed=0.1, way=0.8):
+    """Poses the goal, so that a motion of some seconds is planned and judged."""
+    ask, q = bench.conductor.ask, bench.session.status().q_c
+    before = bench.store.state.plan
+    ask(requests.SetSpeed(speed=speed))
+    ask(requests.MoveJoint(joint=0, angle=float(q[0]) + (way if q[0] < 0.1 else -way)))
+
+    def planned() -> bool:
+        state = bench.store.state
+        return state.plan is not None and state.plan is not before and state.plan.complete
+
+    wait(planned, "a plan")
+    wait(lambda: bench.store.state.plan.mode == bench.store.state.drive.mode, "the judgement for the mode")
+
+
+def execute(bench, place=0.3):
+    bench.conductor.ask(requests.Drive(what="execute"))
+    wait(
+        lambda: bench.session.status().code == "moving" and (bench.session.status().motion_time or 0.0) > place,
+        "the arm on its way",
+    )
+
+
+def test_what_the_page_takes_for_defaults_is_what_the_virtual_controller_wakes_up_with():
+    ours, woken = standard_control(MODEL.limits), default_settings(MODEL.description)
+    assert ours.joint_stiffness == woken.joint_stiffness
+    assert ours.cartesian_stiffness == woken.cartesian_stiffness
+    assert ours.desired_wrench == woken.desired_wrench
+    assert ours.collision_thresholds == woken.collision_thresholds
+    assert ours.filters == (woken.joint_filter, woken.cartesian_filter, woken.torque_filter)
+    assert ours.report_filter == (woken.torque_report_filter,)
+
+
+def test_every_part_says_its_unit_and_range_and_has_its_words():
+    ranges = control_ranges(MODEL.limits)
+    assert said_ranges(ranges["joint_stiffness"]) == "[0…3000 N·m/rad, 0…300 N·m/rad]"
+    words = load_catalogue("en")
+    for mode in MODES:
+        assert {f"mode.{mode}", f"mode.{mode}_note"} <= words.keys()
+        assert set(PARTS_OF_MODE[mode]) <= ranges.keys()
+    assert {f"control.{part}" for part in ranges} <= words.keys()
+
+
+@pytest.mark.parametrize("name", ["control.joint_stiffness.7", "control.sideways.0", "control.filters", "control"])
+def test_fields_that_do_not_exist_are_none(name):
+    assert control_field(MODEL, name) is None
+
+
+def test_a_typed_parameter_is_told_acknowledged_and_read_back(idle):
+    ask = idle.conductor.ask
+    ask(requests.TypeField(field="control.joint_stiffness.2", text="1234 N·m/rad"))
+    wait(
+        lambda: (c := idle.session.status().setup.control) is not None and c.joint_stiffness[2] == 1234.0, "the answer"
+    )
+    ask(requests.TypeField(field="control.joint_stiffness.2", text="30000"))
+    wait(lambda: "control.joint_stiffness.2" in idle.store.state.problems, "the complaint")
+    assert idle.store.state.drive.control.joint_stiffness[2] == 1234.0
+    ask(requests.PressControl(what="reset"))
+    wait(lambda: idle.session.status().setup.control == standard_control(MODEL.limits), "the defaults")
+    assert "control.joint_stiffness.2" not in idle.store.state.problems
+
+
+def test_the_plan_is_judged_by_the_conditions_of_the_mode(idle):
+    plan(idle, speed=0.5)
+    assert idle.store.state.plan.report.ok
+    idle.conductor.ask(requests.SetDrive(mode="torque"))
+    wait(lambda: idle.store.state.plan.mode == "torque", "another judgement")
+    report = idle.store.state.plan.report
+    assert {row.condition.id for row in report.rows} >= {"torque.rate", "torque.range"}
+    assert not report.ok  # Half of the speed asks for more than the torque rate.
+    idle.conductor.ask(requests.Drive(what="execute"))
+    wait(lambda: told(idle) == "ready.violations", "the refusal")
+    idle.conductor.ask(requests.SetDrive(mode="sideways"))
+    idle.conductor.ask(requests.SetDrive(mode="joint_position"))
+    wait(lambda: idle.store.state.plan.report.ok, "the first judgement again")
+
+
+def test_paused_gone_on_with_slower_and_recorded_as_it_was(idle):
+    idle.conductor.ask(requests.SetDrive(mode="joint_impedance"))
+    wait(lambda: idle.store.state.drive.mode == "joint_impedance", "the mode")
+    plan(idle)
+    motion = idle.store.state.plan.motion
+    execute(idle)
+    idle.conductor.ask(requests.Drive(what="pause"))
+    wait(lambda: idle.session.status().code == "moving.held", "the pause")
+    idle.conductor.ask(requests.SetDrive(mode="torque"))
+    wait(lambda: told(idle) == "notice.moving", "the refusal of another mode in mid-motion")
+    idle.conductor.ask(requests.SetDrive(pace=0.7))
+    idle.conductor.ask(requests.Drive(what="resume"))
+    wait(lambda: idle.session.status().pace == pytest.approx(0.7), "the way on")
+    wait(lambda: told(idle) == "notice.arrived", "the arrival")
+    wait(lambda: idle.store.state.last_run is not None and idle.store.state.last_run.run is not None, "the run")
+    run = idle.store.state.last_run.run
+    assert run.setup.mode == "joint_impedance"
+    assert run.plan.duration > motion.duration + 0.5
+    assert run.plan.goal == pytest.approx(motion.goal, abs=1e-9)
+    assert np.degrees(np.nanmax(np.abs(run.tracking.joint))) < 2.0  # Against what was asked for, pauses and all.
+
+
+def test_the_speed_of_the_slider_counts_from_the_start_and_a_pause_needs_a_motion(idle):
+    idle.conductor.ask(requests.Drive(what="pause"))
+    wait(lambda: told(idle) == "pace.nothing", "the answer")
+    idle.conductor.ask(requests.SetDrive(pace=0.2))
+    plan(idle)
+    execute(idle)
+    wait(lambda: idle.session.status().pace == pytest.approx(0.2), "the slow motion")
+    idle.conductor.ask(requests.Drive(what="stop"))
+    wait(lambda: idle.session.status().phase == "idle", "rest")
+
+
+def test_the_cable_is_pulled_in_a_motion_and_plugged_in_again(idle):
+    plan(idle)
+    execute(idle, 0.1)
+    idle.conductor.ask(requests.SetNetwork(pulled=True))
+    wait(lambda: idle.session.status().phase == "lost", "the loss to be noticed")
+    idle.conductor.ask(requests.SetNetwork(pulled=False))
+    wait(lambda: not idle.store.state.drive.pulled, "the cable in")
+    idle.conductor.ask(requests.SetNetwork(name="loss", value=9.0))
+    wait(lambda: (w := idle.store.state.drive.world) is not None and w.commands.loss == 0.3, "the bound of the slider")
+    idle.conductor.ask(requests.SetNetwork(clear=True))
+    wait(lambda: (w := idle.store.state.drive.world) is not None and w.commands.spares_datagrams, "a good network")
+    idle.conductor.ask(requests.Drive(what="reconnect"))
+    wait(lambda: idle.session.status().phase in ("idle", "fault"), "the connection")
+    if idle.session.status().phase == "fault":
+        idle.conductor.ask(requests.Drive(what="recover"))
+    wait(lambda: idle.session.status().phase == "idle", "an idle arm")
+
+
+def test_the_emergency_stop_has_a_way_out(idle):
+    ask = idle.conductor.ask
+    ask(requests.PressSafety(button="estop"))
+    wait(lambda: idle.session.status().powered is False, "the motors off")
+    wait(lambda: idle.store.state.drive.world.button == "estop", "the button to show")
+    ask(requests.PressSafety(button="none"))
+    wait(lambda: idle.store.state.drive.world.button == "none", "the release")
+    ask(requests.Drive(what="power_on"))
+    wait(lambda: bool(idle.session.status().powered), "the motors on")
+    assert idle.session.status().faults == ()
+
+
+def test_an_address_is_named_once_more_and_preview_connects_to_nothing(idle):
+    ask = idle.conductor.ask
+    ask(requests.ChooseDestination(where="address", address=" rci://127.0.0.1:9 "))
+    wait(lambda: idle.store.state.drive.typed_address == "rci://127.0.0.1:9", "the question")
+    assert idle.store.state.target == "virtual"
+    ask(requests.ChooseDestination(where="address", answer="no"))
+    wait(lambda: idle.store.state.drive.typed_address == "", "the end of it")
+    ask(requests.ChooseDestination(where="address", address="nonsense"))
+    wait(lambda: told(idle) == "address.bad", "the complaint")
+    ask(requests.ChooseDestination(where="preview"))
+    wait(lambda: idle.session.status().phase == "closed", "nothing connected")
+    ask(requests.ChooseDestination(where="ideal"))
+    wait(lambda: idle.session.status().phase == "idle", "the virtual controller again")
+
+
+def test_cycles_that_were_too_late_have_a_word_beside_their_bar():
+    words = memoryview(bytearray(8 * 400)).cast("Q")
+    histogram = LatenessHistogram(words)
+    for lateness in [2e-5] * 900 + [3e-3]:
+        histogram.add(lateness)
+    said = histogram_html(summarise(words), Text("en"))
+    assert "900" in said
+    assert said.count("too late") == 1
+    assert histogram_html(summarise(memoryview(bytearray(8 * 400)).cast("Q")), Text("en")) == ""
