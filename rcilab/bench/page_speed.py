@@ -168,9 +168,7 @@ def bench_scrub() -> Measurement:
                     pass
                 times.append(time.perf_counter() - start)
     longest = f"{1e3 * max(times):.0f} ms at most"
-    return summarise(
-        "scrub", times, "ms", 70.0, f"{_SEEKS} places in {_RECORDED:.0f} s of 7 joints; {longest:.0f} ms at most"
-    )
+    return summarise("scrub", times, "ms", 70.0, f"{_SEEKS} places in {run.duration:.0f} s of 7 joints; {longest}")
 
 
 def recorded(model: RobotModel, seconds: float) -> Run:
