@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import json
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.metadata import version
+from typing import Any
 
 import numpy as np
-import viser
 from websockets.sync.client import connect
 
 from rcilab.bench.browser import find_chromium
@@ -17,6 +20,8 @@ from rcilab.cycle_file import cycle_dtype
 from rcilab.model import RobotModel, load_model
 from rcilab.recording.run import Run, build_run
 from rcilab.views.arm_view import ArmView
+from rcilab.views.gate import Gate
+from rcilab.views.guarded_server import GuardedServer, listen
 from rcilab.views.viser_scene import ViserScene
 from rcilab.workbench.app import Workbench, WorkbenchConfig
 from rcilab.workbench.live import LIVE_PATH
@@ -80,8 +85,7 @@ def bench_page_drag() -> Measurement:
 def _drag_bare(browser: str) -> list[float]:
     """Returns the same of a viser server that puts an arm into the pose of a gizmo and does nothing else, [s]."""
     model = load_model(_ROBOT)
-    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
-    try:
+    with _server() as (server, port):
         server.scene.configure_environment_map(None)
         arm = ArmView(ViserScene(server, shadows=False), "live", model)
         ArmView(ViserScene(server, shadows=False), "candidate", model, "candidate").show(model.home)
@@ -97,9 +101,16 @@ def _drag_bare(browser: str) -> list[float]:
             follower.position = gizmo.position
 
         with open_tab(browser) as tab:
-            return _drag(tab, f"http://127.0.0.1:{server.get_port()}/", "/target", "/follower", 0.26)
-    finally:
-        server.stop()
+            return _drag(tab, f"http://127.0.0.1:{port}/", "/target", "/follower", 0.26)
+
+
+@contextmanager
+def _server() -> Iterator[tuple[Any, int]]:
+    """Serves an empty page; yields viser's server and the port."""
+    bound = listen("127.0.0.1", 0)
+    port = bound.getsockname()[1]
+    with GuardedServer(bound, Gate(host="127.0.0.1", port=port)) as guard:
+        yield guard.viser, port
 
 
 def _drag(tab: Tab, url: str, gizmo: str, follower: str, scale: float) -> list[float]:
@@ -123,20 +134,16 @@ def _drag(tab: Tab, url: str, gizmo: str, follower: str, scale: float) -> list[f
 def bench_mirror() -> Measurement:
     """What it costs this process, in processor time a second, to keep the arm on one page at 60 Hz."""
     model = load_model(_ROBOT)
-    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
-    try:
+    with _server() as (server, port):
         arm = ArmView(ViserScene(server), "live", model)
-        link = connect(
-            f"ws://127.0.0.1:{server.get_port()}/",
-            subprotocols=[f"viser-v{viser.__version__}"],
-            max_size=None,  # type: ignore[list-item]  # Any text.
-        )
-        with link:
+        origin = {"Origin": f"http://127.0.0.1:{port}"}
+        protocol: Any = [f"viser-v{version('viser')}"]
+        with connect(
+            f"ws://127.0.0.1:{port}/", additional_headers=origin, subprotocols=protocol, max_size=None
+        ) as link:
             link.recv(timeout=10.0)
             idle = _processor_time(lambda step: None)
             moving = _processor_time(lambda step: arm.show(model.home + 0.3 * np.sin(0.1 * step + np.arange(model.n))))
-    finally:
-        server.stop()
     costs = [max(busy - still, 0.0) / _MIRRORED for busy, still in zip(moving, idle, strict=True)]
     note = f"{_RATE:.0f} poses a second of an {_ROBOT}, one page connected; 50 ms a second are 5 % of a core"
     return summarise("mirror", costs, "ms", 50.0, note)
