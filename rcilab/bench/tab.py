@@ -12,7 +12,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from websockets.sync.client import ClientConnection, connect
+from websockets.sync.client import connect
+from websockets.sync.connection import Connection
 
 from rcilab.bench.browser import CHROMIUM_FLAGS
 from rcilab.bench.keeper import keeper, launch
@@ -28,7 +29,7 @@ class Tab:
         link: Its debugging connection.
     """
 
-    def __init__(self, link: ClientConnection) -> None:
+    def __init__(self, link: Connection) -> None:
         self._link = link
         self._numbers = itertools.count(1)
 
