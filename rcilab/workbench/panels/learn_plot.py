@@ -7,12 +7,14 @@ from typing import Any
 
 import numpy as np
 
+_NEAR = 0.5  # Share of the lower bound from which on it is shown: a far one would press the curve flat. A choice.
+
 
 def plot_contents(t: Any, values: Any, lower: float, upper: float) -> tuple[Any, Any, Any]:
     """Returns data, series and bands: bounds, what is beyond them, the curve, the sample with the fault."""
     seen = np.where(np.isfinite(values), values, np.nan)
     least = float(np.nanmin(seen))
-    floor = lower if math.isfinite(lower) and least < 0.0 else math.nan
+    floor = lower if math.isfinite(lower) and least < _NEAR * lower else math.nan
     top = 1.25 * max(abs(upper), float(np.nanmax(np.abs(seen))), 1e-9)
 
     def level(value: float) -> Any:
