@@ -10,14 +10,15 @@ import numpy as np
 from rcilab.language import Language
 from rcilab.workbench import requests
 from rcilab.workbench.panels.check_rows import number, pretty_unit
-from rcilab.workbench.panels.learn_plot import plot_axes, plot_contents
+from rcilab.workbench.panels.learn_plot import exhibit_contents
+from rcilab.workbench.panels.plot_contents import plot_axes
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, Html, esc, on_press
 
 if TYPE_CHECKING:
     from rcilab.gallery import Exhibit
     from rcilab.supervisor import SupervisorStatus
-    from rcilab.workbench.store import UiState
+    from rcilab.workbench.store import Theme, UiState
 
 _HEIGHT = 150  # [px]
 _AROUND = 0.06  # Part of the recorded time that the plot goes on behind the fault, so that its mark is whole.
@@ -36,11 +37,12 @@ class LearnExhibitPanel:
         self._back = gui.add_button(text("learn.close"), icon="arrow-left", color="gray", visible=False)
         on_press(self._back, ask, lambda page: requests.Learn(page=page, what="close"))
         self._head = Html(gui)
-        data, series, bands = plot_contents(np.array([0.0, 1.0]), np.zeros(2), -1.0, 1.0)
+        data, series, bands = exhibit_contents(np.array([0.0, 1.0]), np.zeros(2), -1.0, 1.0, state.theme)
         self._plot = gui.add_uplot(
             data, series, bands=bands, height=_HEIGHT, legend={"show": False}, visible=False,
             scales={"x": {"time": False, "range": (0.0, 1.0)}, "y": {"range": (-1.2, 1.2)}},
-            cursor={"drag": {"x": False, "y": False}}, padding=(6, 12, 0, 0), axes=plot_axes(),
+            cursor={"drag": {"x": False, "y": False}}, padding=(6, 12, 0, 0),
+            axes=plot_axes(state.theme, last=True, space=26),
         )  # fmt: skip
         self._body = Html(gui)
         self._moment = gui.add_button(
@@ -70,16 +72,16 @@ class LearnExhibitPanel:
                 part.show("")
             return
         self._head.show(head_html(exhibit, text))
-        self._draw(exhibit)
+        self._draw(exhibit, state.theme)
         self._body.show(body_html(exhibit, text))
         code = f"<pre>{esc(exhibit.script)}</pre>"
         copy = f'<button type="button" data-rl-copy data-done="{esc(text("program.copied"))}">'
         copy += f"{esc(text('program.copy'))}</button>"
         self._script.show(f'<div class="rl-code">{copy}{code}</div>' if learn.is_script_shown else "")
 
-    def _draw(self, exhibit: Exhibit) -> None:
+    def _draw(self, exhibit: Exhibit, theme: Theme) -> None:
         signal, t = exhibit.signal, np.array(exhibit.cycles["t"])
-        data, series, _ = plot_contents(t, signal.values, signal.lower, signal.upper)
+        data, series, _ = exhibit_contents(t, signal.values, signal.lower, signal.upper, theme)
         low, high = float(np.nanmin(data[1:])), float(np.nanmax(data[1:]))
         margin = 0.12 * (high - low or 1.0)
         self._plot.data = data
