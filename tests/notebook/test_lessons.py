@@ -1,7 +1,7 @@
 """Every lesson runs from top to bottom without a display; its exercises wait for an answer, its solutions are right.
 
-A lesson is executed once: its cells as they are, and after each exercise the same with the solution folded below it. The
-Chinese lessons have the same code, so they need not run.
+A lesson is executed once: its cells as they are, and after each exercise the same with the solution folded below it.
+The Chinese lessons have the same code, so they need not run.
 """
 
 from __future__ import annotations
