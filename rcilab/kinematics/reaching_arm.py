@@ -42,7 +42,7 @@ class ReachingArm(MovingArm):
         """Returns every analytic solution inside the joint limits (GetJointPos); `.nearest(q)` is the vendor's answer.
 
         The xMates have 8 solutions at an arm angle. The Panda has offsets, and up to 16 or none: the roots of a
-        polynomial, which take some ten times as long. Where two of them are about to meet, one may be taken for both;
+        polynomial, which takes a millisecond or two. Where two of them are about to meet, one may be taken for both;
         the one next to `near` is always found.
 
         Args:
