@@ -13,7 +13,7 @@ BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stab
 """Names a browser may have on the path."""
 
 _CHROMIUM = BROWSERS[:4]
-_FLAGS = (
+CHROMIUM_FLAGS = (
     "--headless",
     "--no-sandbox",
     "--no-first-run",
@@ -45,6 +45,6 @@ def find_chromium() -> str | None:
 def open_page(url: str, browser: str) -> Iterator[None]:
     """Keeps a page open in a headless Chromium of our own; it and its profile are gone afterwards, and when we die."""
     profile = tempfile.mkdtemp(prefix="rcilab-bench-")
-    with keeper([browser, *_FLAGS, f"--user-data-dir={profile}", url], directory=profile) as process:
+    with keeper([browser, *CHROMIUM_FLAGS, f"--user-data-dir={profile}", url], directory=profile) as process:
         launch(process)
         yield

@@ -68,8 +68,8 @@ def bench_inverse_batch() -> Measurement:
     growth = _growth(model.inverse_batch, {n: poses[:n] for n in (10, 100, 1000, count)})
     one, many = _panda_inverse(count)
     note = (
-        f"{_ROBOT}, time a pose in batches of {count}, limits judged; whole batches: {growth}; Panda, whose offsets make "
-        f"it a polynomial of degree 16: {one:.0f} us single, {many:.1f} us a pose"
+        f"{_ROBOT}, time a pose in batches of {count}, limits judged; whole batches: {growth}; Panda, whose offsets "
+        f"make it a polynomial of degree 16: {one:.0f} us single, {many:.1f} us a pose"
     )
     return summarise("inverse_batch", np.array(times) / count, "us", 2.0, note)
 
@@ -109,9 +109,9 @@ def bench_plan_joint() -> Measurement:
     )
     straight, alone = _ratios(model, ends)
     note = (
-        f"{_ROBOT}, 200 random pairs, {straight.max():.4f} times as long as the fastest straight motion at most; against "
-        f"the slowest joint by itself, which a straight motion cannot always match, {np.median(alone):.4f} (median), "
-        f"{alone.max():.3f} at most; with every 1 ms sample of q {growth}"
+        f"{_ROBOT}, 200 random pairs, {straight.max():.4f} times as long as the fastest straight motion at most; "
+        f"against the slowest joint by itself, which a straight motion cannot always match, {np.median(alone):.4f} "
+        f"(median), {alone.max():.3f} at most; with every 1 ms sample of q {growth}"
     )
     return summarise("plan_joint", times, "ms", 1.0, note)
 

@@ -23,7 +23,8 @@ BENCHES = (
     *("check", "check_full", "check_joint_rows"),
     *("controller_ideal", "controller_mujoco", "controller_cartesian", "controller_impedance", "client_answer"),
     *("jog", "plan_line", "plan_arc", "replan"),
-    *("drag", "lab_slider", "lab_shown", "import", "start", "state_period", "control_loop"),
+    *("drag", "mirror", "scrub", "page_ready", "page_drag", "lab_slider", "lab_shown"),
+    *("import", "start", "state_period", "control_loop"),
 )
 """In the order they run; the slow ones last."""
 COMPARE = "compare"
@@ -118,6 +119,15 @@ def _bench(name: str, seconds: float) -> Callable[[], Measurement]:
         from rcilab.bench import page
 
         return page.bench_drag if name == "drag" else lambda: page.bench_control_loop(seconds)
+    if name in ("mirror", "scrub", "page_ready", "page_drag"):
+        from rcilab.bench import page_speed
+
+        return {
+            "mirror": page_speed.bench_mirror,
+            "scrub": page_speed.bench_scrub,
+            "page_ready": page_speed.bench_page_ready,
+            "page_drag": page_speed.bench_page_drag,
+        }[name]
     if name in ("plan_line", "plan_arc", "replan"):
         from rcilab.bench import paths
 

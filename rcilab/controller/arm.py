@@ -44,7 +44,7 @@ class Arm:
         self.actuator = Actuator(model, settings)
         self._tool_version = self.commanded.version
         self._law = Law.BRAKED
-        self._ddq: list[float] = [0.0] * model.n
+        self._dq_before = measured.dq
         self._is_there: bool = True
         self._is_slow: bool = True
         self._standing = 0
@@ -65,6 +65,7 @@ class Arm:
         self.commanded.place(measured.q.tolist())
         self.tool_c.place(self.commanded.q)
         self._tool_version = self.commanded.version
+        self._dq_before = measured.dq
         self.watch.configure(self.model, measured)
 
     def configure(self, settings: Settings) -> None:
@@ -75,6 +76,7 @@ class Arm:
             self.plant.configure(self.model)
             measured = self.plant.reset(self.watch.measured.q)
             self.tool_c = ToolMotion(self.model, self.commanded.q)
+            self._dq_before = measured.dq
             self.watch.configure(self.model, measured)
         self.actuator.configure(self.model, settings)
 
@@ -89,7 +91,8 @@ class Arm:
         """
         commanded, last = self.commanded, self.watch.measured
         if self._law.yields and not law.yields:
-            commanded.join(last.q.tolist(), last.dq.tolist(), self._ddq)
+            ddq: list[float] = ((last.dq - self._dq_before) / CYCLE_TIME).tolist()
+            commanded.join(last.q.tolist(), last.dq.tolist(), ddq)
         if not (law.leads or commanded.is_at_rest or has_moved):
             commanded.come_to_rest()
         if not law.leads:
@@ -101,9 +104,7 @@ class Arm:
         elif law is Law.BRAKED and measured.q.tolist() != commanded.q:
             commanded.place(measured.q.tolist())
             self._move_tool()
-        if law.yields:
-            self._ddq = ((measured.dq - last.dq) / CYCLE_TIME).tolist()
-        self._law = law
+        self._law, self._dq_before = law, last.dq
         self._is_there = measured.q.tolist() == commanded.q
         speeds: list[float] = measured.dq.tolist()
         self._is_slow = -STANDSTILL < min(speeds) and max(speeds) < STANDSTILL

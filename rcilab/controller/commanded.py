@@ -45,8 +45,9 @@ class CommandedMotion:
     def arrays(self) -> tuple[JointVector, JointVector, JointVector]:
         """q, dq and ddq as read-only arrays, made once a cycle for all who compute with them."""
         if self._arrays is None or self._arrays_version != self.version:
-            q, dq, ddq = sealed(np.array((self.q, self.dq, self.ddq)))
-            self._arrays, self._arrays_version = (q, dq, ddq), self.version
+            n = len(self.q)
+            rows = sealed(np.array([*self.q, *self.dq, *self.ddq]))  # One list: numpy is slow to look into several.
+            self._arrays, self._arrays_version = (rows[:n], rows[n : 2 * n], rows[2 * n :]), self.version
         return self._arrays
 
     def place(self, q: Sequence[float]) -> None:

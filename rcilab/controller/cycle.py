@@ -137,6 +137,11 @@ class ControlCycle:
         return self.phase is Phase.MOVING and not self.playout.is_finished
 
     @property
+    def is_starved(self) -> bool:
+        """Whether a motion runs whose next command is not there."""
+        return self.phase is Phase.MOVING and self.playout.is_starved
+
+    @property
     def loop_back(self) -> bool:
         """Whether every digital output is wired to the input of the same number."""
         return self._loop_back

@@ -101,6 +101,11 @@ class Playout:
         return len(self._queue)
 
     @property
+    def is_starved(self) -> bool:
+        """Whether the next cycle would lose its command, for all that is known now."""
+        return self.is_playing and not (self.is_finished or self._queue or self._lives)
+
+    @property
     def success_rate(self) -> float:
         """Share of the last cycles that had their command, 0 to 1; 1 before the first one."""
         return self._played_in_window / len(self._outcomes) if self._outcomes else 1.0

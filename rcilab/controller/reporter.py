@@ -26,7 +26,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rcilab.arrays import Array, JointVector, frozen
+from rcilab.arrays import Array, JointVector, frozen, sealed
 from rcilab.clock import CYCLE_TIME
 from rcilab.controller.commanded import CommandedMotion
 from rcilab.controller.drive_model import DriveModel
@@ -144,7 +144,7 @@ class StateReporter:
             commanded.is_at_rest and tool_c.is_at_rest and filtered is torques and not is_new and not dtau_c.any()
         )
         n = len(q_c)
-        tool_velocity_c, tool_acceleration_c = frozen((tool_c.twist, tool_c.acceleration))
+        tool_rates_c = sealed(np.array([*tool_c.twist, *tool_c.acceleration]))
         return {
             "q": measured.q,
             "q_c": q_c,
@@ -153,8 +153,8 @@ class StateReporter:
             "ddq_c": ddq_c,
             "T_base_tool": tool.matrix,
             "T_base_tool_c": tool_c.matrix,
-            "tool_velocity_c": tool_velocity_c,
-            "tool_acceleration_c": tool_acceleration_c,
+            "tool_velocity_c": tool_rates_c[:6],
+            "tool_acceleration_c": tool_rates_c[6:],
             "psi": tool.psi,
             "psi_c": tool_c.psi,
             "dpsi_c": tool_c.dpsi,

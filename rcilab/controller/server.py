@@ -2,7 +2,8 @@
 
 Free-running, a state is due every millisecond on a fixed grid; its cycle is lived through a little before, so that it
 leaves in time however long that took. A cycle that this process itself missed is left out
-and counted: the simulated time slips, rather than the client being blamed for commands it had no state to answer.
+and counted: the simulated time slips, rather than the client being blamed for commands it had no state to answer (see
+`pace`).
 A client that went on meanwhile, as the vendor's does on its old state, has then sent more commands than cycles; such
 cycles are made up for, one in each millisecond and unseen, or its commands would be played later and later.
 In lock-step a motion's next cycle is due when its command has come, however long or short that takes. When several
@@ -34,6 +35,7 @@ from rcilab.controller.endpoint import (
 )
 from rcilab.controller.faulty_network import FaultyNetwork
 from rcilab.controller.ideal_plant import IdealPlant
+from rcilab.controller.pace import Pace
 from rcilab.controller.plant import Plant
 from rcilab.controller.stalls import StallPlan
 from rcilab.controller.state_machine import Event, Phase, When
@@ -69,7 +71,6 @@ class ControllerServer:
 
     Attributes:
         cycle: The controller itself; owned by the thread that runs.
-        missed: Cycles that this process was too late for and left out.
         misfits: Datagrams that had not the size of a command.
 
     Args:
@@ -103,11 +104,11 @@ class ControllerServer:
         self.cycle.auto_limit = config.auto_limit
         self.cycle.loop_back = config.loop_back
         self.cycle.limit_table = config.limit_table
-        self.missed = 0
         self.misfits = 0
         self._is_out_of_patience = False
         self._log = log if log is not None else _to_stderr
         self._clock = SystemClock()
+        self._pace = Pace(self._clock.now())
         self._requests: deque[bytes] = deque()
         self._pending: tuple[Request, int, Reply] | None = None
         self._is_ending = False
@@ -122,6 +123,11 @@ class ControllerServer:
             self.cycle, self._network, self._stalls, self._clock, lambda: Mishaps(self.missed, self.misfits)
         )
         self._world = self._open_world()
+
+    @property
+    def missed(self) -> int:
+        """Cycles that were left out because this process was not there for them, or put off; see `pace`."""
+        return self._pace.missed
 
     @property
     def url(self) -> str:
@@ -178,8 +184,8 @@ class ControllerServer:
             raise
 
     def _loop(self, on_ready: Callable[[], None]) -> None:
-        deadline = self._clock.now()
-        self._stalls.replace(self.config.stalls, deadline)
+        self._pace.restart(self._clock.now())
+        self._stalls.replace(self.config.stalls, self._pace.deadline)
         last_moment: float | None = None
         farewell = 0
         is_ready = False
@@ -194,12 +200,12 @@ class ControllerServer:
                     return
             if self.config.lockstep and self.cycle.wants_commands:
                 self._await_command()
-                deadline = self._clock.now()
-                self._step(deadline)
+                self._pace.restart(self._clock.now())
             else:
-                deadline = self._next_deadline(deadline)
-                self._await(deadline - LEAD_TIME)
-                self._step(deadline)
+                self._await(self._pace.next(self._clock.now()) - LEAD_TIME)
+                if self._pace.puts_off(self.cycle.is_starved):
+                    continue
+            self._step(self._pace.deadline)
             if not is_ready:
                 is_ready = True
                 on_ready()
@@ -223,15 +229,6 @@ class ControllerServer:
     def _poll(self, timeout: float) -> None:
         """Serves the sockets once; waits up to `timeout`, [s], for something to serve."""
         self._take(self._network.poll(timeout, () if self._world is None else self._world.sockets))
-
-    def _next_deadline(self, deadline: float) -> float:
-        deadline += CYCLE_TIME
-        late = self._clock.now() - deadline
-        if late >= CYCLE_TIME:
-            skipped = int(late / CYCLE_TIME)
-            self.missed += skipped
-            deadline += skipped * CYCLE_TIME
-        return deadline
 
     def _await(self, deadline: float) -> None:
         """Serves the sockets until the deadline, and at least once."""

@@ -139,8 +139,8 @@ def _reference(
         dq_c, shape (n,), [rad/s]; the force, shape (6,), [N, N m]; `free`, shape (n,), [rad/s^2].
     """
     J = terms.jacobian
-    wanted = np.array((twist, acc))
-    felt = wanted[1]
+    wanted = np.array([*twist, *acc])
+    felt = wanted[6:]
     if any(twist) or any(acc):
         felt -= terms.drift
     if model.n == 7:
@@ -149,5 +149,5 @@ def _reference(
     else:
         free = np.zeros(model.n)
     back = terms.mass_inverse.dot(J.T)
-    L_wanted = model.rigid_body.tool_solver.solve(J.dot(back) + _DAMPED_INVERSE, wanted.T)
+    L_wanted = model.rigid_body.tool_solver.solve(J.dot(back) + _DAMPED_INVERSE, wanted.reshape(2, 6).T)
     return back.dot(L_wanted[:, 0]), L_wanted[:, 1], free

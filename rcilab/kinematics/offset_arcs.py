@@ -77,35 +77,52 @@ def _pieces(
     arm: OffsetGeometry, T_base_flange: Pose, lower: Array, upper: Array
 ) -> tuple[Array, Array, NDArray[np.int64]]:
     """Returns arm angles at both ends of pieces, and what is wrong in each: joints beyond their limits, singular."""
-    motion, R, p = SelfMotion(arm, T_base_flange), T_base_flange.rotation, T_base_flange.position
+    motion = SelfMotion(arm, T_base_flange)
     middles = np.array(arm.middles)
     bits = 1 << np.arange(7)
 
-    def broken(q: Array) -> NDArray[np.int64]:
+    def broken(q: Array, nearness: Array) -> NDArray[np.int64]:
         angle = wrapped(q - middles) + middles
         beyond = np.asarray(((angle <= lower) | (angle >= upper)) @ bits, dtype=np.int64)
-        return beyond + _SINGULAR * (held_singularity_path(arm, q) >= 1.0)
+        return beyond + _SINGULAR * (nearness >= 1.0)
 
-    starts, ends = motion.starts, motion.ends
+    starts, ends, branches = motion.starts, motion.ends, motion.branches
+    half = len(starts) // 2  # The others are their twins, whose determinants are the same.
+    nearness = held_singularity_path(arm, np.concatenate((starts[:half], ends[:half]))).reshape(2, half)
+    before, after = (broken(q, np.tile(near, 2)) for q, near in zip((starts, ends), nearness, strict=True))
+    cut = (before != after) | ((branches < 0) & (np.abs(ends - starts).max(axis=1) > _LONG))
     done: list[tuple[Array, Array, NDArray[np.int64]]] = []
-    for round_ in range(_ROUNDS):
-        before, after = broken(starts), broken(ends)
-        cut = before != after
-        if round_ == 0:
-            cut |= np.abs(ends - starts).max(axis=1) > _LONG
+    shares = np.linspace(0.0, 1.0, _CUTS + 1)[:, None, None]
+    for _ in range(_ROUNDS):
         done.append((starts[~cut, ELBOW], ends[~cut, ELBOW], before[~cut]))
-        shares = np.linspace(0.0, 1.0, _CUTS + 1)[:, None, None]
-        between = (starts[cut] + shares * (ends - starts)[cut]).reshape(-1, 7)
-        found, settled = settle(
-            arm, np.broadcast_to(R, (len(between), 3, 3)), np.broadcast_to(p, (len(between), 3)), between
-        )
-        whole = found.reshape(_CUTS + 1, -1, 7)
-        good = (settled & (np.abs(found - between).max(axis=1) < 2.0 * _LONG)).reshape(_CUTS + 1, -1)
+        between = starts[cut] + shares * (ends - starts)[cut]
+        whole = _placed(arm, motion, T_base_flange, between.reshape(-1, 7), np.tile(branches[cut], _CUTS + 1))
+        whole = whole.reshape(between.shape)
+        q = whole.reshape(-1, 7)
+        codes = broken(q, held_singularity_path(arm, q)).reshape(_CUTS + 1, -1)
+        good = np.abs(whole - between).max(axis=2) < 2.0 * _LONG  # Not so where there is no number.
         both = good[:-1] & good[1:]
-        starts, ends = whole[:-1][both], whole[1:][both]
-    done.append((starts[:, ELBOW], ends[:, ELBOW], broken(starts) | broken(ends)))
-    first, last, codes = zip(*done, strict=True)
-    return np.concatenate(first), np.concatenate(last), np.concatenate(codes)
+        starts, ends, before, after = whole[:-1][both], whole[1:][both], codes[:-1][both], codes[1:][both]
+        branches = np.broadcast_to(branches[cut], (_CUTS, int(cut.sum())))[both]
+        cut = before != after
+    done.append((starts[:, ELBOW], ends[:, ELBOW], before | after))
+    first, last, found = zip(*done, strict=True)
+    return np.concatenate(first), np.concatenate(last), np.concatenate(found)
+
+
+def _placed(
+    arm: OffsetGeometry, motion: SelfMotion, T_base_flange: Pose, guesses: Array, branches: NDArray[np.intp]
+) -> Array:
+    """Returns the points of the self-motion next to guesses, shape (m, 7), [rad], or not a number."""
+    whole = np.full_like(guesses, np.nan)
+    on = branches >= 0
+    whole[on] = motion.on_branches(guesses[on], branches[on])
+    count = int((~on).sum())
+    rotations = np.broadcast_to(T_base_flange.rotation, (count, 3, 3))
+    found, settled = settle(arm, rotations, np.broadcast_to(T_base_flange.position, (count, 3)), guesses[~on])
+    found[~settled] = np.nan
+    whole[~on] = found
+    return whole
 
 
 def _arc(start: float, end: float, code: int, outside: bool) -> Arc:

@@ -118,8 +118,22 @@ class SelfMotion:
         angles = self._with_ends(angles, exists[:, 0])
         table, beyond = trace(arm, self._rotation, self._position, angles)
         exists = np.isfinite(table[..., 0])
-        self.starts, self.ends = _segments(table, exists, beyond > 0.0)
-        """Ends of short pieces of the self-motion, each of shape (m, 7), [rad]; each end within half a turn."""
+        self.starts, self.ends, self.branches = _segments(table, exists, beyond > 0.0)
+        """Ends of short pieces of the self-motion, each of shape (m, 7), [rad]; each end within half a turn. And which
+        branch of `trace` each is on, 4 more where joint 2 is negative, -1 from one to another, shape (m,)."""
+
+    def on_branches(self, guesses: Array, branches: NDArray[np.intp]) -> Array:
+        """Returns the joint angles at the guesses' angles of joint 7, whole turns counted as there; or not a number.
+
+        Args:
+            guesses: Joint angles close by, shape (m, 7), [rad].
+            branches: Which branch each is on, 0 to 7, shape (m,).
+        """
+        table = trace(self._arm, self._rotation, self._position, guesses[:, 6])[0].reshape(4, len(guesses), 7)
+        found = table[branches % 4, np.arange(len(guesses))]
+        is_turned = branches >= 4
+        found[is_turned] = _turned(found[is_turned])
+        return guesses + wrapped(found - guesses)
 
     def _with_ends(self, angles: Array, exists: NDArray[np.bool_]) -> Array:
         """Returns the angles of joint 7, and more of them where branches end, the closer to the end the denser.
@@ -201,14 +215,17 @@ def wrapped(angle: Array) -> Array:
     return angle - tau * np.round(angle / tau)
 
 
-def _segments(table: Array, exists: NDArray[np.bool_], is_beyond: NDArray[np.bool_]) -> tuple[Array, Array]:
-    """Returns short pieces of the self-motion, both ends each.
+def _segments(
+    table: Array, exists: NDArray[np.bool_], is_beyond: NDArray[np.bool_]
+) -> tuple[Array, Array, NDArray[np.intp]]:
+    """Returns short pieces of the self-motion, both ends each, and their branches, see `SelfMotion`.
 
     Most go from one angle of joint 7 to the next. Where a branch ends, the self-motion turns back into its twin: out of
     reach to the other side of the flip, otherwise to the other sign of cos q5.
     """
-    after = np.roll(exists, -1, axis=2)
-    pieces = [(table[exists & after], np.roll(table, -1, axis=2)[exists & after])]
+    goes_on = exists & np.roll(exists, -1, axis=2)
+    pieces = [(table[goes_on], np.roll(table, -1, axis=2)[goes_on])]
+    group, sign, _ = np.nonzero(goes_on)
     for step in (-1, 1):
         last = exists & ~np.roll(exists, step, axis=2)
         flips = np.roll(is_beyond, step)[None, None]
@@ -216,14 +233,22 @@ def _segments(table: Array, exists: NDArray[np.bool_], is_beyond: NDArray[np.boo
             chosen = last & turns & np.isfinite(twin[..., 0])
             pieces.append((table[chosen], twin[chosen]))
     starts, ends = (np.concatenate(side) for side in zip(*pieces, strict=True))
-    turned = starts.copy()
-    turned[:, [0, 2]] += pi
-    turned[:, 1] *= -1.0
     steps = wrapped(ends - starts)
     other = steps.copy()
     other[:, 1] *= -1.0
-    starts = np.concatenate((starts, turned))
-    return starts, starts + np.concatenate((steps, other))
+    branches = np.full(len(starts), -1)
+    branches[: len(group)] = 2 * group + sign
+    starts = np.concatenate((starts, _turned(starts)))
+    turned = np.where(branches < 0, -1, branches + 4)
+    return starts, starts + np.concatenate((steps, other)), np.concatenate((branches, turned))
+
+
+def _turned(q: Array) -> Array:
+    """Returns the twins of joint angles, shape (m, 7), [rad]: the shoulder turned by half a turn, joint 2 mirrored."""
+    twins = q.copy()
+    twins[:, [0, 2]] += pi
+    twins[:, 1] *= -1.0
+    return twins
 
 
 def _unreachable(arm: OffsetGeometry, beyond: Array) -> UnreachableError:

@@ -33,7 +33,7 @@ def held_singularity_path(arm: OffsetGeometry, q: JointPath) -> Array:
         q: Joint angles, shape (N, 7), [rad].
     """
     J = jacobian_path(moving_frame(arm.chain, q, 7, IDENTITY))
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore"):
         return HELD_SINGULAR / np.abs(np.linalg.det(J[:, :, _FREE]))
 
 

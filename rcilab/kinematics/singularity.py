@@ -67,7 +67,9 @@ def find_singularity(arm: ArmGeometry, q: Sequence[float]) -> str | None:
         arm: From `rcilab.kinematics.inverse.build_geometry`.
         q: Joint angles, n plain floats, [rad].
     """
-    upright = [angle - offset for angle, offset in zip(q, arm.offsets, strict=True)]
+    upright = q
+    if any(arm.offsets):
+        upright = [angle - offset for angle, offset in zip(q, arm.offsets, strict=True)]
     if arm.n == 7:
         return _singular_seven(arm, upright)
     return _singular_six(arm, upright)

@@ -27,7 +27,7 @@ from rcilab.motion.path import Path
 from rcilab.motion.path_bounds import LEAST, ROUNDNESS, PathBounds, half_planes, path_bounds
 from rcilab.motion.piecewise import PiecewisePolynomial
 from rcilab.motion.slowdown import spread
-from rcilab.motion.time_law import TimeLaw, fastest_squares, smooth_law
+from rcilab.motion.time_law import FastestLaw, TimeLaw, smooth_law
 from rcilab.motion.turning import TurnThrough, turns_between
 
 _KNOTS = 500
@@ -85,10 +85,10 @@ def plan_along(model: RobotModel, q: JointVector, path: Path, speed: float) -> M
     bounds = _bounds(model, LIMIT_MARGIN * speed)
     allowed = _path_bounds(path, require_path(model, q, path), bounds)
     cycles = max(2, math.ceil(_longest_reversal(bounds) / CYCLE_TIME))
-    slowdown = np.ones(len(allowed.knots))
+    fastest, slowdown = FastestLaw(allowed), np.ones(len(allowed.knots))
     worst = 0.0
     for round_ in range(2 * _ROUNDS):
-        law = smooth_law(allowed.knots, fastest_squares(allowed.slowed(slowdown)), cycles)
+        law = smooth_law(allowed.knots, fastest.slowed(slowdown), cycles)
         rows = _rows_along(model, q, path, law.s)
         excess = _excess(bounds, path, rows, law.s)
         if excess.max() <= 1.0:

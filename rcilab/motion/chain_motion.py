@@ -15,7 +15,7 @@ from rcilab.motion.chain import Chain, Rows
 from rcilab.motion.chain_bounds import ColumnLimits, chain_bounds, column_limits
 from rcilab.motion.hermite import quintic
 from rcilab.motion.slowdown import spread
-from rcilab.motion.time_law import TimeLaw, fastest_squares, smooth_law
+from rcilab.motion.time_law import FastestLaw, TimeLaw, smooth_law
 
 _ROUNDS = 12
 """How often to slow down in places, and then as often as a whole. Seen: 1 to 4 in places."""
@@ -25,8 +25,9 @@ _INSTANTS = (0.25, 0.5, 0.75)
 """Where in a cycle the curve is looked at, besides its start, in cycles."""
 _CHANGE = 1e-9
 """By what part of itself a square of s' has changed that is not rounding."""
-_HASTE = 1.001
-"""To slow down by the square of what was found, and this much more, so that few rounds do. A choice."""
+_HASTE = 1.002
+"""To slow down by the square of what was found, and this much more, also where it was closely under a limit, so that
+few rounds do, and places that were good stay so when the cycles fall elsewhere. A choice."""
 
 
 def plan_chain(chain: Chain, limits: Limits) -> tuple[Array, list[float]]:
@@ -48,11 +49,11 @@ def plan_chain(chain: Chain, limits: Limits) -> tuple[Array, list[float]]:
     # From full deceleration to full acceleration.
     reversal = 2.0 * float(chain.speed.max()) * float((bounds.acceleration[finite] / bounds.jerk[finite]).max())
     cycles = max(2, math.ceil(reversal / CYCLE_TIME))
-    slowdown = np.ones(len(chain.knots))
+    fastest, slowdown = FastestLaw(allowed), np.ones(len(chain.knots))
     squares = np.zeros(len(chain.knots))
     worst = 0.0
     for round_ in range(2 * _ROUNDS):
-        before, squares = squares, fastest_squares(allowed.slowed(slowdown))
+        before, squares = squares, fastest.slowed(slowdown)
         law = smooth_law(chain.knots, squares, cycles)
         interval = chain.interval(law.s)
         changed = np.abs(squares - before) > _CHANGE * squares
@@ -68,7 +69,7 @@ def plan_chain(chain: Chain, limits: Limits) -> tuple[Array, list[float]]:
             return coefficients, corners
         worst = float(law.s[excess.argmax()])
         if round_ < _ROUNDS:
-            factor = np.where(excess > 1.0, excess * excess * _HASTE, 1.0)
+            factor = np.maximum(excess * excess * _HASTE, 1.0)
             slowdown *= spread(factor, law.s, chain.knots, cycles + 3)
         else:
             slowdown *= float(excess.max()) * _HASTE

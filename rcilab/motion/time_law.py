@@ -15,6 +15,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rcilab.arrays import Array
 from rcilab.clock import CYCLE_TIME
@@ -43,27 +44,102 @@ def fastest_squares(bounds: PathBounds) -> Array:
     Args:
         bounds: What the path allows.
     """
-    reserve, tilt, most = bounds.reserve, bounds.tilt, bounds.most
-    # A step on, x has grown by 2 step s'', and each row bounds s'' by tilt * x -+ reserve: the most that x can become,
-    # and the most that it can have been, are the least of many straight lines, hence concave in x.
-    step = 2.0 * np.diff(bounds.knots)
-    gain, factor = step * reserve[:, :-1], 1.0 + step * tilt[:, :-1]
-    binds = factor > LEAST
-    inverse = np.where(binds, 1.0 / np.maximum(factor, LEAST), 0.0)
-    backward = _chords(np.where(binds, gain * inverse, _UNBOUND), inverse, most[1:])
-    forward = _chords(gain, factor, most[:-1])
-    limits = most.tolist()
-    last = len(limits) - 1
-    highest = [0.0] * (last + 1)
-    x = 0.0
-    for k in range(last - 1, -1, -1):
-        x = highest[k] = min(limits[k], _along(backward[k], x / limits[k + 1]))
-    x = 0.0
-    squares = [0.0] * (last + 1)
-    for k in range(last):
-        x = squares[k + 1] = max(min(highest[k + 1], _along(forward[k], x / limits[k])), LEAST)
-    squares[last] = 0.0
-    return np.array(squares)
+    return FastestLaw(bounds).slowed(np.ones(len(bounds.knots)))
+
+
+class FastestLaw:
+    """The fastest law along a path. Slowed down in places, it is computed anew only as far as that is felt.
+
+    Args:
+        bounds: What the path allows.
+    """
+
+    def __init__(self, bounds: PathBounds) -> None:
+        self._bounds = bounds
+        # A step on, x has grown by 2 step s'', and each row bounds s'' by tilt * x -+ reserve: the most that x can
+        # become, and the most that it can have been, are the least of many straight lines, hence concave in x.
+        step = 2.0 * np.diff(bounds.knots)
+        self._gain, self._factor = step * bounds.reserve[:, :-1], 1.0 + step * bounds.tilt[:, :-1]
+        count = len(bounds.knots)
+        self._slowdown = np.zeros(count)
+        self._limits = [0.0] * count
+        self._backward: list[list[float]] = [[]] * (count - 1)
+        self._forward: list[list[float]] = [[]] * (count - 1)
+        self._highest = [0.0] * count
+        """From which the end can still be reached."""
+        self._squares = [0.0] * count
+
+    def slowed(self, factor: Array) -> Array:
+        """Returns the squares of s' at the knots when each is passed that much slower, shape (K + 1,), [1/s^2].
+
+        Args:
+            factor: 1 or more, shape (K + 1,).
+        """
+        changed = factor != self._slowdown
+        self._slowdown = factor.copy()
+        last = len(changed) - 1
+        is_stale = changed[:-1] | changed[1:]
+        stale: list[int] = np.flatnonzero(is_stale).tolist()
+        if stale:
+            self._bound(np.flatnonzero(changed), np.flatnonzero(is_stale))
+            self._look_back(stale)
+            self._go_on(changed[:-1])
+        squares = np.array(self._squares)
+        squares[last] = 0.0
+        return squares
+
+    def _bound(self, knots: NDArray[np.intp], steps: NDArray[np.intp]) -> None:
+        """Computes bounds at some knots, and over some steps between knots."""
+        squares = self._slowdown**2
+        most = self._bounds.most / squares
+        for k, limit in zip(knots.tolist(), most[knots].tolist(), strict=True):
+            self._limits[k] = limit
+        gain, factor = self._gain[:, steps] / squares[steps], self._factor[:, steps]
+        binds = factor > LEAST
+        inverse = np.where(binds, 1.0 / np.maximum(factor, LEAST), 0.0)
+        backward = _chords(np.where(binds, gain * inverse, _UNBOUND), inverse, most[steps + 1])
+        forward = _chords(gain, factor, most[steps])
+        for k, back, forth in zip(steps.tolist(), backward, forward, strict=True):
+            self._backward[k], self._forward[k] = back, forth
+
+    def _look_back(self, stale: list[int]) -> None:
+        """Finds the largest x from which the end can be reached, from the last stale step down."""
+        limits, backward, highest = self._limits, self._backward, self._highest
+        self._lowered = set[int]()
+        waiting = stale.copy()
+        k = len(highest)
+        moves = False
+        while True:
+            k = k - 1 if moves else min(k - 1, waiting[-1] if waiting else -1)
+            if k < 0:
+                return
+            while waiting and waiting[-1] >= k:
+                waiting.pop()
+            x = min(limits[k], _along(backward[k], highest[k + 1] / limits[k + 1]))
+            moves = x != highest[k]
+            if moves:
+                highest[k] = x
+                self._lowered.add(k)
+
+    def _go_on(self, is_changed: NDArray[np.bool_]) -> None:
+        """Finds the largest x that can be had, from the first stale step up."""
+        limits, forward, highest, squares = self._limits, self._forward, self._highest, self._squares
+        is_stale = is_changed.copy()
+        for k in self._lowered:
+            if k:
+                is_stale[k - 1] = True
+        waiting: list[int] = np.flatnonzero(is_stale)[::-1].tolist()
+        k, last = -1, len(highest) - 1
+        moves = False
+        while True:
+            k = k + 1 if moves else max(k + 1, waiting[-1] if waiting else last)
+            if k >= last:
+                return
+            while waiting and waiting[-1] <= k:
+                waiting.pop()
+            x = max(min(highest[k + 1], _along(forward[k], squares[k] / limits[k])), LEAST)
+            moves = x != squares[k + 1]
+            squares[k + 1] = x
 
 
 def duration_of(knots: Array, squares: Array) -> float:

@@ -25,21 +25,28 @@ def save_run(run: Run, file: str | PathLike[str], *, progress: Progress | None =
     """Writes a run to a file; see `Run.save`."""
     path = Path(fspath(file))
     require_ending(path.suffix)
-    content = export_run(run, path.suffix, progress=progress, language=language)
     try:
-        path.write_bytes(content)
+        with path.open("wb") as stream:
+            write_export(run, path.suffix, stream, progress=progress, language=language)
     except OSError as error:
         raise InvalidValueError("file", fspath(file), f"cannot be written: {error.strerror}") from error
 
 
 def export_run(run: Run, ending: str, *, progress: Progress | None = None, language: str = "en") -> bytes:
     """Returns a run in one of the forms of `ENDINGS`; see `Run.save`."""
-    write = WRITERS[require_ending(ending)]
     stream = BytesIO()
+    write_export(run, ending, stream, progress=progress, language=language)
+    return stream.getvalue()
+
+
+def write_export(
+    run: Run, ending: str, stream: IO[bytes], *, progress: Progress | None = None, language: str = "en"
+) -> None:
+    """Writes a run to a stream in one of the forms of `ENDINGS`; what `progress` raises ends it."""
+    write = WRITERS[require_ending(ending)]
     report = progress or (lambda share: None)
     write(run, stream, report, require_language(language))
     report(1.0)
-    return stream.getvalue()
 
 
 def require_ending(ending: str) -> str:

@@ -82,17 +82,19 @@ class LiveRecording:
         return find_delay(first["q_c"], first["command"])
 
     def finish(self, stopped: str | None = None) -> Run | None:
-        """Ends the recording and returns the run; None when not one cycle came.
+        """Ends the recording and returns the run; None, and no file, when not one cycle came.
 
         Raises:
             InvalidValueError: The end of the file cannot be written; all that came before is in it.
         """
         file, self.file = self.file, None
-        if file is not None:
-            file.close(stopped=stopped)
         cycles = self.cycles
         if cycles is None:
+            if file is not None:
+                file.discard()
             return None
+        if file is not None:
+            file.close(stopped=stopped)
         facts = self.facts
         return build_run(cycles, plan=facts.plan, stopped=stopped, model=facts.model, setup=facts.setup)
 

@@ -22,6 +22,7 @@ import json
 import os
 import struct
 import zlib
+from contextlib import suppress
 from io import BytesIO
 from os import PathLike, fspath
 from pathlib import Path
@@ -149,6 +150,12 @@ class RunFile:
                 os.fsync(self._stream.fileno())
         except OSError as error:
             raise _unwritable(self.path, error) from error
+
+    def discard(self) -> None:
+        """Closes the file and takes it away: nothing was recorded."""
+        with suppress(OSError):
+            self._stream.close()
+            self.path.unlink()
 
 
 def write_run(run: Run, stream: IO[bytes]) -> None:

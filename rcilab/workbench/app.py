@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING
+from typing import IO, TYPE_CHECKING
 
 from rcilab.model import load_model, require_rci
 from rcilab.views.gate import Gate
@@ -17,7 +18,7 @@ from rcilab.workbench.goal.actions import initial_goal
 from rcilab.workbench.keepsake import Keepsake, keepsake_file
 from rcilab.workbench.lease import Presence
 from rcilab.workbench.live import LIVE_PATH, Heard, LiveChannel
-from rcilab.workbench.page import decorate, introduce
+from rcilab.workbench.page import decorate, introduce, send_file
 from rcilab.workbench.run.replay import replayed, require_replayable
 from rcilab.workbench.session import Session
 from rcilab.workbench.store import Store, UiState
@@ -136,11 +137,10 @@ class Workbench:
         self.presenter.close()
         self._door.close()
 
-    def _deliver(self, page: int | None, name: str, content: bytes) -> None:
-        """Has a page's browser save a file; a page that has gone wants it no more."""
+    def _deliver(self, page: int | None, name: str, stream: IO[bytes], is_unwanted: Callable[[], bool]) -> bool:
+        """Has a page's browser save a file; a page that has gone wants it no more. Returns whether all was sent."""
         client = self.server.get_clients().get(-1 if page is None else page)
-        if client is not None:
-            client.send_file_download(name, content, save_immediately=True)
+        return client is not None and send_file(client, name, stream, is_unwanted)
 
     def _follow_pages(self) -> None:
         ask = self.conductor.ask

@@ -53,7 +53,7 @@ class Conductor:
         self,
         store: Store,
         session: Session,
-        deliver: Deliver = lambda page, name, content: None,
+        deliver: Deliver = lambda page, name, stream, is_unwanted: True,
         keepsake: Keepsake | None = None,
         presence: Presence | None = None,
     ) -> None:
@@ -119,6 +119,7 @@ class Conductor:
             requests.SetView: self._view.set_view,
             requests.ShowPlot: self._view.show_plot,
             requests.Export: self._export.export,
+            requests.CancelExport: self._export.cancel,
             requests.ClearRuns: self._folder.clear,
             requests.SetRecording: self._view.set_recording,
             requests.TakeControls: self._lease.take_controls,

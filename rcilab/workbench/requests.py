@@ -366,6 +366,11 @@ class Export(Request):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class CancelExport(Request):
+    """Drop the export that is under way."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SetRecording(Request):
     """Whether every cycle of a motion is written to a file."""
 
@@ -403,5 +408,7 @@ class PageWent(Request):
     """A page has gone."""
 
 
-Harmless: TypeAlias = PageCame | PageWent | TakeControls | AnswerControls | Seek | Play | SetView | ShowPlot | Export
+Harmless: TypeAlias = (
+    PageCame | PageWent | TakeControls | AnswerControls | Seek | Play | SetView | ShowPlot | Export | CancelExport
+)
 """What a watching page may ask for as well: nothing of it moves a goal or a robot."""

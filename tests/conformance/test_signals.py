@@ -80,7 +80,7 @@ def test_a_torque_too_high_is_advice_with_joint_value_and_way_out_and_the_motion
     assert "(recommended condition)" in str(advice)
 
 
-@settings(max_examples=60)
+@settings(max_examples=25)  # Joint angles of one arm: test_verdicts.py.
 @given(st.sampled_from(MODELS), st.integers(0, 2**32), st.floats(0.05, 1.2))
 def test_monitor_and_check_give_one_verdict_on_the_safety_box(model, seed, edge):
     motion = random_motion(model, seed)

@@ -175,7 +175,7 @@ def test_a_long_motion_is_not_slowed_into_hours():
     for seconds, at_most in ((10.0, 20.0), (100.0, 6.0), (400.0, 2.0)):
         still = PiecewisePolynomial([0.0, seconds], MODEL.limits.joint.upper.reshape(1, 7, 1))
         motion = Motion(polynomial=still, goal=MODEL.limits.joint.upper, law="samples")
-        assert check(motion, MODEL).slow_down().at_most == at_most
+        assert check(motion, MODEL, distance=None).slow_down().at_most == at_most
 
 
 def test_every_obstacle_has_a_sentence_in_both_languages():

@@ -66,6 +66,10 @@ class Hand:
         """Answers the newest state with joint torques and steps."""
         return self.command(tau_c=tuple(map(float, tau)), **fields)
 
+    def torque_only(self, tau: Sequence[float]) -> None:
+        """Answers the newest state with joint torques."""
+        self.cycle.receive(rci.CommandPacket(self.state.message_id, tau_c=tuple(map(float, tau))))
+
     def shift(self, offset: Sequence[float], duration: float, psi: float = 0.0) -> RobotState:
         """Moves the commanded tool smoothly by an offset in base, [m], and its arm angle; from rest to rest."""
         start, psi_start = self.state.T_base_tool_c.copy(), self.state.psi_c

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rcilab.arrays import Array
 from rcilab.motion.path_bounds import PathBounds, path_bounds
-from rcilab.motion.time_law import duration_of, fastest_squares, smooth_law
+from rcilab.motion.time_law import FastestLaw, duration_of, fastest_squares, smooth_law
 
 KNOTS = 400
 
@@ -105,3 +105,15 @@ def test_a_knot_that_is_slowed_is_passed_slower_and_the_rest_as_fast():
     x = fastest_squares(bounds.slowed(factor))
     assert math.sqrt(x[200]) == pytest.approx(0.5, rel=1e-6)
     assert math.sqrt(x[100]) == pytest.approx(1.0, rel=1e-6)
+
+
+@settings(max_examples=25)
+@given(st.integers(0, 2**32))
+def test_a_law_slowed_down_in_places_step_by_step_is_the_one_computed_at_once(seed):
+    rng = np.random.default_rng(seed)
+    bounds = wavy(seed).bounds
+    law, factor = FastestLaw(bounds), np.ones(len(bounds.knots))
+    for _ in range(4):
+        np.testing.assert_allclose(law.slowed(factor), fastest_squares(bounds.slowed(factor)), rtol=1e-12)
+        place = int(rng.integers(len(factor)))
+        factor[place : place + int(rng.integers(1, 6))] *= rng.uniform(1.0, 2.0)

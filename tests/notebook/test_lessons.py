@@ -1,7 +1,7 @@
 """Every lesson runs from top to bottom without a display; its exercises wait for an answer, its solutions are right.
 
-A lesson is executed once: its cells as they are, and after them every exercise again with the solution that is folded
-below it. The Chinese lessons have the same code, so they need not run.
+A lesson is executed once: its cells as they are, and after each exercise the same with the solution folded below it.
+The Chinese lessons have the same code, so they need not run.
 """
 
 from __future__ import annotations
@@ -42,27 +42,27 @@ def exercises(path: Path) -> list[str]:
     return [source for source in code(path) if CHECK in source]
 
 
-def solved(path: Path) -> list[str]:
-    """Returns the exercises of a lesson with the folded solutions in the place of what is to be changed."""
-    solutions = SOLUTION.findall(text(path))
-    return [
-        solution + CHECK + exercise.split(CHECK)[1]
-        for exercise, solution in zip(exercises(path), solutions, strict=True)
-    ]
+def solutions(path: Path) -> list[str]:
+    return SOLUTION.findall(text(path))
+
+
+def with_solved_exercises(path: Path) -> nbformat.NotebookNode:
+    """Returns a lesson in which every exercise is followed by the same with its folded solution in place."""
+    notebook, pending = read(path), iter(solutions(path))
+    cells: list[nbformat.NotebookNode] = []
+    for cell in notebook.cells:
+        cells.append(cell)
+        if cell.cell_type == "code" and CHECK in cell.source:
+            cells.append(nbformat.v4.new_code_cell(next(pending) + CHECK + cell.source.split(CHECK)[1]))
+    notebook.cells = cells
+    return notebook
 
 
 @cache
 def run_lesson(path: Path) -> nbformat.NotebookNode:
-    """Executes a copy of a lesson, and after it its solved exercises."""
-    notebook = read(path)
-    for cell in notebook.cells:
-        cell.source = (
-            re.sub(r"^\w+\.(close|end)\(\)\n?", "", cell.source, flags=re.M) if CHECK in cell.source else cell.source
-        )
-    notebook.cells += [nbformat.v4.new_code_cell(source) for source in solved(path)]
     environment = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")}
-    client = NotebookClient(notebook, timeout=60, resources={"metadata": {"path": str(path.parent)}})
-    return client.execute(env=environment)
+    resources = {"metadata": {"path": str(path.parent)}}
+    return NotebookClient(with_solved_exercises(path), timeout=60, resources=resources).execute(env=environment)
 
 
 def printed(notebook: nbformat.NotebookNode, stream: str = "stdout") -> str:
@@ -116,15 +116,15 @@ def test_a_chinese_lesson_has_the_code_of_the_english_one(path: Path) -> None:
     english = NOTEBOOKS / path.name.replace(".zh.", ".")
     assert code(path) == code(english)
     assert [cell.cell_type for cell in read(path).cells] == [cell.cell_type for cell in read(english).cells]
-    assert SOLUTION.findall(text(path)) == SOLUTION.findall(text(english))
+    assert solutions(path) == solutions(english)
 
 
 @pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem)
 def test_a_lesson_runs_and_its_exercises_can_be_solved(path: Path) -> None:
-    assert len(exercises(path)) == EXERCISES
+    assert len(exercises(path)) == len(solutions(path)) == EXERCISES
     notebook = run_lesson(path)
     assert printed(notebook, "stderr") == ""
-    assert re.findall("✗ not yet|✓ right", printed(notebook)) == ["✗ not yet"] * EXERCISES + ["✓ right"] * EXERCISES
+    assert re.findall("✗ not yet|✓ right", printed(notebook)) == ["✗ not yet", "✓ right"] * EXERCISES
     assert shown(notebook, "image/png") or shown(notebook, "text/html")
 
 

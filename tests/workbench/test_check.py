@@ -7,12 +7,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from rcilab.conformance import CONDITIONS
 from rcilab.model import load_model
 from rcilab.motion import Program, Waypoint
 from rcilab.posing.planning import Plan
 from rcilab.spatial import Pose
 from rcilab.workbench import requests
-from rcilab.workbench.check.actions import CheckActions
+from rcilab.workbench.check.actions import CheckActions, plot_of
 from rcilab.workbench.check.work import scaled, slow_to_goal
 from rcilab.workbench.goal.actions import GoalActions, initial_goal
 from rcilab.workbench.panels.check_rows import row_tone, rows_html
@@ -20,6 +21,7 @@ from rcilab.workbench.program.actions import ProgramActions
 from rcilab.workbench.program.draft import Draft, number_at
 from rcilab.workbench.store import Store, UiState
 from rcilab.workbench.text import Text
+from rcilab.workbench.view_actions import PLOTS
 from tests.waiting import wait_for
 
 MODEL = load_model("xMatePro7")
@@ -81,8 +83,10 @@ def test_a_row_leads_to_its_worst_moment_and_its_joint(bench: Bench) -> None:
     bench.press("row", row.id)
     assert bench.state.place * bench.plan.motion.duration == pytest.approx(row.time)
     assert bench.state.plot_joint == row.joint
+    bench.press("row", "joint.torque_rate")
+    assert "tau" in bench.state.plots
     bench.press("row", "no.such")
-    assert bench.state.check.sought == 1
+    assert bench.state.check.sought == 2
 
 
 def test_a_slow_down_changes_the_speed_until_it_passes_and_can_be_taken_back(bench: Bench) -> None:
@@ -191,6 +195,12 @@ def test_the_report_is_told_in_words(bench: Bench) -> None:
     assert explained is not None
     assert explained[0] is bench.plan.report
     assert explained[2] == bench.plan.report.explain("en")
+
+
+def test_every_row_of_a_joint_or_the_tool_has_a_plot() -> None:
+    found = {plot_of(row) for row in CONDITIONS} - {None}
+    assert found <= set(PLOTS)
+    assert found >= {"q", "dq", "ddq", "jerk", "tau", "speed", "acceleration", "psi"}
 
 
 def test_rows_say_what_they_are_beside_every_colour(bench: Bench) -> None:

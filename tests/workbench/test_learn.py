@@ -130,6 +130,8 @@ def test_the_first_lesson_ticks_itself_off(bench: Bench) -> None:
     none = np.zeros((1, 7))
     bench.store.update(last_run=Recording(t=np.zeros(1), q=none, q_c=none, dq=none, delay=0, run=SimpleNamespace()))
     assert bench.step() == 5
+    assert bench.state.notice is not None
+    assert Text("en").say(bench.state.notice.text) == "✓ Done. That was it."
     assert "That was it" in steps_html(bench.state.learn.lesson, Text("en"))
     bench.press("leave")
     assert bench.state.learn.lesson is None

@@ -90,7 +90,13 @@ def test_exports_reach_the_page_that_asked_and_problems_are_told(bench, monkeypa
     run = finished(bench).run
     sent = []
     actions = bench.conductor._export
-    monkeypatch.setattr(actions, "_deliver", lambda page, name, content: sent.append((page, name, content)))
+
+    def deliver(page, name, stream, is_unwanted):
+        stream.seek(0)
+        sent.append((page, name, stream.read()))
+        return not is_unwanted()
+
+    monkeypatch.setattr(actions, "_deliver", deliver)
     for ending in (".csv", ".html", ".rcirun"):
         bench.conductor.ask(requests.Export(page=7, ending=ending))
         wait(lambda ending=ending: bool(sent) and sent[-1][1].endswith(ending), f"the {ending}")
@@ -104,6 +110,15 @@ def test_exports_reach_the_page_that_asked_and_problems_are_told(bench, monkeypa
     bench.conductor.ask(requests.Export(page=7, ending=".mcap"))
     wait(lambda: told(bench) == "export.missing", "what is missing")
     wait(lambda: bench.store.state.export is None, "the end of the export")
+    monkeypatch.setattr(
+        actions, "_deliver", lambda page, name, stream, is_unwanted: bool(wait(is_unwanted, "a cancel"))
+    )
+    bench.conductor.ask(requests.Export(page=7, ending=".csv"))
+    wait(lambda: bench.store.state.export is not None, "an export")
+    bench.conductor.ask(requests.CancelExport(page=8))
+    wait(lambda: told(bench) == "export.cancelled", "that it was cancelled")
+    wait(lambda: bench.store.state.export is None, "the end of the export")
+    monkeypatch.setattr(actions, "_deliver", deliver)
     bench.conductor.ask(requests.Export(page=7, ending="../../etc/passwd"))
     bench.store.update(recording=None)
     bench.conductor.ask(requests.Export(page=7, ending=".csv"))

@@ -39,8 +39,32 @@
       if (name) control.dataset.rlName = "";
     });
   };
+  // The one button of viser's that has only a picture: scene tree, connection, its own settings.
+  const sweepButtons = () => {
+    const name = document.documentElement.dataset.rlViser || "";
+    document.querySelectorAll("#root button.mantine-ActionIcon-root").forEach((button) => {
+      if (name && !button.textContent.trim() && (!button.getAttribute("aria-label") || button.dataset.rlName !== undefined)) {
+        button.dataset.rlName = "";
+        if (button.getAttribute("aria-label") !== name) button.setAttribute("aria-label", name);
+      }
+    });
+  };
+  const FOLDER = "#root .mantine-Paper-root > .mantine-Paper-root:first-child:has(> svg.tabler-icon)";
+  const sweepFolders = () => {
+    document.querySelectorAll(FOLDER).forEach((head) => {
+      const icon = head.querySelector("svg"), open = icon.classList.contains("tabler-icon-chevron-up");
+      if (head.getAttribute("role") !== "button") { head.setAttribute("role", "button"); head.tabIndex = 0; }
+      if (head.getAttribute("aria-expanded") !== String(open)) head.setAttribute("aria-expanded", String(open));
+    });
+  };
+  document.addEventListener("keydown", (event) => {
+    const head = (event.key === "Enter" || event.key === " ") && event.target instanceof Element && event.target.closest(FOLDER);
+    if (!head || head !== event.target) return;
+    event.preventDefault();
+    head.click();
+  });
   let timer = 0;
-  const later = () => { if (!timer) timer = setTimeout(() => { timer = 0; sweep(); }, PAUSE); };
+  const later = () => { if (!timer) timer = setTimeout(() => { timer = 0; sweep(); sweepButtons(); sweepFolders(); }, PAUSE); };
   const watch = () => {
     new MutationObserver(later).observe(document.body, { childList: true, subtree: true, characterData: true, attributes: true, attributeFilter: ["aria-label"] });
     later();

@@ -121,6 +121,7 @@
     if (!greeted && said.stopHint) sayOnce();
     greeted = true;
     if ("holder" in news || "take" in news || "question" in news) hold();
+    if (news.viser) document.documentElement.dataset.rlViser = news.viser;
     if (news.theme) document.documentElement.dataset.rlTheme = news.theme;
     if (news.language) document.documentElement.lang = news.language;
   };

@@ -20,7 +20,7 @@ from rcilab.workbench.telling import tell_error
 from rcilab.workbench.text import message
 
 if TYPE_CHECKING:
-    from rcilab.conformance import Report
+    from rcilab.conformance import Condition, Report
     from rcilab.posing.planning import Plan
 
 
@@ -94,7 +94,9 @@ class CheckActions:
         if row is None:
             return
         place = row.time / max(plan.motion.duration, 1e-3)
-        self._store.update(place=min(max(place, 0.0), 1.0), playing=False, plot_joint=row.joint)
+        plot, plots = plot_of(row.condition), self._store.state.plots
+        shown = plots if plot is None else plots | {plot}
+        self._store.update(place=min(max(place, 0.0), 1.0), playing=False, plot_joint=row.joint, plots=shown)
         self._set(sought=self._check.sought + 1, row=name)
 
     def _slow_down(self, plan: Plan) -> None:
@@ -156,6 +158,21 @@ class CheckActions:
         report, language = plan.report, self._store.state.language
         self._work.start(plan, lambda tell: _explained(report, language))
         self._set(doing="explain", progress=0.0)
+
+
+def plot_of(condition: Condition) -> str | None:
+    """Returns the plot that shows what a condition judges; None where there is none."""
+    match condition.signal, condition.order:
+        case "joint", order:
+            return ("q", "dq", "ddq", "jerk")[order]
+        case "torque", _:
+            return "tau"
+        case (("translation" | "rotation"), order) if order in (1, 2):
+            return ("speed", "acceleration")[order - 1]
+        case "arm_angle", _:
+            return "psi"
+        case _:
+            return None
 
 
 def _explained(report: Report, language: str) -> tuple[Report, str, str]:

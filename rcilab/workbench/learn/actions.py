@@ -43,6 +43,8 @@ class LearnActions:
             case "lesson" if request.name in LESSONS:
                 self._watcher = Watcher()
                 self._set(lesson=LessonState(name=request.name))
+                first = LESSONS[request.name][0].name
+                self._store.say("good", message(f"lesson.{request.name}.{first}"))
             case "skip":
                 self._step(skipped=True)
             case "leave":
@@ -119,3 +121,7 @@ class LearnActions:
         passed = lesson.skipped | {lesson.step} if skipped else lesson.skipped
         self._watcher = Watcher()
         self._set(lesson=replace(lesson, step=lesson.step + 1, skipped=passed))
+        if not skipped:  # Said on every tab: the person is where the step was done.
+            steps = LESSONS[lesson.name][lesson.step + 1 :]
+            last = message("lesson.over") if not steps else message(f"lesson.{lesson.name}.{steps[0].name}")
+            self._store.say("good", message("lesson.ticked", next=last))

@@ -22,7 +22,7 @@ _AMBER = {True: "check.exceeded", False: "check.tight"}
 
 def rows_html(report: Report, model: RobotModel, chosen: str, text: Text) -> str:
     """Returns every row, what is broken or near first; each leads to its moment when it is clicked."""
-    rows = sorted(report.rows, key=lambda row: _ORDER[row_tone(row)])
+    rows = sorted(report.rows, key=lambda row: (_ORDER[row_tone(row)], row.ok))
     return f'<div class="rl-cards rl-pick">{"".join(row_html(row, model, chosen, text) for row in rows)}</div>'
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from typing import TYPE_CHECKING, Any, cast
 
@@ -11,13 +10,15 @@ import numpy as np
 from rcilab.language import Language
 from rcilab.workbench import requests
 from rcilab.workbench.panels.check_rows import number, pretty_unit
+from rcilab.workbench.panels.learn_plot import exhibit_contents
+from rcilab.workbench.panels.plot_contents import plot_axes
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, Html, esc, on_press
 
 if TYPE_CHECKING:
     from rcilab.gallery import Exhibit
     from rcilab.supervisor import SupervisorStatus
-    from rcilab.workbench.store import UiState
+    from rcilab.workbench.store import Theme, UiState
 
 _HEIGHT = 150  # [px]
 _AROUND = 0.06  # Part of the recorded time that the plot goes on behind the fault, so that its mark is whole.
@@ -36,11 +37,12 @@ class LearnExhibitPanel:
         self._back = gui.add_button(text("learn.close"), icon="arrow-left", color="gray", visible=False)
         on_press(self._back, ask, lambda page: requests.Learn(page=page, what="close"))
         self._head = Html(gui)
-        data, series, bands = _contents(np.array([0.0, 1.0]), np.zeros(2), -1.0, 1.0)
+        data, series, bands = exhibit_contents(np.array([0.0, 1.0]), np.zeros(2), -1.0, 1.0, state.theme)
         self._plot = gui.add_uplot(
             data, series, bands=bands, height=_HEIGHT, legend={"show": False}, visible=False,
             scales={"x": {"time": False, "range": (0.0, 1.0)}, "y": {"range": (-1.2, 1.2)}},
-            cursor={"drag": {"x": False, "y": False}}, padding=(6, 12, 0, 0), axes=_axes(),
+            cursor={"drag": {"x": False, "y": False}}, padding=(6, 12, 0, 0),
+            axes=plot_axes(state.theme, last=True, space=26),
         )  # fmt: skip
         self._body = Html(gui)
         self._moment = gui.add_button(
@@ -70,16 +72,16 @@ class LearnExhibitPanel:
                 part.show("")
             return
         self._head.show(head_html(exhibit, text))
-        self._draw(exhibit)
+        self._draw(exhibit, state.theme)
         self._body.show(body_html(exhibit, text))
         code = f"<pre>{esc(exhibit.script)}</pre>"
         copy = f'<button type="button" data-rl-copy data-done="{esc(text("program.copied"))}">'
         copy += f"{esc(text('program.copy'))}</button>"
         self._script.show(f'<div class="rl-code">{copy}{code}</div>' if learn.is_script_shown else "")
 
-    def _draw(self, exhibit: Exhibit) -> None:
+    def _draw(self, exhibit: Exhibit, theme: Theme) -> None:
         signal, t = exhibit.signal, np.array(exhibit.cycles["t"])
-        data, series, bands = _contents(t, signal.values, signal.lower, signal.upper)
+        data, series, _ = exhibit_contents(t, signal.values, signal.lower, signal.upper, theme)
         low, high = float(np.nanmin(data[1:])), float(np.nanmax(data[1:]))
         margin = 0.12 * (high - low or 1.0)
         self._plot.data = data
@@ -88,7 +90,6 @@ class LearnExhibitPanel:
             "x": {"time": False, "range": (0.0, float(t[-1]) * (1.0 + _AROUND))},
             "y": {"range": (low - margin, high + margin)},
         }
-        del bands
 
 
 def head_html(exhibit: Exhibit, text: Text) -> str:
@@ -137,39 +138,3 @@ def body_html(exhibit: Exhibit, text: Text) -> str:
     )
     table = "".join(f"<tr><th>{esc(text(key))}</th><td>{cell}</td></tr>" for key, cell in rows)
     return f'<div class="rl-legend">{legend}</div><table class="rl-table rl-facts-table rl-exhibit">{table}</table>'
-
-
-def _contents(t: Any, values: Any, lower: float, upper: float) -> tuple[Any, Any, Any]:
-    """Returns data, series and bands: bounds, what is beyond them, the curve, the sample with the fault."""
-    seen = np.where(np.isfinite(values), values, np.nan)
-    least = float(np.nanmin(seen))
-    floor = lower if math.isfinite(lower) and least < 0.0 else math.nan
-    top = 1.25 * max(abs(upper), float(np.nanmax(np.abs(seen))), 1e-9)
-
-    def level(value: float) -> Any:
-        return np.full(len(t), value)
-
-    mark = np.full(len(t), np.nan)
-    mark[-1] = seen[-1]
-    hidden: Any = {"width": 0, "points": {"show": False}}
-    edge: Any = {"stroke": "#d1392b", "width": 1.2, "dash": (5, 4), "points": {"show": False}}
-    curve: Any = {"stroke": "#0b6fc2", "width": 2, "points": {"show": False}}
-    fault: Any = {"stroke": "#d1392b", "width": 0, "points": {"show": True, "size": 11, "fill": "#d1392b"}}
-    data = (
-        t,
-        level(top if upper >= 0.0 else 0.0),
-        level(upper),
-        level(floor),
-        level(-top if floor < 0 else math.nan),
-        seen,
-        mark,
-    )
-    series = ({}, hidden, edge, edge, hidden, curve, fault)
-    tint = "rgba(209,57,43,0.10)"
-    return data, series, ({"series": (1, 2), "fill": tint}, {"series": (3, 4), "fill": tint})
-
-
-def _axes() -> tuple[Any, ...]:
-    font = "11px system-ui, sans-serif"
-    x: Any = {"font": font, "size": 22, "gap": 2, "ticks": {"size": 3}}
-    return x, {"font": font, "size": 52, "gap": 3, "space": 26, "ticks": {"size": 3}}

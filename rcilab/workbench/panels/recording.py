@@ -45,6 +45,8 @@ class RecordingPanel:
                 on_press(button, ask, _export(ending))
                 self._buttons[ending] = button
             self._progress = Html(gui)
+            self._cancel = gui.add_button(text("export.cancel"), icon="x", color="gray", visible=False)
+            on_press(self._cancel, ask, lambda page: requests.CancelExport(page=page))
             box = gui.add_checkbox(text("record.every"), state.record, hint=text("record.every_hint"))
             self._record = Linked(box, ask, lambda v, p: requests.SetRecording(page=p, on=bool(v)))
             self._where = Html(gui)
@@ -61,6 +63,7 @@ class RecordingPanel:
         for button in self._buttons.values():
             button.disabled = state.last_run is None or export is not None
         self._progress.show("" if export is None else progress_html(export.ending, export.share, text))
+        self._cancel.visible = export is not None
         self._record.handle.disabled = state.runs is None
         self._record.show(state.record and state.runs is not None)
         is_written = state.runs is not None and state.record

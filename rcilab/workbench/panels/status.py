@@ -33,6 +33,7 @@ def status_values(state: UiState, status: SupervisorStatus, text: Text, cursor_e
         "chips": _chips(state, status, text),
         "cursor": _cursor(state, status, cursor_end),
         "theme": state.theme,
+        "viser": text("bar.viser"),
         "holder": state.lease.holder,
         "take": text("lease.take" if state.lease.holder is None else "lease.ask"),
         "question": _question(state, text),

@@ -8,7 +8,8 @@ import time
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeAlias
+from tempfile import TemporaryFile
+from typing import IO, TYPE_CHECKING, TypeAlias
 
 from rcilab.errors import RcilabError
 from rcilab.recording.extra import MissingExtraError
@@ -23,10 +24,14 @@ if TYPE_CHECKING:
 ENDINGS = (".csv", ".parquet", ".mcap", ".html", ".rcirun")
 """What the page offers, in the order of its buttons."""
 
-Deliver: TypeAlias = Callable[["int | None", str, bytes], None]
-"""Sends a file to a page: client id (None: nobody), name, content."""
+Deliver: TypeAlias = Callable[["int | None", str, "IO[bytes]", Callable[[], bool]], bool]
+"""Sends a file to a page: client id (None: nobody), name, content, whether to give up; returns whether all was sent."""
 
 _STEP = 0.05  # Share between two updates of the progress bar.
+
+
+class _UnwantedError(Exception):
+    """Somebody has cancelled."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +54,7 @@ class ExportActions:
     def __init__(self, store: Store, deliver: Deliver) -> None:
         self._store, self._deliver = store, deliver
         self._worker: threading.Thread | None = None
+        self._unwanted = threading.Event()
 
     def export(self, request: requests.Export) -> None:
         """Begins an export; refused while another one is under way."""
@@ -61,23 +67,35 @@ class ExportActions:
         elif self._worker is not None and self._worker.is_alive():
             self._store.say("warn", message("export.busy"))
         else:
+            self._unwanted.clear()
             self._store.update(export=Export(request.ending, 0.0))
             self._worker = threading.Thread(
                 target=self._write, args=(run, request.ending, request.page), name="export", daemon=True
             )
             self._worker.start()
 
+    def cancel(self, request: requests.CancelExport) -> None:
+        """Drops the export under way, at its next report of progress."""
+        self._unwanted.set()
+
     def close(self) -> None:
-        """Waits for an export under way."""
+        """Ends an export under way."""
+        self._unwanted.set()
         if self._worker is not None:
             self._worker.join(10.0)
 
     def _write(self, run: Run, ending: str, page: int | None) -> None:
         try:
-            from rcilab.recording.export import export_run
+            from rcilab.recording.export import write_export
 
-            content = export_run(run, ending, progress=self._follow(ending), language=self._store.state.language)
-            self._deliver(page, file_name(run, ending), content)
+            with TemporaryFile(prefix="rcilab-") as stream:  # A long run does not fit into memory as text.
+                write_export(run, ending, stream, progress=self._follow(ending), language=self._store.state.language)
+                size = f"{max(stream.tell() / 1e6, 0.01):.2f}"
+                is_sent = self._deliver(page, file_name(run, ending), stream, self._unwanted.is_set)
+            if self._unwanted.is_set():
+                raise _UnwantedError
+        except _UnwantedError:
+            self._store.say("warn", message("export.cancelled"))
         except MissingExtraError as error:
             self._store.say("bad", message("export.missing", library=error.library))
         except MemoryError:
@@ -88,8 +106,8 @@ class ExportActions:
             traceback.print_exc(file=sys.stderr)
             self._store.say("bad", message("notice.bug", error=f"{type(error).__name__}: {error}"))
         else:
-            size = f"{max(len(content) / 1e6, 0.01):.2f}"
-            self._store.say("good", message("export.done", file=file_name(run, ending), size=size))
+            said = message("export.done" if is_sent else "export.unsent", file=file_name(run, ending), size=size)
+            self._store.say("good" if is_sent else "warn", said)
         finally:
             self._store.update(export=None)
 
@@ -98,6 +116,8 @@ class ExportActions:
 
         def follow(share: float) -> None:
             nonlocal shown
+            if self._unwanted.is_set():
+                raise _UnwantedError
             if share - shown >= _STEP:
                 shown = share
                 self._store.update(export=Export(ending, share))

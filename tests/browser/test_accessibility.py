@@ -1,0 +1,92 @@
+"""The page by keyboard and for those who hear it read: names, contrast, order, judged by axe and by what we ask for."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from importlib.util import find_spec
+
+import pytest
+
+from rcilab.workbench import requests
+
+WORST = ("serious", "critical")
+VISERS = {
+    # Rule -> selector and reason: what is viser's own and cannot be changed from outside.
+    "aria-allowed-attr": (".mantine-Popover-dropdown", "a popover of viser's that says it is a dialog"),
+    "aria-hidden-focus": ("[data-floating-ui-focus-guard]", "focus guards of viser's popovers"),
+    "nested-interactive": (".mantine-Tabs-tab", "handles inside the tabs of viser's windows"),
+}
+_UNNAMED = """() => [...document.querySelectorAll('#root button, #root input:not([type=hidden]):not([type=file]), '
+  + '#root [role=slider], #root [role=tab], #root textarea, #rl-bar button')]
+  .filter((c) => c.getClientRects().length && !c.closest('[aria-hidden=true]'))
+  .filter((c) => !(c.getAttribute('aria-label') || c.textContent.trim() || c.title
+    || [...(c.labels || [])].some((l) => l.textContent.trim())
+    || (c.getAttribute('aria-labelledby') || '').split(' ').some((id) => id && document.getElementById(id))))
+  .map((c) => c.outerHTML.slice(0, 160))"""
+
+
+@pytest.fixture
+def axe(page):
+    """axe-core in the page; it is no part of rcilab, only of its tests."""
+    if find_spec("axe_playwright_python") is None:
+        pytest.skip("axe-playwright-python is not installed: pip install 'rcilab[test]'")
+    if not page.tab.evaluate("!!window.axe"):
+        page.tab.evaluate(files("axe_playwright_python").joinpath("axe.min.js").read_text(encoding="utf-8"))
+    return page
+
+
+def violations(page) -> list[str]:
+    """What axe calls serious or worse, but for what is viser's own."""
+    options = (
+        "{resultTypes: ['violations'], runOnly: {type: 'tag', values: ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa']}}"
+    )
+    found = page.tab.evaluate(f"async () => (await axe.run(document, {options})).violations")
+    said: list[str] = []
+    for rule in found:
+        selector, _reason = VISERS.get(rule["id"], ("#nobody", ""))
+        for node in rule["nodes"]:
+            is_visers = page.tab.evaluate(
+                "([target, selector]) => !!document.querySelector(target)?.closest(selector)",
+                [node["target"][0], selector],
+            )
+            if rule["impact"] in WORST and not is_visers:
+                said.append(f"{rule['id']}: {node['html'][:140]}")
+    return said
+
+
+def test_axe_finds_nothing_serious_and_every_control_has_a_name(axe):
+    page = axe
+    names = [name for name in page.tab.get_by_role("tab").all_inner_texts() if name != "Timeline and plots"]
+    assert len(names) >= 7
+    for name in names:
+        page.open_tab(name)
+        page.wait(lambda: page.tab.evaluate(_UNNAMED) == [], lambda: str(page.tab.evaluate(_UNNAMED)))
+        assert violations(page) == [], name
+    page.bench.conductor.ask(requests.SetView(name="theme", value="dark"))
+    page.wait(lambda: page.tab.evaluate("document.documentElement.dataset.rlTheme") == "dark", "a dark page")
+    page.wait(lambda: page.tab.evaluate(_UNNAMED) == [], "names in the new panels")
+    page.open_tab("Jog")
+    assert violations(page) == []
+    page.bench.conductor.ask(requests.SetView(name="theme", value="light"))
+    page.wait(lambda: page.tab.evaluate("document.documentElement.dataset.rlTheme") == "light", "a light page")
+
+
+def test_a_slider_has_its_joints_name_a_folder_opens_by_key_and_the_focus_is_seen(page):
+    slider = page.tab.get_by_role("slider", name="J3", exact=True)
+    slider.wait_for()
+    before = float(page.state.goal.q[2])
+    slider.focus()
+    page.tab.keyboard.press("ArrowRight")
+    page.wait(lambda: page.state.goal.q[2] > before, "joint 3 to turn by a key")
+    page.tab.get_by_role("textbox", name="J3", exact=True).wait_for()
+    folder = page.tab.get_by_role("button", name="Plots and loop", expanded=False)
+    folder.focus()
+    assert page.tab.evaluate("getComputedStyle(document.activeElement).outlineStyle") == "solid"
+    page.tab.keyboard.press("Enter")
+    page.tab.get_by_role("checkbox", name="Torque (with load)").press("Space")
+    page.wait(lambda: "tau" in page.state.plots, "the plot of torques to be chosen")
+    page.tab.locator(".rl-plot-title", has_text="Torque").wait_for()
+    page.tab.get_by_role("checkbox", name="Torque (with load)").press("Space")
+    page.wait(lambda: "tau" not in page.state.plots, "and no longer")
+    page.tab.get_by_role("button", name="Plots and loop", expanded=True).press("Enter")
+    page.tab.get_by_role("button", name="Plots and loop", expanded=False).wait_for()

@@ -1,0 +1,210 @@
+"""A person in JupyterLab: runs a notebook with `Lab(model)`, moves a slider, sees the arm move, executes, stops."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import nbformat
+import numpy as np
+import pytest
+from jupyter_client.blocking.client import BlockingKernelClient
+
+import rcilab
+
+FLAGS = (
+    "--no-sandbox --no-first-run --use-gl=angle --use-angle=swiftshader --enable-unsafe-swiftshader "
+    "--disable-background-networking --disable-component-update --disable-sync --disable-default-apps "
+    "--disable-background-timer-throttling --disable-renderer-backgrounding --disable-backgrounding-occluded-windows"
+).split()
+CELL = """import rcilab
+from rcilab.notebook import Lab
+model = rcilab.load_model("xMatePro7")
+lab = Lab(model, height=240)
+lab"""
+PRO7 = rcilab.load_model("xMatePro7")
+TOOL = "/".join(["meshcat", "arm", *(f"joint{i}" for i in range(1, 8)), "flange", "tool"])
+WORLD = """(path) => {
+  let node = viewer.scene_tree;
+  for (const part of path.split("/")) node = node && node.children[part];
+  if (!node) return null;
+  node.object.updateWorldMatrix(true, false);
+  return node.object.matrixWorld.clone().transpose().elements;
+}"""
+
+
+def find_chromium() -> str | None:
+    found = (shutil.which(name) for name in ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable"))
+    return next((path for path in found if path), None)
+
+
+@pytest.fixture(scope="module")
+def jupyter(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, Path]]:
+    """Address of a notebook with one cell in a JupyterLab that `rcilab lab` has opened, and its runtime folder."""
+    folder = tmp_path_factory.mktemp("lab")
+    (folder / "notes").mkdir()
+    kernel = {"kernelspec": {"name": "python3", "display_name": "Python 3", "language": "python"}}
+    note = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(CELL)], metadata=kernel)
+    nbformat.write(note, folder / "notes" / "lab.ipynb")
+    environment = {**os.environ, "JUPYTER_RUNTIME_DIR": str(folder / "runtime")}
+    environment |= {f"JUPYTER_{name}_DIR": str(folder / name) for name in ("CONFIG", "DATA")}
+    environment["JUPYTERLAB_SETTINGS_DIR"] = str(folder / "settings")
+    command = [sys.executable, "-m", "rcilab.cli", "lab", str(folder / "notes"), "--no-browser"]
+    command += ["--allow-root"] if os.geteuid() == 0 else []
+    with open(folder / "log", "w", encoding="utf-8") as log:
+        process = subprocess.Popen(command, env=environment, stdout=log, stderr=log)
+    try:
+        server = wait_for_server(folder / "runtime", process, folder / "log")
+        yield f"{server['url']}lab/tree/lab.ipynb?token={server['token']}", folder / "runtime"
+    finally:
+        process.terminate()
+        process.wait(15)
+
+
+def wait_for_server(runtime: Path, process: subprocess.Popen[bytes], log: Path) -> dict[str, Any]:
+    deadline = time.monotonic() + 60.0
+    while time.monotonic() < deadline:
+        assert process.poll() is None, log.read_text(encoding="utf-8")
+        for file in runtime.glob("jpserver-*.json"):
+            text = file.read_text(encoding="utf-8")
+            if text.strip().endswith("}"):
+                return json.loads(text)
+        time.sleep(0.1)
+    raise AssertionError("JupyterLab did not start within 60 s:\n" + log.read_text(encoding="utf-8"))
+
+
+@pytest.fixture(scope="module")
+def page(jupyter: tuple[str, Path]) -> Iterator[Any]:
+    path = find_chromium()
+    if path is None:
+        reason = "no Chromium found: install it (Debian: apt install chromium) to run the browser tests"
+        pytest.fail(reason) if os.environ.get("CI") == "true" else pytest.skip(reason)
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=path, args=FLAGS)
+        context = browser.new_context(viewport={"width": 1280, "height": 1000})
+        context.set_default_timeout(40_000)
+        outside: list[str] = []
+
+        def guard(route: Any) -> None:
+            if re.match(r"(https?://127\.0\.0\.1|https?://localhost|data:|blob:)", route.request.url):
+                route.continue_()
+            else:
+                outside.append(route.request.url)
+                route.abort()
+
+        context.route("**/*", guard)
+        tab = context.new_page()
+        tab.goto(jupyter[0])
+        yield tab
+        context.close()
+        browser.close()
+        assert outside == [], f"JupyterLab asked for something beyond this machine: {outside}"
+
+
+def wait_for(page: Any, condition: Callable[[], bool], what: str, timeout: float = 40.0) -> None:
+    deadline = time.monotonic() + timeout
+    while not condition():
+        assert time.monotonic() < deadline, f"within {timeout} s this did not happen: {what}"
+        page.wait_for_timeout(100)
+
+
+def run_all(page: Any) -> None:
+    """Presses Run, Run All Cells; a menu that is opened while JupyterLab still loads has no entries yet."""
+    page.locator(".jp-Notebook .jp-Cell").first.wait_for()
+    entry = page.get_by_text("Run All Cells", exact=True)
+
+    def is_open() -> bool:
+        page.keyboard.press("Escape")
+        page.get_by_role("menuitem", name="Run", exact=True).click()
+        return entry.is_visible()
+
+    wait_for(page, is_open, "the menu Run")
+    entry.click()
+
+
+def tool_in_scene(page: Any) -> np.ndarray | None:
+    """Pose of the solid arm's tool, in its base, as the scene inside the notebook has it; None while it loads."""
+    scene = next((frame for frame in page.frames if "/static/" in frame.url and "127.0.0.1" in frame.url), None)
+    if scene is None or not scene.evaluate("() => typeof viewer !== 'undefined' && !!viewer.scene_tree"):
+        return None
+    base, tool = (scene.evaluate(WORLD, path) for path in ("meshcat/arm", TOOL))
+    if base is None or tool is None:
+        return None
+    return np.linalg.inv(np.array(base).reshape(4, 4)) @ np.array(tool).reshape(4, 4)
+
+
+def shows(page: Any, q: np.ndarray) -> bool:
+    found = tool_in_scene(page)
+    return found is not None and float(np.abs(found - PRO7.forward(q).matrix).max()) < 1e-4
+
+
+def button(page: Any, name: str) -> Any:
+    return page.locator(".rl-root button:visible", has_text=re.compile(rf"^\s*{name}\s*$"))
+
+
+@pytest.mark.browser
+def test_a_person_runs_the_lab_moves_a_slider_executes_and_stops(page: Any) -> None:
+    run_all(page)
+    page.locator(".rl-title").wait_for()
+    wait_for(page, lambda: shows(page, PRO7.home), "the arm at home in the scene")
+    assert page.locator(".Toastify__toast").count() == 0  # Nothing has popped up.
+
+    handle = page.locator(".widget-tab .noUi-handle:visible").first
+    handle.focus()
+    for _ in range(60):
+        page.keyboard.press("ArrowRight")
+    goal = PRO7.home.copy()
+    goal[0] = np.radians(30.0)
+    wait_for(page, lambda: shows(page, goal), "the arm where the slider put it")
+
+    page.get_by_role("tab", name="Run", exact=True).click()
+    button(page, "Connect").click()
+    button(page, "Power on").click()
+    page.locator(".rl-chip", has_text=re.compile("^ready$")).wait_for()
+    page.get_by_role("tab", name="Plan", exact=True).click()
+    field = page.locator(".widget-tab input[type=text]:visible").first
+    field.fill("1")
+    field.press("Enter")
+    button(page, "Plan there").click()
+    page.locator(".rl-chip", has_text="Passed").wait_for()
+    page.get_by_role("tab", name="Run", exact=True).click()
+    button(page, "Execute").click()
+    page.locator(".rl-chip", has_text=re.compile("^moving$")).wait_for()
+    wait_for(page, lambda: not shows(page, PRO7.home), "the solid arm on its way")
+    button(page, "Stop").first.click()
+    page.get_by_text("Stopped before its end").wait_for()
+    assert not shows(page, goal)
+
+
+@pytest.mark.browser
+def test_a_tab_that_is_closed_stops_the_arm(page: Any, jupyter: tuple[str, Path]) -> None:
+    page.get_by_role("tab", name="Plan", exact=True).click()
+    button(page, "Plan there").click()
+    page.get_by_role("tab", name="Run", exact=True).click()
+    button(page, "Execute").click()
+    page.locator(".rl-chip", has_text=re.compile("^moving$")).wait_for()
+    page.close()
+    client = BlockingKernelClient(connection_file=str(next(jupyter[1].glob("kernel-*.json"))))
+    client.load_connection_file()
+    client.start_channels()
+    told = {"phase": "lab.state.status.phase", "left": "lab.state.plan.motion.duration - lab.state.status.motion_time"}
+    deadline = time.monotonic() + 20.0
+    while True:
+        reply = client.execute_interactive("", user_expressions=told, timeout=30)
+        phase, left = (reply["content"]["user_expressions"][name]["data"]["text/plain"] for name in told)
+        if phase == "'idle'":
+            break
+        assert time.monotonic() < deadline, "the arm goes on although nobody is there"
+        time.sleep(0.2)
+    client.stop_channels()
+    assert float(left) > 2.0  # It was to go on so long.
