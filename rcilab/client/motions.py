@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 RateLimit: TypeAlias = Literal["manual", "sdk"]
 
-PACE_LEADS = (100, 300, 1000)  # Cycles from now on which another pace begins: what planning it may take.
+PACE_LEADS = (100, 300, 1000, 4000)  # Cycles from now on which another pace begins: what planning it may take.
 HANDING_OVER = 30  # Cycles between the rows of now and the first of others.
 
 

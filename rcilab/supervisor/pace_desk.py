@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rcilab.model import RobotModel
     from rcilab.motion import Motion
 
-LEADS = (120, 400, 1500)  # Cycles from now on which another pace begins: how long planning and handing over may take.
+LEADS = (120, 400, 1500, 5000)  # Cycles from now on which another pace begins: what planning it may take.
 HANDING_OVER = 40  # Cycles between now and the first row that is exchanged.
 _ANSWER = 0.5  # [s] for the control process to take a change; it looks for letters in every cycle.
 _LATEST = 5  # Cycles that the control process needs at least to hear of it.

@@ -41,6 +41,7 @@ def test_a_soft_motion_is_held_gone_on_with_and_a_spoiled_network_is_noticed(hea
     page.button("Pause").click()
     page.wait(lambda: page.status.code == "moving.held", "the pause")
     page.wait(lambda: "Held at" in page.tab.get_by_role("status").first.inner_text(), "the page to say so")
+    assert page.status.code == "moving.held", page.status
     page.button("Go on").dispatch_event("click")
     page.wait(lambda: page.status.code == "moving", "the way on")
     place = page.status.motion_place
