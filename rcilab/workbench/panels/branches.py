@@ -23,6 +23,7 @@ class BranchesPanel:
 
     def __init__(self, text: Text, ask: Ask) -> None:
         self._text, self._ask = text, ask
+        self._seen: tuple[object, ...] = (None, None, None)
 
     def build(self, gui: Any, state: UiState) -> None:
         """Adds the list."""
@@ -38,14 +39,18 @@ class BranchesPanel:
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows goal and arm."""
-        self._rows.show(self._html(state, status))
+        here = None if status.q_c is None else np.round(status.q_c, 2)
+        seen = (state.goal, state.model, None if here is None else here.tobytes())
+        if seen != self._seen:
+            self._seen = seen
+            self._rows.show(self._html(state, here))
 
-    def _html(self, state: UiState, status: SupervisorStatus) -> str:
+    def _html(self, state: UiState, arm: np.ndarray | None) -> str:
         solutions, text = state.goal.reach.solutions, self._text
         if solutions is None or not len(solutions):
             code = "target.out_of_reach" if state.goal.reach.tone == "bad" else "target.no_branches"
             return f'<p class="rl-note">{esc(text(code))}</p>'
-        here = state.goal.q if status.q_c is None else status.q_c
+        here = state.goal.q if arm is None else arm
         rows = "".join(self._row(number, q, here, state) for number, q in enumerate(solutions, start=1))
         heads = "".join(
             f"<span>{esc(text(f'target.head.{name}'))}</span>" for name in ("number", "margin", "worst", "away")

@@ -36,6 +36,7 @@ class GoalStage:
         pose, scene = state.goal.target, server.scene
         self._tone = self._said = ""
         self._via: object = None
+        self._target: object = None
         self._touched = float("-inf")
         self._gizmo: Any = scene.add_transform_controls(
             "/target", scale=_GIZMO_SCALE, line_width=3.0, depth_test=False, wxyz=pose.wxyz, position=pose.position
@@ -79,8 +80,10 @@ class GoalStage:
                 self._gizmo.position = position
             if 1.0 - abs(float(np.asarray(self._gizmo.wxyz) @ wxyz)) > 1e-12:
                 self._gizmo.wxyz = wxyz
-        self._label.position = _above(goal.target.position)
-        self._mark.position = goal.target.position
+        if goal.target is not self._target:
+            self._target = goal.target
+            self._label.position = _above(goal.target.position)
+            self._mark.position = goal.target.position
         if goal.reach.tone != self._tone:
             self._tone = goal.reach.tone
             self._mark.color = TONE_COLORS[self._tone]

@@ -8,6 +8,7 @@ import numpy as np
 
 from rcilab.views.viser_scene import ViserScene
 from rcilab.workbench import requests
+from rcilab.workbench.goal.planning import PATH_POINTS
 from rcilab.workbench.scene.ribbon import Bead, Ribbon
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask
@@ -39,9 +40,11 @@ class RibbonStage:
     def __init__(self, server: viser.ViserServer, drawing: ViserScene, ask: Ask) -> None:
         self._scene, self._drawing, self._ask = server.scene, drawing, ask
         self._drawn: tuple[Ribbon | None, str] = (None, "")
-        self._is_there = False
         self._beads = 0
         self._labels: list[Any] = []
+        # There from the beginning: a page that renders in software can take seconds to mount a line that comes later.
+        drawing.add_segments("/path", np.zeros((PATH_POINTS - 1, 2, 3)), color=_BEAD_COLOR, thickness=_THICK)
+        drawing.set_visible("/path", False)
 
     def show(self, state: UiState, text: Text) -> None:
         """Draws the path of the newest plan."""
@@ -55,16 +58,13 @@ class RibbonStage:
             ends = np.stack([ribbon.path[:-1], ribbon.path[1:]], axis=1)
             shades = np.repeat(colors[:-1, None], 2, axis=1)
             self._drawing.add_segments("/path", ends, color=shades, thickness=_THICK)
-        if self._is_there or ribbon is not None:
-            self._drawing.set_visible("/path", ribbon is not None)
-            self._is_there = True
+        self._drawing.set_visible("/path", ribbon is not None)
         self._exchange_beads(() if ribbon is None else ribbon.beads, text)
 
     def remove(self) -> None:
         """Takes path and beads away."""
         self._exchange_beads((), None)
-        if self._is_there:
-            self._drawing.remove("/path")
+        self._drawing.remove("/path")
 
     def _exchange_beads(self, beads: tuple[Bead, ...], text: Text | None) -> None:
         for number in range(self._beads):

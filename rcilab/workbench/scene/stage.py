@@ -102,8 +102,8 @@ class Stage:
         """Draws where the arm is told to be, once that is somewhere else."""
         told = status.q_c if status.q is not None else None
         bound = _BACK if self._visible.get("commanded") else _STRAYED
-        seen = told is not None and _apart(told, live) > bound
-        if seen:
+        seen = False
+        if told is not None and (seen := _apart(told, live) > bound):
             self._commanded.show(told)
         self._see("commanded", self._commanded, seen)
 
