@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from rcilab.supervisor import SupervisorStatus
     from rcilab.workbench.store import UiState
 
-_CANDIDATE_COLORS = {"good": (90, 200, 150), "warn": (245, 190, 80), "bad": (230, 80, 70), "peek": (150, 110, 230)}
+_CANDIDATE_COLORS = {"good": (46, 180, 124), "warn": (240, 165, 40), "bad": (225, 62, 52), "peek": (130, 86, 225)}
 _SAME_POSE = 2e-3  # [rad] A choice: ghosts closer than this to the arm would only flicker on its surface.
 _STRAYED, _BACK = 0.01, 0.006
 """[rad] A choice: the commanded arm is drawn from where a joint is more than 0.6 degrees away from it, some 10 mm at
