@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import replace
 from types import SimpleNamespace
@@ -15,7 +16,7 @@ from rcilab.spatial import Pose
 from rcilab.workbench import requests
 from rcilab.workbench.goal.actions import SETTLED, GoalActions, initial_goal
 from rcilab.workbench.goal.elbow import look_at_elbow, nearest_free
-from rcilab.workbench.live import LiveChannel
+from rcilab.workbench.live import Heard, LiveChannel
 from rcilab.workbench.panels.elbow import ring_html
 from rcilab.workbench.panels.target import planned_html
 from rcilab.workbench.scene.actions import SceneActions
@@ -137,11 +138,23 @@ def test_every_goal_has_its_branches_and_one_can_be_looked_at_before_it_is_chose
 
 
 def test_a_page_says_which_branch_is_under_the_mouse():
-    heard: list[int] = []
-    live = LiveChannel(lambda: None, lambda: None, lambda place: None, lambda height: None, heard.append)
+    heard: list[tuple[int, int]] = []
+    live = LiveChannel(
+        Heard(
+            stop=lambda: None,
+            here=lambda page: None,
+            seek=lambda place: None,
+            size=lambda height: None,
+            take=lambda page: None,
+            answer=lambda page, yes: None,
+            peek=lambda page, branch: heard.append((page, branch)),
+        )
+    )
+    page = live.hear(json.dumps({"kind": "hello", "page": 3, "key": live.introduce(3)}))
     for message in ('{"kind": "peek", "branch": 2}', '{"kind": "peek", "branch": -1}', '{"kind": "peek"}'):
+        live.hear(message, page)
         live.hear(message)
-    assert heard == [2, -1]
+    assert heard == [(3, 2), (3, -1)]
 
 
 def test_a_plan_that_leaves_the_box_has_a_bead_that_leads_to_its_moment(bench):

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rcilab.posing.planning import PATH_POINTS
 from rcilab.views.viser_scene import ViserScene
 from rcilab.workbench import requests
-from rcilab.workbench.goal.planning import PATH_POINTS
 from rcilab.workbench.scene.ribbon import Bead, Ribbon
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask
