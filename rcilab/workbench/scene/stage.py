@@ -44,7 +44,7 @@ class Stage:
     def __init__(self, server: viser.ViserServer, ask: Ask) -> None:
         self._server, self._ask = server, ask
         self._built: tuple[str, str] | None = None
-        self._look = ""
+        self._look = self._theme = ""
         self._visible: dict[str, bool] = {}
         place_camera(server)
 
@@ -54,6 +54,9 @@ class Stage:
         if wanted != self._built:
             self._build(state)
             self._built = wanted
+        elif state.theme != self._theme:
+            furnish(self._server, full=state.quality == "full", dark=state.theme == "dark")
+        self._theme = state.theme
         if state.model.T_flange_tool is not self._tool:
             self._tool = state.model.T_flange_tool
             for arm in self._arms:
@@ -79,7 +82,7 @@ class Stage:
             self._setup.remove()
             for part in (self._goal, self._elbow, self._ribbon, self._extras, self._grip, *self._arms):
                 part.remove()
-        furnish(server, full=full)
+        furnish(server, full=full, dark=state.theme == "dark")
         drawing = ViserScene(server, shadows=full)
         model = state.model
         self._live = ArmView(drawing, "live", model, "live", quality="fine" if full else "coarse")
