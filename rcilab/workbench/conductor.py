@@ -199,6 +199,7 @@ class Conductor:
         self._keepsake.keep(self._store.state)
 
     def _resume(self, kept: Kept) -> None:
+        self._setup.restore(kept.setup)
         self._goal.pose(kept.q)
         if kept.program is not None and kept.program.model == self._store.state.model.name:
             self._program.restore(kept.program)
