@@ -12,14 +12,10 @@ from importlib.resources import files
 from typing import IO, TYPE_CHECKING, Any
 from uuid import uuid4
 
-import numpy as np
-
 if TYPE_CHECKING:
     import viser
 
 _BRAND = (11, 111, 194)
-_BACKDROPS = {"light": ((222, 231, 241), (250, 251, 253)), "dark": ((22, 25, 29), (58, 65, 75))}
-"""Soft vertical gradients, so that a white arm stands out: their colours at the top and at the bottom."""
 _PART = 1024 * 1024  # [bytes] As viser.
 _WAITING = 8  # Messages of a page that may wait for their way while a file is sent.
 _PAUSE = 0.005  # [s]
@@ -50,12 +46,7 @@ def introduce(client: viser.ClientHandle, key: str) -> None:
 
 
 def dress(server: viser.ViserServer, theme: str) -> None:
-    """Colours the page, and the backdrop of its scene, light or dark; after the scene was built."""
-    top, bottom = _BACKDROPS[theme]
-    shares = np.linspace(0.0, 1.0, 256)[:, None]
-    column = (1.0 - shares) * np.array(top) + shares * np.array(bottom)
-    picture = np.repeat(column[:, None, :], 16, axis=1).astype(np.uint8)
-    server.scene.set_background_image(picture, format="jpeg", jpeg_quality=92)
+    """Colours the page light or dark."""
     server.gui.configure_theme(
         brand_color=_BRAND, show_logo=False, show_share_button=False, control_width="medium", dark_mode=theme == "dark"
     )

@@ -85,7 +85,7 @@ class Presenter:
         self._panels: list[Panel] = []
         self._containers: list[Any] = []
         self._built: tuple[object, ...] | None = None
-        self._dressed: tuple[str, ...] = ()
+        self._theme = ""
         self._ending = threading.Event()
         self._thread: threading.Thread | None = None
         self.errors: list[BaseException] = []
@@ -108,15 +108,14 @@ class Presenter:
         state, status = self._store.state, self._session.status()
         if _looks(state) != self._built:
             self._build(state)
+        if state.theme != self._theme:
+            self._theme = state.theme
+            dress(self._server, state.theme)
         seen = exhibited(state)
         for panel in self._panels:
             panel.show(seen if panel is self._timeline else state, status)
         self._stage.show(exhibited(state, scene=True), status, self._text)
         self._marks.show(seen)
-        dressed = (state.theme, state.quality, state.model.name)
-        if dressed != self._dressed:
-            self._dressed = dressed
-            dress(self._server, state.theme)
         self._live.publish(**status_values(seen, status, self._text, self._timeline.end))
 
     def _build(self, state: UiState) -> None:
