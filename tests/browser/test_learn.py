@@ -6,6 +6,14 @@ import numpy as np
 
 from rcilab.workbench import requests
 
+_INK = """() => {
+  const plot = document.querySelector("div:has(> .rl-under) + div canvas, div:has(> div > .rl-under) + div canvas");
+  if (!plot || !plot.offsetParent || !plot.width) return 0;
+  const pixels = plot.getContext("2d").getImageData(0, 0, plot.width, plot.height).data;
+  return pixels.filter((value, place) => place % 4 === 3 && value > 0).length;
+}"""
+_LOOK = "() => [...document.querySelectorAll('.uplot-container')].map((at) => [at.offsetWidth, at.offsetHeight])"
+
 
 def test_a_fault_is_provoked_beside_the_robot_and_shown_at_its_moment(page):
     page.open_tab("Learn")
@@ -14,7 +22,7 @@ def test_a_fault_is_provoked_beside_the_robot_and_shown_at_its_moment(page):
     page.wait(lambda: page.tab.get_by_text("fault 17, reported").is_visible(), "the fault on show", 40.0)
     assert page.status.phase == "idle", "the robot of the page has nothing to do with it"
     assert page.tab.get_by_text("kCommandTorqueDiscontinuity").count() >= 1
-    page.wait(lambda: page.tab.locator(".uplot-container:visible").count() == 5, "its own plot")
+    page.wait(lambda: page.tab.evaluate(_INK) > 500, lambda: f"its own plot, not {page.tab.evaluate(_LOOK)}")
     page.button("Show as Python").last.click()
     page.wait(lambda: "gallery.provoke" in page.tab.locator(".rl-code pre:visible").inner_text(), "its script")
     page.button("Back to the gallery").click()
