@@ -72,8 +72,9 @@ def test_units_change_everywhere_and_a_typed_number_keeps_its_sign(page):
     field = page.joint_field(2)
     field.fill("0.5")
     page.wait(lambda: abs(page.state.goal.q[1] - 0.5) < 1e-9, "0.5 rad")
+    page.wait(lambda: field.input_value() == "0.5000", "the number in the page's own spelling")
     field.press("ControlOrMeta+a")
-    field.press_sequentially("-0.25", delay=60)  # viser's own number boxes make +0.25 of it.
+    field.press_sequentially("-0.25")  # viser's own number boxes make +0.25 of it.
     page.wait(lambda: abs(page.state.goal.q[1] + 0.25) < 1e-9, "-0.25 rad")
     field.fill("9")
     page.wait(lambda: any("outside -2.09 rad to 2.09 rad" in said for said in page.alerts()), "why 9 is refused")

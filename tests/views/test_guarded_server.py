@@ -90,3 +90,25 @@ def test_a_taken_port_is_refused_and_nothing_stays_open() -> None:
 )
 def test_a_message_is_looked_into_to_the_end(value, finite):
     assert is_orderly(value) is finite
+
+
+def test_with_an_open_address_every_page_that_brings_the_token_gets_in_and_no_other() -> None:
+    bound = listen("127.0.0.1", 0)
+    port = bound.getsockname()[1]
+    gate = Gate(host="0.0.0.0", port=port, token="s3cret")
+    headers = {"Origin": f"http://127.0.0.1:{port}"}
+    with GuardedServer(bound, gate, decorate=lambda page: page):
+        for secret, status in (("?token=s3cret", 200), ("", 403), ("?token=guessed", 403)):
+            link = http.client.HTTPConnection("127.0.0.1", port, timeout=10)
+            link.request("GET", f"/{secret}")
+            answer = link.getresponse()
+            assert answer.status == status
+            if status == 200:
+                headers["Cookie"] = (answer.getheader("Set-Cookie") or "").partition(";")[0]
+            link.close()
+        address = f"ws://127.0.0.1:{port}/"
+        for _ in range(2):
+            with connect(address, additional_headers=headers, subprotocols=[PROTOCOL]) as page:  # type: ignore[list-item]
+                assert page.recv(timeout=20)
+        with pytest.raises(InvalidStatus):
+            connect(address, additional_headers={"Origin": headers["Origin"]}, subprotocols=[PROTOCOL])  # type: ignore[list-item]
