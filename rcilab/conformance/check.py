@@ -17,6 +17,7 @@ from rcilab.conformance.report import ConditionResult, Report, Violation
 from rcilab.conformance.signals import HOLD_SAMPLES as HOLD_SAMPLES
 from rcilab.conformance.signals import MotionSignals
 from rcilab.conformance.start import StartState, as_start
+from rcilab.conformance.usage import Usage, near_bound, worst_of
 from rcilab.conformance.wording import advise
 from rcilab.errors import InvalidValueError
 from rcilab.model import RobotModel, require_model
@@ -102,6 +103,7 @@ def _report(
         warnings=tuple(v for v in found if v.condition.necessity == "recommended"),
         motion=motion,
         start=start,
+        measure=partial(judge.usage, rows),
         issue=partial(issue_certificate, motion, model, start, box, distance, mode),
         judge=partial(_report, model=model, start=start, box=box, distance=distance, mode=mode),
     )
@@ -151,6 +153,16 @@ class _Judge:
             runs = [run for run in runs if run[0] == column and run[1] <= row < run[2]]  # One is advice enough.
         ratio = self._ratio(values, lower, upper)
         return result, [self._violation(condition, values, ratio, first_time, run) for run in runs]
+
+    def usage(self, conditions: tuple[Condition, ...]) -> Usage:
+        """Returns the worst of the necessary conditions that are judged throughout, in every row of the motion."""
+        wanted = [row for row in conditions if row.necessity == "necessary" and row.stage == "throughout"]
+        return worst_of((row, self._used(row)) for row in wanted)
+
+    def _used(self, condition: Condition) -> Array:
+        values, _ = self._signals.table(condition)
+        ratio = self._ratio(values, *condition.bounds(self._limits)).max(axis=1)[: len(self._motion.times)]
+        return near_bound(ratio) if condition.order == 0 and condition.signal in ("joint", "position") else ratio
 
     def _ratio(self, values: Array, lower: Array, upper: Array) -> Array:
         """Returns how much of the way from the middle of the allowed range to the bound is used."""

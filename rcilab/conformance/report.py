@@ -10,6 +10,7 @@ from rcilab.conformance.catalogue import Language
 from rcilab.conformance.certificate import Certificate
 from rcilab.conformance.condition import AnyFault, Condition, Necessity
 from rcilab.conformance.start import StartState
+from rcilab.conformance.usage import Usage
 from rcilab.conformance.wording import amount, share, with_degrees
 from rcilab.errors import ConformanceError
 from rcilab.motion.motion import Motion
@@ -185,6 +186,7 @@ class Report:
         warnings: Recommended conditions that are broken, worst first.
         motion: What was judged.
         start: The state of the arm that it was judged from.
+        measure: Looks at every cycle when somebody asks for `usage`.
         issue: Makes the certificate when somebody asks for it.
         judge: Judges another motion by some of the rows, for the same arm, start, safety box and mode.
     """
@@ -201,6 +203,8 @@ class Report:
     """What was judged."""
     start: StartState
     """The state of the arm that it was judged from."""
+    measure: Callable[[], Usage] = field(repr=False)
+    """Looks at every cycle when somebody asks for `usage`."""
     issue: Callable[[], Certificate] = field(repr=False)
     """Makes the certificate when somebody asks for it."""
     judge: Callable[[Motion, tuple[Condition, ...]], Report] = field(repr=False)
@@ -220,6 +224,10 @@ class Report:
     def certificate(self) -> Certificate | None:
         """The proof for a hand-off; a report that is not ok has none."""
         return self.issue() if self.ok else None
+
+    def usage(self) -> Usage:
+        """Returns which necessary condition is worst in every cycle, and how much of its bound is used there."""
+        return self.measure()
 
     def require(self) -> Report:
         """Returns this report if it is ok.

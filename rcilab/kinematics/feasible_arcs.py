@@ -103,14 +103,19 @@ class FeasibleArcs:
         """Returns the ranges (start, end), [rad], in which one branch, 0 to 7, stays possible all along."""
         return _joined([(arc.start, arc.end) for arc in self.arcs if arc.ok and branch in arc.branches])
 
-    def nearest(self, psi: float) -> float | None:
+    def nearest(self, psi: float, branch: int | None = None) -> float | None:
         """Returns the arm angle closest to one, [rad], at which a branch keeps every joint limit; None if none does.
 
         It is `INSIDE` the range, or in the middle of a narrower one, unless the angle asked for is possible itself.
+
+        Args:
+            psi: Wanted arm angle, [rad].
+            branch: Which branch, 0 to 7, it shall be; None for any.
         """
         found: float | None = None
-        stands = (arc for arc in self.arcs if arc.ok or arc.branches or arc.reasons == ("singularity",))
-        for start, end in _joined([(arc.start, arc.end) for arc in stands]):
+        stands = [arc for arc in self.arcs if arc.ok or arc.branches or arc.reasons == ("singularity",)]
+        possible = stands if branch is None else [arc for arc in self.arcs if branch in arc.branches]
+        for start, end in _joined([(arc.start, arc.end) for arc in possible]):
             middle, half = 0.5 * (start + end), 0.5 * (end - start)
             offset = remainder(psi - middle, tau)
             inner = max(half - INSIDE, 0.0)

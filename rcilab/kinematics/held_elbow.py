@@ -277,21 +277,12 @@ def _joint_angles(
     arm: OffsetGeometry, rotations: Array, positions: Array, psi: Array, rows: NDArray[np.intp], q7: Array
 ) -> tuple[NDArray[np.intp], Array]:
     """Returns the solutions next to roots; each root gives one, or none if it is of rounding."""
-    count = len(q7)
-    both = np.concatenate((q7, q7 + _STEP))
-    twice = np.concatenate((rotations, rotations)), np.concatenate((positions, positions))
-    table = trace(arm, *twice, both)[0].reshape(4, 2, count, 7)
-    miss = wrapped(2.0 * (table[..., ELBOW] - psi)) / 2.0  # The twin is half a turn away.
-    with np.errstate(invalid="ignore", divide="ignore"):
-        rate = wrapped(table[:, 1, :, ELBOW] - table[:, 0, :, ELBOW]) / _STEP
-        step = np.clip(-miss[:, 0] / rate, -_FAR, _FAR)
-    size = np.nan_to_num(np.abs(miss[:, 0]), nan=pi)
+    table = trace(arm, rotations, positions, q7)[0].reshape(4, len(q7), 7)
+    size = np.nan_to_num(np.abs(wrapped(2.0 * (table[..., ELBOW] - psi))), nan=pi)  # The twin is half a turn away.
     branch, root = np.nonzero((size < _NEAR) | ((size == size.min(axis=0)) & (size < _FAR)))
-    step = np.nan_to_num(step[branch, root])
-    R, p, wanted = rotations[root], positions[root], psi[root]
-    q = trace(arm, R, p, q7[root] + step)[0].reshape(4, len(root), 7)[branch, np.arange(len(root))]
-    along = wrapped(table[branch, 1, root] - table[branch, 0, root])
-    q = np.where(np.isnan(q), table[branch, 0, root], q)
+    R, p, wanted, q = rotations[root], positions[root], psi[root], table[branch, root]
+    after = trace(arm, R, p, q7[root] + _STEP)[0].reshape(4, len(root), 7)[branch, np.arange(len(root))]
+    along = wrapped(after - q)
     turned = np.abs(wrapped(q[:, ELBOW] - wanted)) > pi / 2.0
     q[turned, 0] += pi
     q[turned, 1] *= -1.0

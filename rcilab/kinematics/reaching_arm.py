@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from rcilab.arrays import as_number, as_vector, described
 from rcilab.errors import InvalidValueError, KinematicsError
+from rcilab.kinematics.elbow_circle import ElbowCircle, elbow_circle
 from rcilab.kinematics.feasible_arcs import FeasibleArcs
 from rcilab.kinematics.inverse_batch import SolutionBatch, as_pose_batch
 from rcilab.kinematics.inverse_search import InverseSearch
@@ -42,7 +43,7 @@ class ReachingArm(MovingArm):
         """Returns every analytic solution inside the joint limits (GetJointPos); `.nearest(q)` is the vendor's answer.
 
         The xMates have 8 solutions at an arm angle. The Panda has offsets, and up to 16 or none: the roots of a
-        polynomial, which take some ten times as long. Where two of them are about to meet, one may be taken for both;
+        polynomial, which takes a millisecond or two. Where two of them are about to meet, one may be taken for both;
         the one next to `near` is always found.
 
         Args:
@@ -142,6 +143,22 @@ class ReachingArm(MovingArm):
         """
         self._require_arm_angle()
         return self._search.form.arm_angle(self._floats(q))
+
+    def elbow_circle(self, q: ArrayLike) -> ElbowCircle:
+        """Returns the circle on which the elbow can go round while the tool stays, for a 7-axis xMate.
+
+        Args:
+            q: Joint angles, shape (7,), [rad].
+
+        Raises:
+            SingularError: The arm is stretched, or shoulder and wrist are above each other.
+            KinematicsError: The arm has 6 axes, or offsets: then its elbow goes round on no circle.
+        """
+        self._require_arm_angle()
+        if any(row.a for row in self.description.dh):
+            raise KinematicsError(f"{self.description.name} has offsets: its elbow does not go round on a circle")
+        frames = self.joint_frames(q)
+        return elbow_circle(*(frames[joint].position for joint in (0, 2, 4)))
 
     @cached_property
     def _search(self) -> InverseSearch:

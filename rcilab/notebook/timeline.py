@@ -30,22 +30,21 @@ class Timeline(Part):
             step=_INTERVAL,
             show_repeat=False,
             tooltip=self.text("timeline.play_hint"),
-            layout=ipywidgets.Layout(flex="0 0 auto"),
+            layout=ipywidgets.Layout(flex="0 0 auto", width="6em"),
         )
         self.slider = ipywidgets.IntSlider(
-            description=self.text("timeline.moment"),
             min=0,
             max=1,
             readout=False,
             tooltip=self.text("timeline.scrub_hint"),
-            layout=ipywidgets.Layout(flex="1 1 auto", min_width="160px"),
+            layout=ipywidgets.Layout(flex="1 1 auto", min_width="130px"),
         )
         self.rate = ipywidgets.Dropdown(
             description=self.text("timeline.rate"),
             options=[(f"{rate:g} ×", rate) for rate in _RATES],
             value=1.0,
-            layout=ipywidgets.Layout(width="9.5em"),
-            style={"description_width": "4em"},
+            layout=ipywidgets.Layout(width="8.5em"),
+            style={"description_width": "3.6em"},
         )
         self.live = ipywidgets.Button(
             description=self.text("timeline.live"),

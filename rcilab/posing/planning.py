@@ -13,6 +13,7 @@ from rcilab.clock import CYCLE_TIME
 from rcilab.errors import RcilabError
 from rcilab.model import RobotModel
 from rcilab.safety_box import SafetyBox, active_box
+from rcilab.spatial import Pose
 from rcilab.state import Mode
 from rcilab.words.text import Message, message
 
@@ -20,10 +21,13 @@ if TYPE_CHECKING:
     from rcilab.conformance import Report
     from rcilab.motion import Motion, Program
 
+PathKind = Literal["joint", "line", "arc"]
+PATH_KINDS: tuple[PathKind, ...] = ("joint", "line", "arc")
 PlannableLaw = Literal["jerk_limited", "s_profile"]
 LAWS: tuple[PlannableLaw, ...] = ("jerk_limited", "s_profile")
 
 SMALLEST_MOTION = 1e-4  # [rad] A choice: a goal closer than this to the arm is where the arm is.
+SAME_WAY = 1e-3  # [rad] A choice: beyond it a line ends in another way of standing than the one that was wanted.
 PATH_POINTS = 120
 
 
@@ -47,6 +51,10 @@ class Plan:
     """The program that the motion goes through; None where it leads to the goal."""
     mode: Mode = "joint_position"
     """How it was judged to be commanded."""
+    kind: PathKind = "joint"
+    """How the tool goes, where it is no program."""
+    note: Message | None = None
+    """What else is to be said about where it ends."""
     complete: bool = False
     """Whether collisions were looked for, too. While somebody drags they are not: it would halve the rate."""
 
@@ -81,7 +89,7 @@ class Plan:
 
 def tool_path(model: RobotModel, motion: Motion) -> Array:
     """Returns where the tool is at `PATH_POINTS` moments of a motion, shape (N, 3), [m]."""
-    return model.forward_path(motion.q[_sampled_rows(motion)])[:, :3, 3]
+    return model.position_path(motion.q[sampled_rows(motion)])
 
 
 def make_plan(
@@ -91,10 +99,11 @@ def make_plan(
     speed: float,
     law: PlannableLaw,
     box: SafetyBox | None = None,
+    kind: PathKind = "joint",
+    via: Pose | None = None,
 ) -> Plan | Message:
     """Returns a motion from start to goal that is judged but for collisions, or why there is none."""
     from rcilab.conformance import check
-    from rcilab.motion import plan_joint
 
     for name, q in (("plan.start_limit", start), ("plan.at_limit", goal)):
         outside = np.flatnonzero(~((model.limits.joint.lower < q) & (q < model.limits.joint.upper)))
@@ -102,21 +111,47 @@ def make_plan(
             return message(name, joint=int(outside[0]) + 1)
     if float(np.abs(goal - start).max()) < SMALLEST_MOTION:
         return message("plan.here")
+    if kind == "arc" and via is None:
+        return message("plan.no_via")
     try:
-        motion = plan_joint(model, start, goal, speed=speed, law=law)
+        motion = _go(model, start, goal, speed, law, kind, via)
         report = check(motion, model, start=start, box=box, distance=None)
     except RcilabError as error:
         return message("plan.failed", error=str(error))
-    return picture(model, motion, report, box)
+    away = int(np.abs(motion.goal - goal).argmax())
+    note = None
+    if abs(float(motion.goal[away] - goal[away])) > SAME_WAY:
+        note = message("plan.other_way", joint=away + 1)
+    return replace(picture(model, motion, report, box), kind=kind, note=note)
+
+
+def _go(
+    model: RobotModel,
+    start: JointVector,
+    goal: JointVector,
+    speed: float,
+    law: PlannableLaw,
+    kind: PathKind,
+    via: Pose | None,
+) -> Motion:
+    from rcilab.motion import plan_arc, plan_joint, plan_line
+
+    if kind == "joint":
+        return plan_joint(model, start, goal, speed=speed, law=law)
+    target, psi = model.forward(goal), model.arm_angle(goal) if model.n == 7 else None
+    if kind == "line" or via is None:
+        return plan_line(model, start, target, speed=speed, psi=psi, law=law)
+    return plan_arc(model, start, via, target, speed=speed, psi=psi, law=law)
 
 
 def picture(model: RobotModel, motion: Motion, report: Report, box: SafetyBox | None = None) -> Plan:
     """Returns a judged motion with what views draw of it."""
-    effort = np.abs(motion.dq[_sampled_rows(motion)] / model.limits.joint.velocity).max(axis=1)
+    effort = np.abs(motion.dq[sampled_rows(motion)] / model.limits.joint.velocity).max(axis=1)
     return Plan(motion=motion, report=report, path=tool_path(model, motion), effort=effort, model=model, box=box)
 
 
-def _sampled_rows(motion: Motion) -> NDArray[np.intp]:
+def sampled_rows(motion: Motion) -> NDArray[np.intp]:
+    """Returns the rows of a motion at `PATH_POINTS` moments, the first and the last among them."""
     times = np.linspace(0.0, motion.duration, PATH_POINTS)
     return np.minimum((times / CYCLE_TIME).astype(np.intp), len(motion.times) - 1)
 

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from rcilab.arrays import JointVector
-from rcilab.errors import UnreachableError
+from rcilab.errors import KinematicsError, UnreachableError
 from rcilab.kinematics.solutions import Solutions
 from rcilab.model import RobotModel
 from rcilab.spatial import Pose
@@ -32,7 +32,7 @@ class Reach:
     q: JointVector
     """The configuration at the nearest reachable pose, shape (n,), [rad]."""
     solutions: Solutions | None
-    """All branches at that pose; None when the target is out of reach, or was posed joint by joint."""
+    """All branches at that pose; None when there is none."""
     short: Message | None = None
     """How far that pose is from the target, in words; None when the target is reached."""
 
@@ -72,7 +72,11 @@ def judge_pose(model: RobotModel, target: Pose, near: JointVector, psi: float | 
 
 def judge_joints(model: RobotModel, q: JointVector) -> Reach:
     """Returns what is to be said about a configuration that was posed joint by joint."""
-    return _judge_configuration(model, q, None)
+    try:
+        solutions = model.inverse(model.forward(q), near=q)
+    except KinematicsError:
+        solutions = None
+    return _judge_configuration(model, q, solutions)
 
 
 def _judge_configuration(model: RobotModel, q: JointVector, solutions: Solutions | None) -> Reach:

@@ -42,9 +42,9 @@ class _Look:
 
 _LOOKS: dict[ArmStyle, _Look] = {
     "live": _Look(tint=None, opacity=1.0, inset=0.0),
-    "commanded": _Look(tint=(255, 190, 60), opacity=0.35, inset=0.0012),
-    "plan": _Look(tint=(70, 140, 255), opacity=0.35, inset=0.0020),
-    "candidate": _Look(tint=(70, 190, 130), opacity=0.35, inset=0.0028),
+    "commanded": _Look(tint=(255, 170, 20), opacity=0.5, inset=0.0012),
+    "plan": _Look(tint=(70, 140, 255), opacity=0.42, inset=0.0020),
+    "candidate": _Look(tint=(70, 190, 130), opacity=0.42, inset=0.0028),
     "refused": _Look(tint=(230, 80, 70), opacity=0.35, inset=0.0036),
 }
 _TINTED_ROLE_SHADE: dict[ColorRole, float] = {"shell": 1.0, "cap": 0.75, "dark": 0.45}

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from rcilab.spatial import Pose
 from rcilab.views.meshcat_server import MeshcatServer, import_meshcat
-from rcilab.views.scene import NO_TURN, ORIGIN, Color, line_points, unknown_node
+from rcilab.views.scene import NO_TURN, ORIGIN, Color, line_points, segment_ends, unknown_node
 
 _CAMERA = [1.25, 0.75, 1.15]  # [m] axes of three.js: x, up, -y; the page's camera always looks at the origin
 
@@ -84,6 +84,16 @@ class MeshcatScene:
         geometry = g.PointsGeometry(path.T.astype(np.float32), (shades.T / 255.0).astype(np.float32))
         self._nodes[name] = _Node()
         self._at(name).set_object(g.Line(geometry, g.LineBasicMaterial(vertexColors=True)))
+
+    def add_segments(self, name: str, segments: ArrayLike, *, color: ArrayLike, thickness: float = 0.004) -> None:
+        """Adds or moves lines; see `Scene`. WebGL draws them one pixel wide, whatever the thickness."""
+        g = import_meshcat().geometry
+
+        ends, shades = segment_ends(segments, color)
+        points, colors = ends.reshape(-1, 3).T.astype(np.float32), (shades.reshape(-1, 3).T / 255.0).astype(np.float32)
+        self._nodes[name] = _Node()
+        material = g.LineBasicMaterial(vertexColors=True)
+        self._at(name).set_object(g.LineSegments(g.PointsGeometry(points, colors), material))
 
     def set_transform(
         self, name: str, *, wxyz: Sequence[float] | None = None, position: Sequence[float] | None = None

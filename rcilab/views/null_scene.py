@@ -12,21 +12,21 @@ from numpy.typing import ArrayLike
 
 from rcilab.arrays import Array, as_vector, frozen
 from rcilab.spatial import IDENTITY, Pose
-from rcilab.views.scene import NO_TURN, ORIGIN, Color, line_points, unknown_node
+from rcilab.views.scene import NO_TURN, ORIGIN, Color, line_points, segment_ends, unknown_node
 
 
 @dataclass(slots=True)
 class DrawnNode:
     """One node as it stands now; owned by its scene."""
 
-    kind: Literal["frame", "mesh", "polyline"]
+    kind: Literal["frame", "mesh", "polyline", "segments"]
     wxyz: Sequence[float] = NO_TURN
     position: Sequence[float] = ORIGIN
     visible: bool = True
     color: Color = (0, 0, 0)
     opacity: float = 1.0
     points: Array | None = None
-    """Vertices of a mesh or points of a line, shape (N, 3), [m]."""
+    """Vertices of a mesh or points of lines, shape (N, 3), [m]."""
     triangles: int = 0
 
 
@@ -62,6 +62,12 @@ class NullScene:
         path, shades = line_points(points, color)
         red, green, blue = (int(value) for value in shades[0])
         self.nodes[name] = DrawnNode("polyline", color=(red, green, blue), points=frozen(path))
+
+    def add_segments(self, name: str, segments: ArrayLike, *, color: ArrayLike, thickness: float = 0.004) -> None:
+        """Keeps lines; see `Scene`."""
+        ends, shades = segment_ends(segments, color)
+        red, green, blue = (int(value) for value in shades[0, 0])
+        self.nodes[name] = DrawnNode("segments", color=(red, green, blue), points=frozen(ends.reshape(-1, 3)))
 
     def set_transform(
         self, name: str, *, wxyz: Sequence[float] | None = None, position: Sequence[float] | None = None

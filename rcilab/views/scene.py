@@ -70,6 +70,17 @@ class Scene(Protocol):
         """
         ...
 
+    def add_segments(self, name: str, segments: ArrayLike, *, color: ArrayLike, thickness: float = 0.004) -> None:
+        """Adds lines that need not be connected, or moves those of that name: as many as before is cheap.
+
+        Args:
+            name: Path of the node.
+            segments: Start and end of each, shape (N, 2, 3), N >= 1, in the node above, [m].
+            color: One RGB colour, shape (3,), or one an end, shape (N, 2, 3), 0-255.
+            thickness: [m]; stays as it was where only points move.
+        """
+        ...
+
     def set_transform(
         self, name: str, *, wxyz: Sequence[float] | None = None, position: Sequence[float] | None = None
     ) -> None:
@@ -106,6 +117,23 @@ def line_points(points: ArrayLike, color: ArrayLike) -> tuple[np.ndarray, np.nda
     if shades.shape not in ((3,), path.shape):
         raise UsageError(f"colours of shape {shades.shape} fit neither one line, (3,), nor its points, {path.shape}")
     return path, np.broadcast_to(shades, path.shape).astype(np.uint8)
+
+
+def segment_ends(segments: ArrayLike, color: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
+    """Returns checked ends, shape (N, 2, 3), and one colour for each of them, of the same shape, for `add_segments`.
+
+    Raises:
+        UsageError: No segment, or colours that fit neither all of them nor each end.
+    """
+    ends = np.asarray(segments, dtype=np.float64)
+    if ends.ndim != 3 or not len(ends) or ends.shape[1:] != (2, 3):
+        raise UsageError(f"segments need shape (N, 2, 3) with N >= 1, got shape {ends.shape}")
+    shades = np.asarray(color, dtype=np.float64)
+    if shades.shape not in ((3,), ends.shape):
+        raise UsageError(
+            f"colours of shape {shades.shape} fit neither all segments, (3,), nor their ends, {ends.shape}"
+        )
+    return ends, np.broadcast_to(shades, ends.shape).astype(np.uint8)
 
 
 def unknown_node(name: str) -> UsageError:

@@ -95,7 +95,7 @@ class SetupView:
         if load is None:
             return
         axes, radii = inertia_ellipsoid(load)
-        ball = _ball()
+        ball = unit_ball()
         with self._scene.batch():
             self._place(self._load, Pose(load.center_of_mass))
             self._scene.add_mesh(f"{self._load}/center", ball.vertices * _SPHERE, ball.faces, color=LOAD_COLOR)
@@ -153,7 +153,8 @@ def _cone(radius: float, height: float) -> Mesh:
     return revolve([(0.0, -height), (radius, -height), (0.0, 0.0)], segments=32)
 
 
-def _ball() -> Mesh:
+def unit_ball() -> Mesh:
+    """Returns a sphere of radius 1, [m]."""
     angles = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 17)
     profile = [(max(float(np.cos(a)), 0.0), float(np.sin(a))) for a in angles]
     return revolve(profile, segments=32)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.views.scene import NO_TURN, ORIGIN, Color, line_points, unknown_node
+from rcilab.views.scene import NO_TURN, ORIGIN, Color, line_points, segment_ends, unknown_node
 
 if TYPE_CHECKING:
     import viser
@@ -78,6 +78,19 @@ class ViserScene:
             thickness=thickness,
         )
 
+    def add_segments(self, name: str, segments: ArrayLike, *, color: ArrayLike, thickness: float = 0.004) -> None:
+        """Adds or moves lines; see `Scene`. What has not changed does not travel."""
+        ends, shades = segment_ends(segments, color)
+        points, shades = ends.astype(np.float32), _line_colors(shades)
+        handle = self._handles.get(name)
+        if handle is None or handle.points.shape != points.shape:
+            self._handles[name] = self._server.scene.add_line_segments(name, points, shades, thickness=thickness)
+            return
+        if not np.array_equal(handle.points, points):
+            handle.points = points
+        if not np.array_equal(handle.colors, shades):
+            handle.colors = shades
+
     def set_transform(
         self, name: str, *, wxyz: Sequence[float] | None = None, position: Sequence[float] | None = None
     ) -> None:
@@ -108,6 +121,15 @@ class ViserScene:
             act: Called with viser's `SceneNodeDragEvent`, on the server's event loop.
         """
         self._handle(name).on_drag(act)
+
+    def on_click(self, name: str, act: Callable[[Any], Coroutine[Any, Any, None]]) -> None:
+        """Hears of a mesh that is clicked.
+
+        Args:
+            name: Name of the mesh.
+            act: Called with viser's `SceneNodePointerEvent`, on the server's event loop.
+        """
+        self._handle(name).on_click(act)
 
     def ignore_drag(self, name: str) -> None:
         """Lets a drag that begins on this mesh turn the camera again."""
@@ -142,6 +164,11 @@ def _turn(handle: Any, wxyz: Sequence[float]) -> None:
     w, x, y, z = (float(number) for number in wxyz)
     handle._impl.wxyz[:] = (w, x, y, z)
     handle._impl.api._queue_scene_message(_messages.SetOrientationMessage(handle._impl.name, (w, x, y, z)))
+
+
+def _line_colors(colors: np.ndarray) -> np.ndarray:
+    """Returns what viser's lines are to be given: the page takes it for linear light, and draws it paler than meant."""
+    return np.round(255.0 * (colors / 255.0) ** 2.2).astype(np.uint8)
 
 
 def _viser_opacity(opacity: float) -> float | None:

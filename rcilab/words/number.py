@@ -73,5 +73,36 @@ def _bounds(low: float, high: float, unit: str) -> Message:
     return message(code, low=_short(low), high=_short(high), unit=unit)
 
 
+@dataclass(frozen=True)
+class ParsedQuaternion:
+    """A unit quaternion, wxyz, or why there is none."""
+
+    value: tuple[float, ...] | None
+    problem: Message | None = None
+
+
+def parse_quaternion(typed: str) -> ParsedQuaternion:
+    """Returns the orientation that somebody typed as four numbers w x y z, brought to length 1.
+
+    Between the numbers stand blanks, semicolons or commas; decimal commas only where blanks or semicolons part them.
+    """
+    plain = typed.strip()[: 8 * _LONGEST].strip("()[]{} ")
+    parts = [part.rstrip(",") for part in re.split(r"[\s;]+", plain) if part.strip(",")]
+    if len(parts) == 1:
+        parts = [part for part in plain.split(",") if part]
+    if len(parts) != 4:
+        return ParsedQuaternion(None, message("parse.quaternion", count=len(parts)))
+    numbers: list[float] = []
+    for part in parts:
+        parsed = parse_number(part, -1e6, 1e6, "")
+        if parsed.value is None:
+            return ParsedQuaternion(None, parsed.problem)
+        numbers.append(parsed.value)
+    length = math.hypot(*numbers)
+    if length < 1e-6:
+        return ParsedQuaternion(None, message("parse.no_turn"))
+    return ParsedQuaternion(tuple(number / length for number in numbers))
+
+
 def _short(number: float) -> str:
     return f"{number:.3f}".rstrip("0").rstrip(".")

@@ -106,6 +106,7 @@ class Workbench:
                 here=self._here,
                 seek=lambda place: ask(requests.Seek(place=place)),
                 size=lambda height: ask(requests.SetView(name="height", value=height)),
+                peek=lambda page, branch: ask(requests.Peek(page=page, index=branch if branch >= 0 else None)),
                 take=lambda page: ask(requests.TakeControls(page=page)),
                 answer=lambda page, yes: ask(requests.AnswerControls(page=page, yes=yes)),
             )

@@ -28,6 +28,7 @@ from rcilab.workbench.run.mode_actions import ModeActions
 from rcilab.workbench.run.push_actions import PushActions
 from rcilab.workbench.run.where_actions import WhereActions
 from rcilab.workbench.run.world_actions import WorldActions
+from rcilab.workbench.scene.actions import SceneActions
 from rcilab.workbench.session import Session
 from rcilab.workbench.setup.actions import SetupActions, is_setup_field
 from rcilab.workbench.store import Store
@@ -73,6 +74,7 @@ class Conductor:
         self._learn = LearnActions(store, session)
         self._view = ViewActions(store)
         self._lease = LeaseActions(store, session, presence or Presence())
+        self._scene = SceneActions(store, self._goal)
         self._export = ExportActions(store, deliver)
         self._folder = FolderActions(store)
         self._mailbox: Mailbox[requests.Request] = Mailbox()
@@ -87,6 +89,11 @@ class Conductor:
             requests.TypeField: self._type_field,
             requests.SetArmAngle: self._goal.set_arm_angle,
             requests.ChooseBranch: self._goal.choose_branch,
+            requests.DragElbow: self._scene.drag_elbow,
+            requests.Peek: self._scene.peek,
+            requests.ShowBead: self._scene.show_bead,
+            requests.ShowExtra: self._scene.show_extra,
+            requests.SetWay: self._goal.set_way,
             requests.Plan: self._goal.plan,
             requests.SetSpeed: self._goal.set_speed,
             requests.SetLaw: self._goal.set_law,
@@ -154,6 +161,7 @@ class Conductor:
         self._program.close()
         self._check.close()
         self._learn.close()
+        self._scene.close()
         self.robot.close()
         self._export.close()
         self._keepsake.drop()
@@ -187,9 +195,11 @@ class Conductor:
         self._program.tick()
         self._check.tick()
         self._learn.tick()
+        self._scene.tick()
         self._keepsake.keep(self._store.state)
 
     def _resume(self, kept: Kept) -> None:
+        self._setup.restore(kept.setup)
         self._goal.pose(kept.q)
         if kept.program is not None and kept.program.model == self._store.state.model.name:
             self._program.restore(kept.program)
@@ -243,6 +253,8 @@ def _coalescing_key(request: requests.Request) -> str | None:
         return f"joint.{request.joint}.{request.page}"
     if isinstance(request, requests.MoveSetup | requests.ResizeBox) and not request.ended:
         return f"{type(request).__name__}.{request.page}"
+    if isinstance(request, requests.DragElbow) and request.phase == "update":
+        return f"elbow.{request.page}"
     if isinstance(request, requests.PullArm) and request.phase == "update":
         return f"pull.{request.page}"
     if isinstance(request, requests.SetNetwork) and request.name is not None:
@@ -250,7 +262,8 @@ def _coalescing_key(request: requests.Request) -> str | None:
     if isinstance(request, requests.SetDrive) and request.pace is not None:
         return f"pace.{request.page}"
     if isinstance(
-        request, requests.Seek | requests.SetSpeed | requests.SetArmAngle | requests.HoldPush | requests.HoldJog
+        request,
+        requests.Seek | requests.SetSpeed | requests.SetArmAngle | requests.HoldPush | requests.HoldJog | requests.Peek,
     ):
         return f"{type(request).__name__}.{request.page}"
     return None

@@ -1,4 +1,4 @@
-"""What a workbench had when it ended without being closed: its goal and its program come back with the next one."""
+"""What a workbench had when it ended without being closed: goal, program and set-up come back with the next one."""
 
 from __future__ import annotations
 
@@ -6,14 +6,16 @@ import json
 import os
 import time
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rcilab.arrays import JointVector, as_vector, frozen
+from rcilab.client.setup import RobotSetup
 from rcilab.errors import RcilabError
 from rcilab.motion.program import Program
 from rcilab.whole_file import write_whole
+from rcilab.workbench.setup.kept import build_setup, setup_facts
 
 if TYPE_CHECKING:
     from rcilab.model import RobotModel
@@ -30,6 +32,8 @@ class Kept:
     q: JointVector
     """The goal, shape (n,), [rad]."""
     program: Program | None = None
+    setup: RobotSetup = field(default_factory=RobotSetup)
+    """Those parts of the set-up that were edited."""
 
 
 def keepsake_file(port: int) -> Path:
@@ -40,7 +44,7 @@ def keepsake_file(port: int) -> Path:
 
 
 class Keepsake:
-    """Writes goal and program of every arm down when they have changed. Owned by the conductor's thread.
+    """Writes goal, program and set-up of every arm down when they have changed. Owned by the conductor's thread.
 
     Nobody asked for this file, so where it cannot be written or read it is done without, silently.
 
@@ -67,14 +71,22 @@ class Keepsake:
             if own is None:
                 return None
             program = None if own["program"] is None else Program.from_json(own["program"])
-            return Kept(q=frozen(as_vector(own["q"], model.n, "q", "rad")), program=program)
-        except (OSError, ValueError, LookupError, TypeError, RecursionError, RcilabError):
+            setup = build_setup(own.get("setup") or {})
+            setup.applied_to(model)  # A load that it cannot bear is not brought back.
+            return Kept(q=frozen(as_vector(own["q"], model.n, "q", "rad")), program=program, setup=setup)
+        except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError, RcilabError):
             return None
 
     def keep(self, state: UiState) -> None:
         """Writes down what is new, at most once a second."""
         now = time.monotonic()
-        content = (state.model.name, state.goal.q.tobytes(), state.program.draft)
+        content = (
+            state.model.name,
+            state.goal.q.tobytes(),
+            state.program.draft,
+            state.setup.wanted,
+            state.setup.touched,
+        )
         if self._file is None or content == self._written or now < self._next:
             return
         self._written, self._next = content, now + _PAUSE
@@ -83,6 +95,7 @@ class Keepsake:
         self._arms[state.model.name] = {
             "q": state.goal.q.tolist(),
             "program": None if program is None else program.to_json(),
+            "setup": setup_facts(state.setup.wanted.only(state.setup.touched)),
         }
         text = json.dumps({"format": _FORMAT, "version": _VERSION, "arms": self._arms})
         with suppress(OSError):

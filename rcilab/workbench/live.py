@@ -31,6 +31,8 @@ class Heard:
     """A place in the motion was clicked in a plot, 0 to 1."""
     size: Callable[[float], None]
     """Height of a page's window, [px], when it opens and when it changes."""
+    peek: Callable[[int, int], None] = lambda page, branch: None
+    """The branch that is under a page's mouse, from 0; -1 when it is left."""
     take: Callable[[int], None]
     """A page wants the controls."""
     answer: Callable[[int, bool], None]
@@ -101,6 +103,8 @@ class LiveChannel:
             pass  # Nobody that we know.
         elif kind == "here":
             self._heard.here(page)
+        elif kind == "peek":
+            _pass_on(said.get("branch"), -1.0, 99.0, lambda branch: self._heard.peek(page, int(branch)))
         elif kind == "take":
             self._heard.take(page)
         elif kind == "answer" and isinstance(said.get("yes"), bool):

@@ -12,7 +12,10 @@ from rcilab.workbench.learn.state import exhibited
 from rcilab.workbench.live import LiveChannel
 from rcilab.workbench.page import dress
 from rcilab.workbench.panels import Panel
+from rcilab.workbench.panels.branches import BranchesPanel
 from rcilab.workbench.panels.check import CheckPanel
+from rcilab.workbench.panels.elbow import ElbowPanel
+from rcilab.workbench.panels.extras import ExtrasPanel
 from rcilab.workbench.panels.health import HealthPanel
 from rcilab.workbench.panels.jog import JogPanel
 from rcilab.workbench.panels.lab import LabPanel
@@ -34,6 +37,7 @@ from rcilab.workbench.panels.status import status_values
 from rcilab.workbench.panels.target import TargetPanel
 from rcilab.workbench.panels.timeline import TimelinePanel
 from rcilab.workbench.panels.tool_jog import ToolJogPanel
+from rcilab.workbench.panels.way import WayPanel
 from rcilab.workbench.panels.waypoint import WaypointPanel
 from rcilab.workbench.panels.where import WherePanel
 from rcilab.workbench.program.marks import ProgramMarks
@@ -52,13 +56,13 @@ _PERIOD = 1.0 / 30.0  # [s] A choice: the display's rate is enough, and it leave
 _MAIN_WIDTH, _TIMELINE_WIDTH = 352, 380  # [px]
 _TABS = (
     ("tab.jog", "adjustments-horizontal", JogPanel, ToolJogPanel, PosesPanel),
-    ("tab.target", "current-location", TargetPanel),
+    ("tab.target", "current-location", TargetPanel, ElbowPanel, BranchesPanel, WayPanel),
     ("tab.program", "list-numbers", ProgramPanel, WaypointPanel, ProgramFilePanel),
     ("tab.setup", "tool", SetupPanel, SetupNumbersPanel),
     ("tab.check", "clipboard-check", CheckPanel),
     ("tab.run", "player-play", RunPanel, WherePanel, ModePanel, RecordingPanel, PushPanel, LabPanel, HealthPanel),
     ("tab.learn", "school", LearnLessonPanel, LearnPanel, LearnExhibitPanel),
-    ("tab.settings", "settings", SettingsPanel, RunsFolderPanel),
+    ("tab.settings", "settings", SettingsPanel, ExtrasPanel, RunsFolderPanel),
 )
 
 

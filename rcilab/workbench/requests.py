@@ -111,6 +111,35 @@ class ChooseBranch(Request):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class DragElbow(Request):
+    """The handle on the elbow's circle was dragged."""
+
+    eye: tuple[float, ...]
+    """Where the page's camera is, base axes, [m]."""
+    hand: tuple[float, ...]
+    """A point under the mouse, base axes, [m]."""
+    phase: Literal["start", "update", "end"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Peek(Request):
+    """A branch of the list is under the mouse or has the focus."""
+
+    index: int | None
+    """From 0, in the order of the list; None when it is left."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetWay(Request):
+    """How the tool is to go to the goal; what is None stays."""
+
+    kind: str | None = None
+    """"joint", "line" or "arc"."""
+    via: bool = False
+    """Whether the arc shall lead over where the target is now."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Plan(Request):
     """Plan from where the arm is to the goal, and check it."""
 
@@ -358,6 +387,22 @@ class ShowPlot(Request):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ShowBead(Request):
+    """Go to a violation on the path and say what it is."""
+
+    number: int
+    """From 0, worst first."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ShowExtra(Request):
+    """Show or hide one of the things that the scene has switches for."""
+
+    name: str
+    on: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Export(Request):
     """The last run as a file, through the browser."""
 
@@ -409,6 +454,7 @@ class PageWent(Request):
 
 
 Harmless: TypeAlias = (
-    PageCame | PageWent | TakeControls | AnswerControls | Seek | Play | SetView | ShowPlot | Export | CancelExport
-)
+    PageCame | PageWent | TakeControls | AnswerControls | Seek | Play | SetView | ShowPlot | ShowBead | ShowExtra
+    | Peek | Export | CancelExport
+)  # fmt: skip
 """What a watching page may ask for as well: nothing of it moves a goal or a robot."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from rcilab.arrays import JointVector
 from rcilab.model import RobotModel
-from rcilab.posing.planning import Plan, PlannableLaw
+from rcilab.posing.planning import PathKind, Plan, PlannableLaw
 from rcilab.posing.reach import Reach, Tone
 from rcilab.spatial import Pose
 from rcilab.workbench.check.state import CheckState
@@ -23,6 +23,7 @@ from rcilab.workbench.lease import Lease
 from rcilab.workbench.program.draft import ProgramState
 from rcilab.workbench.run.driving import DriveState
 from rcilab.workbench.run.pushing import Plant, PushState
+from rcilab.workbench.scene.extras import SceneState
 from rcilab.workbench.setup.wanted import SetupState
 from rcilab.workbench.text import Message
 from rcilab.workbench.units import USUAL, Units
@@ -58,6 +59,8 @@ class Goal:
     reach: Reach
     psi: float | None = None
     """Arm angle of `q`, [rad]; None where it has none."""
+    snapped: Message | None = None
+    """Why it is another arm angle than was asked for; None where it is that one."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -112,6 +115,8 @@ class UiState:
     goal: Goal
     setup: SetupState = field(default_factory=SetupState)
     """Safety box, tool, load, force-control frame; `model` has this tool and this load."""
+    scene: SceneState = field(default_factory=SceneState)
+    """What was computed for the scene."""
     plan: Plan | None = None
     no_plan: Message | None = None
     """Why there is no plan."""
@@ -132,6 +137,10 @@ class UiState:
     """What is being written for a page."""
     speed: float = 0.5
     law: PlannableLaw = "jerk_limited"
+    way: PathKind = "joint"
+    """How the tool goes to the goal."""
+    via: Pose | None = None
+    """What an arc leads over."""
     busy: Message | None = None
     """What is being done that takes longer than a moment."""
     place: float = 0.0

@@ -126,6 +126,10 @@ class BenchPage:
         pose = self.tool_pose(arm)
         return pose is not None and float(np.abs(pose - self.state.model.forward(q).matrix).max()) < tolerance
 
+    def is_drawn(self, node: str) -> bool:
+        """Whether the page's scene has this node."""
+        return bool(self.tab.evaluate("name => !!__viserMutable.nodeRefFromName[name]", node))
+
     def project(self, node: str, offset: tuple[float, float, float]) -> tuple[float, float]:
         x, y = self.tab.evaluate(_PROJECT, [node, list(offset)])
         return x, y

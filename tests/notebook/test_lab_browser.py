@@ -119,17 +119,20 @@ def wait_for(page: Any, condition: Callable[[], bool], what: str, timeout: float
 
 
 def run_all(page: Any) -> None:
-    """Presses Run, Run All Cells; a menu that is opened while JupyterLab still loads has no entries yet."""
-    page.locator(".jp-Notebook .jp-Cell").first.wait_for()
-    entry = page.get_by_text("Run All Cells", exact=True)
+    """Presses Run, Run All Cells, until the cell runs: JupyterLab drops what is asked before it has a kernel."""
+    page.get_by_text("(ipykernel) | Idle").wait_for()
+    prompt = page.locator(".jp-Cell .jp-InputPrompt").first
 
-    def is_open() -> bool:
+    def begun() -> bool:
         page.keyboard.press("Escape")
         page.get_by_role("menuitem", name="Run", exact=True).click()
-        return entry.is_visible()
+        entry = page.get_by_text("Run All Cells", exact=True)
+        if entry.is_visible():
+            entry.click()
+            page.wait_for_timeout(500)
+        return prompt.inner_text().strip() not in ("", "[ ]:")
 
-    wait_for(page, is_open, "the menu Run")
-    entry.click()
+    wait_for(page, begun, "the cell to run")
 
 
 def tool_in_scene(page: Any) -> np.ndarray | None:

@@ -52,6 +52,19 @@ def test_an_arm_moves_hides_changes_colour_and_goes(scene: Scene) -> None:
     ArmView(scene, "live", model).show(model.home)
 
 
+def test_segments_move_and_change_in_number(scene: Scene) -> None:
+    ends = np.arange(12.0).reshape(2, 2, 3)
+    scene.add_segments("/lines", ends, color=(255, 0, 0))
+    scene.add_segments("/lines", ends + 1.0, color=np.full((2, 2, 3), 7.0))
+    scene.add_segments("/lines", ends[:1], color=(0, 0, 255))
+    scene.set_visible("/lines", False)
+    scene.remove("/lines")
+    with pytest.raises(UsageError, match="segments need"):
+        scene.add_segments("/lines", ends[0], color=(255, 0, 0))
+    with pytest.raises(UsageError, match="fit neither"):
+        scene.add_segments("/lines", ends, color=(1.0, 2.0))
+
+
 def test_a_node_can_be_replaced_under_its_name(scene: Scene) -> None:
     scene.add_frame("/a", position=(1.0, 0.0, 0.0))
     scene.add_mesh("/a/mesh", *TRIANGLE, color=(255, 0, 0))

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rcilab.words.number import parse_number
+from rcilab.words.number import parse_number, parse_quaternion
 from rcilab.workbench.text import Text
 
 
@@ -66,6 +66,27 @@ def test_any_text_gives_a_value_in_range_or_a_problem(typed):
     if parsed.value is not None:
         assert math.isfinite(parsed.value)
         assert -10.0 <= parsed.value <= 10.0
+
+
+@pytest.mark.parametrize("typed", ["0 0 2 0", "(0, 0, 2, 0)", "0;0;2;0", " 0 0  2,0 0 ", "[0 0 2 0]", "0,0,2,0"])
+def test_a_typed_quaternion_is_brought_to_length_one(typed):
+    assert parse_quaternion(typed).value == (0.0, 0.0, 1.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("typed", "code"),
+    [
+        ("", "parse.quaternion"),
+        ("1 0 0", "parse.quaternion"),
+        ("0 0 0 0", "parse.no_turn"),
+        ("1 0 x 0", "parse.garbage"),
+        ("1 0 nan 0", "parse.not_finite"),
+    ],
+)
+def test_what_is_no_orientation_is_answered_in_words(typed, code):
+    parsed = parse_quaternion(typed)
+    assert parsed.value is None
+    assert parsed.problem.code == code
 
 
 @given(st.floats(-170.0, 170.0))

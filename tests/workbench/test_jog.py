@@ -16,8 +16,9 @@ from rcilab.model import load_model
 from rcilab.safety_box import SafetyBox
 from rcilab.spatial import Pose
 from rcilab.supervisor import SupervisorStatus
-from rcilab.workbench import jog_actions, requests
+from rcilab.workbench import requests
 from rcilab.workbench.goal.actions import GoalActions, initial_goal
+from rcilab.workbench.jog import actions as jog_actions
 from rcilab.workbench.jog.actions import JogActions
 from rcilab.workbench.jog.jogging import (
     AXES,

@@ -11,8 +11,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rcilab.client.setup import ForceControlFrame, RobotSetup
+from rcilab.dynamics.payload import Payload
 from rcilab.model import load_model
 from rcilab.motion import Program, Waypoint
+from rcilab.protocols.rci import ForceFrame
+from rcilab.safety_box import SafetyBox
+from rcilab.spatial import Pose
 from rcilab.workbench import requests
 from rcilab.workbench.app import Workbench, WorkbenchConfig
 from rcilab.workbench.goal.actions import initial_goal
@@ -26,8 +31,18 @@ GOAL = MODEL.home + 0.1
 PROGRAM = Program(model=MODEL.name, start=MODEL.home, waypoints=(Waypoint.joint(GOAL), Waypoint.joint(MODEL.home)))
 
 
+SETUP = RobotSetup(
+    tool=Pose((0.01, 0.0, 0.12), (0.8, 0.6, 0.0, 0.0)),
+    load=Payload(mass=1.5, center_of_mass=(0.0, 0.01, 0.05), inertia=np.diag([0.01, 0.02, 0.015])),
+    box=SafetyBox(size=(1.0, 1.2, 0.8), T_base_box=Pose((0.1, 0.0, 0.5)), active=True),
+    force=ForceControlFrame(T_flange_force=Pose((0.0, 0.0, 0.1)), type=ForceFrame.TOOL),
+)
+
+
 def state_with_all() -> UiState:
     state = UiState(model=MODEL, goal=initial_goal(MODEL, GOAL))
+    wanted = state.setup.wanted.updated(SETUP)
+    state = replace(state, setup=replace(state.setup, wanted=wanted, touched=frozenset(SETUP.parts)))
     return replace(state, program=replace(state.program, draft=draft_of(PROGRAM, MODEL)))
 
 
@@ -37,6 +52,10 @@ def test_what_was_kept_is_recalled(tmp_path):
     kept = keepsake.recall(MODEL)
     assert np.array_equal(kept.q, GOAL)
     assert [w.type for w in kept.program.waypoints] == ["joint", "joint"]
+    assert kept.setup.tool.is_close(SETUP.tool, 1e-12)
+    assert (kept.setup.load.mass, kept.setup.box.size, kept.setup.box.active) == (1.5, (1.0, 1.2, 0.8), True)
+    assert np.array_equal(kept.setup.load.inertia, SETUP.load.inertia)
+    assert kept.setup.force.type is ForceFrame.TOOL
     other = load_model("xMate3")
     assert keepsake.recall(other) is None
     keepsake.keep(UiState(model=other, goal=initial_goal(other, other.home)))
@@ -77,6 +96,7 @@ def test_the_next_workbench_at_the_port_has_goal_plan_and_program():
         wait_for(lambda: bench.session.status().phase == "idle", what="an idle arm")
         for joint, angle in enumerate(GOAL.tolist()):
             bench.conductor.ask(requests.MoveJoint(joint=joint, angle=angle))
+        bench.conductor.ask(requests.TypeField(field="setup.tool.z", text="120"))
         bench.conductor.ask(requests.LoadProgram(name="mine.json", content=PROGRAM.to_json().encode()))
         wait_for(lambda: is_kept(file), what="the goal and the program to be written down")
         left = file.read_text()
@@ -85,6 +105,8 @@ def test_the_next_workbench_at_the_port_has_goal_plan_and_program():
     with Workbench(WorkbenchConfig(port=port)) as bench:
         assert np.allclose(bench.store.state.goal.q, GOAL, atol=1e-12)
         assert bench.store.state.notice.text.code == "notice.resumed"
+        assert bench.store.state.model.T_flange_tool.position.tolist() == [0.0, 0.0, 0.12]
+        wait_for(lambda: bench.session.status().setup.parts == ("tool",), what="the controller to be told the tool")
         assert len(bench.store.state.program.draft.steps) == 2
         plan = wait_for(lambda: bench.store.state.plan, what="a plan from the arm to the goal")
         assert np.allclose(plan.motion.goal, GOAL, atol=1e-12)

@@ -14,10 +14,11 @@ from rcilab.client.setup import RobotSetup
 from rcilab.model import load_model
 from rcilab.motion import Motion, Program, Waypoint
 from rcilab.spatial import Pose
-from rcilab.workbench import program_planner, requests
+from rcilab.workbench import requests
 from rcilab.workbench.goal.actions import GoalActions, initial_goal
 from rcilab.workbench.panels.program import read_row
 from rcilab.workbench.panels.program_list import list_html
+from rcilab.workbench.program import planner as program_planner
 from rcilab.workbench.program.actions import ProgramActions
 from rcilab.workbench.program.draft import draft_of, number_at, tell_place, time_at
 from rcilab.workbench.run.readiness import obstacle

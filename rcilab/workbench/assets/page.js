@@ -138,6 +138,8 @@
     };
   };
 
+  window.addEventListener("rl-say", (event) => send(event.detail));  // What the other scripts of the page have to say.
+
   const size = () => send({ kind: "size", height: window.innerHeight });
   window.addEventListener("resize", size);
 

@@ -11,17 +11,20 @@ import numpy as np
 
 from rcilab.arrays import JointVector, frozen
 from rcilab.errors import KinematicsError
-from rcilab.posing.planning import LAWS, Plan, make_plan
+from rcilab.posing.planning import LAWS, PATH_KINDS, Plan, make_plan
 from rcilab.posing.reach import judge_joints, judge_pose
 from rcilab.spatial import Pose
-from rcilab.words.number import parse_number
+from rcilab.words.number import parse_number, parse_quaternion
 from rcilab.workbench import requests
+from rcilab.workbench.goal.elbow import nearest_free
 from rcilab.workbench.run.readiness import is_moving
 from rcilab.workbench.session import Session
-from rcilab.workbench.store import Goal, Store
+from rcilab.workbench.store import Goal, Store, UiState
 from rcilab.workbench.text import Message, message
 
 POSE_FIELDS = ("x", "y", "z", "roll", "pitch", "yaw")
+QUATERNION = "wxyz"
+"""Name of the field that takes all four numbers of the orientation."""
 FURTHEST = 3.0  # [m] A choice: no arm of ours reaches half as far, and the gizmo should stay in sight.
 SLOWEST = 0.01
 SETTLED = 0.15  # [s] A choice: a goal that has not moved for so long is no longer dragged.
@@ -34,6 +37,7 @@ class GoalActions:
         self._store, self._session = store, session
         self._stale = False  # The goal has changed while the arm was moving.
         self._planned = 0.0  # [s] When the last plan was made.
+        self._due: float | None = None  # [s] When a path of the tool is to be planned.
 
     def move_joint(self, request: requests.MoveJoint) -> None:
         """Poses one joint of the candidate arm."""
@@ -76,10 +80,12 @@ class GoalActions:
             self._clear_problems("pose.")
         self._aim(Pose(position, request.wxyz))
 
-    def set_arm_angle(self, request: requests.SetArmAngle) -> None:
-        """Turns the elbow about the shoulder-wrist line while the tool stays."""
+    def set_arm_angle(self, request: requests.SetArmAngle, branch: int | None = None) -> None:
+        """Turns the elbow about the shoulder-wrist line while the tool stays, as near as limits allow."""
         if math.isfinite(request.psi) and self._store.state.model.n == 7:
-            self._aim(self._store.state.goal.target, math.remainder(request.psi, math.tau))
+            state = self._store.state
+            psi, snapped = nearest_free(state.model, state.goal.target, math.remainder(request.psi, math.tau), branch)
+            self._aim(state.goal.target, psi, snapped=snapped)
 
     def choose_branch(self, request: requests.ChooseBranch) -> None:
         """Takes another analytic solution of the same pose."""
@@ -117,6 +123,10 @@ class GoalActions:
             parsed = parse_number(request.text, -bound, bound, unit)
             value = parsed.value
             act = None if value is None else lambda: self._aim(_with_number(state.goal.target, index, value))
+        elif kind == "pose" and name == QUATERNION:
+            parsed = parse_quaternion(request.text)
+            wxyz = parsed.value
+            act = None if wxyz is None else lambda: self._aim(Pose(state.goal.target.position, wxyz))
         elif request.field == "speed":
             parsed = parse_number(request.text, 100.0 * SLOWEST, 100.0, "%")
             value = parsed.value
@@ -149,9 +159,20 @@ class GoalActions:
             self._store.update(law=request.law)
             self.plan()
 
+    def set_way(self, request: requests.SetWay) -> None:
+        """Plans along another kind of path, or over another place."""
+        kind = next((kind for kind in PATH_KINDS if kind == request.kind), self._store.state.way)
+        via = self._store.state.goal.target if request.via else self._store.state.via
+        self._store.update(way=kind, via=via)
+        self.plan()
+
     def plan(self, request: requests.Plan | None = None) -> None:
-        """Plans from where the arm stands to the goal, unless it is moving: then when it has come to rest."""
+        """Plans from where the arm stands to the goal, unless it is moving: then when it has come to rest.
+
+        A path of the tool takes longer than a drag can wait for: it is planned once the goal stands still.
+        """
         state, status = self._store.state, self._session.status()
+        self._due = None
         if is_moving(status):
             self._stale = True
             return
@@ -162,7 +183,15 @@ class GoalActions:
             elif state.recording is None:  # A run that is looked at stays, whatever is posed.
                 self._store.update(plan=None, no_plan=message("plan.no_arm"), recording=None, place=0.0, playing=False)
             return
-        made = make_plan(state.model, frozen(status.q_c), state.goal.q, state.speed, state.law, state.setup.wanted.box)
+        if state.way != "joint" and request is None:
+            self._due = time.monotonic() + SETTLED
+            self._store.update(plan=None, no_plan=message("plan.soon"), recording=None, place=0.0, playing=False)
+            return
+        self._make(state, frozen(status.q_c))
+
+    def _make(self, state: UiState, start: JointVector) -> None:
+        box = state.setup.wanted.box
+        made = make_plan(state.model, start, state.goal.q, state.speed, state.law, box, state.way, state.via)
         self._planned = time.monotonic()
         if isinstance(made, Plan):
             made = replace(made, short=state.goal.reach.short)
@@ -173,6 +202,9 @@ class GoalActions:
     def settle(self) -> None:
         """Looks for collisions, too, once the goal has stood still for a moment."""
         state = self._store.state
+        if self._due is not None and time.monotonic() >= self._due:
+            self.plan(requests.Plan())
+            state = self._store.state
         if state.plan is None or time.monotonic() - self._planned < SETTLED:
             return
         judged = state.plan.completed(state.drive.mode)
@@ -201,10 +233,17 @@ class GoalActions:
         self._store.update(goal=goal)
         self.plan()
 
-    def _aim(self, target: Pose, psi: float | None = None, near: JointVector | None = None) -> None:
+    def _aim(
+        self,
+        target: Pose,
+        psi: float | None = None,
+        near: JointVector | None = None,
+        snapped: Message | None = None,
+    ) -> None:
         state = self._store.state
         reach = judge_pose(state.model, target, state.goal.q if near is None else near, psi)
-        self._store.update(goal=Goal(q=reach.q, target=target, reach=reach, psi=self._arm_angle(reach.q)))
+        goal = Goal(q=reach.q, target=target, reach=reach, psi=self._arm_angle(reach.q), snapped=snapped)
+        self._store.update(goal=goal)
         self.plan()
 
     def _arm_angle(self, q: JointVector) -> float | None:

@@ -155,6 +155,13 @@ class SetupActions:
             self._store.update(setup=replace(setup, asked=None))
             self._send()
 
+    def restore(self, setup: RobotSetup) -> None:
+        """Takes a set-up over that was edited before; a foreign robot is not told without being asked about."""
+        now = self._store.state.setup
+        parts: set[SetupPart] = set(setup.parts)
+        if parts:
+            self._take(replace(now, wanted=now.wanted.updated(setup), touched=now.touched | parts), parts)
+
     def tick(self) -> None:
         """Looks what became of a set-up that was sent, and tells our own controller what is new."""
         state, status = self._store.state, self._session.status()

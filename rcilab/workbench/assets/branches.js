@@ -1,0 +1,47 @@
+// The branch list of the Target tab: the row under the mouse, or with the focus, is shown in the scene; Enter, Space or
+// a click chooses it, by pressing the button of viser's that stands hidden behind the list.
+(() => {
+  "use strict";
+  let told = -1, had = -1;
+
+  const rows = () => [...document.querySelectorAll(".rl-branch")];
+  const rowOf = (node) => node instanceof Element ? node.closest(".rl-branch") : null;
+
+  const choose = (row) => {
+    const group = document.querySelector("div:has(> .rl-choice) + div, div:has(> div > .rl-choice) + div");
+    const button = group && group.querySelectorAll("button")[Number(row.dataset.branch)];
+    if (button) button.click();
+  };
+
+  document.addEventListener("click", (event) => {
+    const row = rowOf(event.target);
+    if (row) { row.focus(); choose(row); }
+  });
+
+  document.addEventListener("keydown", (event) => {
+    const row = rowOf(event.target);
+    if (!row) return;
+    const all = rows(), at = all.indexOf(row);
+    const to = { ArrowUp: at - 1, ArrowDown: at + 1, Home: 0, End: all.length - 1 }[event.key];
+    if (to !== undefined) { const other = all[Math.min(Math.max(to, 0), all.length - 1)]; if (other) other.focus(); }
+    else if (event.key === "Enter" || event.key === " ") choose(row);
+    else return;
+    event.preventDefault();
+    event.stopPropagation();
+  }, true);
+
+  // Looked at, not listened to: the list's HTML is exchanged under the mouse, and then nobody tells that it has left.
+  document.addEventListener("focusin", (event) => { const row = rowOf(event.target); had = row ? Number(row.dataset.branch) : -1; });
+  document.addEventListener("pointerdown", (event) => { if (!rowOf(event.target)) had = -1; }, true);
+  setInterval(() => {
+    if (had >= 0 && document.activeElement === document.body) {
+      const row = document.querySelector(`.rl-branch[data-branch="${had}"]`);
+      if (row && row.getClientRects().length) row.focus();
+    }
+    const seen = document.querySelector(".rl-branch:hover") || rowOf(document.activeElement);
+    const branch = seen && seen.getClientRects().length ? Number(seen.dataset.branch) : -1;
+    if (branch === told) return;
+    told = branch;
+    window.dispatchEvent(new CustomEvent("rl-say", { detail: { kind: "peek", branch } }));
+  }, 70);
+})();

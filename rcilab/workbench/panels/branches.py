@@ -1,0 +1,78 @@
+"""The ways to stand at the target, a row each; the one under the mouse, or with the focus, is shown in the scene."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rcilab.posing.reach import NEAR_LIMIT, margin
+from rcilab.workbench import requests
+from rcilab.workbench.text import Text
+from rcilab.workbench.widgets import Ask, Html, esc
+
+if TYPE_CHECKING:
+    from rcilab.supervisor import SupervisorStatus
+    from rcilab.workbench.store import UiState
+
+_MOST = 16
+
+
+class BranchesPanel:
+    """A list for mouse and keyboard. A chosen row presses a hidden button, so that it comes from this page."""
+
+    def __init__(self, text: Text, ask: Ask) -> None:
+        self._text, self._ask = text, ask
+        self._seen: tuple[object, ...] = (None, None, None)
+
+    def build(self, gui: Any, state: UiState) -> None:
+        """Adds the list."""
+        text, ask = self._text, self._ask
+        with gui.add_folder(text("target.branches")):
+            self._rows = Html(gui)
+            gui.add_html('<i class="rl-choice"></i>')
+            choice = gui.add_button_group(" ", [str(number) for number in range(1, _MOST + 1)])
+
+            @choice.on_click
+            async def _(event: Any) -> None:
+                ask(requests.ChooseBranch(page=event.client_id, index=int(event.target.value) - 1))
+
+    def show(self, state: UiState, status: SupervisorStatus) -> None:
+        """Follows goal and arm."""
+        here = None if status.q_c is None else np.round(status.q_c, 2)
+        seen = (state.goal, state.model, None if here is None else here.tobytes())
+        if seen != self._seen:
+            self._seen = seen
+            self._rows.show(self._html(state, here))
+
+    def _html(self, state: UiState, arm: np.ndarray | None) -> str:
+        solutions, text = state.goal.reach.solutions, self._text
+        if solutions is None or not len(solutions):
+            code = "target.out_of_reach" if state.goal.reach.tone == "bad" else "target.no_branches"
+            return f'<p class="rl-note">{esc(text(code))}</p>'
+        here = state.goal.q if arm is None else arm
+        rows = "".join(self._row(number, q, here, state) for number, q in enumerate(solutions, start=1))
+        heads = "".join(
+            f"<span>{esc(text(f'target.head.{name}'))}</span>" for name in ("number", "margin", "worst", "away")
+        )
+        others = len(solutions.all) - len(solutions)
+        rest = f'<p class="rl-note rl-dim">{esc(text("target.forbidden", count=others))}</p>' if others else ""
+        return (
+            f'<div class="rl-branch-head" aria-hidden="true">{heads}</div>'
+            f'<div class="rl-branches" role="listbox" aria-label="{esc(text("target.branches"))}">{rows}</div>'
+            f'<p class="rl-note rl-dim">{esc(text("target.branch_point"))}</p>{rest}'
+        )
+
+    def _row(self, number: int, q: np.ndarray, here: np.ndarray, state: UiState) -> str:
+        least = margin(state.model, q)
+        chosen = float(np.abs(np.angle(np.exp(1j * (q - state.goal.q)))).max()) < 1e-6
+        left, away = (self._text.units.angle_of(a, 0) for a in (least.angle, float(np.abs(q - here).max())))
+        sign = "▲ " if least.angle < NEAR_LIMIT else ""
+        cells = (f"{number}", f"{sign}{left}", f"J{least.joint}", away)
+        said = self._text("target.branch_said", number=cells[0], margin=cells[1], joint=cells[2], away=cells[3])
+        return (
+            f'<div class="rl-branch" role="option" tabindex="{0 if chosen or number == 1 else -1}" '
+            f'data-branch="{number - 1}" aria-selected="{str(chosen).lower()}" aria-label="{esc(said)}">'
+            + "".join(f"<span>{esc(cell)}</span>" for cell in cells)
+            + "</div>"
+        )

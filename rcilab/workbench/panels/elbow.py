@@ -1,0 +1,146 @@
+"""Arm angle: a slider over the ring of a 7-axis arm's elbow, laid out flat, free and forbidden arcs told apart."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rcilab.views.elbow_view import ARC_COLORS, free_colors
+from rcilab.workbench import requests
+from rcilab.workbench.goal.elbow import LOOKS, Elbow, say_why
+from rcilab.workbench.panels.jog import problems_html
+from rcilab.workbench.text import Text
+from rcilab.workbench.widgets import Ask, Html, Linked, NumberField, esc, shown
+
+if TYPE_CHECKING:
+    from rcilab.supervisor import SupervisorStatus
+    from rcilab.workbench.store import UiState
+
+_HEIGHT = {"free": 10, "other": 4}  # Of 14; forbidden arcs are as high as hatched.
+
+
+class ElbowPanel:
+    """Absent from 6-axis arms, which have no arm angle."""
+
+    def __init__(self, text: Text, ask: Ask) -> None:
+        self._text, self._ask = text, ask
+        self._drawn: Elbow | None = None
+
+    def build(self, gui: Any, state: UiState) -> None:
+        """Adds the controls."""
+        text, ask = self._text, self._ask
+        self._psi: Linked | None = None
+        if state.model.n != 7:
+            return
+        with gui.add_folder(text("target.psi_title")):
+            gui.add_html('<i class="rl-rows"></i>')
+            factor, _ = text.units.from_si("rad")
+            end, step = (180.0, 1.0) if text.units.angle == "deg" else (3.14, 0.01)
+            slider = gui.add_slider("ψ", -end, end, step, 0.0, hint=text("target.psi_hint"))
+            self._psi = Linked(slider, ask, lambda v, p: requests.SetArmAngle(page=p, psi=v / factor))
+            self._field = NumberField(gui.add_text("", ""), ask, "psi", text.unit("deg"))
+            self._ring = Html(gui)
+        self._said = Html(gui)
+
+    def show(self, state: UiState, status: SupervisorStatus) -> None:
+        """Follows the goal."""
+        if self._psi is None:
+            return
+        goal, elbow = state.goal, state.scene.elbow
+        if goal.psi is not None:
+            is_deg = self._text.units.angle == "deg"
+            self._psi.show(float(round(math.degrees(goal.psi))) if is_deg else round(goal.psi, 2))
+            self._field.show(shown(math.degrees(goal.psi)), state.problems.get("psi"), state.typed)
+        if elbow is not self._drawn or elbow is None:
+            self._drawn = elbow
+            self._ring.show(f'<p class="rl-note">{esc(self._text("elbow.none"))}</p>' if elbow is None
+                            else ring_html(elbow, self._text))  # fmt: skip
+        said = problems_html(state, self._text, [("psi", "ψ")])
+        if goal.snapped is not None:
+            said += f'<p class="rl-verdict rl-warn" role="status"><b>▲</b> {esc(self._text.say(goal.snapped))}</p>'
+        self._said.show(said)
+
+
+def ring_html(elbow: Elbow, text: Text) -> str:
+    """Returns the ring from -180 to 180 degrees as a bar, a legend of what is in it, and what is free in words."""
+    parts: list[str] = []
+    for arc in elbow.arcs:
+        title = esc(_title(arc.kind, arc.joints, text))
+        for start, end in _unrolled(arc.start, arc.end):
+            left, width = math.degrees(start) + 180.0, math.degrees(end - start)
+            if arc.kind == "free":
+                parts += _shaded(start, end, elbow, title)
+            else:
+                height = _HEIGHT.get(arc.kind, 10)
+                fill = f"url(#rl-arc-{arc.kind})" if arc.kind != "other" else _css(ARC_COLORS["other"])
+                parts.append(
+                    f'<rect x="{left:.2f}" y="{7 - height / 2:g}" width="{width:.2f}" height="{height}" fill="{fill}">'
+                    f"<title>{title}</title></rect>"
+                )
+    here = math.degrees(elbow.psi) + 180.0
+    kinds = list(dict.fromkeys(arc.kind for arc in elbow.arcs))
+    legend = "".join(f'<span class="rl-arc-{kind}">{esc(text(f"elbow.kind.{kind}"))}</span>' for kind in kinds)
+    free = ", ".join(_range(arc.start, arc.end, text) for arc in elbow.arcs if arc.kind == "free")
+    words = text("elbow.free", ranges=free) if free else text("elbow.nowhere")
+    return (
+        f'<div class="rl-ring"><svg viewBox="0 0 360 14" preserveAspectRatio="none" role="img" '
+        f'aria-label="{esc(words)}">{_PATTERNS}{"".join(parts)}</svg><i style="left:{here / 3.6:.2f}%"></i></div>'
+        f'<div class="rl-arcs">{legend}</div><p class="rl-note rl-dim">{esc(words)}</p>'
+    )
+
+
+def _shaded(start: float, end: float, elbow: Elbow, title: str) -> list[str]:
+    """Returns a free arc in pieces, from amber next to a singularity to blue-green."""
+    pieces = max(1, math.ceil((end - start) / math.tau * LOOKS))
+    marks = np.linspace(start, end, pieces + 1)
+    colors = free_colors(0.5 * (marks[:-1] + marks[1:]), elbow.dexterity)
+    width = math.degrees(end - start) / pieces
+    return [
+        f'<rect x="{math.degrees(mark) + 180.0:.2f}" y="2" width="{width + 0.3:.2f}" height="10" fill="{_css(color)}">'
+        f"<title>{title}</title></rect>"
+        for mark, color in zip(marks[:-1].tolist(), colors.tolist(), strict=True)
+    ]
+
+
+def _unrolled(start: float, end: float) -> list[tuple[float, float]]:
+    """Returns an arc as ranges within -pi to pi."""
+    turn = math.tau * math.floor((start + math.pi) / math.tau)
+    start, end = start - turn, end - turn
+    return [(start, end)] if end <= math.pi else [(start, math.pi), (-math.pi, end - math.tau)]
+
+
+def _range(start: float, end: float, text: Text) -> str:
+    ends = (-math.pi, math.pi)
+    if end - start < math.tau - 1e-9:
+        ends = (math.remainder(start, math.tau), math.remainder(end, math.tau))
+    return " … ".join(text.units.angle_of(angle, 0) for angle in ends).replace("-", "−")
+
+
+def _title(kind: str, joints: tuple[int, ...], text: Text) -> str:
+    return text.say(say_why(joints)) if joints else text(f"elbow.kind.{kind}")
+
+
+def _css(color: Any) -> str:
+    red, green, blue = (round(value) for value in color)
+    return f"rgb({red},{green},{blue})"
+
+
+def _pattern(kind: str, step: float, shape: str) -> str:
+    color = _css(ARC_COLORS[kind])
+    return (
+        f'<pattern id="rl-arc-{kind}" width="{step:g}" height="10" patternUnits="userSpaceOnUse">'
+        f'<rect width="{step:g}" height="10" fill="{color}" opacity="0.16"/>{shape.format(color=color)}</pattern>'
+    )
+
+
+_PATTERNS = "".join(
+    (
+        _pattern("limits", 5, '<path d="M-1 11L6 -1" stroke="{color}" stroke-width="1.6"/>'),
+        _pattern("singular", 4, '<circle cx="2" cy="3" r="1.1" fill="{color}"/>'
+                 '<circle cx="2" cy="8" r="1.1" fill="{color}"/>'),
+        _pattern("box", 4, '<path d="M2 0V10" stroke="{color}" stroke-width="1.6"/>'),
+        _pattern("reach", 6, '<path d="M0 5H3" stroke="{color}" stroke-width="1.2"/>'),
+    )
+)  # fmt: skip

@@ -1,0 +1,45 @@
+"""Switches of the scene: what it shows besides arm, target and path."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from rcilab.workbench import requests
+from rcilab.workbench.scene.extras import EXTRAS, Extra
+from rcilab.workbench.text import Text
+from rcilab.workbench.widgets import Ask, Linked
+
+if TYPE_CHECKING:
+    from rcilab.supervisor import SupervisorStatus
+    from rcilab.workbench.store import UiState
+
+
+class ExtrasPanel:
+    """One switch each; all pages see the same scene."""
+
+    def __init__(self, text: Text, ask: Ask) -> None:
+        self._text, self._ask = text, ask
+
+    def build(self, gui: Any, state: UiState) -> None:
+        """Adds the switches."""
+        self._switches: dict[Extra, Linked] = {}
+        with gui.add_folder(self._text("extra.title")):
+            for extra in EXTRAS:
+                if extra == "elbow" and state.model.n != 7:
+                    continue
+                box = gui.add_checkbox(
+                    self._text(f"extra.{extra}"), extra in state.scene.extras, hint=self._text(f"extra.{extra}_hint")
+                )
+                self._switches[extra] = Linked(box, self._ask, _request(extra))
+
+    def show(self, state: UiState, status: SupervisorStatus) -> None:
+        """Follows what is switched on."""
+        for extra, switch in self._switches.items():
+            switch.show(extra in state.scene.extras)
+
+
+def _request(extra: Extra):  # type: ignore[no-untyped-def]
+    def make(on: bool, page: int | None) -> requests.Request:
+        return requests.ShowExtra(page=page, name=extra, on=bool(on))
+
+    return make

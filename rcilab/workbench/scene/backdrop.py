@@ -1,0 +1,58 @@
+"""Light, ground, axes and background: the room the arm stands in."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import viser
+
+_CAMERA, _LOOK_AT = (2.0, -2.1, 1.45), (0.1, 0.05, 0.62)  # [m]
+_FIELD_OF_VIEW = 0.75  # [rad]
+
+
+def place_camera(server: viser.ViserServer) -> None:
+    """Puts the camera of new pages where the whole arm is seen."""
+    camera = server.initial_camera
+    camera.position, camera.look_at, camera.fov = _CAMERA, _LOOK_AT, _FIELD_OF_VIEW
+
+
+def furnish(server: viser.ViserServer, *, full: bool, dark: bool = False) -> None:
+    """Lights the scene and lays the ground.
+
+    Args:
+        server: The page.
+        full: Whether with shadows and reflections, which cost software rendering seconds.
+        dark: Whether the page is dark.
+    """
+    scene = server.scene
+    scene.configure_default_lights(True, cast_shadow=full)
+    scene.configure_environment_map("studio" if full else None, environment_intensity=0.55)
+    scene.set_background_image(_backdrop(dark), format="jpeg", jpeg_quality=92)
+    scene.add_light_ambient("/light", intensity=(0.22 if dark else 0.3) if full else 1.1)
+    scene.add_grid(
+        "/ground",
+        width=4.0,
+        height=4.0,
+        cell_size=0.1,
+        section_size=0.5,
+        cell_color=(62, 70, 82) if dark else (196, 206, 218),
+        section_color=(88, 100, 118) if dark else (150, 165, 184),
+        cell_thickness=0.6,
+        section_thickness=1.0,
+        fade_distance=5.0,
+        fade_strength=1.6,
+        shadow_opacity=0.28 if full else 0.0,
+    )
+    scene.add_frame("/base_axes", axes_length=0.22, axes_radius=0.004, origin_radius=0.006)
+
+
+def _backdrop(dark: bool) -> np.ndarray:
+    """Returns a soft vertical gradient, so that a white arm stands out, (H, W, 3) uint8."""
+    top, bottom = np.array([222.0, 231.0, 241.0]), np.array([250.0, 251.0, 253.0])
+    if dark:
+        top, bottom = np.array([20.0, 25.0, 33.0]), np.array([50.0, 58.0, 70.0])
+    share = np.linspace(0.0, 1.0, 256)[:, None]
+    return np.repeat(((1.0 - share) * top + share * bottom)[:, None, :], 16, axis=1).astype(np.uint8)

@@ -1,0 +1,247 @@
+"""What the scene is told of goal and plan, and what is done in it: without a page, and with nothing connected."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from rcilab.model import load_model
+from rcilab.safety_box import SafetyBox
+from rcilab.spatial import Pose
+from rcilab.workbench import requests
+from rcilab.workbench.goal.actions import SETTLED, GoalActions, initial_goal
+from rcilab.workbench.goal.elbow import look_at_elbow, nearest_free
+from rcilab.workbench.live import Heard, LiveChannel
+from rcilab.workbench.panels.elbow import ring_html
+from rcilab.workbench.panels.target import planned_html
+from rcilab.workbench.scene.actions import SceneActions
+from rcilab.workbench.scene.ribbon_stage import bead_words
+from rcilab.workbench.store import Store, UiState
+from rcilab.workbench.text import LANGUAGES, Text
+
+MODEL = load_model("xMatePro7")
+HOME = np.array(MODEL.home)
+
+
+class Bench:
+    """Goal and scene as the conductor has them, with an arm that stands at home."""
+
+    def __init__(self, q_c: np.ndarray | None = HOME, model=MODEL) -> None:
+        self.store = Store(UiState(model=model, goal=initial_goal(model, np.array(model.home))))
+        self.goal = GoalActions(self.store, SimpleNamespace(status=lambda: SimpleNamespace(phase="idle", q_c=q_c)))
+        self.scene = SceneActions(self.store, self.goal)
+        self.scene.tick()
+
+    @property
+    def state(self) -> UiState:
+        return self.store.state
+
+    def aim(self, *step: float) -> None:
+        target = self.state.goal.target
+        self.goal.move_target(requests.MoveTarget(position=tuple(target.position + step), wxyz=tuple(target.wxyz)))
+
+
+@pytest.fixture
+def bench():
+    made = Bench()
+    yield made
+    made.scene.close()
+
+
+def test_the_arcs_of_an_elbow_go_all_round_and_agree_with_the_inverse():
+    elbow = look_at_elbow(MODEL, HOME, None)
+    assert sum(arc.end - arc.start for arc in elbow.arcs) == pytest.approx(math.tau)
+    for arc in elbow.arcs:
+        middle = 0.5 * (arc.start + arc.end)
+        q = MODEL.inverse_batch(MODEL.forward(HOME).matrix[None], middle).q[0, elbow.branch]
+        inside = bool(((MODEL.limits.joint.lower < q) & (q < MODEL.limits.joint.upper)).all())
+        assert inside == (arc.kind == "free")
+        assert bool(arc.joints) == (arc.kind == "limits")
+
+
+def test_a_tool_outside_the_safety_box_forbids_every_arm_angle_and_says_so():
+    box = SafetyBox(size=(0.1, 0.1, 0.1), T_base_box=Pose((2.0, 0.0, 0.0)))
+    kinds = {arc.kind for arc in look_at_elbow(MODEL, HOME, box).arcs}
+    assert "box" in kinds
+    assert not kinds & {"free", "other"}
+
+
+def test_arms_without_a_circle_have_none(bench):
+    assert look_at_elbow(load_model("xMate3"), np.zeros(6), None) is None
+    assert look_at_elbow(MODEL, np.zeros(7), None) is None
+    six = Bench(None, load_model("xMate3"))
+    six.scene.drag_elbow(requests.DragElbow(eye=(2.0, 0.0, 1.0), hand=(0.0, 0.0, 1.0), phase="update"))
+    assert six.state.scene.elbow is None
+
+
+def test_dragging_the_handle_turns_the_elbow_and_holds_the_tool(bench):
+    elbow = bench.state.scene.elbow
+    eye = (2.0, -2.1, 1.45)
+    hand = tuple(elbow.circle.points(0.8, 0.105)[0])
+    bench.scene.drag_elbow(requests.DragElbow(eye=eye, hand=hand, phase="start"))
+    assert bench.state.goal.psi == pytest.approx(0.0, abs=1e-9)
+    bench.scene.drag_elbow(requests.DragElbow(eye=eye, hand=hand, phase="update"))
+    goal = bench.state.goal
+    assert goal.psi == pytest.approx(0.8, abs=math.radians(0.5))
+    assert goal.snapped is None
+    assert MODEL.forward(goal.q).is_close(goal.target, 1e-9)
+    bench.goal.pose_goal(requests.PoseGoal(name="undo"))
+    assert bench.state.goal.psi == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("number", [math.nan, math.inf])
+def test_a_drag_that_is_no_place_changes_nothing(bench, number):
+    before = bench.state.goal
+    bench.scene.drag_elbow(requests.DragElbow(eye=(number, 0.0, 0.0), hand=(0.0, 0.0, 0.0), phase="update"))
+    bench.scene.drag_elbow(requests.DragElbow(eye=(), hand=(), phase="update"))
+    assert bench.state.goal is before
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_a_forbidden_arm_angle_is_left_for_the_nearest_free_one_and_told_why(bench, language):
+    bench.goal.set_arm_angle(requests.SetArmAngle(psi=2.5))
+    goal = bench.state.goal
+    assert goal.reach.tone != "bad"
+    assert goal.psi is not None
+    assert goal.psi < 2.0
+    said = Text(language).say(goal.snapped)
+    assert "143" in said
+    assert "6" in said
+    free, why = nearest_free(MODEL, goal.target, 0.4)
+    assert (free, why) == (0.4, None)
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_the_ring_laid_out_flat_tells_its_arcs_in_words_and_patterns(bench, language):
+    html = ring_html(bench.state.scene.elbow, Text(language))
+    assert "url(#rl-arc-limits)" in html
+    assert Text(language)("elbow.kind.limits") in html
+    assert "98°" in html
+    assert "elbow." not in html
+
+
+def test_every_goal_has_its_branches_and_one_can_be_looked_at_before_it_is_chosen(bench):
+    assert len(bench.state.goal.reach.solutions) >= 1
+    bench.scene.peek(requests.Peek(index=0))
+    assert bench.state.scene.peek == 0
+    bench.scene.peek(requests.Peek(index=99))
+    assert bench.state.scene.peek is None
+    bench.scene.peek(requests.Peek(index=0))
+    bench.aim(0.0, 0.05, 0.0)
+    bench.scene.tick()
+    assert bench.state.scene.peek is None
+
+
+def test_a_page_says_which_branch_is_under_the_mouse():
+    heard: list[tuple[int, int]] = []
+    live = LiveChannel(
+        Heard(
+            stop=lambda: None,
+            here=lambda page: None,
+            seek=lambda place: None,
+            size=lambda height: None,
+            take=lambda page: None,
+            answer=lambda page, yes: None,
+            peek=lambda page, branch: heard.append((page, branch)),
+        )
+    )
+    page = live.hear(json.dumps({"kind": "hello", "page": 3, "key": live.introduce(3)}))
+    for message in ('{"kind": "peek", "branch": 2}', '{"kind": "peek", "branch": -1}', '{"kind": "peek"}'):
+        live.hear(message, page)
+        live.hear(message)
+    assert heard == [(3, 2), (3, -1)]
+
+
+def test_a_plan_that_leaves_the_box_has_a_bead_that_leads_to_its_moment(bench):
+    box = SafetyBox(size=(1.0, 0.4, 1.5), T_base_box=Pose((0.5, 0.0, 0.5)))
+    setup = bench.state.setup
+    bench.store.update(setup=replace(setup, wanted=replace(setup.wanted, box=box)))
+    bench.aim(-0.05, 0.3, 0.0)
+    bench.scene.tick()
+    ribbon = bench.state.scene.ribbon
+    assert ribbon.usage.max() > 1.0
+    bead = ribbon.beads[0]
+    assert box.excess(bead.position) > 0.0
+    bench.scene.show_bead(requests.ShowBead(number=0))
+    assert bench.state.place == pytest.approx(bead.place)
+    assert bench.state.notice.tone == "bad"
+    for language in LANGUAGES:
+        assert "condition." not in bead_words(bead, Text(language))
+    bench.scene.show_bead(requests.ShowBead(number=99))
+    bench.goal.pose_goal(requests.PoseGoal(name="home"))
+    bench.scene.tick()
+    assert bench.state.scene.ribbon is None
+
+
+def test_a_line_is_planned_once_the_goal_stands_still_and_keeps_the_tool_on_it(bench, monkeypatch):
+    from rcilab.workbench.goal import actions
+
+    now = [100.0]
+    monkeypatch.setattr(actions, "time", SimpleNamespace(monotonic=lambda: now[0]))
+    bench.goal.set_way(requests.SetWay(kind="line"))
+    bench.aim(-0.05, 0.1, 0.05)
+    assert bench.state.plan is None
+    assert bench.state.no_plan.code == "plan.soon"
+    bench.goal.settle()
+    assert bench.state.plan is None
+    now[0] += 1.1 * SETTLED
+    bench.goal.settle()
+    plan = bench.state.plan
+    assert plan.kind == "line"
+    way = plan.path[-1] - plan.path[0]
+    beside = np.linalg.norm(np.cross(plan.path - plan.path[0], way / np.linalg.norm(way)), axis=1)
+    assert beside.max() < 1e-6
+    assert Text("en")("target.planned.line", duration=f"{plan.motion.duration:.3f}") in planned_html(
+        bench.state, Text("en")
+    )
+
+
+def test_an_arc_needs_a_place_to_lead_over_and_then_does(bench):
+    bench.goal.set_way(requests.SetWay(kind="arc"))
+    bench.aim(-0.03, 0.08, 0.0)
+    bench.goal.plan(requests.Plan())
+    assert bench.state.no_plan.code == "plan.no_via"
+    bench.goal.set_way(requests.SetWay(via=True))
+    via = bench.state.via.position
+    bench.aim(0.0, 0.08, 0.05)
+    bench.goal.plan(requests.Plan())
+    assert bench.state.plan.kind == "arc"
+    assert np.linalg.norm(bench.state.plan.path - via, axis=1).min() < 5e-3
+    bench.goal.set_way(requests.SetWay(kind="sideways"))
+    assert bench.state.way == "arc"
+
+
+def test_a_typed_quaternion_turns_the_target_and_a_bad_one_is_answered(bench):
+    position = bench.state.goal.target.position
+    bench.goal.type_field(requests.TypeField(field="pose.wxyz", text="0 0.2 0.97 0"))
+    target = bench.state.goal.target
+    assert np.allclose(target.position, position)
+    assert abs(float(target.wxyz @ (0.0, 0.2, 0.97, 0.0))) == pytest.approx(math.hypot(0.2, 0.97))
+    bench.goal.type_field(requests.TypeField(field="pose.wxyz", text="0 0 0 0"))
+    assert bench.state.problems["pose.wxyz"].code == "parse.no_turn"
+    assert bench.state.goal.target is target
+
+
+def test_extras_are_computed_when_they_are_switched_on_and_gone_when_off(bench):
+    bench.aim(0.0, 0.1, 0.0)
+    for name in ("ellipsoid", "cloud", "swept", "nonsense"):
+        bench.scene.show_extra(requests.ShowExtra(name=name, on=True))
+    assert "nonsense" not in bench.state.scene.extras
+    bench.scene.tick()
+    for made in dict(bench.scene._made).values():
+        made.result(30.0)
+    bench.scene.tick()
+    seen = bench.state.scene
+    J = MODEL.jacobian(bench.state.goal.q)[:3]
+    assert np.allclose((seen.ellipsoid.axes * seen.ellipsoid.radii**2) @ seen.ellipsoid.axes.T, J @ J.T)
+    assert len(seen.cloud) > 1000
+    assert len(seen.swept.faces) > 1000
+    for name in ("ellipsoid", "cloud", "swept"):
+        bench.scene.show_extra(requests.ShowExtra(name=name, on=False))
+    bench.scene.tick()
+    assert (bench.state.scene.ellipsoid, bench.state.scene.cloud, bench.state.scene.swept) == (None, None, None)
