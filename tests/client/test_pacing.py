@@ -1,0 +1,43 @@
+"""Pauses and paces of a session's motion, from another thread."""
+
+from __future__ import annotations
+
+import threading
+
+import numpy as np
+import pytest
+
+import rcilab
+from rcilab.errors import InvalidValueError, UsageError
+from rcilab.motion import plan_joint
+from tests.waiting import wait_for
+
+
+def test_a_motion_of_a_session_is_held_and_gone_on_with():
+    model = rcilab.load_model("xMate3")
+    with rcilab.simulate(model) as robot:
+        robot.power_on()
+        with pytest.raises(UsageError, match="pace"):
+            robot.pause()
+        motion = plan_joint(model, model.home, model.home + np.array([0.2, 0.1, 0.0, 0.0, 0.0, 0.2]), speed=0.03)
+        runs: list[rcilab.Run] = []
+        moved: list[float] = []
+        mover = threading.Thread(
+            target=lambda: runs.append(
+                robot.execute(motion, progress=lambda t, duration: moved.append(t), mode="joint_impedance")
+            )
+        )
+        mover.start()
+        wait_for(lambda: moved)
+        with pytest.raises(InvalidValueError, match="pace"):
+            robot.set_pace(0.01)
+        robot.pause()
+        wait_for(lambda: not robot.state.dq_c.any())
+        robot.resume(0.7)
+        mover.join(30.0)
+    run = runs[0]
+    assert run.setup.mode == "joint_impedance"
+    assert run.plan is not motion
+    assert run.plan.duration > motion.duration
+    assert run.plan.goal == pytest.approx(motion.goal, abs=1e-12)
+    assert np.abs(run.q[-1] - motion.goal).max() < 0.02
