@@ -57,7 +57,7 @@ class TargetPanel(Part):
             )
             for i in range(3)
         ]
-        rows: list[Any] = [block(head(text("target.pose"))), *pairs, self._reach]
+        rows: list[Any] = [block(head(text("target.pose", in_mm="mm", in_deg="deg"))), *pairs, self._reach]
         self.psi: Any = None
         if self.model.n == 7:
             rows += self._arm_angle_rows()
@@ -82,7 +82,7 @@ class TargetPanel(Part):
         row = ipywidgets.HBox(
             [self._circle, side], layout=ipywidgets.Layout(align_items="center", flex_flow="row wrap")
         )
-        return [block(head(text("target.psi_title"))), row]
+        return [block(head(text("target.psi_title", in_deg="deg"))), row]
 
     def _taker(self, index: int) -> Any:
         def take(value: float) -> None:

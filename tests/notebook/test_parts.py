@@ -83,6 +83,26 @@ def test_the_names_of_the_architecture_are_there() -> None:
     }  # fmt: skip
 
 
+def said_by(widget: Any) -> Iterator[str]:
+    """Every text of a widget and of what is in it, but for style sheets."""
+    for name in ("value", "description", "tooltip"):
+        text = getattr(widget, name, None)
+        if isinstance(text, str) and "<style>" not in text:
+            yield text
+    for child in getattr(widget, "children", ()):
+        yield from said_by(child)
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_no_place_in_a_sentence_is_left_unfilled(language: str) -> None:
+    with Lab(PRO7, language=language, place=Place(way="loopback")) as made:
+        made.jog.q = GOAL
+        made.plan.plan.click()
+        texts = list(said_by(made.widget))
+    assert len(texts) > 50
+    assert [text for text in texts if re.search(r"\{[a-z_]+\}", text)] == []
+
+
 def test_a_slider_moves_the_goal_and_its_ends_are_the_limits(fresh: Lab) -> None:
     slider = fresh.jog.sliders[3]
     slider.value = 30.0
