@@ -239,24 +239,11 @@ def test_a_foreign_robot_is_told_nothing_before_a_second_yes(bench, ask):
 
 
 def test_the_check_tab_says_that_its_report_is_out_of_date(bench, ask):
-    class Shown:
-        def __init__(self):
-            self.content = ""
-
-    class Gui:
-        def __init__(self):
-            self.made = []
-
-        def add_html(self, content):
-            self.made.append(Shown())
-            return self.made[-1]
-
     ask(requests.MoveJoint(joint=0, angle=float(bench.session.status().q_c[0]) + 0.3))
     type_in(ask, tool_z="100")
-    gui, panel = Gui(), CheckPanel(Text("en"), lambda request: None)
-    panel.build(gui, bench.store.state)
-    panel.show(bench.store.state, bench.session.status())
-    assert "Out of date" in gui.made[0].content
+    panel = next(panel for panel in bench.presenter._panels if isinstance(panel, CheckPanel))
+    wait(lambda: "Out of date" in panel._verdict._shown, "the tab to say so")
+    assert panel._again.visible
 
 
 def test_a_robot_that_is_not_ours_is_changed_only_after_a_second_yes(bench, ask):

@@ -83,6 +83,9 @@ def test_a_page_that_goes_away_in_mid_motion_means_one_controlled_stop(bench):
     origin = {"Origin": f"http://127.0.0.1:{bench.port}"}
     with connect(f"ws://127.0.0.1:{bench.port}/rcilab/live", additional_headers=origin, close_timeout=0.1) as page:
         going = threading.Event()
+        page.send(json.dumps({"kind": "hello", "page": 1, "key": bench.live.introduce(1)}))
+        bench.conductor.ask(requests.PageCame(page=1))
+        wait(lambda: bench.store.state.lease.holder == 1, "the page to hold the controls")
 
         def answer() -> None:
             for message in page:
