@@ -35,17 +35,11 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
             return "live" if is_live(file) else file
 
         def _assign_work_unit(self, node: object) -> None:
-            if "live" in self.workqueue:  # The longest, and before its process is made nice.
+            if "live" in self.workqueue:  # The longest of all.
                 self.workqueue.move_to_end("live", last=False)
             super()._assign_work_unit(node)
 
     return OneLiveTestAtATime(config, log)
-
-
-def pytest_runtest_setup(item: pytest.Item) -> None:
-    """Tests beside a live one leave it the core that it needs: it waits for a person's eyes, they only compute."""
-    if "PYTEST_XDIST_WORKER" in os.environ and not is_live(item.nodeid.split("::")[0]) and os.nice(0) == 0:
-        os.nice(10)
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -137,21 +137,13 @@ class BenchPage:
     def drag(self, start: tuple[float, float], end: tuple[float, float], steps: int = 8) -> None:
         mouse = self.tab.mouse
         mouse.move(*start)
-        self.wait_for_frames(2)  # The gizmo notices the mouse on its next drawn frame.
+        self.tab.wait_for_timeout(500)  # The gizmo notices the mouse on its next drawn frame.
         mouse.down()
         for step in range(1, steps + 1):
             share = step / steps
             mouse.move(start[0] + (end[0] - start[0]) * share, start[1] + (end[1] - start[1]) * share)
             self.tab.wait_for_timeout(60)
-        self.wait_for_frames(1)
         mouse.up()
-
-    def wait_for_frames(self, count: int) -> None:
-        """Waits until the scene was drawn so many times more, and for 300 ms."""
-        frames = "() => __viserTestpoints.rendererInfo.render.frame"
-        first = self.tab.evaluate(frames)
-        self.tab.wait_for_timeout(300)
-        self.wait(lambda: self.tab.evaluate(frames) >= first + count, f"{count} more pictures of the scene")
 
     def type_joint(self, joint: int, text: str) -> None:
         self.joint_field(joint).fill(text)
