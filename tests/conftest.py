@@ -24,7 +24,7 @@ def is_live(file: str) -> bool:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
-    """Where tests run side by side (`pytest -n 2`), the live ones run one after the other, in one process."""
+    """Where tests run side by side (`pytest -n 3`), the live ones run at the end, one after the other."""
     from xdist.scheduler import LoadScopeScheduling
 
     class OneLiveTestAtATime(LoadScopeScheduling):
@@ -35,8 +35,8 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
             return "live" if is_live(file) else file
 
         def _assign_work_unit(self, node: object) -> None:
-            if "live" in self.workqueue:  # The longest of all.
-                self.workqueue.move_to_end("live", last=False)
+            if "live" in self.workqueue:  # They come last: what computes beside them would take the cores they need.
+                self.workqueue.move_to_end("live")
             super()._assign_work_unit(node)
 
     return OneLiveTestAtATime(config, log)
