@@ -14,8 +14,9 @@ from rcilab.errors import RcilabError
 from rcilab.notebook.heart import Heart
 from rcilab.notebook.look import PHASE_TONES, block, head, problem, soft, table, verdict, write
 from rcilab.notebook.part import Part
-from rcilab.notebook.ready import describe_move, obstacle
+from rcilab.notebook.ready import obstacle
 from rcilab.notebook.robot_side import Outcome, RobotSide, SessionRobot, SupervisedRobot
+from rcilab.posing.readiness import ask_to_move
 from rcilab.supervisor import SupervisorStatus
 from rcilab.supervisor.supervisor import VIRTUAL
 
@@ -161,14 +162,15 @@ class RunPanel(Part):
         self._show()
 
     def _on_execute(self) -> None:
-        reason = obstacle(self.state)
+        reason, plan = obstacle(self.state), self.state.plan
         if reason is not None:
             write(self._said, problem(self.text.say(reason)))
             return
         if self._robot.is_virtual:
             self._move()
             return
-        question = describe_move(self.state, self._robot.name)
+        assert plan is not None  # Without one there is an obstacle.
+        question = ask_to_move(plan, self._robot.name)
         write(self._question, verdict("warn", "▲", self.text.say(question)))
         self._answers.layout.display = None
 

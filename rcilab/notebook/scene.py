@@ -17,9 +17,9 @@ from rcilab.notebook.place import Place, find_place
 from rcilab.notebook.preview import Preview, aim_camera
 from rcilab.posing.planning import Plan
 from rcilab.views.arm_view import ArmView
-from rcilab.views.effort import effort_colors
 from rcilab.views.scene import Color
 from rcilab.views.scene import Scene as Canvas
+from rcilab.views.usage_colors import usage_colors
 
 View = Literal["auto", "meshcat", "viser", "static"]
 VIEWS: tuple[View, ...] = ("auto", "meshcat", "viser", "static")
@@ -151,7 +151,7 @@ class _LivePicture:
             self._canvas.remove("/path")
         self._path = plan
         if plan is not None:
-            self._canvas.add_polyline("/path", plan.path, color=effort_colors(plan.effort))
+            self._canvas.add_polyline("/path", plan.path, color=usage_colors(plan.effort))
 
     def flush(self) -> None:
         """Waits for meshcat's server."""

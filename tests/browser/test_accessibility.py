@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from importlib.resources import files
 from importlib.util import find_spec
 
@@ -29,7 +30,8 @@ _UNNAMED = """() => [...document.querySelectorAll('#root button, #root input:not
 def axe(page):
     """axe-core in the page; it is no part of rcilab, only of its tests."""
     if find_spec("axe_playwright_python") is None:
-        pytest.skip("axe-playwright-python is not installed: pip install 'rcilab[test]'")
+        reason = "axe-playwright-python is not installed: pip install 'rcilab[test]'"
+        pytest.fail(reason) if os.environ.get("CI") == "true" else pytest.skip(reason)
     if not page.tab.evaluate("!!window.axe"):
         page.tab.evaluate(files("axe_playwright_python").joinpath("axe.min.js").read_text(encoding="utf-8"))
     return page

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
+from rcilab.posing.readiness import arm_obstacle, ask_to_move, plan_obstacle
 from rcilab.workbench.run.driving import control_obstacle
 from rcilab.workbench.setup.wanted import name_parts, setup_obstacle
 from rcilab.workbench.store import UiState
@@ -14,18 +13,6 @@ from rcilab.workbench.text import Message, message
 
 if TYPE_CHECKING:
     from rcilab.supervisor import SupervisorStatus
-
-_SAME_PLACE = 1e-9  # [rad] What the checker allows between the arm and the start of a motion.
-
-_NOT_IDLE = {
-    "starting": "ready.starting",
-    "connecting": "ready.starting",
-    "moving": "ready.moving",
-    "stopping": "ready.moving",
-    "fault": "ready.fault",
-    "lost": "ready.lost",
-    "closed": "ready.closed",
-}
 
 
 def obstacle(state: UiState, status: SupervisorStatus) -> Message | None:
@@ -38,12 +25,11 @@ def obstacle(state: UiState, status: SupervisorStatus) -> Message | None:
         return message("ready.held")
     if status.phase == "crashed" or (status.phase == "lost" and state.target == "virtual"):
         return tell_status(status)
-    if status.phase in _NOT_IDLE:
-        return message(_NOT_IDLE[status.phase])
-    if not status.powered:
-        return message("ready.power")
+    resting = arm_obstacle(status.phase, status.powered)
+    if resting is not None:
+        return resting
     if state.plan is None:
-        return message("ready.no_plan")
+        return plan_obstacle(None, status.q_c)
     program = state.program
     if state.plan.program is not None and program.planned is not program.draft:
         return message("ready.program")
@@ -58,11 +44,7 @@ def obstacle(state: UiState, status: SupervisorStatus) -> Message | None:
     untold = control_obstacle(state, status)
     if untold is not None:
         return untold
-    if not state.plan.report.ok:
-        return message("ready.violations", count=len(state.plan.report.violations))
-    if status.q_c is None or float(np.abs(status.q_c - state.plan.starts_at).max()) > _SAME_PLACE:
-        return message("ready.elsewhere")
-    return None
+    return plan_obstacle(state.plan, status.q_c)
 
 
 def describe_move(state: UiState) -> Message | None:
@@ -70,17 +52,7 @@ def describe_move(state: UiState) -> Message | None:
     plan = state.plan
     if plan is None or state.asked is not plan.motion:
         return None
-    travel = np.degrees(np.abs(plan.motion.goal - plan.motion.start))
-    joint = int(travel.argmax())
-    return message(
-        "run.ask",
-        model=state.model.name,
-        address=state.target,
-        duration=f"{plan.motion.duration:.2f}",
-        joint=joint + 1,
-        angle=f"{travel[joint]:.1f}",
-        mm=f"{1000.0 * float(np.linalg.norm(plan.path[-1] - plan.path[0])):.0f}",
-    )
+    return ask_to_move(plan, state.target)
 
 
 def is_moving(status: SupervisorStatus) -> bool:

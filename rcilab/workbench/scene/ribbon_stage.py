@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rcilab.posing.planning import PATH_POINTS
+from rcilab.views.usage_colors import usage_colors
 from rcilab.views.viser_scene import ViserScene
 from rcilab.workbench import requests
 from rcilab.workbench.scene.ribbon import Bead, Ribbon
@@ -103,11 +104,3 @@ def bead_words(bead: Bead, text: Text) -> str:
     joint = f" J{worst.joint}" if worst.joint else ""
     more = f" +{len(bead.violations) - 1}" if len(bead.violations) > 1 else ""
     return f"◆ {text('condition.' + worst.condition.id)}{joint} · {worst.worst_time:.2f} s{more}"
-
-
-def usage_colors(usage: np.ndarray) -> np.ndarray:
-    """Returns colours from blue-green (little of any limit used) over amber to red (a limit is broken), (N, 3)."""
-    stops = np.array([0.0, 0.55, 0.9, 0.999, 1.0])
-    colors = np.array([[20, 140, 170], [50, 170, 110], [225, 165, 25], [235, 130, 15], [214, 30, 38]], dtype=float)
-    shares = np.clip(usage, 0.0, 1.0)
-    return np.stack([np.interp(shares, stops, colors[:, channel]) for channel in range(3)], axis=1)

@@ -1,0 +1,54 @@
+"""What stands in the way of executing a plan, as far as arm and plan tell; and what a robot is about to do."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rcilab.arrays import JointVector
+from rcilab.posing.planning import Plan
+from rcilab.words.text import Message, message
+
+_SAME_PLACE = 1e-9  # [rad] What the checker allows between the arm and the start of a motion.
+_NOT_IDLE = {
+    "starting": "ready.starting",
+    "connecting": "ready.starting",
+    "moving": "ready.moving",
+    "stopping": "ready.moving",
+    "fault": "ready.fault",
+    "lost": "ready.lost",
+    "crashed": "ready.lost",
+    "closed": "ready.closed",
+}
+
+
+def arm_obstacle(phase: str, powered: bool | None) -> Message | None:
+    """Returns why an arm cannot set out in this phase of its control process, or None."""
+    if phase in _NOT_IDLE:
+        return message(_NOT_IDLE[phase])
+    return None if powered else message("ready.power")
+
+
+def plan_obstacle(plan: Plan | None, q_c: JointVector | None) -> Message | None:
+    """Returns why a plan cannot be executed from where the arm was commanded to be, [rad], or None."""
+    if plan is None:
+        return message("ready.no_plan")
+    if not plan.report.ok:
+        return message("ready.violations", count=len(plan.report.violations))
+    if q_c is None or float(np.abs(q_c - plan.starts_at).max()) > _SAME_PLACE:
+        return message("ready.elsewhere")
+    return None
+
+
+def ask_to_move(plan: Plan, address: str) -> Message:
+    """Returns what the robot at an address is about to do, as the question before it does."""
+    travel = np.degrees(np.abs(plan.motion.goal - plan.motion.start))
+    joint = int(travel.argmax())
+    return message(
+        "run.ask",
+        model=plan.model.name,
+        address=address,
+        duration=f"{plan.motion.duration:.2f}",
+        joint=joint + 1,
+        angle=f"{travel[joint]:.1f}",
+        mm=f"{1000.0 * float(np.linalg.norm(plan.path[-1] - plan.path[0])):.0f}",
+    )
