@@ -7,12 +7,14 @@ from collections.abc import Callable
 from contextlib import suppress
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rcilab.arrays import Array
 from rcilab.client.control_loop import Callback
 from rcilab.client.following import follow
 from rcilab.client.recorder import CycleLog, Recorder
 from rcilab.client.session import RobotSession
+from rcilab.clock import CYCLE_TIME
 from rcilab.closing import Closing
 from rcilab.command import Command
 from rcilab.errors import CommandRejectedError, ControlError, RcilabError, UsageError
@@ -32,6 +34,7 @@ _CAPACITY = 4096  # [cycles] More than any recipe takes.
 _OPEN = SafetyBox(size=(20.0, 20.0, 20.0), T_base_box=IDENTITY, active=False)
 _CALM = 1.0  # [N, N m] A choice: far below any threshold that a recipe sets.
 _CALM_STATES = 500
+_AFTER = 200  # [cycles] How long the controlled stop is watched; a choice: the arm stands still by then.
 _NUDGE = 0.02  # [rad] How far the arm moves to show that it does again; a choice.
 _THERE = 1e-6  # [rad] What counts as standing where a recipe begins.
 _OPENED, _PLACED, _SHOWN = 0.4, 0.5, 0.8
@@ -108,6 +111,7 @@ class Booth(Closing):
         progress(_SHOWN)
         rows = log.recorder.rows()
         rows = np.concatenate((rows, fault.record[fault.record["message_id"] > rows["message_id"][-1]]))
+        after = _watch_stop(robot, rows[-1])
         signal = Signals(rows, self.model, scene.limits, scene.box, status.lost).find(recipe.fault)
         if signal is None:
             raise RcilabError(
@@ -121,6 +125,7 @@ class Booth(Closing):
             reported=tuple(bit for bit in fault.faults if isinstance(bit, Fault)),
             said=status.reason,
             cycles=rows,
+            after=after,
             signal=signal,
             way_out=tuple(self._leave(robot, recipe)),
         )
@@ -178,6 +183,20 @@ def _is_far_outside(error: CommandRejectedError) -> bool:
     from rcilab.protocols.rci import RecoveryStatus
 
     return error.status == RecoveryStatus.MANUAL_RECOVERY_NEEDED
+
+
+def _watch_stop(robot: RobotSession, last: np.void) -> NDArray[np.void]:
+    """Returns the cycles after the one with the fault, in which the controller brings the arm to rest."""
+    log = CycleLog(Recorder(robot.model.n, _CAPACITY))
+    begun, t = int(last["message_id"]), float(last["t"])
+    for _ in range(_AFTER):
+        state = robot.receive_state()
+        since = state.message_id - begun
+        if since > 0:
+            log.write(state, time.monotonic_ns(), t + since * CYCLE_TIME)
+        if since >= _AFTER:
+            break
+    return log.recorder.rows()
 
 
 def _logged(callback: Callback, log: CycleLog, progress: Tell) -> Callback:

@@ -6,11 +6,34 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from types import MappingProxyType
+from typing import Protocol, runtime_checkable
 
 from rcilab.language import Language, load_words, require_language
+from rcilab.words.units import Units
 
 SHARED = "rcilab.words"
 """Whose catalogue every face has."""
+
+
+@runtime_checkable
+class Explains(Protocol):
+    """What can be among the values of a message and has words of its own: a violation, an exhibit's line."""
+
+    def explain(self, language: Language, units: Units | None = None) -> str:
+        """Returns itself in words."""
+        ...
+
+
+@dataclass(frozen=True)
+class Finished:
+    """A sentence that came finished: it stays in its language, and its numbers are said in the units of the face."""
+
+    sentence: str
+    """Angles and lengths in it with their units, in SI or not."""
+
+    def explain(self, language: Language, units: Units | None = None) -> str:
+        """Returns the sentence."""
+        return self.sentence if units is None else units.restate(self.sentence)
 
 
 @dataclass(frozen=True)
@@ -39,6 +62,9 @@ class Text:
         InvalidValueError: There is no catalogue for this language.
     """
 
+    units: Units | None = None
+    """What angles and lengths are shown in; None is as they come."""
+
     def __init__(self, language: str, package: str) -> None:
         self.language: Language = require_language(language)
         self._entries = load_face(package, self.language)
@@ -53,9 +79,13 @@ class Text:
         return code in self._entries
 
     def say(self, said: Message) -> str:
-        """Returns a message in this language; messages among its values are translated first."""
-        values = {k: self.say(v) if isinstance(v, Message) else v for k, v in said.values.items()}
-        return self(said.code, **values)
+        """Returns a message in this language; what has words of its own among its values is translated first."""
+        return self(said.code, **{name: self._put(value) for name, value in said.values.items()})
+
+    def _put(self, value: object) -> object:
+        if isinstance(value, Message):
+            return self.say(value)
+        return value.explain(self.language, self.units) if isinstance(value, Explains) else value
 
 
 @lru_cache

@@ -30,7 +30,7 @@ class Text(text.Text):
 
     def __init__(self, language: str, units: Units = USUAL) -> None:
         super().__init__(language, _PAGE)
-        self.units = units
+        self.units: Units = units
         self._entries = {code: units.adapt(entry) for code, entry in self._entries.items()}
 
     def __call__(self, code: str, **values: object) -> str:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
-from rcilab.conformance.catalogue import Language
 from rcilab.errors import RcilabError
 from rcilab.workbench import requests
 from rcilab.workbench.check.state import CheckState, Slowed
@@ -20,7 +19,7 @@ from rcilab.workbench.telling import tell_error
 from rcilab.workbench.text import message
 
 if TYPE_CHECKING:
-    from rcilab.conformance import Condition, Report
+    from rcilab.conformance import Condition
     from rcilab.posing.planning import Plan
 
 
@@ -155,8 +154,8 @@ class CheckActions:
         self._set(slowed=None, answer=None)
 
     def _explain(self, plan: Plan) -> None:
-        report, language = plan.report, self._store.state.language
-        self._work.start(plan, lambda tell: _explained(report, language))
+        report = plan.report
+        self._work.start(plan, lambda tell: (report, None if report.ok else report.slow_down()))
         self._set(doing="explain", progress=0.0)
 
 
@@ -173,7 +172,3 @@ def plot_of(condition: Condition) -> str | None:
             return "psi"
         case _:
             return None
-
-
-def _explained(report: Report, language: str) -> tuple[Report, str, str]:
-    return report, language, report.explain(cast(Language, language))

@@ -41,8 +41,8 @@ class CheckState:
     found: SlowDown | None = None
     """What was found where the plan stays as it is: it says why in its own words."""
     slowed: Slowed | None = None
-    explained: tuple[Report, str, str] | None = None
-    """A report, a language, and the report in words."""
+    explained: tuple[Report, SlowDown | None] | None = None
+    """A report that is told in words, and the slow-down that belongs to them; a report that is ok has none."""
     sought: int = 0
     """How often somebody went to the moment of a row."""
     row: str = ""
