@@ -24,6 +24,10 @@ if TYPE_CHECKING:
     from rcilab.supervisor import SupervisorStatus
 
 _CRASHES = ("crashed.controller", "crashed.worker", "crashed.frozen")
+_PHASES = {
+    **{code: f"phase.{code}" for code in _CRASHES}, "moving.held": "phase.held", "moving.guided": "phase.guided",
+}  # fmt: skip
+"""States that are worth a word of their own beside that of their phase."""
 _LOST = ("lost.silent", "lost.unreachable", "lost.other_arm")
 
 
@@ -67,12 +71,12 @@ def tell_status(status: SupervisorStatus) -> Message:
         return message("ready.fault_of", faults=name_faults(status.faults))
     if status.code in _CRASHES or status.code in _LOST:
         return _tell_loss(status.code, status)
-    return message(f"phase.{status.phase}")
+    return message(phase_code(status))
 
 
 def phase_code(status: SupervisorStatus) -> str:
     """Returns the key of the two or three words for what the robot side is doing."""
-    return f"phase.{status.code}" if status.code in _CRASHES else f"phase.{status.phase}"
+    return _PHASES.get(status.code, f"phase.{status.phase}")
 
 
 def name_faults(faults: Iterable[object]) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -68,12 +67,11 @@ class RunKeeper:
         live, self._live = self._live, None
         run: Run | None = None
         try:
-            run = live.finish(stopped)
+            run = live.finish(stopped, plan)
         except InvalidValueError as error:
             self._complain(error)
-            run = live.finish(stopped)  # Its file is given up now; the run in memory is whole.
+            run = live.finish(stopped, plan)  # Its file is given up now; the run in memory is whole.
         if run is not None:
-            run = run if plan is None else replace(run, plan=plan)
             recording = whole_recording(run, self._file)
             self._store.update(recording=recording, last_run=recording)
 
