@@ -166,7 +166,7 @@ class ControlLoop:
         raise DeadlineError(
             f"{self._link.name} accepted StartMove and then did not show {self._mode.name} within {MODE_TIMEOUT:g} s; "
             "try again, and look at the teach pendant if it goes on"
-        )
+        ).coded("not_started", seconds=f"{MODE_TIMEOUT:g}")
 
     def _stream(self, state: RobotState, callback: Callback) -> str | None:
         while True:

@@ -105,7 +105,8 @@ class Booth(Closing):
                 raise
             fault = error
         else:
-            raise RcilabError(f"{self.model.name}: {recipe.fault.manual_name} did not come")
+            error = RcilabError(f"{self.model.name}: {recipe.fault.manual_name} did not come")
+            raise error.coded("no_fault", fault=recipe.fault.manual_name)
         assert fault.record is not None
         status = robot.world.status()
         progress(_SHOWN)
@@ -116,7 +117,7 @@ class Booth(Closing):
         if signal is None:
             raise RcilabError(
                 f"{recipe.fault.manual_name}: the record does not show what the controller saw: {status.reason}"
-            )
+            ).coded("no_fault", fault=recipe.fault.manual_name)
         return Exhibit(
             fault=recipe.fault,
             recipe=recipe,

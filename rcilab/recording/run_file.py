@@ -299,4 +299,4 @@ def _fields(dtype: np.dtype[np.void]) -> list[tuple[str, Any]]:
 
 
 def _unwritable(path: Path, error: OSError) -> InvalidValueError:
-    return InvalidValueError("run file", str(path), f"cannot be written: {error.strerror}")
+    return InvalidValueError("run file", str(path), f"cannot be written: {error.strerror}").coded("unwritable")

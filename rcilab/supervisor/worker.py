@@ -254,7 +254,7 @@ class Worker:
         if link.latest is not None:
             mismatch = describe_start_mismatch(rows[0], link.latest.q_c)
             if mismatch is not None:
-                raise UsageError(mismatch)
+                raise UsageError(mismatch).coded("elsewhere")
             self._model.rigid_body.motion_torque(link.latest.q, link.latest.dq, link.latest.dq)  # Loads it now.
         self._publisher.begin_motion(request["duration"])
         self._say("moving", "moving")
@@ -355,7 +355,7 @@ class Worker:
         self._outbox.post(reply)
 
     def _do_pace(self, request: dict[str, Any]) -> None:
-        raise UsageError("no motion runs whose pace could change")
+        raise UsageError("no motion runs whose pace could change").coded("no_pace")
 
     def _is_operator_gone(self) -> bool:
         beat = self._words[Word.OPERATOR_BEAT]
@@ -384,7 +384,7 @@ class Worker:
 
     def _require_link(self) -> Link:
         if self._link is None:
-            raise UsageError("no controller is connected; reconnect first")
+            raise UsageError("no controller is connected; reconnect first").coded("not_connected")
         return self._link
 
     def _disconnect(self) -> None:

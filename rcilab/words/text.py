@@ -36,6 +36,24 @@ class Finished:
         return self.sentence if units is None else units.restate(self.sentence)
 
 
+class Remark(str):
+    """An English sentence that faces can also say in their own words.
+
+    Args:
+        sentence: In English.
+        code: Names what it says; its words are `remark.CODE` of the catalogues.
+        facts: What fills them: numbers as text, angles in degrees and lengths in millimetres.
+    """
+
+    code: str
+    facts: Mapping[str, object]
+
+    def __new__(cls, sentence: str, code: str = "", **facts: object) -> Remark:  # noqa: D102  # The class says it.
+        remark = super().__new__(cls, sentence)
+        remark.code, remark.facts = code, facts
+        return remark
+
+
 @dataclass(frozen=True)
 class Message:
     """Something to say, before it is known in which language."""

@@ -16,6 +16,8 @@ from rcilab.errors import (
     UsageError,
 )
 from rcilab.faults import Fault
+from rcilab.words.errors import tell
+from rcilab.words.text import Finished
 from rcilab.workbench.text import Message, message
 
 if TYPE_CHECKING:
@@ -53,7 +55,7 @@ def tell_error(error: RcilabError, status: SupervisorStatus | None = None) -> Me
     if isinstance(error, ConnectionLostError) and status is not None:
         known = status.code in (*_CRASHES, *_LOST) or status.incident is None
         return _tell_loss(status.code if known or status.incident is None else status.incident.code, status)
-    return message("notice.plain", text=str(error))
+    return message("notice.error", text=tell(error))
 
 
 def tell_incident(code: str, sentence: str, status: SupervisorStatus) -> Message:
@@ -62,7 +64,7 @@ def tell_incident(code: str, sentence: str, status: SupervisorStatus) -> Message
         return message("notice.fault", faults=name_faults(status.faults))
     if code in _CRASHES or code in _LOST:
         return _tell_loss(code, status)
-    return message("notice.plain", text=sentence)
+    return message("notice.plain", text=Finished(sentence))
 
 
 def tell_status(status: SupervisorStatus) -> Message:

@@ -12,6 +12,7 @@ from rcilab.errors import InvalidValueError
 from rcilab.recording.live import LiveRecording, RunFacts
 from rcilab.recording.run import Run
 from rcilab.recording.setup import Setup
+from rcilab.words.errors import tell
 from rcilab.workbench.store import Recording, Store
 from rcilab.workbench.text import message
 
@@ -96,7 +97,10 @@ class RunKeeper:
 
     def _complain(self, error: InvalidValueError) -> None:
         self._file = ""
-        self._store.say("warn", message("record.unwritable", file=str(error.value), why=error.requirement))
+        self._store.say(
+            "warn",
+            message("record.unwritable", file=str(error.value), why=tell(error) if error.code else error.requirement),
+        )
 
 
 def as_recording(cycles: NDArray[np.void], delay: int) -> Recording:
