@@ -191,6 +191,15 @@ def explain_place(found: ConditionResult | Violation, language: Language = "en")
     return say(language, f"place.{'joint' if row.is_per_joint else row.place(found.joint)}", axis=axis)
 
 
+def explain_source(row: Condition, language: Language = "en") -> str:
+    """Returns where a condition and its bound come from; sources without other words keep their English ones.
+
+    Raises:
+        InvalidValueError: There is no such language.
+    """
+    return load_catalogue(language).get(f"source.{row.source}", row.source)
+
+
 def _link(number: int, voice: _Voice) -> str:
     from rcilab.kinematics.collision import FLOOR, TOOL
 
@@ -204,23 +213,23 @@ def _quantity(row: Condition, voice: _Voice) -> str:
 
 def _amounts(row: Condition, value: float, bound: float, voice: _Voice) -> tuple[str, str]:
     """Returns value and bound with units, with as few digits as show that they differ."""
-    if voice.units is not None and _has_units(row):
+    if voice.units is not None:
         first, second = voice.units.numbers(row.unit, value, bound)
-        return voice.units.with_unit(first, row.unit), voice.units.with_unit(second, row.unit)
+        return _with_unit(row, first, voice.units, voice), _with_unit(row, second, voice.units, voice)
     texts = amount(value, bound)
     first, second = (_in_unit(row, number, text, voice) for number, text in zip((value, bound), texts, strict=True))
     return first, second
 
 
 def _one(row: Condition, value: float, voice: _Voice) -> str:
-    if voice.units is not None and _has_units(row):
-        return voice.units.with_unit(voice.units.numbers(row.unit, value)[0], row.unit)
+    if voice.units is not None:
+        return _with_unit(row, voice.units.numbers(row.unit, value)[0], voice.units, voice)
     return _in_unit(row, value, f"{value:.4g}", voice)
 
 
-def _has_units(row: Condition) -> bool:
-    """Returns whether a condition is about angles or lengths."""
-    return row.unit.partition("/")[0] in ("rad", "m")
+def _with_unit(row: Condition, number: str, units: Units, voice: _Voice) -> str:
+    unit = load_catalogue(voice.language).get(f"unit.{row.unit}")
+    return units.with_unit(number, row.unit) if unit is None else f"{number} {unit}"
 
 
 def _in_unit(row: Condition, value: float, text: str, voice: _Voice) -> str:

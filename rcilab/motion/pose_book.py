@@ -120,11 +120,12 @@ class PoseBook:
         except FileNotFoundError:
             return {"format": FORMAT, "version": VERSION, "poses": {}}
         except (OSError, UnicodeDecodeError) as error:
-            raise self._unsound(f"cannot be read: {getattr(error, 'strerror', None) or error}") from error
+            reason = getattr(error, "strerror", None) or error
+            raise self._unsound(f"cannot be read: {reason}").coded("unreadable") from error
         try:
             content: Any = json.loads(text)
         except ValueError as error:
-            raise self._unsound(f"is no JSON ({error}); mend it or move it away") from error
+            raise self._unsound(f"is no JSON ({error}); mend it or move it away").coded("poses_no_file") from error
         if not isinstance(content, dict) or cast("dict[str, Any]", content).get("format") != FORMAT:
             raise self._unsound("is no file of poses; mend it or move it away").coded("poses_no_file")
         found = cast("dict[str, Any]", content)

@@ -132,7 +132,7 @@ class Waypoint:
             if not lowest <= number <= highest or (name == "angle" and number == 0.0):
                 span = f"{'more than 0' if name == 'angle' else f'{lowest:.5g}'} to {highest:.5g} [{unit}]"
                 bad = InvalidValueError(name, number, f"must be from {span}")
-                raise bad.coded("span", low=f"{lowest:.5g}", high=f"{highest:.5g}", unit=unit)
+                raise bad.coded("span", low=f"{lowest:.5g}", high=f"{highest:.5g}")
             object.__setattr__(self, name, number)
 
     @classmethod
@@ -265,7 +265,7 @@ class Program:
         if not 1 <= len(self.waypoints) <= MOST_WAYPOINTS:
             raise InvalidValueError(
                 "waypoints", Words(str(len(self.waypoints))), f"must be 1 to {MOST_WAYPOINTS}"
-            ).coded("span", low="1", high=str(MOST_WAYPOINTS), unit="1")
+            ).coded("span", low="1", high=str(MOST_WAYPOINTS))
         for number, waypoint in enumerate(self.waypoints, 1):
             if not isinstance(waypoint, Waypoint):
                 raise InvalidValueError(f"waypoint {number}", described(waypoint), "is none; Waypoint.line makes one")

@@ -14,7 +14,7 @@ import pytest
 from rcilab.conformance import CONDITION_TABLES, CONDITIONS, Violation, check
 from rcilab.conformance.catalogue import Language, Phrase, load_catalogue, say
 from rcilab.conformance.condition import Condition
-from rcilab.conformance.explain import explain_violation
+from rcilab.conformance.explain import explain_source, explain_violation
 from rcilab.conformance.wording import advise
 from rcilab.errors import InvalidValueError
 from rcilab.faults import Fault
@@ -71,6 +71,10 @@ def test_english_words_are_those_of_the_table_and_of_the_faults():
     for table in CONDITION_TABLES.values():
         for row in table.conditions:
             assert words[f"quantity.{row.id}"] == row.quantity
+    for row in CONDITIONS:
+        assert explain_source(row) == row.source
+        said = re.sub(r"RCI|SDK|URDF|rcilab|setCollisionBehavior|Hz|deg", "", explain_source(row, "zh"))
+        assert not re.search(r"[A-Za-z]{2}", said), said
     for faults in (Fault, FrankaError):
         assert [words[f"fault.{fault.name}"] for fault in faults] == [fault.cause for fault in faults]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, cast
 
-from rcilab.conformance.explain import explain_place
+from rcilab.conformance.explain import explain_place, explain_source
 from rcilab.language import Language
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import esc
@@ -41,7 +41,7 @@ def row_html(row: ConditionResult, model: RobotModel, chosen: str, text: Text) -
     name, fault = text(f"condition.{condition.id}"), ""
     if condition.fault is not None:
         fault = f"<br>{esc(text('check.raises', fault=condition.fault.manual_name))}"
-    source = text.units.restate(condition.source)
+    source = text.units.restate(explain_source(condition, text.language))
     current = ' aria-current="true"' if condition.id == chosen else ""
     return (
         f'<div class="rl-card rl-{tone}" role="button" tabindex="0" data-say="{esc(condition.id)}"{current} '

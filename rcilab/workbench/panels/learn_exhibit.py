@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
+from rcilab.conformance.explain import explain_source
 from rcilab.language import Language
 from rcilab.workbench import requests
 from rcilab.workbench.panels.learn_plot import exhibit_contents
@@ -129,10 +130,11 @@ def body_html(exhibit: Exhibit, text: Text) -> str:
     legend = "".join(
         f'<span class="rl-sign-{sign}">{esc(text(f"learn.legend.{sign}"))}</span>' for sign in ("limit", "fault")
     )
+    source = text.units.restate(explain_source(row, language))
     rows = (
         ("learn.cause", esc(text.units.restate(exhibit.told("cause", language)))),
         ("learn.remedy", esc(text.units.restate(exhibit.told("remedy", language)))),
-        ("learn.condition", f"{esc(row.formula)}<br><span class='rl-dim'>{esc(text.units.restate(row.source))}</span>"),
+        ("learn.condition", f"{esc(row.formula)}<br><span class='rl-dim'>{esc(source)}</span>"),
         ("learn.manual", esc(text("learn.section", section=exhibit.section, number=exhibit.fault.value))),
         (
             "learn.way_out",
