@@ -190,7 +190,10 @@ class ControlError(RecordedError):
 
     Attributes:
         faults: The faults that were set, in wire order.
+        stop: The cycles after `record`, in which the controller brought the arm to rest, alike; None where not seen.
     """
+
+    stop: Any = None
 
     def __init__(self, message: str, faults: Sequence[object] = (), record: Any = None) -> None:
         super().__init__(message, record)

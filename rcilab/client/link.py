@@ -68,6 +68,11 @@ class Link:
                 return states
         return []
 
+    @property
+    def is_heard(self) -> bool:
+        """Whether somebody takes the states that arrive while an answer is waited for."""
+        return self.on_states is not _ignore
+
     def send(self, packet: CommandPacket) -> None:
         """Sends one command."""
         self._transport.send_command(encode_command(packet))

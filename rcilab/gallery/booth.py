@@ -34,6 +34,7 @@ _CAPACITY = 4096  # [cycles] More than any recipe takes.
 _OPEN = SafetyBox(size=(20.0, 20.0, 20.0), T_base_box=IDENTITY, active=False)
 _CALM = 1.0  # [N, N m] A choice: far below any threshold that a recipe sets.
 _CALM_STATES = 500
+_GAP = 5  # [cycles] A choice: so many states may be missing between two that are shown, as on any network.
 _AFTER = 200  # [cycles] How long the controlled stop is watched; a choice: the arm stands still by then.
 _NUDGE = 0.02  # [rad] How far the arm moves to show that it does again; a choice.
 _THERE = 1e-6  # [rad] What counts as standing where a recipe begins.
@@ -108,11 +109,11 @@ class Booth(Closing):
             error = RcilabError(f"{self.model.name}: {recipe.fault.manual_name} did not come")
             raise error.coded("no_fault", fault=recipe.fault.manual_name)
         assert fault.record is not None
-        status = robot.world.status()
-        progress(_SHOWN)
         rows = log.recorder.rows()
         rows = np.concatenate((rows, fault.record[fault.record["message_id"] > rows["message_id"][-1]]))
-        after = _watch_stop(robot, rows[-1])
+        after = _watch_stop(robot, rows[-1], fault.stop)  # First: its states are coming in already.
+        status = robot.world.status()
+        progress(_SHOWN)
         signal = Signals(rows, self.model, scene.limits, scene.box, status.lost).find(recipe.fault)
         if signal is None:
             raise RcilabError(
@@ -186,18 +187,27 @@ def _is_far_outside(error: CommandRejectedError) -> bool:
     return error.status == RecoveryStatus.MANUAL_RECOVERY_NEEDED
 
 
-def _watch_stop(robot: RobotSession, last: np.void) -> NDArray[np.void]:
-    """Returns the cycles after the one with the fault, in which the controller brings the arm to rest."""
+def _watch_stop(robot: RobotSession, last: np.void, stop: NDArray[np.void]) -> NDArray[np.void]:
+    """Returns the cycles after the one with the fault: the controller brings the arm to rest, and it stands there.
+
+    Args:
+        robot: Sends the states behind `stop`.
+        last: The cycle with the fault.
+        stop: What was seen of the stop already.
+    """
     log = CycleLog(Recorder(robot.model.n, _CAPACITY))
     begun, t = int(last["message_id"]), float(last["t"])
-    for _ in range(_AFTER):
-        state = robot.receive_state()
-        since = state.message_id - begun
-        if since > 0:
+    seen = int(stop["message_id"][-1]) - begun if len(stop) else 0
+    while seen < _AFTER:
+        for state in robot.receive_states():
+            since = state.message_id - begun
             log.write(state, time.monotonic_ns(), t + since * CYCLE_TIME)
-        if since >= _AFTER:
-            break
-    return log.recorder.rows()
+            seen = max(seen, since)
+    rows = np.concatenate((stop, log.recorder.rows()))
+    steps = np.diff(rows["message_id"].astype(np.int64), prepend=begun)
+    missed = np.flatnonzero(steps > _GAP)  # What was missed is not made up: there the record ends.
+    rows = rows[: missed[0]] if missed.size else rows
+    return rows[rows["message_id"] <= begun + _AFTER]
 
 
 def _logged(callback: Callback, log: CycleLog, progress: Tell) -> Callback:
