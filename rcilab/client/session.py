@@ -187,7 +187,7 @@ class RobotSession(Motions, Closing):
         with self._turn("receive_states"):
             states = self._link.poll(timeout)
         if not states:
-            raise self._silence(timeout)
+            raise self._no_state(timeout)
         return states
 
     def receive_state(self, timeout: float = 1.0, max_age: float = 0.0) -> RobotState:
@@ -212,10 +212,10 @@ class RobotSession(Motions, Closing):
                 return self._link.latest
             states = self._link.poll(timeout)
         if not states:
-            raise self._silence(timeout)
+            raise self._no_state(timeout)
         return states[-1]
 
-    def _silence(self, timeout: float) -> ConnectionLostError:
+    def _no_state(self, timeout: float) -> ConnectionLostError:
         return ConnectionLostError(
             f"{self._link.name}: no state within {timeout:g} s; look whether the controller runs and the cable is "
             "in, then connect again"

@@ -129,8 +129,10 @@ class Exhibit:
     def _every_cycle(self, name: str) -> Array:
         """Returns joint angles of every cycle, shape (N, n), [rad]; between states that were dropped, interpolated."""
         stop = np.concatenate((self.cycles[-1:], self.after))
-        missing = np.arange(stop["message_id"][0] + 1, stop["message_id"][-1] + 1)
-        after = [np.interp(missing, stop["message_id"], column) for column in stop[name].T]
+        known: Array = np.array(stop["message_id"], np.float64)
+        wanted = np.arange(known[0] + 1.0, known[-1] + 1.0)
+        angles: Array = np.array(stop[name], np.float64)
+        after: list[Array] = [np.interp(wanted, known, angles[:, joint]) for joint in range(angles.shape[1])]
         return np.concatenate((self.cycles[name], np.stack(after, axis=1)))
 
     def told(self, what: Literal["sent", "cause", "remedy"], language: Language = "en") -> str:

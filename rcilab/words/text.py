@@ -80,9 +80,6 @@ class Text:
         InvalidValueError: There is no catalogue for this language.
     """
 
-    units: Units | None = None
-    """What angles and lengths are shown in; None is as they come."""
-
     def __init__(self, language: str, package: str) -> None:
         self.language: Language = require_language(language)
         self._entries = load_face(package, self.language)
@@ -103,7 +100,10 @@ class Text:
     def _put(self, value: object) -> object:
         if isinstance(value, Message):
             return self.say(value)
-        return value.explain(self.language, self.units) if isinstance(value, Explains) else value
+        return self._explain(value) if isinstance(value, Explains) else value
+
+    def _explain(self, said: Explains) -> str:
+        return said.explain(self.language)
 
 
 @lru_cache
