@@ -14,7 +14,7 @@ from rcilab.posing.planning import Plan
 from rcilab.spatial import Pose
 from rcilab.workbench import requests
 from rcilab.workbench.check.actions import CheckActions, plot_of
-from rcilab.workbench.check.work import scaled, slow_to_goal
+from rcilab.workbench.check.slowing import scaled, slow_to_goal
 from rcilab.workbench.goal.actions import GoalActions, initial_goal
 from rcilab.workbench.panels.check_rows import row_tone, rows_html
 from rcilab.workbench.program.actions import ProgramActions

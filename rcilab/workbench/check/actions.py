@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any, cast
 from rcilab.conformance.catalogue import Language
 from rcilab.errors import RcilabError
 from rcilab.workbench import requests
-from rcilab.workbench.check.state import CheckState, Slowed
-from rcilab.workbench.check.work import CheckWork, Slower, slow_program, slow_to_goal
+from rcilab.workbench.background import Background
+from rcilab.workbench.check.slowing import Slower, slow_program, slow_to_goal
+from rcilab.workbench.check.state import CheckState, Explained, Slowed
 from rcilab.workbench.goal.actions import GoalActions
 from rcilab.workbench.program.actions import ProgramActions
 from rcilab.workbench.run.readiness import is_moving
@@ -29,7 +30,7 @@ class CheckActions:
 
     def __init__(self, store: Store, session: Session, goal: GoalActions, program: ProgramActions) -> None:
         self._store, self._session, self._goal, self._program = store, session, goal, program
-        self._work = CheckWork()
+        self._work: Background[Plan, Slower | Explained] = Background("check")
 
     def press(self, request: requests.Check) -> None:
         """Does what a button or a row of the tab says."""
@@ -56,18 +57,16 @@ class CheckActions:
 
     def tick(self) -> None:
         """Shows how far something is, and what came of it; forgets what is about another plan."""
-        check = self._check
         if self._work.is_done:
-            doing = check.doing
             self._set(doing=None)
             about, result = self._work.take()
             if isinstance(result, RcilabError):
                 self._answer("bad", tell_error(result))
-            elif doing == "slow":
+            elif isinstance(result, Slower):
                 self._finish(about, result)
-            elif doing == "explain":
+            else:
                 self._set(explained=result)
-        elif self._work.progress is not None and self._work.progress != check.progress:
+        elif self._work.progress is not None and self._work.progress != self._check.progress:
             self._set(progress=self._work.progress)
         slowed, plan = self._check.slowed, self._store.state.plan
         if slowed is not None and (plan is None or plan.motion is not slowed.after.motion):
@@ -175,5 +174,5 @@ def plot_of(condition: Condition) -> str | None:
             return None
 
 
-def _explained(report: Report, language: str) -> tuple[Report, str, str]:
+def _explained(report: Report, language: str) -> Explained:
     return report, language, report.explain(cast(Language, language))

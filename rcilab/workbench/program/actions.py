@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 from types import MappingProxyType
 from typing import Any
 
@@ -16,6 +17,7 @@ from rcilab.motion.program_file import read_program
 from rcilab.posing.planning import Plan
 from rcilab.words.number import parse_number
 from rcilab.workbench import requests
+from rcilab.workbench.background import Background
 from rcilab.workbench.goal.actions import GoalActions
 from rcilab.workbench.program.draft import (
     MOST_ROUNDS,
@@ -29,7 +31,7 @@ from rcilab.workbench.program.draft import (
     time_at,
 )
 from rcilab.workbench.program.fields import default_via, proposed
-from rcilab.workbench.program.planner import Job, ProgramPlanner
+from rcilab.workbench.program.planning import Job, plan_job
 from rcilab.workbench.run.readiness import is_moving
 from rcilab.workbench.session import Session
 from rcilab.workbench.store import Store
@@ -53,7 +55,7 @@ class ProgramActions:
 
     def __init__(self, store: Store, session: Session, goal: GoalActions) -> None:
         self._store, self._session, self._goal = store, session, goal
-        self._planner = ProgramPlanner()
+        self._planner: Background[Job, Plan | Message] = Background("program")
         self._shelves: dict[str, _Shelf] = {}
         self._edits: dict[str, Callable[[requests.EditProgram, int], None]] = {
             "select": self._select, "teach": self._teach, "via": self._via, "type": self._retype,
@@ -115,23 +117,21 @@ class ProgramActions:
             return
         assert program is not None
         assert status.q_c is not None
-        here = frozen(status.q_c)
-        self._planner.start(
-            Job(
-                model=self._draft.arm(state.model),
-                draft=self._draft,
-                program=program,
-                here=here,
-                rounds=self._program.rounds,
-                box=state.setup.wanted.box,
-            )
+        job = Job(
+            model=self._draft.arm(state.model),
+            draft=self._draft,
+            program=program,
+            here=frozen(status.q_c),
+            rounds=self._program.rounds,
+            box=state.setup.wanted.box,
         )
+        self._planner.start(job, partial(plan_job, job))
         self._store.update(busy=message("program.planning"))
         self._set(progress=0.0, answer=None, failed=None)
 
     def cancel(self, request: requests.CancelProgram) -> None:
         """Drops the planning that is under way; the plan there was before stays."""
-        if self._planner.job is not None:
+        if self._planner.progress is not None:
             self._drop_planning()
             self._set(tone="warn", answer=message("program.cancelled"))
 
@@ -243,7 +243,7 @@ class ProgramActions:
             self._exchange(self._shelf.future.pop(), self._program.selected)
 
     def _drop_planning(self) -> bool:
-        if self._planner.job is None:
+        if self._planner.progress is None:
             return False
         self._planner.cancel()
         self._store.update(busy=None)
