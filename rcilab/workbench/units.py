@@ -47,8 +47,7 @@ class Unit:
         value = self.factor * float(said)
         if "e" in said:
             return f"{value:.3g}"
-        digits = len(said.partition(".")[2]) + _MORE_DIGITS[self.name]
-        return f"{round(value, digits) + 0.0:.{digits}f}"
+        return _rounded(value, len(said.partition(".")[2]) + _MORE_DIGITS[self.name])
 
 
 @dataclass(frozen=True)
@@ -74,8 +73,8 @@ class Units:
             digits: Behind the point, in degrees; radians get two more.
         """
         if self.angle == "rad":
-            return f"{round(angle, digits + 2) + 0.0:.{digits + 2}f} rad"
-        return f"{round(math.degrees(angle), digits) + 0.0:.{digits}f}°"
+            return f"{_rounded(angle, digits + _MORE_DIGITS['rad'])} rad"
+        return f"{_rounded(math.degrees(angle), digits)}°"
 
     def length_of(self, length: float, digits: int = 0) -> str:
         """Returns a length with its unit, such as "42 mm" or "0.042 m".
@@ -85,8 +84,8 @@ class Units:
             digits: Behind the point, in millimetres; metres get three more.
         """
         if self.length == "m":
-            return f"{round(length, digits + 3) + 0.0:.{digits + 3}f} m"
-        return f"{round(1000.0 * length, digits) + 0.0:.{digits}f} mm"
+            return f"{_rounded(length, digits + _MORE_DIGITS['m'])} m"
+        return f"{_rounded(1000.0 * length, digits)} mm"
 
     def from_si(self, unit: str) -> tuple[float, str]:
         """Returns how many of its unit on the page one SI unit is, and that one's name: of rad/s^2, 57.3 and °/s²."""
@@ -118,6 +117,11 @@ class Units:
             return found.group()
         shown = said[:-1] + ":" + unit.name + "}" if said.startswith("{") else unit.restate(said)
         return f"{shown} {unit.name}{rate}"
+
+
+def _rounded(value: float, digits: int) -> str:
+    """Returns a number with so many digits behind the point; what is rounded to zero has no minus."""
+    return f"{round(value, digits) + 0.0:.{digits}f}"
 
 
 USUAL = Units()
