@@ -12,6 +12,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+from rcilab.words.number import fixed
+
 AngleUnit = Literal["deg", "rad"]
 LengthUnit = Literal["mm", "m"]
 
@@ -47,7 +49,7 @@ class Unit:
         value = self.factor * float(said)
         if "e" in said:
             return f"{value:.3g}"
-        return _rounded(value, len(said.partition(".")[2]) + _MORE_DIGITS[self.name])
+        return fixed(value, len(said.partition(".")[2]) + _MORE_DIGITS[self.name])
 
 
 @dataclass(frozen=True)
@@ -73,8 +75,8 @@ class Units:
             digits: Behind the point, in degrees; radians get two more.
         """
         if self.angle == "rad":
-            return f"{_rounded(angle, digits + _MORE_DIGITS['rad'])} rad"
-        return f"{_rounded(math.degrees(angle), digits)}°"
+            return f"{fixed(angle, digits + _MORE_DIGITS['rad'])} rad"
+        return f"{fixed(math.degrees(angle), digits)}°"
 
     def length_of(self, length: float, digits: int = 0) -> str:
         """Returns a length with its unit, such as "42 mm" or "0.042 m".
@@ -84,8 +86,8 @@ class Units:
             digits: Behind the point, in millimetres; metres get three more.
         """
         if self.length == "m":
-            return f"{_rounded(length, digits + _MORE_DIGITS['m'])} m"
-        return f"{_rounded(1000.0 * length, digits)} mm"
+            return f"{fixed(length, digits + _MORE_DIGITS['m'])} m"
+        return f"{fixed(1000.0 * length, digits)} mm"
 
     def from_si(self, unit: str) -> tuple[float, str]:
         """Returns how many of its unit on the page one SI unit is, and that one's name: of rad/s^2, 57.3 and °/s²."""
@@ -117,11 +119,6 @@ class Units:
             return found.group()
         shown = said[:-1] + ":" + unit.name + "}" if said.startswith("{") else unit.restate(said)
         return f"{shown} {unit.name}{rate}"
-
-
-def _rounded(value: float, digits: int) -> str:
-    """Returns a number with so many digits behind the point; what is rounded to zero has no minus."""
-    return f"{round(value, digits) + 0.0:.{digits}f}"
 
 
 USUAL = Units()
