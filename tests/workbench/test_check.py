@@ -175,7 +175,7 @@ def test_a_program_that_is_exchanged_for_a_slower_one_can_be_had_back(bench: Ben
     assert [step.waypoint.speed for step in slow.steps] == [0.5, 0.25]
     bench.program.exchange(slow, fast)
     assert bench.state.program.planned is bench.state.program.draft is slow
-    bench.program.edit(requests.EditProgram(what="undo"))
+    bench.program.editing.edit(requests.EditProgram(what="undo"))
     assert bench.state.program.draft is draft
 
 

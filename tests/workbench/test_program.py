@@ -77,12 +77,12 @@ class Bench:
         return None if self.state.notice is None else self.state.notice.text.code
 
     def edit(self, what, **values) -> None:
-        self.actions.edit(Edit(what=what, **values))
+        self.actions.editing.edit(Edit(what=what, **values))
 
     def type(self, name: str, text: str, key: int | None = None) -> str | None:
         """Types into a field of a step, and returns what is answered beside it."""
         field = f"program.{self.program.selected if key is None else key}.{name}"
-        self.actions.type_field(requests.TypeField(field=field, text=text))
+        self.actions.editing.type_field(requests.TypeField(field=field, text=text))
         problem = self.state.problems.get(field)
         return None if problem is None else problem.code
 

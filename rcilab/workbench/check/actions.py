@@ -147,7 +147,7 @@ class CheckActions:
         if slowed is None:
             return
         if slowed.draft is not None:
-            self._program.edit(requests.EditProgram(what="undo"))
+            self._program.editing.edit(requests.EditProgram(what="undo"))
             self._program.keep_plan(slowed.before)
         else:
             self._store.update(plan=slowed.before, speed=slowed.speed, recording=None, place=0.0, playing=False)
