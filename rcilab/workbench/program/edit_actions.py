@@ -121,7 +121,7 @@ class EditActions:
     def _select(self, request: requests.EditProgram, key: int) -> None:
         """Chooses a step; while the plan is of this program, the preview goes there."""
         if key != self._shelves.state.selected:
-            self._shelves.forget_problems("program.")
+            self._store.clear_problems("program.")
         self._shelves.set(selected=key)
         state, place = self._store.state, self._draft.place(key)
         plan = state.plan

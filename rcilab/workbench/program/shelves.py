@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from types import MappingProxyType
 from typing import Any
 
 from rcilab.workbench.program.draft import Draft, ProgramState
@@ -85,16 +84,11 @@ class Shelves:
     def answer(self, name: str, problem: Message | None) -> bool:
         """Says what is wrong with what was typed; returns whether nothing is."""
         if problem is None:
-            self.forget_problems(name)
+            self._store.clear_problems(name)
             self._store.update(typed=self._store.state.typed + 1)
             return True
-        self._store.update(problems=MappingProxyType({**self._store.state.problems, name: problem}))
+        self._store.complain(name, problem)
         return False
-
-    def forget_problems(self, prefix: str) -> None:
-        """Takes back what was said beside the fields whose names begin so."""
-        kept = {k: v for k, v in self._store.state.problems.items() if not k.startswith(prefix)}
-        self._store.update(problems=MappingProxyType(kept))
 
     @property
     def _shelf(self) -> _Shelf:
@@ -108,4 +102,4 @@ class Shelves:
             draft=draft, selected=selected, can_undo=bool(shelf.past), can_redo=bool(shelf.future), failed=None,
             tone="warn", answer=message("program.changed") if is_dropped else None,
         )  # fmt: skip
-        self.forget_problems("program.")
+        self._store.clear_problems("program.")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import replace
-from types import MappingProxyType
 from typing import TYPE_CHECKING, cast
 
 from rcilab.client.control_settings import control_ranges, standard_control
@@ -76,22 +75,22 @@ class ModeActions:
         part, place = found
         bounds = control_ranges(state.model.limits)[part][place]
         parsed = parse_number(request.text, bounds.low, bounds.high, bounds.unit)
-        problems = {name: problem for name, problem in state.problems.items() if name != request.field}
         if parsed.value is None:
             assert parsed.problem is not None
-            self._store.update(problems=MappingProxyType({**problems, request.field: parsed.problem}))
+            self._store.complain(request.field, parsed.problem)
             return
         drive = state.drive.with_number(state.model, part, place, parsed.value)
-        self._store.update(drive=drive, problems=MappingProxyType(problems), typed=state.typed + 1)
+        self._store.clear_problems(request.field)
+        self._store.update(drive=drive, typed=state.typed + 1)
 
     def press(self, request: requests.PressControl) -> None:
         """Sends the parameters, or takes those that a controller wakes up with."""
         state, now = self._store.state, time.monotonic()
         if request.what == "reset":
             control = standard_control(state.model.limits)
-            kept = {name: problem for name, problem in state.problems.items() if not name.startswith("control.")}
             drive = replace(state.drive, control=control, refusal=None)
-            self._store.update(drive=drive, problems=MappingProxyType(kept), typed=state.typed + 1)
+            self._store.clear_problems("control.")
+            self._store.update(drive=drive, typed=state.typed + 1)
             return
         if state.target != "virtual" and now - self._asked_to_send > _SECOND_THOUGHT:
             self._asked_to_send = now

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterable
 from dataclasses import replace
-from types import MappingProxyType
 from typing import cast
 
 import numpy as np
@@ -63,7 +61,7 @@ class SetupActions:
         parsed = parse_number(request.text, bounds.low, bounds.high, bounds.unit)
         if parsed.value is None:
             assert parsed.problem is not None
-            self._complain(request.field, parsed.problem)
+            self._store.complain(request.field, parsed.problem)
             return
         changed = with_field(state.setup, part, name, parsed.value)
         if isinstance(changed, SetupState) and name in INERTIA_NAMES:
@@ -74,13 +72,13 @@ class SetupActions:
             made = with_inertia(changed)
             changed, untaken = (changed, made) if isinstance(made, Message) else (made, None)
         if isinstance(changed, Message):
-            self._complain(request.field, changed)
+            self._store.complain(request.field, changed)
             return
         related = {name, *INERTIA_NAMES} if name in (*INERTIA_NAMES, "mass") else {name}
-        self._clear_problems(f"setup.{part}.{other}" for other in related)
+        self._store.clear_problems(*(f"setup.{part}.{other}" for other in related))
         self._edit(changed, cast("SetupPart", part))
         if untaken is not None:
-            self._complain("setup.load.ixx", untaken)
+            self._store.complain("setup.load.ixx", untaken)
 
     def move(self, request: requests.MoveSetup) -> None:
         """Follows the handles of a part."""
@@ -94,7 +92,7 @@ class SetupActions:
             self._store.say("warn", changed)
         else:
             self._edit(changed, request.part, drag=(request.page, request.part))
-            self._clear_problems(f"setup.{request.part}.{name}" for name in FIELD_NAMES[request.part])
+            self._store.clear_problems(f"setup.{request.part}.")
         self._hear_drag(request.ended)
 
     def resize(self, request: requests.ResizeBox) -> None:
@@ -204,7 +202,7 @@ class SetupActions:
         if self._post.is_underway:
             touched |= setup.touched
         parts: set[SetupPart] = {p for p in SETUP_PARTS if getattr(before, p) is not getattr(setup.wanted, p)}
-        self._clear_problems(f"setup.{part}.{name}" for part in parts for name in FIELD_NAMES[part])
+        self._store.clear_problems(*(f"setup.{part}." for part in parts))
         self._take(replace(setup, wanted=before, touched=touched, inertia=None), parts)
 
     def _take(self, setup: SetupState, parts: set[SetupPart]) -> None:
@@ -224,15 +222,6 @@ class SetupActions:
                     changes["plan"] = replace(state.plan, path=tool_path(model, state.plan.motion), short=None)
         changes["setup"] = replace(setup, asked=None, refusal=None, can_undo=bool(self._past))
         self._store.update(**changes, typed=state.typed + 1)
-
-    def _complain(self, field: str, problem: Message) -> None:
-        problems = self._store.state.problems
-        self._store.update(problems=MappingProxyType({**problems, field: problem}))
-
-    def _clear_problems(self, fields: Iterable[str]) -> None:
-        gone = set(fields)
-        kept = {field: problem for field, problem in self._store.state.problems.items() if field not in gone}
-        self._store.update(problems=MappingProxyType(kept))
 
 
 def is_setup_field(field: str) -> bool:
