@@ -64,6 +64,7 @@ class Worker:
         self._is_ending = False
         self._model = load_model(self._settings.name, tool=self._settings.T_flange_tool)
         self._guide: HandGuide | None = None
+        self._told: tuple[bytes, bytes] | None = None  # Joint angles and pose that the tool was last found from.
 
     def run(self) -> int:
         """Lives until asked to end or until the supervisor is gone; returns the exit code."""
@@ -79,7 +80,6 @@ class Worker:
             print(granted.warning, file=sys.stderr, flush=True)
         try:
             while not (self._is_ending or self._oversight.is_orphan):
-                self._publisher.beat()
                 self._listen()
                 self._serve()
                 self._mind_guiding()
@@ -90,6 +90,7 @@ class Worker:
     def _listen(self) -> None:
         """Takes in what the robot says while nothing moves."""
         if self._link is None:
+            self._publisher.beat()
             time.sleep(_LOOK)
             return
         states = self._link.poll(_LOOK)
@@ -100,7 +101,8 @@ class Worker:
             self._publisher.say("lost", "lost.silent", address=self._address)
 
     def _record(self, states: list[RobotState]) -> None:
-        self._publisher.beat()
+        if not states:
+            self._publisher.beat()  # Otherwise every row is one.
         for state in states:
             assert self._link is not None
             self._log.write(state, self._link.received_ns)
@@ -111,9 +113,7 @@ class Worker:
         if state.robot_mode is RobotMode.USER_STOPPED and self._publisher.snapshot.powered:
             self._publisher.update(powered=False)  # The emergency stop, or the gate, has taken it.
             self._say_ready()
-        with suppress(InvalidValueError):  # A controller may report no pose before it is ready.
-            flange = self._model.pose(state.q_c, "flange")
-            self._publisher.show_tool(flange.inverse() @ Pose.from_matrix(state.T_base_tool_c))
+        self._show_tool(state)
         if self._guide is not None and self._guide.has_ended(state):
             self._guide = None
             self._say_ready()
@@ -122,6 +122,16 @@ class Worker:
                 self._publisher.say("fault", "fault", faults=_names(state.faults))
         elif phase in ("fault", "lost"):
             self._say_ready()
+
+    def _show_tool(self, state: RobotState) -> None:
+        """Shows the tool that follows from joint angles and pose; at rest both stay, and there is nothing to do."""
+        told = (state.q_c.tobytes(), state.T_base_tool_c.tobytes())
+        if told == self._told:
+            return
+        self._told = told
+        with suppress(InvalidValueError):  # A controller may report no pose before it is ready.
+            flange = self._model.pose(state.q_c, "flange")
+            self._publisher.show_tool(flange.inverse() @ Pose.from_matrix(state.T_base_tool_c))
 
     def _serve(self) -> None:
         while (request := self._letters.take()) is not None:
@@ -166,6 +176,7 @@ class Worker:
         link.on_states = self._record
         self._log.restart()
         self._publisher.restart()
+        self._told = None
         self._commands = RciCommands(link, self._settings.limits)
         self._learn_power()
         self._do_set_up(request)
