@@ -20,7 +20,7 @@ from rcilab.client.address import parse_address
 from rcilab.clock import CYCLE_TIME
 from rcilab.controller.config import PLANT_KINDS, PlantKind
 from rcilab.controller.cycle import ControlCycle
-from rcilab.controller.server import build_plant
+from rcilab.controller.plants import build_plant
 from rcilab.errors import DeadlineError
 from rcilab.model import RobotModel, load_model
 from rcilab.protocols import rci

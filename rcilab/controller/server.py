@@ -34,16 +34,16 @@ from rcilab.controller.endpoint import (
     GuestsReady,
 )
 from rcilab.controller.faulty_network import FaultyNetwork
-from rcilab.controller.ideal_plant import IdealPlant
 from rcilab.controller.pace import Pace
 from rcilab.controller.plant import Plant
+from rcilab.controller.plants import build_plant
 from rcilab.controller.stalls import StallPlan
 from rcilab.controller.state_machine import Event, Phase, When
 from rcilab.controller.surroundings import Mishaps, Surroundings
 from rcilab.controller.world_port import WorldPort
 from rcilab.errors import DecodeError, UsageError
 from rcilab.faults import Fault
-from rcilab.model import RobotModel, load_model, require_rci
+from rcilab.model import load_model, require_rci
 from rcilab.protocols.rci import (
     COMMAND_SIZE,
     Connect,
@@ -399,15 +399,6 @@ class ControllerServer:
             self._log(f"the client {reason} in mid-motion: the arm comes to rest")
         elif reason != "closed the connection":
             self._log(f"the client {reason}")
-
-
-def build_plant(kind: str, model: RobotModel) -> Plant:
-    """Returns the arm that a controller moves."""
-    if kind == "mujoco":
-        from rcilab.controller.mujoco_plant import MuJoCoPlant
-
-        return MuJoCoPlant(model)
-    return IdealPlant(model)
 
 
 def _to_stderr(line: str) -> None:
