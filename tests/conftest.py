@@ -14,32 +14,38 @@ settings.register_profile(
 settings.load_profile("rcilab")
 
 
-LIVE = ("browser", "workbench", "supervisor")
-"""In the names of files whose tests draw, or run control processes at 1 kHz: a core has no room for two of them."""
+LANES = {"pages": ("browser",), "loops": ("workbench", "supervisor")}
+"""In the names of files whose tests draw, or run control processes at 1 kHz: a core has no room for two of a kind."""
+_ORDER = ("loops", "", "notebook", "pages")
+"""Loops wait more than they compute. Notebooks suffer beside them, and pages beside anything."""
 
 
-def is_live(file: str) -> bool:
-    return any(name in file for name in LIVE)
+def lane_of(file: str) -> str:
+    """Returns the lane that a file's tests run in, one after the other; nothing for files that need none."""
+    return next((lane for lane, parts in LANES.items() if any(part in file for part in parts)), "")
+
+
+def place_of(scope: str) -> int:
+    """Returns when a piece of work comes: places of `_ORDER`."""
+    return _ORDER.index(scope if scope in LANES else "notebook" if "notebook" in scope else "")
 
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
-    """Where tests run side by side (`pytest -n 3`), the live ones run at the end, one after the other."""
+    """Where tests run side by side (`pytest -n 3`), a file is a piece of work, and so is a lane."""
     from xdist.scheduler import LoadScopeScheduling
 
-    class OneLiveTestAtATime(LoadScopeScheduling):
-        """A file is a piece of work; all that are live are one."""
-
+    class InLanes(LoadScopeScheduling):
         def _split_scope(self, nodeid: str) -> str:
             file = super()._split_scope(nodeid)
-            return "live" if is_live(file) else file
+            return lane_of(file) or file
 
         def _assign_work_unit(self, node: object) -> None:
-            if "live" in self.workqueue:  # They come last: what computes beside them would take the cores they need.
-                self.workqueue.move_to_end("live")
+            first = min(self.workqueue, key=place_of)  # The first of those that come first.
+            self.workqueue.move_to_end(first, last=False)
             super()._assign_work_unit(node)
 
-    return OneLiveTestAtATime(config, log)
+    return InLanes(config, log)
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -32,11 +32,13 @@ class CoreWatch:
 
     Attributes:
         pauses: After the end: every pause as a row (begin, end), monotonic, shape (m, 2), [s].
+        lateness: After the end: how late the empty loops woke up, shape (k,), [s].
         stolen: After the end: how long the hypervisor says it has kept the cores from us, all together, [s].
     """
 
     def __init__(self) -> None:
         self.pauses: NDArray[np.float64] = np.empty((0, 2))
+        self.lateness: NDArray[np.float64] = np.empty(0)
         self.stolen = 0.0
         self._loops: list[subprocess.Popen[str]] = []
 
@@ -54,7 +56,9 @@ class CoreWatch:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         found = [json.loads(loop.communicate()[0]) for loop in self._loops]
-        self.pauses = np.array([pause for pauses in found for pause in pauses]).reshape(-1, 2)
+        deadlines, wakes = (np.concatenate([loop[key] for loop in found]) for key in ("deadlines", "wakes"))
+        self.lateness = wakes - deadlines
+        self.pauses = np.column_stack((deadlines, wakes))[self.lateness > SHORTEST_PAUSE]
         self.stolen += _stolen_time()
 
     def explains(self, times: NDArray[np.float64], window: NDArray[np.float64] | float) -> NDArray[np.bool_]:
@@ -74,19 +78,21 @@ def _stolen_time() -> float:
         return int(file.readline().split()[8]) / 100.0  # proc(5): in hundredths of a second.
 
 
-def _watch(core: int) -> list[tuple[float, float]]:
+def _watch(core: int) -> dict[str, list[float]]:
     os.sched_setaffinity(0, {core})
     enter_realtime(_PRIORITY)
-    pauses: list[tuple[float, float]] = []
+    deadlines: list[float] = []
+    wakes: list[float] = []
     print("watching", flush=True)
     deadline = time.monotonic()
     while True:
         deadline += CYCLE_TIME
         if select.select([sys.stdin], [], [], max(deadline - time.monotonic(), 0.0))[0]:
-            return pauses
+            return {"deadlines": deadlines, "wakes": wakes}
         now = time.monotonic()
+        deadlines.append(deadline)
+        wakes.append(now)
         if now - deadline > SHORTEST_PAUSE:
-            pauses.append((deadline, now))
             deadline = now
 
 

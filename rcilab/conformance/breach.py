@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from operator import lt
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, NamedTuple
 
 from rcilab.conformance.condition import Condition
@@ -44,14 +43,6 @@ class Breach(NamedTuple):
 def describe_breaches(breaches: Iterable[Breach]) -> str:
     """Returns all of them in one line."""
     return "; ".join(breach.text for breach in breaches)
-
-
-def are_inside(values: Sequence[float], lower: Sequence[float], upper: Sequence[float]) -> bool:
-    """Returns whether every value is strictly between its bounds, which no NaN is.
-
-    Every cycle asks this of some seventy numbers; a loop in Python would take half as long again.
-    """
-    return all(map(lt, lower, values)) and all(map(lt, values, upper))
 
 
 def faults_of(breaches: Iterable[Breach]) -> tuple[Fault, ...]:

@@ -6,7 +6,8 @@ import math
 from collections.abc import Sequence
 from typing import TypeAlias
 
-from rcilab.conformance.breach import Breach, are_inside, faults_of
+from rcilab.conformance.bound_rows import BoundRows
+from rcilab.conformance.breach import Breach
 from rcilab.conformance.condition import Condition
 from rcilab.conformance.spans import spans
 from rcilab.conformance.tool_conditions import TOOL_CONDITIONS
@@ -48,10 +49,7 @@ class CartesianMonitor:
         self, limits: Limits, box: SafetyBox | None = None, rows: Sequence[Condition] = TOOL_CONDITIONS
     ) -> None:
         self._box = active_box(box)
-        self._rows = list(rows)
-        bounds = [row.bounds(limits) for row in rows]
-        self._lower = [float(lower[0]) for lower, _ in bounds]
-        self._upper = [float(upper[0]) for _, upper in bounds]
+        self._rows = BoundRows(rows, limits)
         self.reset(IDENTITY)
 
     def reset(self, pose: Pose, psi: float | None = None) -> None:
@@ -92,16 +90,11 @@ class CartesianMonitor:
         self._pose, self.twist, self.acceleration = pose, twist, acceleration
         self.arm_angle = _arm_angle_differences(self.arm_angle, psi, times)
         self._values = self._signals()
-        is_fine = are_inside(self._values, self._lower, self._upper)
-        return () if is_fine else faults_of(self.broken())
+        return self._rows.judge(self._values)
 
     def broken(self) -> list[Breach]:
         """Returns what the last step broke."""
-        return [
-            Breach(row, 0, value, low if value <= low else high)
-            for value, row, low, high in zip(self._values, self._rows, self._lower, self._upper, strict=True)
-            if not low < value < high
-        ]
+        return self._rows.broken(self._values)
 
     def _signals(self) -> tuple[float, ...]:
         """Returns the value of every row."""

@@ -6,8 +6,8 @@ import math
 from collections.abc import Sequence
 
 from rcilab.clock import CYCLE_TIME
-from rcilab.conformance.breach import Breach, are_inside, faults_of
-from rcilab.conformance.condition import Condition
+from rcilab.conformance.bound_rows import BoundRows
+from rcilab.conformance.breach import Breach
 from rcilab.conformance.measured_conditions import ACCELERATION_CUTOFF, MEASURED_CONDITIONS
 from rcilab.errors import InvalidValueError
 from rcilab.faults import Fault
@@ -37,14 +37,7 @@ class MeasuredMonitor:
     def __init__(self, limits: Limits, box: SafetyBox | None = None) -> None:
         self._n = len(limits.joint.velocity)
         self._box = active_box(box)
-        self._rows: list[tuple[Condition, int]] = []
-        self._lower: list[float] = []
-        self._upper: list[float] = []
-        for row in MEASURED_CONDITIONS:
-            lower, upper = row.bounds(limits)
-            self._rows += [(row, joint if row.is_per_joint else 0) for joint in range(1, len(lower) + 1)]
-            self._lower += lower.tolist()
-            self._upper += upper.tolist()
+        self._rows = BoundRows(MEASURED_CONDITIONS, limits)
         self.reset([0.0] * self._n)
 
     def reset(self, q: Sequence[float]) -> None:
@@ -94,17 +87,11 @@ class MeasuredMonitor:
         velocity = (0.0, 0.0) if twist is None else _norms(twist)
         acceleration = _norms(self.tool_acceleration)
         self._values = [*q, outside, speed, *dq, *velocity, *self.acceleration, *acceleration]
-        is_fine = are_inside(self._values, self._lower, self._upper)
-        return () if is_fine else faults_of(self.broken())
+        return self._rows.judge(self._values)
 
     def broken(self) -> list[Breach]:
         """Returns what the last step broke."""
-        bounds = zip(self._rows, self._values, self._lower, self._upper, strict=False)
-        return [
-            Breach(row, axis, value, low if value <= low else high)
-            for (row, axis), value, low, high in bounds
-            if not low < value < high
-        ]
+        return self._rows.broken(self._values)
 
 
 def _low_passed(state: list[float], new: Sequence[float] | None, old: Sequence[float] | None) -> list[float]:

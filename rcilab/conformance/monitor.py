@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from rcilab.conformance.breach import Breach, are_inside, faults_of
+from rcilab.conformance.bound_rows import BoundRows
+from rcilab.conformance.breach import Breach
 from rcilab.conformance.condition import Condition
 from rcilab.conformance.conditions import JOINT_CONDITIONS
 from rcilab.conformance.spans import spans
@@ -36,14 +37,7 @@ class JointMonitor:
 
     def __init__(self, limits: JointLimits, rows: Sequence[Condition] = JOINT_CONDITIONS) -> None:
         self._n = len(limits.velocity)
-        self._rows: list[tuple[Condition, int]] = []
-        self._lower: list[float] = []
-        self._upper: list[float] = []
-        for row in rows:
-            lower, upper = row.bounds(limits)
-            self._rows += [(row, joint) for joint in range(1, self._n + 1)]
-            self._lower += lower.tolist()
-            self._upper += upper.tolist()
+        self._rows = BoundRows(rows, limits)
         self.reset([0.0] * self._n)
 
     def reset(self, q: Sequence[float], dq: Sequence[float] | None = None, ddq: Sequence[float] | None = None) -> None:
@@ -80,17 +74,11 @@ class JointMonitor:
         ddq = [(new - old) / second for new, old in zip(dq, self.dq, strict=True)]
         jerk = [(new - old) / third for new, old in zip(ddq, self.ddq, strict=True)]
         self.q, self.dq, self.ddq, self.jerk = q, dq, ddq, jerk
-        is_fine = are_inside([*q, *dq, *ddq, *jerk], self._lower, self._upper)
-        return () if is_fine else faults_of(self.broken())
+        return self._rows.judge([*q, *dq, *ddq, *jerk])
 
     def broken(self) -> list[Breach]:
         """Returns what the last step broke."""
-        values = (*self.q, *self.dq, *self.ddq, *self.jerk)
-        return [
-            Breach(row, joint, value, low if value <= low else high)
-            for (row, joint), value, low, high in zip(self._rows, values, self._lower, self._upper, strict=True)
-            if not low < value < high
-        ]
+        return self._rows.broken((*self.q, *self.dq, *self.ddq, *self.jerk))
 
     def _numbers(self, values: Sequence[float], name: str) -> list[float]:
         if len(values) != self._n:

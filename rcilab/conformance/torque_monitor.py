@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rcilab.clock import CYCLE_TIME
-from rcilab.conformance.breach import Breach, are_inside, faults_of
+from rcilab.conformance.bound_rows import BoundRows
+from rcilab.conformance.breach import Breach
 from rcilab.conformance.condition import Condition
 from rcilab.conformance.tool_conditions import TORQUE_CONDITIONS
 from rcilab.errors import InvalidValueError
@@ -30,14 +31,7 @@ class TorqueMonitor:
 
     def __init__(self, limits: JointLimits, rows: Sequence[Condition] = TORQUE_CONDITIONS) -> None:
         self._n = len(limits.torque)
-        self._rows: list[tuple[Condition, int]] = []
-        self._lower: list[float] = []
-        self._upper: list[float] = []
-        for row in rows:
-            lower, upper = row.bounds(limits)
-            self._rows += [(row, joint) for joint in range(1, self._n + 1)]
-            self._lower += lower.tolist()
-            self._upper += upper.tolist()
+        self._rows = BoundRows(rows, limits)
         self.reset([0.0] * self._n)
 
     def reset(self, tau: Sequence[float]) -> None:
@@ -67,14 +61,8 @@ class TorqueMonitor:
         new = list(tau[: self._n])
         self.dtau = [(value - old) / h for value, old in zip(new, self.tau, strict=True)]
         self.tau = new
-        is_fine = are_inside([*self.dtau, *new], self._lower, self._upper)
-        return () if is_fine else faults_of(self.broken())
+        return self._rows.judge([*self.dtau, *new])
 
     def broken(self) -> list[Breach]:
         """Returns what the last step broke."""
-        values = (*self.dtau, *self.tau)
-        return [
-            Breach(row, joint, value, low if value <= low else high)
-            for (row, joint), value, low, high in zip(self._rows, values, self._lower, self._upper, strict=True)
-            if not low < value < high
-        ]
+        return self._rows.broken((*self.dtau, *self.tau))

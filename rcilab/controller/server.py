@@ -34,16 +34,16 @@ from rcilab.controller.endpoint import (
     GuestsReady,
 )
 from rcilab.controller.faulty_network import FaultyNetwork
-from rcilab.controller.ideal_plant import IdealPlant
 from rcilab.controller.pace import Pace
 from rcilab.controller.plant import Plant
+from rcilab.controller.plants import build_plant
 from rcilab.controller.stalls import StallPlan
 from rcilab.controller.state_machine import Event, Phase, When
 from rcilab.controller.surroundings import Mishaps, Surroundings
 from rcilab.controller.world_port import WorldPort
 from rcilab.errors import DecodeError, UsageError
 from rcilab.faults import Fault
-from rcilab.model import RobotModel, load_model, require_rci
+from rcilab.model import load_model, require_rci
 from rcilab.protocols.rci import (
     COMMAND_SIZE,
     Connect,
@@ -63,6 +63,7 @@ SPOILED_PATIENCE = 0.05  # [s] The same where the network spoils datagrams on pu
 FAREWELL = 20  # [cycles] In which a client learns of the end from the error bit of its states.
 SLIP = 20  # [cycles] A motion that took so much longer than it should is worth a line.
 GRACE = 2.0  # [s] For the arm to come to rest when the controller shall end.
+_QUIET = (Phase.OFF, Phase.IDLE)
 _LOOK = 0.1  # [s] Between looks at whether the parent process still lives, or a stalled controller shall end.
 
 
@@ -202,7 +203,8 @@ class ControllerServer:
                 self._await_command()
                 self._pace.restart(self._clock.now())
             else:
-                self._await(self._pace.next(self._clock.now()) - LEAD_TIME)
+                lead = CYCLE_TIME if self._is_idle else LEAD_TIME
+                self._await(self._pace.next(self._clock.now()) - lead)
                 if self._pace.puts_off(self.cycle.is_starved):
                     continue
             self._step(self._pace.deadline)
@@ -233,9 +235,8 @@ class ControllerServer:
     def _await(self, deadline: float) -> None:
         """Serves the sockets until the deadline, and at least once."""
         while True:
-            remaining = deadline - self._clock.now()
-            self._poll(remaining)
-            if remaining <= 0.0:
+            self._poll(deadline - self._clock.now())
+            if self._clock.now() >= deadline:
                 return
 
     def _await_command(self) -> None:
@@ -267,12 +268,26 @@ class ControllerServer:
             return self.config.patience
         return SPOILED_PATIENCE if any(faults.corrupt for faults in self._network.faults) else PATIENCE
 
+    @property
+    def _is_idle(self) -> bool:
+        """Whether a cycle may be lived through early and sockets be served until its state is due: one wait, not two.
+
+        A request may then show one state later, which matters to no arm at rest.
+        """
+        cycle = self.cycle
+        is_quiet = cycle.phase in _QUIET and self._pending is None and self._endpoint.has_client
+        return is_quiet and not (cycle.is_moving or self.config.lockstep)
+
     def _step(self, due: float) -> None:
         """Lives through a cycle and sends its state when it is due, or at once when that is over."""
         was_moving = self.cycle.is_moving
+        is_idle = self._is_idle
         self._catch_up()
         self._live()
-        self._clock.sleep_until(due)
+        if is_idle:
+            self._await(due)
+        else:
+            self._clock.sleep_until(due)
         self._send_state()
         if self.cycle.is_moving is not was_moving and not self.config.lockstep:
             self._tell_slip()
@@ -384,15 +399,6 @@ class ControllerServer:
             self._log(f"the client {reason} in mid-motion: the arm comes to rest")
         elif reason != "closed the connection":
             self._log(f"the client {reason}")
-
-
-def build_plant(kind: str, model: RobotModel) -> Plant:
-    """Returns the arm that a controller moves."""
-    if kind == "mujoco":
-        from rcilab.controller.mujoco_plant import MuJoCoPlant
-
-        return MuJoCoPlant(model)
-    return IdealPlant(model)
 
 
 def _to_stderr(line: str) -> None:

@@ -102,12 +102,17 @@ class Path:
 
     def positions(self, shares: Array) -> Array:
         """Returns where the tool is, shape (N, 3), [m], at many shares of the way, (N,); beyond its ends, too."""
-        u = shares[:, np.newaxis]
         if self.circle is None:
             a, b = np.array(self.start.parts[1]), np.array(self.goal.parts[1])
-            return a + u * (b - a)
+            way = np.multiply.outer(b - a, shares)
+            way += a[:, np.newaxis]
+            return way.T
         c, e, f = (np.array(point) for point in (self.circle.center, self.circle.first, self.circle.second))
-        return c + np.cos(u * self.circle.angle) * e + np.sin(u * self.circle.angle) * f
+        angles = shares * self.circle.angle
+        way = np.multiply.outer(e, np.cos(angles))
+        way += np.multiply.outer(f, np.sin(angles))
+        way += c[:, np.newaxis]
+        return way.T
 
     def sample(self, shares: Array) -> tuple[Array, Array | None]:
         """Returns poses, shape (N, 4, 4), and arm angles, shape (N,), [rad], at many shares of the way, (N,).

@@ -8,7 +8,7 @@ a0 = 1.5 V / t1 on the way up and a1 on the way down, and the jerk is finite but
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import copysign, isfinite, sqrt
 
 import numpy as np
@@ -28,16 +28,22 @@ class SCurve:
     """How far it goes, with its sign, [rad]; 0 where it does not move."""
     peak: float
     """Speed of the middle part, V, [rad/s]."""
-    rise: float
-    """Duration of the rise, t1, [s]."""
-    fall: float
-    """Duration of the fall, t2, [s]."""
     duration: float
     """Total time T, [s]."""
     start_acceleration: float
     """Largest acceleration of the rise, a0, [rad/s^2]."""
     end_acceleration: float
     """Largest deceleration of the fall, a1, [rad/s^2]."""
+
+    @property
+    def rise(self) -> float:
+        """Duration of the rise, t1, [s]."""
+        return 1.5 * self.peak / self.start_acceleration
+
+    @property
+    def fall(self) -> float:
+        """Duration of the fall, t2, [s]."""
+        return 1.5 * self.peak / self.end_acceleration
 
     def stretched(self, duration: float) -> SCurve:
         """Returns the curve over the same distance in a longer time: same accelerations, lower peak speed.
@@ -53,15 +59,7 @@ class SCurve:
         a0, a1, distance = self.start_acceleration, self.end_acceleration, abs(self.distance)
         fastest = _shortest_time(distance, a0, a1)
         peak = 2.0 * distance / (duration + sqrt(max(0.0, (duration - fastest) * (duration + fastest))))
-        return SCurve(
-            distance=self.distance,
-            peak=peak,
-            rise=1.5 * peak / a0,
-            fall=1.5 * peak / a1,
-            duration=duration,
-            start_acceleration=a0,
-            end_acceleration=a1,
-        )
+        return replace(self, peak=peak, duration=duration)
 
     def pieces(self) -> tuple[Array, Array]:
         """Returns the curve as four polynomial pieces: rise, constant speed, fall, standing at the end.
@@ -127,24 +125,14 @@ def plan_s_curve(
             raise InvalidValueError(name, bound, "must be positive and finite")
     length = abs(distance)
     if length <= STANDSTILL_DISTANCE:
-        return SCurve(
-            distance=0.0, peak=0.0, rise=0.0, fall=0.0, duration=0.0, start_acceleration=a0, end_acceleration=a1
-        )
+        return SCurve(distance=0.0, peak=0.0, duration=0.0, start_acceleration=a0, end_acceleration=a1)
     if length < 0.75 * velocity**2 * (1.0 / a0 + 1.0 / a1):
         peak = sqrt(4.0 / 3.0 * length * a0 * a1 / (a0 + a1))
         duration = _shortest_time(length, a0, a1)
     else:
         peak = velocity
         duration = 0.75 * velocity * (1.0 / a0 + 1.0 / a1) + length / velocity
-    return SCurve(
-        distance=distance,
-        peak=peak,
-        rise=1.5 * peak / a0,
-        fall=1.5 * peak / a1,
-        duration=duration,
-        start_acceleration=a0,
-        end_acceleration=a1,
-    )
+    return SCurve(distance=distance, peak=peak, duration=duration, start_acceleration=a0, end_acceleration=a1)
 
 
 def synchronize(curves: list[SCurve]) -> list[SCurve]:

@@ -36,7 +36,7 @@ class SteadyTurn:
         """Returns the orientations at many shares of the way, shape (N, 3, 3)."""
         angle = self.fastest
         R = np.array(self.start).reshape(3, 3)
-        K = _crossing(np.array([self.turn]) / (angle or 1.0))[0]
+        K = _crossing(np.array(self.turn) / (angle or 1.0))
         # Rodrigues: 1 + sin K + (1 - cos) K^2, its constant parts multiplied out once.
         still, across, along = R @ (np.eye(3) + K @ K), R @ K, -R @ K @ K
         # One element after the other in memory, as what follows along the path.
@@ -73,14 +73,14 @@ class TurnThrough:
 
     def sample(self, shares: Array) -> Array:
         """Returns the orientations at many shares of the way, shape (N, 3, 3)."""
-        u = (shares - self.place)[:, np.newaxis]
-        back, ahead = np.array(self.before), np.array(self.after)
-        slope = self._slope()
-        lead, rest = self.place, 1.0 - self.place
-        p = slope * u + np.where(u < 0.0, back + slope * lead, ahead - slope * rest) * (
-            np.where(u < 0.0, -u / lead, u / rest) ** 3
-        )
-        return np.array(self.middle).reshape(3, 3) @ _exponential(p)
+        u = shares - self.place
+        lead, rest, slope = self.place, 1.0 - self.place, self._slope()
+        bend = np.where(u < 0.0, u / -lead, u / rest) ** 3
+        p = np.multiply.outer(slope, u)
+        p += np.multiply.outer(np.array(self.before) + slope * lead, np.where(u < 0.0, bend, 0.0))
+        p += np.multiply.outer(np.array(self.after) - slope * rest, np.where(u < 0.0, 0.0, bend))
+        turned = np.array(self.middle).reshape(3, 3) @ _exponential(p).reshape(3, -1)
+        return turned.reshape(3, 3, -1).transpose(2, 0, 1)  # One element after the other in memory, as above.
 
     def _slope(self) -> Array:
         """Returns dp/du at the middle, shape (3,): towards the slower of both parts, so that nothing overshoots.
@@ -142,17 +142,22 @@ def _turn_of(a: Rotation9, b: Rotation9) -> tuple[float, float, float]:
 
 
 def _exponential(p: Array) -> Array:
-    """Returns the rotation matrices of rotation vectors, shape (N, 3, 3) for (N, 3), [rad]."""
-    angle = np.sqrt((p * p).sum(axis=1))
-    # sin(a) / a and (1 - cos(a)) / a^2, exact at zero too.
-    sine, half = np.sinc(angle / math.pi), np.sinc(angle / math.tau)
-    K = _crossing(p)
-    return np.eye(3) + sine[:, None, None] * K + (0.5 * half * half)[:, None, None] * (K @ K)
+    """Returns the rotation matrices of rotation vectors, shape (3, 3, N) for (3, N), [rad]."""
+    x, y, z = p
+    xx, yy, zz = p * p
+    angle = np.sqrt(xx + yy + zz)
+    # sin(a / 2) / a: what sin(a) / a and (1 - cos(a)) / a^2 are made of, exact at zero too.
+    part = np.divide(np.sin(0.5 * angle), angle, out=np.full(len(angle), 0.5), where=angle > 0.0)
+    across, along = 2.0 * part * np.cos(0.5 * angle), 2.0 * part * part
+    sx, sy, sz = across * p
+    cx, cy = along * x, along * y
+    xy, xz, yz = cx * y, cx * z, cy * z
+    xx, yy, zz = along * xx, along * yy, along * zz
+    rows = (1.0 - yy - zz, xy - sz, xz + sy, xy + sz, 1.0 - xx - zz, yz - sx, xz - sy, yz + sx, 1.0 - xx - yy)
+    return np.array(rows).reshape(3, 3, -1)
 
 
 def _crossing(p: Array) -> Array:
-    """Returns the matrices of the cross products with vectors, shape (N, 3, 3) for (N, 3)."""
-    K = np.zeros((len(p), 3, 3))
-    K[:, 2, 1], K[:, 0, 2], K[:, 1, 0] = p.T
-    K[:, 1, 2], K[:, 2, 0], K[:, 0, 1] = -p.T
-    return K
+    """Returns the matrix of the cross product with a vector, shape (3, 3) for (3,)."""
+    x, y, z = p.tolist()
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

@@ -13,6 +13,7 @@ from rcilab.arrays import JointVector, frozen
 from rcilab.notebook.look import block, verdict, write
 from rcilab.notebook.number_field import NumberField
 from rcilab.notebook.part import Part
+from rcilab.words.number import fixed
 
 _STEP_DEG = 0.5
 
@@ -88,7 +89,7 @@ class JogPanel(Part):
         cells = [f"{name} <b>{number:.1f}</b>{unit}" for name, number, unit in zip(names, numbers, units, strict=True)]
         psi = self.state.arm_angle
         if psi is not None:
-            cells.append(f"{self.text('jog.arm_angle')} <b>{round(math.degrees(psi), 1) + 0.0:.1f}</b>°")
+            cells.append(f"{self.text('jog.arm_angle')} <b>{fixed(math.degrees(psi), 1)}</b>°")
         elif self.model.n == 7:
             cells.append(self.text("jog.no_arm_angle"))
         return f'<p class="rl-soft rl-num">{self.text("jog.tool")}: {", ".join(cells)}</p>'

@@ -8,7 +8,7 @@ from typing import Any
 import ipywidgets
 
 from rcilab.notebook.look import block, problem, write
-from rcilab.words.number import parse_number
+from rcilab.words.number import fixed, parse_number
 from rcilab.words.text import Text
 
 
@@ -58,7 +58,7 @@ class NumberField:
 
     def show(self, value: float) -> None:
         """Shows a number, whatever was typed."""
-        self._shown = f"{round(value, self._digits) + 0.0:.{self._digits}f}"
+        self._shown = fixed(value, self._digits)
         write(self.said, "")
         if self.box.value != self._shown:
             self.box.value = self._shown

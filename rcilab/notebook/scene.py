@@ -186,17 +186,9 @@ class _LivePicture:
         return self._meshcat
 
     def _open_viser(self) -> Canvas:
-        from rcilab.notebook.viser_link import LOOPBACK, bind_loopback
-        from rcilab.views.gate import Gate
-        from rcilab.views.guarded_server import GuardedServer
+        from rcilab.notebook.viser_link import LOOPBACK, open_page
         from rcilab.views.viser_scene import ViserScene
-        from rcilab.views.viser_stage import set_stage
 
-        bound = bind_loopback(0)
-        port = int(bound.getsockname()[1])
-        self._door = GuardedServer(bound, Gate(host=LOOPBACK, port=port))
-        server = self._door.viser
-        server.gui.configure_theme(show_logo=False, show_share_button=False)
-        set_stage(server, quality="light")
+        self._door, port = open_page(0)
         self.url = f"http://{LOOPBACK}:{port}/"
-        return ViserScene(server, shadows=False)
+        return ViserScene(self._door.viser, shadows=False)

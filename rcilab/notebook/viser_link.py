@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import socket
 import threading
 
 from rcilab.closing import Closing
@@ -14,7 +13,7 @@ from rcilab.views.arm_view import ArmView
 from rcilab.views.gate import Gate
 from rcilab.views.guarded_server import GuardedServer, listen
 from rcilab.views.viser_scene import ViserScene
-from rcilab.views.viser_stage import set_stage
+from rcilab.views.viser_stage import furnish, place_camera
 
 LOOPBACK = "127.0.0.1"
 _TICK = 1.0 / 30.0  # [s] As often as a slider sends, and more than software rendering shows.
@@ -40,18 +39,13 @@ class PreviewPage(Closing):
     def __init__(self, motion: Motion, model: RobotModel, *, port: int = 0) -> None:
         require_motion(motion)
         require_model(model)
-        bound = bind_loopback(port)
-        self.port: int = bound.getsockname()[1]
         self._motion = motion
-        self._door = GuardedServer(bound, Gate(host=LOOPBACK, port=self.port))
-        server = self._door.viser
-        server.gui.configure_theme(show_logo=False, show_share_button=False)
-        set_stage(server, quality="light")
-        scene = ViserScene(server, shadows=False)
+        self._door, self.port = open_page(port)
+        scene = ViserScene(self._door.viser, shadows=False)
         ArmView(scene, "goal", model, "plan").show(motion.goal)
         self._arm = ArmView(scene, "arm", model)
         self._arm.show(motion.start)
-        gui = server.gui
+        gui = self._door.viser.gui
         last = max(math.ceil(1e3 * motion.duration) / 1e3, _TICK)
         self._play = gui.add_checkbox("Play", True)
         self._slider = gui.add_slider("Time [s]", min=0.0, max=last, step=0.001, initial_value=0.0)
@@ -115,15 +109,24 @@ def serve_preview(motion: Motion, model: RobotModel, *, port: int = 0) -> Previe
     return PreviewPage(motion, model, port=port)
 
 
-def bind_loopback(port: int) -> socket.socket:
-    """Returns a socket that listens on loopback.
+def open_page(port: int) -> tuple[GuardedServer, int]:
+    """Returns a viser page on loopback with nothing but the room an arm stands in, and its TCP port.
+
+    Args:
+        port: TCP port; 0 takes any free one.
 
     Raises:
         UsageError: The port is taken.
     """
     try:
-        return listen(LOOPBACK, port)
+        bound = listen(LOOPBACK, port)
     except OSError as error:
         raise UsageError(
             f"cannot listen on {LOOPBACK} port {port} ({error.strerror}); port=0 takes a free one"
         ) from error
+    number = int(bound.getsockname()[1])
+    door = GuardedServer(bound, Gate(host=LOOPBACK, port=number))
+    door.viser.gui.configure_theme(show_logo=False, show_share_button=False)
+    place_camera(door.viser)
+    furnish(door.viser, full=False)
+    return door, number

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from rcilab.arrays import JointVector, as_vector, frozen
 from rcilab.errors import InvalidValueError, KinematicsError
 from rcilab.model import RobotModel, require_model
+from rcilab.words.number import fixed
 
 _STEP_DEG = 0.5
 _POSITION_FORMAT = "x {:.1f}, y {:.1f}, z {:.1f} mm; roll {:.1f}, pitch {:.1f}, yaw {:.1f}°"
@@ -100,7 +101,7 @@ class JointSliders:
         if self._model.n == 7:
             try:
                 psi = math.degrees(self._model.arm_angle(self._q))
-                text += f"; arm angle {round(psi, 1) + 0.0:.1f}°"
+                text += f"; arm angle {fixed(psi, 1)}°"
             except KinematicsError:  # Stretched or straight above the base: there is no elbow to measure.
                 text += "; no arm angle here (singular)"
         self.pose.value = f"<code>tool in base: {text}</code>"

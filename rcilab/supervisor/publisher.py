@@ -13,6 +13,7 @@ from rcilab.spatial import Pose
 from rcilab.supervisor.lateness import LatenessHistogram
 from rcilab.supervisor.layout import RING_CYCLES, ControlBlock, Word
 from rcilab.supervisor.snapshot import Snapshot, write_snapshot
+from rcilab.supervisor.status import MESSAGES, Phase
 
 _SNAPSHOT_CYCLES = 20  # Rows between two snapshots: 50 a second.
 _WRENCH = struct.Struct("=6d")
@@ -58,6 +59,11 @@ class Publisher:
         """Writes the snapshot with some fields changed."""
         self.snapshot = replace(self.snapshot, **changes)
         write_snapshot(self._block.snapshot, self._words, self.snapshot)
+
+    def say(self, phase: Phase, code: str, **facts: Any) -> None:
+        """Shows another phase, and why; what was said last is not said again."""
+        if self.snapshot.code != code or facts:
+            self.update(phase=phase, code=code, message=MESSAGES[code].format(**facts))
 
     def on_row(self, log: CycleLog) -> None:
         """Announces a row that was written to the ring."""

@@ -1,70 +1,58 @@
-"""Light, floor and camera of the page's 3D scene: the studio an arm is photographed in.
-
-An environment map costs seconds of start-up on software rendering, so the stage lights the arm itself: soft light from
-everywhere, a key light that throws the shadow, and a rim light that lifts white housings off a light background.
-"""
+"""Light, ground, axes and background: the room the arm stands in."""
 
 from __future__ import annotations
 
-import math
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
-
-from rcilab.views.scene import Color
 
 if TYPE_CHECKING:
     import viser
 
-BACKGROUND_LIGHT: tuple[Color, Color] = ((198, 208, 219), (250, 251, 252))
-"""Top and bottom of the backdrop."""
-BACKGROUND_DARK: tuple[Color, Color] = ((22, 25, 29), (52, 58, 66))
-
-CAMERA_POSITION = (2.05, -1.75, 1.30)  # [m]
-CAMERA_TARGET = (0.12, 0.0, 0.52)  # [m]
-CAMERA_FOV = math.radians(38.0)  # [rad] vertical; viser's own 75 degrees bends an arm
+_CAMERA, _LOOK_AT = (2.0, -2.1, 1.45), (0.1, 0.05, 0.62)  # [m]
+_FIELD_OF_VIEW = 0.75  # [rad]
 
 
-def set_stage(server: viser.ViserServer, *, quality: Literal["full", "light"] = "full", dark: bool = False) -> None:
-    """Lights the scene, lays the floor and places the camera that new pages start with.
+def place_camera(server: viser.ViserServer) -> None:
+    """Puts the camera of new pages where the whole arm is seen."""
+    camera = server.initial_camera
+    camera.position, camera.look_at, camera.fov = _CAMERA, _LOOK_AT, _FIELD_OF_VIEW
+
+
+def furnish(server: viser.ViserServer, *, full: bool, dark: bool = False) -> None:
+    """Lights the scene and lays the ground.
 
     Args:
-        server: The server of the page.
-        quality: "light" leaves the shadows out, for browsers that render in software.
-        dark: Whether the page is in dark mode.
+        server: The page.
+        full: Whether with shadows and reflections, which cost software rendering seconds.
+        dark: Whether the page is dark.
     """
     scene = server.scene
-    scene.configure_environment_map(hdri=None)
-    scene.configure_default_lights(enabled=False)
-    scene.add_light_hemisphere("/stage/sky", sky_color=(255, 255, 255), ground_color=(176, 184, 194), intensity=1.45)
-    scene.add_light_directional(
-        "/stage/key", color=(255, 250, 242), intensity=2.2, cast_shadow=quality == "full", position=(1.6, -2.2, 4.0)
-    )
-    scene.add_light_directional("/stage/fill", color=(226, 236, 255), intensity=0.55, position=(2.5, 2.5, 0.8))
-    scene.add_light_directional("/stage/rim", color=(255, 255, 255), intensity=0.9, position=(-3.0, 1.0, 1.5))
+    scene.configure_default_lights(True, cast_shadow=full)
+    scene.configure_environment_map("studio" if full else None, environment_intensity=0.55)
+    scene.set_background_image(_backdrop(dark), format="jpeg", jpeg_quality=92)
+    scene.add_light_ambient("/light", intensity=(0.22 if dark else 0.3) if full else 1.1)
     scene.add_grid(
-        "/stage/floor",
-        width=8.0,
-        height=8.0,
+        "/ground",
+        width=4.0,
+        height=4.0,
         cell_size=0.1,
-        cell_thickness=0.6,
-        cell_color=(66, 72, 80) if dark else (226, 230, 235),
         section_size=0.5,
-        section_thickness=0.9,
-        section_color=(86, 94, 104) if dark else (200, 207, 215),
-        plane_opacity=0.0,
-        shadow_opacity=0.30 if dark else 0.16,
-        fade_distance=7.0,
-        position=(0.0, 0.0, -0.001),
+        cell_color=(62, 70, 82) if dark else (196, 206, 218),
+        section_color=(88, 100, 118) if dark else (150, 165, 184),
+        cell_thickness=0.6,
+        section_thickness=1.0,
+        fade_distance=5.0,
+        fade_strength=1.6,
+        shadow_opacity=0.28 if full else 0.0,
     )
-    scene.set_background_image(_gradient(*(BACKGROUND_DARK if dark else BACKGROUND_LIGHT)), format="png")
-    camera = server.initial_camera
-    camera.position = CAMERA_POSITION
-    camera.look_at = CAMERA_TARGET
-    camera.fov = CAMERA_FOV
+    scene.add_frame("/base_axes", axes_length=0.22, axes_radius=0.004, origin_radius=0.006)
 
 
-def _gradient(top: Color, bottom: Color) -> np.ndarray:
-    """Returns a narrow picture that fades from one colour to another, shape (256, 8, 3)."""
-    column = np.linspace(top, bottom, 256)[:, None, :]
-    return np.repeat(column, 8, axis=1).astype(np.uint8)
+def _backdrop(dark: bool) -> np.ndarray:
+    """Returns a soft vertical gradient, so that a white arm stands out, (H, W, 3) uint8."""
+    top, bottom = np.array([222.0, 231.0, 241.0]), np.array([250.0, 251.0, 253.0])
+    if dark:
+        top, bottom = np.array([20.0, 25.0, 33.0]), np.array([50.0, 58.0, 70.0])
+    share = np.linspace(0.0, 1.0, 256)[:, None]
+    return np.repeat(((1.0 - share) * top + share * bottom)[:, None, :], 16, axis=1).astype(np.uint8)

@@ -6,10 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from types import MappingProxyType
-from typing import Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from rcilab.language import Language, load_words, require_language
-from rcilab.words.units import Units
+
+if TYPE_CHECKING:
+    from rcilab.words.units import Units
 
 SHARED = "rcilab.words"
 """Whose catalogue every face has."""

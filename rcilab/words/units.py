@@ -13,6 +13,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+from rcilab.words.number import fixed
+
 AngleUnit = Literal["deg", "rad"]
 LengthUnit = Literal["mm", "m"]
 
@@ -57,8 +59,7 @@ class Unit:
         value = self.factor * float(said)
         if "e" in said:
             return f"{value:.3g}"
-        digits = len(said.partition(".")[2]) + _MORE_DIGITS[self.name]
-        return f"{round(value, digits) + 0.0:.{digits}f}"
+        return fixed(value, len(said.partition(".")[2]) + _MORE_DIGITS[self.name])
 
 
 @dataclass(frozen=True)
@@ -84,8 +85,8 @@ class Units:
             digits: Behind the point, in degrees; radians get two more.
         """
         if self.angle == "rad":
-            return f"{round(angle, digits + 2) + 0.0:.{digits + 2}f} rad"
-        return f"{round(math.degrees(angle), digits) + 0.0:.{digits}f}°"
+            return f"{fixed(angle, digits + _MORE_DIGITS['rad'])} rad"
+        return f"{fixed(math.degrees(angle), digits)}°"
 
     def length_of(self, length: float, digits: int = 0) -> str:
         """Returns a length with its unit, such as "42 mm" or "0.042 m".
@@ -95,8 +96,8 @@ class Units:
             digits: Behind the point, in millimetres; metres get three more.
         """
         if self.length == "m":
-            return f"{round(length, digits + 3) + 0.0:.{digits + 3}f} m"
-        return f"{round(1000.0 * length, digits) + 0.0:.{digits}f} mm"
+            return f"{fixed(length, digits + _MORE_DIGITS['m'])} m"
+        return f"{fixed(1000.0 * length, digits)} mm"
 
     def from_si(self, unit: str) -> tuple[float, str]:
         """Returns how many of its unit on the page one SI unit is, and that one's name: of rad/s^2, 57.3 and °/s²."""

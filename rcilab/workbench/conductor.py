@@ -115,7 +115,7 @@ class Conductor:
             requests.ResizeBox: self._setup.resize,
             requests.SetSetup: self._setup.set_setup,
             requests.PressSetup: self._setup.press,
-            requests.EditProgram: self._program.edit,
+            requests.EditProgram: self._program.editing.edit,
             requests.PlanProgram: self._program.plan,
             requests.CancelProgram: self._program.cancel,
             requests.LoadProgram: self._program.load,
@@ -219,7 +219,7 @@ class Conductor:
         elif request.field.startswith("control."):
             self._mode.type_field(request)
         elif request.field.startswith("program."):
-            self._program.type_field(request)
+            self._program.editing.type_field(request)
         else:
             self._goal.type_field(request)
 

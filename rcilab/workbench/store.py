@@ -195,6 +195,15 @@ class Store:
             serial = self._state.notice.serial + 1 if self._state.notice else 1
             self._state = replace(self._state, notice=Notice(serial, tone, text))
 
+    def complain(self, field: str, problem: Message) -> None:
+        """Says beside a field what is wrong with what was typed."""
+        self.update(problems=MappingProxyType({**self._state.problems, field: problem}))
+
+    def clear_problems(self, *beginnings: str) -> None:
+        """Takes back what was said beside all fields whose names begin so."""
+        kept = {field: said for field, said in self._state.problems.items() if not field.startswith(beginnings)}
+        self.update(problems=MappingProxyType(kept))
+
     def remember(self) -> None:
         """Keeps the goal of this moment, to come back to with `undo`."""
         self._past = [*self._past[-_UNDO_DEPTH:], self._state.goal]

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 from typing import Any, TypeAlias
 
+from rcilab.words.number import fixed
 from rcilab.workbench.requests import Request, TypeField
 from rcilab.workbench.text import Message
 from rcilab.workbench.units import Unit
@@ -123,4 +124,4 @@ def esc(text: object) -> str:
 
 def shown(number: float) -> str:
     """Returns a number for a field: two decimals, and never "-0.00"."""
-    return f"{round(float(number), 2) + 0.0:.2f}"
+    return fixed(float(number), 2)

@@ -83,7 +83,7 @@ def opened(chromium, bench) -> Iterator[BenchPage]:
     tab = context.new_page()
     page = BenchPage(tab, bench)
     tab.on("pageerror", lambda error: page.problems.append(str(error)))
-    tab.goto(f"{bench.url}?fixedDpr=0.4")
+    tab.goto(f"{bench.url}?fixedDpr=0.2")
     page.wait_until_drawn()
     close_toasts(tab)
     yield page

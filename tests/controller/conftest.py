@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rcilab.controller.cycle import ControlCycle
-from rcilab.controller.server import build_plant
+from rcilab.controller.plants import build_plant
 from rcilab.model import RobotModel, load_model
 from rcilab.protocols import rci
 from rcilab.spatial import Pose

@@ -12,7 +12,7 @@ from rcilab.controller.config import ControllerConfig
 from rcilab.controller.cycle import ControlCycle
 from rcilab.controller.endpoint import Endpoint
 from rcilab.controller.faulty_network import FaultyNetwork
-from rcilab.controller.server import build_plant
+from rcilab.controller.plants import build_plant
 from rcilab.controller.stalls import StallPlan
 from rcilab.controller.surroundings import Mishaps, Surroundings
 from rcilab.model import load_model

@@ -2,11 +2,13 @@ from __future__ import annotations
 
 import json
 import os
+import socket
 import subprocess
 import sys
 import time
 import urllib.request
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -47,14 +49,22 @@ def test_jupyterlab_starts_on_loopback_and_serves_the_directory(tmp_path: Path) 
         lab.wait(10)
 
 
-def _wait_for_server(runtime: Path, lab: subprocess.Popen[bytes], log: Path) -> dict[str, str]:
-    """Returns what Jupyter writes about itself once it listens."""
+def _wait_for_server(runtime: Path, lab: subprocess.Popen[bytes], log: Path) -> dict[str, Any]:
+    """Returns what Jupyter writes about itself, once it listens: it writes a moment before that."""
     deadline = time.monotonic() + 40.0
     while time.monotonic() < deadline:
         assert lab.poll() is None, log.read_text(encoding="utf-8")
         for file in runtime.glob("jpserver-*.json"):
             text = file.read_text(encoding="utf-8")
-            if text.strip().endswith("}"):
-                return json.loads(text)
+            if text.strip().endswith("}") and _listens(server := json.loads(text)):
+                return server
         time.sleep(0.1)
     raise AssertionError("JupyterLab did not start within 40 s:\n" + log.read_text(encoding="utf-8"))
+
+
+def _listens(server: dict[str, Any]) -> bool:
+    try:
+        socket.create_connection((server["hostname"], server["port"]), timeout=5.0).close()
+    except ConnectionRefusedError:
+        return False
+    return True

@@ -14,7 +14,8 @@ from typing import Any
 
 from rcilab.controller.config import ControllerConfig
 from rcilab.controller.cycle import ControlCycle
-from rcilab.controller.server import ControllerServer, build_plant
+from rcilab.controller.plants import build_plant
+from rcilab.controller.server import ControllerServer
 from rcilab.model import load_model
 from tests.peers.robot import PATIENCE, Robot
 

@@ -14,7 +14,7 @@ from rcilab.views.meshcat_scene import MeshcatScene
 from rcilab.views.null_scene import NullScene
 from rcilab.views.scene import Scene
 from rcilab.views.viser_scene import ViserScene
-from rcilab.views.viser_stage import set_stage
+from rcilab.views.viser_stage import furnish, place_camera
 
 TRIANGLE = ([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], [[0, 1, 2]])
 
@@ -103,8 +103,9 @@ def test_the_stage_can_be_set_again_while_the_page_is_open() -> None:
 
     server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
     try:
-        set_stage(server)
-        set_stage(server, quality="light", dark=True)
+        place_camera(server)
+        furnish(server, full=True)
+        furnish(server, full=False, dark=True)
         assert server.initial_camera.fov < 1.0  # [rad] a portrait lens
     finally:
         server.stop()

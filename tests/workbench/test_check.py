@@ -16,7 +16,7 @@ from rcilab.posing.planning import Plan
 from rcilab.spatial import Pose
 from rcilab.workbench import requests
 from rcilab.workbench.check.actions import CheckActions, plot_of
-from rcilab.workbench.check.work import scaled, slow_to_goal
+from rcilab.workbench.check.slowing import scaled, slow_to_goal
 from rcilab.workbench.goal.actions import GoalActions, initial_goal
 from rcilab.workbench.panels.check_rows import row_tone, rows_html
 from rcilab.workbench.program.actions import ProgramActions
@@ -178,7 +178,7 @@ def test_a_program_that_is_exchanged_for_a_slower_one_can_be_had_back(bench: Ben
     assert [step.waypoint.speed for step in slow.steps] == [0.5, 0.25]
     bench.program.exchange(slow, fast)
     assert bench.state.program.planned is bench.state.program.draft is slow
-    bench.program.edit(requests.EditProgram(what="undo"))
+    bench.program.editing.edit(requests.EditProgram(what="undo"))
     assert bench.state.program.draft is draft
 
 

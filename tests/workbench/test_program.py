@@ -18,7 +18,8 @@ from rcilab.workbench import requests
 from rcilab.workbench.goal.actions import GoalActions, initial_goal
 from rcilab.workbench.panels.program import read_row
 from rcilab.workbench.panels.program_list import list_html
-from rcilab.workbench.program import planner as program_planner
+from rcilab.workbench.program import actions as program_actions
+from rcilab.workbench.program import planning as program_planning
 from rcilab.workbench.program.actions import ProgramActions
 from rcilab.workbench.program.draft import draft_of, number_at, tell_place, time_at
 from rcilab.workbench.run.readiness import obstacle
@@ -76,12 +77,12 @@ class Bench:
         return None if self.state.notice is None else self.state.notice.text.code
 
     def edit(self, what, **values) -> None:
-        self.actions.edit(Edit(what=what, **values))
+        self.actions.editing.edit(Edit(what=what, **values))
 
     def type(self, name: str, text: str, key: int | None = None) -> str | None:
         """Types into a field of a step, and returns what is answered beside it."""
         field = f"program.{self.program.selected if key is None else key}.{name}"
-        self.actions.type_field(requests.TypeField(field=field, text=text))
+        self.actions.editing.type_field(requests.TypeField(field=field, text=text))
         problem = self.state.problems.get(field)
         return None if problem is None else problem.code
 
@@ -232,17 +233,19 @@ def test_an_error_names_the_waypoint_and_marks_it(square):
 
 def test_planning_can_be_cancelled_at_once_and_an_edit_drops_it(square, monkeypatch):
     going, ended = threading.Event(), threading.Event()
-    tell = program_planner._Work._tell
 
-    def slowly(work, part) -> None:
-        going.wait(20.0)
-        try:
-            tell(work, part)
-        except BaseException:
-            ended.set()
-            raise
+    def slowly(job, tell):
+        def tell_late(share) -> None:
+            going.wait(20.0)
+            try:
+                tell(share)
+            except BaseException:
+                ended.set()
+                raise
 
-    monkeypatch.setattr(program_planner._Work, "_tell", slowly)
+        return program_planning.plan_job(job, tell_late)
+
+    monkeypatch.setattr(program_actions, "plan_job", slowly)
     for give_up in (lambda: square.actions.cancel(requests.CancelProgram()), lambda: square.edit("delete")):
         going.clear()
         ended.clear()
@@ -366,7 +369,7 @@ def test_a_bug_in_the_planning_leaves_the_page_usable(square, monkeypatch):
     def fail(*args, **kwargs):
         raise MemoryError
 
-    monkeypatch.setattr(program_planner, "picture", fail)
+    monkeypatch.setattr(program_planning, "picture", fail)
     with pytest.raises(MemoryError):
         square.plan()
     assert square.state.busy is None

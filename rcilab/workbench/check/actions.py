@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 from rcilab.errors import RcilabError
 from rcilab.workbench import requests
-from rcilab.workbench.check.state import CheckState, Slowed
-from rcilab.workbench.check.work import CheckWork, Slower, slow_program, slow_to_goal
+from rcilab.workbench.background import Background
+from rcilab.workbench.check.slowing import Slower, slow_program, slow_to_goal
+from rcilab.workbench.check.state import CheckState, Explained, Slowed
 from rcilab.workbench.goal.actions import GoalActions
 from rcilab.workbench.program.actions import ProgramActions
 from rcilab.workbench.run.readiness import is_moving
@@ -19,7 +20,7 @@ from rcilab.workbench.telling import tell_error
 from rcilab.workbench.text import message
 
 if TYPE_CHECKING:
-    from rcilab.conformance import Condition
+    from rcilab.conformance import Condition, Report
     from rcilab.posing.planning import Plan
 
 
@@ -28,7 +29,7 @@ class CheckActions:
 
     def __init__(self, store: Store, session: Session, goal: GoalActions, program: ProgramActions) -> None:
         self._store, self._session, self._goal, self._program = store, session, goal, program
-        self._work = CheckWork()
+        self._work: Background[Plan, Slower | Explained] = Background("check")
 
     def press(self, request: requests.Check) -> None:
         """Does what a button or a row of the tab says."""
@@ -55,18 +56,16 @@ class CheckActions:
 
     def tick(self) -> None:
         """Shows how far something is, and what came of it; forgets what is about another plan."""
-        check = self._check
         if self._work.is_done:
-            doing = check.doing
             self._set(doing=None)
             about, result = self._work.take()
             if isinstance(result, RcilabError):
                 self._answer("bad", tell_error(result))
-            elif doing == "slow":
+            elif isinstance(result, Slower):
                 self._finish(about, result)
-            elif doing == "explain":
+            else:
                 self._set(explained=result)
-        elif self._work.progress is not None and self._work.progress != check.progress:
+        elif self._work.progress is not None and self._work.progress != self._check.progress:
             self._set(progress=self._work.progress)
         slowed, plan = self._check.slowed, self._store.state.plan
         if slowed is not None and (plan is None or plan.motion is not slowed.after.motion):
@@ -147,7 +146,7 @@ class CheckActions:
         if slowed is None:
             return
         if slowed.draft is not None:
-            self._program.edit(requests.EditProgram(what="undo"))
+            self._program.editing.edit(requests.EditProgram(what="undo"))
             self._program.keep_plan(slowed.before)
         else:
             self._store.update(plan=slowed.before, speed=slowed.speed, recording=None, place=0.0, playing=False)
@@ -155,7 +154,7 @@ class CheckActions:
 
     def _explain(self, plan: Plan) -> None:
         report = plan.report
-        self._work.start(plan, lambda tell: (report, None if report.ok else report.slow_down()))
+        self._work.start(plan, lambda tell: _explained(report))
         self._set(doing="explain", progress=0.0)
 
 
@@ -172,3 +171,7 @@ def plot_of(condition: Condition) -> str | None:
             return "psi"
         case _:
             return None
+
+
+def _explained(report: Report) -> Explained:
+    return report, None if report.ok else report.slow_down()

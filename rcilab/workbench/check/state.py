@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from rcilab.workbench.text import Message
 
@@ -11,6 +11,9 @@ if TYPE_CHECKING:
     from rcilab.conformance import Report, SlowDown
     from rcilab.posing.planning import Plan
     from rcilab.workbench.program.draft import Draft
+
+Explained: TypeAlias = "tuple[Report, SlowDown | None]"
+"""A report that is told in words, and the slow-down that belongs to them; a report that is ok has none."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -41,8 +44,7 @@ class CheckState:
     found: SlowDown | None = None
     """What was found where the plan stays as it is: it says why in its own words."""
     slowed: Slowed | None = None
-    explained: tuple[Report, SlowDown | None] | None = None
-    """A report that is told in words, and the slow-down that belongs to them; a report that is ok has none."""
+    explained: Explained | None = None
     sought: int = 0
     """How often somebody went to the moment of a row."""
     row: str = ""

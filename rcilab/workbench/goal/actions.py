@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import replace
-from types import MappingProxyType
 
 import numpy as np
 
@@ -66,7 +65,7 @@ class GoalActions:
             "here": state.goal.q if here is None else here,
         }
         self._pose(frozen(named[request.name]))
-        self._clear_problems("")
+        self._store.clear_problems("")
 
     def move_target(self, request: requests.MoveTarget) -> None:
         """Follows the gizmo."""
@@ -77,7 +76,7 @@ class GoalActions:
             return
         position = [min(max(number, -FURTHEST), FURTHEST) for number in request.position]
         if request.ended:
-            self._clear_problems("pose.")
+            self._store.clear_problems("pose.")
         self._aim(Pose(position, request.wxyz))
 
     def set_arm_angle(self, request: requests.SetArmAngle, branch: int | None = None) -> None:
@@ -103,7 +102,7 @@ class GoalActions:
             self._aim(target, psi)
         else:
             self._pose(q)
-        self._clear_problems("pose.")
+        self._store.clear_problems("pose.")
 
     def type_field(self, request: requests.TypeField) -> None:
         """Takes a typed number, or says beside the field what is wrong with it."""
@@ -139,10 +138,10 @@ class GoalActions:
             return
         if act is None:
             assert parsed.problem is not None
-            self._store.update(problems=MappingProxyType({**state.problems, request.field: parsed.problem}))
+            self._store.complain(request.field, parsed.problem)
             return
         self._store.remember()
-        self._clear_problems(request.field)
+        self._store.clear_problems(request.field)
         act()
         self._store.update(typed=self._store.state.typed + 1)
 
@@ -150,7 +149,7 @@ class GoalActions:
         """Plans faster or slower."""
         if math.isfinite(request.speed):
             self._store.update(speed=min(max(request.speed, SLOWEST), 1.0))
-            self._clear_problems("speed")
+            self._store.clear_problems("speed")
             self.plan()
 
     def set_law(self, request: requests.SetLaw) -> None:
@@ -251,10 +250,6 @@ class GoalActions:
             return self._store.state.model.arm_angle(q)
         except KinematicsError:
             return None
-
-    def _clear_problems(self, prefix: str) -> None:
-        kept: dict[str, Message] = {k: v for k, v in self._store.state.problems.items() if not k.startswith(prefix)}
-        self._store.update(problems=MappingProxyType(kept))
 
 
 def initial_goal(model, q: JointVector) -> Goal:  # type: ignore[no-untyped-def]

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
+from rcilab.errors import RcilabError
 from rcilab.faults import Fault
 from rcilab.gallery import FAULTS, Exhibit
 from rcilab.workbench import requests
+from rcilab.workbench.background import Background
 from rcilab.workbench.learn.lessons import LESSONS, Watcher
+from rcilab.workbench.learn.private_arm import PrivateArm
 from rcilab.workbench.learn.state import LearnState, LessonState, make_show
-from rcilab.workbench.learn.work import GalleryWork
 from rcilab.workbench.run.readiness import is_moving
 from rcilab.workbench.session import Session
 from rcilab.workbench.store import Store
@@ -23,7 +26,8 @@ class LearnActions:
 
     def __init__(self, store: Store, session: Session) -> None:
         self._store, self._session = store, session
-        self._work = GalleryWork()
+        self._arm = PrivateArm()
+        self._work: Background[Fault, Exhibit] = Background("gallery")
         self._watcher = Watcher()
 
     def press(self, request: requests.Learn) -> None:
@@ -56,7 +60,7 @@ class LearnActions:
         """Shows how far a provocation is and what came of it; closes the show; looks what the learner has done."""
         learn = self._learn
         if self._work.is_done:
-            self._finish(self._work.take())
+            self._finish(self._work.take()[1])
         elif self._work.progress is not None and self._work.progress != learn.progress:
             self._set(progress=self._work.progress)
         self._look_beside()
@@ -64,7 +68,8 @@ class LearnActions:
 
     def close(self) -> None:
         """Ends the private controller."""
-        self._work.close()
+        self._work.cancel()
+        self._arm.close()
 
     @property
     def _learn(self) -> LearnState:
@@ -80,11 +85,11 @@ class LearnActions:
         if recipe.needs_elbow and model.n != 7:
             self._set(problem=message("learn.no_elbow", model=model.name))
             return
-        self._work.start(recipe.fault, model.name)
+        self._work.start(recipe.fault, partial(self._arm.provoke, recipe.fault, model.name))
         self._set(provoking=recipe.fault, progress=0.0, problem=None)
 
-    def _finish(self, result: Exhibit | Any) -> None:
-        if not isinstance(result, Exhibit):
+    def _finish(self, result: Exhibit | RcilabError) -> None:
+        if isinstance(result, RcilabError):
             self._set(provoking=None, problem=message("learn.failed", error=tell_error(result)))
             return
         state = self._store.state

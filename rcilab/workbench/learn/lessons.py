@@ -22,7 +22,6 @@ _POSED = 0.15  # [rad] A choice: so far from the arm a goal was moved on purpose
 _TURNED = 0.2  # [rad] of arm angle; a choice.
 _FAST = 0.95  # Share of the limits to plan with; a choice.
 _FELT = 3.0  # [N] A choice: more than an arm at rest feels.
-_LOSSY = 0.995  # Share of commands in time below which a network is bad; a choice.
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
+from rcilab.words.number import fixed
 from rcilab.workbench import requests
 from rcilab.workbench.run.pushing import (
     DIRECTIONS,
@@ -108,8 +107,8 @@ def felt_html(status: SupervisorStatus, text: Text) -> str:
     """Returns what the controller believes presses on the arm."""
     if status.tau_ext is None:
         return ""
-    force = " / ".join(f"{round(float(number)) + 0:d}" for number in status.tau_ext[:3])
-    moment = " / ".join(f"{float(number) + 0.0:.1f}" for number in np.round(status.tau_ext[3:], 1))
+    force = " / ".join(fixed(float(number), 0) for number in status.tau_ext[:3])
+    moment = " / ".join(fixed(float(number), 1) for number in status.tau_ext[3:])
     return (
         f'<table class="rl-table rl-facts-table"><tr><th>{esc(text("push.felt"))}</th>'
         f"<td>{force} N<br>{moment} N·m</td></tr></table>"

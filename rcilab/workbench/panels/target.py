@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rcilab.words.number import fixed
 from rcilab.workbench.goal.actions import POSE_FIELDS, QUATERNION
 from rcilab.workbench.panels.jog import problems_html, reach_html
 from rcilab.workbench.setup.wanted import name_parts
@@ -59,7 +60,7 @@ class TargetPanel:
 def quaternion_text(wxyz: np.ndarray) -> str:
     """Returns the four numbers of an orientation for a field, w not below 0."""
     sign = -1.0 if wxyz[0] < 0.0 else 1.0
-    return " ".join(f"{round(sign * float(number), 4) + 0.0:.4f}" for number in wxyz)
+    return " ".join(fixed(sign * float(number), 4) for number in wxyz)
 
 
 def planned_html(state: UiState, text: Text) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import replace
-from types import MappingProxyType
 from typing import TYPE_CHECKING, cast
 
 from rcilab.client.control_settings import control_ranges, standard_control
@@ -18,8 +17,8 @@ from rcilab.workbench import requests
 from rcilab.workbench.run.driving import control_field, is_control_pending
 from rcilab.workbench.run.readiness import is_moving
 from rcilab.workbench.session import Session
+from rcilab.workbench.setup.post import SetupPost
 from rcilab.workbench.store import Store
-from rcilab.workbench.telling import StartingError, tell_error
 from rcilab.workbench.text import Message, message
 
 if TYPE_CHECKING:
@@ -34,7 +33,7 @@ class ModeActions:
 
     def __init__(self, store: Store, session: Session) -> None:
         self._store, self._session = store, session
-        self._ticket: Ticket | None = None
+        self._post = SetupPost(session, self._refuse)
         self._changing: Ticket | None = None
         self._wish: float | None = None  # A pace that waits until the last change was taken.
         self._asked_to_send = -math.inf
@@ -76,22 +75,22 @@ class ModeActions:
         part, place = found
         bounds = control_ranges(state.model.limits)[part][place]
         parsed = parse_number(request.text, bounds.low, bounds.high, bounds.unit)
-        problems = {name: problem for name, problem in state.problems.items() if name != request.field}
         if parsed.value is None:
             assert parsed.problem is not None
-            self._store.update(problems=MappingProxyType({**problems, request.field: parsed.problem}))
+            self._store.complain(request.field, parsed.problem)
             return
         drive = state.drive.with_number(state.model, part, place, parsed.value)
-        self._store.update(drive=drive, problems=MappingProxyType(problems), typed=state.typed + 1)
+        self._store.clear_problems(request.field)
+        self._store.update(drive=drive, typed=state.typed + 1)
 
     def press(self, request: requests.PressControl) -> None:
         """Sends the parameters, or takes those that a controller wakes up with."""
         state, now = self._store.state, time.monotonic()
         if request.what == "reset":
             control = standard_control(state.model.limits)
-            kept = {name: problem for name, problem in state.problems.items() if not name.startswith("control.")}
             drive = replace(state.drive, control=control, refusal=None)
-            self._store.update(drive=drive, problems=MappingProxyType(kept), typed=state.typed + 1)
+            self._store.clear_problems("control.")
+            self._store.update(drive=drive, typed=state.typed + 1)
             return
         if state.target != "virtual" and now - self._asked_to_send > _SECOND_THOUGHT:
             self._asked_to_send = now
@@ -105,8 +104,9 @@ class ModeActions:
         """Looks what became of what was sent, tells our own controller what is new, changes the pace."""
         state, status = self._store.state, self._session.status()
         if state.model.name != self._arm:
-            self._arm, self._ticket, self._wish = state.model.name, None, None
-        self._collect()
+            self._arm, self._wish = state.model.name, None
+            self._post.forget()
+        self._post.collect()
         state = self._store.state
         if state.target == "virtual" and state.drive.refusal is None and status.phase == "idle":
             self._send()
@@ -117,23 +117,9 @@ class ModeActions:
         self._change_pace(status.code, status.pace)
 
     def _send(self) -> None:
-        state, status = self._store.state, self._session.status()
-        if self._ticket is not None or not is_control_pending(state, status):
-            return
-        try:
-            self._ticket = self._session.supervisor().set_up(RobotSetup(control=state.drive.control))
-        except StartingError:
-            return
-        except RcilabError as error:
-            self._refuse(tell_error(error))
-
-    def _collect(self) -> None:
-        ticket = self._ticket
-        if ticket is None or not ticket.done:
-            return
-        self._ticket = None
-        if ticket.error is not None:
-            self._refuse(tell_error(ticket.error))
+        state = self._store.state
+        if not self._post.is_underway and is_control_pending(state, self._session.status()):
+            self._post.send(RobotSetup(control=state.drive.control))
 
     def _refuse(self, why: Message) -> None:
         self._store.update(drive=replace(self._store.state.drive, refusal=why))

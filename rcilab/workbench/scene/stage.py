@@ -8,9 +8,9 @@ import numpy as np
 
 from rcilab.views.arm_view import ArmView
 from rcilab.views.viser_scene import ViserScene
+from rcilab.views.viser_stage import furnish, place_camera
 from rcilab.workbench.run.readiness import is_moving
 from rcilab.workbench.run.replay import replayed_pose
-from rcilab.workbench.scene.backdrop import furnish, place_camera
 from rcilab.workbench.scene.elbow_stage import ElbowStage
 from rcilab.workbench.scene.extras_stage import ExtrasStage
 from rcilab.workbench.scene.goal_stage import GoalStage

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterable
 from dataclasses import replace
-from types import MappingProxyType
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 import numpy as np
 
 from rcilab.client.setup import SETUP_PARTS, RobotSetup, SetupPart
-from rcilab.errors import RcilabError
 from rcilab.posing.planning import Plan, tool_path
 from rcilab.posing.reach import judge_joints, judge_pose
 from rcilab.safety_box import SafetyBox
@@ -32,13 +29,10 @@ from rcilab.workbench.setup.fields import (
     with_inertia,
     with_pose,
 )
+from rcilab.workbench.setup.post import SetupPost
 from rcilab.workbench.setup.wanted import FORCE_AXES, SetupState, name_parts, pending_parts
 from rcilab.workbench.store import Goal, Store
-from rcilab.workbench.telling import StartingError, tell_error
 from rcilab.workbench.text import Message, message
-
-if TYPE_CHECKING:
-    from rcilab.supervisor import Ticket
 
 _UNDO_DEPTH = 100
 _HAND_GONE = 1.0  # [s] A choice: a drag that was not heard of for so long has ended, whatever became of its page.
@@ -53,7 +47,7 @@ class SetupActions:
         self._arm = store.state.model.name
         self._drag: tuple[int | None, str] | None = None  # Which page drags which part.
         self._dragged = -math.inf  # When it was last heard to.
-        self._ticket: Ticket | None = None
+        self._post = SetupPost(session, self._refuse)
         self._told = 0  # At how many connections the controller has taken a set-up, as far as that was said.
 
     def type_field(self, request: requests.TypeField) -> None:
@@ -67,7 +61,7 @@ class SetupActions:
         parsed = parse_number(request.text, bounds.low, bounds.high, bounds.unit)
         if parsed.value is None:
             assert parsed.problem is not None
-            self._complain(request.field, parsed.problem)
+            self._store.complain(request.field, parsed.problem)
             return
         changed = with_field(state.setup, part, name, parsed.value)
         if isinstance(changed, SetupState) and name in INERTIA_NAMES:
@@ -78,13 +72,13 @@ class SetupActions:
             made = with_inertia(changed)
             changed, untaken = (changed, made) if isinstance(made, Message) else (made, None)
         if isinstance(changed, Message):
-            self._complain(request.field, changed)
+            self._store.complain(request.field, changed)
             return
         related = {name, *INERTIA_NAMES} if name in (*INERTIA_NAMES, "mass") else {name}
-        self._clear_problems(f"setup.{part}.{other}" for other in related)
+        self._store.clear_problems(*(f"setup.{part}.{other}" for other in related))
         self._edit(changed, cast("SetupPart", part))
         if untaken is not None:
-            self._complain("setup.load.ixx", untaken)
+            self._store.complain("setup.load.ixx", untaken)
 
     def move(self, request: requests.MoveSetup) -> None:
         """Follows the handles of a part."""
@@ -98,7 +92,7 @@ class SetupActions:
             self._store.say("warn", changed)
         else:
             self._edit(changed, request.part, drag=(request.page, request.part))
-            self._clear_problems(f"setup.{request.part}.{name}" for name in FIELD_NAMES[request.part])
+            self._store.clear_problems(f"setup.{request.part}.")
         self._hear_drag(request.ended)
 
     def resize(self, request: requests.ResizeBox) -> None:
@@ -166,8 +160,10 @@ class SetupActions:
         """Looks what became of a set-up that was sent, and tells our own controller what is new."""
         state, status = self._store.state, self._session.status()
         if state.model.name != self._arm:
-            self._arm, self._past, self._ticket, self._told = state.model.name, [], None, 0
-        self._collect()
+            self._arm, self._past, self._told = state.model.name, [], 0
+            self._post.forget()
+        self._post.collect()
+        state = self._store.state
         told, self._told = self._told, status.setup_times  # Another supervisor counts anew.
         if self._told > told:
             self._store.say("good", message("setup.sent_again", what=name_parts(status.setup.parts)))
@@ -177,24 +173,13 @@ class SetupActions:
 
     def _send(self) -> None:
         """Tells the controller every part that it has not taken yet."""
-        state, status = self._store.state, self._session.status()
-        parts = pending_parts(state, status)
-        if self._ticket is not None or not parts:
-            return
-        try:
-            self._ticket = self._session.supervisor().set_up(state.setup.wanted.only(parts))
-        except StartingError:
-            return
-        except RcilabError as error:
-            self._store.update(setup=replace(state.setup, refusal=tell_error(error)))
+        state = self._store.state
+        parts = pending_parts(state, self._session.status())
+        if parts and not self._post.is_underway:
+            self._post.send(state.setup.wanted.only(parts))
 
-    def _collect(self) -> None:
-        ticket = self._ticket
-        if ticket is None or not ticket.done:
-            return
-        self._ticket = None
-        if ticket.error is not None:
-            self._store.update(setup=replace(self._store.state.setup, refusal=tell_error(ticket.error)))
+    def _refuse(self, why: Message) -> None:
+        self._store.update(setup=replace(self._store.state.setup, refusal=why))
 
     def _hear_drag(self, has_ended: bool) -> None:
         self._dragged = -math.inf if has_ended else time.monotonic()
@@ -214,10 +199,10 @@ class SetupActions:
             return
         setup, (before, touched) = self._store.state.setup, self._past.pop()
         touched |= frozenset(self._session.status().setup.parts)  # What it was told it must be told to forget.
-        if self._ticket is not None:
+        if self._post.is_underway:
             touched |= setup.touched
         parts: set[SetupPart] = {p for p in SETUP_PARTS if getattr(before, p) is not getattr(setup.wanted, p)}
-        self._clear_problems(f"setup.{part}.{name}" for part in parts for name in FIELD_NAMES[part])
+        self._store.clear_problems(*(f"setup.{part}." for part in parts))
         self._take(replace(setup, wanted=before, touched=touched, inertia=None), parts)
 
     def _take(self, setup: SetupState, parts: set[SetupPart]) -> None:
@@ -237,15 +222,6 @@ class SetupActions:
                     changes["plan"] = replace(state.plan, path=tool_path(model, state.plan.motion), short=None)
         changes["setup"] = replace(setup, asked=None, refusal=None, can_undo=bool(self._past))
         self._store.update(**changes, typed=state.typed + 1)
-
-    def _complain(self, field: str, problem: Message) -> None:
-        problems = self._store.state.problems
-        self._store.update(problems=MappingProxyType({**problems, field: problem}))
-
-    def _clear_problems(self, fields: Iterable[str]) -> None:
-        gone = set(fields)
-        kept = {field: problem for field, problem in self._store.state.problems.items() if field not in gone}
-        self._store.update(problems=MappingProxyType(kept))
 
 
 def is_setup_field(field: str) -> bool:

@@ -1,14 +1,13 @@
-"""Slow-downs and explanations are worked out beside the conductor's thread: each judges a motion several times."""
+"""How a plan is slowed down until it passes: it is judged several times, so this takes a while."""
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from rcilab.errors import RcilabError
 from rcilab.posing.planning import Plan, make_plan, picture
+from rcilab.workbench.background import Tell
 from rcilab.workbench.program.draft import Draft
 
 if TYPE_CHECKING:
@@ -37,75 +36,7 @@ class Slower:
     """Whether the same curve runs slower as a whole, because no speed is slow enough: speed does not bound the jerk."""
 
 
-class CheckWork:
-    """One job at a time. Owned by the conductor's thread, which asks for the result at every tick."""
-
-    def __init__(self) -> None:
-        self._job: _Job | None = None
-
-    @property
-    def progress(self) -> float | None:
-        """How much is done, 0 to 1; None where nothing is being worked out."""
-        return None if self._job is None else self._job.progress
-
-    @property
-    def is_done(self) -> bool:
-        """Whether there is something to take."""
-        return self._job is not None and self._job.done.is_set()
-
-    def start(self, about: Any, run: Callable[[Callable[[float], None]], Any]) -> None:
-        """Begins; what was being worked out is dropped.
-
-        Args:
-            about: What it is about; comes back with the result.
-            run: Does it; it is given what takes how much is done, and ends it where nobody wants it any more.
-        """
-        self.cancel()
-        job = self._job = _Job(about, run)
-        threading.Thread(target=job.run, name="check", daemon=True).start()
-
-    def cancel(self) -> None:
-        """Drops what is being worked out, at once; its thread ends when it comes to know."""
-        if self._job is not None:
-            self._job.unwanted.set()
-        self._job = None
-
-    def take(self) -> tuple[Any, Any]:
-        """Returns what it was about and what came of it, once it is done; a failure of ours is raised."""
-        job, self._job = self._job, None
-        assert job is not None
-        if isinstance(job.result, Exception) and not isinstance(job.result, RcilabError):
-            raise job.result
-        return job.about, job.result
-
-
-class _Cancelled(Exception):
-    """Nobody wants the result any more."""
-
-
-class _Job:
-    """One job in its thread."""
-
-    def __init__(self, about: Any, run: Callable[[Callable[[float], None]], Any]) -> None:
-        self.about, self._run = about, run
-        self.progress = 0.0
-        self.unwanted, self.done = threading.Event(), threading.Event()
-        self.result: Any = None
-
-    def run(self) -> None:
-        try:
-            self.result = self._run(self._tell)
-        except Exception as error:
-            self.result = error
-        self.done.set()
-
-    def _tell(self, share: float) -> None:
-        if self.unwanted.is_set():
-            raise _Cancelled
-        self.progress = share
-
-
-def slow_to_goal(plan: Plan, speed: float, law: PlannableLaw, tell: Callable[[float], None]) -> Slower:
+def slow_to_goal(plan: Plan, speed: float, law: PlannableLaw, tell: Tell) -> Slower:
     """Returns the plan to the same goal at the largest speed that passes, planned anew."""
 
     def make(scale: float) -> Plan | None:
@@ -115,7 +46,7 @@ def slow_to_goal(plan: Plan, speed: float, law: PlannableLaw, tell: Callable[[fl
     return _slower(plan, make, SLOWEST / speed, tell)
 
 
-def slow_program(plan: Plan, draft: Draft, rounds: int, tell: Callable[[float], None]) -> Slower:
+def slow_program(plan: Plan, draft: Draft, rounds: int, tell: Tell) -> Slower:
     """Returns the plan of the same program with every speed scaled by the largest factor that passes."""
     from rcilab.conformance import check
     from rcilab.motion import plan_program
@@ -143,7 +74,7 @@ def scaled(draft: Draft, scale: float) -> Draft:
     return replace(draft, steps=steps)
 
 
-def _slower(plan: Plan, make: Callable[[float], Plan | None], least: float, tell: Callable[[float], None]) -> Slower:
+def _slower(plan: Plan, make: Callable[[float], Plan | None], least: float, tell: Tell) -> Slower:
     tell(0.05)
     recommended = plan.report.ok
     found = plan.completed().report.slow_down(recommended=recommended)

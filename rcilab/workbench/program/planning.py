@@ -1,0 +1,50 @@
+"""The planning of a program from beginning to end, as it is done beside the conductor's thread."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from rcilab.arrays import JointVector
+from rcilab.model import RobotModel
+from rcilab.motion.program import Program
+from rcilab.posing.planning import Plan, picture
+from rcilab.safety_box import SafetyBox
+from rcilab.supervisor.layout import MOTION_TIME
+from rcilab.workbench.background import Tell
+from rcilab.workbench.program.draft import Draft
+from rcilab.workbench.text import Message, message
+
+_MOTION, _JUDGED = 0.75, 0.8
+"""Parts of the work when the motion is made, and when all but collisions has been looked at; about what was seen."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Job:
+    """What is to be planned."""
+
+    model: RobotModel
+    draft: Draft
+    program: Program
+    """The draft, or the first part of it."""
+    here: JointVector
+    """Where the arm stands, [rad]."""
+    rounds: int
+    box: SafetyBox | None
+    """The safety box to judge with."""
+
+
+def plan_job(job: Job, tell: Tell) -> Plan | Message:
+    """Returns the plan of a program, or that it takes longer than any motion may."""
+    from rcilab.conformance import check
+    from rcilab.motion import plan_program
+
+    motion = plan_program(
+        job.model, job.program, start=job.here, rounds=job.rounds, progress=lambda part: tell(_MOTION * part)
+    )
+    tell(_MOTION)
+    if motion.duration > MOTION_TIME:
+        return message("program.long", duration=f"{motion.duration:.0f}", most=f"{MOTION_TIME:.0f}")
+    report = check(motion, job.model, start=job.here, box=job.box, distance=None)
+    plan = replace(picture(job.model, motion, report, job.box), program=job.program)
+    tell(_JUDGED)
+    return plan.completed()
