@@ -130,7 +130,7 @@ class Exhibit:
         """Returns joint angles of every cycle, shape (N, n), [rad]; between states that were dropped, interpolated."""
         stop = np.concatenate((self.cycles[-1:], self.after))
         known: Array = np.array(stop["message_id"], np.float64)
-        wanted = np.arange(known[0] + 1.0, known[-1] + 1.0)
+        wanted: Array = np.arange(float(known[0]) + 1.0, float(known[-1]) + 1.0)
         angles: Array = np.array(stop[name], np.float64)
         after: list[Array] = [np.interp(wanted, known, angles[:, joint]) for joint in range(angles.shape[1])]
         return np.concatenate((self.cycles[name], np.stack(after, axis=1)))
