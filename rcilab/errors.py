@@ -23,13 +23,27 @@ Facts stay on the exception as attributes; nobody has to search a message for me
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from os import PathLike
-from typing import Any
+from types import MappingProxyType
+from typing import Any, Self
 
 
 class RcilabError(Exception):
-    """The root of everything this package raises on purpose."""
+    """The root of everything this package raises on purpose.
+
+    Attributes:
+        code: Names what went wrong, for faces that say it in their own words and language; "" where nothing does.
+        facts: What fills these words, by name: numbers as text, angles in degrees, lengths in millimetres; or errors.
+    """
+
+    code: str = ""
+    facts: Mapping[str, object] = MappingProxyType({})
+
+    def coded(self, code: str, **facts: object) -> Self:
+        """Returns this error with a name for what went wrong; its words are `error.CODE` of the catalogues of words."""
+        self.code, self.facts = code, facts
+        return self
 
 
 class ModelError(RcilabError):
@@ -123,6 +137,7 @@ class VersionMismatchError(ProtocolError):
         super().__init__(f"{what}: found version {found}, need {expected}; {advice}")
         self.found = found
         self.expected = expected
+        self.coded("version", found=str(found), expected=str(expected))
 
 
 class RecordedError(RcilabError):
@@ -165,6 +180,7 @@ class CommandRejectedError(RcilabError):
     def __init__(self, command: str, status: object, advice: str = "") -> None:
         name = getattr(status, "name", str(status)).lower().replace("_", " ")
         super().__init__(f"{command} was refused: {name}" + (f"; {advice}" if advice else ""))
+        self.coded("rejected", command=command, status=name)
         self.command = command
         self.status = status
 
@@ -174,7 +190,10 @@ class ControlError(RecordedError):
 
     Attributes:
         faults: The faults that were set, in wire order.
+        stop: The cycles after `record`, in which the controller brought the arm to rest, alike; None where not seen.
     """
+
+    stop: Any = None
 
     def __init__(self, message: str, faults: Sequence[object] = (), record: Any = None) -> None:
         super().__init__(message, record)

@@ -116,7 +116,7 @@ def choose_route(address: RobotAddress) -> Route:
         raise ConnectionLostError(
             f"{address}: the host {address.host!r} is not known ({_reason(error)}); "
             "check its spelling, or write the IP address that the teach pendant's RCI page shows"
-        ) from error
+        ).coded("unknown_host", host=address.host) from error
     host = str(host)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
@@ -126,7 +126,7 @@ def choose_route(address: RobotAddress) -> Route:
             raise ConnectionLostError(
                 f"{address}: no network of this computer leads to {host} ({_reason(error)}); check the cable and "
                 "that this computer has an address in the robot's network"
-            ) from error
+            ).coded("no_network", host=host) from error
     if local == host and address.state_port == address.command_port:
         local = SPARE_LOOPBACK
     return Route(

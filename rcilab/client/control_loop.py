@@ -166,7 +166,7 @@ class ControlLoop:
         raise DeadlineError(
             f"{self._link.name} accepted StartMove and then did not show {self._mode.name} within {MODE_TIMEOUT:g} s; "
             "try again, and look at the teach pendant if it goes on"
-        )
+        ).coded("not_started", seconds=f"{MODE_TIMEOUT:g}")
 
     def _stream(self, state: RobotState, callback: Callback) -> str | None:
         while True:
@@ -260,9 +260,16 @@ class ControlLoop:
                 self._come_to_rest()
             except BaseException as worse:
                 surprise = worse
-        self._stop_move(surprise)
+        first, others = self._log.recorder.count, self._link.on_states
+        if isinstance(surprise, ControlError) and not self._link.is_heard:
+            self._link.on_states = self._record  # The controller's own stop has begun.
+        try:
+            self._stop_move(surprise)
+        finally:
+            self._link.on_states = others
         if isinstance(surprise, ControlError):
             self._watch_standstill()
+            surprise.stop = self._log.recorder.rows(first)
         if surprise is not None and surprise is not error:
             raise surprise from error
 
@@ -291,11 +298,14 @@ class ControlLoop:
         before: RobotState | None = None
         while time.monotonic() < deadline:
             states = self._link.poll(self._silence)
-            for state in states:
-                self._log.write(state, self._link.received_ns, self._time(state))
+            self._record(states)
             if not states or (before is not None and _stands(before, states[-1])):
                 return
             before = states[-1]
+
+    def _record(self, states: list[RobotState]) -> None:
+        for state in states:
+            self._log.write(state, self._link.received_ns, self._time(state))
 
     def _checked(self, command: Any, state: RobotState) -> Command:
         """Returns the callback's command once it is found good."""

@@ -68,6 +68,11 @@ class Link:
                 return states
         return []
 
+    @property
+    def is_heard(self) -> bool:
+        """Whether somebody takes the states that arrive while an answer is waited for."""
+        return self.on_states is not _ignore
+
     def send(self, packet: CommandPacket) -> None:
         """Sends one command."""
         self._transport.send_command(encode_command(packet))
@@ -95,7 +100,7 @@ class Link:
                 raise DeadlineError(
                     f"{self.name} did not answer {type(request).__name__} within {limit:g} s; "
                     "look whether the controller is busy or hangs, and connect again if it goes on"
-                )
+                ).coded("no_answer", command=type(request).__name__, seconds=f"{limit:g}")
             is_ready = self._transport.wait(min(remaining, _LOOK), frames=True)
             self.on_states(self._take_states() if is_ready else [])
 

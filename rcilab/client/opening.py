@@ -48,4 +48,4 @@ def await_first_state(link: Link, place: RobotAddress, local: tuple[str, int], t
             f"{place} accepted the connection but sent no state to {local[0]}:{local[1]} within {timeout:g} s; check "
             "that the teach pendant's RCI page names this computer's address and that no firewall drops UDP; if the "
             "robot sends to another port of ours, add ?client_port=N to its address"
-        )
+        ).coded("no_state", address=str(place), seconds=f"{timeout:g}")

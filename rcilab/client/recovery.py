@@ -28,4 +28,4 @@ def recover(commands: RciCommands, link: Link) -> None:
     raise DeadlineError(
         f"{link.name}: {names or 'the faults'} did not clear within {RECOVERY_TIMEOUT:g} s; remove the cause first"
         + (f": {faults[0].remedy}" if faults else "")
-    )
+    ).coded("not_cleared", faults=names, seconds=f"{RECOVERY_TIMEOUT:g}")

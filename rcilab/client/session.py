@@ -173,6 +173,23 @@ class RobotSession(Motions, Closing):
             return self._link.latest
         return self.receive_state()
 
+    def receive_states(self, timeout: float = 1.0) -> list[RobotState]:
+        """Returns every state that has arrived since the last look, oldest first; waits for the first one.
+
+        Args:
+            timeout: How long to wait for it, [s].
+
+        Raises:
+            ConnectionLostError: None came.
+            UsageError: The session is closed, or a motion runs.
+        """
+        require_timeout(timeout)
+        with self._turn("receive_states"):
+            states = self._link.poll(timeout)
+        if not states:
+            raise self._no_state(timeout)
+        return states
+
     def receive_state(self, timeout: float = 1.0, max_age: float = 0.0) -> RobotState:
         """Returns a state that was sent after this call; older ones that waited in the socket are dropped.
 
@@ -195,11 +212,14 @@ class RobotSession(Motions, Closing):
                 return self._link.latest
             states = self._link.poll(timeout)
         if not states:
-            raise ConnectionLostError(
-                f"{self._link.name}: no state within {timeout:g} s; look whether the controller runs and the cable is "
-                "in, then connect again"
-            )
+            raise self._no_state(timeout)
         return states[-1]
+
+    def _no_state(self, timeout: float) -> ConnectionLostError:
+        return ConnectionLostError(
+            f"{self._link.name}: no state within {timeout:g} s; look whether the controller runs and the cable is "
+            "in, then connect again"
+        )
 
     def set_coor(self, T_flange_tool: Pose) -> None:
         """Sets the tool by its pose in the flange frame; `model` has it from then on."""

@@ -115,7 +115,9 @@ class SocketTransport:
             try:
                 self._frames += self._reader.feed(piece)
             except DecodeError as error:
-                raise ConnectionLostError(f"{self.address}: what answers there does not speak RCI: {error}") from error
+                raise ConnectionLostError(f"{self.address}: what answers there does not speak RCI: {error}").coded(
+                    "no_rci", address=str(self.address)
+                ) from error
         return self._frames.pop(0)
 
     def receive_states(self) -> list[bytes]:
@@ -187,8 +189,10 @@ def _bind_udp(address: RobotAddress, route: Route) -> socket.socket:
             raise ConnectionLostError(
                 f"{address}: states would come to UDP port {port} of {host}, and a program here already listens "
                 "there, probably another client of this robot; close it and connect again"
-            ) from error
-        raise ConnectionLostError(f"{address}: cannot receive at {host}:{port}: {error.strerror or error}") from error
+            ).coded("port_taken", address=str(address), port=port) from error
+        raise ConnectionLostError(f"{address}: cannot receive at {host}:{port}: {error.strerror or error}").coded(
+            "no_port", address=str(address), port=port
+        ) from error
     return udp
 
 
@@ -213,5 +217,5 @@ def _connect_tcp(address: RobotAddress, route: Route, timeout: float) -> socket.
             f"no robot at {address} ({reason}); check that it is switched on, that its IP address and port are those "
             "of the teach pendant's RCI page with RCI enabled there, and that the cable and no firewall is in between; "
             "a virtual one is started with, for example: rcilab controller --model xMatePro7"
-        ) from error
+        ).coded("no_robot", address=str(address)) from error
     return tcp

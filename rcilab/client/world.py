@@ -195,7 +195,7 @@ class World(Closing):
                 self._disconnect()
                 raise ConnectionLostError(
                     f"{self} does not answer {request.name} ({error}); look whether the virtual controller still runs"
-                ) from error
+                ).coded("world_silent") from error
         if isinstance(answer, Refused):
             raise UsageError(answer.reason)
         return answer

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from rcilab.conformance.catalogue import Language, Phrase, load_catalogue, say
 from rcilab.conformance.condition import Condition
 from rcilab.conformance.report import LISTED, ConditionResult, Report, Violation
 from rcilab.conformance.wording import amount, with_degrees
+from rcilab.words.units import Units
 
 if TYPE_CHECKING:
     from rcilab.conformance.slow_down import SlowDown
@@ -17,47 +19,69 @@ _TIMES = 10.0
 """From this share of a bound on it is told as a factor, not in percent."""
 
 
-def explain_report(report: Report, language: Language = "en") -> str:
+@dataclass(frozen=True, slots=True)
+class _Voice:
+    """In which language, and in which units; without units in SI, angles in degrees beside."""
+
+    language: Language
+    units: Units | None = None
+
+    def say(self, key: str, **values: str) -> str:
+        return say(self.language, key, **values)
+
+
+def explain_report(
+    report: Report, language: Language = "en", units: Units | None = None, slowed: SlowDown | None = None
+) -> str:
     """Returns a report in sentences, a line each: the verdict, what is broken, what a slow-down does.
+
+    Args:
+        report: What to explain.
+        language: "en" is English, "zh" Chinese.
+        units: What angles and lengths are said in; None is SI, with degrees beside.
+        slowed: What `report.slow_down` has found, where that is known already: finding it takes the longest.
 
     Raises:
         InvalidValueError: There is no such language.
     """
-    lines = [_verdict(report, language)]
+    voice = _Voice(language, units)
+    lines = [_verdict(report, voice)]
     found = (*report.violations, *report.warnings)
-    lines += [f"- {explain_violation(violation, language)}" for violation in found[:LISTED]]
+    lines += [f"- {explain_violation(violation, language, units)}" for violation in found[:LISTED]]
     if len(found) > LISTED:
-        lines.append(f"- {say(language, 'verdict.more', count=str(len(found) - LISTED))}")
+        lines.append(f"- {voice.say('verdict.more', count=str(len(found) - LISTED))}")
     if not report.ok:
-        lines.append(explain_slow_down(report.slow_down(), language))
+        lines.append(explain_slow_down(slowed or report.slow_down(), language))
     return "\n".join(lines)
 
 
-def explain_violation(violation: Violation, language: Language = "en") -> str:
+def explain_violation(violation: Violation, language: Language = "en", units: Units | None = None) -> str:
     """Returns a violation of any condition in sentences: the fact, the fault, the remedy.
 
     Raises:
         InvalidValueError: There is no such language.
     """
-    row = violation.condition
-    stop = say(language, "stop")
-    sentences = (_fact(violation, language) + _when(violation, language) + stop, _fault(row, language))
+    row, voice = violation.condition, _Voice(language, units)
+    stop = voice.say("stop")
+    sentences = (_fact(violation, voice) + _when(violation, voice) + stop, _fault(row, voice))
     advice = violation.advice.text(language) if isinstance(violation.advice, Phrase) else violation.advice
-    return say(language, "gap").join((*sentences, say(language, "remedy", advice=advice)))
+    if units is not None:
+        advice = units.restate(advice)
+    return voice.say("gap").join((*sentences, voice.say("remedy", advice=advice)))
 
 
 def explain_slow_down(result: SlowDown, language: Language = "en") -> str:
-    """Returns what a slow-down does to a motion, in a sentence.
+    """Returns what a slow-down does to a motion, in a sentence; angles and lengths are not in it.
 
     Raises:
         InvalidValueError: There is no such language.
     """
-    row = result.decisive
+    row, voice = result.decisive, _Voice(language)
     at_most = f"{result.at_most:g}"
     if row is None:
         text = say(language, "slow_down.none")
     else:
-        place, what = explain_place(row, language), _quantity(row.condition, language)
+        place, what = explain_place(row, language), _quantity(row.condition, voice)
         if result.obstacle is not None:
             time = f"{row.time / (1.0 if result.obstacle == 'position' else result.at_most):.3f}"
             key = f"slow_down.{result.obstacle}"
@@ -75,84 +99,83 @@ def explain_slow_down(result: SlowDown, language: Language = "en") -> str:
         )
     if not result.unmet:
         return text
-    names = say(language, "comma").join(_quantity(row, language) for row in result.unmet)
+    names = say(language, "comma").join(_quantity(row, voice) for row in result.unmet)
     return say(language, "gap").join((text, say(language, "slow_down.warned", at_most=at_most, quantities=names)))
 
 
-def _verdict(report: Report, language: Language) -> str:
+def _verdict(report: Report, voice: _Voice) -> str:
     if not report.ok:
         is_noticed = any(violation.fault is not None for violation in report.violations)
         key = "verdict.broken" if is_noticed else "verdict.collides"
-        parts = [say(language, key, count=str(len(report.violations)))]
+        parts = [voice.say(key, count=str(len(report.violations)))]
     else:
-        parts = [say(language, "verdict.ok"), _nearest(report.worst, language)]
+        parts = [voice.say("verdict.ok"), _nearest(report.worst, voice)]
     if report.warnings:
-        parts.append(say(language, "verdict.warned", count=str(len(report.warnings))))
-    return say(language, "gap").join(parts)
+        parts.append(voice.say("verdict.warned", count=str(len(report.warnings))))
+    return voice.say("gap").join(parts)
 
 
-def _nearest(row: ConditionResult, language: Language) -> str:
+def _nearest(row: ConditionResult, voice: _Voice) -> str:
     """Returns how near an accepted motion comes to a bound."""
     time = f"{row.time:.3f}"
     if row.condition.signal == "position":
-        return say(language, "verdict.deepest", depth=f"{max(-row.value, 0.0):.4g}", time=time)
+        return voice.say("verdict.deepest", depth=_one(row.condition, max(-row.value, 0.0), voice), time=time)
     if row.condition.signal == "frame":
-        return say(language, "verdict.singular", share=_share(row.ratio, language), time=time)
+        return voice.say("verdict.singular", share=_share(row.ratio, voice), time=time)
     if row.condition.is_clearance:
-        place = explain_place(row, language)
-        return say(language, "verdict.clearest", place=place, distance=f"{row.value:.4g}", time=time)
-    value, bound = _amounts(row.condition, row.value, row.bound, language)
-    return say(
-        language,
+        place = explain_place(row, voice.language)
+        return voice.say("verdict.clearest", place=place, distance=_one(row.condition, row.value, voice), time=time)
+    value, bound = _amounts(row.condition, row.value, row.bound, voice)
+    return voice.say(
         "verdict.nearest",
-        place=explain_place(row, language),
-        quantity=_quantity(row.condition, language),
+        place=explain_place(row, voice.language),
+        quantity=_quantity(row.condition, voice),
         value=value,
         bound=bound,
-        share=_share(row.ratio, language),
+        share=_share(row.ratio, voice),
         time=time,
     )
 
 
-def _fact(violation: Violation, language: Language) -> str:
+def _fact(violation: Violation, voice: _Voice) -> str:
     """Returns what is broken, where and by how much."""
     row = violation.condition
-    place, quantity = explain_place(violation, language), _quantity(row, language)
+    place, quantity = explain_place(violation, voice.language), _quantity(row, voice)
     if row.signal == "frame":
-        return say(language, "fact.frame", place=place, quantity=quantity)
-    value, bound = _amounts(row, violation.value, violation.bound, language)
+        return voice.say("fact.frame", place=place, quantity=quantity)
+    value, bound = _amounts(row, violation.value, violation.bound, voice)
     if row.signal == "elbow_sign":
-        return say(language, "fact.elbow_sign", place=place, quantity=quantity, value=value)
+        return voice.say("fact.elbow_sign", place=place, quantity=quantity, value=value)
     if row.signal == "position":
-        return say(language, "fact.box", place=place, quantity=quantity, value=value)
+        return voice.say("fact.box", place=place, quantity=quantity, value=value)
     if row.is_clearance:
         key = "fact.overlap" if violation.value < 0.0 else "fact.clearance"
-        depth = _one(row, abs(violation.value), language)
-        return say(language, key, place=place, quantity=quantity, value=value, bound=bound, depth=depth)
+        depth = _one(row, abs(violation.value), voice)
+        return voice.say(key, place=place, quantity=quantity, value=value, bound=bound, depth=depth)
     if row.stage != "throughout":
-        limit = _one(row, abs(violation.bound), language)
-        return say(language, "fact.rest", place=place, quantity=quantity, value=value, bound=limit)
-    excess = _one(row, abs(violation.value - violation.bound), language)
-    text = say(language, "fact.bound", place=place, quantity=quantity, value=value, bound=bound, excess=excess)
+        limit = _one(row, abs(violation.bound), voice)
+        return voice.say("fact.rest", place=place, quantity=quantity, value=value, bound=limit)
+    excess = _one(row, abs(violation.value - violation.bound), voice)
+    text = voice.say("fact.bound", place=place, quantity=quantity, value=value, bound=bound, excess=excess)
     if row.order == 0 and row.unit == "rad":  # A share of a range says nothing: zero may be anywhere in it.
         return text
-    return text + say(language, "fact.share", share=_share(violation.ratio, language))
+    return text + voice.say("fact.share", share=_share(violation.ratio, voice))
 
 
-def _when(violation: Violation, language: Language) -> str:
+def _when(violation: Violation, voice: _Voice) -> str:
     if violation.condition.stage != "throughout":
         return ""
     time, worst = f"{violation.time:.3f}", f"{violation.worst_time:.3f}"
     if violation.count == 1:
-        return say(language, "when.once", time=time)
-    return say(language, "when.lasting", time=time, worst=worst, count=str(violation.count))
+        return voice.say("when.once", time=time)
+    return voice.say("when.lasting", time=time, worst=worst, count=str(violation.count))
 
 
-def _fault(row: Condition, language: Language) -> str:
+def _fault(row: Condition, voice: _Voice) -> str:
     if row.fault is None:
-        return say(language, "raises.nothing" if row.necessity == "recommended" else "raises.unnoticed")
-    cause = say(language, f"fault.{row.fault.name}")
-    return say(language, "raises.fault", fault=row.fault.manual_name, cause=cause)
+        return voice.say("raises.nothing" if row.necessity == "recommended" else "raises.unnoticed")
+    cause = voice.say(f"fault.{row.fault.name}")
+    return voice.say("raises.fault", fault=row.fault.manual_name, cause=cause)
 
 
 def explain_place(found: ConditionResult | Violation, language: Language = "en") -> str:
@@ -163,41 +186,60 @@ def explain_place(found: ConditionResult | Violation, language: Language = "en")
     """
     row, axis = found.condition, str(found.joint)
     if found.links is not None:
-        first, second = (_link(number, language) for number in found.links)
+        first, second = (_link(number, _Voice(language)) for number in found.links)
         return say(language, "place.pair", first=first, second=second)
     return say(language, f"place.{'joint' if row.is_per_joint else row.place(found.joint)}", axis=axis)
 
 
-def _link(number: int, language: Language) -> str:
+def explain_source(row: Condition, language: Language = "en") -> str:
+    """Returns where a condition and its bound come from; sources without other words keep their English ones.
+
+    Raises:
+        InvalidValueError: There is no such language.
+    """
+    return load_catalogue(language).get(f"source.{row.source}", row.source)
+
+
+def _link(number: int, voice: _Voice) -> str:
     from rcilab.kinematics.collision import FLOOR, TOOL
 
     key = {FLOOR: "floor", TOOL: "tool", 0: "base"}.get(number, "link")
-    return say(language, f"place.{key}", number=str(number))
+    return voice.say(f"place.{key}", number=str(number))
 
 
-def _quantity(row: Condition, language: Language) -> str:
-    return load_catalogue(language).get(f"quantity.{row.id}", row.quantity)
+def _quantity(row: Condition, voice: _Voice) -> str:
+    return load_catalogue(voice.language).get(f"quantity.{row.id}", row.quantity)
 
 
-def _amounts(row: Condition, value: float, bound: float, language: Language) -> tuple[str, str]:
+def _amounts(row: Condition, value: float, bound: float, voice: _Voice) -> tuple[str, str]:
     """Returns value and bound with units, with as few digits as show that they differ."""
+    if voice.units is not None:
+        first, second = voice.units.numbers(row.unit, value, bound)
+        return _with_unit(row, first, voice.units, voice), _with_unit(row, second, voice.units, voice)
     texts = amount(value, bound)
-    first, second = (_in_unit(row, number, text, language) for number, text in zip((value, bound), texts, strict=True))
+    first, second = (_in_unit(row, number, text, voice) for number, text in zip((value, bound), texts, strict=True))
     return first, second
 
 
-def _one(row: Condition, value: float, language: Language) -> str:
-    return _in_unit(row, value, f"{value:.4g}", language)
+def _one(row: Condition, value: float, voice: _Voice) -> str:
+    if voice.units is not None:
+        return _with_unit(row, voice.units.numbers(row.unit, value)[0], voice.units, voice)
+    return _in_unit(row, value, f"{value:.4g}", voice)
 
 
-def _in_unit(row: Condition, value: float, text: str, language: Language) -> str:
+def _with_unit(row: Condition, number: str, units: Units, voice: _Voice) -> str:
+    unit = load_catalogue(voice.language).get(f"unit.{row.unit}")
+    return units.with_unit(number, row.unit) if unit is None else f"{number} {unit}"
+
+
+def _in_unit(row: Condition, value: float, text: str, voice: _Voice) -> str:
     if row.unit == "rad" and math.isfinite(value):
         return with_degrees(value, text)
-    unit = load_catalogue(language).get(f"unit.{row.unit}", row.unit)
+    unit = load_catalogue(voice.language).get(f"unit.{row.unit}", row.unit)
     return f"{text} {unit}"
 
 
-def _share(ratio: float, language: Language) -> str:
+def _share(ratio: float, voice: _Voice) -> str:
     if ratio < _TIMES:
-        return say(language, "share.percent", number=f"{100.0 * ratio:.1f}")
-    return say(language, "share.times", number=f"{ratio:.0f}")
+        return voice.say("share.percent", number=f"{100.0 * ratio:.1f}")
+    return voice.say("share.times", number=f"{ratio:.0f}")

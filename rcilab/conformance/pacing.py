@@ -41,7 +41,7 @@ def plan_pace(paced: PacedMotion, cycle: int, pace: float, model: RobotModel, mo
     raise PlanningError(
         f"at t = {paced.place_at(cycle):.2f} s of {paced.motion.duration:.2f} s of the plan there is no way within the "
         f"limits to go on with {100 * pace:.0f} % of its speed; the motion goes on as it is, stop() always works"
-    )
+    ).coded("no_way_to_pace", pace=f"{100 * pace:.0f}")
 
 
 def _breaches(candidate: PacedMotion, model: RobotModel, mode: Mode) -> list[Violation]:

@@ -18,6 +18,7 @@ from rcilab.motion.motion import Motion
 if TYPE_CHECKING:
     from rcilab.conformance.slow_down import SlowDown
     from rcilab.kinematics.collision import LinkPair
+    from rcilab.words.units import Units
 
 LISTED = 8  # Violations printed in full; a thousand sentences help nobody.
 
@@ -143,6 +144,16 @@ class Violation:
         """Whose value it is: "joint 2", "tool", or "base and link 5"."""
         return str(self.links) if self.links else self.condition.place(self.joint)
 
+    def explain(self, language: Language = "en", units: Units | None = None) -> str:
+        """Returns it in sentences: the fact, the fault, the remedy. Arguments as of `Report.explain`.
+
+        Raises:
+            InvalidValueError: There is no such language.
+        """
+        from rcilab.conformance.explain import explain_violation
+
+        return explain_violation(self, language, units)
+
     def __repr__(self) -> str:
         return f"<Violation: {self}>"
 
@@ -261,20 +272,22 @@ class Report:
 
         return find_slow_down(self, recommended=recommended, at_most=at_most)
 
-    def explain(self, language: Language = "en") -> str:
+    def explain(self, language: Language = "en", units: Units | None = None, *, slowed: SlowDown | None = None) -> str:
         """Returns in whole sentences what is wrong, where, when and by how much, what it raises and what to do.
 
-        It ends with what `slow_down` finds, and so takes as long.
+        It ends with what `slow_down` finds, and so takes as long, unless that is given.
 
         Args:
             language: "en" is English, "zh" Chinese.
+            units: What angles and lengths are said in; None is SI, with degrees beside.
+            slowed: What `slow_down` has found already.
 
         Raises:
             InvalidValueError: There is no such language.
         """
         from rcilab.conformance.explain import explain_report
 
-        return explain_report(self, language)
+        return explain_report(self, language, units, slowed)
 
     def __str__(self) -> str:
         lines = [self.title, self._verdict()]

@@ -56,6 +56,7 @@ class Playout:
     Attributes:
         lost: Lost cycles of this motion.
         lost_in_row: Lost cycles since the last command.
+        most_in_row: The most that were lost in a row in this motion.
         late: Commands dropped because their cycle had passed.
         dropped: Commands dropped, oldest first, because the queue was full.
         copies: Datagrams dropped because they were the same as the one before.
@@ -91,7 +92,7 @@ class Playout:
         self._surplus = 0
         self.is_playing = False
         self.is_finished = False
-        self.lost = self.lost_in_row = self.late = self.dropped = self.copies = 0
+        self.lost = self.lost_in_row = self.most_in_row = self.late = self.dropped = self.copies = 0
 
     def clear(self) -> None:
         """Drops what is queued; what was counted stays."""
@@ -224,6 +225,7 @@ class Playout:
         self._extrapolated_through = self._last_id
         self.lost += 1
         self.lost_in_row += 1
+        self.most_in_row = max(self.most_in_row, self.lost_in_row)
         self._count(False)
         return playback
 

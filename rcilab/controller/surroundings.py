@@ -160,6 +160,7 @@ class Surroundings:
             button=cycle.safety_stop.name.lower(),
             q=tuple(cycle.state.q.tolist()),
             lost=cycle.playout.lost,
+            lost_in_row=cycle.playout.most_in_row,
             success_rate=cycle.playout.success_rate,
             missed=mishaps.missed,
             misfits=mishaps.misfits,

@@ -7,12 +7,14 @@ from collections.abc import Callable
 from contextlib import suppress
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rcilab.arrays import Array
 from rcilab.client.control_loop import Callback
 from rcilab.client.following import follow
 from rcilab.client.recorder import CycleLog, Recorder
 from rcilab.client.session import RobotSession
+from rcilab.clock import CYCLE_TIME
 from rcilab.closing import Closing
 from rcilab.command import Command
 from rcilab.errors import CommandRejectedError, ControlError, RcilabError, UsageError
@@ -32,6 +34,8 @@ _CAPACITY = 4096  # [cycles] More than any recipe takes.
 _OPEN = SafetyBox(size=(20.0, 20.0, 20.0), T_base_box=IDENTITY, active=False)
 _CALM = 1.0  # [N, N m] A choice: far below any threshold that a recipe sets.
 _CALM_STATES = 500
+_GAP = 5  # [cycles] A choice: so many states may be missing between two that are shown, as on any network.
+_AFTER = 200  # [cycles] How long the controlled stop is watched; a choice: the arm stands still by then.
 _NUDGE = 0.02  # [rad] How far the arm moves to show that it does again; a choice.
 _THERE = 1e-6  # [rad] What counts as standing where a recipe begins.
 _OPENED, _PLACED, _SHOWN = 0.4, 0.5, 0.8
@@ -102,17 +106,19 @@ class Booth(Closing):
                 raise
             fault = error
         else:
-            raise RcilabError(f"{self.model.name}: {recipe.fault.manual_name} did not come")
+            error = RcilabError(f"{self.model.name}: {recipe.fault.manual_name} did not come")
+            raise error.coded("no_fault", fault=recipe.fault.manual_name)
         assert fault.record is not None
-        status = robot.world.status()
-        progress(_SHOWN)
         rows = log.recorder.rows()
         rows = np.concatenate((rows, fault.record[fault.record["message_id"] > rows["message_id"][-1]]))
+        after = _watch_stop(robot, rows[-1], fault.stop)  # First: its states are coming in already.
+        status = robot.world.status()
+        progress(_SHOWN)
         signal = Signals(rows, self.model, scene.limits, scene.box, status.lost).find(recipe.fault)
         if signal is None:
             raise RcilabError(
                 f"{recipe.fault.manual_name}: the record does not show what the controller saw: {status.reason}"
-            )
+            ).coded("no_fault", fault=recipe.fault.manual_name)
         return Exhibit(
             fault=recipe.fault,
             recipe=recipe,
@@ -121,6 +127,7 @@ class Booth(Closing):
             reported=tuple(bit for bit in fault.faults if isinstance(bit, Fault)),
             said=status.reason,
             cycles=rows,
+            after=after,
             signal=signal,
             way_out=tuple(self._leave(robot, recipe)),
         )
@@ -178,6 +185,29 @@ def _is_far_outside(error: CommandRejectedError) -> bool:
     from rcilab.protocols.rci import RecoveryStatus
 
     return error.status == RecoveryStatus.MANUAL_RECOVERY_NEEDED
+
+
+def _watch_stop(robot: RobotSession, last: np.void, stop: NDArray[np.void]) -> NDArray[np.void]:
+    """Returns the cycles after the one with the fault: the controller brings the arm to rest, and it stands there.
+
+    Args:
+        robot: Sends the states behind `stop`.
+        last: The cycle with the fault.
+        stop: What was seen of the stop already.
+    """
+    log = CycleLog(Recorder(robot.model.n, _CAPACITY))
+    begun, t = int(last["message_id"]), float(last["t"])
+    seen = int(stop["message_id"][-1]) - begun if len(stop) else 0
+    while seen < _AFTER:
+        for state in robot.receive_states():
+            since = state.message_id - begun
+            log.write(state, time.monotonic_ns(), t + since * CYCLE_TIME)
+            seen = max(seen, since)
+    rows = np.concatenate((stop, log.recorder.rows()))
+    steps = np.diff(rows["message_id"].astype(np.int64), prepend=begun)
+    missed = np.flatnonzero(steps > _GAP)  # What was missed is not made up: there the record ends.
+    rows = rows[: missed[0]] if missed.size else rows
+    return rows[rows["message_id"] <= begun + _AFTER]
 
 
 def _logged(callback: Callback, log: CycleLog, progress: Tell) -> Callback:

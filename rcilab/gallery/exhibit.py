@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from rcilab.arrays import JointVector, frozen
+from rcilab.arrays import Array, JointVector, frozen
 from rcilab.conformance.condition import Condition
 from rcilab.controller.fault_stop import FAULT_STOP, Offender
 from rcilab.faults import Fault
@@ -44,6 +44,8 @@ class Exhibit:
     """The controller's own words and numbers."""
     cycles: NDArray[np.void]
     """Recorded cycles from the first command on, see `rcilab.cycle_file.cycle_dtype`; the last one shows the fault."""
+    after: NDArray[np.void]
+    """Recorded cycles after the fault, in which the controller brings the arm to rest; nothing is commanded in them."""
     signal: Signal
     """What broke its condition, cycle by cycle."""
     way_out: tuple[Step, ...]
@@ -58,6 +60,11 @@ class Exhibit:
     def time(self) -> float:
         """When it was reported, since the first command, [s]."""
         return float(self.cycles["t"][-1])
+
+    @property
+    def whole(self) -> NDArray[np.void]:
+        """All recorded cycles: up to the fault, and the controlled stop."""
+        return np.concatenate((self.cycles, self.after))
 
     @property
     def q(self) -> JointVector:
@@ -98,15 +105,16 @@ class Exhibit:
     def commanded(self) -> Motion:
         """The joint angles that the arm was told: those sent, the wrong one too; or what the controller made of poses.
 
-        While torques are commanded no angles are: the motion stands at the start.
+        After the fault it is the controller's way to rest. While torques are commanded no angles are: the motion stands
+        at the start.
         """
         from rcilab.motion import Motion
 
-        q = np.array(self.cycles["q_c"])
+        q, sent = self._every_cycle("q_c"), self.cycles["command"][:-1]
         if self.recipe.mode == "torque":
             q[:] = q[0]
-        elif np.isfinite(self.cycles["command"][:-1]).all():
-            q[1:] = self.cycles["command"][:-1]
+        elif np.isfinite(sent).all():
+            q[1 : len(self.cycles)] = sent
         return Motion.from_samples(q)
 
     @property
@@ -116,7 +124,16 @@ class Exhibit:
 
         if FAULT_STOP[self.fault].offender is Offender.COMMAND and self.recipe.mode != "torque":
             return self.commanded
-        return Motion.from_samples(self.cycles["q"])
+        return Motion.from_samples(self._every_cycle("q"))
+
+    def _every_cycle(self, name: str) -> Array:
+        """Returns joint angles of every cycle, shape (N, n), [rad]; between states that were dropped, interpolated."""
+        stop = np.concatenate((self.cycles[-1:], self.after))
+        known: Array = np.array(stop["message_id"], np.float64)
+        wanted: Array = np.arange(float(known[0]) + 1.0, float(known[-1]) + 1.0)
+        angles: Array = np.array(stop[name], np.float64)
+        after: list[Array] = [np.interp(wanted, known, angles[:, joint]) for joint in range(angles.shape[1])]
+        return np.concatenate((self.cycles[name], np.stack(after, axis=1)))
 
     def told(self, what: Literal["sent", "cause", "remedy"], language: Language = "en") -> str:
         """Returns what was done wrong, why the controller minds, or what to do about it, in our own words.

@@ -44,15 +44,17 @@ def arm_angle(upper: float, fore: float, q: Sequence[float]) -> float:
     wz = ez - s2 * fx + c2 * fz
     length = sqrt(wx * wx + wy * wy + wz * wz)
     if length == 0.0:
-        raise SingularError("arm angle: the wrist is on the shoulder, so there is no shoulder-wrist line")
+        error = SingularError("arm angle: the wrist is on the shoulder, so there is no shoulder-wrist line")
+        raise error.coded("no_arm_angle")
     # The elbow in the directions of `reference_frame`, written out: this runs every cycle.
     horizontal = hypot(wx, wy)
     if horizontal < _VERTICAL * length:
-        raise SingularError(_NO_REFERENCE)
+        raise SingularError(_NO_REFERENCE).coded("no_arm_angle")
     cx, cy = wx / horizontal, wy / horizontal
     along, side = (horizontal * ez - wz * (cx * ex + cy * ey)) / length, cy * ex - cx * ey
     if hypot(along, side) < _STRETCHED * (upper + fore):
-        raise SingularError("arm angle: the arm is stretched (q4 = 0), the elbow is on the shoulder-wrist line")
+        error = SingularError("arm angle: the arm is stretched (q4 = 0), the elbow is on the shoulder-wrist line")
+        raise error.coded("stretched")
     return atan2(side, along)
 
 
@@ -85,6 +87,6 @@ def reference_frame(u: Vec) -> tuple[Vec, Vec]:
     """
     horizontal = hypot(u[0], u[1])
     if horizontal < _VERTICAL:
-        raise SingularError(_NO_REFERENCE)
+        raise SingularError(_NO_REFERENCE).coded("no_arm_angle")
     cx, cy = u[0] / horizontal, u[1] / horizontal
     return (-u[2] * cx, -u[2] * cy, horizontal), (cy, -cx, 0.0)

@@ -104,7 +104,7 @@ def _seven(
             "the wrist is straight above or below the shoulder, where the arm angle has no reference; lead the tool "
             "around it, or go there in joint space"
         )
-        tracker.lose(int(vertical.argmax()), SingularError(reason))
+        tracker.lose(int(vertical.argmax()), SingularError(reason).coded("vertical"))
     cx, cy = ux / np.maximum(horizontal, _VERTICAL), uy / np.maximum(horizontal, _VERTICAL)
     cp, sp = aside * np.cos(psi), aside * np.sin(psi)
     # Shoulder to elbow as a direction; from there on sines and cosines of the joints need no angles.
@@ -169,7 +169,7 @@ class _Tracker:
                 reason = SingularError(
                     f"{axes} would have to jump by half a turn, because a singularity is in the way; "
                     "lead the tool around it, or go there in joint space"
-                )
+                ).coded("half_turn")
                 self.lose(int(beside[0]) + 1, reason)
         tilt *= 1.0 - 2.0 * odd
         if known.all():

@@ -108,8 +108,8 @@ def _reason(arm: OffsetGeometry, rotation: Array, position: Array, psi: float) -
     except UnreachableError as error:
         return error
     if not found:
-        return UnreachableError(f"{no_solution(psi)}; give another arm angle")
+        return UnreachableError(f"{no_solution(psi)}; give another arm angle").coded("no_angles")
     return SingularError(
         "the arm would have to jump, because a singularity is in the way; lead the tool around it, give another arm "
         "angle, or go there in joint space"
-    )
+    ).coded("jump")

@@ -90,7 +90,8 @@ class Solutions(Sequence[JointVector]):
         """
         if not self.all:
             where = "" if self.psi is None else f" at arm angle {degrees(self.psi):.1f} deg"
-            return UnreachableError(f"no joint angles put the tool there{where}; give another arm angle")
+            error = UnreachableError(f"no joint angles put the tool there{where}; give another arm angle")
+            return error.coded("no_angles")
         best = min(self.all, key=lambda branch: branch.excess)
         joint = best.joint or 1
         angle, lower, upper = best.q[joint - 1], self._lower[joint - 1], self._upper[joint - 1]
@@ -108,7 +109,10 @@ class Solutions(Sequence[JointVector]):
             f"({degrees(lower):.0f} to {degrees(upper):.0f} deg), {place}; {advice}",
             joint=joint,
             excess=best.excess,
-        )
+        ).coded(
+            "joint_beyond", joint=joint, angle=f"{degrees(angle):.1f}", low=f"{degrees(lower):.0f}",
+            high=f"{degrees(upper):.0f}",
+        )  # fmt: skip
 
     def __repr__(self) -> str:
         rows = "\n".join("  " + " ".join(f"{degrees(angle):8.2f}" for angle in q) for q in self._feasible)

@@ -220,13 +220,13 @@ def _solve(problem: Any) -> Any:
         result = ruckig.Ruckig(problem.degrees_of_freedom).calculate(problem, trajectory)
     except ruckig.RuckigError as error:
         reason = str(error).replace("[ruckig]", "").strip()
-        raise PlanningError(f"no motion: {reason}; choose another start, goal or speed") from error
+        raise PlanningError(f"no motion: {reason}; choose another start, goal or speed").coded("no_motion") from error
     except ValueError as error:  # Its Python binding does not know all of ruckig's results, such as -101.
         reason = "the motion would last longer than the planner can count"
-        raise PlanningError(f"no motion: {reason}; choose a higher speed") from error
+        raise PlanningError(f"no motion: {reason}; choose a higher speed").coded("too_long") from error
     if result not in (Result.Working, Result.Finished):
         reason = _REASONS.get(result, f"the planner answered {result!r}")
-        raise PlanningError(f"no motion: {reason}; choose another start, goal or speed")
+        raise PlanningError(f"no motion: {reason}; choose another start, goal or speed").coded("no_motion")
     return trajectory
 
 

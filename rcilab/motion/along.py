@@ -14,7 +14,7 @@ import numpy as np
 
 from rcilab.arrays import Array, JointPath, JointVector, as_number, sealed
 from rcilab.clock import CYCLE_TIME
-from rcilab.errors import InvalidValueError
+from rcilab.errors import InvalidValueError, PlanningError
 from rcilab.model import RobotModel
 from rcilab.motion.blocks import blocks
 from rcilab.motion.hermite import quintic
@@ -111,7 +111,7 @@ def plan_along(model: RobotModel, q: JointVector, path: Path, speed: float) -> M
         if slowdown.max() > _SLOWEST:
             break
     reason = "the joints would have to jump, because a singularity is close; lead the tool around it"
-    raise refusal(path, worst, reason)
+    raise refusal(path, worst, PlanningError(reason).coded("jump"))
 
 
 def curve_through(model: RobotModel, path: Path, rows: JointPath, law: TimeLaw) -> PiecewisePolynomial:
@@ -165,7 +165,8 @@ def _require_inside(model: RobotModel, path: Path, rows: JointPath, shares: Arra
     if outside.size:
         row, joint = outside[0].tolist()
         angle = math.degrees(rows[row, joint])
-        raise refusal(path, float(shares[row]), f"joint {joint + 1} would touch its limit at {angle:.2f} deg")
+        touched = PlanningError(f"joint {joint + 1} would touch its limit at {angle:.2f} deg")
+        raise refusal(path, float(shares[row]), touched.coded("touches", joint=joint + 1, angle=f"{angle:.2f}"))
 
 
 def _bounds(model: RobotModel, part: float) -> _Bounds:

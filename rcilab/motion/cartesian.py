@@ -221,7 +221,7 @@ def plan_nullspace(
             advice = f"the {other} way round is not free either; model.feasible_arcs tells which arm angles are"
         else:
             advice = f'the {other} way round is free: way="{other}"'
-        raise PlanningError(f"{error}; {advice}", share=error.share) from error
+        raise PlanningError(f"{error}; {advice}", share=error.share).coded(error.code, **error.facts) from error
 
 
 def arm_angles(
@@ -247,7 +247,8 @@ def arm_angles(
     try:
         here = model.arm_angle(q)
     except SingularError as error:
-        raise PlanningError(f"at the start {error}; move to a bent pose in joint space first") from error
+        refused = PlanningError(f"at the start {error}; move to a bent pose in joint space first")
+        raise refused.coded("stretched_start") from error
     wanted = here if psi is None else as_number(psi, "psi", "rad")
     if not abs(wanted) <= math.pi:
         raise InvalidValueError("psi", psi, "must be from -pi to pi [rad]")
@@ -328,5 +329,9 @@ def _require_start(model: RobotModel, start: ArrayLike, law: str) -> JointVector
         raise PlanningError(
             f"joint {i + 1}: start {math.degrees(q[i]):.2f} deg is not strictly between "
             f"{math.degrees(limits.lower[i]):.2f} and {math.degrees(limits.upper[i]):.2f} deg"
-        )
+        ).coded("range", joint=i + 1, **_degrees(angle=q[i], low=limits.lower[i], high=limits.upper[i]))
     return q
+
+
+def _degrees(**angles: float) -> dict[str, str]:
+    return {name: f"{math.degrees(angle):.2f}" for name, angle in angles.items()}

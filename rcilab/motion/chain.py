@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rcilab.arrays import Array
-from rcilab.errors import PlanningError
+from rcilab.errors import PlanningError, RcilabError
 from rcilab.model import RobotModel
 from rcilab.motion.blend import LENGTH, Blend
 from rcilab.motion.hermite import State, derived, evaluate, quintic
@@ -258,12 +258,12 @@ def _lead_tool(model: RobotModel, pieces: list[_Piece], states: tuple[Array, ...
     near = pieces[0].segment.near(float(first_share))
     q, loss = inverse_path(model, T, psi if model.n == 7 else None, near)
     if loss is not None:
-        raise _refusal(owners[loss.row // 3], T[loss.row], str(loss.reason))
+        raise _refusal(owners[loss.row // 3], T[loss.row], loss.reason)
     jumps = np.abs(np.diff(q[1::3], axis=0)).max(axis=1, initial=0.0)
     if jumps.size and jumps.max() > _JUMP:
         place = int(jumps.argmax()) + 1
         reason = "the joints would have to jump, because a singularity is close; lead the tool around it"
-        raise _refusal(owners[place], T[3 * place + 1], reason)
+        raise _refusal(owners[place], T[3 * place + 1], PlanningError(reason).coded("jump"))
     rate, change = np.concatenate(rates)[:, np.newaxis], np.concatenate(changes)[:, np.newaxis]
     rows = slice(row, row + len(owners))
     n = model.n
@@ -290,17 +290,19 @@ def _turns(before: Array, after: Array) -> Array:
     return np.stack((R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]), axis=1) / 2.0
 
 
-def _refusal(piece: _Piece, T: Array, reason: str) -> PlanningError:
+def _refusal(piece: _Piece, T: Array, reason: RcilabError) -> PlanningError:
     x, y, z = T[:3, 3].tolist()
     where = f"with the tool at {x:.3f}, {y:.3f}, {z:.3f} m"
+    facts: dict[str, object] = {"number": piece.segment.number, "kind": piece.segment.waypoint.type, "reason": reason}
+    facts["place"] = ", ".join(f"{1e3 * at:.0f}" for at in (x, y, z))
     if piece.blend is None:
         return PlanningError(
             f"{piece.segment.label}: cannot be followed {where}: {reason}", waypoint=piece.segment.number
-        )
+        ).coded("way", **facts)
     return PlanningError(
         f"{piece.segment.label}: its blend cannot be followed {where}: {reason}, or give it a smaller blend radius",
         waypoint=piece.segment.number,
-    )
+    ).coded("blend", **facts)
 
 
 def derivatives_at_knots(chain: Chain) -> tuple[Array, Array, Array]:

@@ -78,6 +78,11 @@ def plan_chain(chain: Chain, limits: Limits) -> tuple[Array, list[float]]:
     raise PlanningError(
         f"{chain.place(worst)}: the joints would have to jump, because a singularity is close; lead the tool around it",
         waypoint=chain.segment_at(worst).number,
+    ).coded(
+        "waypoint",
+        number=chain.segment_at(worst).number,
+        kind=chain.segment_at(worst).waypoint.type,
+        reason=PlanningError("").coded("jump"),
     )
 
 
@@ -188,9 +193,15 @@ def _require_inside(chain: Chain, q: Array, law: TimeLaw, limits: JointLimits) -
     outside = np.argwhere(~((limits.lower < q) & (q < limits.upper)))
     if outside.size:
         row, joint = outside[0].tolist()
+        segment, angle = chain.segment_at(float(law.s[row])), f"{math.degrees(q[row, joint]):.2f}"
         raise PlanningError(
             f"{chain.place(float(law.s[row]))}: joint {joint + 1} would touch its limit at "
-            f"{math.degrees(q[row, joint]):.2f} deg ({math.degrees(limits.lower[joint]):.0f} to "
+            f"{angle} deg ({math.degrees(limits.lower[joint]):.0f} to "
             f"{math.degrees(limits.upper[joint]):.0f} deg); a smaller blend radius stays closer to the waypoints",
-            waypoint=chain.segment_at(float(law.s[row])).number,
+            waypoint=segment.number,
+        ).coded(
+            "waypoint",
+            number=segment.number,
+            kind=segment.waypoint.type,
+            reason=PlanningError("").coded("touches", joint=joint + 1, angle=angle),
         )

@@ -43,4 +43,4 @@ def require_stoppable(limits: JointLimits, q: JointVector, dq: JointVector, ddq:
             raise PlanningError(
                 f"joint {i + 1}: {name} {x:.4f} {unit} is not inside {bound:.4f} {unit}{angle}; "
                 f"start from a state inside the limits, or brake with plan_stop"
-            )
+            ).coded("jog_start", joint=i + 1)

@@ -117,7 +117,9 @@ def _plan_s_profile(
     if dq.any() or ddq.any():
         raise PlanningError("the S profile starts at rest; use law='jerk_limited' to plan from a moving start")
     if n not in S_PROFILE_VELOCITY:
-        raise PlanningError(f"the S profile is defined for arms of 6 or 7 joints, not {n}; use law='jerk_limited'")
+        raise PlanningError(
+            f"the S profile is defined for arms of 6 or 7 joints, not {n}; use law='jerk_limited'"
+        ).coded("s_profile")
     acceleration = S_PROFILE_ACCELERATION * speed
     curves = synchronize(
         [
@@ -150,10 +152,11 @@ def _require_inside(name: str, q: JointVector, limits: JointLimits) -> None:
     if outside.size:
         i = int(outside[0])
         low, high = float(limits.lower[i]), float(limits.upper[i])
+        facts = {"angle": float(q[i]), "low": low, "high": high}
         raise PlanningError(
             f"joint {i + 1}: {name} {_angle(float(q[i]))} is not strictly between {_angle(low)} and {_angle(high)}; "
             f"choose an angle between them"
-        )
+        ).coded("range", joint=i + 1, **{k: f"{degrees(v):.2f}" for k, v in facts.items()})
 
 
 def _require_possible(limits: JointLimits, dq: JointVector, ddq: JointVector) -> None:

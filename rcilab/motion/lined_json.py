@@ -55,13 +55,17 @@ def read_json(content: bytes, name: str) -> Node:
         InvalidValueError: It is no JSON, or not what this reader takes; the message names the line.
     """
     if len(content) > LONGEST:
-        raise InvalidValueError(name, Words(f"{len(content) / 1e6:.1f} MB"), f"is above {LONGEST / 1e6:g} MB")
+        raise InvalidValueError(name, Words(f"{len(content) / 1e6:.1f} MB"), f"is above {LONGEST / 1e6:g} MB").coded(
+            "file_large", file=name, size=f"{len(content) / 1e6:.1f}", most=f"{LONGEST / 1e6:g}"
+        )
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
         problem = "is no text in UTF-8; save it as JSON"
-        raise InvalidValueError(f"{name}, line {line}", content[error.start : error.end], problem) from error
+        raise InvalidValueError(f"{name}, line {line}", content[error.start : error.end], problem).coded(
+            "file_no_text", file=name, line=line
+        ) from error
     return _Reader(text, name).read()
 
 
@@ -160,4 +164,5 @@ class _Reader:
         word = _WORD.match(self._text, self._at)
         shown = word[0] if word else self._text[self._at : self._at + 20].split("\n")[0]
         found = Words(shown[:60]) if shown else Words("the end of the text")
-        return InvalidValueError(f"{self._name}, line {self._line()}", found, problem)
+        error = InvalidValueError(f"{self._name}, line {self._line()}", found, problem)
+        return error.coded("file_json", file=self._name, line=self._line(), found=str(found))

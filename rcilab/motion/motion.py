@@ -15,6 +15,7 @@ from rcilab.arrays import Array, JointPath, JointVector, as_number, as_path, as_
 from rcilab.clock import CYCLE_TIME
 from rcilab.errors import InvalidValueError
 from rcilab.motion.piecewise import DERIVATIVES, PiecewisePolynomial
+from rcilab.words.text import Remark
 
 Law: TypeAlias = Literal["jerk_limited", "s_profile", "stop", "samples"]
 """How a motion runs along its path: as fast as all limits allow, by the manual's S profile (3.5), as the fastest stop,
@@ -76,7 +77,7 @@ class Motion:
         if starts.ndim != 1 or not starts.size or starts[0] != 0.0 or not (np.diff(starts, append=np.inf) >= 0.0).all():
             raise InvalidValueError("segment_starts", self.segment_starts, "must begin at 0 and never decrease [s]")
         object.__setattr__(self, "segment_starts", starts)
-        object.__setattr__(self, "notes", tuple(str(note) for note in self.notes))
+        object.__setattr__(self, "notes", tuple(note if isinstance(note, Remark) else str(note) for note in self.notes))
 
     @classmethod
     def from_samples(cls, q: ArrayLike) -> Motion:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rcilab.arrays import Array, JointPath, JointVector
-from rcilab.errors import PlanningError, SingularError, UnreachableError
+from rcilab.errors import PlanningError, RcilabError, SingularError, UnreachableError
 from rcilab.model import RobotModel
 from rcilab.motion.inverse_path import inverse_path
 from rcilab.motion.path import Path
@@ -22,7 +22,7 @@ class Obstacle:
     """The first row of a path that the arm cannot follow."""
 
     row: int
-    reason: str
+    reason: RcilabError
     is_singular: bool
     """Rather than out of reach, or at a joint limit."""
 
@@ -50,29 +50,29 @@ def examine(
     first = min(jumps[:1] + outside[:1], default=len(rows))
     # The elbow turns ever faster before the arm is stretched: then reach is the reason.
     if loss is not None and loss.row <= first + _STRETCHING * isinstance(loss.reason, UnreachableError):
-        return rows, Obstacle(loss.row, str(loss.reason), isinstance(loss.reason, SingularError))
+        return rows, Obstacle(loss.row, loss.reason, isinstance(loss.reason, SingularError))
     if first == len(rows):
         return rows, None
     advice = ", or give another arm angle" if model.n == 7 else ""
     if outside[:1] == [first]:
         angles = rows[first]
         i = int(np.maximum(limits.lower - angles, angles - limits.upper).argmax())
-        reason = (
-            f"joint {i + 1} would pass its limit at {math.degrees(angles[i]):.1f} deg "
-            f"({math.degrees(limits.lower[i]):.0f} to {math.degrees(limits.upper[i]):.0f} deg); "
+        angle, low, high = (math.degrees(a) for a in (angles[i], limits.lower[i], limits.upper[i]))
+        passed = PlanningError(
+            f"joint {i + 1} would pass its limit at {angle:.1f} deg ({low:.0f} to {high:.0f} deg); "
             f"start from another branch{advice}"
-        )
-        return rows, Obstacle(first, reason, False)
+        ).coded("path_limit", joint=i + 1, angle=f"{angle:.1f}", low=f"{low:.0f}", high=f"{high:.0f}")
+        return rows, Obstacle(first, passed, False)
     i = int(excess[first - 1].argmax())
     turn = abs(math.degrees(rows[first, i] - rows[first - 1, i]))
-    reason = (
+    jump = PlanningError(
         f"joint {i + 1} would have to jump by {turn:.1f} deg {span}, because a singularity is in the way; lead the "
         f"tool around it, go there in joint space{advice}"
-    )
-    return rows, Obstacle(first, reason, True)
+    ).coded("path_singular", joint=i + 1, turn=f"{turn:.1f}")
+    return rows, Obstacle(first, jump, True)
 
 
-def refusal(path: Path, share: float, reason: str, when: str = "") -> PlanningError:
+def refusal(path: Path, share: float, reason: RcilabError, when: str = "") -> PlanningError:
     """Returns the error that tells where a path cannot be followed, and why.
 
     Args:
@@ -86,4 +86,4 @@ def refusal(path: Path, share: float, reason: str, when: str = "") -> PlanningEr
         f"the {path.name} cannot be followed at {share * path.distance:.3f} of {path.distance:.3f} {path.unit} "
         f"({when}{100.0 * share:.1f} % of the way, tool at {x:.3f}, {y:.3f}, {z:.3f} m): {reason}",
         share=share,
-    )
+    ).coded("path", share=f"{100.0 * share:.1f}", place=", ".join(f"{1e3 * at:.0f}" for at in (x, y, z)), reason=reason)

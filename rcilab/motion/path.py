@@ -228,12 +228,13 @@ def build_circle(
     radius = float(np.linalg.norm(first))
     height = float(first @ normal)
     if radius <= STANDSTILL_DISTANCE:
-        raise PlanningError(f"the centre of the circle is where the tool is, at {_shown(middle)}; move it away")
+        error = PlanningError(f"the centre of the circle is where the tool is, at {_shown(middle)}; move it away")
+        raise error.coded("circle_centre")
     if abs(height) > _OUT_OF_PLANE * radius:
         raise PlanningError(
             f"the tool at {_shown(start.position)} is {1e3 * abs(height):.2f} mm out of the plane of the circle; "
             f"choose the centre at its height along the axis: {_shown(middle + height * normal)}"
-        )
+        ).coded("circle_plane", height=f"{1e3 * abs(height):.2f}")
     first = start.position - (middle + height * normal)
     circle = Circle(_point(middle + height * normal), _point(first), _point(np.cross(normal, first)), angle)
     turned = middle + height * normal + math.cos(angle) * first + math.sin(angle) * np.cross(normal, first)
@@ -285,12 +286,12 @@ def _circle(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> Circle:
         raise PlanningError(
             f"two of the three points of the arc are the same (start {_shown(a)}, via {_shown(b)}, goal {_shown(c)}); "
             "an arc needs three different ones; plan_circle makes a full circle"
-        )
+        ).coded("arc_same")
     if float(np.linalg.norm(normal)) <= _COLLINEAR * chords[1] * chords[2]:
         raise PlanningError(
             f"the three points of the arc lie on a line (start {_shown(a)}, via {_shown(b)}, goal {_shown(c)}); "
             "move via off the line, or go straight with plan_line or move_l"
-        )
+        ).coded("arc_line")
     # The circumcentre seen from a: https://en.wikipedia.org/wiki/Circumcircle, "higher dimensions".
     spread = float(to_b @ to_b) * to_c - float(to_c @ to_c) * to_b
     square = float(normal @ normal)

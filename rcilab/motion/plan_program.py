@@ -24,6 +24,7 @@ from rcilab.motion.piecewise import PiecewisePolynomial
 from rcilab.motion.program import MOST_WAYPOINTS, Program, label
 from rcilab.motion.s_curve import STANDSTILL_DISTANCE
 from rcilab.motion.segment import Segment, build_segments, naming
+from rcilab.words.text import Remark
 
 _SHORTENED = 1e-6
 """How much shorter than asked a radius must be to be mentioned, [m]."""
@@ -157,16 +158,18 @@ def _plan_run(model: RobotModel, run: list[Segment], scale: float, notes: list[s
         for before, blend in zip(run[:-1], blends, strict=True):
             asked = before.waypoint.blend
             if blend.radius < asked - _SHORTENED:
-                notes.append(
+                said = (
                     f"{before.label}: blend radius {1e3 * asked:.1f} mm shortened to {1e3 * blend.radius:.1f} mm: a "
                     "blend takes at most half of the ways before and after it"
                 )
+                radii = {"asked": f"{1e3 * asked:.1f}", "radius": f"{1e3 * blend.radius:.1f}"}
+                notes.append(Remark(said, "blend", number=before.number, **radii))
         coefficients, corners = plan_chain(build_chain(model, run, blends, scale), model.limits)
         breaks = np.arange(len(coefficients) + 1, dtype=np.float64) * CYCLE_TIME
         return _Curve(breaks, coefficients, run[-1].goal, run[-1].waypoint.dwell, tuple(corners))
     if segment.stands:
         return _stand(segment.goal, segment.waypoint.dwell)
-    with naming(segment.label, segment.number):
+    with naming(segment.label, segment.number, segment.waypoint.type):
         if segment.path is None:
             motion = plan_joint(model, segment.start, segment.goal, speed=speed)
         else:

@@ -58,18 +58,20 @@ class PoseBook:
         own = self._own(self._read())
         if name not in own:
             known = ", ".join(own) or "none"
-            raise InvalidValueError("pose", described(name), f"is not stored for {self._model.name}; stored: {known}")
+            raise InvalidValueError(
+                "pose", described(name), f"is not stored for {self._model.name}; stored: {known}"
+            ).coded("pose_unknown", name=name)
         limits = self._model.limits.joint
         try:
             q = as_vector(own[name], self._model.n, f"pose {name!r}", "rad")
         except InvalidValueError as error:
-            raise self._unsound(f"{error}; mend or delete it") from error
+            raise self._unsound(f"{error}; mend or delete it").coded("pose_damaged", name=name) from error
         for joint, (low, angle, high) in enumerate(zip(limits.lower, q, limits.upper, strict=True), start=1):
             if not low <= angle <= high:
                 raise self._unsound(
                     f"pose {name!r} has joint {joint} at {math.degrees(angle):.1f} deg, outside "
                     f"{math.degrees(low):.0f} to {math.degrees(high):.0f} deg; mend or delete it"
-                )
+                ).coded("pose_damaged", name=name)
         return frozen(q)
 
     def store(self, name: str, q: ArrayLike) -> str:
@@ -118,13 +120,14 @@ class PoseBook:
         except FileNotFoundError:
             return {"format": FORMAT, "version": VERSION, "poses": {}}
         except (OSError, UnicodeDecodeError) as error:
-            raise self._unsound(f"cannot be read: {getattr(error, 'strerror', None) or error}") from error
+            reason = getattr(error, "strerror", None) or error
+            raise self._unsound(f"cannot be read: {reason}").coded("unreadable") from error
         try:
             content: Any = json.loads(text)
         except ValueError as error:
-            raise self._unsound(f"is no JSON ({error}); mend it or move it away") from error
+            raise self._unsound(f"is no JSON ({error}); mend it or move it away").coded("poses_no_file") from error
         if not isinstance(content, dict) or cast("dict[str, Any]", content).get("format") != FORMAT:
-            raise self._unsound("is no file of poses; mend it or move it away")
+            raise self._unsound("is no file of poses; mend it or move it away").coded("poses_no_file")
         found = cast("dict[str, Any]", content)
         if found.get("version") != VERSION:
             raise VersionMismatchError(f"{self.file}", found.get("version"), VERSION, "move the file away")
@@ -132,7 +135,7 @@ class PoseBook:
         if not isinstance(poses, dict) or not all(
             isinstance(one, dict) for one in cast("dict[str, Any]", poses).values()
         ):
-            raise self._unsound("is no file of poses; mend it or move it away")
+            raise self._unsound("is no file of poses; mend it or move it away").coded("poses_no_file")
         return found
 
     def _write(self, content: dict[str, Any], own: dict[str, Any]) -> None:
@@ -141,7 +144,7 @@ class PoseBook:
         try:
             write_whole(self.file, json.dumps(content, ensure_ascii=False, indent=1) + "\n")
         except OSError as error:
-            raise self._unsound(f"cannot be written: {error.strerror}") from error
+            raise self._unsound(f"cannot be written: {error.strerror}").coded("unwritable") from error
 
     def _unsound(self, reason: str) -> InvalidValueError:
         return InvalidValueError("file of poses", str(self.file), reason)

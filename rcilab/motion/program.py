@@ -104,7 +104,8 @@ class Waypoint:
     def __post_init__(self) -> None:
         if self.type not in get_args(WaypointType):
             known = ", ".join(get_args(WaypointType))
-            raise InvalidValueError("type", described(self.type), f"is unknown; known: {known}")
+            error = InvalidValueError("type", described(self.type), f"is unknown; known: {known}")
+            raise error.coded("unknown", known=known)
         allowed = (*ALLOWED[self.type], *ALWAYS)
         for name, known in WORDS.items():
             if getattr(self, name) is None and name in allowed:
@@ -116,7 +117,8 @@ class Waypoint:
                     name, described(value), f"has no meaning here; {self.type} takes: {', '.join(allowed)}"
                 )
             if value is None and name in NEEDED[self.type]:
-                raise InvalidValueError(name, None, f"is missing: {self.type} needs {', '.join(NEEDED[self.type])}")
+                missing = InvalidValueError(name, None, f"is missing: {self.type} needs {', '.join(NEEDED[self.type])}")
+                raise missing.coded("missing", type=self.type, names=", ".join(NEEDED[self.type]))
             if name in WORDS:
                 _require_word(name, value)
             elif value is not None and name not in ("q", "angle", "psi"):
@@ -129,7 +131,8 @@ class Waypoint:
             number = as_number(value, name, unit)
             if not lowest <= number <= highest or (name == "angle" and number == 0.0):
                 span = f"{'more than 0' if name == 'angle' else f'{lowest:.5g}'} to {highest:.5g} [{unit}]"
-                raise InvalidValueError(name, number, f"must be from {span}")
+                bad = InvalidValueError(name, number, f"must be from {span}")
+                raise bad.coded("span", low=f"{lowest:.5g}", high=f"{highest:.5g}")
             object.__setattr__(self, name, number)
 
     @classmethod
@@ -260,7 +263,9 @@ class Program:
         object.__setattr__(self, "start", angles_of(self.start, "start", n, robot.name))
         object.__setattr__(self, "waypoints", tuple(self.waypoints))
         if not 1 <= len(self.waypoints) <= MOST_WAYPOINTS:
-            raise InvalidValueError("waypoints", Words(str(len(self.waypoints))), f"must be 1 to {MOST_WAYPOINTS}")
+            raise InvalidValueError(
+                "waypoints", Words(str(len(self.waypoints))), f"must be 1 to {MOST_WAYPOINTS}"
+            ).coded("span", low="1", high=str(MOST_WAYPOINTS))
         for number, waypoint in enumerate(self.waypoints, 1):
             if not isinstance(waypoint, Waypoint):
                 raise InvalidValueError(f"waypoint {number}", described(waypoint), "is none; Waypoint.line makes one")
@@ -356,12 +361,13 @@ def angles_of(value: ArrayLike, name: str, n: int | None = None, robot: str = ""
     """
     size = n or (np.size(value) if np.size(value) in (6, 7) else 7)
     if n is not None and np.shape(value) != (n,):
-        raise InvalidValueError(name, described(value), f"must be {n} joint angles [rad]: {robot} has {n} axes")
+        error = InvalidValueError(name, described(value), f"must be {n} joint angles [rad]: {robot} has {n} axes")
+        raise error.coded("axes", count=n, model=robot)
     angles: Floats = tuple(as_vector(value, size, name, "rad").tolist())
     for joint, angle in enumerate(angles, 1):
         if abs(angle) > MOST:
             problem = f"rad of joint {joint} is more than two turns, {MOST:.4g} rad; degrees times pi / 180 are radians"
-            raise InvalidValueError(name, angle, problem)
+            raise InvalidValueError(name, angle, problem).coded("turns", joint=joint)
     return angles
 
 
@@ -386,10 +392,11 @@ def _vector(name: str, value: ArrayLike) -> Floats:
     if name.endswith("wxyz"):
         if abs(math.hypot(*numbers) - 1.0) > _UNIT:
             problem = f"has length {math.hypot(*numbers):.4g}, must be 1 within {_UNIT:g}: a unit quaternion, w first"
-            raise InvalidValueError(name, numbers, problem)
+            raise InvalidValueError(name, numbers, problem).coded("no_unit")
     elif name == "axis":
         if math.hypot(*numbers) < 1e-12:
             raise InvalidValueError(name, numbers, "has no direction: its length is zero")
     elif max(map(abs, numbers)) > FARTHEST:
-        raise InvalidValueError(name, numbers, f"is beyond {FARTHEST:g} m; millimetres divided by 1000 are metres")
+        error = InvalidValueError(name, numbers, f"is beyond {FARTHEST:g} m; millimetres divided by 1000 are metres")
+        raise error.coded("beyond", most=f"{1e3 * FARTHEST:g}")
     return numbers

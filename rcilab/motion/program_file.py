@@ -20,6 +20,7 @@ VERSION = 1
 SCHEMA = Path(__file__).with_name("program.schema.json")
 """The JSON schema (draft 2020-12) of a program."""
 
+_SHOWN = 40  # Characters of a value that a face repeats.
 _SCALARS = ("angle", "psi", "speed", "blend", "dwell")
 _PROGRAM_KEYS = ("format", "version", "name", "model", "tool", "start", "waypoints")
 
@@ -85,25 +86,33 @@ def read_program(content: bytes, name: str) -> Program:
         if key not in found:
             raise InvalidValueError(
                 f"{name}, {key}", None, f"is missing; a program has {json.dumps(_written(expected))}"
-            )
+            ).coded("file_missing", file=name, key=key)
         value = found[key].value
         if key == "version" and value != expected:
             what = f"{name}, line {found[key].line}, version"
             raise VersionMismatchError(what, value, VERSION, "write it anew with the rcilab that reads it")
         if value != expected:
-            raise InvalidValueError(_at(name, found[key], key), found[key].plain(), f"must be {expected!r}")
+            raise InvalidValueError(_at(name, found[key], key), found[key].plain(), f"must be {expected!r}").coded(
+                "file_no_program", file=name, line=found[key].line
+            )
     for key in ("model", "start", "waypoints"):
         if key not in found:
-            raise InvalidValueError(f"{name}, {key}", None, "is missing; a program has model, start and waypoints")
+            raise InvalidValueError(
+                f"{name}, {key}", None, "is missing; a program has model, start and waypoints"
+            ).coded("file_missing", file=name, key=key)
     texts = {key: _text(name, found[key], key) for key in ("name", "model") if key in found}
     vectors = {key: _vector(name, found[key], key) for key in ("start", "tool") if key in found}
     listed = found["waypoints"]
     if not isinstance(listed.value, list):
-        raise InvalidValueError(_at(name, listed, "waypoints"), listed.plain(), "must be a list [{...}, {...}]")
+        raise InvalidValueError(_at(name, listed, "waypoints"), listed.plain(), "must be a list [{...}, {...}]").coded(
+            "file_kind", file=name, line=listed.line, key="waypoints"
+        )
     try:
         robot = describe_robot(str(texts["model"]))
     except ModelError as error:
-        raise InvalidValueError(_at(name, found["model"], "model"), texts["model"], f"is no robot: {error}") from error
+        raise InvalidValueError(_at(name, found["model"], "model"), texts["model"], f"is no robot: {error}").coded(
+            "file_model", file=name, line=found["model"].line, model=texts["model"]
+        ) from error
     waypoints = tuple(_waypoint(node, number, name, robot) for number, node in enumerate(listed.value, 1))
     try:
         return Program(waypoints=waypoints, **texts, **vectors)  # type: ignore[arg-type]  # Program checks them.
@@ -118,7 +127,7 @@ def _waypoint(node: Node, number: int, name: str, robot: RobotDescription) -> Wa
     if "type" not in found:
         raise InvalidValueError(
             f"{name}, line {node.line}, {kind}, type", None, f"is missing; known: {', '.join(ALLOWED)}"
-        )
+        ).coded("file_missing_of", file=name, line=node.line, number=number, key="type")
     values: dict[str, Any] = {"type": _text(name, found["type"], f"{kind}, type")}
     for key, value in found.items():
         if key == "type" or (value.value is None and key not in ALWAYS):
@@ -131,40 +140,60 @@ def _waypoint(node: Node, number: int, name: str, robot: RobotDescription) -> Wa
         require_fit(waypoint, len(robot.home), robot.name)
         return waypoint
     except InvalidValueError as error:
-        raise _placed(error, name, found.get(error.name, node), f"waypoint {number} ({values['type']}), ") from error
+        raise _placed(
+            error, name, found.get(error.name, node), f"waypoint {number} ({values['type']}), ", number
+        ) from error
 
 
-def _placed(error: InvalidValueError, name: str, node: Node, prefix: str = "") -> InvalidValueError:
+def _placed(error: InvalidValueError, name: str, node: Node, prefix: str = "", number: int = 0) -> InvalidValueError:
     value = Words("nothing") if error.value is None else error.value
-    return InvalidValueError(f"{name}, line {node.line}, {prefix}{error.name}", value, error.requirement)
+    placed = InvalidValueError(f"{name}, line {node.line}, {prefix}{error.name}", value, error.requirement)
+    reason = error if error.code else error.requirement
+    facts: dict[str, object] = {"file": name, "line": node.line, "key": error.name, "value": _shown(value)}
+    if number:
+        return placed.coded("file_waypoint", number=number, reason=reason, **facts)
+    return placed.coded("file_value", reason=reason, **facts)
+
+
+def _shown(value: object) -> str:
+    text = str(value)
+    return text if len(text) <= _SHOWN else text[: _SHOWN - 1] + "…"
 
 
 def _object(node: Node, name: str, kind: str, keys: tuple[str, ...]) -> dict[str, Node]:
     if not isinstance(node.value, dict):
-        raise InvalidValueError(f"{name}, line {node.line}", node.plain(), f"must be {kind}: an object {{...}}")
+        raise InvalidValueError(f"{name}, line {node.line}", node.plain(), f"must be {kind}: an object {{...}}").coded(
+            "file_no_program", file=name, line=node.line
+        )
     for key, value in node.value.items():
         if key not in keys:
             raise InvalidValueError(
                 f"{name}, line {value.line}, {kind}, {key}", value.plain(), f"is unknown; known: {', '.join(keys)}"
-            )
+            ).coded("file_unknown", file=name, line=value.line, key=key)
     return node.value
 
 
 def _text(name: str, node: Node, key: str) -> str:
     if not isinstance(node.value, str):
-        raise InvalidValueError(_at(name, node, key), node.plain(), "must be text in double quotes")
+        raise InvalidValueError(_at(name, node, key), node.plain(), "must be text in double quotes").coded(
+            "file_kind", file=name, line=node.line, key=key
+        )
     return node.value
 
 
 def _number(name: str, node: Node, key: str) -> float:
     if not isinstance(node.value, float):
-        raise InvalidValueError(_at(name, node, key), node.plain(), "must be a number")
+        raise InvalidValueError(_at(name, node, key), node.plain(), "must be a number").coded(
+            "file_kind", file=name, line=node.line, key=key
+        )
     return node.value
 
 
 def _vector(name: str, node: Node, key: str) -> tuple[float, ...]:
     if not isinstance(node.value, list):
-        raise InvalidValueError(_at(name, node, key), node.plain(), "must be a list of numbers [...]")
+        raise InvalidValueError(_at(name, node, key), node.plain(), "must be a list of numbers [...]").coded(
+            "file_kind", file=name, line=node.line, key=key
+        )
     return tuple(_number(name, item, f"{key}, number {i}") for i, item in enumerate(node.value, 1))
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rcilab.arrays import Array, JointPath, JointVector
-from rcilab.errors import InvalidValueError, KinematicsError, PlanningError
+from rcilab.errors import InvalidValueError, KinematicsError, PlanningError, RcilabError
 from rcilab.model import RobotModel
 from rcilab.motion.along import require_path
 from rcilab.motion.cartesian import arm_angles
@@ -92,10 +92,10 @@ def build_segments(
     try:
         _require_inside(model, q)
     except PlanningError as error:
-        raise PlanningError(f"the start: {error}") from error
+        raise PlanningError(f"the start: {error}").coded("program_start", reason=error) from error
     segments: list[Segment] = []
     for number, waypoint in enumerate(program.waypoints, 1):
-        with naming(label(number, waypoint), number):
+        with naming(label(number, waypoint), number, waypoint.type):
             segments.append(_segment(model, q, number, waypoint))
         q = segments[-1].goal
         progress(number / len(program.waypoints))
@@ -103,16 +103,24 @@ def build_segments(
 
 
 @contextmanager
-def naming(what: str, number: int | None = None) -> Iterator[None]:
+def naming(what: str, number: int | None = None, kind: str = "") -> Iterator[None]:
     """Puts the name of a waypoint in front of whatever goes wrong, and notes its number."""
     try:
         yield
     except InvalidValueError as error:
         raise InvalidValueError(f"{what}, {error.name}", error.value, error.requirement) from error
     except PlanningError as error:
-        raise PlanningError(f"{what}: {error}", share=error.share, waypoint=number) from error
+        raise _named(
+            PlanningError(f"{what}: {error}", share=error.share, waypoint=number), number, kind, error
+        ) from error
     except KinematicsError as error:
-        raise PlanningError(f"{what}: {error}", waypoint=number) from error
+        raise _named(PlanningError(f"{what}: {error}", waypoint=number), number, kind, error) from error
+
+
+def _named(error: PlanningError, number: int | None, kind: str, reason: RcilabError) -> PlanningError:
+    if number is None:
+        return error.coded("way_to_start", reason=reason)
+    return error.coded("waypoint", number=number, kind=kind, reason=reason)
 
 
 def _positions(path: Path, shares: Array) -> Array:
@@ -141,7 +149,7 @@ def _segment(model: RobotModel, q: JointVector, number: int, waypoint: Waypoint)
             f"the {waypoint.type} ends with joint {joint + 1} at {math.degrees(goal[joint]):.2f} deg and not at "
             f"{math.degrees(waypoint.q[joint]):.2f} deg: q is on another branch; go there with a joint move",
             share=1.0,
-        )
+        ).coded("other_branch", joint=joint + 1)
     return Segment(number=number, waypoint=waypoint, start=q, goal=goal, path=path, knots=knots)
 
 
@@ -190,4 +198,10 @@ def _require_inside(model: RobotModel, q: JointVector) -> None:
         raise PlanningError(
             f"joint {i + 1} at {math.degrees(q[i]):.2f} deg is not strictly between "
             f"{math.degrees(limits.lower[i]):.2f} and {math.degrees(limits.upper[i]):.2f} deg; choose one between them"
+        ).coded(
+            "range",
+            joint=i + 1,
+            angle=f"{math.degrees(q[i]):.2f}",
+            low=f"{math.degrees(limits.lower[i]):.2f}",
+            high=f"{math.degrees(limits.upper[i]):.2f}",
         )

@@ -24,6 +24,7 @@ from rcilab.motion.motion import Motion, require_motion
 from rcilab.posing.planning import Plan, PlannableLaw, make_plan, picture
 from rcilab.posing.reach import Reach, judge_joints, judge_pose
 from rcilab.spatial import Pose
+from rcilab.words.errors import tell
 from rcilab.words.text import Message, message
 
 if TYPE_CHECKING:
@@ -204,7 +205,7 @@ class LabState:
             motion = plan_line(self.model, self.here, self.model.forward(self.goal), speed=self.speed)
             return picture(self.model, motion, check(motion, self.model, start=self.here, distance=None))
         except RcilabError as error:
-            return message("plan.failed", error=str(error))
+            return message("plan.failed", error=tell(error))
 
 
 _of_session: weakref.WeakValueDictionary[int, LabState] = weakref.WeakValueDictionary()

@@ -15,6 +15,7 @@ from rcilab.model import RobotModel
 from rcilab.safety_box import SafetyBox, active_box
 from rcilab.spatial import Pose
 from rcilab.state import Mode
+from rcilab.words.errors import tell
 from rcilab.words.text import Message, message
 
 if TYPE_CHECKING:
@@ -117,7 +118,7 @@ def make_plan(
         motion = _go(model, start, goal, speed, law, kind, via)
         report = check(motion, model, start=start, box=box, distance=None)
     except RcilabError as error:
-        return message("plan.failed", error=str(error))
+        return message("plan.failed", error=tell(error))
     away = int(np.abs(motion.goal - goal).argmax())
     note = None
     if abs(float(motion.goal[away] - goal[away])) > SAME_WAY:

@@ -81,8 +81,12 @@ class LiveRecording:
         first = cycles[:_DELAY_WINDOW]
         return find_delay(first["q_c"], first["command"])
 
-    def finish(self, stopped: str | None = None) -> Run | None:
+    def finish(self, stopped: str | None = None, plan: Motion | None = None) -> Run | None:
         """Ends the recording and returns the run; None, and no file, when not one cycle came.
+
+        Args:
+            stopped: Why the motion did not reach its end; None: it did.
+            plan: What was asked of the arm in the end, where that is not what was planned: another pace.
 
         Raises:
             InvalidValueError: The end of the file cannot be written; all that came before is in it.
@@ -94,9 +98,9 @@ class LiveRecording:
                 file.discard()
             return None
         if file is not None:
-            file.close(stopped=stopped)
+            file.close(stopped=stopped, plan=plan)
         facts = self.facts
-        return build_run(cycles, plan=facts.plan, stopped=stopped, model=facts.model, setup=facts.setup)
+        return build_run(cycles, plan=plan or facts.plan, stopped=stopped, model=facts.model, setup=facts.setup)
 
     def _make_room(self, rows: NDArray[np.void]) -> None:
         needed = self._count + len(rows)

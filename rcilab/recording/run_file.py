@@ -6,7 +6,8 @@ The file is a row of blocks (`blocks.py`), in this order:
             "fields": [[name, type as numpy spells it, shape], ...] of one cycle, "bytes": its size,
             "realtime": whether timing means something, "setup": where and how (`Setup`),
             "report": the verdict on the plan, one object a condition, or null}
-    PLAN    the planned motion as `Motion.save` writes it; missing for a callback
+    PLAN    the planned motion as `Motion.save` writes it; missing for a callback. A motion whose pace was changed has
+            another one behind its cycles, as it was asked of the arm in the end; the last one counts
     CYCL    u32 number of cycles, then zlib of their bytes, transposed: the first byte of every cycle, then the second
             byte of every cycle, and so on (neighbours are then alike and take a quarter of the room). Any number of
             these
@@ -88,9 +89,7 @@ class RunWriter:
         }
         stream.write(encode_header() + encode_block("HEAD", json.dumps(head).encode()))
         if plan is not None:
-            buffer = BytesIO()
-            plan.save(buffer)
-            stream.write(encode_block("PLAN", buffer.getvalue()))
+            self._write_plan(plan)
         stream.flush()
 
     def add(self, cycles: NDArray[np.void]) -> None:
@@ -101,13 +100,26 @@ class RunWriter:
             self._waiting = self._waiting[BLOCK_CYCLES:]
         self._stream.flush()
 
-    def finish(self, *, stopped: str | None = None, truncated: bool = False) -> None:
-        """Writes what is left, and that the run ended properly."""
+    def finish(self, *, stopped: str | None = None, truncated: bool = False, plan: Motion | None = None) -> None:
+        """Writes what is left, and that the run ended properly.
+
+        Args:
+            stopped: Why it ended early; None: it did not.
+            truncated: Whether the beginning is missing.
+            plan: What was asked of the arm in the end, where that is not what was planned.
+        """
         if len(self._waiting):
             self._write(self._waiting)
             self._waiting = self._waiting[:0]
+        if plan is not None:
+            self._write_plan(plan)
         self._stream.write(encode_block("TAIL", json.dumps({"stopped": stopped, "truncated": truncated}).encode()))
         self._stream.flush()
+
+    def _write_plan(self, plan: Motion) -> None:
+        buffer = BytesIO()
+        plan.save(buffer)
+        self._stream.write(encode_block("PLAN", buffer.getvalue()))
 
     def _write(self, cycles: NDArray[np.void]) -> None:
         planes = np.frombuffer(cycles.tobytes(), np.uint8).reshape(len(cycles), self._dtype.itemsize).T
@@ -142,11 +154,11 @@ class RunFile:
         except OSError as error:
             raise _unwritable(self.path, error) from error
 
-    def close(self, *, stopped: str | None = None, truncated: bool = False) -> None:
-        """Writes the end and closes the file."""
+    def close(self, *, stopped: str | None = None, truncated: bool = False, plan: Motion | None = None) -> None:
+        """Writes the end and closes the file; arguments as of `RunWriter.finish`."""
         try:
             with self._stream:
-                self._writer.finish(stopped=stopped, truncated=truncated)
+                self._writer.finish(stopped=stopped, truncated=truncated, plan=plan)
                 os.fsync(self._stream.fileno())
         except OSError as error:
             raise _unwritable(self.path, error) from error
@@ -243,7 +255,7 @@ def _build(blocks: tuple[Block, ...]) -> Run:
     if not isinstance(stopped, str | None):
         raise TypeError("why it was stopped is no text")
     return Run(
-        plan=Motion.load(BytesIO(plans[0])) if plans else None,
+        plan=Motion.load(BytesIO(plans[-1])) if plans else None,
         cycles=cycles,
         stopped=stopped,
         truncated=tail.get("truncated", False),
@@ -287,4 +299,4 @@ def _fields(dtype: np.dtype[np.void]) -> list[tuple[str, Any]]:
 
 
 def _unwritable(path: Path, error: OSError) -> InvalidValueError:
-    return InvalidValueError("run file", str(path), f"cannot be written: {error.strerror}")
+    return InvalidValueError("run file", str(path), f"cannot be written: {error.strerror}").coded("unwritable")

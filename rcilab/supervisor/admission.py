@@ -56,7 +56,7 @@ def require_admissible(
     if len(motion.q) > MOTION_ROWS:
         raise UsageError(
             f"the motion takes {motion.duration:.1f} s, {MOTION_TIME:g} s at most can be handed over; split it"
-        )
+        ).coded("long_motion", duration=f"{motion.duration:.1f}", most=f"{MOTION_TIME:g}")
 
 
 def require_ready(status: SupervisorStatus, *, is_operator_overdue: bool) -> JointVector:
@@ -70,11 +70,11 @@ def require_ready(status: SupervisorStatus, *, is_operator_overdue: bool) -> Joi
         UsageError: The arm is moving, no controller is connected, or nobody is at the controls.
     """
     if status.phase in ("moving", "stopping"):
-        raise UsageError("the arm is moving; stop it first, or wait until it has arrived")
+        raise UsageError("the arm is moving; stop it first, or wait until it has arrived").coded("moving")
     if status.q_c is None or status.phase not in ("idle", "fault"):
-        raise UsageError(f"nothing can move now: {status.message}")
+        raise UsageError(f"nothing can move now: {status.message}").coded("not_ready")
     if is_operator_overdue:
         raise UsageError(
             f"nobody is at the controls: the page that holds them has not been heard of for {OPERATOR_TIMEOUT:g} s"
-        )
+        ).coded("nobody", seconds=f"{OPERATOR_TIMEOUT:g}")
     return status.q_c

@@ -146,12 +146,14 @@ class ArmRequests:
                     )  # fmt: skip
                     self._pace.follow(ticket, changed, handed)
                     return ticket
-        raise UsageError("this machine is too busy to change the pace of the motion in time; it goes on as it is")
+        raise UsageError(
+            "this machine is too busy to change the pace of the motion in time; it goes on as it is"
+        ).coded("too_busy")
 
     def _require_cycle(self) -> int:
         cycle = self._motion_cycle()
         if cycle is None:
-            raise UsageError("no motion runs whose pace could change")
+            raise UsageError("no motion runs whose pace could change").coded("no_pace")
         return cycle
 
     def jog(self, kind: JogKind, values: ArrayLike, *, goes_on: Ticket | None = None) -> Ticket:
@@ -180,7 +182,7 @@ class ArmRequests:
             block = self._require_block()
             is_under_way = self._jogging is not None and not self._jogging.done
             if goes_on is not None and goes_on.done:
-                raise UsageError("this jog has ended; begin another one")
+                raise UsageError("this jog has ended; begin another one").coded("jog_ended")
             if not is_under_way:
                 self._setup.require_given()
                 require_ready(self.status(), is_operator_overdue=self._is_operator_overdue())

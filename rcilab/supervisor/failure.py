@@ -13,6 +13,8 @@ def pack_failure(error: Exception) -> dict[str, Any]:
     """Returns an error as a letter."""
     kind = next((kind.__name__ for kind in type(error).__mro__ if hasattr(errors, kind.__name__)), "RcilabError")
     failure: dict[str, Any] = {"kind": kind, "message": str(error)}
+    if isinstance(error, RcilabError) and error.code:
+        failure |= {"code": error.code, "facts": {name: _pack_fact(fact) for name, fact in error.facts.items()}}
     if not isinstance(error, RcilabError):
         failure["message"] = f"the control process failed with {type(error).__name__}: {error}; this is a defect"
     if isinstance(error, ControlError):
@@ -27,7 +29,14 @@ def unpack_failure(failure: dict[str, Any]) -> RcilabError:
         kind = RcilabError
     error: RcilabError = kind.__new__(kind)  # Its constructor would build a sentence from facts; here is the sentence.
     error.args = (str(failure.get("message")),)
+    if "code" in failure:
+        facts = {name: unpack_failure(f) if isinstance(f, dict) else f for name, f in failure["facts"].items()}
+        error.coded(str(failure["code"]), **facts)
     if isinstance(error, ControlError):
         error.faults = tuple(Fault(number) for number in failure.get("faults", ()))
         error.record = None
     return error
+
+
+def _pack_fact(fact: object) -> object:
+    return pack_failure(fact) if isinstance(fact, RcilabError) else fact if isinstance(fact, int) else str(fact)

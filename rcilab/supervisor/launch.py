@@ -58,7 +58,7 @@ class Child:
             )
         except OSError as error:
             self._stderr.close()
-            raise ConnectionLostError(f"{name} could not be started: {error}") from error
+            raise ConnectionLostError(f"{name} could not be started: {error}").coded("no_process") from error
 
     @property
     def pid(self) -> int:
@@ -163,12 +163,14 @@ class VirtualController(Child):
                     return self._address
             if not is_alive:
                 words = self.last_words or "it said nothing"
-                raise ConnectionLostError(f"{self.name} did not start ({self.how_it_ended}): {words}")
+                raise ConnectionLostError(f"{self.name} did not start ({self.how_it_ended}): {words}").coded(
+                    "no_process"
+                )
             if time.monotonic() - self._started > START_TIMEOUT:
                 raise ConnectionLostError(
                     f"{self.name} was not ready after {START_TIMEOUT:g} s: {self.last_words or 'it said nothing'}; "
                     "try again when the machine is less busy"
-                )
+                ).coded("slow_start", seconds=f"{START_TIMEOUT:g}")
         return self._address
 
     @property

@@ -46,7 +46,7 @@ class Mailbox:
         if posted - self._words[self._taken] >= MAIL_SLOTS:
             raise UsageError(
                 f"{MAIL_SLOTS} requests are waiting already; the control process does not keep up, restart it"
-            )
+            ).coded("too_many")
         start = posted % MAIL_SLOTS * MAIL_SIZE
         self._slots[start + _LENGTH.size : start + _LENGTH.size + len(text)] = text
         _LENGTH.pack_into(self._slots, start, len(text))

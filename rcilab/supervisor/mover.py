@@ -72,7 +72,7 @@ class Mover:
         if link.latest is not None:
             mismatch = describe_start_mismatch(rows[0], link.latest.q_c)
             if mismatch is not None:
-                raise UsageError(mismatch)
+                raise UsageError(mismatch).coded("elsewhere")
             model.rigid_body.motion_torque(link.latest.q, link.latest.dq, link.latest.dq)  # Loads it now.
         self._publisher.begin_motion(request["duration"])
         self._publisher.say("moving", "moving")

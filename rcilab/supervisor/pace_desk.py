@@ -75,7 +75,7 @@ class PaceDesk:
         with self._planning:
             self._await_answer()
             if self.paced is None or self._model is None:
-                raise UsageError("no motion runs whose pace could change")
+                raise UsageError("no motion runs whose pace could change").coded("no_pace")
             return plan_pace(self.paced, cycle + lead, pace, self._model, self.mode)
 
     def hand_over(self, changed: PacedMotion, cycle: int) -> HandedOver | None:
@@ -95,7 +95,7 @@ class PaceDesk:
             raise PlanningError(
                 f"at this pace the motion would last {changed.duration:.0f} s; {MOTION_TIME:g} s at most can be handed "
                 "over, less what is being streamed; choose a faster one"
-            )
+            ).coded("pace_long", duration=f"{changed.duration:.0f}", most=f"{MOTION_TIME:g}")
         self._block.motion[place : place + len(tail)] = tail
         return HandedOver(first, place, len(tail))
 
@@ -112,7 +112,9 @@ class PaceDesk:
         with suppress(RcilabError):
             ticket.wait(_ANSWER)
         if not ticket.done:
-            raise UsageError("the last change of pace is still being handed over; ask again in a moment")
+            raise UsageError("the last change of pace is still being handed over; ask again in a moment").coded(
+                "pace_again"
+            )
         self._before = None
         if ticket.error is not None:
             self.paced, self._in_use = paced, in_use

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from rcilab.client.setup import RobotSetup
-from rcilab.errors import UsageError
+from rcilab.errors import RcilabError, UsageError
 from rcilab.spatial import IDENTITY
 from rcilab.supervisor.setup_letter import pack_setup
 
@@ -29,7 +29,7 @@ class SetupDesk:
         self.times = 0
         """At how many connections it has taken a set-up."""
         self._waiting: list[tuple[Ticket, RobotSetup, bool]] = []
-        self._refusal: str | None = None
+        self._refusal: RcilabError | None = None
 
     def letter(self) -> dict[str, Any]:
         """Returns what a letter that connects says of the set-up."""
@@ -54,7 +54,7 @@ class SetupDesk:
             if is_new_connection:
                 self.acknowledged = RobotSetup()
             if ticket.error is not None:
-                self._refusal = str(ticket.error)
+                self._refusal = ticket.error
                 # It may have taken some of it: what it has of these parts now, nobody knows.
                 self.acknowledged = self.acknowledged.without(setup.parts)
                 continue
@@ -70,9 +70,13 @@ class SetupDesk:
         """
         self.look()
         if self._waiting:
-            raise UsageError("the controller is being told its set-up; wait for the ticket of set_up()")
+            raise UsageError("the controller is being told its set-up; wait for the ticket of set_up()").coded(
+                "telling_setup"
+            )
         if self._refusal is not None and self.wanted.parts:
-            raise UsageError(f"the controller did not take its set-up ({self._refusal}); call set_up() again")
+            raise UsageError(f"the controller did not take its set-up ({self._refusal}); call set_up() again").coded(
+                "setup_refused", reason=self._refusal
+            )
 
 
 def standard_setup(model: RobotModel, *, is_virtual: bool) -> RobotSetup:

@@ -180,7 +180,9 @@ class Supervisor(ArmRequests, Closing):
             self._require_block()
             address = self._keeper.address
             if address is None:
-                raise UsageError("there is no controller to connect to; restart() starts the virtual one again")
+                raise UsageError("there is no controller to connect to; restart() starts the virtual one again").coded(
+                    "not_connected"
+                )
             letter = self._setup.letter()
             ticket = self._ask("reconnect", kind="connect", address=address, timeout=ANSWER_TIMEOUT, setup=letter)
             self._setup.follow(ticket, self._setup.wanted, is_new_connection=True)
@@ -225,7 +227,9 @@ class Supervisor(ArmRequests, Closing):
         with self._lock:
             self._require_block()
             if self._keeper.worker_pid is None:
-                raise UsageError(f"the control process is not running; restart() starts it again (asked: {what})")
+                raise UsageError(
+                    f"the control process is not running; restart() starts it again (asked: {what})"
+                ).coded("not_connected")
             return self._desk.send(what, letter)
 
     def _open(self) -> None:
@@ -250,7 +254,7 @@ class Supervisor(ArmRequests, Closing):
             if time.monotonic() > deadline:
                 raise ConnectionLostError(
                     f"not ready after {timeout:g} s ({status.message}); try again when the machine is less busy"
-                )
+                ).coded("slow_start", seconds=f"{timeout:g}")
             time.sleep(_TICK / 2)
         if status.phase == "crashed":
             raise ConnectionLostError(status.message)
@@ -334,5 +338,5 @@ class Supervisor(ArmRequests, Closing):
 
     def _require_block(self) -> ControlBlock:
         if self._block is None:
-            raise UsageError("the supervisor is not running: start() it first")
+            raise UsageError("the supervisor is not running: start() it first").coded("not_connected")
         return self._block

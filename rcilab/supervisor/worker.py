@@ -245,7 +245,7 @@ class Worker:
         self._mover.jog(link, self._commands, self._model)
 
     def _do_pace(self, request: Letter) -> None:
-        raise UsageError("no motion runs whose pace could change")
+        raise UsageError("no motion runs whose pace could change").coded("no_pace")
 
     def _learn_power(self) -> None:
         self._publisher.update(powered=self._commands.motor_state())
@@ -262,7 +262,7 @@ class Worker:
 
     def _require_link(self) -> Link:
         if self._link is None:
-            raise UsageError("no controller is connected; reconnect first")
+            raise UsageError("no controller is connected; reconnect first").coded("not_connected")
         return self._link
 
     def _disconnect(self) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -56,6 +56,19 @@ class Frame:
     """The plot reaches from -bound to bound; a curve far beyond its limit leaves it, so that the limit stays seen."""
     end: float
     """Where the time axis ends, [s]: a round number, so that the axis stands still while a plan is dragged."""
+
+
+def mark_moment(frame: Frame, moment: float) -> Frame:
+    """Returns a frame with an instant marked as a violation is, whatever the curves do there.
+
+    Args:
+        frame: What to mark.
+        moment: When, [s].
+    """
+    here = int(np.abs(frame.t - moment).argmin())
+    marked = frame.violated.copy()
+    marked[max(here - _WIDENED, 0) : here + _WIDENED + 1] = True
+    return replace(frame, violated=marked)
 
 
 def decimate(curves: Curves, edges: Array) -> Array:

@@ -6,11 +6,54 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from types import MappingProxyType
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from rcilab.language import Language, load_words, require_language
 
+if TYPE_CHECKING:
+    from rcilab.words.units import Units
+
 SHARED = "rcilab.words"
 """Whose catalogue every face has."""
+
+
+@runtime_checkable
+class Explains(Protocol):
+    """What can be among the values of a message and has words of its own: a violation, an exhibit's line."""
+
+    def explain(self, language: Language, units: Units | None = None) -> str:
+        """Returns itself in words."""
+        ...
+
+
+@dataclass(frozen=True)
+class Finished:
+    """A sentence that came finished: it stays in its language, and its numbers are said in the units of the face."""
+
+    sentence: str
+    """Angles and lengths in it with their units, in SI or not."""
+
+    def explain(self, language: Language, units: Units | None = None) -> str:
+        """Returns the sentence."""
+        return self.sentence if units is None else units.restate(self.sentence)
+
+
+class Remark(str):
+    """An English sentence that faces can also say in their own words.
+
+    Args:
+        sentence: In English.
+        code: Names what it says; its words are `remark.CODE` of the catalogues.
+        facts: What fills them: numbers as text, angles in degrees and lengths in millimetres.
+    """
+
+    code: str
+    facts: Mapping[str, object]
+
+    def __new__(cls, sentence: str, code: str = "", **facts: object) -> Remark:  # noqa: D102  # The class says it.
+        remark = super().__new__(cls, sentence)
+        remark.code, remark.facts = code, facts
+        return remark
 
 
 @dataclass(frozen=True)
@@ -53,9 +96,16 @@ class Text:
         return code in self._entries
 
     def say(self, said: Message) -> str:
-        """Returns a message in this language; messages among its values are translated first."""
-        values = {k: self.say(v) if isinstance(v, Message) else v for k, v in said.values.items()}
-        return self(said.code, **values)
+        """Returns a message in this language; what has words of its own among its values is translated first."""
+        return self(said.code, **{name: self._put(value) for name, value in said.values.items()})
+
+    def _put(self, value: object) -> object:
+        if isinstance(value, Message):
+            return self.say(value)
+        return self._explain(value) if isinstance(value, Explains) else value
+
+    def _explain(self, said: Explains) -> str:
+        return said.explain(self.language)
 
 
 @lru_cache

@@ -169,7 +169,7 @@ class Conductor:
     def act(self, request: requests.Request) -> None:
         """Carries out one request; what goes wrong becomes a sentence on the page."""
         lease = self._store.state.lease
-        if not isinstance(request, requests.Harmless) and not lease.allows(request.page) and not _is_stop(request):
+        if not requests.is_harmless(request) and not lease.allows(request.page) and not _is_stop(request):
             code = "lease.free" if lease.holder is None else "notice.watching"
             self._store.say("warn", message(code, page=lease.number(lease.holder)))
             return

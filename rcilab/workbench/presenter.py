@@ -84,6 +84,7 @@ class Presenter:
         self._text = Text(store.state.language, store.state.units)
         self._panels: list[Panel] = []
         self._containers: list[Any] = []
+        self._window: Any = None  # Of the timeline.
         self._built: tuple[object, ...] | None = None
         self._theme = ""
         self._ending = threading.Event()
@@ -135,16 +136,17 @@ class Presenter:
                     panel.build(gui, state)
                     self._panels.append(panel)
         self._timeline = TimelinePanel(self._text, self._ask)
-        window = gui.add_panel()
-        with window.add_tab(self._text("panel.timeline"), "timeline"):
-            self._timeline.build(gui, state)
-        self._panels.append(self._timeline)
-        window.dock_left()
-        window.set_width(_TIMELINE_WIDTH)
-        if not self._containers:
+        if self._window is None:  # It stays: a new one would lose its width, and where somebody has put it.
+            self._window = gui.add_panel()
+            self._window.dock_left()
+            self._window.set_width(_TIMELINE_WIDTH)
             gui.main_panel.dock_right()
             gui.main_panel.set_width(_MAIN_WIDTH)
-        self._containers = [tabs, window]
+        timeline = self._window.add_tab(self._text("panel.timeline"), "timeline")
+        with timeline:
+            self._timeline.build(gui, state)
+        self._panels.append(self._timeline)
+        self._containers = [tabs, timeline]
 
     def _run(self) -> None:
         deadline = time.monotonic()

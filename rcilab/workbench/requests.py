@@ -458,3 +458,12 @@ Harmless: TypeAlias = (
     | Peek | Export | CancelExport
 )  # fmt: skip
 """What a watching page may ask for as well: nothing of it moves a goal or a robot."""
+
+
+def is_harmless(request: Request) -> bool:
+    """Returns whether a watching page may ask for this as well.
+
+    To look at the moment of a row, or of a fault on show, is like seeking: timeline and scene are one for all pages.
+    """
+    looks = {Check: ("row",), Learn: ("moment",)}.get(type(request), ())
+    return isinstance(request, Harmless) or getattr(request, "what", None) in looks

@@ -16,6 +16,8 @@ from rcilab.errors import (
     UsageError,
 )
 from rcilab.faults import Fault
+from rcilab.words.errors import tell
+from rcilab.words.text import Finished
 from rcilab.workbench.text import Message, message
 
 if TYPE_CHECKING:
@@ -24,6 +26,10 @@ if TYPE_CHECKING:
     from rcilab.supervisor import SupervisorStatus
 
 _CRASHES = ("crashed.controller", "crashed.worker", "crashed.frozen")
+_PHASES = {
+    **{code: f"phase.{code}" for code in _CRASHES}, "moving.held": "phase.held", "moving.guided": "phase.guided",
+}  # fmt: skip
+"""States that are worth a word of their own beside that of their phase."""
 _LOST = ("lost.silent", "lost.unreachable", "lost.other_arm")
 
 
@@ -49,7 +55,7 @@ def tell_error(error: RcilabError, status: SupervisorStatus | None = None) -> Me
     if isinstance(error, ConnectionLostError) and status is not None:
         known = status.code in (*_CRASHES, *_LOST) or status.incident is None
         return _tell_loss(status.code if known or status.incident is None else status.incident.code, status)
-    return message("notice.plain", text=str(error))
+    return message("notice.error", text=tell(error))
 
 
 def tell_incident(code: str, sentence: str, status: SupervisorStatus) -> Message:
@@ -58,7 +64,7 @@ def tell_incident(code: str, sentence: str, status: SupervisorStatus) -> Message
         return message("notice.fault", faults=name_faults(status.faults))
     if code in _CRASHES or code in _LOST:
         return _tell_loss(code, status)
-    return message("notice.plain", text=sentence)
+    return message("notice.plain", text=Finished(sentence))
 
 
 def tell_status(status: SupervisorStatus) -> Message:
@@ -67,12 +73,12 @@ def tell_status(status: SupervisorStatus) -> Message:
         return message("ready.fault_of", faults=name_faults(status.faults))
     if status.code in _CRASHES or status.code in _LOST:
         return _tell_loss(status.code, status)
-    return message(f"phase.{status.phase}")
+    return message(phase_code(status))
 
 
 def phase_code(status: SupervisorStatus) -> str:
     """Returns the key of the two or three words for what the robot side is doing."""
-    return f"phase.{status.code}" if status.code in _CRASHES else f"phase.{status.phase}"
+    return _PHASES.get(status.code, f"phase.{status.phase}")
 
 
 def name_faults(faults: Iterable[object]) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from rcilab.language import LANGUAGES, Language
 from rcilab.words import text
-from rcilab.words.text import Message, load_face, message
+from rcilab.words.text import Explains, Message, load_face, message
 from rcilab.workbench.units import USUAL, Unit, Units
 
 __all__ = ["LANGUAGES", "Message", "Text", "load_catalogue", "message"]
@@ -36,6 +36,9 @@ class Text(text.Text):
     def __call__(self, code: str, **values: object) -> str:
         """Returns the words for a key; the key itself when the catalogues lack it (a test keeps them complete)."""
         return super().__call__(code, **self.units.values(values))
+
+    def _explain(self, said: Explains) -> str:
+        return said.explain(self.language, self.units)
 
     def unit(self, usual: str) -> Unit:
         """Returns the unit that numbers of a field are shown and typed in, for "deg" or "mm"."""

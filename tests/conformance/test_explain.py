@@ -14,7 +14,7 @@ import pytest
 from rcilab.conformance import CONDITION_TABLES, CONDITIONS, Violation, check
 from rcilab.conformance.catalogue import Language, Phrase, load_catalogue, say
 from rcilab.conformance.condition import Condition
-from rcilab.conformance.explain import explain_violation
+from rcilab.conformance.explain import explain_source, explain_violation
 from rcilab.conformance.wording import advise
 from rcilab.errors import InvalidValueError
 from rcilab.faults import Fault
@@ -24,6 +24,7 @@ from rcilab.model import RobotModel, load_model
 from rcilab.motion import Motion, plan_joint
 from rcilab.safety_box import SafetyBox
 from rcilab.spatial import Pose
+from rcilab.words.units import Units
 from tests.catalogues import require_equal
 
 MODEL = load_model("xMatePro7")
@@ -70,6 +71,10 @@ def test_english_words_are_those_of_the_table_and_of_the_faults():
     for table in CONDITION_TABLES.values():
         for row in table.conditions:
             assert words[f"quantity.{row.id}"] == row.quantity
+    for row in CONDITIONS:
+        assert explain_source(row) == row.source
+        said = re.sub(r"RCI|SDK|URDF|rcilab|setCollisionBehavior|Hz|deg", "", explain_source(row, "zh"))
+        assert not re.search(r"[A-Za-z]{2}", said), said
     for faults in (Fault, FrankaError):
         assert [words[f"fault.{fault.name}"] for fault in faults] == [fault.cause for fault in faults]
 
@@ -148,6 +153,18 @@ def test_a_sentence_in_full_in_both_languages():
         "关节 4：指令速度 -2.31 rad/s，超过限值 -2.175 rad/s，超出 0.135 rad/s，为限值的 106.2 %，t = 0.400 s。"
         "控制器会报 kCommandJointVelocityLimitsViolation：关节指令速度过高。处理办法：将 speed 降到 0.36 或更低。"
     )
+
+
+def test_a_sentence_is_said_in_the_units_that_are_asked_for():
+    velocity = next(row for row in CONDITIONS if row.id == "joint.velocity")
+    violation = replace(violation_of(velocity, count=1), joint=4, value=-2.31, bound=-2.175, ratio=2.31 / 2.175)
+    assert "commanded velocity -132.4°/s passes the bound of -124.6°/s by 7.735°/s" in violation.explain(units=Units())
+    box = replace(violation_of(next(row for row in CONDITIONS if row.id == "cartesian.position")), value=0.042)
+    assert "is 42 mm outside" in box.explain("en", Units())
+    assert "0.042 m" in box.explain("zh", Units(length="m"))
+    report = check(MOTION, MODEL)
+    assert "rad" not in report.explain("en", Units())
+    assert "°" not in report.explain("en", Units(angle="rad"))
 
 
 def test_an_accepted_motion_is_told_with_what_is_nearest_to_its_bound():

@@ -17,7 +17,7 @@ from rcilab.recording.export import export_run
 from rcilab.recording.live import LiveRecording, RunFacts
 from rcilab.recording.run import Run
 from rcilab.recording.run_file import BLOCK_CYCLES, RunFile, decode_run
-from tests.recording.runs import MODEL, PLAN, SETUP, some_cycles, some_run
+from tests.recording.runs import MODEL, OFFSET, PLAN, SETUP, some_cycles, some_run
 
 
 def same(a: Run, b: Run) -> bool:
@@ -37,6 +37,22 @@ def test_a_run_comes_back_as_it_was(tmp_path):
     assert back.report is not None
     assert back.report.ok
     assert repr(back) == repr(run)
+
+
+def test_a_file_holds_the_plan_that_was_run_in_the_end_and_its_errors_are_right(tmp_path):
+    """Another pace makes another plan: the errors against the first one would be those of the pace."""
+    path, slower = tmp_path / "a.rcirun", PLAN.slowed(2.0)
+    live = LiveRecording(
+        RunFacts(plan=slower, model=MODEL, setup=SETUP), RunFile(path, cycle_dtype(7), plan=slower, model=MODEL)
+    )
+    live.add(some_cycles())
+    run = live.finish(plan=PLAN)
+    assert run is not None
+    for kept in (run, rcilab.load_run(path)):
+        assert kept.plan is not None
+        assert np.array_equal(kept.plan.q, PLAN.q)
+        assert kept.tracking is not None
+        assert np.abs(kept.tracking.joint).max() == pytest.approx(OFFSET, rel=1e-6)
 
 
 def test_a_callback_without_plan_or_arm_comes_back_too():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -21,6 +23,7 @@ from rcilab.workbench.program.actions import ProgramActions
 from rcilab.workbench.program.draft import Draft, number_at
 from rcilab.workbench.store import Store, UiState
 from rcilab.workbench.text import Text
+from rcilab.workbench.units import Units
 from rcilab.workbench.view_actions import PLOTS
 from tests.waiting import wait_for
 
@@ -193,8 +196,19 @@ def test_the_report_is_told_in_words(bench: Bench) -> None:
     bench.settle()
     explained = bench.state.check.explained
     assert explained is not None
-    assert explained[0] is bench.plan.report
-    assert explained[2] == bench.plan.report.explain("en")
+    report, slowed = explained
+    assert report is bench.plan.report
+    assert report.explain("en", slowed=slowed) == bench.plan.report.explain("en")
+
+
+def test_rows_and_words_are_in_the_units_of_the_page(bench: Bench) -> None:
+    report = bench.plan.report
+    degrees, radians = (Text("en", Units(angle=angle, length="m")) for angle in ("deg", "rad"))
+    row = next(row for row in report.rows if row.id == "joint.velocity")
+    assert f"{math.degrees(row.value):.4g} / {math.degrees(row.bound):.4g}°/s" in rows_html(report, MODEL, "", degrees)
+    assert f"{row.value:.4g} / {row.bound:.4g} rad/s" in rows_html(report, MODEL, "", radians)
+    assert not re.search(r"\d ?rad", rows_html(report, MODEL, "", degrees))
+    assert not re.search(r"\d ?(?:mm|°)", rows_html(report, MODEL, "", radians))
 
 
 def test_every_row_of_a_joint_or_the_tool_has_a_plot() -> None:

@@ -289,7 +289,7 @@ def test_what_the_control_process_refuses_is_told(jog, store, robot, monkeypatch
 
     monkeypatch.setattr(robot, "jog", refuse)
     hold(jog)
-    assert said(store) == "notice.plain"
+    assert said(store) == "notice.error"
 
 
 def test_the_robot_slows_down_before_it_touches_the_floor_and_goes_back_freely(jog, store, session, robot):

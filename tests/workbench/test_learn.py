@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from types import SimpleNamespace
 
@@ -11,6 +12,7 @@ import pytest
 from rcilab.faults import Fault
 from rcilab.gallery import FAULTS
 from rcilab.model import load_model
+from rcilab.views.plots import build_frame, mark_moment, plan_curves
 from rcilab.workbench import requests
 from rcilab.workbench.goal.actions import GoalActions, initial_goal
 from rcilab.workbench.learn.actions import LearnActions
@@ -20,6 +22,7 @@ from rcilab.workbench.panels.learn_exhibit import body_html, head_html
 from rcilab.workbench.panels.learn_lesson import steps_html
 from rcilab.workbench.store import Recording, Store, UiState
 from rcilab.workbench.text import LANGUAGES, Text, load_catalogue
+from rcilab.workbench.units import Units
 from tests.waiting import wait_for
 
 MODEL = load_model("xMatePro7")
@@ -77,15 +80,38 @@ def test_a_fault_is_shown_at_its_moment_and_the_plan_of_the_page_is_kept(bench: 
     seen = exhibited(bench.state, scene=True)
     assert seen.plan is show.scene
     assert [row.id for row in show.plan.report.rows if not row.ok and row.fault] == ["joint.jerk"]
-    assert np.abs(seen.plan.motion.at(seen.place * seen.plan.motion.duration).q - show.exhibit.moved.q[-1]).max() < 1e-3
+    assert (
+        np.abs(
+            seen.plan.motion.at(seen.place * seen.plan.motion.duration).q - show.exhibit.moved.q[show.exhibit.sample]
+        ).max()
+        < 1e-3
+    )
     for language in LANGUAGES:
-        said = head_html(show.exhibit, Text(language)) + body_html(show.exhibit, Text(language))
-        assert "kCommandJointAccelerationDiscontinuity" in said.replace("<wbr>", "")
-        assert "5000" in said
+        for units, bound in ((Units(angle="rad", length="m"), "5000 rad/s³"), (Units(), "286479°/s³")):
+            text = Text(language, units)
+            said = head_html(show.exhibit, text) + body_html(show.exhibit, text)
+            assert "kCommandJointAccelerationDiscontinuity" in said.replace("<wbr>", "")
+            assert bound in said
+            assert not re.search(r"\d ?(?:rad|m/)" if units.angle == "deg" else r"\d ?(?:°|mm)", said), said
     bench.goal.pose(HOME - 0.1)
     bench.learn.tick()
     assert bench.state.learn.show is None, "another plan is to be seen"
     assert exhibited(bench.state) is bench.state
+
+
+def test_the_controlled_stop_after_the_fault_is_shown_too_and_its_moment_marked(bench: Bench) -> None:
+    bench.provoke(Fault.COMMAND_JOINT_ACCELERATION_DISCONTINUITY)
+    show = bench.state.learn.show
+    assert show is not None
+    exhibit, recording = show.exhibit, show.recording
+    assert recording.moment == exhibit.time == exhibit.cycles["t"][-1]
+    assert 0.1 < recording.t[-1] - exhibit.time <= 0.3
+    assert np.abs(recording.dq[-1]).max() < 1e-3, "it stands still"
+    assert 0.0 < bench.state.place == show.moment < 1.0
+    assert show.scene.motion.duration == show.plan.motion.duration == pytest.approx(recording.t[-1], abs=2e-3)
+    frame = build_frame(plan_curves(show.plan.motion, "q"), None, MODEL.limits.joint, "q", 0)
+    marked = mark_moment(frame, exhibit.time)
+    assert np.abs(marked.t[marked.violated & ~frame.violated] - exhibit.time).min() < 0.02
 
 
 def test_who_cancels_sees_nothing(bench: Bench) -> None:

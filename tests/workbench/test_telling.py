@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import cast
 
@@ -10,8 +11,11 @@ import pytest
 from rcilab.client.address import parse_address
 from rcilab.errors import CertificateError, ConnectionLostError, ControlError, InvalidValueError, RcilabError
 from rcilab.faults import Fault
+from rcilab.posing.planning import Plan, make_plan
+from rcilab.protocols.world import WorldStatus
 from rcilab.supervisor import SupervisorStatus
 from rcilab.supervisor.status import MESSAGES, Incident
+from rcilab.workbench.panels.health import health_html
 from rcilab.workbench.panels.status import status_values
 from rcilab.workbench.run.actions import RobotActions
 from rcilab.workbench.run.readiness import obstacle
@@ -127,6 +131,27 @@ def test_the_virtual_arm_is_switched_on_however_late_its_control_process_comes(m
     now[0] += 10.0
     robot.watch()
     assert side.asked == 2, "it has succeeded: a person may switch it off now"
+
+
+def test_a_held_motion_has_its_own_word_and_the_cursor_stands_where_it_is_held():
+    state = initial_state()
+    plan = make_plan(state.model, state.model.home, state.model.home + 0.1, 0.5, "jerk_limited")
+    assert isinstance(plan, Plan)
+    state = replace(state, plan=plan, place=1.0)
+    held = status(phase="moving", code="moving.held", motion_time=1.9, motion_place=0.25, motion_duration=9.0)
+    for language, word in (("en", "held"), ("zh", "已暂停")):
+        bar = status_values(state, held, Text(language), 2.0)
+        chip = next(chip for chip in bar["chips"] if chip["id"] == "phase")
+        assert (chip["value"], chip["tone"], chip["hint"]) == (word, "warn", word)
+        assert bar["cursor"] == {"place": 0.125}, "the place in the plan, not how long it took to come there"
+
+
+def test_health_says_how_many_commands_were_lost_in_a_row():
+    world = WorldStatus(model="xMatePro7", plant="ideal", cycle=9, phase="move", lost=30, lost_in_row=12)
+    state = initial_state()
+    spoiled = replace(state, drive=replace(state.drive, world=world))
+    assert "<th>Commands lost in a row, at most</th><td>12</td>" in health_html(spoiled, status(), Text("en"))
+    assert "<td>—</td>" in health_html(state, status(), Text("en")), "another controller does not tell"
 
 
 def test_the_bar_and_the_reason_on_run_speak_of_the_same_death():

@@ -76,3 +76,30 @@ def test_other_units_stay():
     assert SI.from_si("N m") == (1.0, "N m")
     assert Units().from_si("rad/s^2") == (pytest.approx(math.degrees(1.0)), "°/s²")
     assert Units().from_si("m/s") == (1000.0, "mm/s")
+
+
+@pytest.mark.parametrize(
+    ("said", "usual", "si"),
+    [
+        ("joint 2: 2.31 rad/s exceeds 2.175 rad/s", "joint 2: 132°/s exceeds 124.6°/s", None),
+        ("passes 0.35 rad (20.05°)", "passes 20.1°", "passes 0.35 rad"),
+        ("not between -2.97 and 2.97 rad", "not between -170 and 170°", None),
+        ("from 10 to 20 mm", None, "from 0.01 to 0.02 m"),
+        ("start [0.1, -0.2, 0.35] m away", "start [100, -200, 350] mm away", None),
+        ("6 rad/s^2 at t = 0.412 s, 60 N, 5 ms, 12 N m", "344°/s² at t = 0.412 s, 60 N, 5 ms, 12 N m", None),
+        ("a box of 60 mm, 2.9° beside joint 1", None, "a box of 0.06 m, 0.0506 rad beside joint 1"),
+        ("links 5, 0.02 m apart; 3 messages; 4 MB", "links 5, 20 mm apart; 3 messages; 4 MB", None),
+    ],
+)
+def test_a_finished_sentence_is_restated_number_by_number(said, usual, si):
+    assert Units().restate(said) == (said if usual is None else usual)
+    assert SI.restate(said) == (said if si is None else si)
+
+
+def test_two_numbers_that_differ_look_different():
+    for units in (SI, Units()):
+        first, second = units.numbers("rad/s", 2.17501, 2.175)
+        assert first != second
+    assert Units().numbers("rad/s^3", 5000.0, 5000.0) == ("286479", "286479")
+    assert Units().with_unit("286479", "rad/s^3") == "286479°/s³"
+    assert SI.with_unit("0.02", "m") == "0.02 m"

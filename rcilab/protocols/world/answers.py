@@ -44,6 +44,8 @@ class WorldStatus:
     """Measured joint angles, [rad]."""
     lost: int = 0
     """Cycles of the last motion whose command did not come in time."""
+    lost_in_row: int = 0
+    """The most of them that followed one another; 10 to 20 end a motion."""
     success_rate: float = 1.0
     """As the state says it, 0 to 1."""
     missed: int = 0
@@ -64,7 +66,7 @@ class WorldStatus:
 
 WorldAnswer: TypeAlias = Done | Refused | WorldStatus
 
-_COUNTS = ("cycle", "lost", "missed", "misfits", "ignored", "stalls")
+_COUNTS = ("cycle", "lost", "lost_in_row", "missed", "misfits", "ignored", "stalls")
 _LARGEST_COUNT = 2**63
 
 

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
-from rcilab.conformance.catalogue import Language
 from rcilab.errors import RcilabError
 from rcilab.workbench import requests
 from rcilab.workbench.background import Background
@@ -154,8 +153,8 @@ class CheckActions:
         self._set(slowed=None, answer=None)
 
     def _explain(self, plan: Plan) -> None:
-        report, language = plan.report, self._store.state.language
-        self._work.start(plan, lambda tell: _explained(report, language))
+        report = plan.report
+        self._work.start(plan, lambda tell: _explained(report))
         self._set(doing="explain", progress=0.0)
 
 
@@ -174,5 +173,5 @@ def plot_of(condition: Condition) -> str | None:
             return None
 
 
-def _explained(report: Report, language: str) -> Explained:
-    return report, language, report.explain(cast(Language, language))
+def _explained(report: Report) -> Explained:
+    return report, None if report.ok else report.slow_down()

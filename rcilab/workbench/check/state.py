@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     from rcilab.posing.planning import Plan
     from rcilab.workbench.program.draft import Draft
 
-Explained: TypeAlias = "tuple[Report, str, str]"
-"""A report, a language, and the report in words."""
+Explained: TypeAlias = "tuple[Report, SlowDown | None]"
+"""A report that is told in words, and the slow-down that belongs to them; a report that is ok has none."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

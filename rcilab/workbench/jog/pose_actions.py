@@ -8,6 +8,8 @@ from pathlib import Path
 
 from rcilab.errors import InvalidValueError, RcilabError
 from rcilab.motion.pose_book import LONGEST_NAME, PoseBook
+from rcilab.words.errors import tell
+from rcilab.words.text import Finished
 from rcilab.workbench import requests
 from rcilab.workbench.goal.actions import GoalActions
 from rcilab.workbench.store import Store
@@ -85,7 +87,8 @@ class PoseActions:
         try:
             act()
         except RcilabError as error:
-            reason = error.requirement if isinstance(error, InvalidValueError) else str(error)
+            plain = error.requirement if isinstance(error, InvalidValueError) else str(error)
+            reason = tell(error) if error.code else Finished(plain)
             self._store.say("bad", message("poses.file", file=self._book.file, reason=reason))
             if isinstance(error, InvalidValueError) and error.name == "pose":
                 self._try(self._show)  # Another program has deleted it.

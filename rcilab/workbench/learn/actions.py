@@ -13,7 +13,7 @@ from rcilab.workbench import requests
 from rcilab.workbench.background import Background
 from rcilab.workbench.learn.lessons import LESSONS, Watcher
 from rcilab.workbench.learn.private_arm import PrivateArm
-from rcilab.workbench.learn.state import MOMENT, LearnState, LessonState, make_show
+from rcilab.workbench.learn.state import LearnState, LessonState, make_show
 from rcilab.workbench.run.readiness import is_moving
 from rcilab.workbench.session import Session
 from rcilab.workbench.store import Store
@@ -41,7 +41,7 @@ class LearnActions:
             case "close":
                 self._close()
             case "moment" if self._learn.show is not None:
-                self._store.update(place=MOMENT, playing=False)
+                self._store.update(place=self._learn.show.moment, playing=False)
             case "script":
                 self._set(is_script_shown=not self._learn.is_script_shown)
             case "lesson" if request.name in LESSONS:
@@ -94,8 +94,9 @@ class LearnActions:
             return
         state = self._store.state
         beside = None if state.plan is None else state.plan.motion
-        self._set(provoking=None, show=make_show(result, beside))
-        self._store.update(place=MOMENT, playing=False)
+        show = make_show(result, beside)
+        self._set(provoking=None, show=show)
+        self._store.update(place=show.moment, playing=False)
 
     def _close(self) -> None:
         if self._learn.show is not None:

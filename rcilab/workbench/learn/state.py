@@ -7,17 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rcilab.clock import CYCLE_TIME
 from rcilab.faults import Fault
 from rcilab.gallery import Exhibit
 from rcilab.posing.planning import Plan, picture
 from rcilab.workbench.text import Message
 
 if TYPE_CHECKING:
-    from rcilab.motion import Motion
     from rcilab.workbench.store import Recording, UiState
-
-MOMENT = 0.9999
-"""Where the timeline stands at the fault: at the end, as far as a translucent arm is drawn."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -33,6 +30,11 @@ class Show:
     """What the arm did."""
     beside: object
     """The motion that was planned on the page when it opened; another one closes the show."""
+
+    @property
+    def moment(self) -> float:
+        """Where the timeline stands at the fault, 0 to 1; behind it comes the controlled stop."""
+        return self.exhibit.sample * CYCLE_TIME / max(self.plan.motion.duration, CYCLE_TIME)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -62,17 +64,21 @@ class LearnState:
 def make_show(exhibit: Exhibit, beside: object) -> Show:
     """Returns a fault as timeline and scene draw it."""
     from rcilab.conformance import check
+    from rcilab.motion import Motion
     from rcilab.workbench.store import Recording
 
     def draw(motion: Motion) -> Plan:
-        return picture(exhibit.model, motion, check(motion, exhibit.model, distance=None))
+        judged = Motion.from_samples(motion.q[: exhibit.sample + 1])  # From there on the way is the controller's.
+        return picture(exhibit.model, motion, check(judged, exhibit.model, distance=None))
 
-    rows = exhibit.cycles
+    rows = exhibit.whole
     return Show(
         exhibit=exhibit,
         plan=draw(exhibit.commanded),
         scene=draw(exhibit.moved),
-        recording=Recording(t=np.array(rows["t"]), q=rows["q"], q_c=rows["q_c"], dq=rows["dq"], delay=0),
+        recording=Recording(
+            t=np.array(rows["t"]), q=rows["q"], q_c=rows["q_c"], dq=rows["dq"], delay=0, moment=exhibit.time
+        ),
         beside=beside,
     )
 

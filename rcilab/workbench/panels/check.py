@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import re
 import time
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
-from rcilab.language import Language
 from rcilab.workbench import requests
 from rcilab.workbench.panels.check_rows import rows_html
 from rcilab.workbench.run.readiness import is_moving
@@ -118,10 +117,11 @@ class CheckPanel:
         if check.answer is not None and check.about is plan.report:
             answer = esc(self._text.say(check.answer))
             if check.found is not None:
-                answer += f" {esc(check.found.explain(cast(Language, self._text.language)))}"
+                answer += f" {esc(check.found.explain(self._text.language))}"
             said += f'<p class="rl-verdict rl-{check.tone}" role="status">{answer}</p>'
         if check.explained is not None and check.explained[0] is plan.report:
-            first, *rest = check.explained[2].splitlines()
+            report, slowed = check.explained
+            first, *rest = report.explain(self._text.language, self._text.units, slowed=slowed).splitlines()
             lines = "".join(f"<li>{esc(line.removeprefix('- '))}</li>" for line in rest)
             said += f'<div class="rl-words"><p>{esc(first)}</p><ul class="rl-list">{lines}</ul></div>'
         return said

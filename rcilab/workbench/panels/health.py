@@ -37,13 +37,13 @@ class HealthPanel:
         if time.monotonic() - self._shown < _PERIOD:
             return
         self._shown = time.monotonic()
-        self._health.show(health_html(status, self._text))
+        self._health.show(health_html(state, status, self._text))
         self._histogram.show(histogram_html(status.lateness, self._text))
 
 
-def health_html(status: SupervisorStatus, text: Text) -> str:
+def health_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
     """Returns how well the cycles are kept, as a table."""
-    late = status.lateness
+    late, world = status.lateness, state.drive.world
     mode = "—" if status.robot_mode is None else text(f"robot_mode.{status.robot_mode.name}")
     power = {None: "—", True: text("run.on"), False: text("run.off")}[status.powered]
     rows = [
@@ -51,6 +51,7 @@ def health_html(status: SupervisorStatus, text: Text) -> str:
         ("control", "—" if status.controller_mode is None else text(f"controller_mode.{status.controller_mode.name}")),
         ("power", power),
         ("success", f"{100.0 * status.success_rate:.1f} %"),
+        ("in_row", "—" if world is None else f"{world.lost_in_row}"),
         ("rate", f"{status.rate_hz:.0f} Hz"),
         ("late", text("run.late_value", late=status.late_cycles, lost=status.lost_cycles, cycles=late.cycles)),
         ("lateness", f"{late.p50:.0f} / {late.p99:.0f} / {late.p999:.0f} / {late.max:.0f} µs"),

@@ -95,7 +95,7 @@ def noticed_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
         ("controller_faults", faults),
     ]
     if world is not None and world.reason and status.faults:
-        rows.append(("controller_reason", world.reason))
+        rows.append(("controller_reason", text.units.restate(world.reason)))
     body = "".join(f"<tr><th>{esc(text(f'network.{name}'))}</th><td>{esc(value)}</td></tr>" for name, value in rows)
     return f'<table class="rl-table rl-facts-table">{body}</table>'
 

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
+from rcilab.conformance.explain import explain_source
 from rcilab.language import Language
 from rcilab.workbench import requests
-from rcilab.workbench.panels.check_rows import number, pretty_unit
 from rcilab.workbench.panels.learn_plot import exhibit_contents
 from rcilab.workbench.panels.plot_contents import plot_axes
 from rcilab.workbench.text import Text
@@ -81,7 +81,10 @@ class LearnExhibitPanel:
 
     def _draw(self, exhibit: Exhibit, theme: Theme) -> None:
         signal, t = exhibit.signal, np.array(exhibit.cycles["t"])
-        data, series, _ = exhibit_contents(t, signal.values, signal.lower, signal.upper, theme)
+        factor = self._text.units.from_si(signal.condition.unit)[0]
+        data, series, _ = exhibit_contents(
+            t, factor * signal.values, factor * signal.lower, factor * signal.upper, theme
+        )
         low, high = float(np.nanmin(data[1:])), float(np.nanmax(data[1:]))
         margin = 0.12 * (high - low or 1.0)
         self._plot.data = data
@@ -97,16 +100,18 @@ def head_html(exhibit: Exhibit, text: Text) -> str:
     language, row = cast(Language, text.language), exhibit.condition
     others = [fault.manual_name for fault in exhibit.reported if fault is not exhibit.fault]
     also = f" {text('learn.also', faults=', '.join(others))}" if others else ""
-    unit = pretty_unit(row.unit)
+    value, bound = text.units.numbers(row.unit, exhibit.value, exhibit.bound)
+    unit = text.units.from_si(row.unit)[1]
     facts = text(
-        "learn.number", value=number(exhibit.value), bound=number(exhibit.bound), unit=unit,
+        "learn.number", value=value, bound=text.units.with_unit(bound, row.unit),
         time=f"{exhibit.time:.3f}", sample=exhibit.sample,
     )  # fmt: skip
+    sent = text.units.restate(exhibit.told("sent", language))
     place = text("check.joint", joint=exhibit.signal.axis) + " · " if exhibit.signal.axis else ""
     return (
         f'<p class="rl-verdict rl-bad rl-big"><b>◆ {_breakable(exhibit.fault.manual_name)}</b> '
         f"{esc(text('learn.reported', number=exhibit.fault.value))}{esc(also)}</p>"
-        f'<p class="rl-note"><b>{esc(text("learn.done"))}</b> {esc(exhibit.told("sent", language))}</p>'
+        f'<p class="rl-note"><b>{esc(text("learn.done"))}</b> {esc(sent)}</p>'
         f'<div class="rl-plot-title">{esc(text(f"condition.{row.id}"))} [{esc(unit or "1")}]</div>'
         f'<p class="rl-note rl-under">{esc(place)}{esc(facts)}</p>'
     )
@@ -125,16 +130,17 @@ def body_html(exhibit: Exhibit, text: Text) -> str:
     legend = "".join(
         f'<span class="rl-sign-{sign}">{esc(text(f"learn.legend.{sign}"))}</span>' for sign in ("limit", "fault")
     )
+    source = text.units.restate(explain_source(row, language))
     rows = (
-        ("learn.cause", esc(exhibit.told("cause", language))),
-        ("learn.remedy", esc(exhibit.told("remedy", language))),
-        ("learn.condition", f"{esc(row.formula)}<br><span class='rl-dim'>{esc(row.source)}</span>"),
+        ("learn.cause", esc(text.units.restate(exhibit.told("cause", language)))),
+        ("learn.remedy", esc(text.units.restate(exhibit.told("remedy", language)))),
+        ("learn.condition", f"{esc(row.formula)}<br><span class='rl-dim'>{esc(source)}</span>"),
         ("learn.manual", esc(text("learn.section", section=exhibit.section, number=exhibit.fault.value))),
         (
             "learn.way_out",
             f'<ol class="rl-steps-out">{steps}</ol>{executed}',
         ),
-        ("learn.said", f"<code>{esc(exhibit.said)}</code>"),
+        ("learn.said", f"<code>{esc(text.units.restate(exhibit.said))}</code>"),
     )
     table = "".join(f"<tr><th>{esc(text(key))}</th><td>{cell}</td></tr>" for key, cell in rows)
     return f'<div class="rl-legend">{legend}</div><table class="rl-table rl-facts-table rl-exhibit">{table}</table>'

@@ -14,6 +14,7 @@ from rcilab.views.plots import (
     build_frame,
     build_tool_frame,
     last_time,
+    mark_moment,
     plan_curves,
     recorded_curves,
 )
@@ -119,6 +120,8 @@ class Plots:
             unit = unit if joint else self._text("plot.percent")
         if name not in _ERRORS:
             self.end = frame.end
+        if state.recording is not None and state.recording.moment is not None:
+            frame = mark_moment(frame, state.recording.moment)
         title = self._text(f"plot.{name}") + (f" · J{joint}" if joint else "") + f" [{unit}]"
         self._titles[name].show(f'<div class="rl-plot-title">{esc(title)}</div>')
         reach = (0.0 if name in ("speed", "acceleration", "tool") else -frame.bound, frame.bound)

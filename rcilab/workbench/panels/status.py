@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 _TONES = {
     "idle": "good",
     "moving": "good",
+    "moving.held": "warn",
     "starting": "warn",
     "connecting": "warn",
     "stopping": "warn",
@@ -49,8 +50,6 @@ def _chips(state: UiState, status: SupervisorStatus, text: Text) -> list[dict[st
     doing = text.say(state.busy) if state.busy is not None else phase
     if status.phase == "idle" and status.powered is False:
         doing = text("phase.unpowered")
-    if status.code == "moving.guided":
-        doing = text("phase.guided")
     mode = "—" if status.robot_mode is None else text(f"robot_mode.{status.robot_mode.name}")
     faults = text("bar.none") if not status.faults else ", ".join(fault.manual_name for fault in status.faults)
     connected = status.rate_hz > 0.0
@@ -58,7 +57,13 @@ def _chips(state: UiState, status: SupervisorStatus, text: Text) -> list[dict[st
     return [
         _chip(text, "model", state.model.name),
         _chip(text, "where", text(f"where.{state.plant}") if state.target == "virtual" else state.target),
-        _chip(text, "phase", doing, _TONES.get(status.phase, "bad"), hint=text.say(tell_status(status))),
+        _chip(
+            text,
+            "phase",
+            doing,
+            _TONES.get(status.code, _TONES.get(status.phase, "bad")),
+            hint=text.say(tell_status(status)),
+        ),
         _chip(text, "mode", mode),
         _chip(text, "rate", f"{status.rate_hz:.0f} Hz" if connected else "—"),
         _chip(text, "success", f"{100.0 * status.success_rate:.0f} %" if connected else "—"),
@@ -97,6 +102,6 @@ def _cursor(state: UiState, status: SupervisorStatus, end: float) -> dict[str, f
     if state.plan is None or end <= 0.0:
         return None
     t = state.place * state.plan.motion.duration
-    if is_moving(status) and status.motion_time is not None:
-        t = status.motion_time
+    if is_moving(status) and status.motion_place is not None:
+        t = status.motion_place
     return {"place": round(min(max(t / end, 0.0), 1.0), 4)}

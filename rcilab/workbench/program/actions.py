@@ -11,6 +11,7 @@ from rcilab.errors import InvalidValueError, PlanningError, RcilabError, Version
 from rcilab.motion.program import Program
 from rcilab.motion.program_file import read_program
 from rcilab.posing.planning import Plan
+from rcilab.words.errors import tell, tell_note
 from rcilab.workbench import requests
 from rcilab.workbench.background import Background
 from rcilab.workbench.goal.actions import GoalActions
@@ -76,7 +77,7 @@ class ProgramActions:
         try:
             program = read_program(request.content, request.name[:LONGEST_NAME] or "program")
         except (InvalidValueError, VersionMismatchError) as error:
-            self._shelves.answer("program.0.file", message("program.file_bad", error=str(error)))
+            self._shelves.answer("program.0.file", message("program.file_bad", error=tell(error)))
             return
         model = self._store.state.model.name
         if program.model != model:
@@ -137,7 +138,9 @@ class ProgramActions:
         if isinstance(result, RcilabError):
             number = result.waypoint if isinstance(result, PlanningError) else None
             failed = None if number is None else steps[number - 1].key
-            self._shelves.set(tone="bad", answer=message("plan.failed", error=str(result)), failed=failed, planned=None)
+            self._shelves.set(
+                tone="bad", answer=message("plan.failed", error=tell(result)), failed=failed, planned=None
+            )
             return
         self._store.update(plan=result, no_plan=None, recording=None, place=0.0, playing=False, asked=None)
         tone, answer, failed = "good", [], None
@@ -145,7 +148,7 @@ class ProgramActions:
             tone, answer = "warn", [_tell_approach(job, result)]
         if result.motion.notes:
             tone = "warn"
-            answer.append(message("program.notes", text="; ".join(result.motion.notes)))
+            answer += [message("program.notes", text=tell_note(note)) for note in result.motion.notes]
         if result.report.violations:
             number = number_at(result, result.report.violations[0].time) or 0
             failed = steps[number - 1].key if number else None

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +12,7 @@ from rcilab.errors import InvalidValueError
 from rcilab.recording.live import LiveRecording, RunFacts
 from rcilab.recording.run import Run
 from rcilab.recording.setup import Setup
+from rcilab.words.errors import tell
 from rcilab.workbench.store import Recording, Store
 from rcilab.workbench.text import message
 
@@ -68,12 +68,11 @@ class RunKeeper:
         live, self._live = self._live, None
         run: Run | None = None
         try:
-            run = live.finish(stopped)
+            run = live.finish(stopped, plan)
         except InvalidValueError as error:
             self._complain(error)
-            run = live.finish(stopped)  # Its file is given up now; the run in memory is whole.
+            run = live.finish(stopped, plan)  # Its file is given up now; the run in memory is whole.
         if run is not None:
-            run = run if plan is None else replace(run, plan=plan)
             recording = whole_recording(run, self._file)
             self._store.update(recording=recording, last_run=recording)
 
@@ -98,7 +97,10 @@ class RunKeeper:
 
     def _complain(self, error: InvalidValueError) -> None:
         self._file = ""
-        self._store.say("warn", message("record.unwritable", file=str(error.value), why=error.requirement))
+        self._store.say(
+            "warn",
+            message("record.unwritable", file=str(error.value), why=tell(error) if error.code else error.requirement),
+        )
 
 
 def as_recording(cycles: NDArray[np.void], delay: int) -> Recording:

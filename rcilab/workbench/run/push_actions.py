@@ -25,7 +25,7 @@ from rcilab.workbench.run.pushing import (
 )
 from rcilab.workbench.session import Session
 from rcilab.workbench.store import Store
-from rcilab.workbench.text import message
+from rcilab.workbench.telling import tell_error
 
 _NO_MOMENT = (0.0, 0.0, 0.0)
 
@@ -109,7 +109,7 @@ class PushActions:
         error = None if self._push is None else self._push.take_error()
         if error is not None:
             self._grip = self._button = None
-            self._store.say("bad", message("notice.plain", text=str(error)))
+            self._store.say("bad", tell_error(error))
 
     def close(self) -> None:
         """Lets go of the arm."""

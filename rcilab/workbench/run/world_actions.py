@@ -13,6 +13,7 @@ from rcilab.workbench.run.driving import CABLE_PULLED, NETWORK_LAB
 from rcilab.workbench.run.pushing import no_push
 from rcilab.workbench.session import Session
 from rcilab.workbench.store import Store
+from rcilab.workbench.telling import tell_error
 from rcilab.workbench.text import message
 
 
@@ -67,7 +68,7 @@ class WorldActions:
             return
         error = self._watch.take_error()
         if error is not None:
-            self._store.say("bad", message("notice.plain", text=str(error)))
+            self._store.say("bad", tell_error(error))
         if self._watch.status is not self._store.state.drive.world:
             self._store.update(drive=replace(self._store.state.drive, world=self._watch.status))
 

@@ -11,7 +11,6 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from typing import Any
 
-from rcilab.conformance.explain import explain_violation
 from rcilab.views.elbow_view import OUTWARD
 from rcilab.workbench import requests
 from rcilab.workbench.goal.actions import GoalActions
@@ -66,8 +65,7 @@ class SceneActions:
             return
         bead = ribbon.beads[request.number]
         self._store.update(place=bead.place, playing=False)
-        language = "zh" if state.language == "zh" else "en"
-        self._store.say("bad", message("notice.plain", text=explain_violation(bead.violations[0], language)))
+        self._store.say("bad", message("notice.plain", text=bead.violations[0]))
 
     def show_extra(self, request: requests.ShowExtra) -> None:
         """Turns a switch."""

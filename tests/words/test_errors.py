@@ -1,0 +1,87 @@
+"""Errors in the words of faces: every code has words in both languages, and they survive the way between processes."""
+
+from __future__ import annotations
+
+import ast
+import pickle
+from collections.abc import Iterator
+from pathlib import Path
+from string import Formatter
+
+import pytest
+
+import rcilab
+from rcilab.errors import CommandRejectedError, PlanningError, RcilabError, UsageError
+from rcilab.language import LANGUAGES, load_words
+from rcilab.protocols.rci import (
+    GuideStatus,
+    RecoveryStatus,
+    SettingStatus,
+    StartStatus,
+    StopStatus,
+)
+from rcilab.supervisor.failure import pack_failure, unpack_failure
+from rcilab.words.errors import tell, tell_note
+from rcilab.words.text import Finished, Message, Remark, Text
+
+
+def coded() -> Iterator[tuple[str, set[str | None]]]:
+    """Every code in the source, with the names of the facts it is given; None among them stands for others."""
+    for path in sorted(Path(rcilab.__file__).parent.rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            is_call = isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == "coded"
+            if is_call and node.args and isinstance(code := node.args[0], ast.Constant) and code.value:
+                yield str(code.value), {keyword.arg for keyword in node.keywords}
+
+
+def places(entry: str) -> set[str]:
+    return {name for _, name, _, _ in Formatter().parse(entry) if name}
+
+
+def test_every_code_has_words_and_whatever_fills_them():
+    used = list(coded())
+    assert len(used) > 70
+    for language in LANGUAGES:
+        words = load_words("rcilab.words", language)
+        known = {key.removeprefix("error.") for key in words if key.startswith("error.")}
+        assert {code for code, _ in used} == known
+        for code, facts in used:
+            assert None in facts or places(words[f"error.{code}"]) <= facts, code
+
+
+@pytest.mark.parametrize("kind", [SettingStatus, StartStatus, StopStatus, RecoveryStatus, GuideStatus])
+def test_every_refusal_has_words(kind):
+    words = load_words("rcilab.words", "zh")
+    for status in kind:
+        if status:
+            said = tell(CommandRejectedError("StartMove", status))
+            assert isinstance(said, Message)
+            assert isinstance(status_said := said.values["status"], Message)
+            assert status_said.code in words
+
+
+def test_the_english_sentence_stays_and_facts_come_along():
+    inner = UsageError("the arm is moving").coded("moving")
+    error = PlanningError("waypoint 2: the arm is moving", waypoint=2).coded(
+        "waypoint", number=2, kind="line", reason=inner
+    )
+    assert str(error) == "waypoint 2: the arm is moving"
+    for same in (error, unpack_failure(pack_failure(error)), pickle.loads(pickle.dumps(error))):
+        said = tell(same)
+        assert isinstance(said, Message)
+        assert (said.code, said.values["number"]) == ("error.waypoint", 2)
+        assert said.values["reason"] == tell(inner)
+        assert Text("zh", "rcilab.words").say(said) == "路点 2（直线）：机械臂正在运动：请先停止，或等待到达"
+    assert tell(RcilabError("nobody named this")) == Finished("nobody named this")
+
+
+def test_a_note_keeps_its_words_in_a_file_of_its_own():
+    note = Remark("line 2: blend shortened", "blend", number=2, asked="50.0", radius="10.0")
+    back = pickle.loads(pickle.dumps(note))
+    said = tell_note(back)
+    assert isinstance(said, Message)
+    assert said.values["radius"] == "10.0"
+    assert set(said.values) == {
+        name for _, name, _, _ in Formatter().parse(load_words("rcilab.words", "en")[said.code]) if name
+    }
+    assert tell_note("plain") == Finished("plain")
