@@ -81,12 +81,11 @@ class StatusReader:
         """Returns the tool; the same pose for as long as the same numbers stand there."""
         raw = self._block.tool.tobytes()
         if raw != self._tool[0]:
-            self._tool = raw, _pose(self._block.tool)
+            self._tool = raw, _pose(self._block.tool.tolist())
         return self._tool[1]
 
 
-def _pose(tool: memoryview) -> Pose | None:
-    numbers = tool.tolist()
+def _pose(numbers: list[float]) -> Pose | None:
     if numbers[15] != 1.0:
         return None
     try:

@@ -265,7 +265,7 @@ def test_an_arm_that_is_pushed_in_a_soft_motion_gives_way_comes_back_arrives_and
         wait(lambda: status().phase == "idle" and bool(status().powered), "a powered arm")
     ask(requests.SetDrive(mode=mode))
     ask(requests.SetPush(link=TOOL, direction="+z", newtons=40.0))
-    ask(requests.SetSpeed(speed=0.05))
+    ask(requests.SetSpeed(speed=0.08))
     last, q = bench.store.state.last_run, status().q_c
     angle = float(q[0]) + (0.5 if q[0] < 0.1 else -0.5)
     ask(requests.MoveJoint(joint=0, angle=angle))
