@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -85,7 +86,7 @@ class StatusReader:
         return self._tool[1]
 
 
-def _pose(numbers: list[float]) -> Pose | None:
+def _pose(numbers: Sequence[float]) -> Pose | None:
     if numbers[15] != 1.0:
         return None
     try:
