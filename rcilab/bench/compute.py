@@ -236,7 +236,7 @@ def program_of(model: RobotModel, count: int) -> Program:
 
 
 def motion_of(model: RobotModel, duration: float, start: Array | None = None) -> Motion:
-    """Returns a fresh motion of about this duration, [s], towards the far end of every joint's range.
+    """Returns a fresh motion of about this duration, [s], towards the far end of every joint's range, or back home.
 
     Args:
         model: The arm.
@@ -245,6 +245,8 @@ def motion_of(model: RobotModel, duration: float, start: Array | None = None) ->
     """
     near = -0.9 * model.limits.joint.upper if start is None else start
     far = 0.9 * model.limits.joint.upper
+    if np.linalg.norm(near - far) < np.linalg.norm(near - model.home):
+        far = model.home
     fastest = plan_joint(model, near, far, speed=1.0).duration
     if duration <= fastest:
         return plan_joint(model, near, near + (far - near) * duration / fastest, speed=1.0)

@@ -41,8 +41,17 @@ Command = Callable[[int, int], bytes]
 """`(message id, cycle) -> datagram`."""
 
 
-def bench_controller(plant: PlantKind) -> Measurement:
+def bench_controller_ideal() -> Measurement:
     """A cycle while every joint moves: command in, judged, plant moved, state out."""
+    return _bench_plant("ideal")
+
+
+def bench_controller_mujoco() -> Measurement:
+    """The same with an arm that has mass."""
+    return _bench_plant("mujoco")
+
+
+def _bench_plant(plant: PlantKind) -> Measurement:
     model = load_model(_ROBOT)
     return _measure(f"controller_{plant}", model, plant, rci.StartMove(0, 1), joint_commands(model, _DURATION))
 

@@ -1,4 +1,4 @@
-"""A measurement: a named number beside its target."""
+"""A measurement: a named number beside its target, or the reason why there is none."""
 
 from __future__ import annotations
 
@@ -31,6 +31,21 @@ class Measurement:
     def as_json(self) -> dict[str, Any]:
         """Returns the entry that `rcilab bench --json` prints."""
         return asdict(self)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Absent:
+    """A row without a number."""
+
+    name: str
+    note: str
+    """Why there is none, and what to do."""
+    ok: bool | None = None
+    """False when it was tried and failed; None when it cannot be tried here."""
+
+    def as_json(self) -> dict[str, Any]:
+        """Returns an entry with the keys of a `Measurement`, its figures null."""
+        return dict.fromkeys(("name", "median", "p99", "unit", "target", "ok")) | asdict(self)
 
 
 def summarise(name: str, seconds: ArrayLike, unit: Unit, target: float | None, note: str = "") -> Measurement:

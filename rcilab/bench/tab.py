@@ -1,4 +1,4 @@
-"""A tab of a headless Chromium, driven over its own debugging protocol: enough to time what a person waits for."""
+"""A window of a headless Chromium, driven over its own debugging protocol: enough to time what a person waits for."""
 
 from __future__ import annotations
 
@@ -17,13 +17,14 @@ from websockets.sync.connection import Connection
 
 from rcilab.bench.browser import CHROMIUM_FLAGS
 from rcilab.bench.keeper import keeper, launch
-from rcilab.errors import DeadlineError
+from rcilab.bench.measure import Absent
+from rcilab.errors import DeadlineError, RcilabError
 
-_PATIENCE = 90.0  # [s] Software rendering on a busy machine.
+PATIENCE = 60.0  # [s] Software rendering on a busy machine.
 
 
 class Tab:
-    """One tab. Owned by the thread that opened it.
+    """One window. Owned by the thread that opened it.
 
     Args:
         link: Its debugging connection.
@@ -32,57 +33,93 @@ class Tab:
     def __init__(self, link: Connection) -> None:
         self._link = link
         self._numbers = itertools.count(1)
+        self._held = False
 
     def send(self, method: str, **params: Any) -> dict[str, Any]:
-        """Asks the browser for something and returns its answer."""
-        number = next(self._numbers)
+        """Asks the browser for something and returns its answer.
+
+        Raises:
+            DeadlineError: The browser does not answer.
+        """
+        number, deadline = next(self._numbers), time.monotonic() + PATIENCE
         self._link.send(json.dumps({"id": number, "method": method, "params": params}))
-        while True:
-            answer = json.loads(self._link.recv(timeout=_PATIENCE))
+        while (left := deadline - time.monotonic()) > 0.0:
+            try:
+                answer = json.loads(self._link.recv(timeout=left))
+            except TimeoutError:
+                break
             if answer.get("id") == number:
                 return answer.get("result", {})
+        raise DeadlineError(
+            f"bench: the browser did not answer {method} within {PATIENCE:g} s; close others, try again"
+        )
+
+    def open(self, url: str) -> None:
+        """Goes to an address and waits until the browser has loaded what is there."""
+        self.send("Page.navigate", url=url)
+        loaded = "location.href !== 'about:blank' && performance.getEntriesByType('navigation')[0].loadEventEnd > 0"
+        self.wait("the page to load", loaded)
+
+    def open_window(self, url: str) -> None:
+        """Opens another window of the same browser; all of them draw."""
+        self.send("Target.createTarget", url=url, newWindow=True)
 
     def evaluate(self, script: str) -> Any:
-        """Returns the value of an expression; of a promise, what becomes of it."""
-        answer = self.send("Runtime.evaluate", expression=script, awaitPromise=True, returnByValue=True)
+        """Returns the value of an expression.
+
+        Raises:
+            RcilabError: The page's script failed.
+        """
+        answer = self.send("Runtime.evaluate", expression=script, returnByValue=True)
+        if "exceptionDetails" in answer:
+            said = answer["exceptionDetails"].get("exception", {}).get("description", "no reason given")
+            raise RcilabError(f"bench: the page's script failed: {said.splitlines()[0]}")
         return answer.get("result", {}).get("value")
 
-    def wait(self, what: str, script: str) -> None:
-        """Waits until an expression is true."""
-        deadline = time.monotonic() + _PATIENCE
-        while not self.evaluate(script):
+    def wait(self, what: str, script: str) -> Any:
+        """Waits until an expression is true and returns it.
+
+        Raises:
+            DeadlineError: It does not become true.
+        """
+        deadline = time.monotonic() + PATIENCE
+        while not (found := self.evaluate(script)):
             if time.monotonic() > deadline:
-                raise DeadlineError(
-                    f"bench: waited {_PATIENCE:g} s for {what}; look at `rcilab doctor`, then try again"
-                )
+                raise DeadlineError(f"bench: waited {PATIENCE:g} s for {what}; look at `rcilab doctor`, then try again")
             time.sleep(0.05)
+        return found
 
     def mouse(self, kind: str, x: float, y: float) -> None:
         """Moves or presses the mouse: mouseMoved, mousePressed, mouseReleased."""
         button = {} if kind == "mouseMoved" else {"button": "left", "clickCount": 1}
-        held = 0 if kind == "mouseReleased" else 1
-        self.send("Input.dispatchMouseEvent", type=kind, x=x, y=y, buttons=held, **button)
+        self._held = kind == "mousePressed" or (self._held and kind == "mouseMoved")
+        self.send("Input.dispatchMouseEvent", type=kind, x=x, y=y, buttons=int(self._held), **button)
+
+
+def no_browser(name: str) -> Absent:
+    """Returns the row of a bench that needs a browser where there is none."""
+    return Absent(name=name, note="NO BROWSER FOUND, so nothing was measured: install Chromium (apt install chromium)")
 
 
 @contextmanager
 def open_tab(browser: str) -> Iterator[Tab]:
-    """Opens an empty tab in a headless Chromium of our own; all of it is gone afterwards, and when we die."""
+    """Opens an empty window in a headless Chromium of our own; all of it is gone afterwards, and when we die."""
     profile = tempfile.mkdtemp(prefix="rcilab-bench-")
     with keeper([browser, *CHROMIUM_FLAGS, f"--user-data-dir={profile}", "about:blank"], directory=profile) as process:
         launch(process)
-        port = _debugging_port(Path(profile))
-        with urllib.request.urlopen(f"http://127.0.0.1:{port}/json/list", timeout=_PATIENCE) as answer:
-            pages = [page for page in json.load(answer) if page["type"] == "page"]
-        with connect(pages[0]["webSocketDebuggerUrl"], max_size=None, compression=None) as link:
+        with connect(_first_window(Path(profile)), max_size=None, compression=None) as link:
             yield Tab(link)
 
 
-def _debugging_port(profile: Path) -> int:
-    deadline = time.monotonic() + _PATIENCE
+def _first_window(profile: Path) -> str:
+    """Returns the address of the debugging connection of the browser's window, once there is one."""
+    deadline = time.monotonic() + PATIENCE
     file = profile / "DevToolsActivePort"
-    while True:
+    while time.monotonic() < deadline:
         if file.is_file() and (lines := file.read_text().split()):
-            return int(lines[0])
-        if time.monotonic() > deadline:
-            raise DeadlineError("bench: the browser did not start; look at `rcilab doctor`, then try again")
+            with urllib.request.urlopen(f"http://127.0.0.1:{lines[0]}/json/list", timeout=PATIENCE) as answer:
+                windows = [window for window in json.load(answer) if window["type"] == "page"]
+            if windows:
+                return windows[0]["webSocketDebuggerUrl"]
         time.sleep(0.05)
+    raise DeadlineError("bench: the browser did not start; look at `rcilab doctor`, then try again")

@@ -6,26 +6,18 @@ import argparse
 import json
 import sys
 import textwrap
-from collections.abc import Callable
 from contextlib import redirect_stdout
 from typing import TYPE_CHECKING, Any
 
+from rcilab.bench.rows import ROWS
 from rcilab.errors import UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from rcilab.bench.compare.peer import Absent
-    from rcilab.bench.measure import Measurement
+    from rcilab.bench.measure import Absent, Measurement
 
-BENCHES = (
-    *("forward", "inverse", "inverse_batch", "feasible_arcs", "plan_joint", "program"),
-    *("check", "check_full", "check_joint_rows"),
-    *("controller_ideal", "controller_mujoco", "controller_cartesian", "controller_impedance", "client_answer"),
-    *("jog", "plan_line", "plan_arc", "replan"),
-    *("drag", "mirror", "scrub", "page_ready", "page_drag", "lab_slider", "lab_shown"),
-    *("import", "start", "state_period", "control_loop"),
-)
+BENCHES = tuple(ROWS)
 """In the order they run; the slow ones last."""
 COMPARE = "compare"
 """Runs only when it is named: what it measures are others' packages."""
@@ -40,7 +32,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("names", nargs="*", metavar="NAME", help=known)
     parser.add_argument("--json", action="store_true", help="print one JSON list instead of a table")
     parser.add_argument(
-        "--seconds", type=float, default=_STREAMING, help="how long control_loop streams, [s] (default: %(default)s)"
+        "--seconds",
+        type=float,
+        default=_STREAMING,
+        help="how long control_loop and spectators stream, [s] (default: %(default)s)",
     )
     parser.set_defaults(run=run)
 
@@ -57,21 +52,24 @@ def run(args: argparse.Namespace) -> int:
     from rcilab.bench.machine import describe_machine
 
     machine = describe_machine()
-    if not args.json:
+    if args.json:
+        print("[\n" + json.dumps(machine), end="", flush=True)
+    else:
         _print_machine(machine)
-    found: list[Measurement | Absent] = []
-    out = sys.stdout
+    kept, out = True, sys.stdout
     for name in names:
         if not args.json and sys.stderr.isatty():
             print(f"{name} ...", end="\r", file=sys.stderr, flush=True)
         with redirect_stdout(sys.stderr):  # What libraries have to say is no part of the list.
-            for measurement in _measured(name, args.seconds):
-                found.append(measurement)
-                if not args.json:
-                    print(_row(measurement), file=out, flush=True)
+            for found in _measured(name, args.seconds):
+                kept = kept and found.ok is not False
+                if args.json:
+                    print(",\n" + json.dumps(found.as_json()), end="", file=out, flush=True)
+                else:
+                    print(_row(found), file=out, flush=True)
     if args.json:
-        print(json.dumps([machine, *(measurement.as_json() for measurement in found)], indent=1))
-    return 1 if any(measurement.ok is False for measurement in found) else 0
+        print("\n]")
+    return 0 if kept else 1
 
 
 def _chosen(names: list[str]) -> list[str]:
@@ -88,68 +86,9 @@ def _measured(name: str, seconds: float) -> Iterable[Measurement | Absent]:
         from rcilab.bench.compare.comparison import compare
 
         return compare()
-    return (_bench(name, seconds)(),)
+    from rcilab.bench.apart import measure_apart
 
-
-def _bench(name: str, seconds: float) -> Callable[[], Measurement]:
-    """Returns a bench by name; what it needs is loaded now, so that it is not part of what the next one measures."""
-    if name == "client_answer":
-        from rcilab.bench.client import bench_client_answer
-
-        return bench_client_answer
-    if name.startswith("controller_") or name == "state_period":
-        from rcilab.bench import controller
-
-        return {
-            "controller_ideal": lambda: controller.bench_controller("ideal"),
-            "controller_mujoco": lambda: controller.bench_controller("mujoco"),
-            "controller_cartesian": controller.bench_controller_cartesian,
-            "controller_impedance": controller.bench_controller_impedance,
-            "state_period": controller.bench_state_period,
-        }[name]
-    if name in ("import", "start"):
-        from rcilab.bench import start
-
-        return {"import": start.bench_import, "start": start.bench_start}[name]
-    if name.startswith("lab_"):
-        from rcilab.bench import notebook
-
-        return notebook.bench_lab_shown if name == "lab_shown" else notebook.bench_lab_slider
-    if name in ("drag", "control_loop"):
-        from rcilab.bench import page
-
-        return page.bench_drag if name == "drag" else lambda: page.bench_control_loop(seconds)
-    if name in ("mirror", "scrub", "page_ready", "page_drag"):
-        from rcilab.bench import page_speed
-
-        return {
-            "mirror": page_speed.bench_mirror,
-            "scrub": page_speed.bench_scrub,
-            "page_ready": page_speed.bench_page_ready,
-            "page_drag": page_speed.bench_page_drag,
-        }[name]
-    if name in ("plan_line", "plan_arc", "replan"):
-        from rcilab.bench import paths
-
-        return {
-            "plan_line": paths.bench_plan_line,
-            "plan_arc": paths.bench_plan_arc,
-            "replan": paths.bench_replan,
-        }[name]
-    from rcilab.bench import compute
-
-    return {
-        "forward": compute.bench_forward,
-        "inverse": compute.bench_inverse,
-        "inverse_batch": compute.bench_inverse_batch,
-        "feasible_arcs": compute.bench_feasible_arcs,
-        "plan_joint": compute.bench_plan_joint,
-        "program": compute.bench_program,
-        "check": compute.bench_check,
-        "check_full": compute.bench_check_full,
-        "check_joint_rows": compute.bench_check_joint_rows,
-        "jog": compute.bench_jog,
-    }[name]
+    return (measure_apart(name, seconds),)
 
 
 def _print_machine(machine: dict[str, Any]) -> None:
@@ -161,11 +100,11 @@ def _print_machine(machine: dict[str, Any]) -> None:
 
 
 def _row(found: Measurement | Absent) -> str:
-    from rcilab.bench.compare.peer import Absent
-    from rcilab.bench.measure import plain
+    from rcilab.bench.measure import Absent, plain
 
     verdict = {True: "ok", False: "SLOW", None: "-"}[found.ok]
     if isinstance(found, Absent):
+        verdict = "FAIL" if found.ok is False else verdict
         numbers = f"{verdict:4} {found.name:20} {'-':>10} {'-':>10} {'-':>10}"
     else:
         target = "-" if found.target is None else f"{found.target:g}"

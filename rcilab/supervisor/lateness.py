@@ -21,6 +21,13 @@ LATE_AFTER = 1e-3  # [s] One cycle: the answer came when the next one was due.
 _SHOWN_EDGES = (0.0, 5.0, 10.0, 20.0, 30.0, 50.0, 75.0, 100.0, 150.0, 200.0, 300.0, 500.0, 750.0, 1000.0, 2000.0,
                 5000.0, 10000.0, np.inf)  # fmt: skip
 """Edges of the bins that people see, [us]."""
+_EDGES = np.array(_SHOWN_EDGES)
+_EDGES.flags.writeable = False
+_MIDDLES = 2.0 ** ((np.arange(BIN_COUNT) + 0.5) / BINS_PER_OCTAVE)
+_MIDDLES[0] = 0.5
+_SHOWN_BIN = np.searchsorted(_EDGES, _MIDDLES, side="right") - 1
+"""In which of the bins that people see a bin is counted."""
+_SHARES = np.array((0.5, 0.99, 0.999))
 
 
 class LatenessHistogram:
@@ -62,18 +69,13 @@ def late_cycles(words: memoryview) -> int:
 
 def summarise(words: memoryview) -> Lateness:
     """Returns the figures of a histogram that may still be counting."""
-    counts = np.array(words[:BIN_COUNT], dtype=np.int64)
-    total = int(counts.sum())
-    if total == 0:
-        return Lateness(edges=np.array(_SHOWN_EDGES), histogram=np.zeros(len(_SHOWN_EDGES) - 1, dtype=np.int64))
-    middles = 2.0 ** ((np.arange(BIN_COUNT) + 0.5) / BINS_PER_OCTAVE)
-    middles[0] = 0.5
-    largest = words[MAXIMUM] / 1e3
+    counts = np.frombuffer(words, dtype=np.int64, count=BIN_COUNT).copy()
     cumulative = np.cumsum(counts)
-    p50, p99, p999 = (
-        min(float(middles[np.searchsorted(cumulative, share * total)]), largest) for share in (0.5, 0.99, 0.999)
-    )
-    shown: NDArray[np.int64] = np.histogram(middles, bins=np.array(_SHOWN_EDGES), weights=counts)[0].astype(np.int64)
-    return Lateness(
-        p50=p50, p99=p99, p999=p999, max=largest, cycles=total, edges=np.array(_SHOWN_EDGES), histogram=shown
-    )
+    total = int(cumulative[-1])
+    shown: NDArray[np.int64] = np.bincount(_SHOWN_BIN, counts, len(_EDGES) - 1).astype(np.int64)
+    if total == 0:
+        return Lateness(edges=_EDGES, histogram=shown)
+    largest = words[MAXIMUM] / 1e3
+    places = np.searchsorted(cumulative, _SHARES * total)
+    p50, p99, p999 = np.minimum(_MIDDLES[places], largest).tolist()
+    return Lateness(p50=p50, p99=p99, p999=p999, max=largest, cycles=total, edges=_EDGES, histogram=shown)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,7 @@ class StatusReader:
     def __init__(self, block: ControlBlock) -> None:
         self._block = block
         self._ring = RingReader(block)
+        self._tool: tuple[bytes, Pose | None] = b"", None
 
     def read_snapshot(self) -> Snapshot:
         """Returns what the control process last said about itself."""
@@ -77,10 +79,17 @@ class StatusReader:
         }
 
     def _read_tool(self) -> Pose | None:
-        numbers = self._block.tool.tolist()
-        if numbers[15] != 1.0:
-            return None
-        try:
-            return Pose.from_row_major(numbers)
-        except InvalidValueError:  # It is being written at this moment.
-            return None
+        """Returns the tool; the same pose for as long as the same numbers stand there."""
+        raw = self._block.tool.tobytes()
+        if raw != self._tool[0]:
+            self._tool = raw, _pose(self._block.tool.tolist())
+        return self._tool[1]
+
+
+def _pose(numbers: Sequence[float]) -> Pose | None:
+    if numbers[15] != 1.0:
+        return None
+    try:
+        return Pose.from_row_major(numbers)
+    except InvalidValueError:  # It is being written at this moment.
+        return None

@@ -50,9 +50,11 @@ from rcilab.workbench.widgets import Ask
 if TYPE_CHECKING:
     import viser
 
+    from rcilab.supervisor import SupervisorStatus
     from rcilab.workbench.store import UiState
 
 _PERIOD = 1.0 / 30.0  # [s] A choice: the display's rate is enough, and it leaves the processor to the robot.
+_AT_REST = 0.12  # [s] A choice: so often counters and clocks are shown while nothing else changes.
 _MAIN_WIDTH, _TIMELINE_WIDTH = 352, 380  # [px]
 _TABS = (
     ("tab.jog", "adjustments-horizontal", JogPanel, ToolJogPanel, PosesPanel),
@@ -87,6 +89,8 @@ class Presenter:
         self._window: Any = None  # Of the timeline.
         self._built: tuple[object, ...] | None = None
         self._theme = ""
+        self._shown: tuple[object, ...] = ()
+        self._next = 0.0
         self._ending = threading.Event()
         self._thread: threading.Thread | None = None
         self.errors: list[BaseException] = []
@@ -105,18 +109,26 @@ class Presenter:
             self._thread.join(5.0)
 
     def show(self) -> None:
-        """Shows one snapshot."""
+        """Shows one snapshot; one that looks like the last costs next to nothing, but for now and then."""
         state, status = self._store.state, self._session.status()
+        shown, now = (state, *_traits(status)), time.monotonic()
+        if shown == self._shown and now < self._next:
+            return
+        self._draw(state, status)
+        self._shown, self._next = shown, now + _AT_REST
+
+    def _draw(self, state: UiState, status: SupervisorStatus) -> None:
+        """Shows a snapshot: first what is in the scene, since a hand may be dragging it."""
         if _looks(state) != self._built:
             self._build(state)
         if state.theme != self._theme:
             self._theme = state.theme
             dress(self._server, state.theme)
         seen = exhibited(state)
-        for panel in self._panels:
-            panel.show(seen if panel is self._timeline else state, status)
         self._stage.show(exhibited(state, scene=True), status, self._text)
         self._marks.show(seen)
+        for panel in self._panels:
+            panel.show(seen if panel is self._timeline else state, status)
         self._live.publish(**status_values(seen, status, self._text, self._timeline.end))
 
     def _build(self, state: UiState) -> None:
@@ -158,6 +170,15 @@ class Presenter:
                 self.errors.append(error)
                 traceback.print_exc(file=sys.stderr)
             self._ending.wait(max(0.0, deadline - time.monotonic()))
+
+
+def _traits(status: SupervisorStatus) -> tuple[object, ...]:
+    """Returns what of the robot side is shown at once when it changes; the rest counts up all the time."""
+    q, q_c = ((None if angles is None else angles.tobytes()) for angles in (status.q, status.q_c))
+    return (
+        status.phase, status.code, status.message, status.incident, status.address, status.robot_mode, status.faults,
+        status.powered, status.T_flange_tool, status.setup, status.pace, q, q_c,
+    )  # fmt: skip
 
 
 def _looks(state: UiState) -> tuple[object, ...]:

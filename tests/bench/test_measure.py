@@ -44,6 +44,15 @@ def test_a_motion_to_stream_takes_as_long_as_asked_and_conforms(duration: float)
     assert check(motion, model).ok
 
 
+def test_a_motion_from_the_far_end_leads_back_home() -> None:
+    model = load_model("xMatePro7")
+    there = motion_of(model, 6.0, model.home)
+    back = motion_of(model, 6.0, there.goal)
+    assert back.goal == pytest.approx(model.home)
+    assert back.duration == pytest.approx(there.duration)
+    assert check(back, model).ok
+
+
 def test_the_cost_by_length_names_every_length_beside_the_median_of_its_calls() -> None:
     called: list[object] = []
     words = cost_by_length(called.append, [(1.0, ["a"]), (97.16, ["b", "c", "d"])])

@@ -21,7 +21,7 @@ from rcilab.workbench.lease import Lease
 from rcilab.workbench.run import push_actions
 from rcilab.workbench.run.actions import RobotActions
 from rcilab.workbench.run.push_actions import PushActions
-from rcilab.workbench.run.pushing import SPRING, STRONGEST, place_of, spring_force
+from rcilab.workbench.run.pushing import SPRING, STRONGEST, TOOL, place_of, spring_force
 from rcilab.workbench.store import Store, UiState
 from tests.workbench.opened import opened, told, wait
 
@@ -252,3 +252,57 @@ def test_a_guided_arm_follows_the_button(bench):
     ask(requests.Drive(what="unguide"))
     wait(lambda: bench.session.status().code == "idle.guided", "the arm to be held again")
     wait(lambda: bench.store.state.push.acting is None, "the push to end")
+
+
+@pytest.mark.parametrize("mode", ["joint_impedance", "cartesian_impedance"])
+def test_an_arm_that_is_pushed_in_a_soft_motion_gives_way_comes_back_arrives_and_is_recorded(bench, mode):
+    ask, status = bench.conductor.ask, bench.session.status
+    wait(lambda: status().phase == "idle" and bool(status().powered) and told(bench) != "notice.moving", "a rest")
+    if bench.store.state.plant != "mujoco":
+        pid = status().controller_pid
+        ask(requests.ChooseRobot(plant="mujoco"))
+        wait(lambda: status().controller_pid not in (None, pid), "another controller")
+        wait(lambda: status().phase == "idle" and bool(status().powered), "a powered arm")
+    ask(requests.SetDrive(mode=mode))
+    ask(requests.SetPush(link=TOOL, direction="+z", newtons=40.0))
+    ask(requests.SetSpeed(speed=0.08))
+    last, q = bench.store.state.last_run, status().q_c
+    angle = float(q[0]) + (0.5 if q[0] < 0.1 else -0.5)
+    ask(requests.MoveJoint(joint=0, angle=angle))
+
+    def planned() -> bool:
+        plan = bench.store.state.plan
+        return plan is not None and plan.complete and plan.mode == mode and abs(plan.motion.goal[0] - angle) < 1e-9
+
+    wait(planned, "a plan that was judged for the mode")
+    motion = bench.store.state.plan.motion
+    ask(requests.Drive(what="execute"))
+    wait(lambda: status().code == "moving" and (status().motion_time or 0.0) > 0.3, "the arm on its way")
+
+    def height() -> float:
+        """How far the tool is above where it is told to be, [m]."""
+        now = status()
+        return float(MODEL.forward(now.q).position[2] - MODEL.forward(now.q_c).position[2])
+
+    still = height()
+
+    def given_way() -> bool:
+        ask(requests.HoldPush())
+        return height() > still + 0.003
+
+    wait(given_way, "the arm to give way")
+    assert status().code == "moving"
+    wait(lambda: bench.store.state.push.acting is None, "the push to end")
+    wait(lambda: abs(height() - still) < 0.001, "the arm to come back")
+    assert status().code == "moving", "it came back while it went on"
+    wait(lambda: (r := bench.store.state.last_run) not in (None, last) and r.run is not None, "the arrival")
+    assert (status().code, status().faults) == ("idle.arrived", ())
+    run = bench.store.state.last_run.run
+    assert (run.setup.mode, run.setup.plant, run.stopped) == (mode, "mujoco", None)
+    assert run.plan.goal == pytest.approx(motion.goal, abs=1e-9)
+    away = [
+        MODEL.forward(q).position[2] - MODEL.forward(q_c).position[2]
+        for q, q_c in zip(run.cycles["q"][::20], run.cycles["q_c"][::20], strict=True)
+    ]
+    assert max(away) > still + 0.002, "the recording shows the push"
+    ask(requests.SetDrive(mode="joint_position"))

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from rcilab.bench.compare.inverse import compare_inverse
-from rcilab.bench.compare.peer import Absent
 from rcilab.bench.compare.timing import compare_timing
-from rcilab.bench.measure import Measurement
+from rcilab.bench.measure import Absent, Measurement
 from rcilab.model import load_model
 
 _ROBOT = "xMatePro7"

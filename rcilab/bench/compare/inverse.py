@@ -10,8 +10,8 @@ import numpy as np
 
 from rcilab.arrays import Array, JointPath, JointVector
 from rcilab.bench.compare import closed_form, iterative
-from rcilab.bench.compare.peer import Absent, Solver, absent
-from rcilab.bench.measure import Measurement, summarise
+from rcilab.bench.compare.peer import Solver, absent
+from rcilab.bench.measure import Absent, Measurement, summarise
 from rcilab.errors import UnreachableError
 from rcilab.model import RobotModel
 

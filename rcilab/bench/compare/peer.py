@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
-from typing import Any, TypeAlias
+from dataclasses import dataclass
+from typing import TypeAlias
 
 from rcilab.arrays import Array, JointVector
+from rcilab.bench.measure import Absent
 
 Solve: TypeAlias = Callable[[Array, JointVector], Sequence[JointVector] | Array]
 """From a pose of the flange in base, (4, 4), and joint angles to start from, (n,), [rad], to the answers."""
@@ -28,23 +29,6 @@ class Solver:
     solve: Solve
     about: str
     """Who it is, in which version, and how it was asked."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Absent:
-    """A row that cannot be measured here, because its package is not installed."""
-
-    name: str
-    note: str
-    """What to install."""
-
-    @property
-    def ok(self) -> None:
-        """Nothing is promised."""
-
-    def as_json(self) -> dict[str, Any]:
-        """Returns an entry with the keys of a `Measurement`, its figures null."""
-        return dict.fromkeys(("name", "median", "p99", "unit", "target", "ok")) | asdict(self)
 
 
 def absent(name: str, error: ModuleNotFoundError) -> Absent:

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from rcilab.arrays import Array, JointVector
-from rcilab.bench.compare.peer import Absent, absent
-from rcilab.bench.measure import Measurement, summarise
+from rcilab.bench.compare.peer import absent
+from rcilab.bench.measure import Absent, Measurement, summarise
 from rcilab.clock import CYCLE_TIME
 from rcilab.errors import PlanningError
 from rcilab.model import RobotModel

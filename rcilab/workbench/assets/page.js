@@ -194,7 +194,7 @@
     if (held && !holds(event.target)) return;  // Another finger beside the one that holds a button.
     letGo();
     held = event;
-    watchHeld();
+    if (event.target instanceof Element && event.target.closest("button")) watchHeld();  // It costs a layout each time.
   }, true);
   for (const kind of ["pointerup", "pointercancel"]) {
     window.addEventListener(kind, (event) => {

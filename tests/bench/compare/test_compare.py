@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 
 from rcilab.bench.compare import comparison, peer, timing
 from rcilab.bench.compare.inverse import Tally, compare_inverse, pose_errors
-from rcilab.bench.compare.peer import Absent, absent
-from rcilab.bench.measure import Measurement
+from rcilab.bench.compare.peer import absent
+from rcilab.bench.measure import Absent, Measurement
 from rcilab.cli import main
 from rcilab.model import load_model
 from rcilab.spatial import Pose
