@@ -9,6 +9,7 @@ from rcilab.conformance.catalogue import Language, Phrase, load_catalogue, say
 from rcilab.conformance.condition import Condition
 from rcilab.conformance.report import LISTED, ConditionResult, Report, Violation
 from rcilab.conformance.wording import amount, with_degrees
+from rcilab.language import require_language
 
 if TYPE_CHECKING:
     from rcilab.conformance.slow_down import SlowDown
@@ -23,7 +24,7 @@ def explain_report(report: Report, language: Language = "en") -> str:
     Raises:
         InvalidValueError: There is no such language.
     """
-    lines = [_verdict(report, language)]
+    lines = [explain_verdict(report, language)]
     found = (*report.violations, *report.warnings)
     lines += [f"- {explain_violation(violation, language)}" for violation in found[:LISTED]]
     if len(found) > LISTED:
@@ -46,6 +47,15 @@ def explain_violation(violation: Violation, language: Language = "en") -> str:
     return say(language, "gap").join((*sentences, say(language, "remedy", advice=advice)))
 
 
+def explain_source(condition: Condition, language: Language = "en") -> str:
+    """Returns where a condition and its bound come from; as it was written where nobody has translated it.
+
+    Raises:
+        InvalidValueError: There is no such language.
+    """
+    return load_catalogue(require_language(language)).get(f"source.{condition.source}", condition.source)
+
+
 def explain_slow_down(result: SlowDown, language: Language = "en") -> str:
     """Returns what a slow-down does to a motion, in a sentence.
 
@@ -57,7 +67,7 @@ def explain_slow_down(result: SlowDown, language: Language = "en") -> str:
     if row is None:
         text = say(language, "slow_down.none")
     else:
-        place, what = explain_place(row, language), _quantity(row.condition, language)
+        place, what = explain_place(row, language), explain_quantity(row.condition, language)
         if result.obstacle is not None:
             time = f"{row.time / (1.0 if result.obstacle == 'position' else result.at_most):.3f}"
             key = f"slow_down.{result.obstacle}"
@@ -75,11 +85,16 @@ def explain_slow_down(result: SlowDown, language: Language = "en") -> str:
         )
     if not result.unmet:
         return text
-    names = say(language, "comma").join(_quantity(row, language) for row in result.unmet)
+    names = say(language, "comma").join(explain_quantity(row, language) for row in result.unmet)
     return say(language, "gap").join((text, say(language, "slow_down.warned", at_most=at_most, quantities=names)))
 
 
-def _verdict(report: Report, language: Language) -> str:
+def explain_verdict(report: Report, language: Language = "en") -> str:
+    """Returns the verdict of a report in a sentence or two.
+
+    Raises:
+        InvalidValueError: There is no such language.
+    """
     if not report.ok:
         is_noticed = any(violation.fault is not None for violation in report.violations)
         key = "verdict.broken" if is_noticed else "verdict.collides"
@@ -106,7 +121,7 @@ def _nearest(row: ConditionResult, language: Language) -> str:
         language,
         "verdict.nearest",
         place=explain_place(row, language),
-        quantity=_quantity(row.condition, language),
+        quantity=explain_quantity(row.condition, language),
         value=value,
         bound=bound,
         share=_share(row.ratio, language),
@@ -117,7 +132,7 @@ def _nearest(row: ConditionResult, language: Language) -> str:
 def _fact(violation: Violation, language: Language) -> str:
     """Returns what is broken, where and by how much."""
     row = violation.condition
-    place, quantity = explain_place(violation, language), _quantity(row, language)
+    place, quantity = explain_place(violation, language), explain_quantity(row, language)
     if row.signal == "frame":
         return say(language, "fact.frame", place=place, quantity=quantity)
     value, bound = _amounts(row, violation.value, violation.bound, language)
@@ -175,7 +190,12 @@ def _link(number: int, language: Language) -> str:
     return say(language, f"place.{key}", number=str(number))
 
 
-def _quantity(row: Condition, language: Language) -> str:
+def explain_quantity(row: Condition, language: Language = "en") -> str:
+    """Returns what a condition judges.
+
+    Raises:
+        InvalidValueError: There is no such language.
+    """
     return load_catalogue(language).get(f"quantity.{row.id}", row.quantity)
 
 

@@ -117,12 +117,20 @@ def make_plan(
         motion = _go(model, start, goal, speed, law, kind, via)
         report = check(motion, model, start=start, box=box, distance=None)
     except RcilabError as error:
-        return message("plan.failed", error=str(error))
+        return why_no_plan(error)
     away = int(np.abs(motion.goal - goal).argmax())
     note = None
     if abs(float(motion.goal[away] - goal[away])) > SAME_WAY:
         note = message("plan.other_way", joint=away + 1)
     return replace(picture(model, motion, report, box), kind=kind, note=note)
+
+
+def why_no_plan(error: RcilabError) -> Message:
+    """Returns why there is no plan; where a way is blocked, how far along."""
+    share = getattr(error, "share", None)
+    if share is None:
+        return message("plan.failed", error=str(error))
+    return message("plan.blocked", share=f"{100.0 * share:.0f}", error=str(error))
 
 
 def _go(

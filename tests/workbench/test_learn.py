@@ -10,13 +10,13 @@ import pytest
 
 from rcilab.faults import Fault
 from rcilab.gallery import FAULTS
+from rcilab.gallery.shown import body_html, head_html
 from rcilab.model import load_model
 from rcilab.workbench import requests
 from rcilab.workbench.goal.actions import GoalActions, initial_goal
 from rcilab.workbench.learn.actions import LearnActions
 from rcilab.workbench.learn.lessons import LESSONS
 from rcilab.workbench.learn.state import exhibited
-from rcilab.workbench.panels.learn_exhibit import body_html, head_html
 from rcilab.workbench.panels.learn_lesson import steps_html
 from rcilab.workbench.store import Recording, Store, UiState
 from rcilab.workbench.text import LANGUAGES, Text, load_catalogue

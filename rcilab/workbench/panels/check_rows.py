@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING
 
-from rcilab.conformance.explain import explain_place
-from rcilab.language import Language
+from rcilab.conformance.explain import explain_place, explain_source
+from rcilab.words.shown import number, pretty_unit
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import esc
 
@@ -30,9 +30,9 @@ def row_html(row: ConditionResult, model: RobotModel, chosen: str, text: Text) -
     """Returns one row."""
     condition, tone = row.condition, row_tone(row)
     word = text("check.kept" if tone == "good" else "check.broken" if tone == "bad" else _AMBER[not row.ok])
-    facts = [f"{number(row.value)} / {number(row.bound)} {pretty_unit(condition.unit)}"]
+    facts = [f"{number(row.value)} / {number(row.bound)} {pretty_unit(condition.unit, text)}"]
     if row.links is not None:
-        facts.append(explain_place(row, cast(Language, text.language)))
+        facts.append(explain_place(row, text.language))
     elif row.joint:
         facts.append(text("check.joint", joint=row.joint))
     facts.append(f"t = {row.time:.3f} s")
@@ -42,6 +42,7 @@ def row_html(row: ConditionResult, model: RobotModel, chosen: str, text: Text) -
     if condition.fault is not None:
         fault = f"<br>{esc(text('check.raises', fault=condition.fault.manual_name))}"
     current = ' aria-current="true"' if condition.id == chosen else ""
+    source = explain_source(condition, text.language)
     return (
         f'<div class="rl-card rl-{tone}" role="button" tabindex="0" data-say="{esc(condition.id)}"{current} '
         f'title="{esc(text("check.row_hint"))}">'
@@ -50,7 +51,7 @@ def row_html(row: ConditionResult, model: RobotModel, chosen: str, text: Text) -
         f'<div class="rl-meter"><i style="width:{min(100.0, 100.0 * row.ratio):.1f}%"></i></div>'
         f'<div class="rl-facts"><span class="rl-badge">{esc(text("necessity." + condition.necessity))}</span> '
         f"{esc(' · '.join(facts))}</div>"
-        f'<div class="rl-source">{esc(condition.formula)} — {esc(condition.source)}{fault}</div></div>'
+        f'<div class="rl-source">{esc(condition.formula)} — {esc(source)}{fault}</div></div>'
     )
 
 
@@ -69,14 +70,3 @@ def load_words(model: RobotModel, text: Text) -> str:
     """Returns which load the torques of a row were computed with."""
     mass = model.load.mass
     return text("check.load", mass=f"{mass:g}") if mass > 0.0 else text("check.no_load")
-
-
-def pretty_unit(unit: str) -> str:
-    """Returns a unit with raised digits."""
-    return unit.replace("^2", "²").replace("^3", "³")
-
-
-def number(value: float) -> str:
-    """Returns a number with four digits, without an exponent where it can be read without."""
-    size = abs(value)
-    return f"{value:.0f}" if size >= 1000.0 else f"{value:.4g}" if size >= 1e-3 or size == 0.0 else f"{value:.1e}"
