@@ -19,6 +19,7 @@ from rcilab.notebook.exhibit_plot import draw_exhibit
 from rcilab.notebook.flight_recorder import record_html
 from rcilab.notebook.look import block, esc, problem, soft, verdict, write
 from rcilab.notebook.part import Part
+from rcilab.words.text import Text
 
 _LOOK = 0.1  # [s] Between two looks at what is being provoked.
 
@@ -87,20 +88,13 @@ class FaultPanel(Part):
     def _tell(self, said: str = "") -> None:
         fault, text, exhibit = self.fault.value, self.text, self.exhibit
         has_no_elbow = FAULTS[fault].needs_elbow and self.model.n != 7
-        self.provoke.disabled = has_no_elbow or self._work.progress is not None
         if exhibit is not None and exhibit.fault is fault:
-            write(self._told, said + _exhibit_html(exhibit, text))
-            return
-        remedy = f"remedy.{fault.name}"
-        write(
-            self._told,
-            f'{said}<div class="rl-card rl-none"><b>{esc(fault.manual_name)}</b> '
-            f'<span class="rl-soft">{esc(text("fault.bit", bit=int(fault)))}</span>'
-            f"<p>{esc(text(f'fault.{fault.name}'))}</p>"
-            f'<p class="rl-soft">{esc(text("run.remedy"))} '
-            f"{esc(text(remedy) if text.has(remedy) else text('remedy.smoothness'))}</p></div>"
-            + soft(text("fault.no_elbow", model=self.model.name) if has_no_elbow else text("fault.private")),
-        )
+            told = _exhibit_html(exhibit, text)
+        else:
+            note = text("fault.no_elbow", model=self.model.name) if has_no_elbow else text("fault.private")
+            told = _card_html(fault, text) + soft(note)
+        write(self._told, said + told)
+        self.provoke.disabled = has_no_elbow or self._work.progress is not None
 
     def _provoke(self) -> None:
         self._end_watch()
@@ -156,7 +150,18 @@ class FaultPanel(Part):
         return button
 
 
-def _exhibit_html(exhibit: Exhibit, text: Any) -> str:
+def _card_html(fault: Fault, text: Text) -> str:
+    remedy = f"remedy.{fault.name}"
+    return (
+        f'<div class="rl-card rl-none"><b>{esc(fault.manual_name)}</b> '
+        f'<span class="rl-soft">{esc(text("fault.bit", bit=int(fault)))}</span>'
+        f"<p>{esc(text(f'fault.{fault.name}'))}</p>"
+        f'<p class="rl-soft">{esc(text("run.remedy"))} '
+        f"{esc(text(remedy) if text.has(remedy) else text('remedy.smoothness'))}</p></div>"
+    )
+
+
+def _exhibit_html(exhibit: Exhibit, text: Text) -> str:
     picture = draw_exhibit(exhibit, text(f"condition.{exhibit.condition.id}"), text("plot.time"))
     script = f"<details><summary>{esc(text('learn.script'))}</summary><pre>{esc(exhibit.script)}</pre></details>"
     return f"{head_html(exhibit, text)}{picture}{body_html(exhibit, text)}{script}"
