@@ -43,6 +43,14 @@ def test_the_program_written_by_hand_is_sound_and_the_one_from_python_runs(tmp_p
     assert said.getvalue().endswith(" 2\n")
 
 
+def test_the_parts_of_the_lab_combine_around_a_session_as_printed() -> None:
+    code = re.findall(r"```python\n(.*?)```", README, re.DOTALL)[2]
+    end = "assert plan.state is run.state is scene.state\nrobot.close()\n"
+    result = subprocess.run([sys.executable, "-c", code + end], capture_output=True, text=True, timeout=60, cwd=ROOT)
+    assert result.returncode == 0, result.stderr
+    assert "conforms" in result.stdout
+
+
 def test_both_set_up_commands_stand_on_a_line_of_their_own() -> None:
     lines = README.splitlines()
     assert "python3 -m venv .venv && .venv/bin/pip install -e . && .venv/bin/rcilab" in lines

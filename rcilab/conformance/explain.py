@@ -45,7 +45,7 @@ def explain_report(
         InvalidValueError: There is no such language.
     """
     voice = _Voice(language, units)
-    lines = [_verdict(report, voice)]
+    lines = [explain_verdict(report, language, units)]
     found = (*report.violations, *report.warnings)
     lines += [f"- {explain_violation(violation, language, units)}" for violation in found[:LISTED]]
     if len(found) > LISTED:
@@ -81,7 +81,7 @@ def explain_slow_down(result: SlowDown, language: Language = "en") -> str:
     if row is None:
         text = say(language, "slow_down.none")
     else:
-        place, what = explain_place(row, language), _quantity(row.condition, voice)
+        place, what = explain_place(row, language), explain_quantity(row.condition, voice.language)
         if result.obstacle is not None:
             time = f"{row.time / (1.0 if result.obstacle == 'position' else result.at_most):.3f}"
             key = f"slow_down.{result.obstacle}"
@@ -99,11 +99,17 @@ def explain_slow_down(result: SlowDown, language: Language = "en") -> str:
         )
     if not result.unmet:
         return text
-    names = say(language, "comma").join(_quantity(row, voice) for row in result.unmet)
+    names = say(language, "comma").join(explain_quantity(row, voice.language) for row in result.unmet)
     return say(language, "gap").join((text, say(language, "slow_down.warned", at_most=at_most, quantities=names)))
 
 
-def _verdict(report: Report, voice: _Voice) -> str:
+def explain_verdict(report: Report, language: Language = "en", units: Units | None = None) -> str:
+    """Returns the verdict of a report in a sentence or two.
+
+    Raises:
+        InvalidValueError: There is no such language.
+    """
+    voice = _Voice(language, units)
     if not report.ok:
         is_noticed = any(violation.fault is not None for violation in report.violations)
         key = "verdict.broken" if is_noticed else "verdict.collides"
@@ -129,7 +135,7 @@ def _nearest(row: ConditionResult, voice: _Voice) -> str:
     return voice.say(
         "verdict.nearest",
         place=explain_place(row, voice.language),
-        quantity=_quantity(row.condition, voice),
+        quantity=explain_quantity(row.condition, voice.language),
         value=value,
         bound=bound,
         share=_share(row.ratio, voice),
@@ -140,7 +146,7 @@ def _nearest(row: ConditionResult, voice: _Voice) -> str:
 def _fact(violation: Violation, voice: _Voice) -> str:
     """Returns what is broken, where and by how much."""
     row = violation.condition
-    place, quantity = explain_place(violation, voice.language), _quantity(row, voice)
+    place, quantity = explain_place(violation, voice.language), explain_quantity(row, voice.language)
     if row.signal == "frame":
         return voice.say("fact.frame", place=place, quantity=quantity)
     value, bound = _amounts(row, violation.value, violation.bound, voice)
@@ -191,6 +197,15 @@ def explain_place(found: ConditionResult | Violation, language: Language = "en")
     return say(language, f"place.{'joint' if row.is_per_joint else row.place(found.joint)}", axis=axis)
 
 
+def explain_quantity(row: Condition, language: Language = "en") -> str:
+    """Returns what a condition judges.
+
+    Raises:
+        InvalidValueError: There is no such language.
+    """
+    return load_catalogue(language).get(f"quantity.{row.id}", row.quantity)
+
+
 def explain_source(row: Condition, language: Language = "en") -> str:
     """Returns where a condition and its bound come from; sources without other words keep their English ones.
 
@@ -205,10 +220,6 @@ def _link(number: int, voice: _Voice) -> str:
 
     key = {FLOOR: "floor", TOOL: "tool", 0: "base"}.get(number, "link")
     return voice.say(f"place.{key}", number=str(number))
-
-
-def _quantity(row: Condition, voice: _Voice) -> str:
-    return load_catalogue(voice.language).get(f"quantity.{row.id}", row.quantity)
 
 
 def _amounts(row: Condition, value: float, bound: float, voice: _Voice) -> tuple[str, str]:

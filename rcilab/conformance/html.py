@@ -5,6 +5,15 @@ from __future__ import annotations
 from html import escape
 from typing import TYPE_CHECKING
 
+from rcilab.conformance.catalogue import Language, say
+from rcilab.conformance.explain import (
+    explain_place,
+    explain_quantity,
+    explain_source,
+    explain_verdict,
+    explain_violation,
+)
+
 if TYPE_CHECKING:
     from rcilab.conformance.report import ConditionResult, Report
 
@@ -13,20 +22,28 @@ COLORS = {"ok": "#1a7f37", "advice": "#b26a00", "violated": "#c62828"}
 
 _LISTED = 8
 _CELL = 'style="text-align:left;white-space:nowrap;padding:2px 10px"'
-_HEADINGS = ("", "condition", "worst", "bound", "used", "where", "t [s]", "source")
+_HEADINGS = ("condition", "worst", "bound", "used", "where", "time", "source")
 
 
-def report_html(report: Report) -> str:
-    """Returns a table with one row a condition, then a sentence a violation."""
+def report_html(report: Report, language: Language = "en") -> str:
+    """Returns a table with one row a condition, then a sentence a violation.
+
+    Raises:
+        InvalidValueError: There is no such language.
+    """
     verdict = "ok" if report.ok and not report.warnings else "advice" if report.ok else "violated"
-    head = "".join(f"<th {_CELL}>{heading}</th>" for heading in _HEADINGS)
-    body = "".join(_row(row) for row in report.rows)
+    headings = ("", *(say(language, f"html.{heading}") for heading in _HEADINGS))
+    head = "".join(f"<th {_CELL}>{heading}</th>" for heading in headings)
+    body = "".join(_row(row, language) for row in report.rows)
+    is_english = language == "en"
+    told = str(report).splitlines()[1] if is_english else explain_verdict(report, language)
     found = (*report.violations, *report.warnings)
-    items = "".join(f"<li>{escape(str(violation))}</li>" for violation in found[:_LISTED])
+    sentences = [str(item) if is_english else explain_violation(item, language) for item in found[:_LISTED]]
+    items = "".join(f"<li>{escape(sentence)}</li>" for sentence in sentences)
     if len(found) > _LISTED:
-        items += f"<li>… and {len(found) - _LISTED} more</li>"
+        items += f"<li>{say(language, 'html.more', count=str(len(found) - _LISTED))}</li>"
     return (
-        f'<div><b style="color:{COLORS[verdict]}">{escape(str(report).splitlines()[1])}</b>'
+        f'<div><b style="color:{COLORS[verdict]}">{escape(told)}</b>'
         f"<br>{escape(report.title)}"
         f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
         + (f"<ul>{items}</ul>" if items else "")
@@ -34,21 +51,24 @@ def report_html(report: Report) -> str:
     )
 
 
-def _row(row: ConditionResult) -> str:
+def _row(row: ConditionResult, language: Language) -> str:
     value, bound, used = row.texts
+    place, quantity = row.place, row.condition.quantity  # In English as short as in `print(report)`.
+    if language != "en":
+        place, quantity = explain_place(row, language), explain_quantity(row.condition, language)
     unit = escape(row.unit).replace("^2", "²").replace("^3", "³")
-    name = f'<span title="{escape(row.condition.formula)}">{escape(row.condition.quantity)}</span>'
+    name = f'<span title="{escape(row.condition.formula)}">{escape(quantity)}</span>'
     if row.necessity == "recommended":
-        name += " <i>(recommended)</i>"
-    mark = f'<b style="color:{COLORS[row.verdict]}">{row.verdict}</b>'
+        name += f" <i>{say(language, 'html.recommended')}</i>"
+    mark = f'<b style="color:{COLORS[row.verdict]}">{say(language, f"html.{row.verdict}")}</b>'
     cells = (
         mark,
         name,
         f"{value} {unit}",
         f"{bound} {unit}",
         used,
-        row.place,
+        place,
         f"{row.time:.3f}",
-        escape(row.source),
+        escape(explain_source(row.condition, language)),
     )
     return "<tr>" + "".join(f"<td {_CELL}>{cell}</td>" for cell in cells) + "</tr>"

@@ -1,26 +1,34 @@
-"""Faults: every one of the manual's with its cause and remedy, and the flight recorder of the last stop."""
+"""Faults: each of the manual's, really provoked on a private controller, and the flight recorder of the last stop."""
 
 from __future__ import annotations
 
+import threading
+from functools import partial
 from typing import Any
 
 import ipywidgets
-import numpy as np
-from numpy.typing import NDArray
 
+from rcilab.background import Background
+from rcilab.errors import RcilabError
 from rcilab.faults import Fault
-from rcilab.notebook.look import block, esc, head, soft, table, verdict, write
+from rcilab.gallery.exhibit import Exhibit
+from rcilab.gallery.private_arm import PrivateArm
+from rcilab.gallery.shown import body_html, head_html
+from rcilab.gallery.table import FAULTS
+from rcilab.notebook.exhibit_plot import draw_exhibit
+from rcilab.notebook.flight_recorder import record_html
+from rcilab.notebook.look import block, esc, problem, soft, verdict, write
 from rcilab.notebook.part import Part
-from rcilab.notebook.svg_plot import Panel, draw
-from rcilab.views.plots import Quantity, build_frame, recorded_curves
+from rcilab.words.text import Text
 
-_RECORDED = 400  # Cycles before the end that are drawn; a choice: 0.4 s.
-_LISTED = 8
-_QUANTITIES: tuple[Quantity, ...] = ("dq", "ddq", "jerk")
+_LOOK = 0.1  # [s] Between two looks at what is being provoked.
 
 
 class FaultPanel(Part):
     """The twenty faults, which of them are set now, and the last milliseconds before a stop.
+
+    "Provoke" has the chosen fault happen on a private virtual controller, which nobody else sees and which ends with
+    this panel; the robot of the notebook is not touched.
 
     Args:
         subject: A model, a session, or another part to look at the same arm as.
@@ -30,17 +38,39 @@ class FaultPanel(Part):
     def __init__(self, subject: object, *, language: str = "en") -> None:
         super().__init__(subject, language)
         text = self.text
+        self.exhibit: Exhibit | None = None
+        """The fault on show; None as long as none was provoked."""
         self._now, self._told, self._record = block(), block(), block()
         self._set: tuple[Fault, ...] | None = None
+        self._arm = PrivateArm()
+        self._work: Background[Fault, Exhibit] = Background("rcilab-gallery")
+        self._ending = threading.Event()
+        self._watcher: threading.Thread | None = None
         self.fault: Any = ipywidgets.Dropdown(
-            description=text("fault.which"), options=[(fault.manual_name, fault) for fault in Fault],
-            layout=ipywidgets.Layout(width="100%", max_width="40em"),
+            description=text("fault.which"), layout=ipywidgets.Layout(width="100%", max_width="46em"),
+            options=[(f"{text(f'learn.fault.{fault.name}')} · {fault.manual_name}", fault) for fault in Fault],
         )  # fmt: skip
+        self.provoke = self._button("fault.provoke", self._provoke, icon="bolt", tooltip=text("fault.provoke_hint"))
+        self.cancel = self._button("learn.cancel", self.halt, icon="times")
+        self.progress = ipywidgets.FloatProgress(min=0.0, max=1.0, layout=ipywidgets.Layout(width="14em"))
+        self._buttons = ipywidgets.HBox(
+            [self.provoke, self.progress, self.cancel], layout=ipywidgets.Layout(align_items="center")
+        )
+        self.build([self._now, self.fault, self._buttons, self._told, self._record], min_width="360px")
         self.fault.observe(lambda _: self._tell(), names="value")
-        self.build([self._now, self.fault, self._told, self._record], min_width="360px")
-        self._tell()
+        self._rest()
         self.hear("robot", self._show)
-        self.hear("run", self._show_record)
+        self.hear("run", lambda: write(self._record, record_html(self.state, self.text)))
+
+    def halt(self) -> None:
+        """Gives up what is being provoked; the private arm is brought to rest beside."""
+        self._work.cancel()
+
+    def end(self) -> None:
+        """Ends the private controller."""
+        self._end_watch()
+        self._work.cancel()
+        self._arm.close()
 
     def _show(self) -> None:
         status, text = self.state.status, self.text
@@ -55,61 +85,83 @@ class FaultPanel(Part):
         write(self._now, verdict("bad", "◆", text("fault.now", faults=names)))
         self.fault.value = faults[0]
 
-    def _tell(self) -> None:
-        fault, text = self.fault.value, self.text
-        remedy = f"remedy.{fault.name}"
-        write(
-            self._told,
-            f'<div class="rl-card rl-none"><b>{esc(fault.manual_name)}</b> '
-            f'<span class="rl-soft">{esc(text("fault.bit", bit=int(fault)))}</span>'
-            f"<p>{esc(text(f'fault.{fault.name}'))}</p>"
-            f'<p class="rl-soft">{esc(text("run.remedy"))} '
-            f"{esc(text(remedy) if text.has(remedy) else text('remedy.smoothness'))}</p></div>",
+    def _tell(self, said: str = "") -> None:
+        fault, text, exhibit = self.fault.value, self.text, self.exhibit
+        has_no_elbow = FAULTS[fault].needs_elbow and self.model.n != 7
+        if exhibit is not None and exhibit.fault is fault:
+            told = _exhibit_html(exhibit, text)
+        else:
+            note = text("fault.no_elbow", model=self.model.name) if has_no_elbow else text("fault.private")
+            told = _card_html(fault, text) + soft(note)
+        write(self._told, said + told)
+        self.provoke.disabled = has_no_elbow or self._work.progress is not None
+
+    def _provoke(self) -> None:
+        self._end_watch()
+        fault: Fault = self.fault.value
+        self.exhibit = None
+        self._work.start(fault, partial(self._arm.provoke, fault, self.model.name))
+        self._tell(verdict("warn", "…", self.text("learn.provoking", fault=fault.manual_name)))
+        self.progress.value = 0.0
+        self.progress.layout.display = self.cancel.layout.display = None
+        self._ending.clear()
+        self._watcher = threading.Thread(target=self._watch, name="rcilab-notebook-faults", daemon=True)
+        self._watcher.start()
+
+    def _watch(self) -> None:
+        """The watching thread: shows how far a provocation is, and what came of it."""
+        said = ""
+        try:
+            while not self._ending.wait(_LOOK):
+                if self._work.is_done:
+                    said = self._take(self._work.take()[1])
+                    return
+                share = self._work.progress
+                if share is None:  # Given up.
+                    return
+                self.progress.value = share
+        finally:
+            if not self._ending.is_set():
+                self._rest(said)
+
+    def _take(self, found: Exhibit | RcilabError) -> str:
+        if isinstance(found, RcilabError):
+            return problem(self.text("learn.failed", error=str(found)))
+        self.exhibit = found
+        self.fault.value = found.fault
+        return ""
+
+    def _rest(self, said: str = "") -> None:
+        self.progress.layout.display = self.cancel.layout.display = "none"
+        self._tell(said)
+
+    def _end_watch(self) -> None:
+        self._ending.set()
+        watcher, self._watcher = self._watcher, None
+        if watcher is not None and watcher is not threading.current_thread():
+            watcher.join()
+
+    def _button(self, code: str, act: Any, *, icon: str, tooltip: str = "") -> Any:
+        said = self.text(code)
+        button = ipywidgets.Button(
+            description=said, tooltip=tooltip or said, icon=icon, layout=ipywidgets.Layout(width="auto")
         )
+        button.on_click(lambda _: act())
+        return button
 
-    def _show_record(self) -> None:
-        rows = self._last_rows()
-        if rows is None:
-            write(self._record, head(self.text("fault.recorder")) + soft(self.text("fault.no_record")))
-            return
-        text, last = self.text, rows[-_LISTED:]
-        heads = [text(f"fault.head.{name}") for name in ("cycle", "t", "success", "late", "joint", "velocity")]
-        cells = [
-            [
-                f"{row['message_id']}",
-                f"{row['t']:.3f} s",
-                f"{100.0 * row['success_rate']:.0f} %",
-                f"{1e6 * row['lateness']:.0f} µs",
-                f"J{int(np.abs(row['dq']).argmax()) + 1}",
-                f"{np.degrees(np.abs(row['dq']).max()):.2f} deg/s",
-            ]
-            for row in last
-        ]
-        picture = draw(self._panels(rows), list(range(self.model.n)), text("plot.time"), text("legend.limit"))
-        told = head(text("fault.recorder")) + soft(text("fault.record_of", cycles=len(rows)))
-        write(self._record, f"{told}{picture}{table(heads, cells, right=True)}")
 
-    def _last_rows(self) -> NDArray[Any] | None:
-        """Returns the last cycles of an execution that was not allowed to end; None where none was."""
-        error, run = self.state.error, self.state.run
-        record = getattr(error, "record", None)
-        if record is None and error is not None and run is not None:
-            record = run.cycles
-        if record is None or not len(record):
-            return None
-        rows = record[np.isfinite(record["t"])]
-        return rows[-_RECORDED:] if len(rows) > len(_QUANTITIES) else None
+def _card_html(fault: Fault, text: Text) -> str:
+    remedy = f"remedy.{fault.name}"
+    return (
+        f'<div class="rl-card rl-none"><b>{esc(fault.manual_name)}</b> '
+        f'<span class="rl-soft">{esc(text("fault.bit", bit=int(fault)))}</span>'
+        f"<p>{esc(text(f'fault.{fault.name}'))}</p>"
+        f'<p class="rl-soft">{esc(text("run.remedy"))} '
+        f"{esc(text(remedy) if text.has(remedy) else text('remedy.smoothness'))}</p></div>"
+    )
 
-    def _panels(self, rows: NDArray[Any]) -> list[Panel]:
-        t = rows["t"] - rows["t"][0]
-        text, limits = self.text, self.model.limits.joint
-        return [
-            Panel(
-                title=text(f"plot.{quantity}"),
-                unit=text("plot.percent"),
-                frame=build_frame(
-                    None, recorded_curves(t, rows["q"], rows["q_c"], rows["dq"], quantity), limits, quantity, 0
-                ),
-            )
-            for quantity in _QUANTITIES
-        ]
+
+def _exhibit_html(exhibit: Exhibit, text: Text) -> str:
+    picture = draw_exhibit(exhibit, text(f"condition.{exhibit.condition.id}"), text("plot.time"))
+    script = f"<details><summary>{esc(text('learn.script'))}</summary><pre>{esc(exhibit.script)}</pre></details>"
+    return f"{head_html(exhibit, text)}{picture}{body_html(exhibit, text)}{script}"

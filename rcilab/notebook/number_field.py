@@ -22,7 +22,7 @@ class NumberField:
         low: Smallest number that is taken, in that unit.
         high: Largest one.
         take: Called with a number that is taken.
-        digits: Digits after the point that are shown.
+        digits: Digits after the point that are shown; None: as many as it takes.
     """
 
     def __init__(
@@ -34,7 +34,7 @@ class NumberField:
         high: float,
         take: Callable[[float], None],
         *,
-        digits: int = 1,
+        digits: int | None = 1,
     ) -> None:
         self._text, self._unit, self._low, self._high, self._take = text, unit, low, high, take
         self._digits = digits
@@ -58,7 +58,7 @@ class NumberField:
 
     def show(self, value: float) -> None:
         """Shows a number, whatever was typed."""
-        self._shown = fixed(value, self._digits)
+        self._shown = f"{value:g}" if self._digits is None else fixed(value, self._digits)
         write(self.said, "")
         if self.box.value != self._shown:
             self.box.value = self._shown

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from rcilab.notebook.state import LabState
+from rcilab.posing.driving import control_obstacle
 from rcilab.posing.readiness import arm_obstacle, plan_obstacle
 from rcilab.words.text import Message, message
 
@@ -12,4 +13,10 @@ def obstacle(state: LabState) -> Message | None:
     status = state.status
     if status is None:
         return message("ready.closed")
-    return arm_obstacle(status.phase, status.powered) or plan_obstacle(state.plan, status.q_c)
+    resting = arm_obstacle(status.phase, status.powered)
+    if resting is not None or state.plan is None:
+        return resting or plan_obstacle(None, status.q_c)
+    robot = state.robot
+    address = None if robot is None or robot.is_virtual else robot.name
+    untold = control_obstacle(state.control, status.setup.control, state.refusal, address)
+    return untold or plan_obstacle(state.plan, status.q_c)

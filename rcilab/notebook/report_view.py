@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from rcilab.conformance.explain import explain_place, explain_violation
+from rcilab.conformance.explain import explain_place, explain_source, explain_violation
 from rcilab.conformance.report import ConditionResult, Report
 from rcilab.notebook.look import Tone, block, esc, soft, verdict, write
 from rcilab.notebook.part import Part
+from rcilab.words.shown import value_against_bound
 
 _TIGHT = 0.95  # A choice: from this share of a bound on, a row is amber.
 _LISTED = 8
@@ -60,22 +61,17 @@ class ReportView(Part):
         word = "check.kept" if tone == "good" else "check.tight" if row.ok else "check.exceeded"
         if not row.ok and condition.necessity == "necessary":
             tone, word = "bad", "check.broken"
-        unit = condition.unit.replace("^2", "²").replace("^3", "³")
-        facts = [f"{_number(row.value)} / {_number(row.bound)} {unit}"]
+        facts = [value_against_bound(row.value, row.bound, condition.unit, text)]
         facts += [text("check.joint", joint=row.joint)] if row.joint else []
         facts += [explain_place(row, text.language)] if row.links is not None else []
         facts.append(f"t = {row.time:.3f} s")
         fault = "" if condition.fault is None else "; " + text("check.raises", fault=condition.fault.manual_name)
+        source = explain_source(condition, text.language)
         return (
             f'<div class="rl-card rl-{tone}"><div class="rl-row"><b>{esc(text(f"condition.{condition.id}"))}</b>'
             f'<span class="rl-soft">{esc(text("necessity." + condition.necessity))}</span>'
             f'<span class="rl-push">{esc(text(word))}</span><span class="rl-num">{100.0 * row.ratio:.1f} %</span></div>'
             f'<div class="rl-meter"><i style="width:{min(100.0, 100.0 * row.ratio):.1f}%"></i></div>'
             f'<div class="rl-num">{esc(" · ".join(facts))}</div>'
-            f'<div class="rl-soft">{esc(condition.formula)} — {esc(condition.source + fault)}</div></div>'
+            f'<div class="rl-soft">{esc(condition.formula)} — {esc(source + fault)}</div></div>'
         )
-
-
-def _number(value: float) -> str:
-    size = abs(value)
-    return f"{value:.0f}" if size >= 1000.0 else f"{value:.4g}" if size >= 1e-3 or size == 0.0 else f"{value:.1e}"

@@ -14,7 +14,9 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from numpy.typing import NDArray
 
+from rcilab.client.control_settings import ControlSettings, give_control
 from rcilab.client.session import RobotSession
+from rcilab.client.setup import RobotSetup
 from rcilab.errors import ConnectionLostError, RcilabError, UsageError
 from rcilab.recording.live import LiveRecording, RunFacts
 from rcilab.recording.run import Run
@@ -37,7 +39,7 @@ class Outcome:
     """What came of something that was asked for."""
 
     what: str
-    """"execute", "power_on", "power_off", "recover" or "connect"."""
+    """"execute", "control", "power_on", "power_off", "recover" or "connect"."""
     run: Run | None = None
     error: RcilabError | None = None
 
@@ -46,6 +48,18 @@ class Outcome:
         """The last cycles, as the flight recorder kept them; None where nothing moved."""
         record = getattr(self.error, "record", None)
         return record if record is not None else None if self.run is None else self.run.cycles
+
+
+class BusyError(UsageError):
+    """Something was asked of a robot while something else was under way.
+
+    Attributes:
+        under_way: What, as in `Outcome.what`.
+    """
+
+    def __init__(self, what: str, under_way: str) -> None:
+        super().__init__(f"no {what} now: {under_way} is still under way; stop it, or wait")
+        self.under_way = under_way
 
 
 class RobotSide(Protocol):
@@ -69,7 +83,15 @@ class RobotSide(Protocol):
         ...
 
     def execute(self, plan: Plan) -> None:
-        """Streams a checked motion."""
+        """Streams a checked motion in the mode that it was judged for."""
+        ...
+
+    def set_control(self, control: ControlSettings) -> None:
+        """Tells the controller parameters of the modes; what is acknowledged stands in the status.
+
+        Raises:
+            UsageError: The arm moves, or something else is under way.
+        """
         ...
 
     def stop(self) -> None:
@@ -141,11 +163,15 @@ class SupervisedRobot:
         setup = Setup(
             target=self.name,
             plant=self._plant if self.is_virtual else "",
-            mode="joint_position",
+            mode=plan.mode,
             started_ns=time.time_ns(),
         )
         self._live = LiveRecording(RunFacts(plan=plan.motion, model=self._model, setup=setup))
-        self._tickets.append(("execute", self._supervisor.execute(plan.motion, certificate)))
+        self._tickets.append(("execute", self._supervisor.execute(plan.motion, certificate, plan.mode)))
+
+    def set_control(self, control: ControlSettings) -> None:
+        """Tells the controller parameters of the modes."""
+        self._tickets.append(("control", self._supervisor.set_up(RobotSetup(control=control))))
 
     def stop(self) -> None:
         """Brings a running motion to rest."""
@@ -207,6 +233,7 @@ class SessionRobot:
         self._done: list[Outcome] = []
         self._time: tuple[float, float] = (0.0, 0.0)
         self._powered: bool | None = None
+        self._held = RobotSetup()  # What it was told from here.
         self._power_seen = float("-inf")
         self._last = SupervisorStatus(phase="connecting", code="connecting", target=self.name)
         self._looked = float("-inf")
@@ -245,6 +272,7 @@ class SessionRobot:
             success_rate=state.success_rate,
             rate_hz=1000.0,
             message_id=state.message_id,
+            setup=self._held,
             motion_time=self._time[0] if self._time[1] else None,
             motion_duration=self._time[1] or None,
         )
@@ -260,7 +288,17 @@ class SessionRobot:
     def execute(self, plan: Plan) -> None:
         """Streams a checked motion in a thread of the kernel."""
         certificate = plan.report.require().certificate
-        self._do("execute", lambda: self._session.execute(plan.motion, certificate, progress=self._on_progress))
+        go, told = self._session.execute, self._on_progress
+        self._do("execute", lambda: go(plan.motion, certificate, progress=told, mode=plan.mode))
+
+    def set_control(self, control: ControlSettings) -> None:
+        """Tells the controller parameters of the modes."""
+
+        def tell() -> None:
+            give_control(self._session, control)
+            self._held = self._held.updated(RobotSetup(control=control))
+
+        self._do("control", tell)
 
     def stop(self) -> None:
         """Brings a running motion to rest, also one that a cell has started."""
@@ -287,7 +325,7 @@ class SessionRobot:
 
     def _do(self, what: str, act: Callable[[], object]) -> None:
         if self._is_busy:
-            raise UsageError(f"no {what} now: {self._what} is still under way; stop it, or wait")
+            raise BusyError(what, self._what)
 
         def work() -> None:
             error: RcilabError | None = None

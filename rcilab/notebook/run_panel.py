@@ -1,4 +1,4 @@
-"""Run: which robot, power, Execute and Stop, how well the milliseconds are kept, and what came of it."""
+"""Run: which robot, power, mode, Execute and Stop, how well the milliseconds are kept, and what came of it."""
 
 from __future__ import annotations
 
@@ -8,14 +8,16 @@ from collections.abc import Callable
 from typing import Any
 
 import ipywidgets
-import numpy as np
 
 from rcilab.errors import RcilabError
 from rcilab.notebook.heart import Heart
-from rcilab.notebook.look import PHASE_TONES, block, head, problem, soft, table, verdict, write
+from rcilab.notebook.look import PHASE_TONES, block, problem, soft, verdict, write
+from rcilab.notebook.mode_fields import ModeFields
+from rcilab.notebook.parameter_desk import ParameterDesk
 from rcilab.notebook.part import Part
 from rcilab.notebook.ready import obstacle
 from rcilab.notebook.robot_side import Outcome, RobotSide, SessionRobot, SupervisedRobot
+from rcilab.notebook.robot_words import health_html, name_phase, outcome_html, tell_refusal, tell_trouble
 from rcilab.posing.readiness import ask_to_move
 from rcilab.supervisor import SupervisorStatus
 from rcilab.supervisor.supervisor import VIRTUAL
@@ -28,9 +30,9 @@ class RunPanel(Part):
     """Everything that moves a robot is here, and nothing on it moves one by a drag.
 
     With a model it connects to a virtual controller of its own, or to an address; a control process outside of the
-    kernel keeps the milliseconds. With a session it uses that one. A robot that is not virtual is moved only after the
-    question has been answered. A motion is brought to rest when the page is gone, the kernel is interrupted, restarted
-    or dead, or the cell is run again.
+    kernel keeps the milliseconds. With a session it uses that one. Modes and parameters are those of the page. A robot
+    that is not virtual is moved, or told other parameters, only after the question has been answered. A motion is
+    brought to rest when the page is gone, the kernel is interrupted, restarted or dead, or the cell is run again.
 
     Args:
         subject: A model, a session, or another part to look at the same arm as.
@@ -66,6 +68,8 @@ class RunPanel(Part):
         )
         self._said, self._where, self._plan, self._question = block(), block(), block(), block()
         self._health, self._outcome = block(), block()
+        self._desk = ParameterDesk(self.state)
+        self.modes = ModeFields(self.state, text, self._desk)
         self._answers = ipywidgets.HBox([self.yes, self.no], layout=ipywidgets.Layout(display="none"))
         self._choice = ipywidgets.VBox([self.target, self.address])
         self.build([
@@ -75,12 +79,14 @@ class RunPanel(Part):
             self._said,
             self._where,
             ipywidgets.HBox([self.power_on, self.power_off, self.recover]),
+            self.modes.choice,
             self._plan,
             ipywidgets.HBox([self.execute, self.stop]),
             self._question,
             self._answers,
             self.progress,
             self._outcome,
+            self.modes.parameters,
             self._health,
         ], min_width="360px")  # fmt: skip
         self.target.observe(lambda _: self._show(), names="value")
@@ -122,6 +128,7 @@ class RunPanel(Part):
         self.state.tell("robot")
 
     def _take(self, robot: RobotSide) -> None:
+        self._desk.forget()
         self.state.robot = robot
         self._heart.start()
         self._ending.clear()
@@ -150,12 +157,16 @@ class RunPanel(Part):
                 robot.beat()
             for outcome in robot.outcomes():
                 self._take_in(outcome)
+            self._desk.tick(robot)
             self.state.tell("robot")
 
     def _take_in(self, outcome: Outcome) -> None:
+        if outcome.what == "control":
+            self._desk.take(outcome.error)
+            return
         if outcome.what == "execute":
             self.state.take_run(outcome.run, outcome.error)
-        self._write_outcome(outcome)
+        write(self._outcome, outcome_html(outcome, self.model, self.state.status, self.text))
 
     def _on_plan(self) -> None:
         self._forget_question()
@@ -203,10 +214,10 @@ class RunPanel(Part):
         self.power_off.disabled = is_moving or powered is not True
         self.recover.disabled = phase not in ("fault", "lost", "crashed")
         name = "" if state.robot is None else text("run.at", name=self._name_robot(state.robot))
-        write(
-            self._said, verdict(PHASE_TONES.get(phase, "none" if status is None else "bad"), _phase(status, text), name)
-        )
-        write(self._where, "" if reason is None or is_moving else soft(text.say(reason)))
+        tone = PHASE_TONES.get(phase, "none" if status is None else "bad")
+        write(self._said, verdict(tone, name_phase(status, text), name))
+        told = tell_trouble(status, text) or ("" if reason is None else text.say(reason))
+        write(self._where, "" if is_moving or not told else soft(told))
         plan = state.plan
         if plan is None:
             write(self._plan, "")
@@ -214,7 +225,8 @@ class RunPanel(Part):
             told, word = ("good", "check.passed") if plan.report.ok else ("bad", "check.failed")
             write(self._plan, verdict(told, text(word), text("plan.ready", duration=f"{plan.motion.duration:.3f}")))
         self._show_progress(status, is_moving)
-        write(self._health, "" if status is None else self._tell_health(status))
+        self.modes.show(status)
+        write(self._health, "" if status is None else health_html(status, text))
 
     def _name_robot(self, robot: RobotSide) -> str:
         return self.text("run.virtual") if robot.name == VIRTUAL else robot.name
@@ -225,37 +237,6 @@ class RunPanel(Part):
         if shown and status is not None and status.motion_duration:
             share = (status.motion_time or 0.0) / status.motion_duration
             self.progress.value = min(max(share, 0.0), 1.0) if math.isfinite(share) else 0.0
-
-    def _tell_health(self, status: SupervisorStatus) -> str:
-        text = self.text
-        mode, control = status.robot_mode, status.controller_mode
-        rows = [
-            ("mode", "—" if mode is None else text(f"robot_mode.{mode.name}")),
-            ("control", "—" if control is None else text(f"controller_mode.{control.name}")),
-            ("power", {None: "—", True: text("run.on"), False: text("run.off")}[status.powered]),
-            ("success", f"{100.0 * status.success_rate:.1f} %"),
-            ("rate", f"{status.rate_hz:.0f} Hz"),
-        ]
-        late = status.lateness
-        if late.cycles:
-            late_value = text("run.late_value", late=status.late_cycles, lost=status.lost_cycles, cycles=late.cycles)
-            rows.append(("late", late_value))
-            rows.append(("lateness", f"{late.p50:.0f} / {late.p99:.0f} / {late.p999:.0f} / {late.max:.0f} µs"))
-            rows.append(("scheduling", text(f"scheduling.{status.scheduling}")))
-        return head(text("run.health")) + table([], [[text(f"health.{name}"), value] for name, value in rows])
-
-    def _write_outcome(self, outcome: Outcome) -> None:
-        text, error, run = self.text, outcome.error, outcome.run
-        said = ""
-        if error is not None:
-            faults = ", ".join(getattr(fault, "manual_name", str(fault)) for fault in getattr(error, "faults", ()))
-            said = verdict("bad", "✗", text("run.faulted", faults=faults) if faults else str(error))
-            if outcome.what == "execute" and not faults:
-                said = verdict("warn", "▲", text("run.stopped"))
-        elif run is not None and len(run.q):
-            largest = float(np.degrees(np.abs(np.nan_to_num(run.error)).max()))
-            said = verdict("good", "✓", text("run.arrived", cycles=len(run.t), error=f"{largest:.3f}"))
-        write(self._outcome, said)
 
     def _button(self, code: str, act: Callable[[], object], *, icon: str = "", style: str = "") -> Any:
         hint = f"{code}_hint"
@@ -271,15 +252,7 @@ class RunPanel(Part):
             try:
                 act()
             except RcilabError as error:
-                write(self._outcome, problem(str(error)))
+                write(self._outcome, problem(self.text.say(tell_refusal(error, self.model, self.state.status))))
 
         button.on_click(press)
         return button
-
-
-def _phase(status: SupervisorStatus | None, text: Any) -> str:
-    if status is None:
-        return text("phase.closed")
-    if status.phase == "idle" and status.powered is False:
-        return text("phase.unpowered")
-    return text(f"phase.{status.phase}")

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Literal
 from numpy.typing import ArrayLike
 
 from rcilab.arrays import JointVector, as_vector, frozen
+from rcilab.client.control_settings import ControlSettings
 from rcilab.client.session import RobotSession
 from rcilab.conformance.check import check
 from rcilab.errors import InvalidValueError, KinematicsError, RcilabError
@@ -24,6 +25,7 @@ from rcilab.motion.motion import Motion, require_motion
 from rcilab.posing.planning import Plan, PlannableLaw, make_plan, picture
 from rcilab.posing.reach import Reach, judge_joints, judge_pose
 from rcilab.spatial import Pose
+from rcilab.state import Mode, require_mode
 from rcilab.words.errors import tell
 from rcilab.words.text import Message, message
 
@@ -65,6 +67,12 @@ class LabState:
         self.speed = 0.5
         self.law: PlannableLaw = "jerk_limited"
         self.way: Way = "joint"
+        self.mode: Mode = "joint_position"
+        """How a motion is commanded; its conditions judge the plan."""
+        self.control: ControlSettings | None = None
+        """Parameters of the modes as somebody wants them; None: nobody has touched them."""
+        self.refusal: Message | None = None
+        """Why the controller did not take them."""
         self._rest: JointVector = self.goal  # Where the arm stands as long as no robot says otherwise.
         self._hearers: dict[Topic, list[Callable[[], None]]] = {}
 
@@ -149,13 +157,25 @@ class LabState:
     def make_plan(self) -> None:
         """Plans from where the arm stands to the goal and judges it, collisions too."""
         made = self._line() if self.way == "line" else self._joint()
-        self.show(made.completed() if isinstance(made, Plan) else made)
+        self.show(made.completed(self.mode) if isinstance(made, Plan) else made)
 
     def take_motion(self, motion: Motion) -> None:
         """Takes a motion that was planned elsewhere; it is judged as any other."""
         require_motion(motion)
-        report = check(motion, self.model)
-        self.show(replace(picture(self.model, motion, report), complete=True))
+        report = check(motion, self.model, mode=self.mode)
+        self.show(replace(picture(self.model, motion, report), mode=self.mode, complete=True))
+
+    def follow(self, mode: Mode) -> None:
+        """Chooses how motions are commanded; the plan is judged by the conditions of that mode.
+
+        Args:
+            mode: One of `rcilab.state.MODES`.
+        """
+        with self.lock:
+            self.mode = require_mode(mode)
+            if self.plan is not None:
+                self.plan = self.plan.completed(mode)
+            self.tell("plan")
 
     def show(self, made: Plan | Message) -> None:
         """Shows a plan, or why there is none."""

@@ -20,10 +20,10 @@ from rcilab.views.plots import Frame
 _WIDTH, _HEIGHT = 420.0, 168.0  # Units of a panel; the browser scales it to its place.
 _LEFT, _RIGHT, _TOP, _BOTTOM = 40.0, 6.0, 20.0, 20.0
 _ACROSS, _HIGH = _WIDTH - _LEFT - _RIGHT, _HEIGHT - _TOP - _BOTTOM
-_INK = "var(--jp-ui-font-color1, var(--vscode-editor-foreground, #1d2a3c))"
-_SOFT = "var(--jp-ui-font-color2, var(--vscode-descriptionForeground, #51607a))"
-_LINE = "var(--jp-border-color2, var(--vscode-panel-border, #d5dbe4))"
-_BAD = "#d1392b"
+INK = "var(--jp-ui-font-color1, var(--vscode-editor-foreground, #1d2a3c))"
+SOFT = "var(--jp-ui-font-color2, var(--vscode-descriptionForeground, #51607a))"
+LINE = "var(--jp-border-color2, var(--vscode-panel-border, #d5dbe4))"
+BAD = "#d1392b"
 _BLACK = 6  # The last colour of the palette is black: in a dark notebook it takes the colour of the text.
 
 
@@ -60,6 +60,19 @@ def share_of(t: float, end: float) -> float:
     return (_LEFT + _ACROSS * t / end) / _WIDTH
 
 
+def ticks(low: float, high: float, count: int) -> list[float]:
+    """Returns about so many round numbers between two ends."""
+    rough = (high - low) / count
+    power = 10.0 ** math.floor(math.log10(rough))
+    step = next(power * m for m in (1.0, 2.0, 2.5, 5.0, 10.0) if power * m >= rough - 1e-12)
+    return [round(k * step, 9) + 0.0 for k in range(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1)]
+
+
+def number(value: float) -> str:
+    """Returns what a tick is called."""
+    return f"{value:.0f}" if abs(value) >= 1000.0 else f"{value:g}"
+
+
 def _picture(panel: Panel, joints: Sequence[int], time: str, limit: str) -> str:
     frame = panel.frame
     middle, half, bottom, right = _TOP + _HIGH / 2.0, _HIGH / 2.0, _TOP + _HIGH, _WIDTH - _RIGHT
@@ -70,19 +83,19 @@ def _picture(panel: Panel, joints: Sequence[int], time: str, limit: str) -> str:
     x = _LEFT + _ACROSS * frame.t / frame.end
     out = [
         f'<svg viewBox="0 0 {_WIDTH:g} {_HEIGHT:g}" role="img" aria-label="{esc(panel.title)}" font-size="10.5">',
-        f'<text x="{_LEFT:g}" y="13" fill="{_INK}" font-weight="600">{esc(panel.title)} '
-        f'<tspan fill="{_SOFT}" font-weight="400">[{esc(panel.unit)}]</tspan></text>',
+        f'<text x="{_LEFT:g}" y="13" fill="{INK}" font-weight="600">{esc(panel.title)} '
+        f'<tspan fill="{SOFT}" font-weight="400">[{esc(panel.unit)}]</tspan></text>',
     ]
-    for tick in _ticks(-frame.bound, frame.bound, 4):
+    for tick in ticks(-frame.bound, frame.bound, 4):
         out.append(
-            f'<path d="M{_LEFT:g},{y(tick):.1f}H{right:g}" stroke="{_LINE}" stroke-width=".7"/>'
-            f'<text x="{_LEFT - 4:g}" y="{y(tick) + 3.5:.1f}" text-anchor="end" fill="{_SOFT}">{_number(tick)}</text>'
+            f'<path d="M{_LEFT:g},{y(tick):.1f}H{right:g}" stroke="{LINE}" stroke-width=".7"/>'
+            f'<text x="{_LEFT - 4:g}" y="{y(tick) + 3.5:.1f}" text-anchor="end" fill="{SOFT}">{number(tick)}</text>'
         )
-    for tick in _ticks(0.0, frame.end, 6):
+    for tick in ticks(0.0, frame.end, 6):
         at = _LEFT + _ACROSS * tick / frame.end
         side = "end" if at > right - 12.0 else "middle"
         name = f"{tick:g} {time}" if side == "end" else f"{tick:g}"
-        out.append(f'<text x="{at:.1f}" y="{bottom + 13:g}" text-anchor="{side}" fill="{_SOFT}">{esc(name)}</text>')
+        out.append(f'<text x="{at:.1f}" y="{bottom + 13:g}" text-anchor="{side}" fill="{SOFT}">{esc(name)}</text>')
     out.append(_beyond(frame, y, limit))
     out += [_span(float(x[a]), float(x[b])) for a, b in _spans(frame.violated)]
     for curve, joint in zip(frame.actual, joints, strict=False):
@@ -91,7 +104,7 @@ def _picture(panel: Panel, joints: Sequence[int], time: str, limit: str) -> str:
     for curve, joint in zip(frame.plan, joints, strict=False):
         out.append(_curve(x, y(curve), _color(joint), f'stroke-width="1.5"{dash}'))
     frame_line = f'<rect x="{_LEFT:g}" y="{_TOP:g}" width="{_ACROSS:g}" height="{_HIGH:g}" fill="none" '
-    out.append(f'{frame_line}stroke="{_LINE}"/></svg>')
+    out.append(f'{frame_line}stroke="{LINE}"/></svg>')
     return "".join(out)
 
 
@@ -103,17 +116,17 @@ def _beyond(frame: Frame, y: Callable[[float], Array], limit: str) -> str:
     out = ""
     for a, b in ((_TOP, upper), (lower, _TOP + _HIGH)):
         size = f'width="{_ACROSS:g}" height="{max(b - a, 0.0):.1f}"'
-        out += f'<rect x="{_LEFT:g}" y="{a:.1f}" {size} fill="{_SOFT}" opacity=".14"/>'
+        out += f'<rect x="{_LEFT:g}" y="{a:.1f}" {size} fill="{SOFT}" opacity=".14"/>'
     for edge in (upper, lower):
-        out += f'<path d="M{_LEFT:g},{edge:.1f}h{_ACROSS:g}" stroke="{_SOFT}" stroke-dasharray="2 3"/>'
+        out += f'<path d="M{_LEFT:g},{edge:.1f}h{_ACROSS:g}" stroke="{SOFT}" stroke-dasharray="2 3"/>'
     place = f'x="{_WIDTH - _RIGHT - 4:g}" y="{upper + 11.0:.1f}" text-anchor="end"'
-    return out + f'<text {place} fill="{_SOFT}" font-size="9.5">{esc(limit)}</text>'
+    return out + f'<text {place} fill="{SOFT}" font-size="9.5">{esc(limit)}</text>'
 
 
 def _span(left: float, right: float) -> str:
     return (
         f'<rect class="rl-violation" x="{left:.1f}" y="{_TOP:g}" width="{max(right - left, 2.0):.1f}" '
-        f'height="{_HIGH:g}" fill="{_BAD}" opacity=".22"/>'
+        f'height="{_HIGH:g}" fill="{BAD}" opacity=".22"/>'
     )
 
 
@@ -132,15 +145,4 @@ def _curve(x: Array, y: Array, color: str, style: str) -> str:
 
 def _color(joint: int) -> str:
     place = joint % len(JOINT_COLORS)
-    return _INK if place == _BLACK else JOINT_COLORS[place]
-
-
-def _ticks(low: float, high: float, count: int) -> list[float]:
-    rough = (high - low) / count
-    power = 10.0 ** math.floor(math.log10(rough))
-    step = next(power * m for m in (1.0, 2.0, 2.5, 5.0, 10.0) if power * m >= rough - 1e-12)
-    return [round(k * step, 9) + 0.0 for k in range(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1)]
-
-
-def _number(value: float) -> str:
-    return f"{value:.0f}" if abs(value) >= 1000.0 else f"{value:g}"
+    return INK if place == _BLACK else JOINT_COLORS[place]

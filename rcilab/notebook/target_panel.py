@@ -135,8 +135,8 @@ class TargetPanel(Part):
             self._psi_field.show(degrees)
         try:
             arcs = self.model.feasible_arcs(self.model.forward(self.state.goal))
-        except KinematicsError as error:
-            write(self._circle, soft(str(error)))
+        except KinematicsError:
+            write(self._circle, soft(self.text("jog.no_arm_angle")))
             return
         write(self._circle, draw_circle(arcs, psi, self.text))
 

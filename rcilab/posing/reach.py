@@ -66,7 +66,7 @@ def judge_pose(model: RobotModel, target: Pose, near: JointVector, psi: float | 
     found = model.closest(target, near, psi)
     if found.refusal is not None:
         short = _how_short(target, found.pose)
-        return Reach(tone="bad", reason=_why_not(found.refusal), q=found.q, solutions=None, short=short)
+        return Reach(tone="bad", reason=why_not(found.refusal), q=found.q, solutions=None, short=short)
     return _judge_configuration(model, found.q, found.solutions)
 
 
@@ -77,6 +77,15 @@ def judge_joints(model: RobotModel, q: JointVector) -> Reach:
     except KinematicsError:
         solutions = None
     return _judge_configuration(model, q, solutions)
+
+
+def why_not(refusal: UnreachableError) -> Message:
+    """Returns why a pose is not reachable."""
+    if refusal.distance > 0.0:
+        return message("reach.far", distance=f"{refusal.distance * 1000.0:.0f}")
+    if refusal.joint is not None:
+        return message("reach.joint", joint=refusal.joint, excess=f"{math.degrees(refusal.excess):.1f}")
+    return message("reach.no")
 
 
 def _judge_configuration(model: RobotModel, q: JointVector, solutions: Solutions | None) -> Reach:
@@ -95,11 +104,3 @@ def _how_short(target: Pose, reached: Pose) -> Message:
     away = float(np.linalg.norm(target.position - reached.position)) * 1000.0
     turned = math.degrees(2.0 * math.acos(min(1.0, abs(float(np.asarray(target.wxyz) @ np.asarray(reached.wxyz))))))
     return message("reach.short", mm=f"{away:.0f}", deg=f"{turned:.1f}")
-
-
-def _why_not(refusal: UnreachableError) -> Message:
-    if refusal.distance > 0.0:
-        return message("reach.far", distance=f"{refusal.distance * 1000.0:.0f}")
-    if refusal.joint is not None:
-        return message("reach.joint", joint=refusal.joint, excess=f"{math.degrees(refusal.excess):.1f}")
-    return message("reach.no")

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from enum import IntEnum
 from typing import Any
 
 from rcilab import errors
-from rcilab.errors import ControlError, RcilabError
+from rcilab.errors import CommandRejectedError, ControlError, RcilabError
 from rcilab.faults import Fault
+from rcilab.protocols import rci
 
 
 def pack_failure(error: Exception) -> dict[str, Any]:
@@ -19,6 +21,8 @@ def pack_failure(error: Exception) -> dict[str, Any]:
         failure["message"] = f"the control process failed with {type(error).__name__}: {error}; this is a defect"
     if isinstance(error, ControlError):
         failure["faults"] = [int(fault) for fault in error.faults if isinstance(fault, Fault)]
+    if isinstance(error, CommandRejectedError) and isinstance(error.status, IntEnum):
+        failure["command"], failure["status"] = error.command, [type(error.status).__name__, int(error.status)]
     return failure
 
 
@@ -35,6 +39,10 @@ def unpack_failure(failure: dict[str, Any]) -> RcilabError:
     if isinstance(error, ControlError):
         error.faults = tuple(Fault(number) for number in failure.get("faults", ()))
         error.record = None
+    if isinstance(error, CommandRejectedError):
+        kind_of_status, number = failure.get("status") or ("", 0)
+        status: Any = getattr(rci, kind_of_status, None)
+        error.command, error.status = str(failure.get("command")), None if status is None else status(number)
     return error
 
 

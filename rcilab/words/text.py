@@ -6,12 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Protocol, runtime_checkable
+from typing import Protocol, runtime_checkable
 
 from rcilab.language import Language, load_words, require_language
-
-if TYPE_CHECKING:
-    from rcilab.words.units import Units
+from rcilab.words.units import USUAL, Units
 
 SHARED = "rcilab.words"
 """Whose catalogue every face has."""
@@ -74,6 +72,10 @@ def message(code: str, **values: object) -> Message:
 class Text:
     """The catalogue of one language, called with a key.
 
+    Attributes:
+        language: Which.
+        units: What angles and lengths are shown in.
+
     Args:
         language: "en" or "zh".
         package: Whose own words there are beside the shared ones, such as rcilab.workbench.
@@ -84,6 +86,7 @@ class Text:
 
     def __init__(self, language: str, package: str) -> None:
         self.language: Language = require_language(language)
+        self.units: Units = USUAL
         self._entries = load_face(package, self.language)
 
     def __call__(self, code: str, **values: object) -> str:

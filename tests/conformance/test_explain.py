@@ -15,6 +15,7 @@ from rcilab.conformance import CONDITION_TABLES, CONDITIONS, Violation, check
 from rcilab.conformance.catalogue import Language, Phrase, load_catalogue, say
 from rcilab.conformance.condition import Condition
 from rcilab.conformance.explain import explain_source, explain_violation
+from rcilab.conformance.html import report_html
 from rcilab.conformance.wording import advise
 from rcilab.errors import InvalidValueError
 from rcilab.faults import Fault
@@ -217,3 +218,21 @@ def test_a_phrase_is_its_english_and_remembers_how_to_say_it_otherwise():
 def test_a_language_that_nobody_speaks_here_is_refused():
     with pytest.raises(InvalidValueError, match="'de' is unknown; known: en, zh"):
         check(MOTION, MODEL).explain("de")  # type: ignore[arg-type]
+
+
+def test_every_source_is_told_in_both_languages():
+    for row in (*CONDITIONS, *FRANKA_CONDITIONS):
+        assert explain_source(row) == row.source
+        assert explain_source(row, "zh") != row.source
+    own = replace(CONDITIONS[0], source="a page of somebody's own")
+    assert explain_source(own, "zh") == own.source
+
+
+def test_the_table_of_a_notebook_speaks_both_languages():
+    broken = check(Motion.from_samples(MOTION.q[::2]), MODEL)
+    for report in (check(MOTION, MODEL), broken):
+        english, chinese = report_html(report), report_html(report, "zh")
+        assert english == report._repr_html_()
+        assert english.count("<tr>") == chinese.count("<tr>") == len(report.rows) + 1
+        words = set(re.findall(r"[a-z]{4,}", re.sub(r"<[^>]*>|^.*?<br>.*?<table>", "", chinese)))
+        assert not words & {"commanded", "joint", "manual", "recommended", "condition", "exceeds", "bound", "source"}

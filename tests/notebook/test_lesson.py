@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import pytest
 
 from rcilab.notebook.lesson import answer, language
@@ -16,6 +18,13 @@ SESSION = "JPY_SESSION_NAME"
 def test_the_name_of_the_notebook_decides_the_language(monkeypatch, name: str, found: str) -> None:
     monkeypatch.setenv(SESSION, name)
     assert language() == found
+
+
+def test_vs_code_leaves_the_name_among_the_variables(monkeypatch) -> None:
+    monkeypatch.delenv(SESSION, raising=False)
+    shell = SimpleNamespace(user_ns={"__vsc_ipynb_file__": "/home/me/01_first_motion.zh.ipynb"})
+    monkeypatch.setattr("IPython.core.getipython.get_ipython", lambda: shell)
+    assert language() == "zh"
 
 
 def test_without_a_notebook_it_is_english(monkeypatch) -> None:

@@ -22,6 +22,7 @@ CHINESE = [path for path in ALL if path.name.endswith(".zh.ipynb")]
 LESSONS = [path for path in ALL if path not in CHINESE]
 EXERCISES = 2  # A lesson.
 LONGEST_FUNCTION = 30  # Lines; a screen.
+CELLS = range(10, 21)  # How many make one story.
 CHECK = "# check\n"  # What of an exercise's cell comes after this line is not for the student to change.
 SOLUTION = re.compile(r"<details>.*?```python\n(.*?)```\n</details>", re.DOTALL)
 
@@ -100,6 +101,11 @@ def test_a_lesson_is_committed_without_output(path: Path) -> None:
     assert all(cell.outputs == [] for cell in cells)
     assert all(cell.metadata == {} for cell in notebook.cells)
     assert notebook.cells[0].cell_type == "markdown"
+
+
+@pytest.mark.parametrize("path", ALL, ids=lambda path: path.stem)
+def test_a_lesson_is_one_story_of_ten_to_twenty_cells(path: Path) -> None:
+    assert len(read(path).cells) in CELLS
 
 
 @pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem)

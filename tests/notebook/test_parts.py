@@ -116,7 +116,7 @@ def test_a_typed_number_counts_and_a_bad_one_is_answered_below_the_field(fresh: 
     for typed, sentence in (
         ("far", "is not a number"),
         ("1e999", "not a finite"),
-        ("500", "outside"),
+        ("500", "outside -170° to 170°"),
         ("nan", "finite"),
     ):
         field.box.value = typed

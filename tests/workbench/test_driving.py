@@ -10,13 +10,13 @@ import pytest
 from rcilab.client.control_settings import control_ranges, standard_control
 from rcilab.controller.settings import default_settings
 from rcilab.model import load_model
+from rcilab.posing.driving import PARTS_OF_MODE, said_ranges
 from rcilab.state import MODES
 from rcilab.supervisor.lateness import LatenessHistogram, summarise
 from rcilab.workbench import requests
 from rcilab.workbench.app import Workbench
 from rcilab.workbench.panels.health import histogram_html
-from rcilab.workbench.panels.mode import said_ranges
-from rcilab.workbench.run.driving import PARTS_OF_MODE, control_field
+from rcilab.workbench.run.driving import control_field
 from rcilab.workbench.text import Text, load_catalogue
 from tests.workbench.opened import opened, told, wait
 

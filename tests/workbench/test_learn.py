@@ -11,6 +11,7 @@ import pytest
 
 from rcilab.faults import Fault
 from rcilab.gallery import FAULTS
+from rcilab.gallery.shown import body_html, head_html
 from rcilab.model import load_model
 from rcilab.views.plots import build_frame, mark_moment, plan_curves
 from rcilab.workbench import requests
@@ -18,7 +19,6 @@ from rcilab.workbench.goal.actions import GoalActions, initial_goal
 from rcilab.workbench.learn.actions import LearnActions
 from rcilab.workbench.learn.lessons import LESSONS
 from rcilab.workbench.learn.state import exhibited
-from rcilab.workbench.panels.learn_exhibit import body_html, head_html
 from rcilab.workbench.panels.learn_lesson import steps_html
 from rcilab.workbench.store import Recording, Store, UiState
 from rcilab.workbench.text import LANGUAGES, Text, load_catalogue

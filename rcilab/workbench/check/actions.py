@@ -6,9 +6,9 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from rcilab.background import Background
 from rcilab.errors import RcilabError
 from rcilab.workbench import requests
-from rcilab.workbench.background import Background
 from rcilab.workbench.check.slowing import Slower, slow_program, slow_to_goal
 from rcilab.workbench.check.state import CheckState, Explained, Slowed
 from rcilab.workbench.goal.actions import GoalActions

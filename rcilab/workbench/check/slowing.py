@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from rcilab.background import Tell
 from rcilab.posing.planning import Plan, make_plan, picture
-from rcilab.workbench.background import Tell
 from rcilab.workbench.program.draft import Draft
 
 if TYPE_CHECKING:

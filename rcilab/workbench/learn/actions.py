@@ -6,13 +6,13 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
+from rcilab.background import Background
 from rcilab.errors import RcilabError
 from rcilab.faults import Fault
 from rcilab.gallery import FAULTS, Exhibit
+from rcilab.gallery.private_arm import PrivateArm
 from rcilab.workbench import requests
-from rcilab.workbench.background import Background
 from rcilab.workbench.learn.lessons import LESSONS, Watcher
-from rcilab.workbench.learn.private_arm import PrivateArm
 from rcilab.workbench.learn.state import LearnState, LessonState, make_show
 from rcilab.workbench.run.readiness import is_moving
 from rcilab.workbench.session import Session

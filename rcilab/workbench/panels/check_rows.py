@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING
 
 from rcilab.conformance.explain import explain_place, explain_source
-from rcilab.language import Language
+from rcilab.words.shown import value_against_bound
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import esc
 
@@ -30,9 +30,9 @@ def row_html(row: ConditionResult, model: RobotModel, chosen: str, text: Text) -
     """Returns one row."""
     condition, tone = row.condition, row_tone(row)
     word = text("check.kept" if tone == "good" else "check.broken" if tone == "bad" else _AMBER[not row.ok])
-    facts = [text.units.with_unit(" / ".join(text.units.numbers(condition.unit, row.value, row.bound)), condition.unit)]
+    facts = [value_against_bound(row.value, row.bound, condition.unit, text)]
     if row.links is not None:
-        facts.append(explain_place(row, cast(Language, text.language)))
+        facts.append(explain_place(row, text.language))
     elif row.joint:
         facts.append(text("check.joint", joint=row.joint))
     facts.append(f"t = {row.time:.3f} s")

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import re
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rcilab.conformance.explain import explain_source
-from rcilab.language import Language
+from rcilab.gallery.shown import body_html, head_html
 from rcilab.workbench import requests
 from rcilab.workbench.panels.learn_plot import exhibit_contents
 from rcilab.workbench.panels.plot_contents import plot_axes
@@ -93,54 +91,3 @@ class LearnExhibitPanel:
             "x": {"time": False, "range": (0.0, float(t[-1]) * (1.0 + _AROUND))},
             "y": {"range": (low - margin, high + margin)},
         }
-
-
-def head_html(exhibit: Exhibit, text: Text) -> str:
-    """Returns which fault it is, what was done, and what broke which bound."""
-    language, row = cast(Language, text.language), exhibit.condition
-    others = [fault.manual_name for fault in exhibit.reported if fault is not exhibit.fault]
-    also = f" {text('learn.also', faults=', '.join(others))}" if others else ""
-    value, bound = text.units.numbers(row.unit, exhibit.value, exhibit.bound)
-    unit = text.units.from_si(row.unit)[1]
-    facts = text(
-        "learn.number", value=value, bound=text.units.with_unit(bound, row.unit),
-        time=f"{exhibit.time:.3f}", sample=exhibit.sample,
-    )  # fmt: skip
-    sent = text.units.restate(exhibit.told("sent", language))
-    place = text("check.joint", joint=exhibit.signal.axis) + " · " if exhibit.signal.axis else ""
-    return (
-        f'<p class="rl-verdict rl-bad rl-big"><b>◆ {_breakable(exhibit.fault.manual_name)}</b> '
-        f"{esc(text('learn.reported', number=exhibit.fault.value))}{esc(also)}</p>"
-        f'<p class="rl-note"><b>{esc(text("learn.done"))}</b> {esc(sent)}</p>'
-        f'<div class="rl-plot-title">{esc(text(f"condition.{row.id}"))} [{esc(unit or "1")}]</div>'
-        f'<p class="rl-note rl-under">{esc(place)}{esc(facts)}</p>'
-    )
-
-
-def _breakable(name: str) -> str:
-    """Returns a name that may be broken before every word in it."""
-    return re.sub(r"(?<=[a-z])(?=[A-Z])", "<wbr>", esc(name))
-
-
-def body_html(exhibit: Exhibit, text: Text) -> str:
-    """Returns legend, cause, remedy, condition and the way out."""
-    language, row = cast(Language, text.language), exhibit.condition
-    steps = "".join(f"<li>{esc(step)}</li>" for step in exhibit.tell_way_out(language))
-    executed = f'<span class="rl-dim">{esc(text("learn.executed"))}</span>'
-    legend = "".join(
-        f'<span class="rl-sign-{sign}">{esc(text(f"learn.legend.{sign}"))}</span>' for sign in ("limit", "fault")
-    )
-    source = text.units.restate(explain_source(row, language))
-    rows = (
-        ("learn.cause", esc(text.units.restate(exhibit.told("cause", language)))),
-        ("learn.remedy", esc(text.units.restate(exhibit.told("remedy", language)))),
-        ("learn.condition", f"{esc(row.formula)}<br><span class='rl-dim'>{esc(source)}</span>"),
-        ("learn.manual", esc(text("learn.section", section=exhibit.section, number=exhibit.fault.value))),
-        (
-            "learn.way_out",
-            f'<ol class="rl-steps-out">{steps}</ol>{executed}',
-        ),
-        ("learn.said", f"<code>{esc(text.units.restate(exhibit.said))}</code>"),
-    )
-    table = "".join(f"<tr><th>{esc(text(key))}</th><td>{cell}</td></tr>" for key, cell in rows)
-    return f'<div class="rl-legend">{legend}</div><table class="rl-table rl-facts-table rl-exhibit">{table}</table>'

@@ -8,21 +8,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rcilab.arrays import Array
+from rcilab.gallery.shown import seen_lower
 from rcilab.workbench.panels.plot_contents import joint_color
 
 if TYPE_CHECKING:
     from rcilab.workbench.store import Theme
 
 _RED = {"light": "#d1392b", "dark": "#ff7b70"}
-_NEAR = 0.5  # Share of the lower bound from which on it is shown: a far one would press the curve flat. A choice.
 
 
 def exhibit_contents(t: Array, values: Array, lower: float, upper: float, theme: Theme) -> tuple[Any, Any, Any]:
     """Returns data, series and bands: bounds, what is beyond them, the curve, the sample with the fault."""
     red = _RED[theme]
     seen = np.where(np.isfinite(values), values, np.nan)
-    least = float(np.nanmin(seen))
-    floor = lower if math.isfinite(lower) and least < _NEAR * lower else math.nan
+    floor = seen_lower(values, lower)
     top = 1.25 * max(abs(upper), float(np.nanmax(np.abs(seen))), 1e-9)
 
     def level(value: float) -> Any:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.client.control_settings import ControlPart, ControlSettings, Range, control_ranges, standard_control
+from rcilab.client.control_settings import ControlPart, ControlSettings, control_ranges, standard_control
+from rcilab.posing.driving import PARTS_OF_MODE, held_rows, name_number, name_part
 from rcilab.state import MODES, Mode
 from rcilab.workbench import requests
 from rcilab.workbench.panels.jog import problems_html
-from rcilab.workbench.run.driving import PARTS_OF_MODE, is_control_pending
+from rcilab.workbench.run.driving import is_pending
 from rcilab.workbench.run.readiness import is_moving
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, Html, Linked, NumberField, esc, on_press
@@ -16,9 +17,6 @@ from rcilab.workbench.widgets import Ask, Html, Linked, NumberField, esc, on_pre
 if TYPE_CHECKING:
     from rcilab.supervisor import SupervisorStatus
     from rcilab.workbench.store import UiState
-
-_AXES = ("x", "y", "z", "a", "b", "c")
-_FILTERS = ("joint", "cartesian", "torque")
 
 
 class ModePanel:
@@ -45,7 +43,7 @@ class ModePanel:
         for part, ranges in control_ranges(state.model.limits).items():
             visible = part in PARTS_OF_MODE[state.drive.mode]
             closed = part not in ("joint_stiffness", "cartesian_stiffness")
-            folder = gui.add_folder(self._title(part, ranges), visible=visible, expand_by_default=not closed)
+            folder = gui.add_folder(name_part(text, part, ranges), visible=visible, expand_by_default=not closed)
             with folder:
                 gui.add_html('<i class="rl-pairs"></i>')
                 self._fields[part] = [self._build_field(gui, part, place) for place in range(len(ranges))]
@@ -74,22 +72,13 @@ class ModePanel:
             labels = [(field.field, self._labels[field.field]) for field in self._fields[part]]
             self._problems[part].show(problems_html(state, text, labels))
         self._send.visible = state.target != "virtual"
-        self._send.disabled = not is_control_pending(state, status) or status.phase != "idle"
+        self._send.disabled = not is_pending(state, status) or status.phase != "idle"
         self._held.show(held_html(state, status, text))
 
     def _build_field(self, gui: Any, part: ControlPart, place: int) -> NumberField:
         name = f"control.{part}.{place}"
-        self._labels[name] = label = _label(self._text, part, place)
+        self._labels[name] = label = name_number(self._text, part, place)
         return NumberField(gui.add_text(label, "", hint=self._text("target.type_hint")), self._ask, name)
-
-    def _title(self, part: ControlPart, ranges: tuple[Range, ...]) -> str:
-        return f"{self._text(f'control.{part}')} {said_ranges(ranges)}"
-
-
-def said_ranges(ranges: tuple[Range, ...]) -> str:
-    """Returns units and ranges in brackets: one for all, or one for each that differs."""
-    found = dict.fromkeys(f"{item.low:g}…{item.high:g} {item.unit}" for item in ranges)
-    return f"[{', '.join(found)}]"
 
 
 def held_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
@@ -97,27 +86,11 @@ def held_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
     if state.drive.refusal is not None:
         why = text("ready.control_refused", error=text.say(state.drive.refusal))
         return f'<p class="rl-problem" role="alert">{esc(why)}</p>'
-    held = status.setup.control
     own = standard_control(state.model.limits) if state.target == "virtual" else ControlSettings()
-    rows: list[str] = []
-    for part in PARTS_OF_MODE[state.drive.mode]:
-        numbers = getattr(held, part) if held is not None and getattr(held, part) is not None else getattr(own, part)
-        said = text("control.own") if numbers is None else _shown(numbers)
-        rows.append(f"<tr><th>{esc(text(f'control.{part}'))}</th><td>{esc(said)}</td></tr>")
-    pending = (
-        f'<p class="rl-note rl-why">{esc(text("control.pending"))}</p>' if is_control_pending(state, status) else ""
+    rows = "".join(
+        f"<tr><th>{esc(name)}</th><td>{esc(said)}</td></tr>"
+        for name, said in held_rows(state.drive.mode, status.setup.control, own, text)
     )
+    pending = f'<p class="rl-note rl-why">{esc(text("control.pending"))}</p>' if is_pending(state, status) else ""
     title = f'<p class="rl-note">{esc(text("control.held"))}</p>'
-    return f'{title}<table class="rl-table rl-facts-table">{"".join(rows)}</table>{pending}'
-
-
-def _shown(numbers: tuple[float, ...]) -> str:
-    return f"{numbers[0]:g}" if len(set(numbers)) == 1 else " / ".join(f"{number:g}" for number in numbers)
-
-
-def _label(text: Text, part: ControlPart, place: int) -> str:
-    if part in ("joint_stiffness", "collision_thresholds"):
-        return text("control.joint", number=place + 1)
-    if part == "filters":
-        return text(f"control.filter.{_FILTERS[place]}")
-    return text("control.filter.report") if part == "report_filter" else text(f"control.axis.{_AXES[place]}")
+    return f'{title}<table class="rl-table rl-facts-table">{rows}</table>{pending}'

@@ -7,13 +7,13 @@ from functools import partial
 import numpy as np
 
 from rcilab.arrays import frozen
+from rcilab.background import Background
 from rcilab.errors import InvalidValueError, PlanningError, RcilabError, VersionMismatchError
 from rcilab.motion.program import Program
 from rcilab.motion.program_file import read_program
 from rcilab.posing.planning import Plan
 from rcilab.words.errors import tell, tell_note
 from rcilab.workbench import requests
-from rcilab.workbench.background import Background
 from rcilab.workbench.goal.actions import GoalActions
 from rcilab.workbench.program.draft import Draft, draft_of, is_led_in, number_at
 from rcilab.workbench.program.edit_actions import LONGEST_NAME, EditActions

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from rcilab.arrays import JointVector
+from rcilab.background import Tell
 from rcilab.model import RobotModel
 from rcilab.motion.program import Program
 from rcilab.posing.planning import Plan, picture
 from rcilab.safety_box import SafetyBox
 from rcilab.supervisor.layout import MOTION_TIME
-from rcilab.workbench.background import Tell
 from rcilab.workbench.program.draft import Draft
 from rcilab.workbench.text import Message, message
 

@@ -6,9 +6,10 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal
 
 from rcilab.client.control_settings import ControlPart, ControlSettings, control_ranges, standard_control
+from rcilab.posing.driving import control_obstacle, is_control_pending, with_number
 from rcilab.protocols.world import Direction, NetworkFaults, WorldStatus
 from rcilab.state import Mode
-from rcilab.workbench.text import Message, message
+from rcilab.workbench.text import Message
 
 if TYPE_CHECKING:
     from rcilab.model import RobotModel
@@ -18,20 +19,6 @@ if TYPE_CHECKING:
 Destination = Literal["preview", "ideal", "mujoco", "address"]
 
 DESTINATIONS: tuple[Destination, ...] = ("preview", "ideal", "mujoco", "address")
-PARTS_OF_MODE: dict[Mode, tuple[ControlPart, ...]] = {
-    "joint_position": ("collision_thresholds", "filters", "report_filter"),
-    "cartesian_position": ("collision_thresholds", "filters", "report_filter"),
-    "joint_impedance": ("joint_stiffness", "collision_thresholds", "filters", "report_filter"),
-    "cartesian_impedance": (
-        "cartesian_stiffness",
-        "desired_wrench",
-        "collision_thresholds",
-        "filters",
-        "report_filter",
-    ),
-    "torque": ("collision_thresholds", "filters", "report_filter"),
-}
-"""What of the parameters has an effect in a mode."""
 CABLE_PULLED = NetworkFaults(loss=1.0, tcp_delay=10.0)
 """No datagram comes through, and TCP says nothing."""
 NETWORK_LAB: dict[str, tuple[float, str]] = {
@@ -70,10 +57,8 @@ class DriveState:
 
     def with_number(self, model: RobotModel, part: ControlPart, place: int, value: float) -> DriveState:
         """Returns the state with another number among the parameters."""
-        control = self.wanted_control(model)
-        numbers = list(getattr(control, part))
-        numbers[place] = value
-        return replace(self, control=replace(control, **{part: tuple(numbers)}), refusal=None)
+        control = with_number(self.wanted_control(model), part, place, value, model.limits)
+        return replace(self, control=control, refusal=None)
 
 
 def control_field(model: RobotModel, name: str) -> tuple[ControlPart, int] | None:
@@ -85,21 +70,15 @@ def control_field(model: RobotModel, name: str) -> tuple[ControlPart, int] | Non
     return None
 
 
-def is_control_pending(state: UiState, status: SupervisorStatus) -> bool:
+def is_pending(state: UiState, status: SupervisorStatus) -> bool:
     """Returns whether the controller has not taken the parameters yet."""
-    control = state.drive.control
-    return control is not None and status.setup.control is not control
+    return is_control_pending(state.drive.control, status.setup.control)
 
 
-def control_obstacle(state: UiState, status: SupervisorStatus) -> Message | None:
+def parameter_obstacle(state: UiState, status: SupervisorStatus) -> Message | None:
     """Returns why nothing may run with these parameters, or None when the controller has them."""
-    if not is_control_pending(state, status):
-        return None
-    if state.drive.refusal is not None:
-        return message("ready.control_refused", error=state.drive.refusal)
-    if state.target == "virtual":
-        return message("ready.control_pending")
-    return message("ready.control_unsent", address=state.target)
+    address = None if state.target == "virtual" else state.target
+    return control_obstacle(state.drive.control, status.setup.control, state.drive.refusal, address)
 
 
 def destination(state: UiState, status: SupervisorStatus) -> Destination:

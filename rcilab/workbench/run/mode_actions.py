@@ -11,10 +11,11 @@ from rcilab.client.control_settings import control_ranges, standard_control
 from rcilab.client.setup import RobotSetup
 from rcilab.errors import PlanningError, RcilabError
 from rcilab.motion.pacing import SLOWEST_PACE
+from rcilab.posing.driving import SECOND_THOUGHT, ask_to_send
 from rcilab.state import MODES, Mode
 from rcilab.words.number import parse_number
 from rcilab.workbench import requests
-from rcilab.workbench.run.driving import control_field, is_control_pending
+from rcilab.workbench.run.driving import control_field, is_pending
 from rcilab.workbench.run.readiness import is_moving
 from rcilab.workbench.session import Session
 from rcilab.workbench.setup.post import SetupPost
@@ -24,7 +25,6 @@ from rcilab.workbench.text import Message, message
 if TYPE_CHECKING:
     from rcilab.supervisor import Ticket
 
-_SECOND_THOUGHT = 10.0  # [s] A choice: a second press that comes later asks anew.
 _SAME_PACE = 1e-3
 
 
@@ -92,9 +92,9 @@ class ModeActions:
             self._store.clear_problems("control.")
             self._store.update(drive=drive, typed=state.typed + 1)
             return
-        if state.target != "virtual" and now - self._asked_to_send > _SECOND_THOUGHT:
+        if state.target != "virtual" and now - self._asked_to_send > SECOND_THOUGHT:
             self._asked_to_send = now
-            self._store.say("warn", message("control.sure", address=state.target, seconds=f"{_SECOND_THOUGHT:.0f}"))
+            self._store.say("warn", ask_to_send(state.target))
             return
         self._asked_to_send = -math.inf
         self._store.update(drive=replace(state.drive, refusal=None))
@@ -118,7 +118,7 @@ class ModeActions:
 
     def _send(self) -> None:
         state = self._store.state
-        if not self._post.is_underway and is_control_pending(state, self._session.status()):
+        if not self._post.is_underway and is_pending(state, self._session.status()):
             self._post.send(RobotSetup(control=state.drive.control))
 
     def _refuse(self, why: Message) -> None:

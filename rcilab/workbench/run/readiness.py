@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from rcilab.posing.readiness import arm_obstacle, ask_to_move, plan_obstacle
-from rcilab.workbench.run.driving import control_obstacle
+from rcilab.workbench.run.driving import parameter_obstacle
 from rcilab.workbench.setup.wanted import name_parts, setup_obstacle
 from rcilab.workbench.store import UiState
 from rcilab.workbench.telling import tell_status
@@ -41,7 +41,7 @@ def obstacle(state: UiState, status: SupervisorStatus) -> Message | None:
     unset = setup_obstacle(state, status)
     if unset is not None:
         return unset
-    untold = control_obstacle(state, status)
+    untold = parameter_obstacle(state, status)
     if untold is not None:
         return untold
     return plan_obstacle(state.plan, status.q_c)

@@ -6,8 +6,8 @@ import threading
 
 import pytest
 
+from rcilab.background import Background
 from rcilab.errors import PlanningError
-from rcilab.workbench.background import Background
 from tests.waiting import wait_for
 
 

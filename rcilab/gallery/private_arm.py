@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import threading
 
+from rcilab.background import Tell
 from rcilab.faults import Fault
-from rcilab.gallery import Booth, Exhibit
-from rcilab.workbench.background import Tell
+from rcilab.gallery.booth import Booth
+from rcilab.gallery.exhibit import Exhibit
 
 
 class PrivateArm:

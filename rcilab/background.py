@@ -1,4 +1,4 @@
-"""One job at a time beside the conductor's thread: what takes longer than a page may stand still."""
+"""One job at a time beside the thread of page or notebook: what takes longer than they may stand still."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Tell: TypeAlias = Callable[[float], None]
 
 
 class Background(Generic[About, Result]):
-    """Starts, drops and takes jobs. Owned by the conductor's thread, which looks at every tick what has come of one.
+    """Starts, drops and takes jobs. Its owner looks several times a second what has come of one.
 
     Args:
         name: Of the threads.
@@ -80,7 +80,7 @@ class _Job(Generic[About, Result]):
     def run(self) -> None:
         try:
             self.outcome.set_result(self._run(self._tell))
-        except Exception as error:  # The conductor tells it, or raises it where its bugs are counted.
+        except Exception as error:  # Whoever takes it tells it, or raises it where bugs are counted.
             self.outcome.set_exception(error)
 
     def _tell(self, share: float) -> None:

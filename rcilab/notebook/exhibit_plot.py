@@ -1,0 +1,74 @@
+"""The curve that broke its bound, as SVG: the bound, what lies beyond it, and the sample with the fault."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from rcilab.gallery.exhibit import Exhibit
+from rcilab.gallery.shown import seen_lower
+from rcilab.notebook.look import esc
+from rcilab.notebook.svg_plot import BAD, LINE, SOFT, number, ticks
+
+_WIDTH, _HEIGHT = 420.0, 150.0  # Units; the browser scales them to its place.
+_LEFT, _RIGHT, _TOP, _BOTTOM = 46.0, 8.0, 6.0, 20.0
+_AROUND = 0.06  # Part of the recorded time that the plot goes on behind the fault, so that its mark is whole.
+_MARGIN = 0.12  # Part of the height above and below.
+_NAME = 60.0  # What the name of the time axis takes at its end.
+_CURVE = "#0072B2"
+
+
+def draw_exhibit(exhibit: Exhibit, title: str, time: str) -> str:
+    """Returns the picture.
+
+    Args:
+        exhibit: What is on show.
+        title: What the curve is.
+        time: What the time axis is called.
+    """
+    t, values = np.array(exhibit.cycles["t"]), exhibit.signal.values
+    lower, upper = seen_lower(values, exhibit.signal.lower), exhibit.signal.upper
+    known = np.isfinite(values)
+    seen = [float(values[known].min()), float(values[known].max()), upper]
+    seen += [lower] if math.isfinite(lower) else []
+    margin = _MARGIN * (max(seen) - min(seen) or 1.0)
+    low, high, end = min(seen) - margin, max(seen) + margin, float(t[-1]) * (1.0 + _AROUND)
+    right, bottom = _WIDTH - _RIGHT, _HEIGHT - _BOTTOM
+
+    def x(at: float) -> float:
+        return _LEFT + (right - _LEFT) * at / end
+
+    def y(value: float) -> float:
+        return _TOP + (bottom - _TOP) * (high - value) / (high - low)
+
+    out = [
+        f'<svg class="rl-exhibit-plot" viewBox="0 0 {_WIDTH:g} {_HEIGHT:g}" role="img" aria-label="{esc(title)}" '
+        'font-size="10.5">'
+    ]
+    for tick in ticks(low, high, 4):
+        out.append(
+            f'<path d="M{_LEFT:g},{y(tick):.1f}H{right:g}" stroke="{LINE}" stroke-width=".7"/>'
+            f'<text x="{_LEFT - 4:g}" y="{y(tick) + 3.5:.1f}" text-anchor="end" fill="{SOFT}">{number(tick)}</text>'
+        )
+    for tick in (tick for tick in ticks(0.0, end, 5) if x(tick) < right - _NAME):
+        out.append(f'<text x="{x(tick):.1f}" y="{bottom + 13:g}" text-anchor="middle" fill="{SOFT}">{tick:g}</text>')
+    out.append(f'<text x="{right:g}" y="{bottom + 13:g}" text-anchor="end" fill="{SOFT}">{esc(time)}</text>')
+    out.append(_beyond(_TOP, y(upper), y(upper), right))
+    if math.isfinite(lower):
+        out.append(_beyond(y(lower), bottom, y(lower), right))
+    points = " ".join(f"{x(a):.1f},{y(b):.1f}" for a, b in zip(t[known].tolist(), values[known].tolist(), strict=True))
+    out.append(f'<polyline points="{points}" fill="none" stroke="{_CURVE}" stroke-width="2"/>')
+    if known[-1]:
+        out.append(f'<circle cx="{x(float(t[-1])):.1f}" cy="{y(exhibit.value):.1f}" r="5" fill="{BAD}"/>')
+    frame = f'<rect x="{_LEFT:g}" y="{_TOP:g}" width="{right - _LEFT:g}" height="{bottom - _TOP:g}" fill="none" '
+    return "".join(out) + f'{frame}stroke="{LINE}"/></svg>'
+
+
+def _beyond(top: float, bottom: float, edge: float, right: float) -> str:
+    """Returns what lies beyond a bound, tinted, and the bound itself."""
+    return (
+        f'<rect x="{_LEFT:g}" y="{top:.1f}" width="{right - _LEFT:g}" height="{bottom - top:.1f}" '
+        f'fill="{BAD}" opacity=".1"/>'
+        f'<path d="M{_LEFT:g},{edge:.1f}H{right:g}" stroke="{BAD}" stroke-width="1.2" stroke-dasharray="5 4"/>'
+    )

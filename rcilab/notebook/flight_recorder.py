@@ -1,0 +1,69 @@
+"""The flight recorder: what the joints did in the last milliseconds before a motion was stopped."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rcilab.limits import JointLimits
+from rcilab.notebook.look import head, soft, table
+from rcilab.notebook.state import LabState
+from rcilab.notebook.svg_plot import Panel, draw
+from rcilab.views.plots import Quantity, build_frame, recorded_curves
+from rcilab.words.text import Text
+
+_RECORDED = 400  # Cycles before the end that are drawn; a choice: 0.4 s.
+_LISTED = 8
+_QUANTITIES: tuple[Quantity, ...] = ("dq", "ddq", "jerk")
+_HEADS = ("cycle", "t", "success", "late", "joint", "velocity")
+
+
+def record_html(state: LabState, text: Text) -> str:
+    """Returns the last cycles of an execution that was not allowed to end, as curves and as a table."""
+    rows = _last_rows(state)
+    if rows is None:
+        return head(text("fault.recorder")) + soft(text("fault.no_record"))
+    cells = [
+        [
+            f"{row['message_id']}",
+            f"{row['t']:.3f} s",
+            f"{100.0 * row['success_rate']:.0f} %",
+            f"{1e6 * row['lateness']:.0f} µs",
+            f"J{int(np.abs(row['dq']).argmax()) + 1}",
+            f"{np.degrees(np.abs(row['dq']).max()):.2f} deg/s",
+        ]
+        for row in rows[-_LISTED:]
+    ]
+    model = state.model
+    picture = draw(
+        _panels(rows, model.limits.joint, text), list(range(model.n)), text("plot.time"), text("legend.limit")
+    )
+    told = head(text("fault.recorder")) + soft(text("fault.record_of", cycles=len(rows)))
+    return f"{told}{picture}{table([text(f'fault.head.{name}') for name in _HEADS], cells, right=True)}"
+
+
+def _last_rows(state: LabState) -> NDArray[Any] | None:
+    error, run = state.error, state.run
+    record = getattr(error, "record", None)
+    if record is None and error is not None and run is not None:
+        record = run.cycles
+    if record is None or not len(record):
+        return None
+    rows = record[np.isfinite(record["t"])]
+    return rows[-_RECORDED:] if len(rows) > len(_QUANTITIES) else None
+
+
+def _panels(rows: NDArray[Any], limits: JointLimits, text: Text) -> list[Panel]:
+    t = rows["t"] - rows["t"][0]
+    return [
+        Panel(
+            title=text(f"plot.{quantity}"),
+            unit=text("plot.percent"),
+            frame=build_frame(
+                None, recorded_curves(t, rows["q"], rows["q_c"], rows["dq"], quantity), limits, quantity, 0
+            ),
+        )
+        for quantity in _QUANTITIES
+    ]

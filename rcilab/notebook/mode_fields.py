@@ -1,0 +1,132 @@
+"""Which of the five modes, and the parameters that have an effect in it, each with its unit and range."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import ipywidgets
+
+from rcilab.client.control_settings import ControlPart, ControlSettings, control_ranges, standard_control
+from rcilab.notebook.look import block, esc, head, problem, soft, table, verdict, write
+from rcilab.notebook.number_field import NumberField
+from rcilab.notebook.parameter_desk import ParameterDesk
+from rcilab.notebook.state import LabState
+from rcilab.posing.driving import PARTS_OF_MODE, held_rows, is_control_pending, name_number, name_part, shown_numbers
+from rcilab.state import MODES
+from rcilab.supervisor import SupervisorStatus
+from rcilab.words.text import Text
+
+_OPEN: tuple[ControlPart, ...] = ("joint_stiffness", "cartesian_stiffness")
+
+
+class ModeFields:
+    """Two groups of `RunPanel`: `choice` stands before Execute, `parameters` below it.
+
+    Args:
+        state: What the parts share.
+        text: Words.
+        desk: Tells the robot.
+    """
+
+    def __init__(self, state: LabState, text: Text, desk: ParameterDesk) -> None:
+        self._state, self._text, self._desk = state, text, desk
+        self._ranges = control_ranges(state.model.limits)
+        self.mode: Any = ipywidgets.Dropdown(
+            description=text("mode.choose"), options=[(text(f"mode.{mode}"), mode) for mode in MODES],
+            value=state.mode, tooltip=text("mode.hint"), layout=ipywidgets.Layout(width="24em"),
+        )  # fmt: skip
+        self._note, self._held, self._said = block(), block(), block()
+        self.fields: dict[ControlPart, list[NumberField]] = {}
+        """Those of the parts that somebody has opened."""
+        self.folders: dict[ControlPart, Any] = {part: self._folder(part) for part in self._ranges}
+        self.send = self._button("control.send", self._on_send)
+        self.reset = self._button("control.reset", desk.reset)
+        self._shown: ControlSettings | None = None
+        self.choice = ipywidgets.VBox([self.mode, self._note])
+        self.parameters = ipywidgets.VBox([
+            block(head(text("control.title"))),
+            *self.folders.values(),
+            ipywidgets.HBox([self.send, self.reset]),
+            self._said,
+            self._held,
+        ])  # fmt: skip
+        self.mode.observe(self._on_mode, names="value")
+
+    def show(self, status: SupervisorStatus | None) -> None:
+        """Follows mode, parameters and what the controller has of them."""
+        state, text = self._state, self._text
+        self.mode.value = state.mode
+        self.mode.disabled = status is not None and status.phase in ("moving", "stopping")
+        write(self._note, soft(text(f"mode.{state.mode}_note")))
+        for part, folder in self.folders.items():
+            shown = None if part in PARTS_OF_MODE[state.mode] else "none"
+            if folder.layout.display != shown:
+                folder.layout.display = shown
+                folder.selected_index = 0 if shown is None and part in _OPEN else None
+        if self._shown is not state.control:
+            self._shown = state.control
+            for part in self.fields:
+                self._fill(part)
+        robot = state.robot
+        pending = status is not None and is_control_pending(state.control, status.setup.control)
+        self.send.layout.display = "none" if robot is None or robot.is_virtual else None
+        self.send.disabled = not pending or status is None or status.phase != "idle"
+        write(self._held, "" if status is None else self._tell_held(status, pending))
+
+    def _tell_held(self, status: SupervisorStatus, pending: bool) -> str:
+        state, text = self._state, self._text
+        if state.refusal is not None:
+            return problem(text("ready.control_refused", error=text.say(state.refusal)))
+        known = state.session is None and state.robot is not None and state.robot.is_virtual
+        own = standard_control(state.model.limits) if known else ControlSettings()
+        rows = held_rows(state.mode, status.setup.control, own, text)
+        told = soft(text("control.held")) + table([], [list(row) for row in rows])
+        return told + (f'<p class="rl-soft"><b>{esc(text("control.pending"))}</b></p>' if pending else "")
+
+    def _on_mode(self, change: Any) -> None:
+        self._state.follow(change["new"])
+
+    def _on_send(self) -> None:
+        robot = self._state.robot
+        if robot is not None:
+            question = self._desk.press_send(robot)
+            write(self._said, "" if question is None else verdict("warn", "▲", self._text.say(question)))
+
+    def _folder(self, part: ControlPart) -> Any:
+        """Returns a folder whose fields are made when it is opened: forty of them would delay the cell."""
+        inside = ipywidgets.Box(layout=ipywidgets.Layout(flex_flow="row wrap"))
+        folder = ipywidgets.Accordion(
+            children=[inside], titles=(name_part(self._text, part, self._ranges[part]),), selected_index=None,
+            layout=ipywidgets.Layout(display="none"),
+        )  # fmt: skip
+
+        def open_it(change: Any) -> None:
+            if change["new"] == 0 and part not in self.fields:
+                self.fields[part] = [self._field(part, place) for place in range(len(self._ranges[part]))]
+                self._fill(part)
+                cells = [ipywidgets.VBox([field.row, field.said]) for field in self.fields[part]]
+                inside.children = tuple(cells)
+
+        folder.observe(open_it, names="selected_index")
+        return folder
+
+    def _field(self, part: ControlPart, place: int) -> NumberField:
+        low, high, unit = self._ranges[part][place]
+        take = partial(self._desk.set_number, part, place)
+        field = NumberField(self._text, name_number(self._text, part, place), unit, low, high, take, digits=None)
+        field.box.layout.width, field.box.style.description_width = "8em", "3.4em"  # Two a row inside `Lab`.
+        field.unit.layout.width = "4.2em"
+        return field
+
+    def _fill(self, part: ControlPart) -> None:
+        numbers = shown_numbers(self._state.control, part, self._state.model.limits)
+        for field, number in zip(self.fields[part], numbers, strict=True):
+            field.show(number)
+
+    def _button(self, code: str, act: Any) -> Any:
+        button = ipywidgets.Button(
+            description=self._text(code), tooltip=self._text(f"{code}_hint"), layout=ipywidgets.Layout(width="auto")
+        )
+        button.on_click(lambda _: act())
+        return button

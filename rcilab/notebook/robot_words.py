@@ -1,0 +1,72 @@
+"""What is said of the robot on Run: how it stands, how well the milliseconds are kept, what came of it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rcilab.errors import ModelError, RcilabError
+from rcilab.model import RobotModel
+from rcilab.notebook.look import head, table, verdict
+from rcilab.notebook.robot_side import BusyError, Outcome
+from rcilab.supervisor import SupervisorStatus
+from rcilab.supervisor.telling import tell_error, tell_status
+from rcilab.words.text import Message, Text, message
+
+
+def name_phase(status: SupervisorStatus | None, text: Text) -> str:
+    """Returns the two or three words for what the robot does."""
+    if status is None:
+        return text("phase.closed")
+    if status.phase == "idle" and status.powered is False:
+        return text("phase.unpowered")
+    return text(f"phase.{status.phase}")
+
+
+def tell_trouble(status: SupervisorStatus | None, text: Text) -> str:
+    """Returns why a robot that ought to be there is not; empty where nothing is wrong."""
+    return "" if status is None or status.phase not in ("lost", "crashed") else text.say(tell_status(status))
+
+
+def tell_refusal(error: RcilabError, model: RobotModel, status: SupervisorStatus | None = None) -> Message:
+    """Returns why something was not done."""
+    if isinstance(error, BusyError):
+        return message("robot.busy", what=message(f"what.{error.under_way}"))
+    if isinstance(error, ModelError) and model.description.interface != "RCI":
+        return message("robot.no_rci", model=model.name)
+    return tell_error(error, status)
+
+
+def health_html(status: SupervisorStatus, text: Text) -> str:
+    """Returns mode, power, network and timing, as the controller reports them."""
+    mode, control = status.robot_mode, status.controller_mode
+    rows = [
+        ("mode", "—" if mode is None else text(f"robot_mode.{mode.name}")),
+        ("control", "—" if control is None else text(f"controller_mode.{control.name}")),
+        ("power", {None: "—", True: text("run.on"), False: text("run.off")}[status.powered]),
+        ("success", f"{100.0 * status.success_rate:.1f} %"),
+        ("rate", f"{status.rate_hz:.0f} Hz"),
+    ]
+    late = status.lateness
+    if late.cycles:
+        late_value = text("run.late_value", late=status.late_cycles, lost=status.lost_cycles, cycles=late.cycles)
+        rows.append(("late", late_value))
+        rows.append(("lateness", f"{late.p50:.0f} / {late.p99:.0f} / {late.p999:.0f} / {late.max:.0f} µs"))
+        rows.append(("scheduling", text(f"scheduling.{status.scheduling}")))
+    return head(text("run.health")) + table([], [[text(f"health.{name}"), value] for name, value in rows])
+
+
+def outcome_html(outcome: Outcome, model: RobotModel, status: SupervisorStatus | None, text: Text) -> str:
+    """Returns what came of something that was asked for."""
+    error, run = outcome.error, outcome.run
+    if error is not None:
+        faults = ", ".join(getattr(fault, "manual_name", str(fault)) for fault in getattr(error, "faults", ()))
+        if faults:
+            return verdict("bad", "✗", text("run.faulted", faults=faults))
+        if outcome.what == "execute":
+            return verdict("warn", "▲", text("run.stopped"))
+        why = message("notice.failed", what=message(f"what.{outcome.what}"), error=tell_refusal(error, model, status))
+        return verdict("bad", "✗", text.say(why))
+    if run is not None and len(run.q):
+        largest = float(np.degrees(np.abs(np.nan_to_num(run.error)).max()))
+        return verdict("good", "✓", text("run.arrived", cycles=len(run.t), error=f"{largest:.3f}"))
+    return ""

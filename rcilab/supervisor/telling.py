@@ -1,0 +1,94 @@
+"""What errors, incidents and states of the library are called on page and in notebook: what happened, what to press.
+
+The library's own sentences advise Python calls, in English; none of them belongs there. Each face has its own words
+for these keys, because each has its own buttons.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rcilab.errors import (
+    CertificateError,
+    ConnectionLostError,
+    ControlError,
+    InvalidValueError,
+    RcilabError,
+)
+from rcilab.faults import Fault
+from rcilab.words.errors import tell
+from rcilab.words.text import Finished, Message, message
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from rcilab.supervisor import SupervisorStatus
+
+_CRASHES = ("crashed.controller", "crashed.worker", "crashed.frozen")
+_PHASES = {
+    **{code: f"phase.{code}" for code in _CRASHES}, "moving.held": "phase.held", "moving.guided": "phase.guided",
+}  # fmt: skip
+"""States that are worth a word of their own beside that of their phase."""
+_LOST = ("lost.silent", "lost.unreachable", "lost.other_arm")
+
+
+def tell_error(error: RcilabError, status: SupervisorStatus | None = None) -> Message:
+    """Returns the sentence for an error.
+
+    Args:
+        error: What went wrong.
+        status: How the robot side stands, where the error came from there.
+    """
+    if isinstance(error, ControlError) and error.faults:
+        return message("notice.fault", faults=name_faults(error.faults))
+    if isinstance(error, InvalidValueError) and error.name == "address":
+        return message("address.bad", typed=str(error.value))
+    if isinstance(error, CertificateError):
+        return message("notice.stale")
+    if isinstance(error, ConnectionLostError) and status is not None:
+        known = status.code in (*_CRASHES, *_LOST) or status.incident is None
+        return _tell_loss(status.code if known or status.incident is None else status.incident.code, status)
+    return message("notice.error", text=tell(error))
+
+
+def tell_incident(code: str, sentence: str, status: SupervisorStatus) -> Message:
+    """Returns the sentence for an incident of the supervisor."""
+    if code == "fault":
+        return message("notice.fault", faults=name_faults(status.faults))
+    if code in _CRASHES or code in _LOST:
+        return _tell_loss(code, status)
+    return message("notice.plain", text=Finished(sentence))
+
+
+def tell_status(status: SupervisorStatus) -> Message:
+    """Returns what the robot side is doing, in one sentence."""
+    if status.code == "fault":
+        return message("ready.fault_of", faults=name_faults(status.faults))
+    if status.code in _CRASHES or status.code in _LOST:
+        return _tell_loss(status.code, status)
+    return message(phase_code(status))
+
+
+def phase_code(status: SupervisorStatus) -> str:
+    """Returns the key of the two or three words for what the robot side is doing."""
+    return _PHASES.get(status.code, f"phase.{status.phase}")
+
+
+def name_faults(faults: Iterable[object]) -> str:
+    """Returns faults as the manual prints them: their one name everywhere."""
+    return ", ".join(fault.manual_name for fault in faults if isinstance(fault, Fault))
+
+
+def _tell_loss(code: str, status: SupervisorStatus) -> Message:
+    """Returns what has gone, of whom, and what to press; a lost connection to our own controller names no cable."""
+    if code in _CRASHES:
+        pid = status.controller_pid if code == "crashed.controller" else status.worker_pid
+        return message(f"incident.{code}", next=message("incident.again" if pid is not None else "incident.press"))
+    if code == "lost.other_arm":
+        return message("incident.lost.other_arm", address=status.target)
+    if status.target == "virtual":
+        return message("incident.lost.virtual")
+    known = code if code in _LOST else "lost.unreachable"
+    from rcilab.supervisor.keeper import ANSWER_TIMEOUT
+
+    return message(f"incident.{known}", address=status.target, seconds=f"{ANSWER_TIMEOUT:g}")

@@ -1,0 +1,162 @@
+"""The five modes and their parameters on RunPanel: typed, acknowledged, and the arm follows in them."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+
+import rcilab
+from rcilab.client.control_settings import ControlSettings, standard_control
+from rcilab.language import LANGUAGES
+from rcilab.notebook import RunPanel
+from rcilab.notebook.robot_side import BusyError, Outcome
+from rcilab.notebook.robot_words import tell_refusal
+from rcilab.posing.driving import PARTS_OF_MODE
+from rcilab.state import MODES
+from rcilab.supervisor import SupervisorStatus
+from rcilab.words.text import Text
+from tests.waiting import wait_for
+
+PRO7 = rcilab.load_model("xMatePro7")
+
+
+def text_of(widget: Any) -> str:
+    return re.sub(r"<[^>]*>", "", widget.value)
+
+
+def held(panel: RunPanel) -> ControlSettings | None:
+    status = panel.state.status
+    return None if status is None else status.setup.control
+
+
+def run_in(panel: RunPanel, mode: str, speed: float, way: float) -> Any:
+    panel.modes.mode.value = mode
+    panel.state.speed = speed
+    panel.state.pose(panel.state.here + way)
+    panel.state.make_plan()
+    plan = panel.state.plan
+    assert plan is not None
+    assert plan.mode == mode
+    panel.execute.click()
+    return wait_for(lambda: panel.state.run, 30.0, "the run")
+
+
+def test_a_parameter_is_typed_acknowledged_and_the_arm_follows_in_its_mode() -> None:
+    with RunPanel(PRO7) as panel:
+        assert [name for _, name in panel.modes.mode.options] == list(MODES)
+        panel.connect.click()
+        wait_for(lambda: not panel.power_on.disabled, 30.0, "a robot that can be powered")
+        panel.power_on.click()
+        wait_for(lambda: panel.state.status is not None and panel.state.status.powered, 30.0, "motor power")
+        assert panel.modes.folders["joint_stiffness"].layout.display == "none"
+        panel.modes.mode.value = "joint_impedance"
+        field = panel.modes.fields["joint_stiffness"][2]  # The folder of the mode is open.
+        assert field.box.value == "3000"
+        field.box.value = "30000"
+        assert "outside 0" in text_of(field.said)
+        field.box.value = "1234 N·m/rad"
+        wait_for(lambda: (told := held(panel)) is not None and told.joint_stiffness[2] == 1234.0, 30.0, "the answer")
+        run = run_in(panel, "joint_impedance", 0.5, 0.05)
+        assert run.setup.mode == "joint_impedance"
+        assert "1234" in text_of(panel.modes._held)
+        panel.modes.reset.click()
+        wait_for(lambda: held(panel) == standard_control(PRO7.limits), 30.0, "the defaults")
+        assert field.box.value == "3000"
+
+
+def test_a_session_is_told_only_what_was_typed_and_is_driven_in_every_mode() -> None:
+    with rcilab.simulate(PRO7) as robot, RunPanel(robot) as panel:
+        robot.power_on()
+        panel.modes.mode.value = "cartesian_impedance"
+        panel.modes.folders["desired_wrench"].selected_index = 0
+        panel.modes.fields["desired_wrench"][2].box.value = "-1"
+        wait_for(lambda: held(panel) is not None, 30.0, "the answer")
+        assert held(panel) == ControlSettings(desired_wrench=(0.0, 0.0, -1.0, 0.0, 0.0, 0.0))
+        assert "its own; it cannot be asked" in text_of(panel.modes._held)
+        panel.modes.fields["desired_wrench"][2].box.value = "0"
+        wait_for(lambda: held(panel) == ControlSettings(desired_wrench=(0.0,) * 6), 30.0, "the answer")
+        wait_for(lambda: panel.state.status is not None and panel.state.status.powered, 30.0, "motor power")
+        for mode, speed in (("cartesian_position", 0.1), ("torque", 0.03)):
+            run = run_in(panel, mode, speed, 0.01)
+            assert run.setup.mode == mode
+            assert not run.stopped
+            np.testing.assert_allclose(run.q[-1], panel.state.goal, atol=5e-3)  # Torques lead it there softly.
+
+
+class Real:
+    """A robot that is not virtual, as RunPanel sees it."""
+
+    name, is_virtual = "rci://192.168.0.160:1337", False
+
+    def __init__(self) -> None:
+        self.told: list[ControlSettings] = []
+        q = PRO7.home
+        self._status = SupervisorStatus(phase="idle", code="idle", q=q, q_c=q, powered=True)
+
+    def status(self) -> SupervisorStatus:
+        return self._status
+
+    def set_control(self, control: ControlSettings) -> None:
+        self.told.append(control)
+
+    def outcomes(self) -> list[Outcome]:
+        return []
+
+    def execute(self, plan: Any) -> None: ...
+    def stop(self) -> None: ...
+    def beat(self) -> None: ...
+    def close(self) -> None: ...
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_a_robot_is_told_parameters_after_a_second_press_only(language: str) -> None:
+    text = Text(language, "rcilab.notebook")
+    with RunPanel(PRO7, language=language) as panel:
+        robot = Real()
+        panel._take(robot)  # type: ignore[arg-type]
+        panel.state.pose(PRO7.home + 0.1)
+        panel.state.make_plan()
+        panel.modes.mode.value = "joint_impedance"
+        assert not panel.execute.disabled
+        panel.modes.fields["joint_stiffness"][0].box.value = "500"
+        assert panel.execute.disabled
+        assert text("ready.control_unsent", address=robot.name) in text_of(panel._where)
+        panel.modes.send.click()
+        assert robot.told == []
+        assert robot.name in text_of(panel.modes._said)
+        panel.modes.send.click()
+        assert [told.joint_stiffness for told in robot.told] == [
+            (500.0, *standard_control(PRO7.limits).joint_stiffness[1:])
+        ]
+
+
+def test_refusals_are_told_in_the_language_of_the_panel() -> None:
+    from rcilab.errors import CommandRejectedError, InvalidValueError
+    from rcilab.protocols import rci
+
+    kinds = (rci.SettingStatus, rci.StartStatus, rci.StopStatus, rci.RecoveryStatus, rci.GuideStatus)
+    statuses = [status for kind in kinds for status in kind if status.name not in ("SUCCESS", "MOTION_STARTED")]
+    errors = [CommandRejectedError("StartMove", status) for status in statuses]
+    errors += [BusyError("power_on", what) for what in ("execute", "control", "power_on", "power_off", "recover")]
+    errors += [InvalidValueError("address", "robot", "is no address")]
+    for language in LANGUAGES:
+        text = Text(language, "rcilab.notebook")
+        for error in errors:
+            said = text.say(tell_refusal(error, PRO7))
+            assert str(error) not in said
+            assert not re.search(r"\b(status|what|error|robot)\.[a-zA-Z_]+", said), said
+    panda = rcilab.load_model("Panda")
+    with RunPanel(panda, language="zh") as panel:
+        panel.connect.click()
+        assert "RCI" in text_of(panel._outcome)
+        assert "Franka" not in text_of(panel._outcome)
+
+
+def test_every_mode_has_words_and_every_part_a_name() -> None:
+    for language in LANGUAGES:
+        text = Text(language, "rcilab.notebook")
+        assert all(text.has(f"mode.{mode}") and text.has(f"mode.{mode}_note") for mode in MODES)
+        assert all(text.has(f"control.{part}") for parts in PARTS_OF_MODE.values() for part in parts)
