@@ -84,8 +84,9 @@ class Plots:
             self._arrange(state, visible)
         height = _height(state, len(visible))
         for name in visible:
-            if self._plots[name].height != height:
-                self._plots[name].height = height
+            wanted_height = height + (_TIMES if name == visible[-1] else 0)
+            if self._plots[name].height != wanted_height:
+                self._plots[name].height = wanted_height
         wanted = (state.plan, state.recording, state.plot_joint, state.model, visible)
         now = time.monotonic()
         if wanted != self._drawn and now >= self._next:
