@@ -212,7 +212,7 @@ def turn(camera: Camera) -> None:
     places = [camera.spot("/live", point) for point in goal[1:]]
     with camera.held():
         for place in places:
-            camera.glide(place, 4, drawn=1)
+            camera.glide(place, 3, drawn=1)
     camera.take(600)
     camera.say("Every branch of the inverse, before it is chosen")
     for row in (1, 2):
@@ -245,8 +245,7 @@ def run(camera: Camera) -> None:
     camera.press(camera.tab.get_by_role("button", name="Execute", exact=True))
     camera.wait(lambda: bench.session.status().phase == "moving")
     while bench.session.status().phase == "moving":
-        camera.settle(1)
-        camera.take()
+        camera.take(2 * STEP)
     camera.wait(lambda: bench.store.state.recording is not None and bench.store.state.recording.tracking is not None)
     camera.tab.wait_for_timeout(800)
     camera.settle()
@@ -279,7 +278,7 @@ def film(camera: Camera, path: Path) -> None:
 def begin(camera: Camera) -> None:
     """Brings arm and page to where the film begins."""
     camera.go(START)
-    camera.ask(requests.SetSpeed(speed=0.1))
+    camera.ask(requests.SetSpeed(speed=0.08))
     camera.tab.evaluate(DRESS)
     camera.tab_named("Target").click()
     camera.tab.mouse.move(*camera.hand)
