@@ -10,12 +10,14 @@ on when a frame is there, and each is shown equally long, so that dragging looks
 from __future__ import annotations
 
 import argparse
+import base64
 import io
 import shutil
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from PIL import Image
@@ -92,9 +94,31 @@ class Camera:
 
     def take(self, time: int = STEP) -> None:
         """Takes a frame, to be shown so long, [ms]."""
-        shot = Image.open(io.BytesIO(self.tab.screenshot(type="jpeg", quality=94)))
+        self.keep(self.tab.screenshot(type="jpeg", quality=94), time)
+
+    def keep(self, picture: bytes, time: int) -> None:
+        """Adds a frame to the film."""
+        shot = Image.open(io.BytesIO(picture))
         self.frames.append(shot.convert("RGB").resize(FILM, Image.Resampling.LANCZOS))
         self.times.append(time)
+
+    def watch(self, condition: Callable[[], object]) -> None:
+        """Takes every frame that the page draws while something goes on by itself, at the pace of the page."""
+        drawn: list[dict[str, Any]] = []
+        link = self.tab.context.new_cdp_session(self.tab)
+        link.on("Page.screencastFrame", drawn.append)
+        link.send("Page.startScreencast", {"format": "jpeg", "quality": 94})
+        count = 0
+        while condition():
+            self.tab.wait_for_timeout(20)
+            for frame in drawn[count:]:
+                link.send("Page.screencastFrameAck", {"sessionId": frame["sessionId"]})
+                count += 1
+        link.send("Page.stopScreencast")
+        link.detach()
+        times = [frame["metadata"]["timestamp"] for frame in drawn]
+        for frame, begin, end in zip(drawn, times, times[1:], strict=False):
+            self.keep(base64.b64decode(frame["data"]), max(40, round(1000.0 * (end - begin))))
 
     def say(self, words: str) -> None:
         """Writes a caption below the arm."""
@@ -147,7 +171,7 @@ class Camera:
         """Brings the arm to where the film begins."""
         self.pose(degrees)
         self.ask(requests.Drive(what="execute", page=self.bench.store.state.lease.holder))
-        self.wait(lambda: self.bench.store.state.recording is not None and self._idle())
+        self.wait(lambda: self.bench.store.state.recording is not None and self.idle)
         self.ask(requests.PoseGoal(name="here"))
         self.wait(lambda: self.bench.store.state.plan is None)
 
@@ -161,7 +185,9 @@ class Camera:
         plan = self.bench.store.state.plan
         return plan is not None and max(abs(plan.motion.goal * 57.29577951308232 - degrees)) < 1e-6
 
-    def _idle(self) -> bool:
+    @property
+    def idle(self) -> bool:
+        """Whether the arm stands there, ready."""
         status = self.bench.session.status()
         return status.phase == "idle" and bool(status.powered)
 
@@ -169,8 +195,8 @@ class Camera:
 def still(camera: Camera, path: Path) -> None:
     """The arm, its goal, a path that leaves the safety box, and what the check says about it."""
     ask, state = camera.ask, camera.bench.store
-    for name, value in (("box", True), ("active", True)):
-        ask(requests.SetSetup(name=name, value=value))
+    ask(requests.SetSetup(name="box", value=True))
+    ask(requests.SetSetup(name="active", value=True))
     for face, place in BOX.items():
         ask(requests.TypeField(field=f"setup.box.{face}", text=str(place)))
     camera.pose(GOAL)
@@ -244,8 +270,7 @@ def run(camera: Camera) -> None:
     camera.take(500)
     camera.press(camera.tab.get_by_role("button", name="Execute", exact=True))
     camera.wait(lambda: bench.session.status().phase == "moving")
-    while bench.session.status().phase == "moving":
-        camera.take(2 * STEP)
+    camera.watch(lambda: bench.session.status().phase == "moving")
     camera.wait(lambda: bench.store.state.recording is not None and bench.store.state.recording.tracking is not None)
     camera.tab.wait_for_timeout(800)
     camera.settle()
@@ -277,6 +302,8 @@ def film(camera: Camera, path: Path) -> None:
 
 def begin(camera: Camera) -> None:
     """Brings arm and page to where the film begins."""
+    camera.ask(requests.ChooseRobot(plant="mujoco"))
+    camera.wait(lambda: camera.bench.store.state.plant == "mujoco" and camera.idle)
     camera.go(START)
     camera.ask(requests.SetSpeed(speed=0.08))
     camera.tab.evaluate(DRESS)
