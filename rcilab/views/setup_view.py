@@ -34,7 +34,7 @@ _FACES = np.array(
         (7, 3, 2), (6, 7, 2), (6, 2, 0), (4, 6, 0), (7, 5, 1), (3, 7, 1),
     ]
 )  # fmt: skip
-"""They look inwards: one sees the far walls only, and a near wall would hide translucent arms that are drawn after it."""
+"""They look inwards: only far walls are drawn. A near one would hide the translucent arms that are drawn after it."""
 
 
 class SetupView:
