@@ -106,7 +106,7 @@ class Camera:
         """Takes every frame that the page draws while something goes on by itself, at the pace of the page."""
         drawn: list[dict[str, Any]] = []
         link = self.tab.context.new_cdp_session(self.tab)
-        link.on("Page.screencastFrame", drawn.append)
+        link.on("Page.screencastFrame", lambda frame: drawn.append(frame))
         link.send("Page.startScreencast", {"format": "jpeg", "quality": 94})
         count = 0
         while condition():
