@@ -10,14 +10,12 @@ on when a frame is there, and each is shown equally long, so that dragging looks
 from __future__ import annotations
 
 import argparse
-import base64
 import io
 import shutil
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from PIL import Image
@@ -94,31 +92,9 @@ class Camera:
 
     def take(self, time: int = STEP) -> None:
         """Takes a frame, to be shown so long, [ms]."""
-        self.keep(self.tab.screenshot(type="jpeg", quality=94), time)
-
-    def keep(self, picture: bytes, time: int) -> None:
-        """Adds a frame to the film."""
-        shot = Image.open(io.BytesIO(picture))
+        shot = Image.open(io.BytesIO(self.tab.screenshot(type="jpeg", quality=94)))
         self.frames.append(shot.convert("RGB").resize(FILM, Image.Resampling.LANCZOS))
         self.times.append(time)
-
-    def watch(self, condition: Callable[[], object]) -> None:
-        """Takes every frame that the page draws while something goes on by itself, at the pace of the page."""
-        drawn: list[dict[str, Any]] = []
-        link = self.tab.context.new_cdp_session(self.tab)
-        link.on("Page.screencastFrame", lambda frame: drawn.append(frame))
-        link.send("Page.startScreencast", {"format": "jpeg", "quality": 94})
-        count = 0
-        while condition():
-            self.tab.wait_for_timeout(20)
-            for frame in drawn[count:]:
-                link.send("Page.screencastFrameAck", {"sessionId": frame["sessionId"]})
-                count += 1
-        link.send("Page.stopScreencast")
-        link.detach()
-        times = [frame["metadata"]["timestamp"] for frame in drawn]
-        for frame, begin, end in zip(drawn, times, times[1:], strict=False):
-            self.keep(base64.b64decode(frame["data"]), max(40, round(1000.0 * (end - begin))))
 
     def say(self, words: str) -> None:
         """Writes a caption below the arm."""
@@ -262,6 +238,7 @@ def scrub(camera: Camera) -> None:
 def run(camera: Camera) -> None:
     """Check, Execute, plan against actual."""
     bench = camera.bench
+    camera.ask(requests.SetSpeed(speed=0.02))  # So slow that frames are drawn on the way.
     camera.press(camera.tab_named("Check"))
     camera.say("The check: every condition with its bound and its source")
     camera.take(1800)
@@ -270,7 +247,8 @@ def run(camera: Camera) -> None:
     camera.take(500)
     camera.press(camera.tab.get_by_role("button", name="Execute", exact=True))
     camera.wait(lambda: bench.session.status().phase == "moving")
-    camera.watch(lambda: bench.session.status().phase == "moving")
+    while bench.session.status().phase == "moving":
+        camera.take(2 * STEP)
     camera.wait(lambda: bench.store.state.recording is not None and bench.store.state.recording.tracking is not None)
     camera.tab.wait_for_timeout(800)
     camera.settle()
