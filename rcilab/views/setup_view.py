@@ -30,10 +30,11 @@ _THINNEST, _WIDEST = 0.004, 0.4  # [m] What is drawn of an ellipsoid of inertia,
 _EDGES = np.array([(a, b) for a in range(8) for b in range(a + 1, 8) if (a ^ b) in (1, 2, 4)])
 _FACES = np.array(
     [
-        (0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1),
-        (2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4), (1, 5, 7), (1, 7, 3),
+        (3, 1, 0), (2, 3, 0), (7, 6, 4), (5, 7, 4), (5, 4, 0), (1, 5, 0),
+        (7, 3, 2), (6, 7, 2), (6, 2, 0), (4, 6, 0), (7, 5, 1), (3, 7, 1),
     ]
 )  # fmt: skip
+"""They look inwards: only far walls are drawn. A near one would hide the translucent arms that are drawn after it."""
 
 
 class SetupView:

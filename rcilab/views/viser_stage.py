@@ -9,7 +9,7 @@ import numpy as np
 if TYPE_CHECKING:
     import viser
 
-_CAMERA, _LOOK_AT = (2.0, -2.1, 1.45), (0.1, 0.05, 0.62)  # [m]
+_CAMERA, _LOOK_AT = (1.80, -1.85, 1.22), (0.17, 0.02, 0.49)  # [m]
 _FIELD_OF_VIEW = 0.75  # [rad]
 
 

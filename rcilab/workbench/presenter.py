@@ -62,7 +62,7 @@ _TABS = (
     ("tab.program", "list-numbers", ProgramPanel, WaypointPanel, ProgramFilePanel),
     ("tab.setup", "tool", SetupPanel, SetupNumbersPanel),
     ("tab.check", "clipboard-check", CheckPanel),
-    ("tab.run", "player-play", RunPanel, WherePanel, ModePanel, RecordingPanel, PushPanel, LabPanel, HealthPanel),
+    ("tab.run", "player-play", RunPanel, RecordingPanel, WherePanel, ModePanel, PushPanel, LabPanel, HealthPanel),
     ("tab.learn", "school", LearnLessonPanel, LearnPanel, LearnExhibitPanel),
     ("tab.settings", "settings", SettingsPanel, ExtrasPanel, RunsFolderPanel),
 )

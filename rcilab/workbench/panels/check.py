@@ -42,14 +42,14 @@ class CheckPanel:
             self._slow = gui.add_button(text("check.slow"), icon="gauge", hint=text("check.slow_hint"))
             on_press(self._slow, ask, lambda page: requests.Check(page=page, what="slow"))
             self._undo = gui.add_button(
-                text("check.undo"), icon="arrow-back-up", color="gray", hint=text("check.undo_hint")
+                text("check.undo"), icon="arrow-back-up", color="gray", hint=text("check.undo_hint"), visible=False
             )
             on_press(self._undo, ask, lambda page: requests.Check(page=page, what="undo"))
             self._explain = gui.add_button(
                 text("check.explain"), icon="message-2", color="gray", hint=text("check.explain_hint")
             )
             on_press(self._explain, ask, lambda page: requests.Check(page=page, what="explain"))
-            self._cancel = gui.add_button(text("check.cancel"), icon="x", color="gray")
+            self._cancel = gui.add_button(text("check.cancel"), icon="x", color="gray", visible=False)
             on_press(self._cancel, ask, lambda page: requests.Check(page=page, what="cancel"))
         self._bar = gui.add_progress_bar(0.0, visible=False, animated=True)
         self._answer = Html(gui)
@@ -72,8 +72,8 @@ class CheckPanel:
         self._began = self._began if busy else now
         self._bar.visible = busy and now - self._began > _MOMENT
         self._bar.value = round(100.0 * (check.progress if planning is None else planning), 1)
-        self._cancel.disabled = not busy
-        self._undo.disabled = check.slowed is None or busy
+        self._cancel.visible = busy
+        self._undo.visible = check.slowed is not None and not busy
         stale = () if plan is None else plan.stale_parts(state.model, state.setup.wanted.box)
         self._again.visible = bool(stale)
         self._slow.disabled = plan is None or busy or bool(stale) or is_moving(status)

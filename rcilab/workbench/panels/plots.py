@@ -36,6 +36,7 @@ _SI = {
 _ERRORS = ("error", "tool")
 """There once a motion has been executed."""
 _OTHER_HEIGHT = 46 + 62 + 170 + 30  # [px] Bar, window head, strip and choices, legend.
+_HINT = 44  # [px] What to do first takes more room than the clock that stands in its place later.
 _TITLE, _TIMES = 20, 26  # [px] A plot's title, and the times below the last one.
 
 
@@ -84,8 +85,9 @@ class Plots:
             self._arrange(state, visible)
         height = _height(state, len(visible))
         for name in visible:
-            if self._plots[name].height != height:
-                self._plots[name].height = height
+            wanted_height = height + (_TIMES if name == visible[-1] else 0)
+            if self._plots[name].height != wanted_height:
+                self._plots[name].height = wanted_height
         wanted = (state.plan, state.recording, state.plot_joint, state.model, visible)
         now = time.monotonic()
         if wanted != self._drawn and now >= self._next:
@@ -183,7 +185,8 @@ def _times(recording: Recording) -> Any:
 
 
 def _height(state: UiState, rows: int) -> int:
-    spare = state.height - _OTHER_HEIGHT - _TIMES - _TITLE * rows
+    hint = 0 if state.plan is not None else _HINT
+    spare = state.height - _OTHER_HEIGHT - hint - _TIMES - _TITLE * rows
     return max(72, min(int(spare / max(rows, 1)), 260)) // 4 * 4
 
 

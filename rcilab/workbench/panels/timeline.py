@@ -81,7 +81,7 @@ class TimelinePanel:
         """Returns where the preview stands, and what is drawn how."""
         text = self._text
         if state.plan is None:
-            return f'<p class="rl-note">{esc(text("timeline.nothing"))}</p>'
+            return f'<p class="rl-note rl-welcome">{esc(text("timeline.nothing"))}</p>'
         duration = state.plan.motion.duration
         t, kinds = state.place * duration, text("timeline.plan_only")
         if state.recording is not None:

@@ -46,7 +46,7 @@ class GoalStage:
             position=pose.position,
         )  # fmt: skip
         self._label: Any = scene.add_label(
-            "/verdict", "", position=_above(pose.position), anchor="bottom-center", depth_test=False,
+            "/verdict", "", position=_below(pose.position), anchor="top-center", depth_test=False,
             font_screen_scale=1.0,
         )  # fmt: skip
         self._via_mark: Any = scene.add_icosphere(
@@ -82,7 +82,7 @@ class GoalStage:
                 self._gizmo.wxyz = wxyz
         if goal.target is not self._target:
             self._target = goal.target
-            self._label.position = _above(goal.target.position)
+            self._label.position = _below(goal.target.position)
             self._mark.position = goal.target.position
         if goal.reach.tone != self._tone:
             self._tone = goal.reach.tone
@@ -110,6 +110,7 @@ class GoalStage:
             self._via_label.text = text("target.via_label")
 
 
-def _above(position: np.ndarray) -> tuple[float, float, float]:
+def _below(position: np.ndarray) -> tuple[float, float, float]:
+    """Returns a place clear of the handles, and of the wrist, which is above most of the time."""
     x, y, z = (float(number) for number in position)
-    return x, y, z + 0.75 * _GIZMO_SCALE
+    return x, y, z - 1.1 * _GIZMO_SCALE
