@@ -13,7 +13,7 @@ from rcilab.arrays import JointVector, frozen
 from rcilab.notebook.look import block, verdict, write
 from rcilab.notebook.number_field import NumberField
 from rcilab.notebook.part import Part
-from rcilab.words.number import fixed
+from rcilab.words.rounding import fixed
 
 _STEP_DEG = 0.5
 

@@ -8,7 +8,8 @@ from typing import Any
 import ipywidgets
 
 from rcilab.notebook.look import block, problem, write
-from rcilab.words.number import fixed, parse_number
+from rcilab.words.number import parse_number
+from rcilab.words.rounding import fixed
 from rcilab.words.text import Text
 
 

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from rcilab.arrays import JointVector, as_vector, frozen
 from rcilab.errors import InvalidValueError, KinematicsError
 from rcilab.model import RobotModel, require_model
-from rcilab.words.number import fixed
+from rcilab.words.rounding import fixed
 
 _STEP_DEG = 0.5
 _POSITION_FORMAT = "x {:.1f}, y {:.1f}, z {:.1f} mm; roll {:.1f}, pitch {:.1f}, yaw {:.1f}°"

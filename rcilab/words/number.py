@@ -68,11 +68,6 @@ def parse_number(typed: str, low: float, high: float, unit: str) -> Parsed:
     return Parsed(value)
 
 
-def fixed(value: float, digits: int) -> str:
-    """Returns a number with so many digits behind the point; what is rounded to zero has no minus."""
-    return f"{round(value, digits) + 0.0:.{digits}f}"
-
-
 def _bounds(low: float, high: float, unit: str) -> Message:
     code = f"parse.bounds.{unit}" if unit in _UNITS else "parse.bounds"
     return message(code, low=_short(low), high=_short(high), unit=unit)

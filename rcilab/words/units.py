@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from rcilab.words.number import fixed
+from rcilab.words.rounding import fixed
 
 AngleUnit = Literal["deg", "rad"]
 LengthUnit = Literal["mm", "m"]

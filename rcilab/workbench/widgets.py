@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 from typing import Any, TypeAlias
 
-from rcilab.words.number import fixed
+from rcilab.words.rounding import fixed
 from rcilab.workbench.requests import Request, TypeField
 from rcilab.workbench.text import Message
 from rcilab.workbench.units import Unit

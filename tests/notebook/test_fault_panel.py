@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import math
 import os
 import re
 import threading
@@ -45,7 +46,7 @@ def test_a_fault_is_provoked_on_a_private_controller_and_the_session_is_left_alo
             assert panel.exhibit is not None
             said = text_of(panel._told)
             assert "kCommandJointAccelerationDiscontinuity" in said
-            assert "5000" in said
+            assert f"{math.degrees(5000.0):.0f}°/s³" in said  # Five thousand rad/s^3, in the degrees of every widget.
             for part in (panel.exhibit.told("cause", "zh"), *panel.exhibit.tell_way_out("zh"), panel.exhibit.script):
                 assert part in said
             assert "<circle" in panel._told.value

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.words.number import fixed
+from rcilab.words.rounding import fixed
 from rcilab.workbench import requests
 from rcilab.workbench.run.pushing import (
     DIRECTIONS,

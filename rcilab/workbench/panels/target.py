@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rcilab.words.number import fixed
+from rcilab.words.rounding import fixed
 from rcilab.workbench.goal.actions import POSE_FIELDS, QUATERNION
 from rcilab.workbench.panels.jog import problems_html, reach_html
 from rcilab.workbench.setup.wanted import name_parts
