@@ -18,6 +18,9 @@ from rcilab.workbench.app import Workbench, WorkbenchConfig
 
 _ROBOT = "xMatePro7"
 _MOVES = 30
+_FIRST = 4  # Moves that do not count: the arm that follows is drawn for the first time, with shaders of its own.
+_REST = 3.0  # [s] After them.
+_PAUSE = 0.3  # [s] Between two moves.
 _SCALE = 0.26  # [m] As the target's handles of the page.
 _RATIO = 1.3
 _HANDLE = """(() => { const m = __viserMutable, x = m.nodeRefFromName['/target']; x.updateWorldMatrix(true, false);
@@ -82,9 +85,12 @@ def _drag(tab: Tab, url: str, follower: str) -> list[float]:
     tab.mouse("mouseMoved", x, y)
     time.sleep(0.5)  # The gizmo notices the mouse on its next drawn frame.
     tab.mouse("mousePressed", x, y)
-    for move in range(_MOVES):
+    for move in range(-_FIRST, _MOVES):
+        if move == 0:
+            time.sleep(_REST)
+            tab.evaluate("__late.length = 0")
         tab.mouse("mouseMoved", x + 2.0 * (move % 15), y + 1.0 * (move % 15))
-        time.sleep(0.3)
+        time.sleep(_PAUSE)
     tab.mouse("mouseReleased", x, y)
     late = tab.evaluate("window.__late")
     if not late:

@@ -1,6 +1,12 @@
 // The bar of the workbench. It speaks to Python over its own websocket, so that Stop works whatever viser shows.
 (() => {
   "use strict";
+  // Plots are drawn by the processor: without a graphics card the browser would have it imitate one for every curve.
+  const getContext = HTMLCanvasElement.prototype.getContext;
+  HTMLCanvasElement.prototype.getContext = function (kind, options) {
+    return getContext.call(this, kind, kind === "2d" ? { willReadFrequently: true, ...options } : options);
+  };
+
   let live = null, said = {}, bar, chips, stop, take, question, toast, me = null, notice = null, greeted = false, hideTimer = 0;
 
   const send = (message) => {
