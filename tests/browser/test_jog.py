@@ -94,6 +94,6 @@ def test_a_held_button_moves_the_robot_until_it_is_let_go_in_any_way(jogging):
     assert not page.state.jog.robot
     mouse.up()
     assert page.status.faults == ()
-    page.tab.goto(f"{page.bench.url}?fixedDpr=0.4")
+    page.tab.goto(f"{page.bench.url}?fixedDpr=0.2")
     page.wait_until_drawn()
     close_toasts(page.tab)

@@ -41,7 +41,7 @@ def test_another_arm_stands_there_without_a_restart(page):
 def test_the_second_page_watches_asks_for_the_controls_and_is_given_them(page, chromium):
     context = chromium.new_context(viewport={"width": 960, "height": 620})
     other = BenchPage(context.new_page(), page.bench)
-    other.tab.goto(f"{page.bench.url}?fixedDpr=0.4")
+    other.tab.goto(f"{page.bench.url}?fixedDpr=0.2")
     other.wait_until_drawn()
     close_toasts(other.tab)
     page.wait(lambda: len(page.state.lease.pages) == 2, "two pages")
