@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from rcilab.motion.motion import Motion as Motion
     from rcilab.motion.plan_program import plan_program as plan_program
     from rcilab.motion.program import Program as Program
-    from rcilab.motion.program import Waypoint as Waypoint
+    from rcilab.motion.waypoint import Waypoint as Waypoint
     from rcilab.notebook.plot import plot as plot
     from rcilab.notebook.preview import preview as preview
     from rcilab.recording.run import Run as Run
@@ -59,7 +59,7 @@ _HOMES = {
     "Run": "rcilab.recording.run",
     "SafetyBox": "rcilab.safety_box",
     "SafetyDistance": "rcilab.safety_distance",
-    "Waypoint": "rcilab.motion.program",
+    "Waypoint": "rcilab.motion.waypoint",
     "check": "rcilab.conformance.check",
     "connect": "rcilab.client.session",
     "load_model": "rcilab.model",

@@ -22,7 +22,8 @@ from rcilab.motion.joint import plan_joint
 from rcilab.motion.motion import Motion
 from rcilab.motion.online import Jog
 from rcilab.motion.plan_program import plan_program
-from rcilab.motion.program import Program, Waypoint
+from rcilab.motion.program import Program
+from rcilab.motion.waypoint import Waypoint
 from rcilab.safety_distance import ADVISED_DISTANCE
 from rcilab.spatial import Pose
 

@@ -10,9 +10,10 @@ from rcilab.motion.motion import Law, Motion, MotionSample, require_motion
 from rcilab.motion.online import Jog
 from rcilab.motion.piecewise import PiecewisePolynomial
 from rcilab.motion.plan_program import plan_program
-from rcilab.motion.program import Program, Waypoint
+from rcilab.motion.program import Program
 from rcilab.motion.spline import motion_through
 from rcilab.motion.stop import plan_stop
+from rcilab.motion.waypoint import Waypoint
 
 __all__ = [
     "LIMIT_MARGIN",

@@ -21,9 +21,10 @@ from rcilab.motion.chain_motion import plan_chain
 from rcilab.motion.joint import MIN_SPEED, plan_joint
 from rcilab.motion.motion import Motion
 from rcilab.motion.piecewise import PiecewisePolynomial
-from rcilab.motion.program import MOST_WAYPOINTS, Program, label
+from rcilab.motion.program import MOST_WAYPOINTS, Program
 from rcilab.motion.s_curve import STANDSTILL_DISTANCE
 from rcilab.motion.segment import Segment, build_segments, naming
+from rcilab.motion.waypoint import label
 from rcilab.words.text import Remark
 
 _SHORTENED = 1e-6

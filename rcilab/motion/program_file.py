@@ -11,7 +11,8 @@ from typing import Any
 from rcilab.arrays import Words, described
 from rcilab.errors import InvalidValueError, ModelError, VersionMismatchError
 from rcilab.motion.lined_json import LONGEST, Node, read_json
-from rcilab.motion.program import ALLOWED, ALWAYS, WORDS, Program, Waypoint, require_fit
+from rcilab.motion.program import Program
+from rcilab.motion.waypoint import ALLOWED, ALWAYS, WORDS, Waypoint, require_fit
 from rcilab.robots import RobotDescription, describe_robot
 
 FORMAT = "rcilab program"

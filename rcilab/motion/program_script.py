@@ -6,7 +6,8 @@ from dataclasses import fields
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from rcilab.motion.program import Program, Waypoint
+    from rcilab.motion.program import Program
+    from rcilab.motion.waypoint import Waypoint
 
 _HEAD = '''"""Plans a program of rcilab and prints the report; `python SCRIPT OUT.npz` also saves the motion."""
 

@@ -17,8 +17,9 @@ from rcilab.motion.cartesian import arm_angles
 from rcilab.motion.inverse_path import inverse_path
 from rcilab.motion.obstacle import examine
 from rcilab.motion.path import Path, build_arc, build_circle, build_line
-from rcilab.motion.program import Program, Waypoint, label
+from rcilab.motion.program import Program
 from rcilab.motion.s_curve import STANDSTILL_DISTANCE
+from rcilab.motion.waypoint import Waypoint, label
 from rcilab.spatial import Pose
 
 _KNOTS = 100

@@ -20,8 +20,8 @@ import rcilab
 from rcilab.errors import InvalidValueError, ModelError, VersionMismatchError
 from rcilab.model import load_model
 from rcilab.motion import Motion, Program, Waypoint, plan_program
-from rcilab.motion.program import ALLOWED, ALWAYS, WORDS
 from rcilab.motion.program_file import SCHEMA
+from rcilab.motion.waypoint import ALLOWED, ALWAYS, WORDS
 from rcilab.spatial import Pose
 
 MODEL = load_model("xMatePro7")

@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from rcilab.errors import RcilabError
-from rcilab.motion.program import Waypoint
+from rcilab.motion.waypoint import Waypoint
 from rcilab.workbench.program.draft import Draft, target_of
 from rcilab.workbench.program.fields import arm_angle_of
 from rcilab.workbench.text import Text

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rcilab.motion.program import Waypoint
+from rcilab.motion.waypoint import Waypoint
 from rcilab.workbench import requests
 from rcilab.workbench.goal.actions import POSE_FIELDS
 from rcilab.workbench.panels.jog import problems_html

@@ -8,7 +8,8 @@ from itertools import count
 import numpy as np
 
 from rcilab.model import RobotModel
-from rcilab.motion.program import Floats, Program, Waypoint, WaypointType
+from rcilab.motion.program import Program
+from rcilab.motion.waypoint import Floats, Waypoint, WaypointType
 from rcilab.posing.planning import Plan
 from rcilab.posing.reach import Tone
 from rcilab.spatial import Pose

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from rcilab.arrays import JointVector, frozen
-from rcilab.motion.program import Waypoint
+from rcilab.motion.waypoint import Waypoint
 from rcilab.words.number import parse_number
 from rcilab.workbench import requests
 from rcilab.workbench.goal.actions import GoalActions

@@ -12,7 +12,7 @@ from rcilab.arrays import Array
 from rcilab.errors import KinematicsError
 from rcilab.model import RobotModel
 from rcilab.motion.joint import MIN_SPEED
-from rcilab.motion.program import LARGEST_BLEND, LONGEST_DWELL, Waypoint
+from rcilab.motion.waypoint import LARGEST_BLEND, LONGEST_DWELL, Waypoint
 from rcilab.spatial import Pose
 from rcilab.words.number import parse_number
 from rcilab.workbench.goal.actions import FURTHEST, POSE_FIELDS

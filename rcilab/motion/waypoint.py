@@ -1,0 +1,302 @@
+"""Waypoints: one step of a program each, where to and how, as values of plain numbers."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields, replace
+from typing import Any, Literal, TypeAlias, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rcilab.arrays import as_number, as_vector, described
+from rcilab.errors import InvalidValueError
+from rcilab.motion.joint import MIN_SPEED
+from rcilab.motion.path import CircleOrientation, Way
+from rcilab.motion.samples import MOST
+from rcilab.spatial import Pose
+
+WaypointType: TypeAlias = Literal["joint", "line", "arc", "circle", "nullspace"]
+
+FARTHEST = 10.0
+"""Beyond this a coordinate is no place that an arm reaches, [m]; a choice: whoever writes more, writes millimetres."""
+LARGEST_BLEND = 1.0
+"""Largest blend radius, [m]; a choice: an arm's reach."""
+LONGEST_DWELL = 3600.0
+"""Longest stay at a waypoint, [s]; a choice."""
+_UNIT = 1e-3
+"""How far the length of a quaternion may be from 1; it is normalised."""
+
+ALWAYS = ("speed", "blend", "dwell")
+"""What every waypoint may have."""
+ALLOWED: dict[WaypointType, tuple[str, ...]] = {
+    "joint": ("q", "position", "wxyz", "psi"),
+    "line": ("q", "position", "wxyz", "psi"),
+    "arc": ("via", "via_wxyz", "q", "position", "wxyz", "psi"),
+    "circle": ("center", "axis", "angle", "orientation", "psi"),
+    "nullspace": ("psi", "way"),
+}
+"""What else a waypoint of each type may have."""
+NEEDED: dict[WaypointType, tuple[str, ...]] = {
+    "joint": (),
+    "line": (),
+    "arc": ("via",),
+    "circle": ("center", "axis"),
+    "nullspace": ("psi",),
+}
+"""What it must have, besides a target: a joint move, a line and an arc go to q, or to position and wxyz."""
+
+WORDS: dict[str, tuple[str, ...]] = {"orientation": get_args(CircleOrientation), "way": get_args(Way)}
+"""The words that some of them are one of; the first is meant where none is given."""
+
+Floats: TypeAlias = tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Waypoint:
+    """One step of a program: where to, and how. Plain numbers, so that equal waypoints are equal and files exact.
+
+    `Waypoint.joint`, `.line`, `.arc`, `.circle` and `.nullspace` make them of poses and arrays.
+
+    Raises:
+        InvalidValueError: A number is missing, out of range or of no meaning for this type.
+    """
+
+    type: WaypointType
+    """joint: straight in joint space. line, arc: the tool straight, or over `via`. circle: around `center`.
+    nullspace: the elbow alone."""
+    q: Floats | None = None
+    """Target as joint angles, n of them, [rad]; of a line or an arc the pose and the arm angle there."""
+    position: Floats | None = None
+    """Target: position of the tool in base, 3 numbers, [m]; with `wxyz`."""
+    wxyz: Floats | None = None
+    """Target: orientation of the tool in base, 4 numbers, a unit quaternion."""
+    via: Floats | None = None
+    """A point on the arc, in base, 3 numbers, [m]."""
+    via_wxyz: Floats | None = None
+    """Orientation of the tool there, 4 numbers, a unit quaternion; None turns evenly from start to target."""
+    center: Floats | None = None
+    """Centre of the circle in base, 3 numbers, [m]."""
+    axis: Floats | None = None
+    """Axis of the circle in base, 3 numbers of any length; the tool goes around it by the right-hand rule."""
+    angle: float | None = None
+    """How far around the circle, more than 0 up to 2 pi, [rad]; None is all around."""
+    orientation: CircleOrientation | None = None
+    """Of the tool on a circle: "held", or "turning" with the circle, about its axis. Every circle has one: "held" where
+    none is given."""
+    psi: float | None = None
+    """Arm angle of a 7-axis arm at the target, -pi to pi, [rad]; None holds the one before, or in a joint move any."""
+    way: Way | None = None
+    """Which way round a nullspace move goes, "shorter" or "longer"; the longer one to the arm angle of the start is a
+    full turn. Every one has it: "shorter" where none is given."""
+    speed: float = 0.2
+    """Part of the velocity and acceleration limits to use on the way here, 0.001 to 1; jerk limits are used in full."""
+    blend: float = 0.0
+    """How far from this waypoint the tool may leave its way to round the corner, up to 1, [m]. 0 is a stop. So are the
+    last waypoint, one with a dwell, and one at which nothing moves."""
+    dwell: float = 0.0
+    """How long to stay here, up to 3600, [s]; in whole cycles."""
+
+    def __post_init__(self) -> None:
+        if self.type not in get_args(WaypointType):
+            known = ", ".join(get_args(WaypointType))
+            error = InvalidValueError("type", described(self.type), f"is unknown; known: {known}")
+            raise error.coded("unknown", known=known)
+        allowed = (*ALLOWED[self.type], *ALWAYS)
+        for name, known in WORDS.items():
+            if getattr(self, name) is None and name in allowed:
+                object.__setattr__(self, name, known[0])
+        for name in _OPTIONAL:
+            value = getattr(self, name)
+            if value is not None and name not in allowed:
+                raise InvalidValueError(
+                    name, described(value), f"has no meaning here; {self.type} takes: {', '.join(allowed)}"
+                )
+            if value is None and name in NEEDED[self.type]:
+                missing = InvalidValueError(name, None, f"is missing: {self.type} needs {', '.join(NEEDED[self.type])}")
+                raise missing.coded("missing", type=self.type, names=", ".join(NEEDED[self.type]))
+            if name in WORDS:
+                _require_word(name, value)
+            elif value is not None and name not in ("q", "angle", "psi"):
+                object.__setattr__(self, name, vector_of(name, value))
+        self._require_target()
+        for name, lowest, highest, unit in _RANGES:
+            value = getattr(self, name)
+            if value is None:
+                continue
+            number = as_number(value, name, unit)
+            if not lowest <= number <= highest or (name == "angle" and number == 0.0):
+                span = f"{'more than 0' if name == 'angle' else f'{lowest:.5g}'} to {highest:.5g} [{unit}]"
+                bad = InvalidValueError(name, number, f"must be from {span}")
+                raise bad.coded("span", low=f"{lowest:.5g}", high=f"{highest:.5g}")
+            object.__setattr__(self, name, number)
+
+    @classmethod
+    def joint(
+        cls, target: Pose | ArrayLike, *, psi: float | None = None, speed: float = 0.2, blend: float = 0.0,
+        dwell: float = 0.0,
+    ) -> Waypoint:  # fmt: skip
+        """Returns a move straight in joint space, to joint angles, shape (n,), [rad], or to a pose of the tool.
+
+        A pose is reached on the branch closest to where the arm comes from.
+        """
+        return cls(type="joint", **_target(target), psi=psi, speed=speed, blend=blend, dwell=dwell)
+
+    @classmethod
+    def line(
+        cls, target: Pose | ArrayLike, *, psi: float | None = None, speed: float = 0.2, blend: float = 0.0,
+        dwell: float = 0.0,
+    ) -> Waypoint:  # fmt: skip
+        """Returns a straight line of the tool to a pose, or to where it is at joint angles, shape (n,), [rad]."""
+        return cls(type="line", **_target(target), psi=psi, speed=speed, blend=blend, dwell=dwell)
+
+    @classmethod
+    def arc(
+        cls, via: Pose | ArrayLike, target: Pose | ArrayLike, *, psi: float | None = None, speed: float = 0.2,
+        blend: float = 0.0, dwell: float = 0.0,
+    ) -> Waypoint:  # fmt: skip
+        """Returns an arc of the tool over `via`: through that pose, or only that position, shape (3,), [m]."""
+        places: dict[str, Any] = {"via": via}
+        if isinstance(via, Pose):
+            places = {"via": via.position, "via_wxyz": via.wxyz}
+        return cls(type="arc", **places, **_target(target), psi=psi, speed=speed, blend=blend, dwell=dwell)
+
+    @classmethod
+    def circle(
+        cls, center: ArrayLike, axis: ArrayLike, angle: float | None = None, *,
+        orientation: CircleOrientation = "held", psi: float | None = None, speed: float = 0.2, blend: float = 0.0,
+        dwell: float = 0.0,
+    ) -> Waypoint:  # fmt: skip
+        """Returns a circle, or a part of it, around a centre, shape (3,), [m], and an axis, shape (3,).
+
+        The tool keeps its orientation ("held"), or it turns with the circle ("turning").
+        """
+        return cls(
+            type="circle", center=vector_of("center", center), axis=vector_of("axis", axis), angle=angle,
+            orientation=orientation, psi=psi, speed=speed, blend=blend, dwell=dwell,
+        )  # fmt: skip
+
+    @classmethod
+    def nullspace(
+        cls, psi: float, *, way: Way = "shorter", speed: float = 0.2, blend: float = 0.0, dwell: float = 0.0
+    ) -> Waypoint:
+        """Returns a move of the elbow alone, to an arm angle, [rad], the shorter or the longer way round."""
+        return cls(type="nullspace", psi=psi, way=way, speed=speed, blend=blend, dwell=dwell)
+
+    @property
+    def pose(self) -> Pose | None:
+        """The target as a pose, if that is how it was given."""
+        return None if self.position is None or self.wxyz is None else Pose(self.position, self.wxyz)
+
+    def retyped(self, type: WaypointType, via: ArrayLike | None = None) -> Waypoint:
+        """Returns the waypoint with another way to the same target: joint, line or arc.
+
+        Args:
+            type: The other type.
+            via: A point on the arc, shape (3,), [m]; only an arc has one.
+
+        Raises:
+            InvalidValueError: One of the two types leads to no target of its own, or the via does not fit the type.
+        """
+        for kind in (self.type, type):
+            if "q" not in ALLOWED.get(kind, ()):
+                raise InvalidValueError("type", described(kind), "has no target to keep; joint, line and arc have one")
+        point = None if via is None else vector_of("via", via)
+        return replace(self, type=type, via=point, via_wxyz=None)
+
+    def _require_target(self) -> None:
+        if "q" not in ALLOWED[self.type]:
+            return
+        has_pose = self.position is not None or self.wxyz is not None
+        if self.q is None and not has_pose:
+            raise InvalidValueError("target", None, f"is missing: {self.type} needs q, or position and wxyz")
+        if self.q is not None:
+            if has_pose:
+                raise InvalidValueError("q", self.q, "is a second target, beside position and wxyz; keep one")
+            if self.psi is not None:
+                raise InvalidValueError("psi", self.psi, "is a second arm angle: q has one; leave it out")
+            object.__setattr__(self, "q", angles_of(self.q, "q"))
+        for name, other in (("position", "wxyz"), ("wxyz", "position")):
+            if has_pose and getattr(self, name) is None:
+                raise InvalidValueError(name, None, f"is missing beside {other}: a pose has both")
+
+
+_OPTIONAL = tuple(field.name for field in fields(Waypoint) if field.default is None)
+_RANGES = (
+    ("angle", 0.0, math.tau, "rad"),
+    ("psi", -math.pi, math.pi, "rad"),
+    ("speed", MIN_SPEED, 1.0, "part of the limits"),
+    ("blend", 0.0, LARGEST_BLEND, "m"),
+    ("dwell", 0.0, LONGEST_DWELL, "s"),
+)
+
+
+def label(number: int, waypoint: Waypoint) -> str:
+    """Returns what errors call a waypoint, counted from 1."""
+    return f"waypoint {number} ({waypoint.type})"
+
+
+def require_fit(waypoint: Waypoint, n: int, robot: str) -> None:
+    """Refuses a waypoint that is none for this arm.
+
+    Raises:
+        InvalidValueError: Its q has not n angles, or it has an arm angle and the arm has none.
+    """
+    if waypoint.q is not None:
+        angles_of(waypoint.q, "q", n, robot)
+    if n != 7 and (waypoint.psi is not None or waypoint.type == "nullspace"):
+        raise InvalidValueError("psi", waypoint.psi, f"has no meaning for {robot}: a 6-axis arm has no arm angle")
+
+
+def angles_of(value: ArrayLike, name: str, n: int | None = None, robot: str = "") -> Floats:
+    """Returns checked joint angles, [rad].
+
+    Raises:
+        InvalidValueError: Not 6 or 7 finite numbers, or not as many as the arm has axes, or more than two turns.
+    """
+    size = n or (np.size(value) if np.size(value) in (6, 7) else 7)
+    if n is not None and np.shape(value) != (n,):
+        error = InvalidValueError(name, described(value), f"must be {n} joint angles [rad]: {robot} has {n} axes")
+        raise error.coded("axes", count=n, model=robot)
+    angles: Floats = tuple(as_vector(value, size, name, "rad").tolist())
+    for joint, angle in enumerate(angles, 1):
+        if abs(angle) > MOST:
+            problem = f"rad of joint {joint} is more than two turns, {MOST:.4g} rad; degrees times pi / 180 are radians"
+            raise InvalidValueError(name, angle, problem).coded("turns", joint=joint)
+    return angles
+
+
+def _require_word(name: str, value: object) -> None:
+    known = WORDS[name]
+    if value is not None and not (isinstance(value, str) and value in known):
+        raise InvalidValueError(name, described(value), f"is unknown; known: {', '.join(known)}")
+
+
+def _target(target: Pose | ArrayLike) -> dict[str, Any]:
+    if isinstance(target, Pose):
+        return {"position": tuple(target.position.tolist()), "wxyz": tuple(target.wxyz.tolist())}
+    return {"q": angles_of(target, "q")}
+
+
+def vector_of(name: str, value: ArrayLike) -> Floats:
+    """Returns a checked point [m], axis or unit quaternion (a name that ends with wxyz).
+
+    Raises:
+        InvalidValueError: Not 3 finite numbers, or 4 of a quaternion; too far away, of no length, or not a unit one.
+    """
+    numbers: Floats = tuple(
+        as_vector(
+            value, 4 if name.endswith("wxyz") else 3, name, "" if name.endswith(("wxyz", "axis")) else "m"
+        ).tolist()
+    )
+    if name.endswith("wxyz"):
+        if abs(math.hypot(*numbers) - 1.0) > _UNIT:
+            problem = f"has length {math.hypot(*numbers):.4g}, must be 1 within {_UNIT:g}: a unit quaternion, w first"
+            raise InvalidValueError(name, numbers, problem).coded("no_unit")
+    elif name == "axis":
+        if math.hypot(*numbers) < 1e-12:
+            raise InvalidValueError(name, numbers, "has no direction: its length is zero")
+    elif max(map(abs, numbers)) > FARTHEST:
+        error = InvalidValueError(name, numbers, f"is beyond {FARTHEST:g} m; millimetres divided by 1000 are metres")
+        raise error.coded("beyond", most=f"{1e3 * FARTHEST:g}")
+    return numbers
