@@ -84,9 +84,7 @@ class Units:
             angle: [rad].
             digits: Behind the point, in degrees; radians get two more.
         """
-        if self.angle == "rad":
-            return f"{fixed(angle, digits + _MORE_DIGITS['rad'])} rad"
-        return f"{fixed(math.degrees(angle), digits)}°"
+        return self._shown(math.degrees(angle), "deg", digits)
 
     def length_of(self, length: float, digits: int = 0) -> str:
         """Returns a length with its unit, such as "42 mm" or "0.042 m".
@@ -95,9 +93,7 @@ class Units:
             length: [m].
             digits: Behind the point, in millimetres; metres get three more.
         """
-        if self.length == "m":
-            return f"{fixed(length, digits + _MORE_DIGITS['m'])} m"
-        return f"{fixed(1000.0 * length, digits)} mm"
+        return self._shown(1000.0 * length, "mm", digits)
 
     def from_si(self, unit: str) -> tuple[float, str]:
         """Returns how many of its unit on the page one SI unit is, and that one's name: of rad/s^2, 57.3 and °/s²."""
@@ -149,18 +145,22 @@ class Units:
         """Returns values that fill such an entry."""
         return values if self == USUAL else {name: _Value(value, self) for name, value in values.items()}
 
+    def _shown(self, value: float, usual: str, digits: int) -> str:
+        unit = self.unit(usual)
+        return _with_unit(fixed(unit.factor * value, digits + _MORE_DIGITS.get(unit.name, 0)), _sign(unit))
+
     def _restate(self, found: re.Match[str]) -> str:
         unit = found["ahead"] or found["unit"]
         factor, usual = _TO_USUAL[unit]
         to = self.unit(usual)
-        if (to.name if to.name != "deg" else "°") == unit:
+        if _sign(to) == unit:
             return found.group()
         scale = factor * to.factor
         if found["first"]:
             return _rescale(found["first"], scale)
         numbers = _NUMBER.sub(lambda number: _rescale(number.group(), scale), found["numbers"])
         rate = found["rate"].replace("^2", "²").replace("^3", "³")
-        return _with_unit(numbers, ("°" if to.name == "deg" else to.name) + rate)
+        return _with_unit(numbers, _sign(to) + rate)
 
     def _adapt(self, found: re.Match[str]) -> str:
         said, usual, rate = found.groups()
@@ -195,6 +195,10 @@ def plain_number(value: float, digits: int = 4) -> str:
 def _rescale(said: str, scale: float) -> str:
     digits = len(said.partition("e")[0].replace(".", "").lstrip("-0"))
     return plain_number(scale * float(said), max(digits, 3))
+
+
+def _sign(unit: Unit) -> str:
+    return "°" if unit.name == "deg" else unit.name
 
 
 def _with_unit(text: str, name: str) -> str:

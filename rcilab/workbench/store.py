@@ -16,6 +16,7 @@ from rcilab.model import RobotModel
 from rcilab.posing.planning import PathKind, Plan, PlannableLaw
 from rcilab.posing.reach import Reach, Tone
 from rcilab.spatial import Pose
+from rcilab.words.units import USUAL, Units
 from rcilab.workbench.check.state import CheckState
 from rcilab.workbench.jog.jogging import JogState
 from rcilab.workbench.learn.state import LearnState
@@ -26,7 +27,6 @@ from rcilab.workbench.run.pushing import Plant, PushState
 from rcilab.workbench.scene.extras import SceneState
 from rcilab.workbench.setup.wanted import SetupState
 from rcilab.workbench.text import Message
-from rcilab.workbench.units import USUAL, Units
 
 if TYPE_CHECKING:
     from rcilab.motion import Motion

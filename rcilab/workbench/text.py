@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from rcilab.language import LANGUAGES, Language
 from rcilab.words import text
 from rcilab.words.text import Explains, Message, load_face, message
-from rcilab.workbench.units import USUAL, Unit, Units
+from rcilab.words.units import USUAL, Unit, Units
 
 __all__ = ["LANGUAGES", "Message", "Text", "load_catalogue", "message"]
 

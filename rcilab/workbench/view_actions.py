@@ -6,11 +6,11 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from rcilab.words.units import ANGLES, LENGTHS
 from rcilab.workbench import requests
 from rcilab.workbench.learn.state import exhibited
 from rcilab.workbench.store import Store
 from rcilab.workbench.text import LANGUAGES, message
-from rcilab.workbench.units import ANGLES, LENGTHS
 
 if TYPE_CHECKING:
     from rcilab.model import RobotModel

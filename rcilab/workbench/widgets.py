@@ -8,9 +8,9 @@ from collections.abc import Callable
 from typing import Any, TypeAlias
 
 from rcilab.words.rounding import fixed
+from rcilab.words.units import Unit
 from rcilab.workbench.requests import Request, TypeField
 from rcilab.workbench.text import Message
-from rcilab.workbench.units import Unit
 
 Ask: TypeAlias = Callable[[Request], None]
 

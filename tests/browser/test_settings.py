@@ -9,8 +9,8 @@ import time
 import numpy as np
 
 from browser.page import BenchPage, close_toasts
+from rcilab.words.units import USUAL
 from rcilab.workbench import requests
-from rcilab.workbench.units import USUAL
 
 
 def test_the_language_changes_everywhere_and_back(page):

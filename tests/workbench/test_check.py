@@ -14,6 +14,7 @@ from rcilab.model import load_model
 from rcilab.motion import Program, Waypoint
 from rcilab.posing.planning import Plan
 from rcilab.spatial import Pose
+from rcilab.words.units import Units
 from rcilab.workbench import requests
 from rcilab.workbench.check.actions import CheckActions, plot_of
 from rcilab.workbench.check.slowing import scaled, slow_to_goal
@@ -23,7 +24,6 @@ from rcilab.workbench.program.actions import ProgramActions
 from rcilab.workbench.program.draft import Draft, number_at
 from rcilab.workbench.store import Store, UiState
 from rcilab.workbench.text import Text
-from rcilab.workbench.units import Units
 from rcilab.workbench.view_actions import PLOTS
 from tests.waiting import wait_for
 

@@ -27,9 +27,9 @@ from rcilab.spatial import Pose
 from rcilab.supervisor import SupervisorStatus
 from rcilab.supervisor.admission import require_ready
 from rcilab.words.number import parse_number, parse_quaternion
+from rcilab.words.units import Units
 from rcilab.workbench.telling import tell_error
 from rcilab.workbench.text import Text, message
-from rcilab.workbench.units import Units
 
 MODEL = load_model("xMatePro7")
 HOME = np.array(MODEL.home)

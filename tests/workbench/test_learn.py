@@ -14,6 +14,7 @@ from rcilab.gallery import FAULTS
 from rcilab.gallery.shown import body_html, head_html
 from rcilab.model import load_model
 from rcilab.views.plots import build_frame, mark_moment, plan_curves
+from rcilab.words.units import Units
 from rcilab.workbench import requests
 from rcilab.workbench.goal.actions import GoalActions, initial_goal
 from rcilab.workbench.learn.actions import LearnActions
@@ -22,7 +23,6 @@ from rcilab.workbench.learn.state import exhibited
 from rcilab.workbench.panels.learn_lesson import steps_html
 from rcilab.workbench.store import Recording, Store, UiState
 from rcilab.workbench.text import LANGUAGES, Text, load_catalogue
-from rcilab.workbench.units import Units
 from tests.waiting import wait_for
 
 MODEL = load_model("xMatePro7")

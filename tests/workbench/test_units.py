@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rcilab.words.number import parse_number
+from rcilab.words.units import Unit, Units
 from rcilab.workbench.text import LANGUAGES, Text, load_catalogue, message
-from rcilab.workbench.units import Unit, Units
 
 SI = Units(angle="rad", length="m")
 

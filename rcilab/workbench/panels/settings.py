@@ -6,9 +6,9 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from rcilab.robots import RCI_ROBOT_NAMES
+from rcilab.words.units import ANGLES, LENGTHS
 from rcilab.workbench import requests
 from rcilab.workbench.text import LANGUAGES, Text
-from rcilab.workbench.units import ANGLES, LENGTHS
 from rcilab.workbench.view_actions import QUALITIES, THEMES
 from rcilab.workbench.widgets import Ask, Html, Linked, esc, on_press
 
