@@ -10,7 +10,6 @@ from rcilab.bench.bare import bare_page
 from rcilab.bench.browser import find_chromium
 from rcilab.bench.measure import Absent, Measurement, summarise
 from rcilab.bench.tab import Tab, no_browser, open_tab
-from rcilab.errors import RcilabError
 from rcilab.model import load_model
 from rcilab.views.arm_view import ArmView
 from rcilab.views.viser_scene import ViserScene
@@ -20,7 +19,7 @@ _ROBOT = "xMatePro7"
 _MOVES = 30
 _FIRST = 4  # Moves that do not count: the arm that follows is drawn for the first time, with shaders of its own.
 _REST = 3.0  # [s] After them.
-_PAUSE = 0.3  # [s] Between two moves.
+_PAUSE = 0.3  # [s] From what one move has changed to the next move.
 _SCALE = 0.26  # [m] As the target's handles of the page.
 _RATIO = 1.3
 _HANDLE = """(() => { const m = __viserMutable, x = m.nodeRefFromName['/target']; x.updateWorldMatrix(true, false);
@@ -89,10 +88,9 @@ def _drag(tab: Tab, url: str, follower: str) -> list[float]:
         if move == 0:
             time.sleep(_REST)
             tab.evaluate("__late.length = 0")
+        seen = tab.evaluate("__late.length")
         tab.mouse("mouseMoved", x + 2.0 * (move % 15), y + 1.0 * (move % 15))
+        tab.wait("the arm to follow the mouse", f"__late.length > {seen}")
         time.sleep(_PAUSE)
     tab.mouse("mouseReleased", x, y)
-    late = tab.evaluate("window.__late")
-    if not late:
-        raise RcilabError("bench: nothing followed the mouse: the handle of the target was not where it was looked for")
-    return [1e-3 * float(one) for one in late]
+    return [1e-3 * float(one) for one in tab.evaluate("__late")]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,13 +11,46 @@ if TYPE_CHECKING:
     import viser
 
 _CAMERA, _LOOK_AT = (1.80, -1.85, 1.22), (0.17, 0.02, 0.49)  # [m]
-_FIELD_OF_VIEW = 0.75  # [rad]
+_FIELD_OF_VIEW = 0.75  # [rad] from the upper edge to the lower one
+_ROOM = 1.4  # [m] How much of the scene's width the arm and its target's handles take.
 
 
 def place_camera(server: viser.ViserServer) -> None:
     """Puts the camera of new pages where the whole arm is seen."""
     camera = server.initial_camera
     camera.position, camera.look_at, camera.fov = _CAMERA, _LOOK_AT, _FIELD_OF_VIEW
+
+
+def keep_in_view(camera: viser.CameraHandle) -> None:
+    """Has a page's camera step back as far as the window, or the panels beside the scene, leave little room.
+
+    A camera that somebody has moved stays, until they reset the view.
+    """
+    placed = np.array(_CAMERA)
+
+    @camera.on_update
+    async def _(_camera: object) -> None:
+        nonlocal placed
+        if not any(np.allclose(camera.position, known, atol=1e-3) for known in (placed, _CAMERA)):
+            return
+        position = standing_place(camera.aspect)
+        if not np.allclose(camera.position, position, atol=1e-3):
+            placed = position
+            with camera.client.atomic():
+                camera.position = position
+                camera.look_at = np.array(_LOOK_AT)
+
+
+def standing_place(aspect: float) -> np.ndarray:
+    """Returns from where the whole arm is seen, base axes, shape (3,), [m].
+
+    Args:
+        aspect: Width over height of what is seen of the scene.
+    """
+    look_at = np.array(_LOOK_AT)
+    behind = np.array(_CAMERA) - look_at
+    width = 2.0 * np.linalg.norm(behind) * math.tan(0.5 * _FIELD_OF_VIEW) * aspect  # [m] seen there
+    return look_at + max(1.0, _ROOM / width) * behind
 
 
 def furnish(server: viser.ViserServer, *, full: bool, dark: bool = False) -> None:

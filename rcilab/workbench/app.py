@@ -12,6 +12,7 @@ from typing import IO, TYPE_CHECKING
 from rcilab.model import load_model, require_rci
 from rcilab.views.gate import Gate
 from rcilab.views.guarded_server import GuardedServer
+from rcilab.views.viser_stage import keep_in_view
 from rcilab.workbench import requests, security
 from rcilab.workbench.conductor import Conductor
 from rcilab.workbench.goal.actions import initial_goal
@@ -149,6 +150,7 @@ class Workbench:
         @self.server.on_client_connect
         async def _(client: viser.ClientHandle) -> None:
             ask(requests.PageCame(page=client.client_id))
+            keep_in_view(client.camera)
             introduce(client, self.live.introduce(client.client_id))
 
         @self.server.on_client_disconnect

@@ -22,8 +22,9 @@ open("pids", "w").write(f"{os.getpid()} {helper.pid} .")
 time.sleep(600)
 """
 BENCH = """
-import sys, time
+import signal, sys, time
 from rcilab.bench.keeper import keeper, launch
+signal.signal(signal.SIGINT, signal.default_int_handler)  # What runs in the background is started to ignore it.
 with keeper(sys.argv[2:], directory=sys.argv[1]) as process:
     launch(process)
     time.sleep(600)

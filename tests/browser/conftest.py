@@ -21,7 +21,7 @@ FLAGS = (
     "--disable-background-timer-throttling --disable-renderer-backgrounding "
     "--disable-backgrounding-occluded-windows --force-color-profile=srgb"
 ).split()
-VIEW = {"width": 1100, "height": 620}
+VIEW = {"width": 960, "height": 620}
 
 
 def find_chromium() -> str | None:

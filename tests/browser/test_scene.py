@@ -33,7 +33,8 @@ def test_a_way_to_stand_is_seen_under_the_mouse_and_taken_with_enter(page):
     other.hover()
     page.wait(lambda: page.shows("candidate", q), "the way under the mouse in the scene")
     assert np.array_equal(page.state.goal.q, before)
-    other.press("Enter")
+    other.focus()
+    page.tab.keyboard.press("Enter")
     page.wait(lambda: np.abs(page.state.goal.q - q).max() < 1e-6, "the way to be taken")
 
 

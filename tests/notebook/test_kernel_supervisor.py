@@ -19,9 +19,13 @@ import os, threading, time, rcilab
 from ipywidgets.widgets.widget import _instances
 from rcilab.notebook import JogPanel, RunPanel, Scene
 model = rcilab.load_model("xMatePro7")
+def held():
+    "Sockets, pipes and the like; files come and go, as IPython's history does."
+    links = (f"/proc/self/fd/{fd}" for fd in os.listdir("/proc/self/fd"))
+    return sum(os.path.islink(link) and not os.readlink(link).startswith("/") for link in links)
 """
 PARTS = "scene = Scene(model); jog = JogPanel(scene)"
-COUNT = "len(_instances), threading.active_count(), len(os.listdir('/proc/self/fd'))"
+COUNT = "len(_instances), threading.active_count(), held()"
 CONNECT = """
 panel = RunPanel(model)
 def until(condition):
@@ -90,8 +94,7 @@ def test_a_cell_that_runs_again_leaves_no_widget_no_thread_and_no_socket(kernel:
     once = kernel.run(COUNT)
     for _ in range(5):
         kernel.run(PARTS)
-    # A socket takes a moment to close; what leaked five times would stay.
-    wait_for(lambda: all(now <= then for now, then in zip(kernel.run(COUNT), once, strict=True)), what="as few as once")
+    wait_for(lambda: kernel.run(COUNT) == once, what="as many as once")  # A socket takes a moment to close.
     assert once[0] > 50
 
 

@@ -14,7 +14,7 @@ from rcilab.views.meshcat_scene import MeshcatScene
 from rcilab.views.null_scene import NullScene
 from rcilab.views.scene import Scene
 from rcilab.views.viser_scene import ViserScene
-from rcilab.views.viser_stage import furnish, place_camera
+from rcilab.views.viser_stage import furnish, place_camera, standing_place
 
 TRIANGLE = ([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], [[0, 1, 2]])
 
@@ -109,3 +109,16 @@ def test_the_stage_can_be_set_again_while_the_page_is_open() -> None:
         assert server.initial_camera.fov < 1.0  # [rad] a portrait lens
     finally:
         server.stop()
+
+
+@pytest.mark.parametrize("aspect", [2.0, 1.0, 0.7, 0.4, 0.1])
+def test_the_arm_and_the_handles_of_its_target_fit_beside_the_panels(aspect: float) -> None:
+    model = load_model("xMatePro7")
+    camera, look_at = standing_place(aspect), np.array([0.17, 0.02, 0.49])
+    ahead = (look_at - camera) / np.linalg.norm(look_at - camera)
+    aside = np.cross(ahead, (0.0, 0.0, 1.0))
+    aside /= np.linalg.norm(aside)
+    tool = model.forward(model.home).position
+    for point in (np.zeros(3), tool, tool + 0.25 * aside):
+        away = point - camera
+        assert abs(away @ aside) < aspect * np.tan(0.375) * (away @ ahead)

@@ -33,11 +33,16 @@
   // Looked at, not listened to: the list's HTML is exchanged under the mouse, and then nobody tells that it has left.
   document.addEventListener("focusin", (event) => { const row = rowOf(event.target); had = row ? Number(row.dataset.branch) : -1; });
   document.addEventListener("pointerdown", (event) => { if (!rowOf(event.target)) had = -1; }, true);
+  // The focus is given back in the same breath, so that no key gets lost.
+  const keep = () => {
+    if (had < 0 || document.activeElement !== document.body) return;
+    const row = document.querySelector(`.rl-branch[data-branch="${had}"]`);
+    if (row && row.getClientRects().length) row.focus({ preventScroll: true });
+  };
+  new MutationObserver(keep).observe(document.documentElement, { childList: true, subtree: true });
+
   setInterval(() => {
-    if (had >= 0 && document.activeElement === document.body) {
-      const row = document.querySelector(`.rl-branch[data-branch="${had}"]`);
-      if (row && row.getClientRects().length) row.focus();
-    }
+    keep();
     const seen = document.querySelector(".rl-branch:hover") || rowOf(document.activeElement);
     const branch = seen && seen.getClientRects().length ? Number(seen.dataset.branch) : -1;
     if (branch === told) return;

@@ -27,9 +27,9 @@
     event.preventDefault();
   });
   document.addEventListener("focusin", (event) => { if (!rowOf(event.target)) kept = null; });
-  setInterval(() => {
+  new MutationObserver(() => {
     if (kept === null || document.activeElement !== document.body) return;
     const row = document.querySelector(`.rl-pick [data-say="${CSS.escape(kept)}"]`);
     if (row) row.focus({ preventScroll: true });
-  }, 60);
+  }).observe(document.documentElement, { childList: true, subtree: true });
 })();
