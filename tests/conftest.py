@@ -52,6 +52,7 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
 def _no_files_of_the_user(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """What a person has stored, such as poses, neither changes a test nor is changed by one."""
     with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("IPYTHONDIR", os.fspath(tmp_path_factory.mktemp("ipython")))
         for name in ("CONFIG", "STATE"):
             patch.setenv(f"XDG_{name}_HOME", os.fspath(tmp_path_factory.mktemp(name.lower())))
         yield
