@@ -229,10 +229,12 @@ class Conductor:
             request = self._mailbox.take(max(0.0, last + _TICK - time.monotonic()))
             if request is not None:
                 self.act(request)
+                self._store.changed.set()
             now = time.monotonic()
             if now - last >= _TICK:
                 elapsed, last = now - last, now
                 self._guard(lambda elapsed=elapsed: self.tick(elapsed))
+                self._store.changed.set()
 
     def _guard(self, action: Callable[[], None]) -> None:
         try:

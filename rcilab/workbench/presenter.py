@@ -1,4 +1,4 @@
-"""Thirty times a second: takes snapshots of state and robot and lets stage, panels and bar show what has changed."""
+"""At once, but at most thirty times a second: lets stage, panels and bar show what of state and robot has changed."""
 
 from __future__ import annotations
 
@@ -108,14 +108,15 @@ class Presenter:
         if self._thread is not None:
             self._thread.join(5.0)
 
-    def show(self) -> None:
-        """Shows one snapshot; one that looks like the last costs next to nothing, but for now and then."""
+    def show(self) -> bool:
+        """Shows one snapshot, and returns whether there was anything to show; like the last it costs nothing."""
         state, status = self._store.state, self._session.status()
         shown, now = (state, *_traits(status)), time.monotonic()
         if shown == self._shown and now < self._next:
-            return
+            return False
         self._draw(state, status)
         self._shown, self._next = shown, now + _AT_REST
+        return True
 
     def _draw(self, state: UiState, status: SupervisorStatus) -> None:
         """Shows a snapshot: first what is in the scene, since a hand may be dragging it."""
@@ -161,15 +162,18 @@ class Presenter:
         self._containers = [tabs, timeline]
 
     def _run(self) -> None:
-        deadline = time.monotonic()
         while not self._ending.is_set():
-            deadline = max(deadline + _PERIOD, time.monotonic() + 0.3 * _PERIOD)  # A slow page must not starve others.
+            self._store.changed.clear()
+            began, has_drawn = time.monotonic(), True
             try:
-                self.show()
+                has_drawn = self.show()
             except Exception as error:  # A panel that fails must not freeze the others for good.
                 self.errors.append(error)
                 traceback.print_exc(file=sys.stderr)
-            self._ending.wait(max(0.0, deadline - time.monotonic()))
+            if has_drawn:  # A slow page must not starve others.
+                self._ending.wait(max(0.3 * _PERIOD, began + _PERIOD - time.monotonic()))
+            else:
+                self._store.changed.wait(_PERIOD)
 
 
 def _traits(status: SupervisorStatus) -> tuple[object, ...]:

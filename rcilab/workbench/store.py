@@ -177,6 +177,8 @@ class Store:
         self._lock = threading.Lock()
         self._state = state
         self._past: list[Goal] = []
+        self.changed = threading.Event()
+        """Set when a request has been carried out whole, cleared by who shows it."""
 
     @property
     def state(self) -> UiState:
