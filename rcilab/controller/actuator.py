@@ -14,6 +14,7 @@ impedance, wherever the arm yields: under both impedances and while it is guided
 from __future__ import annotations
 
 from enum import Enum
+from typing import Final
 
 from rcilab.arrays import JointVector
 from rcilab.controller.commanded import CommandedMotion
@@ -38,15 +39,11 @@ class Law(Enum):
     GUIDE = "guide"
     BRAKED = "braked"
 
-    @property
-    def yields(self) -> bool:
+    def __init__(self, words: str) -> None:
+        self.yields: Final = words not in ("position", "braked")
         """Whether the arm may be elsewhere than it was told, so that a stop has to begin from where it really is."""
-        return self not in (Law.POSITION, Law.BRAKED)
-
-    @property
-    def leads(self) -> bool:
+        self.leads: Final = words in ("torque", "guide")
         """Whether the arm goes where forces take it and commanded angles only follow."""
-        return self in (Law.TORQUE, Law.GUIDE)
 
 
 class Actuator:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rcilab.arrays import Array, JointVector, Matrix, frozen
+from rcilab.arrays import JointVector, Matrix, frozen
 from rcilab.model import RobotModel
 from rcilab.robots.mjcf import ARMATURE_PER_TORQUE, DAMPING_PER_TORQUE
 
@@ -38,7 +38,8 @@ class DriveModel:
         """Viscous, seen at the joint, shape (n,), [N m s/rad]."""
         q, dq, tau, ddq, dtau = np.split(np.eye(5 * model.n), 5, axis=1)
         columns = self.theta(q, tau), self.dtheta(dq, dtau), self.motor_tau(tau, dq, ddq)
-        self._matrix: Matrix = np.ascontiguousarray(np.concatenate(columns, axis=1).T)
+        self.matrix: Matrix = frozen(np.concatenate(columns, axis=1).T)
+        """All three are linear: theta, dtheta and motor_tau from q, dq, tau, ddq and dtau, shape (3 n, 5 n)."""
 
     def theta(self, q: JointVector, tau: JointVector) -> JointVector:
         """Returns motor angles, shape (n,), [rad], from joint angles [rad] and joint torques [N m]."""
@@ -51,13 +52,3 @@ class DriveModel:
     def motor_tau(self, tau: JointVector, dq: JointVector, ddq: JointVector) -> JointVector:
         """Returns motor torques, shape (n,), [N m], from joint torques, velocities and accelerations."""
         return (tau + self.friction * dq) / self.ratio + self.ratio * self.rotor_inertia * ddq
-
-    def motor_side(self, joint_side: Array) -> tuple[JointVector, JointVector, JointVector]:
-        """Returns motor angles, velocities and torques at once: all three are linear, so one product makes them.
-
-        Args:
-            joint_side: q, dq, tau and the rates of the last two, one after the other, shape (5 n,), in SI.
-        """
-        motor = self._matrix.dot(joint_side)
-        n = len(motor) // 3
-        return motor[:n], motor[n : 2 * n], motor[2 * n :]

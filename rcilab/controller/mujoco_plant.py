@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.arrays import Array, JointVector, frozen
+from rcilab.arrays import Array, JointVector, sealed
 from rcilab.controller.mujoco_obstacles import Obstacles
 from rcilab.controller.plant import Drive, Measurement, Setpoint
 from rcilab.controller.push import Push
@@ -186,7 +186,8 @@ class MuJoCoPlant:
         return stays and list(setpoint.q) == self._rest_q
 
     def _measure(self, tau: Array) -> Measurement:
-        return Measurement(frozen(self._q), frozen(self._dq), frozen(tau))
+        n, rows = self._n, sealed(np.concatenate((self._q, self._dq, tau)))  # One copy for all three.
+        return Measurement(rows[:n], rows[n : 2 * n], rows[2 * n :])
 
     def _let_rotors_be_felt(self, are_felt: bool) -> None:
         if are_felt is not self._rotors_are_felt:

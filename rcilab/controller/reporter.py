@@ -29,8 +29,7 @@ import numpy as np
 from rcilab.arrays import Array, JointVector, frozen, sealed
 from rcilab.clock import CYCLE_TIME
 from rcilab.controller.commanded import CommandedMotion
-from rcilab.controller.drive_model import DriveModel
-from rcilab.controller.filters import low_pass_gain
+from rcilab.controller.drive_report import DriveReport
 from rcilab.controller.plant import Measurement
 from rcilab.controller.settings import Settings
 from rcilab.controller.tool import ToolMotion
@@ -40,7 +39,6 @@ from rcilab.protocols.rci import ForceFrame
 from rcilab.spatial import Pose, Rotation9
 from rcilab.state import ControllerMode, MotionGeneratorMode, RobotMode, RobotState, build_state
 
-_SETTLED_TORQUE = 1e-6  # [N m] A filtered torque this close to the true one takes its value, so that rest is rest.
 _STANDING = 1e-6  # [m/s] Below this the tool has no direction of its path.
 _ALONG = 0.999  # Cosine of an angle above which two directions count as parallel.
 
@@ -72,8 +70,6 @@ class StateReporter:
 
     def __init__(self, model: RobotModel, settings: Settings) -> None:
         self._zeros = frozen(np.zeros(model.n))
-        self._no_rates = frozen(np.zeros(2 * model.n))
-        self._drive_model = DriveModel(model)
         self._path = (0.0, 0.0, 0.0)
         self.configure(model, settings)
 
@@ -84,12 +80,11 @@ class StateReporter:
         self._force_frame = settings.force_frame
         at_tool = not any(self._T_tool_force.parts[1])
         self._is_wrench_at_tool = at_tool and self._force_frame is ForceFrame.WORLD
-        self._gain = low_pass_gain(settings.torque_report_filter)
+        self._drives = DriveReport(model, settings.torque_report_filter)
         self._body: dict[str, Any] | None = None
         self._readings: Readings | None = None
         self._version = -1
         self._is_settled = False
-        self._sensed = self._filtered = self._no_rates
 
     def report(
         self,
@@ -133,17 +128,11 @@ class StateReporter:
         if last is not None and before is not None and (tau_commanded is None) == (before.tau_c is None):
             dtau_c = (tau_c - last["tau_c"]) / h
         is_new = before is None or measured is not before.measured
-        # What is done alike to several vectors is done to all of them at once.
-        sensed = np.concatenate((measured.dq, measured.tau))
-        rates = (sensed - self._sensed) / h if is_new and last is not None else self._no_rates
-        self._sensed = sensed
-        theta, dtheta, motor_tau = self._drive_model.motor_side(np.concatenate((measured.q, sensed, rates)))
-        torques = np.concatenate((measured.tau, motor_tau))
-        filtered = self._filtered = torques if last is None else self._low_pass(torques, commanded.is_at_rest)
+        drives = self._drives
+        theta, dtheta, motor_tau, tau_filtered, motor_tau_filtered = drives.step(measured, commanded.is_at_rest)
         self._is_settled = (
-            commanded.is_at_rest and tool_c.is_at_rest and filtered is torques and not is_new and not dtau_c.any()
+            commanded.is_at_rest and tool_c.is_at_rest and drives.is_settled and not is_new and not dtau_c.any()
         )
-        n = len(q_c)
         tool_rates_c = sealed(np.array([*tool_c.twist, *tool_c.acceleration]))
         return {
             "q": measured.q,
@@ -160,7 +149,7 @@ class StateReporter:
             "dpsi_c": tool_c.dpsi,
             "ddpsi_c": tool_c.ddpsi,
             "tau": measured.tau,
-            "tau_filtered": filtered[:n],
+            "tau_filtered": tau_filtered,
             "tau_c": tau_c,
             "dtau_c": dtau_c,
             "tau_ext_in_base": wrench,
@@ -168,18 +157,8 @@ class StateReporter:
             "theta": theta,
             "dtheta": dtheta,
             "motor_tau": motor_tau,
-            "motor_tau_filtered": filtered[n:],
+            "motor_tau_filtered": motor_tau_filtered,
         }
-
-    def _low_pass(self, torques: Array, may_settle: bool) -> Array:
-        if self._gain == 1.0:
-            return torques
-        missing = torques - self._filtered
-        if may_settle and max(missing.max(), -missing.min()) * (1.0 - self._gain) < _SETTLED_TORQUE:
-            return torques
-        missing *= self._gain
-        missing += self._filtered
-        return missing
 
     def _in_force_frame(self, wrench: Array, T_base_tool: Pose, velocity: Sequence[float]) -> Array:
         """Returns a wrench on the tool (base axes, tool's origin) at the force frame's origin, in its type's axes."""

@@ -48,10 +48,9 @@ class Phase(Enum):
     RECOVERING = (RobotMode.AUTOMATIC_ERROR_RECOVERY, 0)
     """Faults are being cleared."""
 
-    @property
-    def robot_mode(self) -> RobotMode:
+    def __init__(self, robot_mode: RobotMode, _number: int) -> None:
+        self.robot_mode: Final = robot_mode
         """What the state reports in this phase."""
-        return self.value[0]
 
 
 class Event(Enum):

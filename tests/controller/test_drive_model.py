@@ -46,7 +46,7 @@ def test_the_rotor_is_the_one_that_the_mujoco_arm_moves_with() -> None:
 
 def test_all_at_once_is_each_for_itself() -> None:
     drive, (q, dq, tau, ddq, dtau) = DriveModel(load_model("xMate3")), np.random.default_rng(3).normal(size=(5, 6))
-    theta, dtheta, motor_tau = drive.motor_side(np.concatenate((q, dq, tau, ddq, dtau)))
+    theta, dtheta, motor_tau = np.split(drive.matrix @ np.concatenate((q, dq, tau, ddq, dtau)), 3)
     assert theta == pytest.approx(drive.theta(q, tau))
     assert dtheta == pytest.approx(drive.dtheta(dq, dtau))
     assert motor_tau == pytest.approx(drive.motor_tau(tau, dq, ddq))
