@@ -124,7 +124,7 @@ class MuJoCoPlant:
         dq, bias = self._dq.copy(), self._bias.copy()
         drive_torque = self._drive_torque(setpoint)
         np.minimum(drive_torque, self._peak, out=drive_torque)  # np.clip takes three times as long as both together.
-        np.maximum(drive_torque, -self._peak, out=drive_torque)
+        np.maximum(drive_torque, self._trough, out=drive_torque)
         compensated = self._robot.rigid_body.gravity(self._q) if setpoint.drive is Drive.TORQUE else bias
         motor = drive_torque + compensated + self._known_friction * dq
         self._applied[:] = motor
@@ -133,7 +133,9 @@ class MuJoCoPlant:
         mj.mj_step2(model, data)
         mj.mj_step1(model, data)  # Forces and contacts of the place it has come to.
         # What is left of the motor torque behind rotor and friction, brought to the end of the millisecond.
-        loss = self._friction * self._dq + self._armature * (self._dq - dq) / TIMESTEP
+        loss = self._friction * self._dq
+        if self._rotors_are_felt:
+            loss += self._rotors * ((self._dq - dq) / TIMESTEP)
         self._measurement = self._measure(motor - loss + (self._bias - bias))
         self._settle(setpoint)
         return self._measurement
@@ -219,6 +221,7 @@ class MuJoCoPlant:
         self._armature: Array = self._model.dof_armature
         torque = model.limits.joint.torque
         self._peak: Array = PEAK_TORQUE * torque
+        self._trough = -self._peak
         self._rotors: Array = ARMATURE_PER_TORQUE * torque
         self._friction: Array = self._share_of_friction * DAMPING_PER_TORQUE * torque
         self._known_friction = FRICTION_KNOWN * self._friction

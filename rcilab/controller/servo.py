@@ -98,12 +98,11 @@ def cartesian_impedance(
     if axes is not None:
         error = _turned(np.array(error), axes).tolist()
     wrench = np.array([k * e + w for k, e, w in zip(stiffness6, error, desired_wrench6, strict=True)])
-    dq_c, force, free = _reference(model, terms, twist_c, acc_c, q_null, measured)
+    dq_c, ddq_c = _reference(model, terms, twist_c, acc_c, q_null, measured)
     tau = (damper or Damper()).torque(
         lambda: design_damping(terms.mass_inverse, along.T * stiffness6 @ along), along.T.dot(wrench), dq_c - dq
     )
-    tau += J.T.dot(force)
-    tau += body.motion_torque(q, dq, free)
+    tau += body.motion_torque(q, dq, ddq_c)
     return tau
 
 
@@ -125,29 +124,22 @@ def _reference(
     acc: Sequence[float],
     q_null: JointVector,
     measured: Measurement,
-) -> tuple[JointVector, Array, JointVector]:
-    """Returns what moves the tool as commanded: joint velocities, force at the tool, and accelerations besides.
+) -> tuple[JointVector, JointVector]:
+    """Returns the joint velocities and accelerations that move the tool as commanded, shape (n,), [rad/s], [rad/s^2].
 
     Of all that do, they are those of least kinetic energy. With Khatib's inertia at the tool, L = (J M^-1 J^T)^-1,
 
-        dq_c = M^-1 J^T L twist        M ddq_c = J^T L (acc - dJ/dt dq - J free) + M free
+        dq_c = M^-1 J^T L twist        ddq_c = M^-1 J^T L (acc - dJ/dt dq - J free) + free
 
-    so that L times an acceleration is a force, which needs no joint accelerations on its way. On a 7-axis arm `free` is
-    the acceleration of a damped spring at `q_null`, of which the tool feels nothing.
-
-    Returns:
-        dq_c, shape (n,), [rad/s]; the force, shape (6,), [N, N m]; `free`, shape (n,), [rad/s^2].
+    On a 7-axis arm `free` is the acceleration of a damped spring at `q_null`, of which the tool feels nothing.
     """
     J = terms.jacobian
     wanted = np.array([*twist, *acc])
-    felt = wanted[6:]
-    if any(twist) or any(acc):
-        felt -= terms.drift
     if model.n == 7:
         free = NULL_FREQUENCY**2 * (q_null - measured.q) - NULL_DAMPING * measured.dq
-        felt -= J.dot(free)
     else:
         free = np.zeros(model.n)
+    wanted[6:] -= terms.acceleration(free) if any(twist) or any(acc) else J.dot(free)
     back = terms.mass_inverse.dot(J.T)
-    L_wanted = model.rigid_body.tool_solver.solve(J.dot(back) + _DAMPED_INVERSE, wanted.reshape(2, 6).T)
-    return back.dot(L_wanted[:, 0]), L_wanted[:, 1], free
+    joints = back.dot(model.rigid_body.tool_solver.solve(J.dot(back) + _DAMPED_INVERSE, wanted.reshape(2, 6).T))
+    return joints[:, 0], joints[:, 1] + free

@@ -70,7 +70,7 @@ class ToolTerms:
         dq: Joint velocities, shape (n,), [rad/s]; likewise.
     """
 
-    __slots__ = ("_args", "_drift", "_mass_inverse", "jacobian", "matrix", "pose", "twist")
+    __slots__ = ("_args", "_mass_inverse", "jacobian", "matrix", "pose", "twist")
 
     def __init__(self, model: pin.Model, data: pin.Data, tool: int, q: JointVector, dq: JointVector) -> None:
         self._args = (model, data, tool, q, dq)
@@ -79,7 +79,6 @@ class ToolTerms:
         self.pose = _pose(self.matrix)
         self.twist: Twist = tuple(self.jacobian.dot(dq).tolist())
         self._mass_inverse: Matrix | None = None
-        self._drift: Array | None = None
 
     def is_at(self, q: JointVector, dq: JointVector) -> bool:
         """Returns whether it is that of these very arrays."""
@@ -94,17 +93,15 @@ class ToolTerms:
             found = self._mass_inverse = pin.computeMinverse(model, data, q).copy()
         return found
 
-    @property
-    def drift(self) -> Array:
-        """The tool's acceleration when the joints have none: dJ/dt dq, base axes, shape (6,), [m/s^2, rad/s^2]."""
-        found = self._drift
-        if found is None:
-            model, data, tool, q, dq = self._args
-            pin.forwardKinematics(model, data, q, dq, np.zeros(len(q)))
-            pin.updateFramePlacement(model, data, tool)
-            acceleration = pin.getFrameClassicalAcceleration(model, data, tool, pin.LOCAL_WORLD_ALIGNED)
-            found = self._drift = acceleration.vector.copy()
-        return found
+    def acceleration(self, ddq: JointVector) -> Array:
+        """Returns the tool's acceleration J ddq + dJ/dt dq, base axes, linear first, shape (6,), [m/s^2, rad/s^2].
+
+        Args:
+            ddq: Joint accelerations, shape (n,), [rad/s^2].
+        """
+        model, data, tool, q, dq = self._args
+        pin.forwardKinematics(model, data, q, dq, ddq)
+        return pin.getFrameClassicalAcceleration(model, data, tool, pin.LOCAL_WORLD_ALIGNED).vector.copy()
 
 
 class RigidBody:

@@ -97,7 +97,8 @@ def test_all_terms_at_once_are_those_of_the_single_questions(name):
     assert terms.pose.is_close(model.forward(q), 1e-12)
     np.testing.assert_allclose(terms.twist, model.jacobian(q) @ dq, atol=1e-12)
     slope = (model.jacobian(q + step * dq) - model.jacobian(q - step * dq)) / (2.0 * step)
-    np.testing.assert_allclose(terms.drift, slope @ dq, atol=1e-8)
+    np.testing.assert_allclose(terms.acceleration(np.zeros(model.n)), slope @ dq, atol=1e-8)
+    np.testing.assert_allclose(terms.acceleration(ddq), terms.jacobian @ ddq + slope @ dq, atol=1e-8)
     np.testing.assert_allclose(body.acceleration(q, dq, torque.full), ddq, atol=1e-9)
     held = torque.inertial + torque.coriolis
     np.testing.assert_allclose(body.weightless_acceleration(q, dq, held), ddq, atol=1e-9)
