@@ -106,12 +106,12 @@ class CartesianGenerator:
     def _read(self, packet: CommandPacket) -> list[float]:
         """Returns position, quaternion and arm angle of a command, with sign and turn that continue the last one."""
         m = packet.T_base_tool_c
-        wxyz = wxyz_from_rotation((m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]))
-        last = self._stream.last
-        if sum([a * b for a, b in zip(wxyz, last[3:7], strict=True)]) < 0.0:
-            wxyz = (-wxyz[0], -wxyz[1], -wxyz[2], -wxyz[3])
-        psi = last[7] + remainder(self._arm_angle(packet) - last[7], tau)
-        return [m[3], m[7], m[11], *wxyz, psi]
+        w, x, y, z = wxyz_from_rotation((m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]))
+        _, _, _, last_w, last_x, last_y, last_z, last_psi = self._stream.last
+        if w * last_w + x * last_x + y * last_y + z * last_z < 0.0:
+            w, x, y, z = -w, -x, -y, -z
+        psi = last_psi + remainder(self._arm_angle(packet) - last_psi, tau)
+        return [m[3], m[7], m[11], w, x, y, z, psi]
 
     def _arm_angle(self, packet: CommandPacket) -> float:
         if not self._has_psi:

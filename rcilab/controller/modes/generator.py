@@ -118,7 +118,7 @@ class JointReference:
         self._last, self._before = q, self._last
         if reason:
             return lost_motion(reason)
-        return Step(q=q) if cycles == 0 else self._judge(q, cycles)
+        return Step(q) if cycles == 0 else self._judge(q, cycles)
 
     def _find_throw(self, q: list[float], cycles: int) -> str:
         """Returns what the arm cannot be asked to do, or nothing; for as long as a difference reaches to a gap."""
@@ -141,4 +141,4 @@ class JointReference:
             breaches += self._box.broken()
         if faults:
             return Step(faults=tuple(sorted(faults)), reason=describe_breaches(breaches))
-        return Step(q=q)
+        return Step(q)

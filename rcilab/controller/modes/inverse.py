@@ -12,6 +12,8 @@ from rcilab.kinematics.singularity import find_singularity
 from rcilab.model import RobotModel
 from rcilab.spatial import IDENTITY, Pose
 
+_SIDES = ((0.0,), (pi,), (0.0, pi))  # Flips of a joint bent to its positive side, to its negative one, or next to zero.
+_FLIPS = [[[list(product(a, b, c)) for c in _SIDES] for b in _SIDES] for a in _SIDES]
 _STEP = 0.1  # [rad] What no joint passes in a cycle, by far: an arm bent more than that stays bent to the same side.
 
 
@@ -69,12 +71,13 @@ class Follower:
 
     def _near_flips(self, near: Sequence[float]) -> list[tuple[float, ...]]:
         """Returns the branches that a step from `near` may end on: those of its own sides, and of both next to zero."""
-        offsets = self._geometry.offsets
-        sides = [_sides(near[i] - offsets[i]) for i in (1, 3, 5)]
-        return list(product(*sides))
+        _, offset_2, _, offset_4, _, offset_6, _ = self._geometry.offsets
+        _, q2, _, q4, _, q6, _ = near
+        return _FLIPS[_side(q2 - offset_2)][_side(q4 - offset_4)][_side(q6 - offset_6)]
 
 
-def _sides(bend: float) -> tuple[float, ...]:
+def _side(bend: float) -> int:
+    """Returns which of `_SIDES` an upright joint is on."""
     if abs(bend) < _STEP:
-        return 0.0, pi
-    return (pi,) if remainder(bend, tau) < 0.0 else (0.0,)
+        return 2
+    return 1 if remainder(bend, tau) < 0.0 else 0
