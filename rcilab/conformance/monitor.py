@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from operator import sub
 
 from rcilab.conformance.bound_rows import BoundRows
 from rcilab.conformance.breach import Breach
@@ -71,8 +72,8 @@ class JointMonitor:
         self._spacing = (cycles, self._spacing[0])
         q = list(q_c[: self._n])
         dq = [(new - old) / first for new, old in zip(q, self.q, strict=True)]
-        ddq = [(new - old) / second for new, old in zip(dq, self.dq, strict=True)]
-        jerk = [(new - old) / third for new, old in zip(ddq, self.ddq, strict=True)]
+        ddq = [change / second for change in map(sub, dq, self.dq)]
+        jerk = [change / third for change in map(sub, ddq, self.ddq)]
         self.q, self.dq, self.ddq, self.jerk = q, dq, ddq, jerk
         return self._rows.judge([*q, *dq, *ddq, *jerk])
 

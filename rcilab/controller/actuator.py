@@ -93,19 +93,18 @@ class Actuator:
             self._law, self._damper = law, Damper()
         match law:
             case Law.POSITION:
-                arrays = commanded.arrays
-                return Setpoint(Drive.POSITION, commanded.q, commanded.dq, commanded.ddq, arrays=arrays)
+                return Setpoint(Drive.POSITION, commanded.q, commanded.dq, commanded.ddq, None, commanded.arrays)
             case Law.BRAKED:
                 return Setpoint(Drive.BRAKED, commanded.q, commanded.dq, commanded.ddq)
             case Law.TORQUE:
                 torque = [0.0] * len(commanded.q) if tau is None else tau
-                return Setpoint(Drive.TORQUE, commanded.q, commanded.dq, commanded.ddq, tau=torque)
+                return Setpoint(Drive.TORQUE, commanded.q, commanded.dq, commanded.ddq, torque)
             case _:
                 torque = self._compliance(law, commanded, tool_c, measured)
                 box = guiding_box(self._settings)
                 if box is not None:
                     torque = torque + wall_torque(self._model, measured, box, self._settings.cartesian_stiffness)
-                return Setpoint(Drive.TORQUE, commanded.q, commanded.dq, commanded.ddq, tau=torque)
+                return Setpoint(Drive.TORQUE, commanded.q, commanded.dq, commanded.ddq, torque)
 
     def _compliance(
         self, law: Law, commanded: CommandedMotion, tool_c: ToolMotion, measured: Measurement

@@ -92,7 +92,7 @@ def judge_recovery(settings: Settings, watch: Watch) -> rci.RecoveryStatus | Non
             return rci.RecoveryStatus.MANUAL_RECOVERY_NEEDED
     box = active_box(settings.safety_box)
     if box is not None and guiding_box(settings) is None:
-        if box.excess(watch.tool.pose.parts[1]) > BOX_ALLOWANCE:
+        if box.excess(watch.tool.position) > BOX_ALLOWANCE:
             return rci.RecoveryStatus.MANUAL_RECOVERY_NEEDED
     return None if watch.find_collision(settings.collision_thresholds) is None else rci.RecoveryStatus.REFLEX
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from operator import sub
 
 import numpy as np
 
@@ -92,7 +93,7 @@ class CommandedMotion:
     def _advance(self, q: list[float]) -> None:
         h = CYCLE_TIME
         dq = [(new - old) / h for new, old in zip(q, self.q, strict=True)]
-        self.ddq = [(new - old) / h for new, old in zip(dq, self.dq, strict=True)]
+        self.ddq = [change / h for change in map(sub, dq, self.dq)]
         self.q, self.dq = q, dq
         self.is_at_rest = not any(dq) and not any(self.ddq)
         self.version += 1

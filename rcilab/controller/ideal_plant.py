@@ -104,11 +104,11 @@ class IdealPlant:
         return measurement
 
     def _measure(self, q: JointVector, dq: JointVector, ddq: JointVector) -> Measurement:
-        tau = self._body.full_torque(q, dq, ddq)
+        tau = self._body.shared_torque(q, dq, ddq)
         if self._push.is_active:
-            tau -= self._push.torque(q)
+            tau = sealed(tau - self._push.torque(q))
         self._rests = False
-        self._measurement = Measurement(q, dq, sealed(tau))
+        self._measurement = Measurement(q, dq, tau)
         return self._measurement
 
     def _fall(self, tau_c: JointVector) -> Measurement:

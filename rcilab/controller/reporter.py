@@ -36,7 +36,7 @@ from rcilab.controller.tool import ToolMotion
 from rcilab.faults import Fault
 from rcilab.model import RobotModel
 from rcilab.protocols.rci import ForceFrame
-from rcilab.spatial import Pose, Rotation9
+from rcilab.spatial import Rotation9
 from rcilab.state import ControllerMode, MotionGeneratorMode, RobotMode, RobotState, build_state
 
 _STANDING = 1e-6  # [m/s] Below this the tool has no direction of its path.
@@ -123,7 +123,7 @@ class StateReporter:
         if tau_commanded is not None:
             tau_c = frozen(tau_commanded)
         else:
-            tau_c = self._model.rigid_body.full_torque(q_c, dq_c, ddq_c)
+            tau_c = self._model.rigid_body.shared_torque(q_c, dq_c, ddq_c)
         dtau_c = self._zeros
         if last is not None and before is not None and (tau_commanded is None) == (before.tau_c is None):
             dtau_c = (tau_c - last["tau_c"]) / h
@@ -153,14 +153,14 @@ class StateReporter:
             "tau_c": tau_c,
             "dtau_c": dtau_c,
             "tau_ext_in_base": wrench,
-            "tau_ext_in_stiff": self._in_force_frame(wrench, tool.pose, tool_c.twist[:3]),
+            "tau_ext_in_stiff": self._in_force_frame(wrench, tool, tool_c.twist[:3]),
             "theta": theta,
             "dtheta": dtheta,
             "motor_tau": motor_tau,
             "motor_tau_filtered": motor_tau_filtered,
         }
 
-    def _in_force_frame(self, wrench: Array, T_base_tool: Pose, velocity: Sequence[float]) -> Array:
+    def _in_force_frame(self, wrench: Array, tool: ToolMotion, velocity: Sequence[float]) -> Array:
         """Returns a wrench on the tool (base axes, tool's origin) at the force frame's origin, in its type's axes."""
         speed = math.hypot(*velocity)
         if speed > _STANDING:
@@ -169,6 +169,7 @@ class StateReporter:
         fx, fy, fz, mx, my, mz = wrench.tolist()
         if self._is_wrench_at_tool or not (fx or fy or fz or mx or my or mz):
             return wrench
+        T_base_tool = tool.pose
         r, (x, y, z) = (T_base_tool @ self._T_tool_force).parts
         tx, ty, tz = T_base_tool.parts[1]
         ax, ay, az = tx - x, ty - y, tz - z

@@ -26,8 +26,7 @@ class ToolMotion:
     value stays, and at first 0. On 6-axis arms it is 0.
 
     Attributes:
-        pose: Pose of the tool in base.
-        matrix: The same as a homogeneous transform, shape (4, 4), [m].
+        matrix: Pose of the tool in base as a homogeneous transform, shape (4, 4), [m].
         twist: Its velocity in base axes, linear first, [m/s, rad/s]: Jacobian times joint velocity.
         acceleration: The twist's backward difference over one cycle, [m/s^2, rad/s^2].
         psi: Arm angle, [rad].
@@ -42,11 +41,21 @@ class ToolMotion:
     def __init__(self, model: RobotModel, q: Sequence[float]) -> None:
         self._body = model.rigid_body
         self._geometry = build_geometry(model.description)
-        self.pose: Pose
+        self._terms: ToolTerms
         self.matrix: Matrix
         self.twist = self.acceleration = _REST
         self.psi = self.dpsi = self.ddpsi = 0.0
         self.place(q)
+
+    @property
+    def pose(self) -> Pose:
+        """Pose of the tool in base; made when somebody asks for it."""
+        return self._terms.pose
+
+    @property
+    def position(self) -> list[float]:
+        """Where the tool is in base, 3 plain floats, [m]."""
+        return self.matrix[:3, 3].tolist()
 
     @property
     def is_at_rest(self) -> bool:
@@ -55,15 +64,15 @@ class ToolMotion:
 
     def place(self, q: Sequence[float]) -> None:
         """Puts the arm somewhere, at rest."""
-        motion = self._body.tool_motion(np.array(q), np.zeros(len(q)))
-        self.pose, self.matrix = motion.pose, motion.matrix
+        self._terms = self._body.tool_motion(np.array(q), np.zeros(len(q)))
+        self.matrix = self._terms.matrix
         self.twist = self.acceleration = _REST
         self.psi, self.dpsi, self.ddpsi = self._arm_angle(q), 0.0, 0.0
 
     def update(self, q: Sequence[float], motion: ToolTerms) -> None:
         """Takes the joints of this cycle, n plain floats, [rad], and how the tool moves with them."""
         h = CYCLE_TIME
-        self.pose, self.matrix, twist = motion.pose, motion.matrix, motion.twist
+        self._terms, self.matrix, twist = motion, motion.matrix, motion.twist
         a, b, c, d, e, f = twist
         p, r, s, t, u, v = self.twist
         self.acceleration = ((a - p) / h, (b - r) / h, (c - s) / h, (d - t) / h, (e - u) / h, (f - v) / h)
@@ -74,12 +83,12 @@ class ToolMotion:
 
     def observe(self, q: Sequence[float], motion: ToolTerms) -> None:
         """Takes what `coincide` would, from joints that were measured: nobody asks for the differences of those."""
-        self.pose, self.matrix, self.twist = motion.pose, motion.matrix, motion.twist
+        self._terms, self.matrix, self.twist = motion, motion.matrix, motion.twist
         self.psi = self._arm_angle(q)
 
     def coincide(self, other: ToolMotion) -> None:
         """Takes over where another one is: the arm is exactly where it was told to be."""
-        self.pose, self.matrix, self.twist, self.psi = other.pose, other.matrix, other.twist, other.psi
+        self._terms, self.matrix, self.twist, self.psi = other._terms, other.matrix, other.twist, other.psi
 
     def _arm_angle(self, q: Sequence[float]) -> float:
         if self._geometry.n != 7:

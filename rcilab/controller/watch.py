@@ -96,7 +96,7 @@ class Watch:
         monitor, measured, tool = self._monitor, self.measured, self.tool
         assert monitor is not None
         twist, psi = (tool.twist, tool.psi) if self._judges_tool and is_commanded else (None, None)
-        faults = monitor.step(measured.q.tolist(), measured.dq.tolist(), tool.pose.parts[1], twist, psi)
+        faults = monitor.step(measured.q.tolist(), measured.dq.tolist(), tool.position, twist, psi)
         reasons = [describe_breaches(monitor.broken())] if faults else []
         collision = self.find_collision(self._thresholds)
         if collision is not None:

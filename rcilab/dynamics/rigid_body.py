@@ -11,7 +11,7 @@ from typing import TypeAlias
 import numpy as np
 import pinocchio as pin  # pyright: ignore[reportMissingImports]  # It lives behind a .pth file.
 
-from rcilab.arrays import Array, JointPath, JointVector, Matrix, Vector3
+from rcilab.arrays import Array, JointPath, JointVector, Matrix, Vector3, sealed
 from rcilab.dynamics.payload import Payload
 from rcilab.dynamics.symmetric_solver import SymmetricSolver
 from rcilab.robots.description import Link, RobotDescription
@@ -58,7 +58,6 @@ class ToolTerms:
 
     Attributes:
         matrix: Pose of the tool in base as a homogeneous transform, shape (4, 4), [m].
-        pose: The same.
         twist: Its velocity in base axes, linear first, [m/s, rad/s].
         jacobian: At the tool, linear rows first, base axes, shape (6, n).
 
@@ -70,19 +69,27 @@ class ToolTerms:
         dq: Joint velocities, shape (n,), [rad/s]; likewise.
     """
 
-    __slots__ = ("_args", "_mass_inverse", "jacobian", "matrix", "pose", "twist")
+    __slots__ = ("_args", "_mass_inverse", "_pose", "jacobian", "matrix", "twist")
 
     def __init__(self, model: pin.Model, data: pin.Data, tool: int, q: JointVector, dq: JointVector) -> None:
         self._args = (model, data, tool, q, dq)
         self.jacobian: Matrix = pin.computeFrameJacobian(model, data, q, tool, pin.LOCAL_WORLD_ALIGNED)
         self.matrix: Matrix = pin.updateFramePlacement(model, data, tool).homogeneous
-        self.pose = _pose(self.matrix)
         self.twist: Twist = tuple(self.jacobian.dot(dq).tolist())
+        self._pose: Pose | None = None
         self._mass_inverse: Matrix | None = None
 
     def is_at(self, q: JointVector, dq: JointVector) -> bool:
         """Returns whether it is that of these very arrays."""
         return self._args[3] is q and self._args[4] is dq
+
+    @property
+    def pose(self) -> Pose:
+        """Pose of the tool in base."""
+        found = self._pose
+        if found is None:
+            found = self._pose = _pose(self.matrix)
+        return found
 
     @property
     def mass_inverse(self) -> Matrix:
@@ -137,6 +144,8 @@ class RigidBody:
         self._weightless.gravity.linear = np.zeros(3)
         self.tool_solver = SymmetricSolver(6)
         self._tool_terms: ToolTerms | None = None
+        self._shared_args: tuple[JointVector, ...] = ()
+        self._shared_torque = np.zeros(0)
 
     def torque(self, q: JointVector, dq: JointVector, ddq: JointVector) -> TorqueTerms:
         """Returns the torques and their terms; every argument of shape (n,), [rad], [rad/s], [rad/s^2]."""
@@ -155,6 +164,13 @@ class RigidBody:
     def full_torque(self, q: JointVector, dq: JointVector, ddq: JointVector) -> JointVector:
         """Returns only the sum of all terms, shape (n,), [N m]."""
         return pin.rnea(self._model, self._data, q, dq, ddq).copy()
+
+    def shared_torque(self, q: JointVector, dq: JointVector, ddq: JointVector) -> JointVector:
+        """Returns `full_torque`, read-only and computed once for all who ask for the very same arrays."""
+        args = self._shared_args
+        if not (args and args[0] is q and args[1] is dq and args[2] is ddq):
+            self._shared_args, self._shared_torque = (q, dq, ddq), sealed(self.full_torque(q, dq, ddq))
+        return self._shared_torque
 
     def motion_torque(self, q: JointVector, dq: JointVector, ddq: JointVector) -> JointVector:
         """Returns what a motion takes beyond holding the arm still: M ddq + C dq, shape (n,), [N m]."""
