@@ -45,19 +45,18 @@ class Arm:
         self._tool_version = self.commanded.version
         self._law = Law.BRAKED
         self._dq_before = measured.dq
-        self._is_there: bool = True
-        self._is_slow: bool = True
         self._standing = 0
 
     @property
     def stands(self) -> bool:
         """Whether it was told to stay where it is, and its joints have come to a standstill."""
-        return self.commanded.is_at_rest and (self._is_slow or self._standing > SETTLE_LIMIT)
+        return self.commanded.is_at_rest and (self._standing > SETTLE_LIMIT or self._is_slow())
 
     @property
     def may_be_braked(self) -> bool:
         """Whether it was told to stay where it is and does: servos settle, and a yielding arm moves in any case."""
-        return self.commanded.is_at_rest and not self._law.yields and (self._is_there or self._standing > SETTLE_LIMIT)
+        may_rest = self.commanded.is_at_rest and not self._law.yields
+        return may_rest and (self._standing > SETTLE_LIMIT or self.watch.measured.q.tolist() == self.commanded.q)
 
     def reset(self, q: JointVector) -> None:
         """Puts the resting arm somewhere else."""
@@ -105,9 +104,6 @@ class Arm:
             commanded.place(measured.q.tolist())
             self._move_tool()
         self._law, self._dq_before = law, last.dq
-        self._is_there = measured.q.tolist() == commanded.q
-        speeds: list[float] = measured.dq.tolist()
-        self._is_slow = -STANDSTILL < min(speeds) and max(speeds) < STANDSTILL
         self._standing = self._standing + 1 if commanded.is_at_rest else 0
         self.watch.observe(measured, commanded, self.tool_c)
 
@@ -115,6 +111,10 @@ class Arm:
         """Returns what this cycle came to; `tau` are commanded torques, [N m], or None."""
         watch = self.watch
         return Readings(self.commanded, self.tool_c, watch.measured, watch.tool, tau, watch.tau_ext, watch.wrench)
+
+    def _is_slow(self) -> bool:
+        speeds: list[float] = self.watch.measured.dq.tolist()
+        return -STANDSTILL < min(speeds) and max(speeds) < STANDSTILL
 
     def _move_tool(self) -> None:
         commanded, tool = self.commanded, self.tool_c

@@ -120,19 +120,16 @@ class IdealPlant:
         h, gravity = CYCLE_TIME, self._model.rigid_body.gravity
         q, dq = self._measurement.q, self._measurement.dq
         outside = self._push.torque(q) if self._push.is_active else None
-        ddq = self._acceleration(q, dq, tau_c, outside)
-        ddq = self._acceleration(q + (h / 2.0) * dq, dq + (h / 2.0) * ddq, tau_c, outside)
+        tau = tau_c if outside is None else tau_c + outside
+        accelerate = self._body.weightless_acceleration if self._mounted is None else self._acceleration
+        ddq = accelerate(q, dq, tau)
+        ddq = accelerate(q + (h / 2.0) * dq, dq + (h / 2.0) * ddq, tau)
         dq = dq + h * ddq
         q = q + h * dq
-        tau = tau_c + gravity(q)
         self._rests = False
-        self._measurement = Measurement(sealed(q), sealed(dq), sealed(tau))
+        self._measurement = Measurement(sealed(q), sealed(dq), sealed(tau_c + gravity(q)))
         return self._measurement
 
-    def _acceleration(
-        self, q: JointVector, dq: JointVector, tau_c: JointVector, outside: JointVector | None
-    ) -> JointVector:
-        tau = tau_c if outside is None else tau_c + outside
-        if self._mounted is None:  # Gravity is what the controller takes it for.
-            return self._body.weightless_acceleration(q, dq, tau)
+    def _acceleration(self, q: JointVector, dq: JointVector, tau: JointVector) -> JointVector:
+        """Returns how a load moves that the controller takes for another: gravity is not what it compensates."""
         return self._body.acceleration(q, dq, tau + self._model.rigid_body.gravity(q))

@@ -8,7 +8,6 @@ here, so a plant may trust them.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from enum import Enum
 from typing import NamedTuple, Protocol
 
@@ -56,8 +55,7 @@ class Setpoint(NamedTuple):
         return q, dq, ddq
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Measurement:
+class Measurement(NamedTuple):
     """What the sensors of the arm say at the end of a millisecond. Read-only arrays."""
 
     q: JointVector

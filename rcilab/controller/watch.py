@@ -52,6 +52,8 @@ class Watch:
         self._thresholds: Sequence[float] = ()
         self._judges_tool = False
         self._tool_version: int = -1
+        self._q: list[float] = measured.q.tolist()
+        self._dq: list[float] = measured.dq.tolist()
 
     def begin(
         self,
@@ -80,7 +82,7 @@ class Watch:
         """Takes the measurement of this cycle; where the arm is exactly where it was told, so is the tool."""
         if measured is not self.measured or commanded.version != self._tool_version:
             self.measured, self._tool_version = measured, commanded.version
-            q, dq = measured.q.tolist(), measured.dq.tolist()
+            self._q, self._dq = q, dq = measured.q.tolist(), measured.dq.tolist()
             if q == commanded.q and dq == commanded.dq:
                 self.tool.coincide(tool_c)
             else:
@@ -93,10 +95,10 @@ class Watch:
         Args:
             is_commanded: Whether a client's commands are followed; without, tool speed and arm angle do not count.
         """
-        monitor, measured, tool = self._monitor, self.measured, self.tool
+        monitor, tool = self._monitor, self.tool
         assert monitor is not None
         twist, psi = (tool.twist, tool.psi) if self._judges_tool and is_commanded else (None, None)
-        faults = monitor.step(measured.q.tolist(), measured.dq.tolist(), tool.position, twist, psi)
+        faults = monitor.step(self._q, self._dq, tool.position, twist, psi)
         reasons = [describe_breaches(monitor.broken())] if faults else []
         collision = self.find_collision(self._thresholds)
         if collision is not None:
