@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -57,11 +56,11 @@ class LyingSensors:
         measured, lie = self._plant.step(setpoint), self._lie
         if lie is None:
             self._news -= 1
-            return replace(measured) if self._news >= 0 else measured  # Real sensors repeat no sample.
+            return measured._replace() if self._news >= 0 else measured  # Real sensors repeat no sample.
         here, before = (lie.offsets[min(k, len(lie.offsets) - 1)] for k in (self._cycle, max(self._cycle - 1, 0)))
         self._cycle += 1
         self._q = frozen(measured.q + here)
-        return replace(measured, q=self._q, dq=frozen(measured.dq + (here - before) / H))
+        return measured._replace(q=self._q, dq=frozen(measured.dq + (here - before) / H))
 
 
 def _offsets(joint: int, second: Matrix) -> Matrix:
