@@ -26,6 +26,7 @@ LAYERS = [  # From the bottom. A part imports from lines below its own, and from
         "spatial",
         "realtime",
         "awake",
+        "one_core",
         "safety_box",
         "safety_distance",
         "closing",

@@ -10,8 +10,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import jsonschema
-
 from rcilab.cli import main
 from rcilab.motion.program_file import SCHEMA
 
@@ -32,6 +30,8 @@ def test_the_ten_lines_run_as_printed() -> None:
 
 
 def test_the_program_written_by_hand_is_sound_and_the_one_from_python_runs(tmp_path) -> None:
+    import jsonschema  # Takes 2 s, which other workers need not wait for.
+
     (text,) = re.findall(r"```json\n(.*?)```", README, re.DOTALL)
     jsonschema.validate(json.loads(text), json.loads(SCHEMA.read_text(encoding="utf-8")))
     (tmp_path / "program.json").write_text(text, encoding="utf-8")

@@ -28,6 +28,7 @@ from rcilab.client.world import World
 from rcilab.clock import CYCLE_TIME
 from rcilab.closing import Closing
 from rcilab.errors import ConnectionLostError, InvalidValueError, UsageError
+from rcilab.one_core import one_core
 from rcilab.protocols.rci import STATE_SIZE, Request
 from rcilab.recording.run import Run, build_run
 from rcilab.recording.setup import Setup
@@ -71,6 +72,7 @@ def open_session(
     silence: float = SILENCE,
     on_close: Callable[[], None] = lambda: None,
     world: World | None = None,
+    partner: int | None = None,
 ) -> RobotSession:
     """Returns a session as `connect` does, with what only a simulation sets; see `RobotSession`."""
     place = parse_address(address)
@@ -92,7 +94,9 @@ def open_session(
         await_first_state(link, place, transport.local_address, timeout)
         if world is None and place.world_port is not None:
             world = World(place.host, place.world_port)
-        return RobotSession(link, model, realtime=realtime, silence=silence, on_close=on_close, world=world)
+        return RobotSession(
+            link, model, realtime=realtime, silence=silence, on_close=on_close, world=world, partner=partner
+        )
     except BaseException:
         transport.close()
         raise
@@ -111,6 +115,7 @@ class RobotSession(Motions, Closing):
         silence: Time without a state, while moving, that counts as a lost connection, [s].
         on_close: Called once when the session is closed, such as to end a private controller.
         world: What surrounds a virtual robot; None where nothing of the kind is known.
+        partner: Process id of a controller on this machine that is in lock-step with us; None: it is not.
     """
 
     def __init__(
@@ -122,6 +127,7 @@ class RobotSession(Motions, Closing):
         silence: float = SILENCE,
         on_close: Callable[[], None] = lambda: None,
         world: World | None = None,
+        partner: int | None = None,
     ) -> None:
         super().__init__(link, model.limits)
         self._model = model
@@ -130,6 +136,7 @@ class RobotSession(Motions, Closing):
         self._silence = silence
         self._on_close = on_close
         self._world = world
+        self._partner = partner
         self._stop_reason: str | None = None
         self._moving = False
         self._closing = False
@@ -311,7 +318,7 @@ class RobotSession(Motions, Closing):
         self._moving = True
         started_ns = time.time_ns()
         try:
-            with punctual(self._realtime):
+            with punctual(self._realtime), one_core(self._partner):
                 reason = loop.run(callback)
         finally:
             self._moving = False

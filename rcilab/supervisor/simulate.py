@@ -46,6 +46,7 @@ def simulate(model: RobotModel, *, plant: str = "ideal", lockstep: bool = True) 
             silence=SILENCE_IN_LOCKSTEP if lockstep else SILENCE,
             on_close=controller.end,
             world=_world(controller.world_address),
+            partner=controller.pid if lockstep else None,
         )
     except BaseException:
         controller.end()

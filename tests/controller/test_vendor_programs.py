@@ -15,6 +15,7 @@ from tests.peers.kinematics import Model
 from tests.peers.robot import ControlException, Output, Robot
 
 SECONDS = 1.25  # [s] of simulated time, one swing; the long versions are in tests/endurance.
+NEAR = tuple(angle + 0.02 for angle in programs.START[7])  # [rad] So that the move before a program takes 0.2 s.
 
 
 @pytest.fixture(params=PLANTS)
@@ -60,7 +61,7 @@ PROGRAMS: dict[str, tuple[int, Callable[..., Any]]] = {
 def test_a_program_runs_to_its_end_and_moves_the_arm(place: Arena, name: str) -> None:
     mode, program = PROGRAMS[name]
     with place.connect() as robot:
-        programs.prepare(robot, factor=1.0)
+        programs.prepare(robot, NEAR, factor=1.0)
         robot.states.clear()
         program(robot, SECONDS, period=SECONDS)
         ended_well(robot)
@@ -72,7 +73,7 @@ def test_a_program_runs_to_its_end_and_moves_the_arm(place: Arena, name: str) ->
 
 def test_the_state_agrees_with_the_model_that_was_downloaded(place: Arena) -> None:
     with place.connect() as robot:
-        programs.prepare(robot, factor=1.0)
+        programs.prepare(robot, NEAR, factor=1.0)
         model = Model(robot.load_robot_model())
         robot.states.clear()
         programs.nullspace(robot, SECONDS, period=SECONDS)
@@ -85,7 +86,7 @@ def test_the_state_agrees_with_the_model_that_was_downloaded(place: Arena) -> No
 
 def test_in_the_null_space_the_tool_stands_still_and_the_elbow_swings(place: Arena) -> None:
     with place.connect() as robot:
-        programs.prepare(robot, factor=1.0)
+        programs.prepare(robot, NEAR, factor=1.0)
         robot.states.clear()
         programs.nullspace(robot, SECONDS, period=SECONDS)
         states = moving(robot, wire.CARTESIAN_POSITION)
@@ -96,7 +97,7 @@ def test_in_the_null_space_the_tool_stands_still_and_the_elbow_swings(place: Are
 
 def test_a_program_that_ends_in_motion_is_brought_to_rest(place: Arena) -> None:
     with place.connect() as robot:
-        programs.prepare(robot, factor=1.0)
+        programs.prepare(robot, NEAR, factor=1.0)
         robot.states.clear()
         programs.nullspace(robot, 0.75)
         ended_well(robot)
@@ -104,7 +105,7 @@ def test_a_program_that_ends_in_motion_is_brought_to_rest(place: Arena) -> None:
 
 def test_movel_arrives_at_the_pose_with_the_arm_angle(place: Arena) -> None:
     with place.connect() as robot:
-        programs.prepare(robot, factor=1.0)
+        programs.prepare(robot, NEAR, factor=1.0)
         start = robot.receive_fresh_state()
         goal = list(start.pos_m)
         goal[11] -= 0.02  # z
@@ -116,7 +117,7 @@ def test_movel_arrives_at_the_pose_with_the_arm_angle(place: Arena) -> None:
 
 def test_dragging_opens_and_closes(place: Arena) -> None:
     with place.connect() as robot:
-        programs.prepare(robot, factor=1.0)
+        programs.prepare(robot, NEAR, factor=1.0)
         seen = programs.drag(robot, 20)
         assert all(state.robot_mode == wire.ROBOT_GUIDING for state in seen)
         assert np.ptp([state.q for state in seen], axis=0).max() < 1e-3  # Nobody pulls, and nothing sags.
@@ -128,7 +129,7 @@ def test_dragging_opens_and_closes(place: Arena) -> None:
 @pytest.mark.parametrize("name", programs.DRAGS)
 def test_a_hand_leads_the_arm_where_the_drag_lets_it(place: Arena, name: str) -> None:
     with place.connect() as robot:
-        programs.prepare(robot, factor=1.0)
+        programs.prepare(robot, NEAR, factor=1.0)
         robot.states.clear()
         seen = programs.led_by_hand(
             robot, SECONDS, *programs.DRAGS[name], lambda w: place.between(lambda c: c.plant.push(w))
@@ -139,7 +140,7 @@ def test_a_hand_leads_the_arm_where_the_drag_lets_it(place: Arena, name: str) ->
 
 def test_without_a_state_in_time_the_last_one_is_answered_again() -> None:
     with arena() as place, place.connect(receive_timeout=1e-4) as robot:
-        programs.prepare(robot, factor=1.0)
+        programs.prepare(robot, NEAR, factor=1.0)
         robot.receive_robot_state()  # In lock-step each repeated command brought a state; they are all still unread.
         robot.states.clear()
         programs.joint_sine(robot, SECONDS, period=SECONDS)
@@ -173,7 +174,7 @@ def test_rubbish_in_seventh_elements_of_six_axis_arms_is_not_looked_at(name: str
 def test_a_second_start_on_a_poisoned_object_still_moves_the_arm() -> None:
     """After a fault the library's object is spoiled, the controller is not: it moves, then the old error comes."""
     with arena() as place, place.connect() as robot:
-        programs.prepare(robot, factor=1.0)
+        programs.prepare(robot, NEAR, factor=1.0)
         robot.start_move(wire.JOINT_POSITION, wire.JOINT)
         with pytest.raises(ControlException, match="kCommandJointVelocityLimitsViolation"):
             robot.control(lambda state: Output(q=tuple(q + 0.5 for q in state.q)))

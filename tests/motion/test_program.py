@@ -8,9 +8,9 @@ import os
 import re
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
-import jsonschema
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -47,7 +47,6 @@ PROGRAM = Program(
     ),
 )
 TEXT = PROGRAM.to_json()
-VALIDATOR = jsonschema.Draft202012Validator(json.loads(SCHEMA.read_text()))
 
 angles = st.floats(-12.0, 12.0)
 places = st.tuples(*[st.floats(-10.0, 10.0)] * 3)
@@ -76,6 +75,13 @@ waypoints = st.one_of(
 printable = st.text(st.characters(exclude_categories=("C", "Z")))
 
 
+@cache
+def validator():
+    import jsonschema  # Takes 2 s, which other workers need not wait for.
+
+    return jsonschema.Draft202012Validator(json.loads(SCHEMA.read_text()))
+
+
 @settings(max_examples=40)
 @given(st.tuples(*[angles] * 7), st.lists(waypoints, min_size=1, max_size=5), printable)
 def test_json_and_script_give_back_the_same_program_to_the_last_bit(start, steps, name):
@@ -83,7 +89,7 @@ def test_json_and_script_give_back_the_same_program_to_the_last_bit(start, steps
     text = program.to_json()
     assert Program.from_json(text) == program
     assert Program.from_json(text).to_json() == text
-    VALIDATOR.validate(json.loads(text))
+    validator().validate(json.loads(text))
     scope = {}
     exec(program.to_python().split("model = ")[0], scope)
     assert scope["program"] == program
@@ -121,8 +127,8 @@ def test_the_script_runs_without_a_screen_and_gives_the_same_motion_to_the_last_
 
 
 def test_the_schema_knows_what_the_class_knows():
-    schema = json.loads(SCHEMA.read_text())
-    jsonschema.Draft202012Validator.check_schema(schema)
+    schema = validator().schema
+    validator().check_schema(schema)
     properties = schema["$defs"]["waypoint"]["properties"]
     assert set(properties) == {"type", *ALWAYS, *(name for names in ALLOWED.values() for name in names)}
     assert properties["type"]["enum"] == list(ALLOWED)
@@ -132,7 +138,7 @@ def test_the_schema_knows_what_the_class_knows():
         assert properties[key]["enum"] == list(words)
         assert properties[key]["default"] == words[0]
     alone = {**schema, "$ref": "#/$defs/waypoint", "required": [], "properties": {}, "additionalProperties": True}
-    waypoint_alone = jsonschema.Draft202012Validator(alone)
+    waypoint_alone = validator().evolve(schema=alone)
     for kind, allowed in ALLOWED.items():
         assert waypoint_alone.is_valid({"type": kind, **_least(kind)})
         for key in set(properties) - {"type", *ALWAYS, *allowed}:

@@ -11,10 +11,12 @@ import os
 import re
 from functools import cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import nbformat
 import pytest
-from nbclient import NotebookClient
+
+if TYPE_CHECKING:
+    import nbformat
 
 NOTEBOOKS = Path(__file__).parents[2] / "notebooks"
 ALL = sorted(NOTEBOOKS.glob("*.ipynb"))
@@ -28,6 +30,8 @@ SOLUTION = re.compile(r"<details>.*?```python\n(.*?)```\n</details>", re.DOTALL)
 
 
 def read(path: Path) -> nbformat.NotebookNode:
+    import nbformat  # Takes 2 s, which other workers need not wait for.
+
     return nbformat.read(path, as_version=4)
 
 
@@ -49,6 +53,8 @@ def solutions(path: Path) -> list[str]:
 
 def with_solved_exercises(path: Path) -> nbformat.NotebookNode:
     """Returns a lesson in which every exercise is followed by the same with its folded solution in place."""
+    import nbformat
+
     notebook, pending = read(path), iter(solutions(path))
     cells: list[nbformat.NotebookNode] = []
     for cell in notebook.cells:
@@ -61,6 +67,8 @@ def with_solved_exercises(path: Path) -> nbformat.NotebookNode:
 
 @cache
 def run_lesson(path: Path) -> nbformat.NotebookNode:
+    from nbclient import NotebookClient
+
     environment = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")}
     resources = {"metadata": {"path": str(path.parent)}}
     return NotebookClient(with_solved_exercises(path), timeout=60, resources=resources).execute(env=environment)
@@ -93,6 +101,8 @@ def test_there_are_eleven_lessons_in_two_languages() -> None:
 
 @pytest.mark.parametrize("path", ALL, ids=lambda path: path.stem)
 def test_a_lesson_is_committed_without_output(path: Path) -> None:
+    import nbformat
+
     notebook = read(path)
     nbformat.validate(notebook)
     assert set(notebook.metadata) == {"kernelspec", "language_info"}

@@ -17,6 +17,7 @@ from rcilab.controller.cycle import ControlCycle
 from rcilab.controller.plants import build_plant
 from rcilab.controller.server import ControllerServer
 from rcilab.model import load_model
+from rcilab.one_core import one_core
 from tests.peers.robot import PATIENCE, Robot
 
 PLANTS = ("ideal", "mujoco")
@@ -68,7 +69,8 @@ def arena(**options: Any) -> Iterator[Arena]:
     found = Arena(**options)
     found.thread.start()
     try:
-        yield found
+        with one_core(found.thread.native_id if found.server.config.lockstep else None):
+            yield found
     finally:
         found.server.request_stop()
         found.thread.join(PATIENCE)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import threading
 import time
 
@@ -172,6 +173,19 @@ def test_motor_power_is_needed_and_the_message_says_so(robot):
 def test_the_arm_at_the_other_end_is_recognised_and_a_second_client_is_not(robot):
     with pytest.raises(ConnectionLostError, match="another client"):
         connect(robot.address, timeout=1.0)
+
+
+def test_in_lock_step_both_ends_share_a_core_while_a_motion_runs(robot):
+    before = os.sched_getaffinity(0)
+    seen = []
+
+    def callback(state, t):
+        seen.append(os.sched_getaffinity(0))
+        return JointPosition(state.q_c, finished=t >= 0.005)
+
+    robot.control(callback)
+    assert {len(cores) for cores in seen} == {1}
+    assert os.sched_getaffinity(0) == before
 
 
 @pytest.mark.parametrize("name", ["xMate3", "xMatePro3", "xMate7"])
