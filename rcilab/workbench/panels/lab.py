@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from rcilab.protocols.world import DIRECTIONS
+from rcilab.words.errors import tell_note
 from rcilab.workbench import requests
 from rcilab.workbench.run.driving import NETWORK_LAB, is_ours
 from rcilab.workbench.text import Text
@@ -95,7 +96,7 @@ def noticed_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
         ("controller_faults", faults),
     ]
     if world is not None and world.reason and status.faults:
-        rows.append(("controller_reason", text.units.restate(world.reason)))
+        rows.append(("controller_reason", text.tell(tell_note(world.reason))))
     body = "".join(f"<tr><th>{esc(text(f'network.{name}'))}</th><td>{esc(value)}</td></tr>" for name, value in rows)
     return f'<table class="rl-table rl-facts-table">{body}</table>'
 

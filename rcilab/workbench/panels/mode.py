@@ -11,7 +11,7 @@ from rcilab.workbench import requests
 from rcilab.workbench.panels.jog import problems_html
 from rcilab.workbench.run.driving import is_pending
 from rcilab.workbench.run.readiness import is_moving
-from rcilab.workbench.text import Text
+from rcilab.workbench.text import Text, message
 from rcilab.workbench.widgets import Ask, Html, Linked, NumberField, esc, on_press
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ class ModePanel:
 def held_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
     """Returns what the controller has of the parameters of this mode: as it acknowledged them."""
     if state.drive.refusal is not None:
-        why = text("ready.control_refused", error=text.say(state.drive.refusal))
+        why = text.say(message("ready.control_refused", error=state.drive.refusal))
         return f'<p class="rl-problem" role="alert">{esc(why)}</p>'
     own = standard_control(state.model.limits) if state.target == "virtual" else ControlSettings()
     rows = "".join(
