@@ -137,7 +137,7 @@ class Text:
 
     @staticmethod
     def _embedded(entry: str, values: Mapping[str, object]) -> Mapping[str, object]:
-        """Returns values as they stand in an entry: a finished sentence gives up its full stop where another follows."""
+        """Returns values as an entry takes them: a finished sentence gives up its full stop where another follows."""
         ends = {name: value for name, value in values.items() if isinstance(value, str) and value[-1:] in _STOPS}
         followed = {name: value for name, value in ends.items() if any(f"{{{name}}}{stop}" in entry for stop in _STOPS)}
         return {**values, **{name: value[:-1] for name, value in followed.items()}} if followed else values

@@ -28,7 +28,7 @@ class ModePanel:
     def build(self, gui: Any, state: UiState) -> None:
         """Adds the controls."""
         text, ask = self._text, self._ask
-        with gui.add_folder(text("mode.title")):
+        with gui.add_folder(text("mode.title"), expand_by_default=False):
             names: dict[str, Mode] = {text(f"mode.{mode}"): mode for mode in MODES}
             self._names = {mode: label for label, mode in names.items()}
             mode = gui.add_dropdown(
@@ -49,7 +49,7 @@ class ModePanel:
                 self._fields[part] = [self._build_field(gui, part, place) for place in range(len(ranges))]
                 self._problems[part] = Html(gui)
             self._folders[part] = folder
-        with gui.add_folder(text("control.title")):
+        with gui.add_folder(text("control.title"), expand_by_default=False):
             self._held = Html(gui)
             self._send = gui.add_button(text("control.send"), icon="send", color="blue", hint=text("control.send_hint"))
             on_press(self._send, ask, lambda page: requests.PressControl(page=page, what="send"))
