@@ -154,14 +154,14 @@ def _placed(error: InvalidValueError, name: str, node: Node, prefix: str = "", n
     value = Words("nothing") if error.value is None else error.value
     placed = InvalidValueError(f"{name}, line {node.line}, {prefix}{error.name}", value, error.requirement)
     reason = error if error.code else error.requirement
-    facts: dict[str, object] = {"file": name, "line": node.line, "key": error.name, "value": _shown(value)}
+    facts: dict[str, object] = {"file": name, "line": node.line, "key": error.name, "value": _shown(error.value)}
     if number:
         return placed.coded("file_waypoint", number=number, reason=reason, **facts)
     return placed.coded("file_value", reason=reason, **facts)
 
 
 def _shown(value: object) -> str:
-    text = str(value)
+    text = "" if value is None else str(value)
     return text if len(text) <= _SHOWN else text[: _SHOWN - 1] + "…"
 
 
