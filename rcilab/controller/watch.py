@@ -23,6 +23,8 @@ YIELDING_ALLOWANCE = 8.0
 """How much more acceleration than under the position servo a yielding arm may have. A choice: the light last joints of
 an arm that is pushed with 30 N, or told a torque of a few N m, are thrown harder than any command could ask for."""
 
+_NO_REASON = Remark("")
+
 
 class Watch:
     """Follows the measured arm. Owned by the controller's cycle.
@@ -105,7 +107,7 @@ class Watch:
         if collision is not None:
             faults = (*faults, Fault.COLLISION)
             reasons.append(collision)
-        return faults, Remark.all(reasons)
+        return faults, Remark.all(reasons) if reasons else _NO_REASON
 
     def find_collision(self, thresholds: Sequence[float]) -> Remark | None:
         """Returns which outside torque is above its threshold, in words, or None."""

@@ -55,7 +55,7 @@ class Remark(str):
         """Returns several in one line."""
         told = list(remarks)
         if len(told) < 2:
-            return cls() if not told else told[0] if isinstance(told[0], Remark) else cls(told[0])
+            return cls("") if not told else told[0] if isinstance(told[0], Remark) else cls(told[0])
         rest = cls.all(told[1:])
         return cls(f"{told[0]}; {rest}", "both", first=told[0], second=rest)
 

@@ -36,6 +36,18 @@ class ModePanel:
             )
             self._mode = Linked(mode, ask, lambda v, p: requests.SetDrive(page=p, mode=names.get(v)))
             self._note = Html(gui)
+            self._build_parts(gui, state)
+            with gui.add_folder(text("control.title"), expand_by_default=False):
+                self._held = Html(gui)
+                send = gui.add_button(text("control.send"), icon="send", color="blue", hint=text("control.send_hint"))
+                on_press(send, ask, lambda page: requests.PressControl(page=page, what="send"))
+                self._send = send
+                reset = gui.add_button(
+                    text("control.reset"), icon="restore", color="gray", hint=text("control.reset_hint")
+                )
+                on_press(reset, ask, lambda page: requests.PressControl(page=page, what="reset"))
+
+    def _build_parts(self, gui: Any, state: UiState) -> None:
         self._folders: dict[ControlPart, Any] = {}
         self._fields: dict[ControlPart, list[NumberField]] = {}
         self._labels: dict[str, str] = {}
@@ -43,18 +55,12 @@ class ModePanel:
         for part, ranges in control_ranges(state.model.limits).items():
             visible = part in PARTS_OF_MODE[state.drive.mode]
             closed = part not in ("joint_stiffness", "cartesian_stiffness")
-            folder = gui.add_folder(name_part(text, part, ranges), visible=visible, expand_by_default=not closed)
+            folder = gui.add_folder(name_part(self._text, part, ranges), visible=visible, expand_by_default=not closed)
             with folder:
                 gui.add_html('<i class="rl-pairs"></i>')
                 self._fields[part] = [self._build_field(gui, part, place) for place in range(len(ranges))]
                 self._problems[part] = Html(gui)
             self._folders[part] = folder
-        with gui.add_folder(text("control.title"), expand_by_default=False):
-            self._held = Html(gui)
-            self._send = gui.add_button(text("control.send"), icon="send", color="blue", hint=text("control.send_hint"))
-            on_press(self._send, ask, lambda page: requests.PressControl(page=page, what="send"))
-            reset = gui.add_button(text("control.reset"), icon="restore", color="gray", hint=text("control.reset_hint"))
-            on_press(reset, ask, lambda page: requests.PressControl(page=page, what="reset"))
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows mode and parameters."""
