@@ -37,7 +37,11 @@ def test_a_run_is_shown_against_its_plan_and_downloaded(page, tmp_path):
 def test_a_long_export_is_cancelled_and_the_next_one_comes(page, tmp_path):
     page.bench.store.update(last_run=whole_recording(some_long_run()))
     downloads: list[object] = []
-    page.tab.on("download", downloads.append)
+
+    def note(download) -> None:
+        downloads.append(download)
+
+    page.tab.on("download", note)
     page.open_tab("Run")
     page.unfold("Recording")
     page.wait(lambda: page.button("CSV").is_enabled(), "exports to be pressable")
@@ -53,7 +57,7 @@ def test_a_long_export_is_cancelled_and_the_next_one_comes(page, tmp_path):
         page.button("CSV").click()
     coming.value.save_as(tmp_path / "run.csv")
     assert len((tmp_path / "run.csv").read_text().splitlines()) == 1 + len(some_run().t)
-    page.tab.remove_listener("download", downloads.append)
+    page.tab.remove_listener("download", note)
     page.bench.store.update(last_run=None)
 
 

@@ -130,9 +130,10 @@ def decode_world_answer(line: bytes) -> tuple[int, WorldAnswer]:
 
 
 def _refused(content: dict[str, Any]) -> Refused:
-    code, facts = content.get("code"), content.get("facts")
-    is_coded = isinstance(code, str) and isinstance(facts, dict)
-    return Refused(str(content.get("error", "")), *((code, facts) if is_coded else ()))
+    reason, code, facts = str(content.get("error", "")), content.get("code"), content.get("facts")
+    if isinstance(code, str) and isinstance(facts, dict):
+        return Refused(reason, code, cast("dict[str, object]", facts))
+    return Refused(reason)
 
 
 def _encode(content: dict[str, Any]) -> bytes:
