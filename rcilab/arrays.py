@@ -72,7 +72,7 @@ def as_number(value: object, name: str, unit: str = "") -> float:
             return float(value)  # type: ignore[arg-type]  # Whatever has no float is refused below.
         except (TypeError, ValueError, OverflowError):
             pass
-    raise InvalidValueError(name, described(value), f"is not a number{_in(unit)}")
+    raise InvalidValueError(name, described(value), f"is not a number{_in(unit)}").coded("no_number")
 
 
 def as_vector(value: ArrayLike, size: int, name: str, unit: str = "") -> Array:
@@ -90,11 +90,14 @@ def as_vector(value: ArrayLike, size: int, name: str, unit: str = "") -> Array:
     try:
         array = np.array(value, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise InvalidValueError(name, value, f"is not {size} numbers{_in(unit)}") from error
+        raise InvalidValueError(name, value, f"is not {size} numbers{_in(unit)}").coded(
+            "numbers", count=size
+        ) from error
     if array.shape != (size,):
-        raise InvalidValueError(name, value, f"has shape {array.shape}, needs ({size},){_in(unit)}")
+        problem = f"has shape {array.shape}, needs ({size},){_in(unit)}"
+        raise InvalidValueError(name, value, problem).coded("numbers", count=size)
     if not np.isfinite(array).all():
-        raise InvalidValueError(name, value, f"must be finite in every element{_in(unit)}")
+        raise InvalidValueError(name, value, f"must be finite in every element{_in(unit)}").coded("not_finite")
     array.flags.writeable = False
     return array
 
@@ -122,7 +125,7 @@ def as_path(value: ArrayLike, columns: int | None, name: str, unit: str = "") ->
     if not np.isfinite(array).all():
         row, column = (int(i) for i in np.argwhere(~np.isfinite(array))[0])
         where = f"{name} at row {row} (from 0), joint {column + 1}"
-        raise InvalidValueError(where, float(array[row, column]), f"must be finite{_in(unit)}")
+        raise InvalidValueError(where, float(array[row, column]), f"must be finite{_in(unit)}").coded("not_finite")
     array.flags.writeable = False
     return array
 

@@ -160,7 +160,9 @@ def save_cycles(cycles: NDArray[np.void], file: str | PathLike[str]) -> None:
     try:
         _WRITERS[path.suffix](cycles, path)
     except OSError as error:
-        raise InvalidValueError("file", fspath(file), f"cannot be written: {error.strerror}") from error
+        raise InvalidValueError("file", fspath(file), f"cannot be written: {error.strerror}").coded(
+            "file_unwritable", file=fspath(file)
+        ) from error
 
 
 def write_npz(cycles: NDArray[np.void], stream: IO[bytes]) -> None:

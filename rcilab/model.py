@@ -95,7 +95,10 @@ class RobotModel(ReachingArm):
             )
         if load.mass > description.rated_payload:
             bound = f"{description.rated_payload:g} kg for {description.name}"
-            raise InvalidValueError("load mass", load.mass, f"kg is above {bound}, the payload it is rated for")
+            problem = f"kg is above {bound}, the payload it is rated for"
+            raise InvalidValueError("load mass", load.mass, problem).coded(
+                "load_heavy", mass=f"{load.mass:g}", most=f"{description.rated_payload:g}", model=description.name
+            )
         self.load = load
 
     @property

@@ -61,11 +61,11 @@ def require_same_arm(dh: Sequence[float], name: str, lengths: Lengths, address: 
         raise ModelError(
             f"the controller at {address} moves an arm of {axes} axes with the DH lengths d {_in_mm(served)} mm, you "
             f"gave {name} ({len(lengths)} axes, {_in_mm(lengths)} mm); load the model of the arm that is there"
-        )
+        ).coded("unknown_arm", address=address, count=axes, ours=name)
     raise ModelError(
         f"the controller at {address} is an {found} ({axes} axes), you gave {name} ({len(lengths)}); "
         f"leave model out, or load_model({found!r})"
-    )
+    ).coded("other_arm", address=address, theirs=found, ours=name)
 
 
 def dh_lengths(dh: Sequence[DhRow]) -> list[tuple[float, float]]:

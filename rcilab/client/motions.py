@@ -117,7 +117,7 @@ class Motions(RciCommands):
         from rcilab.conformance.pacing import plan_pace
 
         if self._paced is None:
-            raise UsageError("no motion of execute() runs whose pace could change")
+            raise UsageError("no motion of execute() runs whose pace could change").coded("no_pace")
         paced, stream, mode = self._paced
         for lead in PACE_LEADS:
             changed = plan_pace(paced, stream.cycle + lead, pace, self.model, mode)
@@ -125,7 +125,9 @@ class Motions(RciCommands):
             if stream.switch(first, changed.q[first:], holds=changed.holds):
                 self._paced = changed, stream, mode
                 return
-        raise UsageError("this machine is too busy to change the pace of the motion in time; it goes on as it is")
+        raise UsageError(
+            "this machine is too busy to change the pace of the motion in time; it goes on as it is"
+        ).coded("too_busy")
 
     def control(
         self,

@@ -356,9 +356,10 @@ class RobotSession(Motions, Closing):
 
     def _require_free(self, what: str) -> None:
         if self._closing:
-            raise UsageError("this session is closed; connect again")
+            raise UsageError("this session is closed; connect again").coded("session_closed")
         if self._moving:
-            raise UsageError(f"a motion is running already: no {what} meanwhile; let it end, or stop() it first")
+            said = f"a motion is running already: no {what} meanwhile; let it end, or stop() it first"
+            raise UsageError(said).coded("moving")
 
     def _disconnect(self) -> None:
         if not self._closed:

@@ -197,7 +197,7 @@ class World(Closing):
                     f"{self} does not answer {request.name} ({error}); look whether the virtual controller still runs"
                 ).coded("world_silent") from error
         if isinstance(answer, Refused):
-            raise UsageError(answer.reason)
+            raise UsageError(answer.reason).coded(answer.code, **answer.facts)
         return answer
 
     def _connect(self) -> socket.socket:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from rcilab.conformance.condition import Condition
 from rcilab.faults import Fault
+from rcilab.words.text import Remark
 
 if TYPE_CHECKING:
     from rcilab.kinematics.collision import LinkPair
@@ -39,10 +40,25 @@ class Breach(NamedTuple):
             return f"{row.place(0)}: it is flipped to the other side than at the start"
         return f"{row.place(self.axis)}: {row.quantity} {self.value:.6g} {row.unit} passes {self.bound:.6g} {row.unit}"
 
+    @property
+    def remark(self) -> Remark:
+        """The same for faces, which have words of their own for it."""
+        row = self.condition
+        if row.is_clearance:
+            return Remark(self.text)
+        if row.signal == "position":
+            return Remark(self.text, "outside_box", condition=row.id, away=f"{1e3 * self.value:.4g}")
+        if row.signal in ("frame", "elbow_sign"):
+            return Remark(self.text, "broken", condition=row.id)
+        amounts = {"value": f"{self.value:.6g} {row.unit}", "bound": f"{self.bound:.6g} {row.unit}"}
+        if self.axis and row.is_per_joint:
+            return Remark(self.text, "joint_passes", condition=row.id, joint=self.axis, **amounts)
+        return Remark(self.text, "passes", condition=row.id, **amounts)
 
-def describe_breaches(breaches: Iterable[Breach]) -> str:
+
+def describe_breaches(breaches: Iterable[Breach]) -> Remark:
     """Returns all of them in one line."""
-    return "; ".join(breach.text for breach in breaches)
+    return Remark.all(breach.remark for breach in breaches)
 
 
 def faults_of(breaches: Iterable[Breach]) -> tuple[Fault, ...]:

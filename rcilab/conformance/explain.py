@@ -215,6 +215,19 @@ def explain_source(row: Condition, language: Language = "en") -> str:
     return load_catalogue(language).get(f"source.{row.source}", row.source)
 
 
+def explain_limit(source: str, language: Language = "en") -> str:
+    """Returns where a limit was taken from; sources without other words keep their English ones.
+
+    Args:
+        source: From `Limits.source`.
+        language: Which.
+
+    Raises:
+        InvalidValueError: There is no such language.
+    """
+    return load_catalogue(language).get(f"limit.{source}", source)
+
+
 def _link(number: int, voice: _Voice) -> str:
     from rcilab.kinematics.collision import FLOOR, TOOL
 

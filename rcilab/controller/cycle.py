@@ -31,6 +31,7 @@ from rcilab.faults import Fault
 from rcilab.model import RobotModel
 from rcilab.protocols import rci
 from rcilab.state import ControllerMode, MotionGeneratorMode, RobotState
+from rcilab.words.text import Remark
 
 MODE_DELAY = 200  # [cycles] After StartMove; by then the vendor client's buffer is full of idle states, which it skips.
 PREFILL = 10  # [cycles] Pauses of client and network that a motion survives unharmed, and its delay. Both ends on one
@@ -39,6 +40,10 @@ TORQUE_PREFILL = 2  # [cycles] The same for torques, where the client closes the
 LOST_LIMIT = 20  # [cycles] Lost commands in a row that are an instability (manual 4.6: usually 10 to 20).
 RECOVERY_TIME = 50  # [cycles] How long an error recovery takes at least; a choice.
 DRAIN_LIMIT = 300  # [cycles] How long queued commands are played after StopMove; longer than any queue.
+_PRESSED = {
+    rci.SafetyStop.ESTOP: Remark("an emergency stop was pressed", "estop"),
+    rci.SafetyStop.GSTOP: Remark("the safety gate was opened", "gstop"),
+}
 _IDLE_MODES = (ControllerMode.OTHER, MotionGeneratorMode.IDLE)
 _REPORTED = (
     rci.CommandCode.SET_COOR,
@@ -93,7 +98,7 @@ class ControlCycle:
         self.safety_stop: rci.SafetyStop = rci.SafetyStop.NONE
         self.phase = Phase.OFF
         self.faults: tuple[Fault, ...] = ()
-        self.reason = ""
+        self.reason = Remark("")
         self.ignored = 0
         self._mode_delay = mode_delay
         self._recovery_time = recovery_time
@@ -227,10 +232,7 @@ class ControlCycle:
         if kind is not self.safety_stop:
             self.safety_stop = kind
             if kind is not rci.SafetyStop.NONE:
-                cause = (
-                    "an emergency stop was pressed" if kind is rci.SafetyStop.ESTOP else "the safety gate was opened"
-                )
-                self.reason = cause
+                self.reason = _PRESSED[kind]
             event = Event.SAFETY_RELEASE if kind is rci.SafetyStop.NONE else Event.SAFETY_STOP
             self.happen(event, Fault.INSTABILITY_DETECTION)
 
@@ -269,7 +271,7 @@ class ControlCycle:
         if self._countdown == 0 and self.phase is Phase.RECOVERING and self._arm.commanded.is_at_rest:
             self.happen(Event.RECOVERED)
 
-    def _raise(self, faults: tuple[Fault, ...], reason: str) -> None:
+    def _raise(self, faults: tuple[Fault, ...], reason: Remark) -> None:
         self.reason = reason
         self.happen(Event.FAULT, *faults)
 
@@ -294,7 +296,10 @@ class ControlCycle:
         """Raises the instability of too many lost commands in a row."""
         lost = self.playout.lost_in_row
         if playback.is_lost and self.lost_limit is not None and lost >= self.lost_limit:
-            return Step(faults=(Fault.INSTABILITY_DETECTION,), reason=f"{lost} commands in a row were lost")
+            return Step(
+                faults=(Fault.INSTABILITY_DETECTION,),
+                reason=Remark(f"{lost} commands in a row were lost", "lost_in_row", count=lost),
+            )
         return step
 
     def _current_law(self) -> Law:

@@ -66,21 +66,23 @@ class IdealPlant:
 
     def place_box(self, name: str, size: ArrayLike, pose: Pose) -> None:
         """Refuses: nothing is solid here."""
-        raise UsageError(f"box {name!r}: the ideal plant knows no contact; use plant='mujoco'")
+        raise UsageError(f"box {name!r}: the ideal plant knows no contact; use plant='mujoco'").coded("no_contact")
 
     def remove_box(self, name: str) -> None:
         """Refuses: nothing is solid here."""
-        raise UsageError(f"box {name!r}: the ideal plant knows no contact and has no boxes; use plant='mujoco'")
+        raise UsageError(f"box {name!r}: the ideal plant knows no contact and has no boxes; use plant='mujoco'").coded(
+            "no_contact"
+        )
 
     def set_floor(self, on: bool) -> None:
         """Refuses a floor; to have none is granted."""
         if on:
-            raise UsageError("floor: the ideal plant knows no contact; use plant='mujoco'")
+            raise UsageError("floor: the ideal plant knows no contact; use plant='mujoco'").coded("no_contact")
 
     def set_walls(self, box: SafetyBox | None) -> None:
         """Refuses walls; to have none is granted."""
         if box is not None:
-            raise UsageError("walls: the ideal plant knows no contact; use plant='mujoco'")
+            raise UsageError("walls: the ideal plant knows no contact; use plant='mujoco'").coded("no_contact")
 
     def step(self, setpoint: Setpoint) -> Measurement:
         """Lives through one millisecond."""

@@ -59,9 +59,10 @@ class Obstacles:
         """Puts a box somewhere, or moves it; see `Plant.place_box`."""
         x, y, z = as_vector(size, 3, "box size", "m").tolist()
         if min(x, y, z) <= 0.0:
-            raise InvalidValueError("box size", [x, y, z], "must be three lengths above 0 [m]")
+            raise InvalidValueError("box size", [x, y, z], "must be three lengths above 0 [m]").coded("box_size")
         if name not in self._boxes and len(self._boxes) == MOST_BOXES:
-            raise InvalidValueError("box", name, f"would be one too many; {MOST_BOXES} can be there, remove another")
+            problem = f"would be one too many; {MOST_BOXES} can be there, remove another"
+            raise InvalidValueError("box", name, problem).coded("box_many", name=name, most=MOST_BOXES)
         self._boxes[name] = (x, y, z, pose)
         self._apply()
 
@@ -69,7 +70,7 @@ class Obstacles:
         """Takes a box away; see `Plant.remove_box`."""
         if name not in self._boxes:
             known = ", ".join(self._boxes) or "none"
-            raise InvalidValueError("box", name, f"is not there; there are: {known}")
+            raise InvalidValueError("box", name, f"is not there; there are: {known}").coded("box_unknown", name=name)
         del self._boxes[name]
         self._apply()
 

@@ -54,6 +54,7 @@ from rcilab.protocols.rci import (
     encode_state,
 )
 from rcilab.realtime import enter_realtime, leave_realtime
+from rcilab.words.text import Remark
 
 PRIORITY = 80  # Under SCHED_FIFO; above the client's process, whose clock this is.
 LEAD_TIME = 0.0005  # [s] Before its state is due a cycle begins: longer than nearly all of them take; a choice.
@@ -217,7 +218,7 @@ class ControllerServer:
         if self.cycle.phase is not Phase.MOVING:
             self.cycle.happen(Event.CLIENT_LOST)
             return 0
-        self.cycle.reason = "the controller was told to end"
+        self.cycle.reason = Remark("the controller was told to end", "told_to_end")
         self._log("told to end in mid-motion: the arm comes to rest, and the error bit tells the client")
         self.cycle.happen(Event.FAULT, Fault.INSTABILITY_DETECTION)
         return FAREWELL

@@ -92,7 +92,8 @@ class Surroundings:
         try:
             self._change(request)
         except RcilabError as error:
-            return Refused(str(error))
+            facts = {name: fact if isinstance(fact, int | float) else str(fact) for name, fact in error.facts.items()}
+            return Refused(str(error), error.code, facts)
         return Done()
 
     def step(self) -> None:

@@ -17,10 +17,13 @@ from rcilab.faults import Fault
 from rcilab.limits import Limits
 from rcilab.model import RobotModel
 from rcilab.safety_box import SafetyBox
+from rcilab.words.text import Remark
 
 YIELDING_ALLOWANCE = 8.0
 """How much more acceleration than under the position servo a yielding arm may have. A choice: the light last joints of
 an arm that is pushed with 30 N, or told a torque of a few N m, are thrown harder than any command could ask for."""
+
+_NO_REASON = Remark("")
 
 
 class Watch:
@@ -89,7 +92,7 @@ class Watch:
                 self.tool.observe(q, self._model.rigid_body.tool_terms(measured.q, measured.dq))
         self.tau_ext, self.wrench = self._observer.step(measured)
 
-    def judge(self, *, is_commanded: bool = True) -> tuple[tuple[Fault, ...], str]:
+    def judge(self, *, is_commanded: bool = True) -> tuple[tuple[Fault, ...], Remark]:
         """Returns the faults that the measurement of this cycle raises, in wire order, and why.
 
         Args:
@@ -104,16 +107,17 @@ class Watch:
         if collision is not None:
             faults = (*faults, Fault.COLLISION)
             reasons.append(collision)
-        return faults, "; ".join(reasons)
+        return faults, Remark.all(reasons) if reasons else _NO_REASON
 
-    def find_collision(self, thresholds: Sequence[float]) -> str | None:
+    def find_collision(self, thresholds: Sequence[float]) -> Remark | None:
         """Returns which outside torque is above its threshold, in words, or None."""
         torques: list[float] = self.tau_ext.tolist()
         if not any(map(gt, map(abs, torques), thresholds)):
             return None
         joint = next(i for i, torque in enumerate(torques) if abs(torque) > thresholds[i])
         torque, threshold = torques[joint], thresholds[joint]
-        return f"joint {joint + 1}: external torque {torque:.3g} N m is above its threshold {threshold:g} N m"
+        said = f"joint {joint + 1}: external torque {torque:.3g} N m is above its threshold {threshold:g} N m"
+        return Remark(said, "collision", joint=joint + 1, value=f"{torque:.3g} N m", bound=f"{threshold:g} N m")
 
 
 def _widened(limits: Limits) -> Limits:

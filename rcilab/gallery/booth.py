@@ -70,7 +70,8 @@ class Booth(Closing):
         """
         recipe = FAULTS[find_fault(fault)]
         if recipe.needs_elbow and self.model.n != 7:
-            raise UsageError(f"{recipe.fault.manual_name} takes an arm of 7 axes; {self.model.name} has no elbow angle")
+            said = f"{recipe.fault.manual_name} takes an arm of 7 axes; {self.model.name} has no elbow angle"
+            raise UsageError(said).coded("no_psi")
         try:
             return self._provoke(recipe, progress)
         except BaseException:

@@ -11,6 +11,7 @@ import numpy as np
 
 from rcilab.arrays import Array
 from rcilab.conformance.explain import explain_source
+from rcilab.words.errors import tell_note
 from rcilab.words.shown import unit_name, with_unit
 
 if TYPE_CHECKING:
@@ -58,7 +59,7 @@ def body_html(exhibit: Exhibit, text: Text) -> str:
         ("learn.condition", f"{escape(row.formula)}<br><span class='rl-dim'>{escape(source)}</span>"),
         ("learn.manual", escape(text("learn.section", section=exhibit.section, number=exhibit.fault.value))),
         ("learn.way_out", f'<ol class="rl-steps-out">{steps}</ol>{executed}'),
-        ("learn.said", f"<code>{escape(restate(exhibit.said))}</code>"),
+        ("learn.said", f"<code>{escape(text.tell(tell_note(exhibit.said)))}</code>"),
     )
     table = "".join(f"<tr><th>{escape(text(key))}</th><td>{cell}</td></tr>" for key, cell in rows)
     return f'<div class="rl-legend">{legend}</div><table class="rl-table rl-facts-table rl-exhibit">{table}</table>'

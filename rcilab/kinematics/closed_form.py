@@ -178,15 +178,15 @@ class SphericalSix(SphericalSeven):
 
     def arm_angle(self, q: Sequence[float]) -> float:
         """Raises KinematicsError: there is none."""
-        raise KinematicsError("an arm with 6 axes has no arm angle")
+        raise KinematicsError("an arm with 6 axes has no arm angle").coded("no_psi")
 
     def arm_angle_path(self, q: JointPath) -> Array:
         """Raises KinematicsError: there are none."""
-        raise KinematicsError("an arm with 6 axes has no arm angle")
+        raise KinematicsError("an arm with 6 axes has no arm angle").coded("no_psi")
 
     def arcs(self, T_base_flange: Pose, lower: Array, upper: Array, outside_box: bool) -> FeasibleArcs:
         """Raises KinematicsError: there are none."""
-        raise KinematicsError("an arm with 6 axes has no arm angle")
+        raise KinematicsError("an arm with 6 axes has no arm angle").coded("no_psi")
 
 
 class OffsetSeven:

@@ -78,13 +78,17 @@ def elbow_circle(shoulder: Array, elbow: Array, wrist: Array) -> ElbowCircle:
     line = wrist - shoulder
     length = float(np.linalg.norm(line))
     if length < _LEAST:
-        raise SingularError("elbow circle: the wrist is on the shoulder, so there is no shoulder-wrist line")
+        raise SingularError("elbow circle: the wrist is on the shoulder, so there is no shoulder-wrist line").coded(
+            "no_arm_angle"
+        )
     axis = line / length
     upward, across = reference_frame((float(axis[0]), float(axis[1]), float(axis[2])))
     center = shoulder + axis * float(axis @ (elbow - shoulder))
     radius = float(np.linalg.norm(elbow - center))
     if radius < _LEAST:
-        raise SingularError("elbow circle: the arm is stretched, the elbow is on the shoulder-wrist line")
+        raise SingularError("elbow circle: the arm is stretched, the elbow is on the shoulder-wrist line").coded(
+            "stretched"
+        )
     return ElbowCircle(
         center=frozen(center), radius=radius, axis=frozen(axis), upward=frozen(upward), across=frozen(across)
     )

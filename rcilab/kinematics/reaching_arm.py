@@ -67,7 +67,8 @@ class ReachingArm(MovingArm):
             raise InvalidValueError("psi", psi, "must be finite, [rad]")
         if psi is not None and self.n != 7:
             name = self.description.name
-            raise InvalidValueError("psi", psi, f"has no meaning for {name}: a 6-axis arm has no arm angle")
+            problem = f"has no meaning for {name}: a 6-axis arm has no arm angle"
+            raise InvalidValueError("psi", psi, problem).coded("six_axes", model=name)
         return self._search.solve(self._flange(pose), psi, guess)
 
     def closest(self, T: Pose | ArrayLike, near: ArrayLike, psi: float | None = None) -> Reach:
@@ -169,4 +170,6 @@ class ReachingArm(MovingArm):
 
     def _require_arm_angle(self) -> None:
         if self.n != 7:
-            raise KinematicsError(f"{self.description.name} has 6 axes: only a 7-axis arm has an arm angle")
+            raise KinematicsError(f"{self.description.name} has 6 axes: only a 7-axis arm has an arm angle").coded(
+                "no_psi"
+            )

@@ -79,7 +79,9 @@ def plan_along(model: RobotModel, q: JointVector, path: Path, speed: float) -> M
     """
     speed = as_number(speed, "speed")
     if not MIN_SPEED <= speed <= 1.0:
-        raise InvalidValueError("speed", speed, f"must be from {MIN_SPEED:g} to 1: the part of the limits to use")
+        raise InvalidValueError(
+            "speed", speed, f"must be from {MIN_SPEED:g} to 1: the part of the limits to use"
+        ).coded("span", low=f"{MIN_SPEED:g}", high="1")
     if path.distance == 0.0:
         return standing(q, speed=speed)
     bounds = _bounds(model, LIMIT_MARGIN * speed)

@@ -242,7 +242,8 @@ def arm_angles(
     """
     if model.n != 7:
         if psi is not None:
-            raise InvalidValueError("psi", psi, f"has no meaning for {model.name}: a 6-axis arm has no arm angle")
+            problem = f"has no meaning for {model.name}: a 6-axis arm has no arm angle"
+            raise InvalidValueError("psi", psi, problem).coded("six_axes", model=model.name)
         return None, None
     try:
         here = model.arm_angle(q)
@@ -251,7 +252,7 @@ def arm_angles(
         raise refused.coded("stretched_start") from error
     wanted = here if psi is None else as_number(psi, "psi", "rad")
     if not abs(wanted) <= math.pi:
-        raise InvalidValueError("psi", psi, "must be from -pi to pi [rad]")
+        raise InvalidValueError("psi", psi, "must be from -pi to pi [rad]").coded("span", low="-pi", high="pi")
     if way is None or psi is None:
         return here, wanted
     shorter = math.remainder(wanted - here, math.tau)

@@ -85,7 +85,9 @@ def plan_joint(
     ddq = as_vector(np.zeros(n) if start_acceleration is None else start_acceleration, n, "start_acceleration")
     speed = as_number(speed, "speed")
     if not MIN_SPEED <= speed <= 1.0:
-        raise InvalidValueError("speed", speed, f"must be from {MIN_SPEED:g} to 1: the part of the limits to use")
+        raise InvalidValueError(
+            "speed", speed, f"must be from {MIN_SPEED:g} to 1: the part of the limits to use"
+        ).coded("span", low=f"{MIN_SPEED:g}", high="1")
     if not isinstance(law, str) or law not in _PLANNERS:
         raise InvalidValueError("law", law, f"is unknown; known: {', '.join(_PLANNERS)}")
     _require_inside("start", start, limits)
@@ -115,7 +117,9 @@ def _plan_s_profile(
 ) -> Motion:
     n = len(start)
     if dq.any() or ddq.any():
-        raise PlanningError("the S profile starts at rest; use law='jerk_limited' to plan from a moving start")
+        raise PlanningError("the S profile starts at rest; use law='jerk_limited' to plan from a moving start").coded(
+            "s_profile_moving"
+        )
     if n not in S_PROFILE_VELOCITY:
         raise PlanningError(
             f"the S profile is defined for arms of 6 or 7 joints, not {n}; use law='jerk_limited'"

@@ -117,7 +117,9 @@ class _Reader:
             key = self._string()
             if key in found:
                 self._at = start
-                raise self._error(f"is there already, in line {found[key].line}; keep one")
+                raise self._error(f"is there already, in line {found[key].line}; keep one").coded(
+                    "file_json_twice", file=self._name, line=self._line(), key=key, first=found[key].line
+                )
             if not self._takes(":"):
                 raise self._error(f"is no colon; one must follow the key {key!r}")
             found[key] = self._value(depth + 1)
@@ -165,4 +167,6 @@ class _Reader:
         shown = word[0] if word else self._text[self._at : self._at + 20].split("\n")[0]
         found = Words(shown[:60]) if shown else Words("the end of the text")
         error = InvalidValueError(f"{self._name}, line {self._line()}", found, problem)
+        if not shown:
+            return error.coded("file_json_end", file=self._name, line=self._line())
         return error.coded("file_json", file=self._name, line=self._line(), found=str(found))

@@ -65,7 +65,9 @@ class Jog:
         acceleration = as_vector(np.zeros(n) if ddq is None else ddq, n, "ddq", "rad/s^2")
         speed = as_number(speed, "speed")
         if not MIN_SPEED <= speed <= 1.0:
-            raise InvalidValueError("speed", speed, f"must be from {MIN_SPEED:g} to 1: the part of the limits to use")
+            raise InvalidValueError(
+                "speed", speed, f"must be from {MIN_SPEED:g} to 1: the part of the limits to use"
+            ).coded("span", low=f"{MIN_SPEED:g}", high="1")
         require_stoppable(limits, start, velocity, acceleration)
         self._lower = (limits.lower + POSITION_MARGIN).tolist()
         self._upper = (limits.upper - POSITION_MARGIN).tolist()

@@ -88,7 +88,9 @@ def require_pace(pace: object) -> float:
     """
     number = as_number(pace, "pace")
     if not SLOWEST_PACE <= number <= 1.0:
-        raise InvalidValueError("pace", pace, f"must be from {SLOWEST_PACE:g} to 1: part of the planned speed")
+        raise InvalidValueError("pace", pace, f"must be from {SLOWEST_PACE:g} to 1: part of the planned speed").coded(
+            "span", low=f"{SLOWEST_PACE:g}", high="1"
+        )
     return number
 
 

@@ -73,19 +73,25 @@ def plan_program(
     if not isinstance(program, Program):
         raise InvalidValueError("program", described(program), "is no Program; Program.load reads one")
     if program.model != model.name:
-        raise InvalidValueError("program", program.model, f"is the arm it is for, not {model.name}; load that model")
+        raise InvalidValueError(
+            "program", program.model, f"is the arm it is for, not {model.name}; load that model"
+        ).coded("program_model", theirs=program.model, ours=model.name)
     speed = as_number(speed, "speed")
     if not 0.0 < speed <= 1.0:
-        raise InvalidValueError("speed", speed, "must be above 0, to 1: a part of the waypoints' speeds")
+        raise InvalidValueError("speed", speed, "must be above 0, to 1: a part of the waypoints' speeds").coded(
+            "span", low="0", high="1"
+        )
     for number, waypoint in enumerate(program.waypoints, 1):
         if speed * waypoint.speed < MIN_SPEED:
             what = f"{label(number, waypoint)}, speed times {speed:g}"
-            raise InvalidValueError(what, speed * waypoint.speed, f"must be at least {MIN_SPEED:g}")
+            raise InvalidValueError(what, speed * waypoint.speed, f"must be at least {MIN_SPEED:g}").coded(
+                "least", least=f"{MIN_SPEED:g}"
+            )
     count = len(program.waypoints)
     if not 1 <= as_number(rounds, "rounds") <= MOST_WAYPOINTS / count or int(rounds) != rounds:
         raise InvalidValueError(
             "rounds", rounds, f"must be whole, 1 to {MOST_WAYPOINTS // count} for {count} waypoints"
-        )
+        ).coded("rounds", most=MOST_WAYPOINTS // count)
     if program.T_flange_tool is not None:
         model = model.with_tool(program.T_flange_tool)
     tell = progress or (lambda part: None)

@@ -87,14 +87,14 @@ class PoseBook:
         """
         name = name.strip()
         if not name or len(name) > LONGEST_NAME or not name.isprintable():
-            raise InvalidValueError(
-                "name", described(name), f"is no name for a pose: 1 to {LONGEST_NAME} printable characters"
-            )
+            problem = f"is no name for a pose: 1 to {LONGEST_NAME} printable characters"
+            raise InvalidValueError("name", described(name), problem).coded("pose_name", most=LONGEST_NAME)
         angles = as_vector(q, self._model.n, "q", "rad")
         content = self._read()
         own = self._own(content)
         if name in own:
-            raise InvalidValueError("name", described(name), "is taken: delete that pose first, or take another name")
+            problem = "is taken: delete that pose first, or take another name"
+            raise InvalidValueError("name", described(name), problem).coded("pose_taken", name=name)
         own[name] = [round(float(angle), 9) for angle in angles]
         self._write(content, own)
         return name

@@ -7,7 +7,7 @@ from os import PathLike
 
 from rcilab.arrays import Words, as_vector, described
 from rcilab.errors import InvalidValueError
-from rcilab.motion.waypoint import Floats, Waypoint, angles_of, label, require_fit, vector_of
+from rcilab.motion.waypoint import Floats, Waypoint, angles_of, named_value, require_fit, vector_of
 from rcilab.robots import describe_robot
 from rcilab.spatial import Pose
 
@@ -36,7 +36,7 @@ class Program:
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name.isprintable():
-            raise InvalidValueError("name", described(self.name), "must be text in one line")
+            raise InvalidValueError("name", described(self.name), "must be text in one line").coded("one_line")
         robot = describe_robot(self.model)
         object.__setattr__(self, "model", robot.name)
         n = len(robot.home)
@@ -52,9 +52,7 @@ class Program:
             try:
                 require_fit(waypoint, n, robot.name)
             except InvalidValueError as error:
-                raise InvalidValueError(
-                    f"{label(number, waypoint)}, {error.name}", error.value, error.requirement
-                ) from error
+                raise named_value(number, waypoint.type, error) from error
         if self.tool is not None:
             tool = as_vector(self.tool, 7, "tool", "position m, wxyz").tolist()
             object.__setattr__(self, "tool", (*vector_of("tool", tool[:3]), *vector_of("wxyz", tool[3:])))

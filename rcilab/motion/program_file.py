@@ -47,7 +47,9 @@ def save_program(program: Program, file: str | PathLike[str]) -> None:
     try:
         Path(file).write_text(program_text(program), encoding="utf-8")
     except OSError as error:
-        raise InvalidValueError("program file", fspath(file), f"cannot be written: {error.strerror}") from error
+        raise InvalidValueError("program file", fspath(file), f"cannot be written: {error.strerror}").coded(
+            "file_unwritable", file=fspath(file)
+        ) from error
 
 
 def load_program(file: str | PathLike[str]) -> Program:
@@ -64,9 +66,11 @@ def load_program(file: str | PathLike[str]) -> Program:
         with path.open("rb") as stream:
             content = stream.read(LONGEST + 1)
     except FileNotFoundError as error:
-        raise InvalidValueError("program file", str(path), "does not exist") from error
+        raise InvalidValueError("program file", str(path), "does not exist").coded("no_file", file=str(path)) from error
     except OSError as error:
-        raise InvalidValueError("program file", str(path), f"cannot be read: {error.strerror}") from error
+        raise InvalidValueError("program file", str(path), f"cannot be read: {error.strerror}").coded(
+            "file_unreadable", file=str(path)
+        ) from error
     return read_program(content, path.name)
 
 
@@ -150,14 +154,14 @@ def _placed(error: InvalidValueError, name: str, node: Node, prefix: str = "", n
     value = Words("nothing") if error.value is None else error.value
     placed = InvalidValueError(f"{name}, line {node.line}, {prefix}{error.name}", value, error.requirement)
     reason = error if error.code else error.requirement
-    facts: dict[str, object] = {"file": name, "line": node.line, "key": error.name, "value": _shown(value)}
+    facts: dict[str, object] = {"file": name, "line": node.line, "key": error.name, "value": _shown(error.value)}
     if number:
         return placed.coded("file_waypoint", number=number, reason=reason, **facts)
     return placed.coded("file_value", reason=reason, **facts)
 
 
 def _shown(value: object) -> str:
-    text = str(value)
+    text = "" if value is None else str(value)
     return text if len(text) <= _SHOWN else text[: _SHOWN - 1] + "…"
 
 

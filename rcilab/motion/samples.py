@@ -46,13 +46,17 @@ def load_samples(file: str | PathLike[str], *, rate_hz: float | None = None, uni
     try:
         content = path.read_bytes()
     except FileNotFoundError as error:
-        raise InvalidValueError("samples", str(path), "does not exist") from error
+        raise InvalidValueError("samples", str(path), "does not exist").coded("no_file", file=str(path)) from error
     except OSError as error:
-        raise InvalidValueError("samples", str(path), f"cannot be read: {error.strerror}") from error
+        raise InvalidValueError("samples", str(path), f"cannot be read: {error.strerror}").coded(
+            "file_unreadable", file=str(path)
+        ) from error
     times, q, place = _READERS[path.suffix.lower()](content, path.name, rate_hz is not None, unit)
     if times is None:
         if rate_hz is None:
-            raise InvalidValueError("samples", path.name, "has no times; pass rate_hz, the samples a second")
+            raise InvalidValueError("samples", path.name, "has no times; pass rate_hz, the samples a second").coded(
+                "table_no_times", file=path.name
+            )
         times = np.arange(len(q)) / rate_hz
     elif rate_hz is not None:
         raise InvalidValueError("rate_hz", rate_hz, f"is not needed: {path.name} has times of its own; leave it out")
@@ -83,18 +87,20 @@ def _by_header(table: Table, header: list[str], name: str, unit: AngleUnit) -> t
         text = title.lower()
         if time := _TIME.fullmatch(text):
             if times is not None:
-                raise InvalidValueError(where, title, "is a second column of times; keep one")
+                raise InvalidValueError(where, title, "is a second column of times; keep one").coded("table_twice")
             times = table.column(i) * _SECONDS[time[1]]
         elif joint := _JOINT.fullmatch(text):
             number = int(joint[1] or joint[2])
             if number in joints:
-                raise InvalidValueError(where, title, f"is a second column for joint {number}; keep one")
+                raise InvalidValueError(where, title, f"is a second column for joint {number}; keep one").coded(
+                    "table_twice"
+                )
             angles = table.column(i)
             joints[number] = np.radians(angles) if (joint[3] or unit) != "rad" else angles
     if sorted(joints) != list(range(1, len(joints) + 1)) or not joints:
         found = ", ".join(str(number) for number in sorted(joints)) or "none"
         needs = f"names the joints {found}; needs q1, q2, ... without a gap (t [s] for the times, q1 [deg] for degrees)"
-        raise InvalidValueError(where, ",".join(header), needs)
+        raise InvalidValueError(where, ",".join(header), needs).coded("table_titles")
     return times, np.stack([joints[number] for number in sorted(joints)], axis=1)
 
 
@@ -120,7 +126,8 @@ def _require_later(times: Array, place: list[str]) -> None:
     late = np.flatnonzero(np.diff(times) <= 0.0)
     if late.size:
         i = int(late[0]) + 1
-        raise InvalidValueError(place[i], float(times[i]), f"s is not later than the sample before, {times[i - 1]:g} s")
+        problem = f"s is not later than the sample before, {times[i - 1]:g} s"
+        raise InvalidValueError(place[i], float(times[i]), problem).coded("table_order", before=f"{times[i - 1]:g}")
 
 
 def _require_angles(q: Array, place: list[str]) -> None:
@@ -128,4 +135,4 @@ def _require_angles(q: Array, place: list[str]) -> None:
     if beyond.size:
         row, joint = (int(i) for i in beyond[0])
         turns = f"rad of joint {joint + 1} is more than two turns; if these are degrees, pass unit='deg'"
-        raise InvalidValueError(place[row], float(q[row, joint]), turns)
+        raise InvalidValueError(place[row], float(q[row, joint]), turns).coded("turns", joint=joint + 1)

@@ -19,7 +19,7 @@ from rcilab.motion.obstacle import examine
 from rcilab.motion.path import Path, build_arc, build_circle, build_line
 from rcilab.motion.program import Program
 from rcilab.motion.s_curve import STANDSTILL_DISTANCE
-from rcilab.motion.waypoint import Waypoint, label
+from rcilab.motion.waypoint import Waypoint, label, named_value
 from rcilab.spatial import Pose
 
 _KNOTS = 100
@@ -109,6 +109,8 @@ def naming(what: str, number: int | None = None, kind: str = "") -> Iterator[Non
     try:
         yield
     except InvalidValueError as error:
+        if number is not None and kind:
+            raise named_value(number, kind, error) from error
         raise InvalidValueError(f"{what}, {error.name}", error.value, error.requirement) from error
     except PlanningError as error:
         raise _named(

@@ -93,9 +93,11 @@ def _read(file: str | PathLike[str] | BinaryIO, name: str) -> dict[str, np.ndarr
         try:
             content = Path(file).read_bytes()
         except FileNotFoundError as error:
-            raise InvalidValueError("motion file", name, "does not exist") from error
+            raise InvalidValueError("motion file", name, "does not exist").coded("no_file", file=name) from error
         except OSError as error:
-            raise InvalidValueError("motion file", name, f"cannot be read: {error.strerror}") from error
+            raise InvalidValueError("motion file", name, f"cannot be read: {error.strerror}").coded(
+                "file_unreadable", file=name
+            ) from error
     else:
         content = file.read()
     if not content:

@@ -41,7 +41,9 @@ class Table:
         for line, row, number in zip(self.lines, self.rows, numbers, strict=True):
             if number is None or not math.isfinite(number):
                 problem = f"in column {index + 1} is no finite number; decimals need a point"
-                raise InvalidValueError(f"{self.name}, line {line}", row[index], problem)
+                raise InvalidValueError(f"{self.name}, line {line}", row[index], problem).coded(
+                    "table_cell", column=index + 1
+                )
         return np.array(numbers, dtype=np.float64)
 
 
@@ -62,11 +64,13 @@ def read_table(content: bytes, name: str) -> Table:
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
         problem = "is no text in UTF-8; save it as CSV"
-        raise InvalidValueError(f"{name}, line {line}", content[error.start : error.end], problem) from error
+        raise InvalidValueError(f"{name}, line {line}", content[error.start : error.end], problem).coded(
+            "table_no_text", file=name, line=line
+        ) from error
     lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip()]
     lines = [(number, line) for number, line in lines if not line.lstrip().startswith("#")]
     if not lines:
-        raise InvalidValueError("samples", name, "holds no rows")
+        raise InvalidValueError("samples", name, "holds no rows").coded("table_empty", file=name)
     mark = next((mark for mark in ";,\t" if mark in lines[0][1]), None)
     rows = [(number, _cells(line, mark)) for number, line in lines]
     header_line, header = 0, None
@@ -74,11 +78,13 @@ def read_table(content: bytes, name: str) -> Table:
         header_line, header = rows[0]
         rows = rows[1:]
         if not rows:
-            raise InvalidValueError("samples", name, "holds no rows below its header")
+            raise InvalidValueError("samples", name, "holds no rows below its header").coded("table_empty", file=name)
     columns = len(header if header is not None else rows[0][1])
     for number, cells in rows:
         if len(cells) != columns:
-            raise InvalidValueError(f"{name}, line {number}", len(cells), f"columns; the first line has {columns}")
+            raise InvalidValueError(
+                f"{name}, line {number}", len(cells), f"columns; the first line has {columns}"
+            ).coded("table_columns", count=columns)
     return Table(name, header, header_line, [cells for _, cells in rows], [number for number, _ in rows])
 
 

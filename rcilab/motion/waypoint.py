@@ -109,8 +109,9 @@ class Waypoint:
         for name in _OPTIONAL:
             value = getattr(self, name)
             if value is not None and name not in allowed:
-                raise InvalidValueError(
-                    name, described(value), f"has no meaning here; {self.type} takes: {', '.join(allowed)}"
+                problem = f"has no meaning here; {self.type} takes: {', '.join(allowed)}"
+                raise InvalidValueError(name, described(value), problem).coded(
+                    "no_meaning", type=self.type, known=", ".join(allowed)
                 )
             if value is None and name in NEEDED[self.type]:
                 missing = InvalidValueError(name, None, f"is missing: {self.type} needs {', '.join(NEEDED[self.type])}")
@@ -200,7 +201,10 @@ class Waypoint:
         """
         for kind in (self.type, type):
             if "q" not in ALLOWED.get(kind, ()):
-                raise InvalidValueError("type", described(kind), "has no target to keep; joint, line and arc have one")
+                error = InvalidValueError(
+                    "type", described(kind), "has no target to keep; joint, line and arc have one"
+                )
+                raise error.coded("no_target")
         point = None if via is None else vector_of("via", via)
         return replace(self, type=type, via=point, via_wxyz=None)
 
@@ -209,16 +213,20 @@ class Waypoint:
             return
         has_pose = self.position is not None or self.wxyz is not None
         if self.q is None and not has_pose:
-            raise InvalidValueError("target", None, f"is missing: {self.type} needs q, or position and wxyz")
+            missing = InvalidValueError("target", None, f"is missing: {self.type} needs q, or position and wxyz")
+            raise missing.coded("missing", type=self.type, names="q / position, wxyz")
         if self.q is not None:
             if has_pose:
-                raise InvalidValueError("q", self.q, "is a second target, beside position and wxyz; keep one")
+                second = InvalidValueError("q", self.q, "is a second target, beside position and wxyz; keep one")
+                raise second.coded("second_target")
             if self.psi is not None:
-                raise InvalidValueError("psi", self.psi, "is a second arm angle: q has one; leave it out")
+                second = InvalidValueError("psi", self.psi, "is a second arm angle: q has one; leave it out")
+                raise second.coded("second_angle")
             object.__setattr__(self, "q", angles_of(self.q, "q"))
         for name, other in (("position", "wxyz"), ("wxyz", "position")):
             if has_pose and getattr(self, name) is None:
-                raise InvalidValueError(name, None, f"is missing beside {other}: a pose has both")
+                missing = InvalidValueError(name, None, f"is missing beside {other}: a pose has both")
+                raise missing.coded("missing_beside", other=other)
 
 
 _OPTIONAL = tuple(field.name for field in fields(Waypoint) if field.default is None)
@@ -236,6 +244,14 @@ def label(number: int, waypoint: Waypoint) -> str:
     return f"waypoint {number} ({waypoint.type})"
 
 
+def named_value(number: int, kind: str, error: InvalidValueError) -> InvalidValueError:
+    """Returns the error of a value with the name of its waypoint in front."""
+    named = InvalidValueError(f"waypoint {number} ({kind}), {error.name}", error.value, error.requirement)
+    if not error.code:
+        return named
+    return named.coded("waypoint_value", number=number, kind=kind, name=error.name, reason=error)
+
+
 def require_fit(waypoint: Waypoint, n: int, robot: str) -> None:
     """Refuses a waypoint that is none for this arm.
 
@@ -245,7 +261,8 @@ def require_fit(waypoint: Waypoint, n: int, robot: str) -> None:
     if waypoint.q is not None:
         angles_of(waypoint.q, "q", n, robot)
     if n != 7 and (waypoint.psi is not None or waypoint.type == "nullspace"):
-        raise InvalidValueError("psi", waypoint.psi, f"has no meaning for {robot}: a 6-axis arm has no arm angle")
+        problem = f"has no meaning for {robot}: a 6-axis arm has no arm angle"
+        raise InvalidValueError("psi", waypoint.psi, problem).coded("six_axes", model=robot)
 
 
 def angles_of(value: ArrayLike, name: str, n: int | None = None, robot: str = "") -> Floats:
@@ -269,7 +286,8 @@ def angles_of(value: ArrayLike, name: str, n: int | None = None, robot: str = ""
 def _require_word(name: str, value: object) -> None:
     known = WORDS[name]
     if value is not None and not (isinstance(value, str) and value in known):
-        raise InvalidValueError(name, described(value), f"is unknown; known: {', '.join(known)}")
+        error = InvalidValueError(name, described(value), f"is unknown; known: {', '.join(known)}")
+        raise error.coded("unknown", known=", ".join(known))
 
 
 def _target(target: Pose | ArrayLike) -> dict[str, Any]:
@@ -295,7 +313,7 @@ def vector_of(name: str, value: ArrayLike) -> Floats:
             raise InvalidValueError(name, numbers, problem).coded("no_unit")
     elif name == "axis":
         if math.hypot(*numbers) < 1e-12:
-            raise InvalidValueError(name, numbers, "has no direction: its length is zero")
+            raise InvalidValueError(name, numbers, "has no direction: its length is zero").coded("no_direction")
     elif max(map(abs, numbers)) > FARTHEST:
         error = InvalidValueError(name, numbers, f"is beyond {FARTHEST:g} m; millimetres divided by 1000 are metres")
         raise error.coded("beyond", most=f"{1e3 * FARTHEST:g}")

@@ -55,9 +55,11 @@ def decode_blocks(content: bytes, name: str) -> tuple[Block, ...]:
     """
     if not content.startswith(MAGIC):
         problem = "is empty" if not content else "is no run: rcilab did not write it, or its beginning is missing"
-        raise InvalidValueError("run file", name, problem)
+        raise InvalidValueError("run file", name, problem).coded("no_run", file=name)
     if len(content) < _HEADER.size:
-        raise InvalidValueError("run file", name, "ends before its first block; nothing was recorded in it")
+        raise InvalidValueError("run file", name, "ends before its first block; nothing was recorded in it").coded(
+            "run_empty", file=name
+        )
     _, version = _HEADER.unpack_from(content)
     if version != VERSION:
         advice = "read it with the rcilab that wrote it, and export it from there"

@@ -29,7 +29,9 @@ def save_run(run: Run, file: str | PathLike[str], *, progress: Progress | None =
         with path.open("wb") as stream:
             write_export(run, path.suffix, stream, progress=progress, language=language)
     except OSError as error:
-        raise InvalidValueError("file", fspath(file), f"cannot be written: {error.strerror}") from error
+        raise InvalidValueError("file", fspath(file), f"cannot be written: {error.strerror}").coded(
+            "file_unwritable", file=fspath(file)
+        ) from error
 
 
 def export_run(run: Run, ending: str, *, progress: Progress | None = None, language: str = "en") -> bytes:

@@ -202,9 +202,11 @@ def load_run(file: str | PathLike[str]) -> Run:
     try:
         content = Path(name).read_bytes()
     except FileNotFoundError as error:
-        raise InvalidValueError("run file", name, "does not exist") from error
+        raise InvalidValueError("run file", name, "does not exist").coded("no_file", file=name) from error
     except OSError as error:
-        raise InvalidValueError("run file", name, f"cannot be read: {error.strerror}") from error
+        raise InvalidValueError("run file", name, f"cannot be read: {error.strerror}").coded(
+            "file_unreadable", file=name
+        ) from error
     return decode_run(content, name)
 
 
@@ -212,13 +214,15 @@ def decode_run(content: bytes, name: str = "stream") -> Run:
     """Returns the run in the bytes of a `.rcirun` file; see `load_run`."""
     blocks = decode_blocks(content, name)
     if not blocks or blocks[0].kind != "HEAD":
-        raise InvalidValueError("run file", name, "ends before its first block; nothing was recorded in it")
+        raise InvalidValueError("run file", name, "ends before its first block; nothing was recorded in it").coded(
+            "run_empty", file=name
+        )
     try:
         return _build(blocks)
     except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RecursionError) as error:
-        raise InvalidValueError("run file", name, f"is damaged: {error}") from error
+        raise InvalidValueError("run file", name, f"is damaged: {error}").coded("run_damaged", file=name) from error
     except (RcilabError, zlib.error, struct.error) as error:
-        raise InvalidValueError("run file", name, f"is damaged: {error}") from error
+        raise InvalidValueError("run file", name, f"is damaged: {error}").coded("run_damaged", file=name) from error
 
 
 def report_facts(report: Report) -> list[dict[str, Any]]:

@@ -205,4 +205,4 @@ def _open_memory(size: int) -> int:
     raise UsageError(
         f"the control process needs {size / 1e6:.0f} MB of memory to share, and neither {_MEMORY} nor "
         f"{tempfile.gettempdir()} has room; free some"
-    )
+    ).coded("no_memory", size=f"{size / 1e6:.0f}")

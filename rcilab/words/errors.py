@@ -2,25 +2,54 @@
 
 from __future__ import annotations
 
-from rcilab.errors import RcilabError
+from collections.abc import Mapping
+
+from rcilab.errors import InvalidValueError, RcilabError
 from rcilab.words.text import Finished, Message, Remark, message
 
-_NAMES = frozenset({"status", "kind"})
-"""Facts that are names with words of their own: the answer to a command, the type of a waypoint."""
+_NAMES = frozenset({"status", "kind", "condition"})
+"""Facts that are names with words of their own: the answer to a command, the type of a waypoint, a condition."""
+_AMOUNTS = frozenset({"value", "bound"})
+"""Facts of remarks that come with their unit, in SI."""
+_REQUIREMENTS = frozenset(
+    {
+        "span", "least", "rounds", "missing", "missing_beside", "unknown", "axes", "turns", "no_unit", "beyond",
+        "no_number", "numbers", "not_finite", "no_meaning", "no_target", "second_target", "second_angle", "six_axes",
+        "no_direction", "one_line", "box_size", "table_cell", "table_columns", "table_titles", "table_twice",
+        "table_order",
+    }
+)  # fmt: skip
+"""What a value has to be, and is not: said alone, these name it first."""
+_SHOWN = 40  # Characters of a value that is repeated.
 
 
 def tell(error: RcilabError) -> Message | Finished:
     """Returns an error for a face to say; one without a code keeps its English sentence, in the units of the face."""
-    if not error.code:
-        return Finished(str(error))
-    facts = {name: tell(fact) if isinstance(fact, RcilabError) else fact for name, fact in error.facts.items()}
-    for name in _NAMES & facts.keys():
-        facts[name] = message(f"{name}.{str(facts[name]).replace(' ', '_')}")
-    return message(f"error.{error.code}", **facts)
+    said = _tell_reason(error)
+    if isinstance(error, InvalidValueError) and error.code in _REQUIREMENTS:
+        value = str(error.value)
+        shown = value if len(value) <= _SHOWN else value[: _SHOWN - 1] + "…"
+        return message("value.unfit", name=error.name, value="" if error.value is None else shown, reason=said)
+    return said
 
 
 def tell_note(note: str) -> Message | Finished:
-    """Returns what a planner has to say about its motion; a note without a code keeps its English sentence."""
-    if isinstance(note, Remark) and note.code:
-        return message(f"remark.{note.code}", **note.facts)
-    return Finished(note)
+    """Returns what a planner or a controller remarks; a note without a code keeps its English sentence."""
+    if not (isinstance(note, Remark) and note.code):
+        return Finished(note)
+    facts = {name: tell_note(fact) if isinstance(fact, Remark) else fact for name, fact in note.facts.items()}
+    facts |= {name: Finished(str(facts[name])) for name in _AMOUNTS & facts.keys()}
+    return message(f"remark.{note.code}", **_named(facts))
+
+
+def _tell_reason(error: RcilabError) -> Message | Finished:
+    if not error.code:
+        return Finished(str(error))
+    facts = {name: _tell_reason(fact) if isinstance(fact, RcilabError) else fact for name, fact in error.facts.items()}
+    return message(f"error.{error.code}", **_named(facts))
+
+
+def _named(facts: Mapping[str, object]) -> dict[str, object]:
+    """Returns facts with names that have words of their own put into words."""
+    names = {name: message(f"{name}.{str(facts[name]).replace(' ', '_')}") for name in _NAMES & facts.keys()}
+    return {**facts, **names}

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from types import MappingProxyType
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 from rcilab.language import Language, load_words, require_language
 from rcilab.words.units import USUAL, Units
 
+_STOPS = (".", "。")
 SHARED = "rcilab.words"
 """Whose catalogue every face has."""
 
@@ -42,11 +43,39 @@ class Remark(str):
     Args:
         sentence: In English.
         code: Names what it says; its words are `remark.CODE` of the catalogues.
-        facts: What fills them: numbers as text, angles in degrees and lengths in millimetres.
+        facts: What fills them: numbers as text, angles in degrees and lengths in millimetres; "value" and "bound" in
+            any unit, which stands behind; or remarks.
     """
 
     code: str
     facts: Mapping[str, object]
+
+    @classmethod
+    def all(cls, remarks: Iterable[str]) -> Remark:
+        """Returns several in one line."""
+        told = list(remarks)
+        if len(told) < 2:
+            return cls("") if not told else told[0] if isinstance(told[0], Remark) else cls(told[0])
+        rest = cls.all(told[1:])
+        return cls(f"{told[0]}; {rest}", "both", first=told[0], second=rest)
+
+    def as_dict(self) -> dict[str, object]:
+        """Returns it as JSON has it; `from_dict` makes it anew."""
+        facts = {name: fact.as_dict() if isinstance(fact, Remark) else fact for name, fact in self.facts.items()}
+        return {"said": str(self), "code": self.code, "facts": facts}
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> Remark:
+        """Returns what `as_dict` has written.
+
+        Raises:
+            LookupError: It is something else.
+            TypeError: It is something else.
+        """
+        facts = {
+            name: cls.from_dict(fact) if isinstance(fact, dict) else fact for name, fact in content["facts"].items()
+        }
+        return cls(str(content["said"]), str(content["code"]), **facts)
 
     def __new__(cls, sentence: str, code: str = "", **facts: object) -> Remark:  # noqa: D102  # The class says it.
         remark = super().__new__(cls, sentence)
@@ -92,7 +121,7 @@ class Text:
     def __call__(self, code: str, **values: object) -> str:
         """Returns the words for a key; the key itself when the catalogue lacks it (a test keeps it complete)."""
         entry = self._entries.get(code)
-        return code if entry is None else entry.format(**values) if values else entry
+        return code if entry is None else entry.format(**self._embedded(entry, values)) if values else entry
 
     def has(self, code: str) -> bool:
         """Returns whether the catalogue knows a key."""
@@ -101,6 +130,17 @@ class Text:
     def say(self, said: Message) -> str:
         """Returns a message in this language; what has words of its own among its values is translated first."""
         return self(said.code, **{name: self._put(value) for name, value in said.values.items()})
+
+    def tell(self, said: Message | Explains) -> str:
+        """Returns what `rcilab.words.errors` makes of an error or a remark, in this language."""
+        return self.say(said) if isinstance(said, Message) else self._explain(said)
+
+    @staticmethod
+    def _embedded(entry: str, values: Mapping[str, object]) -> Mapping[str, object]:
+        """Returns values as an entry takes them: a finished sentence gives up its full stop where another follows."""
+        ends = {name: value for name, value in values.items() if isinstance(value, str) and value[-1:] in _STOPS}
+        followed = {name: value for name, value in ends.items() if any(f"{{{name}}}{stop}" in entry for stop in _STOPS)}
+        return {**values, **{name: value[:-1] for name, value in followed.items()}} if followed else values
 
     def _put(self, value: object) -> object:
         if isinstance(value, Message):

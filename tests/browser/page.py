@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Callable
 
@@ -83,6 +84,12 @@ class BenchPage:
 
     def open_tab(self, name: str) -> None:
         self.tab.get_by_role("tab", name=name).click()
+
+    def unfold(self, title: str) -> None:
+        """Opens a group whose title begins so, where it is folded."""
+        head = self.tab.locator("[aria-expanded]:visible", has_text=re.compile(f"^{title}")).first
+        if head.get_attribute("aria-expanded") == "false":
+            head.click()
 
     def button(self, name: str):
         return self.tab.get_by_role("button", name=name, exact=True)

@@ -31,6 +31,7 @@ def test_a_soft_motion_is_held_gone_on_with_and_a_spoiled_network_is_noticed(hea
     page.bench.conductor.ask(requests.SetSpeed(speed=0.02))
     page.plan_to(1, -50.0 if page.status.q_c[0] > 0 else 50.0)
     page.open_tab("Run")
+    page.unfold("Mode")
     choose(page, "Follow", "joint impedance")
     page.wait(lambda: page.state.drive.mode == "joint_impedance", "the mode")
     field = page.tab.get_by_text("Joint stiffness").first
@@ -48,7 +49,7 @@ def test_a_soft_motion_is_held_gone_on_with_and_a_spoiled_network_is_noticed(hea
     page.wait(lambda: page.status.motion_place > place + 0.1, "the arm on its way again")
     page.button("Stop").click()
     page.wait(lambda: page.status.phase == "idle", "rest")
-    page.tab.get_by_text("Network lab").first.click()
+    page.unfold("Network lab")
     page.button("Pull the cable").click()
     page.wait(lambda: page.status.phase == "lost", "the client to notice")
     page.button("Plug the cable in").click()

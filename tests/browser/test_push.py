@@ -36,6 +36,8 @@ def has_followed(page, start: np.ndarray) -> bool:
 
 def test_a_guided_arm_is_pulled_by_the_mouse_and_pushed_by_the_button(physics):
     page = physics
+    page.unfold("Guide by hand")
+    page.unfold("Push the arm")
     page.button("Start guiding").click()
     page.wait(lambda: page.chip("phase") == "guided by hand", "a free arm")
     start = np.array(page.status.q)

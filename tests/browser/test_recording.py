@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from rcilab.recording.export import export_run
-from tests.recording.runs import some_run
+from rcilab.workbench.run.keeper import whole_recording
+from tests.recording.runs import some_long_run, some_run
 
 
 def test_a_run_is_shown_against_its_plan_and_downloaded(page, tmp_path):
@@ -21,6 +22,7 @@ def test_a_run_is_shown_against_its_plan_and_downloaded(page, tmp_path):
         lambda: "Ran to its end" in page.tab.locator(".rl-verdict:visible").all_inner_texts().__str__(), "its end"
     )
     page.wait(lambda: page.tab.locator(".rl-plot-title", has_text="Error of the tool").count() == 1, "a plot of errors")
+    page.unfold("Recording")
     page.wait(lambda: page.button("CSV").is_enabled(), "exports to be pressable")
     with page.tab.expect_download(timeout=20_000) as coming:
         page.button("CSV").click()
@@ -30,6 +32,33 @@ def test_a_run_is_shown_against_its_plan_and_downloaded(page, tmp_path):
     run = page.state.recording.run
     assert [float(row["q[1] [rad]"]) for row in rows] == run.q[:, 0].tolist()
     assert "q_plan[1] [rad]" in rows[0]
+
+
+def test_a_long_export_is_cancelled_and_the_next_one_comes(page, tmp_path):
+    page.bench.store.update(last_run=whole_recording(some_long_run()))
+    downloads: list[object] = []
+
+    def note(download) -> None:
+        downloads.append(download)
+
+    page.tab.on("download", note)
+    page.open_tab("Run")
+    page.unfold("Recording")
+    page.wait(lambda: page.button("CSV").is_enabled(), "exports to be pressable")
+    page.button("CSV").click()
+    page.wait(lambda: page.tab.get_by_text("Writing CSV").is_visible(), "the progress")
+    page.button("Cancel the export").click()
+    page.wait(lambda: "was cancelled" in page.toast(), "that it was cancelled")
+    page.wait(lambda: page.state.export is None and page.button("CSV").is_enabled(), "the end of the export")
+    assert page.button("Cancel the export").count() == 0
+    assert downloads == []
+    page.bench.store.update(last_run=whole_recording(some_run()))
+    with page.tab.expect_download(timeout=20_000) as coming:
+        page.button("CSV").click()
+    coming.value.save_as(tmp_path / "run.csv")
+    assert len((tmp_path / "run.csv").read_text().splitlines()) == 1 + len(some_run().t)
+    page.tab.remove_listener("download", note)
+    page.bench.store.update(last_run=None)
 
 
 def test_the_exported_page_lives_without_a_network(chromium, tmp_path):

@@ -35,5 +35,12 @@ def some_cycles(count: int | None = None) -> np.ndarray:
     return recorder.rows()
 
 
+def some_long_run(times: int = 60) -> Run:
+    """The same cycles again and again, for what takes long."""
+    cycles = np.tile(some_cycles(), times)
+    cycles["t"], cycles["message_id"] = 1e-3 * np.arange(len(cycles)), 5 + np.arange(len(cycles))
+    return build_run(cycles, plan=None, model=MODEL, setup=SETUP)
+
+
 def some_run(**facts) -> Run:
     return build_run(some_cycles(), plan=PLAN, model=MODEL, setup=SETUP, **facts)

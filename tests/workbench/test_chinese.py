@@ -6,34 +6,52 @@ import re
 import socket
 from collections.abc import Callable
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
 
 from rcilab.client.address import RobotAddress
+from rcilab.client.identify import dh_lengths, require_same_arm
 from rcilab.client.start_check import describe_start_mismatch
 from rcilab.client.transport import SocketTransport
 from rcilab.conformance import check
+from rcilab.conformance.breach import Breach, describe_breaches
+from rcilab.conformance.conditions import find_condition
+from rcilab.conformance.explain import explain_limit
+from rcilab.controller.ideal_plant import IdealPlant
+from rcilab.controller.modes.generator import lost_motion
 from rcilab.cycle_file import cycle_dtype
+from rcilab.dynamics.payload import Payload
 from rcilab.errors import CertificateError, CommandRejectedError, RcilabError, UsageError
 from rcilab.model import load_model
 from rcilab.motion import Program, Waypoint, plan_joint, plan_line, plan_program
 from rcilab.motion.pose_book import PoseBook
 from rcilab.motion.program_file import read_program
+from rcilab.motion.samples import load_samples
 from rcilab.protocols.rci import RecoveryStatus, StartStatus
+from rcilab.protocols.world import Refused, WorldStatus
+from rcilab.protocols.world.lines import decode_world_answer, encode_world_answer
+from rcilab.recording.blocks import MAGIC
 from rcilab.recording.extra import MissingExtraError
-from rcilab.recording.run_file import RunFile
+from rcilab.recording.run_file import RunFile, decode_run, load_run
+from rcilab.robots import ROBOT_NAMES
 from rcilab.spatial import Pose
 from rcilab.supervisor import SupervisorStatus
 from rcilab.supervisor.admission import require_ready
+from rcilab.words.errors import tell_note
 from rcilab.words.number import parse_number, parse_quaternion
+from rcilab.words.text import Remark
 from rcilab.words.units import Units
 from rcilab.workbench.telling import tell_error
 from rcilab.workbench.text import Text, message
 
 MODEL = load_model("xMatePro7")
 HOME = np.array(MODEL.home)
-NAMES = r"xMatePro7|RCI|IP|UDP|URDF|JSON|UTF|StartMove|AutomaticErrorRecovery|rcilab|speed|rad|mm|deg|rci|[xyzw]\b|MB"
+KEYS = "position wxyz psi via type model start speed blend dwell rounds q1 q2 joint line arc circle nullspace spline"
+ARMS = "xMatePro7 xMatePro3 xMate3 MuJoCo"
+WORDS = "rcilab RCI IP UDP URDF JSON CSV UTF StartMove AutomaticErrorRecovery rci rad mm deg kg MB"
+NAMES = rf"{f'{ARMS} {KEYS} {WORDS}'.replace(' ', '|')}|[xyzw]\b"
 """What is called the same in every language: names of arms, protocols and keys, units."""
 
 
@@ -82,6 +100,38 @@ def robot_at_closed_port() -> None:
     SocketTransport(address, 1024, 1.0)
 
 
+def bad_text(old: str, new: str) -> Callable[[], object]:
+    return bad_file(lambda text: text.replace(old, new))
+
+
+def bad_samples(text: str) -> Callable[[], object]:
+    return lambda: read_samples_text(text)
+
+
+def read_samples_text(text: str) -> None:
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "bad.csv"
+        file.write_text(text)
+        load_samples(file)
+
+
+def refused_by_the_world() -> None:
+    """As a refusal comes back over the wire."""
+    try:
+        IdealPlant(MODEL).set_floor(True)
+    except RcilabError as error:
+        line = encode_world_answer(Refused(str(error), error.code, error.facts), 1)
+        _, answer = decode_world_answer(line)
+        assert isinstance(answer, Refused)
+        raise UsageError(answer.reason).coded(answer.code, **answer.facts) from error
+
+
+def other_arm() -> None:
+    lengths = dh_lengths(load_model("xMate3").description.dh)
+    served = [number for a, d in lengths for number in (1000.0 * a, 0.0, 1000.0 * d, 0.0)]
+    require_same_arm(served, "xMatePro7", dh_lengths(MODEL.description.dh), "127.0.0.1:1337")
+
+
 PROVOKED: dict[str, Callable[[], object]] = {
     "out of reach": lambda: plan_line(MODEL, HOME, moved(3.0)),
     "a singular way": lambda: plan_line(MODEL, np.array([0.0, 0.3, 0.0, 0.4, 0.0, 0.5, 0.0]), moved(0.0, 0.0, 2.0)),
@@ -105,19 +155,76 @@ PROVOKED: dict[str, Callable[[], object]] = {
     "a file of another version": bad_file(lambda text: text.replace('"version": 1', '"version": 7')),
     "a file without an arm": bad_file(lambda text: text.replace('"model"', '"name"')),
     "a folder that is none": lambda: RunFile(Path("/dev/null/a.rcirun"), cycle_dtype(7), plan=None, model=MODEL),
+    "a file with a key twice": bad_text('"start"', '"model": "xMatePro7", "start"'),
+    "a file with a target of two": bad_text('"position"', '"q": [0, 0, 0, 0, 0, 0, 0], "position"'),
+    "a file with half a pose": bad_file(lambda text: re.sub(r'"wxyz": \[[^]]*\], ', "", text, count=1)),
+    "a file with a vector too long": bad_text('"position": [', '"position": [0.0, '),
+    "a file with a strange type": bad_text('"type": "line"', '"type": "spline"'),
+    "a file with a via for a line": bad_text('"position"', '"via": [0.1, 0.2, 0.3], "position"'),
+    "an arm angle for 6 axes": lambda: load_model("xMate3").inverse(load_model("xMate3").forward(np.zeros(6)), psi=0.1),
+    "a program for another arm": lambda: plan_program(load_model("xMatePro3"), program(Waypoint.line(moved(0.05)))),
+    "a speed of nothing": lambda: plan_joint(MODEL, HOME, HOME + 0.1, speed=0.0),
+    "rounds without number": lambda: plan_program(MODEL, program(Waypoint.line(moved(0.05))), rounds=0),
+    "a run of nothing": lambda: decode_run(b"", "bad.json"),
+    "a run cut off": lambda: decode_run(MAGIC, "bad.json"),
+    "a run that is not there": lambda: load_run("bad.json"),
+    "a table of words": bad_samples("t,q1\n0,a\n"),
+    "a table that goes back": bad_samples("t,q1,q2,q3,q4,q5,q6\n0,0,0,0,0,0,0\n0,0,0,0,0,0,0\n"),
+    "a table without joints": bad_samples("t,x\n0,0\n"),
+    "a table of nothing": bad_samples(""),
+    "a refusal of the world port": refused_by_the_world,
+    "another arm": other_arm,
+    "too heavy a load": lambda: MODEL.with_load(Payload(mass=50.0)),
     "a missing pose": lambda: PoseBook(MODEL, Path("/dev/null/none")).recall("bad"),
 }
+
+
+def require_chinese(said: str) -> None:
+    """Fails where words of another language stand in a sentence, or numbers in other units than were chosen."""
+    left = re.sub(NAMES, "", re.sub(r"[\w:/.]*127\.0\.0\.1[\w:/.]*|\S*bad\.(?:json|csv)|“[^”]*”", "", said))
+    assert not re.search(r"[A-Za-z]{2,}", left), said
+    assert not re.search(r"\d ?(?:°|mm)", said), said
+    assert "{" not in said
 
 
 @pytest.mark.parametrize("what", PROVOKED)
 def test_what_goes_wrong_is_said_in_chinese(what):
     with pytest.raises(RcilabError) as caught:
         PROVOKED[what]()
-    said = Text("zh", Units(angle="rad", length="m")).say(tell_error(caught.value))
-    left = re.sub(NAMES, "", re.sub(r"[\w:/.]*127\.0\.0\.1[\w:/.]*|bad\.json|“[^”]*”", "", said))
-    assert not re.search(r"[A-Za-z]{2,}", left), said
-    assert not re.search(r"\d ?(?:°|mm)", said), said
-    assert "{" not in said
+    told = tell_error(caught.value)
+    require_chinese(Text("zh", Units(angle="rad", length="m")).say(told))
+    for language, stop in (("zh", "。"), ("en", ".")):
+        for code in ("notice.refused", "ready.setup_refused", "ready.control_refused", "learn.failed", "notice.error"):
+            values = {"what": "x", "text" if code == "notice.error" else "error": told}
+            said = Text(language, Units(angle="rad", length="m")).say(message(code, **values))
+            assert said.endswith(stop), said
+            assert not said.endswith(2 * stop), said
+
+
+REASONS: dict[str, Remark] = {
+    "a joint too fast": Breach(find_condition("joint.velocity"), 4, 2.3, 2.175).remark,
+    "a tool too fast": Breach(find_condition("cartesian.velocity.translation"), 0, 2.3, 2.0).remark,
+    "a tool outside": Breach(find_condition("cartesian.position"), 0, 0.02, 1e-3).remark,
+    "no pose": Breach(find_condition("cartesian.frame"), 0, 2.0, 1.0).remark,
+    "two at once": describe_breaches([Breach(find_condition("joint.jerk"), 1, 9e3, 8e3)] * 2),
+    "lost commands": lost_motion(Remark("x", "thrown", joint=2, value="9 rad/s^2", bound="8 rad/s^2")).reason,
+}
+
+
+@pytest.mark.parametrize("what", REASONS)
+def test_why_the_controller_stopped_is_said_in_chinese(what):
+    status = WorldStatus(model="xMatePro7", plant="ideal", cycle=9, phase="reflex", reason=REASONS[what])
+    _, back = decode_world_answer(encode_world_answer(status, 1))
+    assert isinstance(back, WorldStatus)
+    assert back.reason == REASONS[what], "the English sentence stays as it was"
+    require_chinese(Text("zh", Units(angle="rad", length="m")).tell(tell_note(back.reason)))
+
+
+@pytest.mark.parametrize("name", ROBOT_NAMES)
+def test_the_sources_of_limits_are_said_in_chinese(name):
+    for source in load_model(name).limits.sources.values():
+        assert re.search(r"[\u4e00-\u9fff]", explain_limit(source, "zh")), source
+        assert explain_limit(source) == source
 
 
 @pytest.mark.parametrize("typed", ["", "abc", "1,000", "9e99", "nan", "999"])

@@ -15,6 +15,7 @@ from rcilab.recording.export import export_run
 from rcilab.recording.run_file import decode_run
 from rcilab.workbench import requests
 from rcilab.workbench.app import Workbench, WorkbenchConfig
+from rcilab.workbench.panels.outcome import outcome_html
 from rcilab.workbench.panels.recording import progress_html, summary_html
 from rcilab.workbench.run.export_actions import ENDINGS
 from rcilab.workbench.run.readiness import obstacle
@@ -65,9 +66,8 @@ def test_a_motion_is_recorded_whole_judged_against_its_plan_and_kept_in_a_file(b
     assert back.is_complete
     assert back.cycles.tobytes() == run.cycles.tobytes()
     assert (back.setup.target, back.setup.plant) == ("virtual", "ideal")
-    html = summary_html(recording, Text("en"))
-    assert "Ran to its end" in html
-    assert "J7" in html
+    assert "Ran to its end" in outcome_html(bench.store.state, Text("en"))
+    assert "J7" in summary_html(recording, Text("en"))
 
 
 def test_a_motion_whose_control_process_is_killed_leaves_every_cycle_until_then(bench):
@@ -81,7 +81,7 @@ def test_a_motion_whose_control_process_is_killed_leaves_every_cycle_until_then(
     assert np.array_equal(np.diff(run.cycles["message_id"]), 1 + run.cycles["lost"][1:])
     assert "control process" in run.stopped
     assert rcilab.load_run(recording.file).cycles.tobytes() == run.cycles.tobytes()
-    assert "Stopped before its end" in summary_html(recording, Text("en"))
+    assert "Stopped before its end" in outcome_html(bench.store.state, Text("en"))
 
 
 def test_exports_reach_the_page_that_asked_and_problems_are_told(bench, monkeypatch):

@@ -150,8 +150,8 @@ def test_health_says_how_many_commands_were_lost_in_a_row():
     world = WorldStatus(model="xMatePro7", plant="ideal", cycle=9, phase="move", lost=30, lost_in_row=12)
     state = initial_state()
     spoiled = replace(state, drive=replace(state.drive, world=world))
-    assert "<th>Commands lost in a row, at most</th><td>12</td>" in health_html(spoiled, status(), Text("en"))
-    assert "<td>—</td>" in health_html(state, status(), Text("en")), "another controller does not tell"
+    assert "<th>Commands lost in a row, at most</th><td>12<br>" in health_html(spoiled, status(), Text("en"))
+    assert "<td>—<br>" in health_html(state, status(), Text("en")), "another controller does not tell"
 
 
 def test_the_bar_and_the_reason_on_run_speak_of_the_same_death():

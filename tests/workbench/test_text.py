@@ -69,7 +69,7 @@ def test_english_causes_are_the_manuals():
 
 def test_messages_inside_messages_are_translated_too():
     said = Text("zh").say(message("notice.refused", what=message("drive.execute"), error="x"))
-    assert said == "执行未成功：x"
+    assert said == "执行未成功：x。"
 
 
 def test_an_unknown_language_lists_the_known_ones():

@@ -26,6 +26,7 @@ from rcilab.errors import InvalidValueError, KinematicsError
 from rcilab.faults import Fault
 from rcilab.protocols.rci import CommandPacket
 from rcilab.spatial import Pose, rotation_from_wxyz, wxyz_from_rotation
+from rcilab.words.text import Remark
 
 _INVALID = (Fault.CARTESIAN_POSITION_MOTION_GENERATOR_INVALID_FRAME,)
 _ELBOW = (Fault.COMMAND_CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION,)
@@ -71,9 +72,10 @@ class CartesianGenerator:
         else:
             error = find_frame_error(packet.T_base_tool_c)
             if error is not None:
-                return Step(faults=_INVALID, reason=error)
+                return Step(faults=_INVALID, reason=Remark(error, "no_pose"))
             if self._has_psi and packet.psi_valid and not abs(packet.psi_c) <= pi + ARM_ANGLE_TOLERANCE:
-                return Step(faults=_ELBOW, reason=f"arm angle: commanded position {packet.psi_c} rad passes +-pi rad")
+                said = f"arm angle: commanded position {packet.psi_c} rad passes +-pi rad"
+                return Step(faults=_ELBOW, reason=Remark(said, "arm_angle", value=f"{packet.psi_c} rad"))
             values = self._read(packet)
             if is_lost:
                 values = self._stream.predict(1, values, playback.steps)
@@ -84,7 +86,7 @@ class CartesianGenerator:
             pose = Pose.from_parts(rotation_from_wxyz(values[3:7]), (values[0], values[1], values[2]))
             pose, psi = self._filter.step(pose, self._psi)
         except InvalidValueError as error:  # Numbers so absurd that bridge or filter made no pose of them.
-            return Step(faults=_INVALID, reason=f"commanded pose: {error}")
+            return Step(faults=_INVALID, reason=Remark(f"commanded pose: {error}", "no_pose"))
         return self._judge(pose, psi, cycles)
 
     def _judge(self, pose: Pose, psi: float, cycles: int) -> Step:
@@ -96,8 +98,8 @@ class CartesianGenerator:
             q = self._follower.solve(pose, psi, self._q)
         except KinematicsError as error:
             if cycles == 0:
-                return lost_motion(f"no joint angles for a pose on its way: {error}")
-            return Step(faults=_INVALID, reason=f"commanded pose: {error}")
+                return lost_motion(Remark(f"no joint angles for a pose on its way: {error}", "no_angles"))
+            return Step(faults=_INVALID, reason=Remark(f"commanded pose: {error}", "no_angles"))
         step = self._reference.step(q, cycles)
         if step.q is not None:
             self._q = step.q

@@ -18,7 +18,10 @@ from rcilab.limits import Limits
 from rcilab.model import RobotModel
 from rcilab.protocols.rci import CommandPacket
 from rcilab.safety_box import SafetyBox
+from rcilab.words.text import Remark
 
+NOTHING = Remark("")
+"""The reason of what raises no fault."""
 _REACH = 2  # [cycles] that a second difference reaches back, after a gap
 
 
@@ -44,7 +47,7 @@ class Step(NamedTuple):
     """Joint torques, [N m]; None where angles are commanded."""
     faults: tuple[Fault, ...] = ()
     """Broken conditions, in wire order; then nothing of this step is given to the arm."""
-    reason: str = ""
+    reason: Remark = NOTHING
     """What broke, in words and numbers."""
 
 
@@ -76,9 +79,10 @@ class Gap:
         return cycles
 
 
-def lost_motion(reason: str) -> Step:
+def lost_motion(reason: Remark) -> Step:
     """Returns the step of a motion that could not go on without the commands that were lost."""
-    return Step(faults=(Fault.INSTABILITY_DETECTION,), reason=f"lost commands broke the motion: {reason}")
+    said = Remark(f"lost commands broke the motion: {reason}", "lost_motion", reason=reason)
+    return Step(faults=(Fault.INSTABILITY_DETECTION,), reason=said)
 
 
 class JointReference:
@@ -114,13 +118,13 @@ class JointReference:
         """
         if self._fence is not None:
             q = self._fence.step(q)
-        reason = "" if cycles == 1 and self._shaken == 0 else self._find_throw(q, cycles)
+        reason = NOTHING if cycles == 1 and self._shaken == 0 else self._find_throw(q, cycles)
         self._last, self._before = q, self._last
         if reason:
             return lost_motion(reason)
         return Step(q) if cycles == 0 else self._judge(q, cycles)
 
-    def _find_throw(self, q: list[float], cycles: int) -> str:
+    def _find_throw(self, q: list[float], cycles: int) -> Remark:
         """Returns what the arm cannot be asked to do, or nothing; for as long as a difference reaches to a gap."""
         self._shaken = self._shaken - 1 if cycles == 1 else _REACH
         h2 = CYCLE_TIME * CYCLE_TIME
@@ -128,10 +132,14 @@ class JointReference:
         for number, (x, y, z, hardest, (lower, upper)) in enumerate(columns, 1):
             ddq = (x - 2.0 * y + z) / h2
             if abs(ddq) > hardest:
-                return f"joint {number} would need {ddq:.4g} rad/s^2 to go on, more than {hardest:g} rad/s^2"
+                said = f"joint {number} would need {ddq:.4g} rad/s^2 to go on, more than {hardest:g} rad/s^2"
+                amounts = {"value": f"{ddq:.4g} rad/s^2", "bound": f"{hardest:g} rad/s^2"}
+                return Remark(said, "thrown", joint=number, **amounts)
             if cycles == 0 and not lower < x < upper:
-                return f"joint {number} would go on to {x:.4g} rad, beyond its range {lower:.4g} to {upper:.4g} rad"
-        return ""
+                said = f"joint {number} would go on to {x:.4g} rad, beyond its range {lower:.4g} to {upper:.4g} rad"
+                bound = lower if x <= lower else upper
+                return Remark(said, "beyond", joint=number, value=f"{x:.4g} rad", bound=f"{bound:.4g} rad")
+        return NOTHING
 
     def _judge(self, q: list[float], cycles: int) -> Step:
         faults = self._monitor.step(q, cycles)

@@ -15,6 +15,7 @@ from rcilab.controller.playout import Playback
 from rcilab.controller.stream import Stream
 from rcilab.faults import Fault
 from rcilab.protocols.rci import CommandPacket
+from rcilab.words.text import Remark
 
 
 class JointGenerator:
@@ -47,7 +48,7 @@ class JointGenerator:
             if playback.is_lost:
                 q = self._stream.predict(1, q, playback.steps)
         if not isfinite(sum(q)):  # Not a number is in no range; the derivatives say nothing then.
-            reason = f"commanded positions {q} rad are not all finite numbers"
+            reason = Remark(f"commanded positions {q} rad are not all finite numbers", "no_numbers")
             return Step(faults=(Fault.COMMAND_JOINT_POSITION_LIMITS_VIOLATION,), reason=reason)
         self._stream.take(q)
         return self._reference.step(self._filter.step(q), cycles)

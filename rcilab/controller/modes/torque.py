@@ -18,6 +18,7 @@ from rcilab.controller.playout import Playback
 from rcilab.controller.stream import Stream
 from rcilab.faults import Fault
 from rcilab.protocols.rci import CommandPacket
+from rcilab.words.text import Remark
 
 
 class TorqueGenerator:
@@ -49,7 +50,7 @@ class TorqueGenerator:
         if packet is not None:
             tau = list(packet.tau_c[: self._n])
             if not isfinite(sum(tau)):
-                reason = f"commanded torques {tau} N m are not all finite numbers"
+                reason = Remark(f"commanded torques {tau} N m are not all finite numbers", "no_numbers")
                 return Step(faults=(Fault.COMMAND_TORQUE_RANGE_VIOLATION,), reason=reason)
             if is_lost:
                 tau = [last + (goal - last) / steps for last, goal in zip(self._tau, tau, strict=True)]

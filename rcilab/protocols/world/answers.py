@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, cast
 
 from rcilab.protocols.world.faults import NetworkFaults
 from rcilab.protocols.world.fields import as_flag, as_float, as_floats, as_integer
+from rcilab.words.text import Remark
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,6 +22,10 @@ class Refused:
 
     reason: str
     """One English sentence: what, why, what to do."""
+    code: str = ""
+    """Names what is wrong, as `RcilabError.code` does; "" where nothing does."""
+    facts: Mapping[str, object] = field(default_factory=dict[str, object])
+    """What fills its words: numbers and text."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,7 +43,7 @@ class WorldStatus:
     faults: tuple[str, ...] = ()
     """Names of the error bits that are set."""
     reason: str = ""
-    """Why the last fault was raised, in words and numbers."""
+    """Why the last fault was raised, in words and numbers; a `Remark` where faces have words of their own for it."""
     button: str = "none"
     """Which safety stop is pressed: none, estop, gstop."""
     q: tuple[float, ...] = ()
@@ -73,6 +79,8 @@ _LARGEST_COUNT = 2**63
 def status_as_dict(status: WorldStatus) -> dict[str, Any]:
     """Returns a status as JSON has it."""
     content = {item.name: getattr(status, item.name) for item in fields(status)}
+    if isinstance(status.reason, Remark) and status.reason.code:
+        content["remark"] = status.reason.as_dict()
     return content | {"commands": status.commands.as_dict(), "states": status.states.as_dict()}
 
 
@@ -87,7 +95,8 @@ def status_from_dict(content: dict[str, Any]) -> WorldStatus:
     for name in _COUNTS:
         if name in judged:
             judged[name] = as_integer(judged[name], name, 0, _LARGEST_COUNT)
-    for name in ("model", "plant", "phase", "reason", "button"):
+    judged["reason"] = _reason(judged.get("reason", ""), judged.pop("remark", None))
+    for name in ("model", "plant", "phase", "button"):
         if name in judged:
             judged[name] = _text(judged[name])
     if "faults" in judged:
@@ -102,6 +111,13 @@ def status_from_dict(content: dict[str, Any]) -> WorldStatus:
         if name in judged:
             judged[name] = NetworkFaults(**judged[name])
     return WorldStatus(**judged)
+
+
+def _reason(said: object, coded: object) -> str:
+    try:
+        return _text(said) if coded is None else Remark.from_dict(cast("dict[str, Any]", coded))
+    except (AttributeError, LookupError, RecursionError) as error:
+        raise TypeError(f"{coded!r} is no remark") from error
 
 
 def _text(value: object) -> str:

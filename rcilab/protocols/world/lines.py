@@ -98,8 +98,10 @@ def encode_world_answer(answer: WorldAnswer, request_id: int) -> bytes:
     """Returns the line of an answer to the request with this id; 0 where none could be read."""
     content: dict[str, Any] = {"id": request_id, "ok": not isinstance(answer, Refused)}
     match answer:
-        case Refused(reason):
+        case Refused(reason, code, facts):
             content["error"] = reason
+            if code:
+                content |= {"code": code, "facts": dict(facts)}
         case WorldStatus():
             content["status"] = status_as_dict(answer)
         case Done():
@@ -116,7 +118,7 @@ def decode_world_answer(line: bytes) -> tuple[int, WorldAnswer]:
     content = _decode(line)
     request_id = _pop_id(content)
     if content.get("ok") is False:
-        return request_id, Refused(str(content.get("error", "")))
+        return request_id, _refused(content)
     if content.get("ok") is not True:
         raise DecodeError("an answer needs ok: true or false")
     if "status" not in content:
@@ -125,6 +127,13 @@ def decode_world_answer(line: bytes) -> tuple[int, WorldAnswer]:
         return request_id, status_from_dict(content["status"])
     except (InvalidValueError, TypeError, ValueError) as error:
         raise DecodeError(f"status: {error}") from error
+
+
+def _refused(content: dict[str, Any]) -> Refused:
+    reason, code, facts = str(content.get("error", "")), content.get("code"), content.get("facts")
+    if isinstance(code, str) and isinstance(facts, dict):
+        return Refused(reason, code, cast("dict[str, object]", facts))
+    return Refused(reason)
 
 
 def _encode(content: dict[str, Any]) -> bytes:

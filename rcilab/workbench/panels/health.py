@@ -27,7 +27,7 @@ class HealthPanel:
 
     def build(self, gui: Any, state: UiState) -> None:
         """Adds the table."""
-        with gui.add_folder(self._text("run.health")):
+        with gui.add_folder(self._text("run.health"), expand_by_default=False):
             self._health = Html(gui)
             self._histogram = Html(gui)
         gui.add_html(f'<p class="rl-note">{esc(self._text("stop.note"))}</p>')
@@ -59,8 +59,15 @@ def health_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
         ("answer", "—" if status.answer_time is None else f"{1e6 * status.answer_time:.0f} µs"),
         ("scheduling", text(f"scheduling.{status.scheduling}")),
     ]
-    body = "".join(f"<tr><th>{esc(text(f'health.{name}'))}</th><td>{esc(value)}</td></tr>" for name, value in rows)
-    return f'<table class="rl-table rl-facts-table">{body}</table>'
+    return f'<table class="rl-table rl-facts-table">{"".join(_row(name, value, text) for name, value in rows)}</table>'
+
+
+def _row(name: str, value: str, text: Text) -> str:
+    """Returns a row: what it is shows under the mouse, what is good stands below the number."""
+    good = f"health.{name}_good"
+    below = f'<br><span class="rl-dim">{esc(text(good))}</span>' if text.has(good) else ""
+    name_cell = f"<th>{esc(text(f'health.{name}'))}</th>"
+    return f'<tr title="{esc(text(f"health.{name}_help"))}">{name_cell}<td>{esc(value)}{below}</td></tr>'
 
 
 def histogram_html(late: Lateness, text: Text) -> str:

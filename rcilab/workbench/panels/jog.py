@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rcilab.conformance.explain import explain_limit
 from rcilab.posing.reach import NEAR_LIMIT
 from rcilab.workbench import requests
 from rcilab.workbench.jog.jogging import FASTEST_JOINT, FASTEST_TOOL, FASTEST_TURN, STEPS, no_jog
@@ -58,7 +59,7 @@ class JogPanel:
         self._sliders: list[Linked] = []
         self._fields: list[NumberField] = []
         self._margins: list[Html] = []
-        source = state.model.limits.source("joint.lower")
+        source = explain_limit(state.model.limits.source("joint.lower"), text.language)
         factor, _ = text.units.from_si("rad")
         step, digits = (0.1, 3) if text.units.angle == "deg" else (0.001, 5)
         angles = factor * state.goal.q

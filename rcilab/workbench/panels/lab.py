@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from rcilab.protocols.world import DIRECTIONS
+from rcilab.words.errors import tell_note
 from rcilab.workbench import requests
 from rcilab.workbench.run.driving import NETWORK_LAB, is_ours
 from rcilab.workbench.text import Text
@@ -32,7 +33,7 @@ class LabPanel:
         """Adds the controls."""
         text, ask = self._text, self._ask
         self._buttons: dict[str, Any] = {}
-        with gui.add_folder(text("safety.title")):
+        with gui.add_folder(text("safety.title"), expand_by_default=False):
             gui.add_html('<i class="rl-buttons"></i>')
             for name, icon, color in _BUTTONS:
                 button = gui.add_button(
@@ -95,9 +96,13 @@ def noticed_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
         ("controller_faults", faults),
     ]
     if world is not None and world.reason and status.faults:
-        rows.append(("controller_reason", text.units.restate(world.reason)))
-    body = "".join(f"<tr><th>{esc(text(f'network.{name}'))}</th><td>{esc(value)}</td></tr>" for name, value in rows)
-    return f'<table class="rl-table rl-facts-table">{body}</table>'
+        rows.append(("controller_reason", text.tell(tell_note(world.reason))))
+    return f'<table class="rl-table rl-facts-table">{"".join(_row(*row, text) for row in rows)}</table>'
+
+
+def _row(name: str, value: str, text: Text) -> str:
+    told = f"<th>{esc(text(f'network.{name}'))}</th><td>{esc(value)}</td>"
+    return f'<tr title="{esc(text(f"network.{name}_help"))}">{told}</tr>'
 
 
 def _set(name: str, scale: float):  # type: ignore[no-untyped-def]

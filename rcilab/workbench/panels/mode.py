@@ -11,7 +11,7 @@ from rcilab.workbench import requests
 from rcilab.workbench.panels.jog import problems_html
 from rcilab.workbench.run.driving import is_pending
 from rcilab.workbench.run.readiness import is_moving
-from rcilab.workbench.text import Text
+from rcilab.workbench.text import Text, message
 from rcilab.workbench.widgets import Ask, Html, Linked, NumberField, esc, on_press
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ class ModePanel:
     def build(self, gui: Any, state: UiState) -> None:
         """Adds the controls."""
         text, ask = self._text, self._ask
-        with gui.add_folder(text("mode.title")):
+        with gui.add_folder(text("mode.title"), expand_by_default=False):
             names: dict[str, Mode] = {text(f"mode.{mode}"): mode for mode in MODES}
             self._names = {mode: label for label, mode in names.items()}
             mode = gui.add_dropdown(
@@ -36,6 +36,18 @@ class ModePanel:
             )
             self._mode = Linked(mode, ask, lambda v, p: requests.SetDrive(page=p, mode=names.get(v)))
             self._note = Html(gui)
+            self._build_parts(gui, state)
+            with gui.add_folder(text("control.title"), expand_by_default=False):
+                self._held = Html(gui)
+                send = gui.add_button(text("control.send"), icon="send", color="blue", hint=text("control.send_hint"))
+                on_press(send, ask, lambda page: requests.PressControl(page=page, what="send"))
+                self._send = send
+                reset = gui.add_button(
+                    text("control.reset"), icon="restore", color="gray", hint=text("control.reset_hint")
+                )
+                on_press(reset, ask, lambda page: requests.PressControl(page=page, what="reset"))
+
+    def _build_parts(self, gui: Any, state: UiState) -> None:
         self._folders: dict[ControlPart, Any] = {}
         self._fields: dict[ControlPart, list[NumberField]] = {}
         self._labels: dict[str, str] = {}
@@ -43,18 +55,12 @@ class ModePanel:
         for part, ranges in control_ranges(state.model.limits).items():
             visible = part in PARTS_OF_MODE[state.drive.mode]
             closed = part not in ("joint_stiffness", "cartesian_stiffness")
-            folder = gui.add_folder(name_part(text, part, ranges), visible=visible, expand_by_default=not closed)
+            folder = gui.add_folder(name_part(self._text, part, ranges), visible=visible, expand_by_default=not closed)
             with folder:
                 gui.add_html('<i class="rl-pairs"></i>')
                 self._fields[part] = [self._build_field(gui, part, place) for place in range(len(ranges))]
                 self._problems[part] = Html(gui)
             self._folders[part] = folder
-        with gui.add_folder(text("control.title")):
-            self._held = Html(gui)
-            self._send = gui.add_button(text("control.send"), icon="send", color="blue", hint=text("control.send_hint"))
-            on_press(self._send, ask, lambda page: requests.PressControl(page=page, what="send"))
-            reset = gui.add_button(text("control.reset"), icon="restore", color="gray", hint=text("control.reset_hint"))
-            on_press(reset, ask, lambda page: requests.PressControl(page=page, what="reset"))
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows mode and parameters."""
@@ -84,7 +90,7 @@ class ModePanel:
 def held_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
     """Returns what the controller has of the parameters of this mode: as it acknowledged them."""
     if state.drive.refusal is not None:
-        why = text("ready.control_refused", error=text.say(state.drive.refusal))
+        why = text.say(message("ready.control_refused", error=state.drive.refusal))
         return f'<p class="rl-problem" role="alert">{esc(why)}</p>'
     own = standard_control(state.model.limits) if state.target == "virtual" else ControlSettings()
     rows = "".join(

@@ -36,9 +36,9 @@ class PushPanel:
 
     def build(self, gui: Any, state: UiState) -> None:
         """Adds the controls."""
-        with gui.add_folder(self._text("guide.title")):
+        with gui.add_folder(self._text("guide.title"), expand_by_default=False):
             self._build_guiding(gui, state)
-        with gui.add_folder(self._text("push.title")):
+        with gui.add_folder(self._text("push.title"), expand_by_default=False):
             self._build_push(gui, state)
 
     def _build_guiding(self, gui: Any, state: UiState) -> None:

@@ -33,7 +33,7 @@ class RecordingPanel:
     def build(self, gui: Any, state: UiState) -> None:
         """Adds table, buttons and the check box."""
         text, ask = self._text, self._ask
-        with gui.add_folder(text("record.title")):
+        with gui.add_folder(text("record.title"), expand_by_default=False):
             gui.add_html('<i class="rl-exports"></i>')
             self._summary = Html(gui)
             self._buttons: dict[str, Any] = {}
@@ -80,16 +80,7 @@ def summary_html(recording: Recording | None, text: Text) -> str:
     run, tracking = recording.run, recording.tracking
     if run is None or tracking is None:
         return f'<p class="rl-note">{esc(text("record.running", cycles=len(recording.t)))}</p>'
-    facts = text("record.facts", duration=f"{run.duration:.3f}", cycles=len(run.t), lost=run.timing.lost)
-    tone, ended = ("good", text("record.arrived"))
-    if run.faults:
-        tone, ended = "bad", text("record.faulted", faults=", ".join(fault.manual_name for fault in run.faults))
-    elif not run.is_complete:
-        tone, ended = "warn", text("record.cut")
-    elif run.stopped:
-        tone, ended = "warn", text("record.stopped")
     return (
-        f'<p class="rl-verdict rl-{tone}"><b>{esc(ended)}</b> {esc(facts)}</p>'
         f'<table class="rl-table"><tr><th>{esc(text("record.error"))}</th><th>{esc(text("record.rms"))}</th>'
         f"<th>{esc(text('record.max'))}</th></tr>{_rows(tracking, text)}</table>"
     )

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from rcilab.motion.pacing import SLOWEST_PACE
 from rcilab.workbench import requests
+from rcilab.workbench.panels.outcome import outcome_html, way_html
 from rcilab.workbench.panels.target import planned_html
 from rcilab.workbench.run.readiness import describe_move, is_moving, obstacle
 from rcilab.workbench.text import Text
@@ -51,7 +52,7 @@ class RunPanel:
             text("run.pace"), 100.0 * SLOWEST_PACE, 100.0, 5.0, 100.0 * state.drive.pace, hint=text("run.pace_hint")
         )
         self._pace = Linked(pace, ask, lambda v, p: requests.SetDrive(page=p, pace=float(v) / 100.0))
-        self._way = Html(gui)
+        self._way, self._outcome = Html(gui), Html(gui)
         self._buttons: dict[str, Any] = {}
         with gui.add_folder(text("run.robot")):
             gui.add_html('<i class="rl-buttons"></i>')
@@ -78,6 +79,7 @@ class RunPanel:
         self._pause.disabled = status.motion_place is None
         self._pace.show(round(100.0 * state.drive.pace, 1))
         self._way.show(way_html(status, text))
+        self._outcome.show("" if moving else outcome_html(state, text))
         self._plan.disabled = moving
         self._buttons["recover"].disabled = status.phase not in ("fault", "crashed", "lost")
         self._buttons["power_on"].disabled = moving or status.powered is not False
@@ -89,20 +91,8 @@ def _drive(what: Any):  # type: ignore[no-untyped-def]
     return lambda page: requests.Drive(page=page, what=what)
 
 
-def way_html(status: SupervisorStatus, text: Text) -> str:
-    """Returns how far a motion is and how fast it runs; nothing while none does."""
-    if status.code not in ("moving", "moving.held") or status.motion_place is None or not status.motion_duration:
-        return ""
-    said = text("run.way", place=f"{status.motion_place:.1f}", pace=f"{100.0 * status.pace:.0f}")
-    if status.code == "moving.held":
-        said = text("run.held", place=f"{status.motion_place:.1f}")
-    return f'<p class="rl-note" role="status">{esc(said)}</p>'
-
-
 def faults_html(status: SupervisorStatus, text: Text) -> str:
-    """Returns every fault that is set, with its cause and what to do about it."""
-    if not status.faults:
-        return f'<p class="rl-verdict rl-good"><b>{esc(text("run.no_faults"))}</b></p>'
+    """Returns every fault that is set, with its cause and what to do about it; nothing while none is."""
     return "".join(
         f'<div class="rl-card rl-bad"><div class="rl-line"><b>{esc(fault.manual_name)}</b></div>'
         f'<div class="rl-facts">{esc(text(f"fault.{fault.name}"))}</div>'

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+from rcilab.conformance.explain import explain_limit
 from rcilab.robots import RCI_ROBOT_NAMES
 from rcilab.words.units import ANGLES, LENGTHS
 from rcilab.workbench import requests
@@ -53,9 +54,8 @@ class SettingsPanel:
                 text("lease.ask"), icon="hand-grab", color="gray", hint=text("settings.take_hint")
             )
             on_press(self._take, ask, lambda page: requests.TakeControls(page=page))
-        gui.add_html(
-            f'<p class="rl-note">{esc(text("settings.limits", source=state.model.limits.source("joint.velocity")))}</p>'
-        )
+        source = explain_limit(state.model.limits.source("joint.velocity"), text.language)
+        gui.add_html(f'<p class="rl-note">{esc(text("settings.limits", source=source))}</p>')
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows the state."""
@@ -65,8 +65,10 @@ class SettingsPanel:
         for choice, chosen in self._choices:
             choice.show(chosen(state))
         self._take.label = text("lease.take" if lease.holder is None else "lease.ask")
-        who = text("settings.who", holder=lease.number(lease.holder), pages=len(lease.pages))
-        self._who.show(f'<p class="rl-note">{esc(text("settings.free") if lease.holder is None else who)}</p>')
+        who = text("settings.free" if lease.holder is None else "settings.alone")
+        if lease.holder is not None and len(lease.pages) > 1:
+            who = text("settings.who", holder=lease.number(lease.holder), pages=len(lease.pages))
+        self._who.show(f'<p class="rl-note">{esc(who)}</p>')
 
     def _choice(self, gui: Any, name: Any, labels: dict[str, str]) -> Linked:
         hint = self._text(f"settings.{name}_hint")

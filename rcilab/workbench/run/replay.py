@@ -28,11 +28,13 @@ def require_replayable(run: Run) -> RobotModel:
         UsageError: It has no cycle, no plan, or nobody knows which arm it was.
     """
     if run.model is None:
-        raise UsageError("this run cannot be replayed: its file does not say which arm made it")
+        raise UsageError("this run cannot be replayed: its file does not say which arm made it").coded("run_no_arm")
     if not len(run.cycles):
-        raise UsageError("this run cannot be replayed: not one cycle was recorded")
+        raise UsageError("this run cannot be replayed: not one cycle was recorded").coded("run_no_cycle")
     if run.plan is None:
-        raise UsageError("this run has no plan to compare with (a callback made it); save it as .html to look at it")
+        raise UsageError(
+            "this run has no plan to compare with (a callback made it); save it as .html to look at it"
+        ).coded("run_no_plan")
     return run.model
 
 

@@ -1,0 +1,45 @@
+"""How a motion goes and what became of the last one: said beside Execute, without scrolling."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rcilab.workbench.text import Text
+from rcilab.workbench.widgets import esc
+
+if TYPE_CHECKING:
+    from rcilab.supervisor import SupervisorStatus
+    from rcilab.workbench.store import Recording, UiState
+
+
+def way_html(status: SupervisorStatus, text: Text) -> str:
+    """Returns how far a motion is and how fast it runs, in words and as a bar; nothing while none does."""
+    if status.code not in ("moving", "moving.held") or status.motion_place is None or not status.motion_duration:
+        return ""
+    said = text("run.way", place=f"{status.motion_place:.1f}", pace=f"{100.0 * status.pace:.0f}")
+    if status.code == "moving.held":
+        said = text("run.held", place=f"{status.motion_place:.1f}")
+    share = min(max(status.motion_place / status.motion_duration, 0.0), 1.0)
+    bar = f'<div class="rl-meter rl-way"><i style="width:{100.0 * share:.0f}%"></i></div>'
+    return f'<p class="rl-note" role="status">{esc(said)}</p>{bar}'
+
+
+def outcome_html(state: UiState, text: Text) -> str:
+    """Returns what became of the last motion; nothing before one has ended."""
+    recording = state.recording if state.recording is not None else state.last_run
+    if recording is None or recording.run is None:
+        return ""
+    tone, ended, facts = _outcome(recording, text)
+    return f'<p class="rl-verdict rl-{tone}"><b>{esc(ended)}</b> {esc(facts)}</p>'
+
+
+def _outcome(recording: Recording, text: Text) -> tuple[str, str, str]:
+    run = recording.run
+    assert run is not None
+    facts = text("record.facts", duration=f"{run.duration:.3f}", cycles=len(run.t), lost=run.timing.lost)
+    if run.faults:
+        faults = ", ".join(fault.manual_name for fault in run.faults)
+        return "bad", text("record.faulted", faults=faults), facts
+    if not run.is_complete:
+        return "warn", text("record.cut"), facts
+    return ("warn", text("record.stopped"), facts) if run.stopped else ("good", text("record.arrived"), facts)
