@@ -17,6 +17,7 @@ from rcilab.gallery.shown import body_html, head_html
 from rcilab.gallery.table import FAULTS
 from rcilab.notebook.exhibit_plot import draw_exhibit
 from rcilab.notebook.flight_recorder import record_html
+from rcilab.notebook.lean import lean
 from rcilab.notebook.look import block, esc, problem, soft, verdict, write
 from rcilab.notebook.part import Part
 from rcilab.words.text import Text
@@ -46,15 +47,15 @@ class FaultPanel(Part):
         self._work: Background[Fault, Exhibit] = Background("rcilab-gallery")
         self._ending = threading.Event()
         self._watcher: threading.Thread | None = None
-        self.fault: Any = ipywidgets.Dropdown(
-            description=text("fault.which"), layout=ipywidgets.Layout(width="100%", max_width="46em"),
+        self.fault: Any = lean(
+            ipywidgets.Dropdown, description=text("fault.which"), layout={"width": "100%", "max_width": "46em"},
             options=[(f"{text(f'learn.fault.{fault.name}')} · {fault.manual_name}", fault) for fault in Fault],
         )  # fmt: skip
         self.provoke = self._button("fault.provoke", self._provoke, icon="bolt", tooltip=text("fault.provoke_hint"))
         self.cancel = self._button("learn.cancel", self.halt, icon="times")
-        self.progress = ipywidgets.FloatProgress(min=0.0, max=1.0, layout=ipywidgets.Layout(width="14em"))
-        self._buttons = ipywidgets.HBox(
-            [self.provoke, self.progress, self.cancel], layout=ipywidgets.Layout(align_items="center")
+        self.progress = lean(ipywidgets.FloatProgress, min=0.0, max=1.0, layout=ipywidgets.Layout(width="14em"))
+        self._buttons = lean(
+            ipywidgets.HBox, [self.provoke, self.progress, self.cancel], layout={"align_items": "center"}
         )
         self.build([self._now, self.fault, self._buttons, self._told, self._record], min_width="360px")
         self.fault.observe(lambda _: self._tell(), names="value")
@@ -143,8 +144,12 @@ class FaultPanel(Part):
 
     def _button(self, code: str, act: Any, *, icon: str, tooltip: str = "") -> Any:
         said = self.text(code)
-        button = ipywidgets.Button(
-            description=said, tooltip=tooltip or said, icon=icon, layout=ipywidgets.Layout(width="auto")
+        button = lean(
+            ipywidgets.Button,
+            description=said,
+            tooltip=tooltip or said,
+            icon=icon,
+            layout=ipywidgets.Layout(width="auto"),
         )
         button.on_click(lambda _: act())
         return button

@@ -11,6 +11,7 @@ import ipywidgets
 
 from rcilab.errors import RcilabError
 from rcilab.notebook.heart import Heart
+from rcilab.notebook.lean import lean
 from rcilab.notebook.look import PHASE_TONES, block, problem, soft, verdict, write
 from rcilab.notebook.mode_fields import ModeFields
 from rcilab.notebook.parameter_desk import ParameterDesk
@@ -45,16 +46,18 @@ class RunPanel(Part):
         self._heart = Heart()
         self._ending = threading.Event()
         self._watcher: threading.Thread | None = None
-        self.target = ipywidgets.Dropdown(
-            description=text("run.robot"), options=[(text(f"robot.{name}"), name) for name in _TARGETS],
-            layout=ipywidgets.Layout(width="24em"),
+        self.target = lean(
+            ipywidgets.Dropdown, description=text("run.robot"),
+            options=[(text(f"robot.{name}"), name) for name in _TARGETS],
+            layout={"width": "24em"},
         )  # fmt: skip
-        self.address = ipywidgets.Text(
-            description=text("run.address"), placeholder="rci://192.168.0.160:1337", tooltip=text("run.address_hint"),
+        self.address = lean(
+            ipywidgets.Text, description=text("run.address"), placeholder="rci://192.168.0.160:1337",
+            tooltip=text("run.address_hint"),
             layout=ipywidgets.Layout(width="24em", display="none"),
         )  # fmt: skip
-        self.connect = self._button("run.connect", self._on_connect, icon="plug")
-        self.disconnect = self._button("run.disconnect", self._on_disconnect)
+        self.connect = self._button("run.connect", self._on_connect, icon="plug", own=True)
+        self.disconnect = self._button("run.disconnect", self._on_disconnect, own=True)
         self.power_on = self._button("run.power_on", lambda: self._robot.power(True), icon="power-off")
         self.power_off = self._button("run.power_off", lambda: self._robot.power(False))
         self.recover = self._button("run.recover", lambda: self._robot.recover())
@@ -63,25 +66,25 @@ class RunPanel(Part):
         self.stop.add_class("rl-stop")
         self.yes = self._button("run.confirm", self._move, style="danger")
         self.no = self._button("run.cancel", self._forget_question)
-        self.progress = ipywidgets.FloatProgress(
-            min=0.0, max=1.0, layout=ipywidgets.Layout(width="100%", visibility="hidden")
+        self.progress = lean(
+            ipywidgets.FloatProgress, min=0.0, max=1.0, layout=ipywidgets.Layout(width="100%", visibility="hidden")
         )
         self._said, self._where, self._plan, self._question = block(), block(), block(), block()
         self._health, self._outcome = block(), block()
         self._desk = ParameterDesk(self.state)
         self.modes = ModeFields(self.state, text, self._desk)
-        self._answers = ipywidgets.HBox([self.yes, self.no], layout=ipywidgets.Layout(display="none"))
-        self._choice = ipywidgets.VBox([self.target, self.address])
+        self._answers = lean(ipywidgets.HBox, [self.yes, self.no], layout=ipywidgets.Layout(display="none"))
+        self._choice = lean(ipywidgets.VBox, [self.target, self.address], layout=ipywidgets.Layout())
         self.build([
             self._heart.widget,
             self._choice,
-            ipywidgets.HBox([self.connect, self.disconnect]),
+            lean(ipywidgets.HBox, [self.connect, self.disconnect]),
             self._said,
             self._where,
-            ipywidgets.HBox([self.power_on, self.power_off, self.recover]),
+            lean(ipywidgets.HBox, [self.power_on, self.power_off, self.recover]),
             self.modes.choice,
             self._plan,
-            ipywidgets.HBox([self.execute, self.stop]),
+            lean(ipywidgets.HBox, [self.execute, self.stop]),
             self._question,
             self._answers,
             self.progress,
@@ -98,9 +101,7 @@ class RunPanel(Part):
 
     def halt(self) -> None:
         """Brings the robot to rest; from any thread, without waiting."""
-        robot = self.state.robot
-        if robot is not None:
-            robot.stop()
+        self.state.halt()
 
     def end(self) -> None:
         """Brings a motion to rest and ends the processes that were started here."""
@@ -238,14 +239,17 @@ class RunPanel(Part):
             share = (status.motion_time or 0.0) / status.motion_duration
             self.progress.value = min(max(share, 0.0), 1.0) if math.isfinite(share) else 0.0
 
-    def _button(self, code: str, act: Callable[[], object], *, icon: str = "", style: str = "") -> Any:
+    def _button(
+        self, code: str, act: Callable[[], object], *, icon: str = "", style: str = "", own: bool = False
+    ) -> Any:
         hint = f"{code}_hint"
-        button = ipywidgets.Button(
+        button = lean(
+            ipywidgets.Button,
             description=self.text(code),
             tooltip=self.text(hint) if self.text.has(hint) else self.text(code),
             icon=icon,
             button_style=style,
-            layout=ipywidgets.Layout(width="auto"),
+            layout=ipywidgets.Layout(width="auto") if own else {"width": "auto"},
         )
 
         def press(_: object) -> None:

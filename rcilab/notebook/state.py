@@ -6,22 +6,18 @@ the library's own calls; here is only who hears of it.
 
 from __future__ import annotations
 
+import sys
 import threading
 import weakref
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, TypeGuard
 
 from numpy.typing import ArrayLike
 
 from rcilab.arrays import JointVector, as_vector, frozen
-from rcilab.client.control_settings import ControlSettings
-from rcilab.client.session import RobotSession
-from rcilab.conformance.check import check
 from rcilab.errors import InvalidValueError, KinematicsError, RcilabError
 from rcilab.model import RobotModel, require_model
-from rcilab.motion.cartesian import plan_line
-from rcilab.motion.motion import Motion, require_motion
 from rcilab.posing.planning import Plan, PlannableLaw, make_plan, picture
 from rcilab.posing.reach import Reach, judge_joints, judge_pose
 from rcilab.spatial import Pose
@@ -30,6 +26,9 @@ from rcilab.words.errors import tell
 from rcilab.words.text import Message, message
 
 if TYPE_CHECKING:
+    from rcilab.client.control_settings import ControlSettings
+    from rcilab.client.session import RobotSession
+    from rcilab.motion.motion import Motion
     from rcilab.notebook.robot_side import RobotSide
     from rcilab.recording.run import Run
     from rcilab.supervisor import SupervisorStatus
@@ -161,6 +160,9 @@ class LabState:
 
     def take_motion(self, motion: Motion) -> None:
         """Takes a motion that was planned elsewhere; it is judged as any other."""
+        from rcilab.conformance.check import check
+        from rcilab.motion.motion import require_motion
+
         require_motion(motion)
         report = check(motion, self.model, mode=self.mode)
         self.show(replace(picture(self.model, motion, report), mode=self.mode, complete=True))
@@ -189,6 +191,12 @@ class LabState:
         with self.lock:
             self.run, self.error = run, error
             self.tell("run")
+
+    def halt(self) -> None:
+        """Brings the robot to rest; from any thread, without waiting."""
+        robot = self.robot
+        if robot is not None:
+            robot.stop()
 
     def look_at(self, moment: float | None) -> None:
         """Looks at a time of the plan, [s]; None looks at the arm as it is."""
@@ -221,6 +229,9 @@ class LabState:
         return replace(made, short=self.reach.short) if isinstance(made, Plan) else made
 
     def _line(self) -> Plan | Message:
+        from rcilab.conformance.check import check
+        from rcilab.motion.cartesian import plan_line
+
         try:
             motion = plan_line(self.model, self.here, self.model.forward(self.goal), speed=self.speed)
             return picture(self.model, motion, check(motion, self.model, start=self.here, distance=None))
@@ -243,10 +254,16 @@ def state_of(subject: object) -> LabState:
     """
     if isinstance(subject, LabState):
         return subject
-    if isinstance(subject, RobotSession):
+    if _is_session(subject):
         shared = _of_session.get(id(subject))
         if shared is None:
             shared = _of_session[id(subject)] = LabState(subject.model, subject)
         return shared
     shared = getattr(subject, "state", None)
     return shared if isinstance(shared, LabState) else LabState(require_model(subject))
+
+
+def _is_session(subject: object) -> TypeGuard[RobotSession]:
+    """Returns whether it is a session, without loading what one is made of: then nobody can have made it."""
+    module = sys.modules.get("rcilab.client.session")
+    return module is not None and isinstance(subject, module.RobotSession)
