@@ -15,6 +15,7 @@ from rcilab.notebook.look import PHASE_TONES, Tone, block, esc, write
 from rcilab.notebook.motion_plot import MotionPlot
 from rcilab.notebook.part import Part
 from rcilab.notebook.place import Place
+from rcilab.notebook.robot_words import name_phase
 from rcilab.notebook.scene import Scene, View
 from rcilab.notebook.timeline import Timeline
 
@@ -147,7 +148,7 @@ class Lab(Part):
         phase = "closed" if status is None else status.phase
         unpowered = status is not None and phase == "idle" and status.powered is False
         tone: Tone = "none" if status is None else "warn" if unpowered else PHASE_TONES.get(phase, "bad")
-        chips = _chip(tone, text("phase.unpowered" if unpowered else f"phase.{phase}"))
+        chips = _chip(tone, name_phase(status, text))
         if state.plan is not None:
             ok = state.plan.report.ok
             duration = f"{state.plan.motion.duration:.2f} s"

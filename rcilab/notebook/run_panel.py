@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import threading
 from collections.abc import Callable
 from typing import Any
@@ -14,6 +13,8 @@ from rcilab.notebook.heart import Heart
 from rcilab.notebook.lean import lean
 from rcilab.notebook.look import PHASE_TONES, block, problem, soft, verdict, write
 from rcilab.notebook.mode_fields import ModeFields
+from rcilab.notebook.pace_desk import PaceDesk
+from rcilab.notebook.pace_fields import PaceFields
 from rcilab.notebook.parameter_desk import ParameterDesk
 from rcilab.notebook.part import Part
 from rcilab.notebook.ready import obstacle
@@ -71,6 +72,9 @@ class RunPanel(Part):
         )
         self._said, self._where, self._plan, self._question = block(), block(), block(), block()
         self._health, self._outcome = block(), block()
+        self._running = 0.0  # [s] Planned duration of the motion under way.
+        self._pacing = PaceDesk(self.state)
+        self.pace = PaceFields(self.state, text, self._pacing)
         self._desk = ParameterDesk(self.state)
         self.modes = ModeFields(self.state, text, self._desk)
         self._answers = lean(ipywidgets.HBox, [self.yes, self.no], layout=ipywidgets.Layout(display="none"))
@@ -84,7 +88,8 @@ class RunPanel(Part):
             lean(ipywidgets.HBox, [self.power_on, self.power_off, self.recover]),
             self.modes.choice,
             self._plan,
-            lean(ipywidgets.HBox, [self.execute, self.stop]),
+            lean(ipywidgets.HBox, [self.execute, *self.pace.buttons, self.stop]),
+            *self.pace.fields,
             self._question,
             self._answers,
             self.progress,
@@ -130,6 +135,7 @@ class RunPanel(Part):
 
     def _take(self, robot: RobotSide) -> None:
         self._desk.forget()
+        self._pacing.forget()
         self.state.robot = robot
         self._heart.start()
         self._ending.clear()
@@ -159,11 +165,15 @@ class RunPanel(Part):
             for outcome in robot.outcomes():
                 self._take_in(outcome)
             self._desk.tick(robot)
+            self._pacing.tick(robot)
             self.state.tell("robot")
 
     def _take_in(self, outcome: Outcome) -> None:
         if outcome.what == "control":
             self._desk.take(outcome.error)
+            return
+        if outcome.what == "pace":
+            self._pacing.take(outcome.error)
             return
         if outcome.what == "execute":
             self.state.take_run(outcome.run, outcome.error)
@@ -192,6 +202,7 @@ class RunPanel(Part):
         if reason is None and plan is not None:
             self.state.look_at(None)
             write(self._outcome, "")
+            self._running = plan.motion.duration
             self._robot.execute(plan)
 
     def _forget_question(self) -> None:
@@ -226,6 +237,7 @@ class RunPanel(Part):
             told, word = ("good", "check.passed") if plan.report.ok else ("bad", "check.failed")
             write(self._plan, verdict(told, text(word), text("plan.ready", duration=f"{plan.motion.duration:.3f}")))
         self._show_progress(status, is_moving)
+        self.pace.show(status)
         self.modes.show(status)
         write(self._health, "" if status is None else health_html(status, text))
 
@@ -233,11 +245,10 @@ class RunPanel(Part):
         return self.text("run.virtual") if robot.name == VIRTUAL else robot.name
 
     def _show_progress(self, status: SupervisorStatus | None, is_moving: bool) -> None:
-        shown = is_moving and status is not None and bool(status.motion_duration)
-        self.progress.layout.visibility = "visible" if shown else "hidden"
-        if shown and status is not None and status.motion_duration:
-            share = (status.motion_time or 0.0) / status.motion_duration
-            self.progress.value = min(max(share, 0.0), 1.0) if math.isfinite(share) else 0.0
+        place = None if status is None or not is_moving else status.motion_place
+        self.progress.layout.visibility = "hidden" if place is None or not self._running else "visible"
+        if place is not None and self._running:
+            self.progress.value = min(max(place / self._running, 0.0), 1.0)
 
     def _button(
         self, code: str, act: Callable[[], object], *, icon: str = "", style: str = "", own: bool = False

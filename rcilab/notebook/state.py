@@ -64,6 +64,8 @@ class LabState:
         self.error: RcilabError | None = None
         """Why the last execution did not reach its end; None when it did."""
         self.speed = 0.5
+        self.pace = 1.0
+        """Part of its planned speed that a motion runs at."""
         self.law: PlannableLaw = "jerk_limited"
         self.way: Way = "joint"
         self.mode: Mode = "joint_position"
