@@ -77,13 +77,13 @@ class MotionPlot(Part):
 
     def _draw(self) -> None:
         state = self.state
-        plan = None if state.plan is None else state.plan.motion
+        plan = None if state.seen is None else state.seen.motion
         if plan is None:
             write(self._curves, soft(self.text("timeline.nothing")))
             write(self._kinds, "")
             self._point()
             return
-        joint, limits, run = int(self.joint.value), self.model.limits.joint, state.run
+        joint, limits, run = int(self.joint.value), self.model.limits.joint, state.seen_run
         times = None if run is None else run.t - run.delay * CYCLE_TIME
         panels: list[Panel] = []
         for quantity in self._quantities:
@@ -113,7 +113,7 @@ class MotionPlot(Part):
 
     def _point(self) -> None:
         moment = self.state.moment
-        if moment is None or self.state.plan is None:
+        if moment is None or self.state.seen is None:
             write(self._cursor, "")
             return
         place = f"display:block;left:{100.0 * share_of(moment, self._end):.2f}%"

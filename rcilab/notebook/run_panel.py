@@ -200,6 +200,7 @@ class RunPanel(Part):
         self._forget_question()
         reason, plan = obstacle(self.state), self.state.plan
         if reason is None and plan is not None:
+            self.state.exhibit(None)
             self.state.look_at(None)
             write(self._outcome, "")
             self._running = plan.motion.duration

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from rcilab.client.control_settings import ControlSettings
     from rcilab.client.session import RobotSession
     from rcilab.motion.motion import Motion
+    from rcilab.notebook.exhibition import Exhibition
     from rcilab.notebook.robot_side import RobotSide
     from rcilab.recording.run import Run
     from rcilab.supervisor import SupervisorStatus
@@ -60,6 +61,8 @@ class LabState:
         self.no_plan: Message | None = None
         self.moment: float | None = None
         """Time of the plan that is looked at, [s]; None looks at the arm as it is."""
+        self.exhibition: Exhibition | None = None
+        """A fault that is looked at in place of the plan, until somebody plans, poses or executes."""
         self.run: Run | None = None
         self.error: RcilabError | None = None
         """Why the last execution did not reach its end; None when it did."""
@@ -107,11 +110,26 @@ class LabState:
         status = self.status
         return self._rest if status is None or status.q_c is None else frozen(status.q_c)
 
+    @property
+    def seen(self) -> Plan | None:
+        """What timeline and curves show: the plan, or what led to the fault on show."""
+        return self.plan if self.exhibition is None else self.exhibition.plan
+
+    @property
+    def seen_arm(self) -> Plan | None:
+        """Where the scene shows the arm at a moment."""
+        return self.plan if self.exhibition is None else self.exhibition.scene
+
+    @property
+    def seen_run(self) -> Run | None:
+        """What happened beside what is seen."""
+        return self.run if self.exhibition is None else self.exhibition.run
+
     def start_from(self, q: ArrayLike) -> None:
         """Says where the arm stands while no robot is connected, shape (n,), [rad]."""
         with self.lock:
             self._rest = frozen(as_vector(q, self.model.n, "q", "rad"))
-            self.plan, self.no_plan, self.moment = None, None, None
+            self.plan, self.no_plan, self.moment, self.exhibition = None, None, None, None
             self.tell("plan", "moment", "goal")
 
     def pose(self, q: ArrayLike) -> None:
@@ -185,7 +203,7 @@ class LabState:
         """Shows a plan, or why there is none."""
         with self.lock:
             self.plan, self.no_plan = (made, None) if isinstance(made, Plan) else (None, made)
-            self.run, self.moment = None, None
+            self.run, self.moment, self.exhibition = None, None, None
             self.tell("plan", "moment")
 
     def take_run(self, run: Run | None, error: RcilabError | None = None) -> None:
@@ -201,15 +219,24 @@ class LabState:
             robot.stop()
 
     def look_at(self, moment: float | None) -> None:
-        """Looks at a time of the plan, [s]; None looks at the arm as it is."""
+        """Looks at a time of what is seen, [s]; None looks at the arm as it is."""
         with self.lock:
-            if self.plan is None:
+            if self.seen is None:
                 moment = None
             elif moment is not None:
-                moment = min(max(moment, 0.0), self.plan.motion.duration)
+                moment = min(max(moment, 0.0), self.seen.motion.duration)
             if moment != self.moment:
                 self.moment = moment
                 self.tell("moment")
+
+    def exhibit(self, exhibition: Exhibition | None) -> None:
+        """Looks at the moment of a fault in place of the plan; None looks at the plan again."""
+        with self.lock:
+            if exhibition is None and self.exhibition is None:
+                return
+            self.exhibition = exhibition
+            self.moment = None if exhibition is None else exhibition.moment
+            self.tell("plan", "moment")
 
     def leave_arm(self, q: ArrayLike) -> None:
         """Says where the robot stood when it was disconnected; what is planned stays."""
@@ -222,6 +249,7 @@ class LabState:
         return self.plan is not None and bool(abs(self.plan.motion.goal - self.goal).max() < 1e-6)
 
     def _look_away(self) -> None:
+        self.exhibit(None)
         if self.moment is not None:
             self.moment = None
             self.tell("moment")

@@ -85,7 +85,7 @@ class Timeline(Part):
         self._link.close()
 
     def _on_plan(self) -> None:
-        plan = self.state.plan
+        plan = self.state.seen
         last = 1 if plan is None else max(round(1000.0 * plan.motion.duration), 1)
         self._writing = True
         try:
@@ -106,10 +106,11 @@ class Timeline(Part):
 
     def _look_away(self) -> None:
         self.play.playing = False
+        self.state.exhibit(None)
         self.state.look_at(None)
 
     def _show(self) -> None:
-        plan, moment = self.state.plan, self.state.moment
+        plan, moment = self.state.seen, self.state.moment
         self.live.disabled = moment is None
         if plan is None:
             write(self._clock, "")
