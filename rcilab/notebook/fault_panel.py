@@ -21,7 +21,8 @@ from rcilab.notebook.flight_recorder import record_html
 from rcilab.notebook.lean import lean
 from rcilab.notebook.look import block, esc, problem, soft, verdict, write
 from rcilab.notebook.part import Part
-from rcilab.words.text import Text
+from rcilab.supervisor.telling import tell_error
+from rcilab.words.text import Text, message
 
 _LOOK = 0.1  # [s] Between two looks at what is being provoked.
 
@@ -148,7 +149,7 @@ class FaultPanel(Part):
 
     def _take(self, found: Exhibit | RcilabError) -> str:
         if isinstance(found, RcilabError):
-            return problem(self.text("learn.failed", error=str(found)))
+            return problem(self.text.say(message("learn.failed", error=tell_error(found))))
         self.exhibit = found
         self.fault.value = found.fault
         self._look()

@@ -7,7 +7,7 @@ import math
 import os
 import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -53,7 +53,7 @@ class Preview(Closing):
         require_installed("meshcat", "preview")
         require_model(model)
         motion = _motion_in(what)
-        pose = as_vector(what if motion is None else motion.start, model.n, "q", "rad")
+        pose = as_vector(cast("ArrayLike", what) if motion is None else motion.start, model.n, "q", "rad")
         with warnings.catch_warnings():  # meshcat 0.3 loads pyzmq's old event loop, which says that it is old.
             warnings.simplefilter("ignore", DeprecationWarning)
             from rcilab.views.meshcat_scene import MeshcatScene
