@@ -31,7 +31,7 @@ class PaceDesk:
         with self._state.lock:
             self._state.pace = pace
             status = self._state.status
-            if is_running(status) and status.code == "moving":
+            if status is not None and is_running(status) and status.code == "moving":
                 self._wish = pace
             self._state.tell("robot")
 
