@@ -190,6 +190,7 @@ def _card_html(fault: Fault, text: Text) -> str:
 
 
 def _exhibit_html(exhibit: Exhibit, text: Text) -> str:
-    picture = draw_exhibit(exhibit, text(f"condition.{exhibit.condition.id}"), text("plot.time"))
+    factor = text.units.from_si(exhibit.condition.unit)[0]
+    picture = draw_exhibit(exhibit, text(f"condition.{exhibit.condition.id}"), text("plot.time"), factor)
     script = f"<details><summary>{esc(text('learn.script'))}</summary><pre>{esc(exhibit.script)}</pre></details>"
     return f"{head_html(exhibit, text)}{picture}{body_html(exhibit, text)}{script}"

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from rcilab.notebook.run_panel import RunPanel
     from rcilab.notebook.target_panel import TargetPanel
 
+_TAB = {"max_height": "540px", "overflow": "hidden auto"}  # No higher than the scene beside it, with its timeline.
 _TABS = {"jog": "jog", "target": "target", "plan": "plan", "check": "report", "run": "run", "faults": "faults"}
 """Words of each tab, and the attribute of what is on it."""
 
@@ -64,7 +65,7 @@ class Lab(Part):
         self.plot = MotionPlot(self, language=language)
         self.jog = JogPanel(self, language=language)
         self._parts: list[Part] = [self.scene, self.timeline, self.plot, self.jog]
-        self._places: dict[str, Any] = {name: lean(ipywidgets.VBox) for name in _TABS.values()}
+        self._places: dict[str, Any] = {name: lean(ipywidgets.VBox, layout=_TAB) for name in _TABS.values()}
         self._places["jog"].children = (self.jog.widget,)
         self.tabs: Any = lean(
             ipywidgets.Tab,

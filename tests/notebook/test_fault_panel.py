@@ -68,6 +68,8 @@ def test_a_fault_is_provoked_on_a_private_controller_looked_at_and_the_session_i
             for part in (panel.exhibit.told("cause", "zh"), *panel.exhibit.tell_way_out("zh"), panel.exhibit.script):
                 assert part in said
             assert "<circle" in panel._told.value
+            ticks = re.findall(r'text-anchor="end"[^>]*>([-0-9.e+]+)<', panel._told.value)
+            assert max(map(float, ticks)) > 1e4  # So are the ticks of its curve.
             assert panel.progress.layout.display == "none"
             with Timeline(panel) as timeline, MotionPlot(panel) as plot:
                 require_at_moment(panel.exhibit, scene, timeline, plot)
