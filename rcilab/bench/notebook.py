@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import queue
+import statistics
 import subprocess
 from typing import Any
 
@@ -26,6 +27,12 @@ display(lab)
 lab.scene.flush()
 time.perf_counter() - begin
 """
+_OPEN = """
+begin = time.perf_counter()
+for tab in range(len(lab.tabs.children)):
+    lab.tabs.selected_index = tab
+time.perf_counter() - begin
+"""
 _SLIDE = f"""
 def slide(angle):
     begin = time.perf_counter()
@@ -37,28 +44,30 @@ def slide(angle):
 
 
 def bench_lab_shown() -> Measurement:
-    """`Lab(model)` in a fresh kernel, from its import to all of it sent to the browser."""
-    times = [_ask_kernel(_SHOW) for _ in range(_KERNELS)]
-    return summarise("lab_shown", times, "s", 2.0, f"{_KERNELS} fresh kernels, the model loaded; imports included")
+    """`Lab(model)` in a fresh kernel, from its import to all that is seen of it sent to the browser."""
+    shown, opened = zip(*(_ask_kernel(_SHOW, _OPEN) for _ in range(_KERNELS)), strict=True)
+    note = (
+        f"{_KERNELS} fresh kernels, the model loaded; imports included; the other tabs are made when they are "
+        f"opened, {statistics.median(opened):.2f} s for all of them"
+    )
+    return summarise("lab_shown", shown, "s", 2.0, note)
 
 
 def bench_lab_slider() -> Measurement:
     """From a slider's message in the kernel to the new pose on its way to the inline scene, with all of `Lab` open."""
-    times = _ask_kernel(_SHOW, _SLIDE)
+    *_, times = _ask_kernel(_SHOW, _OPEN, _SLIDE)
     note = f"{_SLIDES} messages of a joint slider; scene, target, arm-angle circle and tables follow each"
     return summarise("lab_slider", times, "ms", 50.0, note)
 
 
-def _ask_kernel(*cells: str) -> Any:
-    """Returns the value of the last cell, run after the others in a kernel of its own."""
+def _ask_kernel(*cells: str) -> list[Any]:
+    """Returns the value of each cell, run one after the other in a kernel of its own."""
     from jupyter_client.manager import start_new_kernel
 
     manager, client = start_new_kernel(startup_timeout=_PATIENCE, stderr=subprocess.DEVNULL)
     try:
-        value = None
-        for cell in (_MAKE, *cells):
-            value = _run(client, cell)
-        return value
+        _run(client, _MAKE)
+        return [_run(client, cell) for cell in cells]
     finally:
         client.stop_channels()
         manager.shutdown_kernel(now=True)

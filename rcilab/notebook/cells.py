@@ -51,8 +51,10 @@ class Cells:
         return self._running.is_set()
 
     def adopt(self, thing: Owned) -> None:
-        """Ties something to the cell that is running now."""
-        self._owned.setdefault(self._current(), []).append(weakref.ref(thing))
+        """Ties something to the cell that is running now; what a press makes between two cells ends with its maker."""
+        cell = self._current()
+        if cell is not None:
+            self._owned.setdefault(cell, []).append(weakref.ref(thing))
         self._keep[id(thing)] = thing
 
     def forget(self, thing: Owned) -> None:
@@ -85,10 +87,12 @@ class Cells:
             with suppress(Exception):  # The process ends: what cannot be closed must not keep the others open.
                 thing.close()
 
-    def _current(self) -> str:
+    def _current(self) -> str | None:
         parent = self._shell.get_parent() if hasattr(self._shell, "get_parent") else {}
-        content = parent.get("content", {}).get("code", "")
-        return _name(parent.get("metadata", {}).get("cellId"), content)
+        content = parent.get("content", {})
+        if "code" not in content:
+            return None
+        return _name(parent.get("metadata", {}).get("cellId"), content["code"])
 
 
 def kernel_cells() -> Cells:

@@ -19,16 +19,17 @@ _NAME = 60.0  # What the name of the time axis takes at its end.
 _CURVE = "#0072B2"
 
 
-def draw_exhibit(exhibit: Exhibit, title: str, time: str) -> str:
+def draw_exhibit(exhibit: Exhibit, title: str, time: str, factor: float = 1.0) -> str:
     """Returns the picture.
 
     Args:
         exhibit: What is on show.
         title: What the curve is.
         time: What the time axis is called.
+        factor: From SI to the unit that is shown.
     """
-    t, values = np.array(exhibit.cycles["t"]), exhibit.signal.values
-    lower, upper = seen_lower(values, exhibit.signal.lower), exhibit.signal.upper
+    t, values = np.array(exhibit.cycles["t"]), factor * exhibit.signal.values
+    lower, upper = seen_lower(values, factor * exhibit.signal.lower), factor * exhibit.signal.upper
     known = np.isfinite(values)
     seen = [float(values[known].min()), float(values[known].max()), upper]
     seen += [lower] if math.isfinite(lower) else []
@@ -60,7 +61,7 @@ def draw_exhibit(exhibit: Exhibit, title: str, time: str) -> str:
     points = " ".join(f"{x(a):.1f},{y(b):.1f}" for a, b in zip(t[known].tolist(), values[known].tolist(), strict=True))
     out.append(f'<polyline points="{points}" fill="none" stroke="{_CURVE}" stroke-width="2"/>')
     if known[-1]:
-        out.append(f'<circle cx="{x(float(t[-1])):.1f}" cy="{y(exhibit.value):.1f}" r="5" fill="{BAD}"/>')
+        out.append(f'<circle cx="{x(float(t[-1])):.1f}" cy="{y(factor * exhibit.value):.1f}" r="5" fill="{BAD}"/>')
     frame = f'<rect x="{_LEFT:g}" y="{_TOP:g}" width="{right - _LEFT:g}" height="{bottom - _TOP:g}" fill="none" '
     return "".join(out) + f'{frame}stroke="{LINE}"/></svg>'
 

@@ -16,10 +16,13 @@ from rcilab.gallery.private_arm import PrivateArm
 from rcilab.gallery.shown import body_html, head_html
 from rcilab.gallery.table import FAULTS
 from rcilab.notebook.exhibit_plot import draw_exhibit
+from rcilab.notebook.exhibition import exhibition_of
 from rcilab.notebook.flight_recorder import record_html
+from rcilab.notebook.lean import lean
 from rcilab.notebook.look import block, esc, problem, soft, verdict, write
 from rcilab.notebook.part import Part
-from rcilab.words.text import Text
+from rcilab.supervisor.telling import tell_error
+from rcilab.words.text import Text, message
 
 _LOOK = 0.1  # [s] Between two looks at what is being provoked.
 
@@ -28,7 +31,8 @@ class FaultPanel(Part):
     """The twenty faults, which of them are set now, and the last milliseconds before a stop.
 
     "Provoke" has the chosen fault happen on a private virtual controller, which nobody else sees and which ends with
-    this panel; the robot of the notebook is not touched.
+    this panel; the robot of the notebook is not touched. `Scene`, `Timeline` and `MotionPlot` of the same arm go to the
+    moment of the fault, until somebody plans, poses or executes.
 
     Args:
         subject: A model, a session, or another part to look at the same arm as.
@@ -46,18 +50,19 @@ class FaultPanel(Part):
         self._work: Background[Fault, Exhibit] = Background("rcilab-gallery")
         self._ending = threading.Event()
         self._watcher: threading.Thread | None = None
-        self.fault: Any = ipywidgets.Dropdown(
-            description=text("fault.which"), layout=ipywidgets.Layout(width="100%", max_width="46em"),
+        self.fault: Any = lean(
+            ipywidgets.Dropdown, description=text("fault.which"), layout={"width": "100%", "max_width": "46em"},
             options=[(f"{text(f'learn.fault.{fault.name}')} · {fault.manual_name}", fault) for fault in Fault],
         )  # fmt: skip
         self.provoke = self._button("fault.provoke", self._provoke, icon="bolt", tooltip=text("fault.provoke_hint"))
         self.cancel = self._button("learn.cancel", self.halt, icon="times")
-        self.progress = ipywidgets.FloatProgress(min=0.0, max=1.0, layout=ipywidgets.Layout(width="14em"))
-        self._buttons = ipywidgets.HBox(
-            [self.provoke, self.progress, self.cancel], layout=ipywidgets.Layout(align_items="center")
+        self.moment = self._button("learn.moment", self._look, icon="crosshairs", tooltip=text("learn.moment_hint"))
+        self.progress = lean(ipywidgets.FloatProgress, min=0.0, max=1.0, layout=ipywidgets.Layout(width="14em"))
+        self._buttons = lean(
+            ipywidgets.HBox, [self.provoke, self.moment, self.progress, self.cancel], layout={"align_items": "center"}
         )
         self.build([self._now, self.fault, self._buttons, self._told, self._record], min_width="360px")
-        self.fault.observe(lambda _: self._tell(), names="value")
+        self.fault.observe(lambda _: self._on_fault(), names="value")
         self._rest()
         self.hear("robot", self._show)
         self.hear("run", lambda: write(self._record, record_html(self.state, self.text)))
@@ -85,10 +90,27 @@ class FaultPanel(Part):
         write(self._now, verdict("bad", "◆", text("fault.now", faults=names)))
         self.fault.value = faults[0]
 
+    @property
+    def _shown(self) -> Exhibit | None:
+        """The exhibit, if its fault is the one that is chosen."""
+        exhibit = self.exhibit
+        return exhibit if exhibit is not None and exhibit.fault is self.fault.value else None
+
+    def _on_fault(self) -> None:
+        if self._shown is None:
+            self.state.exhibit(None)
+        self._tell()
+
+    def _look(self) -> None:
+        """Shows the moment of the fault in scene, timeline and curves."""
+        if self._shown is not None:
+            self.state.exhibit(exhibition_of(self._shown))
+
     def _tell(self, said: str = "") -> None:
-        fault, text, exhibit = self.fault.value, self.text, self.exhibit
+        fault, text, exhibit = self.fault.value, self.text, self._shown
         has_no_elbow = FAULTS[fault].needs_elbow and self.model.n != 7
-        if exhibit is not None and exhibit.fault is fault:
+        self.moment.layout.display = "none" if exhibit is None else None
+        if exhibit is not None:
             told = _exhibit_html(exhibit, text)
         else:
             note = text("fault.no_elbow", model=self.model.name) if has_no_elbow else text("fault.private")
@@ -100,6 +122,7 @@ class FaultPanel(Part):
         self._end_watch()
         fault: Fault = self.fault.value
         self.exhibit = None
+        self.state.exhibit(None)
         self._work.start(fault, partial(self._arm.provoke, fault, self.model.name))
         self._tell(verdict("warn", "…", self.text("learn.provoking", fault=fault.manual_name)))
         self.progress.value = 0.0
@@ -126,9 +149,10 @@ class FaultPanel(Part):
 
     def _take(self, found: Exhibit | RcilabError) -> str:
         if isinstance(found, RcilabError):
-            return problem(self.text("learn.failed", error=str(found)))
+            return problem(self.text.say(message("learn.failed", error=tell_error(found))))
         self.exhibit = found
         self.fault.value = found.fault
+        self._look()
         return ""
 
     def _rest(self, said: str = "") -> None:
@@ -143,8 +167,12 @@ class FaultPanel(Part):
 
     def _button(self, code: str, act: Any, *, icon: str, tooltip: str = "") -> Any:
         said = self.text(code)
-        button = ipywidgets.Button(
-            description=said, tooltip=tooltip or said, icon=icon, layout=ipywidgets.Layout(width="auto")
+        button = lean(
+            ipywidgets.Button,
+            description=said,
+            tooltip=tooltip or said,
+            icon=icon,
+            layout=ipywidgets.Layout(width="auto"),
         )
         button.on_click(lambda _: act())
         return button
@@ -162,6 +190,7 @@ def _card_html(fault: Fault, text: Text) -> str:
 
 
 def _exhibit_html(exhibit: Exhibit, text: Text) -> str:
-    picture = draw_exhibit(exhibit, text(f"condition.{exhibit.condition.id}"), text("plot.time"))
+    factor = text.units.from_si(exhibit.condition.unit)[0]
+    picture = draw_exhibit(exhibit, text(f"condition.{exhibit.condition.id}"), text("plot.time"), factor)
     script = f"<details><summary>{esc(text('learn.script'))}</summary><pre>{esc(exhibit.script)}</pre></details>"
     return f"{head_html(exhibit, text)}{picture}{body_html(exhibit, text)}{script}"

@@ -12,6 +12,7 @@ from typing import Any
 import ipywidgets
 
 from rcilab.notebook.cells import kernel_cells
+from rcilab.notebook.lean import lean
 
 INTERVAL = 500  # [ms] A page in the background is throttled to once a second.
 SILENCE = 2.5  # [s] A choice: so long a page may be silent before it counts as gone.
@@ -21,8 +22,9 @@ class Heart:
     """Beats in every page that shows `widget`. No page has ever been seen in a run without a browser."""
 
     def __init__(self) -> None:
-        self.widget: Any = ipywidgets.Play(min=0, max=2**30, interval=INTERVAL, show_repeat=False)
-        self.widget.add_class("rl-heart")
+        self.widget: Any = lean(
+            ipywidgets.Play, min=0, max=2**30, interval=INTERVAL, show_repeat=False, classes=("rl-heart",)
+        )
         self._heard: float | None = None
         self.widget.observe(self._on_beat, names="value")
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rcilab.arrays import JointVector, frozen
+from rcilab.notebook.lean import lean
 from rcilab.notebook.look import block, verdict, write
 from rcilab.notebook.number_field import NumberField
 from rcilab.notebook.part import Part
@@ -39,22 +40,32 @@ class JogPanel(Part):
         low, high = np.degrees(limits.lower), np.degrees(limits.upper)
         self._before: list[JointVector] = []
         self._writing = False
-        self.sliders = [self._slider(j, float(low[j]), float(high[j]), continuous) for j in range(self.model.n)]
-        self.fields = [
-            NumberField(
-                self.text, "", "deg", round(float(low[j]), 6), round(float(high[j]), 6), self._taker(j), digits=2
+        if q is not None:
+            self.state.pose(q)
+        here: list[float] = np.degrees(self.state.goal).tolist()
+        names = [self.text("jog.joint", joint=j + 1) for j in range(self.model.n)]
+        self.sliders = [
+            lean(
+                ipywidgets.FloatSlider, value=here[j], tooltip=names[j], min=float(low[j]), max=float(high[j]),
+                step=_STEP_DEG, readout=False, continuous_update=continuous,
+                layout={"flex": "1 1 auto", "width": "auto", "min_width": "150px"},
             )
             for j in range(self.model.n)
-        ]
+        ]  # fmt: skip
+        self.fields = [
+            NumberField(
+                self.text, "", "deg", round(float(low[j]), 6), round(float(high[j]), 6), self._taker(j), digits=2,
+                of=names[j], value=here[j],
+            )
+            for j in range(self.model.n)
+        ]  # fmt: skip
         rows: list[Any] = []
         for slider, field in zip(self.sliders, self.fields, strict=True):
             slider.observe(self._on_slider, names="value")
-            rows += [self._row(slider, field), field.said]
+            rows += [_row(slider, field), field.said]
         buttons = [self._button(name) for name in ("home", "zero", "arm", "undo")]
         self._pose, self._reach = block(), block()
-        self.build([*rows, ipywidgets.HBox(buttons), self._pose, self._reach], min_width="360px")
-        if q is not None:
-            self.state.pose(q)
+        self.build([*rows, lean(ipywidgets.HBox, buttons), self._pose, self._reach], min_width="360px")
         self.hear("goal", self._show)
 
     @property
@@ -120,33 +131,19 @@ class JogPanel(Part):
         self._before = [*self._before[-19:], self.state.goal]
 
     def _button(self, name: str) -> Any:
-        button = ipywidgets.Button(
+        button = lean(
+            ipywidgets.Button,
             description=self.text(f"jog.{name}"),
             tooltip=self.text(f"jog.{name}_hint"),
-            layout=ipywidgets.Layout(width="auto"),
+            layout={"width": "auto"},
         )
         button.on_click(lambda _: self._on_button(name))
         return button
 
-    def _slider(self, joint: int, low: float, high: float, continuous: bool) -> Any:
-        return ipywidgets.FloatSlider(
-            tooltip=self.text("jog.joint", joint=joint + 1),
-            min=low,
-            max=high,
-            step=_STEP_DEG,
-            readout=False,
-            continuous_update=continuous,
-            layout=ipywidgets.Layout(flex="1 1 auto", width="auto", min_width="150px"),
-        )
 
-    def _row(self, slider: Any, field: NumberField) -> Any:
-        """Returns the slider between its limits, which is where a hand looks for them, and the number."""
-        name = slider.tooltip
-        field.box.tooltip = f"{name}: {field.box.tooltip}"
-        low, high = (_label(f"{end:.0f}°", "3.2em") for end in (slider.min, slider.max))
-        row = [_label(name, "4.4em"), low, slider, high, field.row]
-        return ipywidgets.HBox(row, layout=ipywidgets.Layout(align_items="center"))
-
-
-def _label(said: str, width: str) -> Any:
-    return ipywidgets.Label(said, layout=ipywidgets.Layout(width=width, display="flex", justify_content="center"))
+def _row(slider: Any, field: NumberField) -> Any:
+    """Returns the slider between its limits, which is where a hand looks for them, and the number."""
+    low, high = (f"<span>{end:.0f}°</span>" for end in (slider.min, slider.max))
+    before = block(f'<div class="rl-ends"><span>{slider.tooltip}</span>{low}</div>', width="8em", flex="0 0 auto")
+    behind = block(high, width="2.6em", flex="0 0 auto")
+    return lean(ipywidgets.HBox, [before, slider, behind, field.box, field.unit], layout={"align_items": "center"})

@@ -2,26 +2,40 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 import ipywidgets
 
-from rcilab.notebook.fault_panel import FaultPanel
+from rcilab.errors import UsageError
 from rcilab.notebook.jog_panel import JogPanel
+from rcilab.notebook.lean import lean
 from rcilab.notebook.look import PHASE_TONES, Tone, block, esc, write
 from rcilab.notebook.motion_plot import MotionPlot
 from rcilab.notebook.part import Part
 from rcilab.notebook.place import Place
-from rcilab.notebook.plan_panel import PlanPanel
-from rcilab.notebook.report_view import ReportView
-from rcilab.notebook.run_panel import RunPanel
+from rcilab.notebook.robot_words import name_phase
 from rcilab.notebook.scene import Scene, View
-from rcilab.notebook.target_panel import TargetPanel
 from rcilab.notebook.timeline import Timeline
+
+if TYPE_CHECKING:
+    from rcilab.notebook.fault_panel import FaultPanel
+    from rcilab.notebook.plan_panel import PlanPanel
+    from rcilab.notebook.report_view import ReportView
+    from rcilab.notebook.run_panel import RunPanel
+    from rcilab.notebook.target_panel import TargetPanel
+
+_TAB = {"max_height": "540px", "overflow": "hidden auto"}  # No higher than the scene beside it, with its timeline.
+_TABS = {"jog": "jog", "target": "target", "plan": "plan", "check": "report", "run": "run", "faults": "faults"}
+"""Words of each tab, and the attribute of what is on it."""
 
 
 class Lab(Part):
     """Everything in one cell; Stop is always in sight.
 
-    The parts are attributes (`lab.jog`, `lab.plan`, `lab.run`, ...), so that a cell can set what a hand can.
+    The parts are attributes (`lab.jog`, `lab.plan`, `lab.run`, ...), so that a cell can set what a hand can. What is on
+    a tab is made when the tab is opened, or the attribute asked for: the cell need not wait for what nobody sees.
 
     Args:
         subject: A model, a session, or another part to look at the same arm as.
@@ -50,47 +64,84 @@ class Lab(Part):
         self.timeline = Timeline(self, language=language)
         self.plot = MotionPlot(self, language=language)
         self.jog = JogPanel(self, language=language)
-        self.target = TargetPanel(self, language=language)
-        self.plan = PlanPanel(self, language=language)
-        self.report = ReportView(self, language=language)
-        self.run = RunPanel(self, language=language)
-        self.faults = FaultPanel(self, language=language)
-        self._parts: tuple[Part, ...] = (
-            self.scene, self.timeline, self.plot, self.jog, self.target, self.plan, self.report, self.run, self.faults
-        )  # fmt: skip
-        panels = {
-            "jog": self.jog, "target": self.target, "plan": self.plan, "check": self.report, "run": self.run,
-            "faults": self.faults,
-        }  # fmt: skip
-        self.tabs = ipywidgets.Tab(
-            children=[part.widget for part in panels.values()],
-            titles=[text(f"tab.{name}") for name in panels],
-            layout=ipywidgets.Layout(flex="1 1 410px", min_width="400px"),
+        self._parts: list[Part] = [self.scene, self.timeline, self.plot, self.jog]
+        self._places: dict[str, Any] = {name: lean(ipywidgets.VBox, layout=_TAB) for name in _TABS.values()}
+        self._places["jog"].children = (self.jog.widget,)
+        self.tabs: Any = lean(
+            ipywidgets.Tab,
+            children=list(self._places.values()),
+            titles=[text(f"tab.{name}") for name in _TABS],
+            selected_index=0,
+            layout={"flex": "1 1 410px", "min_width": "400px"},
         )
-        self.stop = ipywidgets.Button(
-            description=text("run.stop"), tooltip=text("run.stop_hint"), button_style="danger", icon="stop",
-            layout=ipywidgets.Layout(width="8em", flex="0 0 auto"),
+        self.tabs.observe(self._on_tab, names="selected_index")
+        self.stop = lean(
+            ipywidgets.Button, description=text("run.stop"), tooltip=text("run.stop_hint"), button_style="danger",
+            icon="stop", classes=("rl-stop",), layout={"width": "8em", "flex": "0 0 auto"},
         )  # fmt: skip
-        self.stop.add_class("rl-stop")
         self.stop.on_click(lambda _: self.halt())
         self._title = block(flex="1 1 auto")
-        bar = ipywidgets.HBox([self._title, self.stop], layout=ipywidgets.Layout(align_items="center"))
-        left = ipywidgets.VBox(
-            [self.scene.widget, self.timeline.widget], layout=ipywidgets.Layout(flex="1.4 1 360px", min_width="350px")
+        bar = lean(ipywidgets.HBox, [self._title, self.stop], layout={"align_items": "center"})
+        left = lean(
+            ipywidgets.VBox,
+            [self.scene.widget, self.timeline.widget],
+            layout={"flex": "1.4 1 360px", "min_width": "350px"},
         )
-        body = ipywidgets.HBox([left, self.tabs], layout=ipywidgets.Layout(flex_flow="row wrap", grid_gap="10px"))
+        body = lean(ipywidgets.HBox, [left, self.tabs], layout={"flex_flow": "row wrap", "grid_gap": "10px"})
         self.build([bar, body, self.plot.widget], width="100%")
         self._ends.append(self.state.hear("plan", self._show))
         self.hear("robot", self._show)
+        if self.state.session is not None:
+            self._open("run")  # It looks after the robot that there is.
+
+    @cached_property
+    def target(self) -> TargetPanel:
+        """Pose of the tool, branches, arm angle."""
+        return self._make("target", "TargetPanel")
+
+    @cached_property
+    def plan(self) -> PlanPanel:
+        """Way, speed, law."""
+        return self._make("plan", "PlanPanel")
+
+    @cached_property
+    def report(self) -> ReportView:
+        """The judgement of the plan."""
+        return self._make("report", "ReportView")
+
+    @cached_property
+    def run(self) -> RunPanel:
+        """Robot, power, mode, Execute."""
+        return self._make("run", "RunPanel")
+
+    @cached_property
+    def faults(self) -> FaultPanel:
+        """Gallery and flight recorder."""
+        return self._make("faults", "FaultPanel")
 
     def halt(self) -> None:
         """Brings the robot to rest; from any thread, without waiting."""
-        self.run.halt()
+        self.state.halt()
 
     def end(self) -> None:
         """Ends every part with what it started."""
         for part in reversed(self._parts):
             part.close()
+
+    def _make(self, name: str, kind: str) -> Any:
+        if self._closed:
+            raise UsageError(f"this lab was closed, and {name} with it: run its cell again")
+        part = getattr(import_module("rcilab.notebook"), kind)(self, language=self.text.language)
+        self._parts.append(part)
+        self._places[name].children = (part.widget,)
+        return part
+
+    def _on_tab(self, change: Any) -> None:
+        if change["new"] is not None:
+            self._open(list(_TABS.values())[change["new"]])
+
+    def _open(self, name: str) -> None:
+        getattr(self, name)
 
     def _show(self) -> None:
         state, text = self.state, self.text
@@ -98,7 +149,7 @@ class Lab(Part):
         phase = "closed" if status is None else status.phase
         unpowered = status is not None and phase == "idle" and status.powered is False
         tone: Tone = "none" if status is None else "warn" if unpowered else PHASE_TONES.get(phase, "bad")
-        chips = _chip(tone, text("phase.unpowered" if unpowered else f"phase.{phase}"))
+        chips = _chip(tone, name_phase(status, text))
         if state.plan is not None:
             ok = state.plan.report.ok
             duration = f"{state.plan.motion.duration:.2f} s"

@@ -9,6 +9,8 @@ from typing import Any, Literal
 
 import ipywidgets
 
+from rcilab.notebook.lean import is_shared, lean, once
+
 Tone = Literal["good", "warn", "bad", "none"]
 
 PHASE_TONES: dict[str, Tone] = {
@@ -29,13 +31,13 @@ def _sheet() -> str:
 
 
 def style_sheet() -> Any:
-    """Returns the widget that carries the style sheet; it takes no room."""
-    return ipywidgets.HTML(f"<style>{_sheet()}</style>", layout=ipywidgets.Layout(display="none"))
+    """Returns the widget that carries the style sheet, one for all parts; it takes no room."""
+    return once("sheet", lambda: lean(ipywidgets.HTML, f"<style>{_sheet()}</style>", layout={"display": "none"}))
 
 
 def block(content: str = "", **layout: str) -> Any:
     """Returns a widget that shows HTML."""
-    return ipywidgets.HTML(f'<div class="rl">{content}</div>' if content else "", layout=ipywidgets.Layout(**layout))
+    return lean(ipywidgets.HTML, f'<div class="rl">{content}</div>' if content else "", layout=layout)
 
 
 def write(widget: Any, content: str) -> None:
@@ -73,11 +75,12 @@ def table(heads: list[str], rows: list[list[str]], *, right: bool = False) -> st
 
 
 def close_tree(widget: Any) -> None:
-    """Closes a widget with everything in it; ipywidgets keeps what is not closed for as long as the kernel lives."""
+    """Closes a widget with all that is its own; ipywidgets keeps what is not closed as long as the kernel lives."""
     for child in getattr(widget, "children", ()):
         close_tree(child)
     for name in ("layout", "style"):
         part = getattr(widget, name, None)
-        if isinstance(part, ipywidgets.Widget):
+        if isinstance(part, ipywidgets.Widget) and not is_shared(part):
             part.close()
-    widget.close()
+    if not is_shared(widget):
+        widget.close()

@@ -8,6 +8,7 @@ from typing import Any
 import ipywidgets
 
 from rcilab.client.control_settings import ControlPart, ControlSettings, control_ranges, standard_control
+from rcilab.notebook.lean import lean
 from rcilab.notebook.look import block, esc, head, problem, soft, table, verdict, write
 from rcilab.notebook.number_field import NumberField
 from rcilab.notebook.parameter_desk import ParameterDesk
@@ -17,6 +18,7 @@ from rcilab.state import MODES
 from rcilab.supervisor import SupervisorStatus
 from rcilab.words.text import Text
 
+_WIDTHS = ("8em", "3.4em", "4.2em")  # So that two fields stand in a row inside `Lab`.
 _OPEN: tuple[ControlPart, ...] = ("joint_stiffness", "cartesian_stiffness")
 
 
@@ -32,9 +34,10 @@ class ModeFields:
     def __init__(self, state: LabState, text: Text, desk: ParameterDesk) -> None:
         self._state, self._text, self._desk = state, text, desk
         self._ranges = control_ranges(state.model.limits)
-        self.mode: Any = ipywidgets.Dropdown(
-            description=text("mode.choose"), options=[(text(f"mode.{mode}"), mode) for mode in MODES],
-            value=state.mode, tooltip=text("mode.hint"), layout=ipywidgets.Layout(width="24em"),
+        self.mode: Any = lean(
+            ipywidgets.Dropdown, description=text("mode.choose"),
+            options=[(text(f"mode.{mode}"), mode) for mode in MODES],
+            value=state.mode, tooltip=text("mode.hint"), layout={"width": "24em"},
         )  # fmt: skip
         self._note, self._held, self._said = block(), block(), block()
         self.fields: dict[ControlPart, list[NumberField]] = {}
@@ -43,11 +46,11 @@ class ModeFields:
         self.send = self._button("control.send", self._on_send)
         self.reset = self._button("control.reset", desk.reset)
         self._shown: ControlSettings | None = None
-        self.choice = ipywidgets.VBox([self.mode, self._note])
-        self.parameters = ipywidgets.VBox([
+        self.choice = lean(ipywidgets.VBox, [self.mode, self._note])
+        self.parameters = lean(ipywidgets.VBox, [
             block(head(text("control.title"))),
             *self.folders.values(),
-            ipywidgets.HBox([self.send, self.reset]),
+            lean(ipywidgets.HBox, [self.send, self.reset]),
             self._said,
             self._held,
         ])  # fmt: skip
@@ -95,9 +98,10 @@ class ModeFields:
 
     def _folder(self, part: ControlPart) -> Any:
         """Returns a folder whose fields are made when it is opened: forty of them would delay the cell."""
-        inside = ipywidgets.Box(layout=ipywidgets.Layout(flex_flow="row wrap"))
-        folder = ipywidgets.Accordion(
-            children=[inside], titles=(name_part(self._text, part, self._ranges[part]),), selected_index=None,
+        inside = lean(ipywidgets.Box, layout={"flex_flow": "row wrap"})
+        folder = lean(
+            ipywidgets.Accordion, children=[inside], titles=(name_part(self._text, part, self._ranges[part]),),
+            selected_index=None,
             layout=ipywidgets.Layout(display="none"),
         )  # fmt: skip
 
@@ -105,7 +109,10 @@ class ModeFields:
             if change["new"] == 0 and part not in self.fields:
                 self.fields[part] = [self._field(part, place) for place in range(len(self._ranges[part]))]
                 self._fill(part)
-                cells = [ipywidgets.VBox([field.row, field.said]) for field in self.fields[part]]
+                cells = [
+                    lean(ipywidgets.VBox, [lean(ipywidgets.HBox, field.cells), field.said])
+                    for field in self.fields[part]
+                ]
                 inside.children = tuple(cells)
 
         folder.observe(open_it, names="selected_index")
@@ -114,10 +121,8 @@ class ModeFields:
     def _field(self, part: ControlPart, place: int) -> NumberField:
         low, high, unit = self._ranges[part][place]
         take = partial(self._desk.set_number, part, place)
-        field = NumberField(self._text, name_number(self._text, part, place), unit, low, high, take, digits=None)
-        field.box.layout.width, field.box.style.description_width = "8em", "3.4em"  # Two a row inside `Lab`.
-        field.unit.layout.width = "4.2em"
-        return field
+        name = name_number(self._text, part, place)
+        return NumberField(self._text, name, unit, low, high, take, digits=None, widths=_WIDTHS)
 
     def _fill(self, part: ControlPart) -> None:
         numbers = shown_numbers(self._state.control, part, self._state.model.limits)
@@ -125,8 +130,11 @@ class ModeFields:
             field.show(number)
 
     def _button(self, code: str, act: Any) -> Any:
-        button = ipywidgets.Button(
-            description=self._text(code), tooltip=self._text(f"{code}_hint"), layout=ipywidgets.Layout(width="auto")
+        button = lean(
+            ipywidgets.Button,
+            description=self._text(code),
+            tooltip=self._text(f"{code}_hint"),
+            layout=ipywidgets.Layout(width="auto"),
         )
         button.on_click(lambda _: act())
         return button

@@ -8,6 +8,7 @@ import ipywidgets
 import numpy as np
 
 from rcilab.clock import CYCLE_TIME
+from rcilab.notebook.lean import lean
 from rcilab.notebook.look import block, soft, write
 from rcilab.notebook.part import Part
 from rcilab.notebook.svg_plot import Panel, draw, share_of
@@ -51,19 +52,19 @@ class MotionPlot(Part):
         super().__init__(subject, language)
         self._quantities = quantities
         names = [self.text("timeline.all"), *(self.text("jog.joint", joint=j + 1) for j in range(self.model.n))]
-        self.joint: Any = ipywidgets.Dropdown(
+        self.joint: Any = lean(
+            ipywidgets.Dropdown,
             description=self.text("timeline.joint"),
             options=[(name, number) for number, name in enumerate(names)],
             value=joint,
-            layout=ipywidgets.Layout(width="22em"),
+            layout={"width": "22em"},
         )
         self._kinds = block()
         self._curves, self._cursor = block(), block()
         self._end = 1.0
         self._name = f"rl-plot-{id(self)}"
-        bar = ipywidgets.HBox([self.joint, self._kinds], layout=ipywidgets.Layout(align_items="center"))
-        self.build([bar, self._curves, self._cursor], width="100%")
-        self._root.add_class(self._name)
+        bar = lean(ipywidgets.HBox, [self.joint, self._kinds], layout={"align_items": "center"})
+        self.build([bar, self._curves, self._cursor], self._name, width="100%")
         self.joint.observe(lambda _: self._draw(), names="value")
         self._ends.append(self.state.hear("run", self._draw))
         self.hear("plan", self._draw)
@@ -76,13 +77,13 @@ class MotionPlot(Part):
 
     def _draw(self) -> None:
         state = self.state
-        plan = None if state.plan is None else state.plan.motion
+        plan = None if state.seen is None else state.seen.motion
         if plan is None:
             write(self._curves, soft(self.text("timeline.nothing")))
             write(self._kinds, "")
             self._point()
             return
-        joint, limits, run = int(self.joint.value), self.model.limits.joint, state.run
+        joint, limits, run = int(self.joint.value), self.model.limits.joint, state.seen_run
         times = None if run is None else run.t - run.delay * CYCLE_TIME
         panels: list[Panel] = []
         for quantity in self._quantities:
@@ -112,7 +113,7 @@ class MotionPlot(Part):
 
     def _point(self) -> None:
         moment = self.state.moment
-        if moment is None or self.state.plan is None:
+        if moment is None or self.state.seen is None:
             write(self._cursor, "")
             return
         place = f"display:block;left:{100.0 * share_of(moment, self._end):.2f}%"

@@ -7,10 +7,13 @@ from typing import Any
 
 import ipywidgets
 
+from rcilab.notebook.lean import lean
 from rcilab.notebook.look import block, problem, write
 from rcilab.words.number import parse_number
 from rcilab.words.rounding import fixed
 from rcilab.words.text import Text
+
+_LABELLED, _BARE = ("9.5em", "4em", "2.6em"), ("5.2em", "", "2.6em")
 
 
 class NumberField:
@@ -24,6 +27,9 @@ class NumberField:
         high: Largest one.
         take: Called with a number that is taken.
         digits: Digits after the point that are shown; None: as many as it takes.
+        of: What the number is, where it stands beside the field instead of before it.
+        value: What stands in it at first.
+        widths: Of the field with its label, of the label, and of the unit.
     """
 
     def __init__(
@@ -36,21 +42,27 @@ class NumberField:
         take: Callable[[float], None],
         *,
         digits: int | None = 1,
+        of: str = "",
+        value: float | None = None,
+        widths: tuple[str, str, str] | None = None,
     ) -> None:
         self._text, self._unit, self._low, self._high, self._take = text, unit, low, high, take
         self._digits = digits
-        self._shown = ""
+        self._shown = self._write(value)
         hint = text("field.hint", low=_short(low), high=_short(high), unit=unit)
-        self.box = ipywidgets.Text(
-            description=label, tooltip=hint, continuous_update=False, layout=ipywidgets.Layout(width="5.2em")
-        )
-        if label:
-            self.box.layout.width = "9.5em"
-            self.box.style.description_width = "4em"
-        self.unit = ipywidgets.Label(unit, layout=ipywidgets.Layout(width="2.6em"))
+        box, before, behind = widths or (_LABELLED if label else _BARE)
+        self.box: Any = lean(
+            ipywidgets.Text, value=self._shown, description=label, tooltip=f"{of}: {hint}" if of else hint,
+            continuous_update=False, layout={"width": box}, style={"description_width": before},
+        )  # fmt: skip
+        self.unit: Any = lean(ipywidgets.Label, unit, layout={"width": behind})
         self.said: Any = block()
-        self.row = ipywidgets.HBox([self.box, self.unit])
         self.box.observe(self._on_typed, names="value")
+
+    @property
+    def cells(self) -> list[Any]:
+        """The field and its unit, to stand in a row."""
+        return [self.box, self.unit]
 
     @property
     def problem(self) -> bool:
@@ -59,10 +71,15 @@ class NumberField:
 
     def show(self, value: float) -> None:
         """Shows a number, whatever was typed."""
-        self._shown = f"{value:g}" if self._digits is None else fixed(value, self._digits)
+        self._shown = self._write(value)
         write(self.said, "")
         if self.box.value != self._shown:
             self.box.value = self._shown
+
+    def _write(self, value: float | None) -> str:
+        if value is None:
+            return ""
+        return f"{value:g}" if self._digits is None else fixed(value, self._digits)
 
     def _on_typed(self, change: Any) -> None:
         if change["new"] == self._shown:

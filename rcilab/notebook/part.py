@@ -10,6 +10,7 @@ import ipywidgets
 from rcilab.closing import Closing
 from rcilab.model import RobotModel
 from rcilab.notebook.cells import kernel_cells
+from rcilab.notebook.lean import lean
 from rcilab.notebook.look import close_tree, style_sheet
 from rcilab.notebook.state import LabState, Topic, state_of
 from rcilab.words.text import Text
@@ -51,10 +52,10 @@ class Part(Closing):
         self._ends.append(self.state.hear(topic, act))
         act()
 
-    def build(self, children: Sequence[Any], **layout: str) -> None:
+    def build(self, children: Sequence[Any], *classes: str, **layout: str) -> None:
         """Takes the widgets that this part is made of, one below the other."""
-        self._root = ipywidgets.VBox([style_sheet(), *children], layout=ipywidgets.Layout(**layout))
-        self._root.add_class("rl-root")
+        own = ipywidgets.Layout(**layout)
+        self._root = lean(ipywidgets.VBox, [style_sheet(), *children], layout=own, classes=("rl-root", *classes))
 
     def halt(self) -> None:
         """Brings to rest what this part moves; most move nothing."""

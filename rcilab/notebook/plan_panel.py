@@ -6,6 +6,7 @@ from typing import Any
 
 import ipywidgets
 
+from rcilab.notebook.lean import lean
 from rcilab.notebook.look import block, soft, verdict, write
 from rcilab.notebook.number_field import NumberField
 from rcilab.notebook.part import Part
@@ -26,35 +27,42 @@ class PlanPanel(Part):
     def __init__(self, subject: object, *, language: str = "en") -> None:
         super().__init__(subject, language)
         state, text = self.state, self.text
-        wide = ipywidgets.Layout(width="24em")
-        self.way = ipywidgets.Dropdown(
-            description=text("plan.way"), options=[(text(f"way.{way}"), way) for way in WAYS], value=state.way,
+        wide = {"width": "24em"}
+        self.way = lean(
+            ipywidgets.Dropdown, description=text("plan.way"), options=[(text(f"way.{way}"), way) for way in WAYS],
+            value=state.way,
             layout=wide,
         )  # fmt: skip
-        self.law = ipywidgets.Dropdown(
-            description=text("target.law"), options=[(text(f"law.{law}"), law) for law in LAWS], value=state.law,
+        self.law = lean(
+            ipywidgets.Dropdown, description=text("target.law"), options=[(text(f"law.{law}"), law) for law in LAWS],
+            value=state.law,
             tooltip=text("target.law_hint"), layout=wide,
         )  # fmt: skip
-        self.speed = ipywidgets.FloatSlider(
-            description=text("target.speed"), min=_SLOWEST, max=100.0, step=1.0, value=100.0 * state.speed,
-            readout=False, tooltip=text("target.speed_hint"), layout=ipywidgets.Layout(width="19em"),
+        self.speed = lean(
+            ipywidgets.FloatSlider, description=text("target.speed"), min=_SLOWEST, max=100.0, step=1.0,
+            value=100.0 * state.speed,
+            readout=False, tooltip=text("target.speed_hint"), layout={"width": "19em"},
         )  # fmt: skip
         self._speed_field = NumberField(text, "", "%", _SLOWEST, 100.0, self._set_speed)
-        self.plan = ipywidgets.Button(
-            description=text("target.plan"), icon="check", button_style="primary", tooltip=text("target.plan_hint")
+        self.plan = lean(
+            ipywidgets.Button,
+            description=text("target.plan"),
+            icon="check",
+            button_style="primary",
+            tooltip=text("target.plan_hint"),
         )
-        self.slow_down = ipywidgets.Button(
-            description=text("plan.slow_down"), tooltip=text("plan.slow_down_hint"),
+        self.slow_down = lean(
+            ipywidgets.Button, description=text("plan.slow_down"), tooltip=text("plan.slow_down_hint"),
             layout=ipywidgets.Layout(width="auto", display="none"),
         )  # fmt: skip
         self._said = block()
         self.build([
             self.way,
-            ipywidgets.HBox([self.speed, self._speed_field.row], layout=ipywidgets.Layout(align_items="center")),
+            lean(ipywidgets.HBox, [self.speed, *self._speed_field.cells], layout={"align_items": "center"}),
             self._speed_field.said,
             self.law,
             block(soft(text("target.law_hint"))),
-            ipywidgets.HBox([self.plan, self.slow_down]),
+            lean(ipywidgets.HBox, [self.plan, self.slow_down]),
             self._said,
         ], min_width="360px")  # fmt: skip
         self.way.observe(self._on_way, names="value")

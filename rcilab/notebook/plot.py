@@ -19,6 +19,7 @@ from rcilab.limits import JointLimits
 from rcilab.model import RobotModel, require_model
 from rcilab.motion.motion import Motion, require_motion
 from rcilab.notebook.installed import require_installed
+from rcilab.notebook.palette import JOINT_COLORS
 from rcilab.views.plots import QUANTITIES, recorded_curves
 
 if TYPE_CHECKING:
@@ -28,8 +29,6 @@ if TYPE_CHECKING:
     from rcilab.conformance.report import Violation
     from rcilab.recording.run import Run
 
-# Okabe and Ito's palette, told apart with every kind of colour vision, without its yellow (too pale on white).
-JOINT_COLORS = ("#0072B2", "#E69F00", "#009E73", "#D55E00", "#56B4E9", "#CC79A7", "#000000")
 VIOLATION_COLOR = "#B00020"
 BEYOND_LIMIT_COLOR = "#808080"
 

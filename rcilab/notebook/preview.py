@@ -7,7 +7,7 @@ import math
 import os
 import warnings
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,11 +16,13 @@ from rcilab.arrays import Array, as_vector
 from rcilab.closing import Closing
 from rcilab.errors import UsageError
 from rcilab.model import RobotModel, require_model
-from rcilab.motion.motion import Motion
 from rcilab.notebook.installed import require_installed
 from rcilab.notebook.place import find_place
 from rcilab.robots.upright import upright_joints
 from rcilab.views.arm_view import ArmView
+
+if TYPE_CHECKING:
+    from rcilab.motion.motion import Motion
 
 HEIGHT = 420  # [px]
 _RATE = 30  # [1/s] Keyframes; the viewer turns smoothly between them.
@@ -50,7 +52,8 @@ class Preview(Closing):
     def __init__(self, what: Motion | ArrayLike, model: RobotModel, *, live: bool = True, height: int = HEIGHT) -> None:
         require_installed("meshcat", "preview")
         require_model(model)
-        pose = as_vector(what.start if isinstance(what, Motion) else what, model.n, "q", "rad")
+        motion = _motion_in(what)
+        pose = as_vector(cast("ArrayLike", what) if motion is None else motion.start, model.n, "q", "rad")
         with warnings.catch_warnings():  # meshcat 0.3 loads pyzmq's old event loop, which says that it is old.
             warnings.simplefilter("ignore", DeprecationWarning)
             from rcilab.views.meshcat_scene import MeshcatScene
@@ -63,9 +66,9 @@ class Preview(Closing):
         self._arm = ArmView(self._scene, "arm", model, quality="fine" if live else "coarse")
         self._arm.show(pose)
         self._moving = False
-        if isinstance(what, Motion):
-            ArmView(self._scene, "goal", model, "plan").show(what.goal)
-            self._animate(what)
+        if motion is not None:
+            ArmView(self._scene, "goal", model, "plan").show(motion.goal)
+            self._animate(motion)
         self._markup = ""
         aim_camera(self._scene.visualizer)
         if not live:
@@ -164,6 +167,13 @@ def aim_camera(visualizer: Any) -> None:
     visualizer["/Grid"].set_property("visible", False)  # Lines out to 20 m, far larger than any arm.
     x, y, z = _CAMERA_POSITION
     visualizer["/Cameras/default/rotated/<object>"].set_property("position", [x, z, -y])  # Its y axis points up.
+
+
+def _motion_in(what: Motion | ArrayLike) -> Motion | None:
+    """Returns what is to be played, if it is a motion."""
+    from rcilab.motion.motion import Motion
+
+    return what if isinstance(what, Motion) else None
 
 
 def _keyframes(motion: Motion) -> tuple[Array, Array]:

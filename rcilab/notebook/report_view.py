@@ -65,7 +65,7 @@ class ReportView(Part):
         facts += [text("check.joint", joint=row.joint)] if row.joint else []
         facts += [explain_place(row, text.language)] if row.links is not None else []
         facts.append(f"t = {row.time:.3f} s")
-        fault = "" if condition.fault is None else "; " + text("check.raises", fault=condition.fault.manual_name)
+        fault = "" if condition.fault is None else " · " + text("check.raises", fault=condition.fault.manual_name)
         source = explain_source(condition, text.language)
         return (
             f'<div class="rl-card rl-{tone}"><div class="rl-row"><b>{esc(text(f"condition.{condition.id}"))}</b>'

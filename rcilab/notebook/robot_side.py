@@ -39,7 +39,7 @@ class Outcome:
     """What came of something that was asked for."""
 
     what: str
-    """"execute", "control", "power_on", "power_off", "recover" or "connect"."""
+    """"execute", "pace", "control", "power_on", "power_off", "recover" or "connect"."""
     run: Run | None = None
     error: RcilabError | None = None
 
@@ -91,6 +91,15 @@ class RobotSide(Protocol):
 
         Raises:
             UsageError: The arm moves, or something else is under way.
+        """
+        ...
+
+    def set_pace(self, pace: float) -> None:
+        """Runs the motion under way at part of its planned speed; 0 holds it. An outcome tells when that is taken.
+
+        Raises:
+            PlanningError: There is no way within the limits to change from here; it goes on as it is.
+            UsageError: No motion is under way, or this machine is too busy.
         """
         ...
 
@@ -173,6 +182,11 @@ class SupervisedRobot:
         """Tells the controller parameters of the modes."""
         self._tickets.append(("control", self._supervisor.set_up(RobotSetup(control=control))))
 
+    def set_pace(self, pace: float) -> None:
+        """Runs the motion under way at part of its planned speed; 0 holds it."""
+        asked = self._supervisor.set_pace(pace) if pace else self._supervisor.pause()
+        self._tickets.append(("pace", asked))
+
     def stop(self) -> None:
         """Brings a running motion to rest."""
         try:
@@ -232,6 +246,7 @@ class SessionRobot:
         self._what = ""
         self._done: list[Outcome] = []
         self._time: tuple[float, float] = (0.0, 0.0)
+        self._pace: float | None = None  # None: the motion runs as it was planned.
         self._powered: bool | None = None
         self._held = RobotSetup()  # What it was told from here.
         self._power_seen = float("-inf")
@@ -257,9 +272,10 @@ class SessionRobot:
         except UsageError:  # Another cell moves the arm, or the session was closed.
             return self._last
         phase = "fault" if state.faults else "moving" if is_moving else "idle"
+        is_held = phase == "moving" and self._pace == 0.0
         return SupervisorStatus(
             phase=phase,
-            code=phase,
+            code="moving.held" if is_held else phase,
             target=self.name,
             address=self.name,
             q=state.q,
@@ -275,6 +291,8 @@ class SessionRobot:
             setup=self._held,
             motion_time=self._time[0] if self._time[1] else None,
             motion_duration=self._time[1] or None,
+            motion_place=self._time[0] if self._time[1] and self._pace is None else None,  # Who paces tells no place.
+            pace=1.0 if self._pace is None else self._pace,
         )
 
     def power(self, on: bool) -> None:
@@ -289,6 +307,7 @@ class SessionRobot:
         """Streams a checked motion in a thread of the kernel."""
         certificate = plan.report.require().certificate
         go, told = self._session.execute, self._on_progress
+        self._time, self._pace = (0.0, 0.0), None
         self._do("execute", lambda: go(plan.motion, certificate, progress=told, mode=plan.mode))
 
     def set_control(self, control: ControlSettings) -> None:
@@ -299,6 +318,15 @@ class SessionRobot:
             self._held = self._held.updated(RobotSetup(control=control))
 
         self._do("control", tell)
+
+    def set_pace(self, pace: float) -> None:
+        """Runs the motion under way at part of its planned speed; 0 holds it."""
+        if pace:
+            self._session.set_pace(pace)
+        else:
+            self._session.pause()
+        self._pace = pace
+        self._done.append(Outcome(what="pace"))
 
     def stop(self) -> None:
         """Brings a running motion to rest, also one that a cell has started."""

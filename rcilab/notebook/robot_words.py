@@ -9,7 +9,7 @@ from rcilab.model import RobotModel
 from rcilab.notebook.look import head, table, verdict
 from rcilab.notebook.robot_side import BusyError, Outcome
 from rcilab.supervisor import SupervisorStatus
-from rcilab.supervisor.telling import tell_error, tell_status
+from rcilab.supervisor.telling import phase_code, tell_error, tell_status
 from rcilab.words.text import Message, Text, message
 
 
@@ -19,7 +19,7 @@ def name_phase(status: SupervisorStatus | None, text: Text) -> str:
         return text("phase.closed")
     if status.phase == "idle" and status.powered is False:
         return text("phase.unpowered")
-    return text(f"phase.{status.phase}")
+    return text(phase_code(status))
 
 
 def tell_trouble(status: SupervisorStatus | None, text: Text) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import threading
 from collections.abc import Callable
 from typing import Any
@@ -11,8 +10,11 @@ import ipywidgets
 
 from rcilab.errors import RcilabError
 from rcilab.notebook.heart import Heart
+from rcilab.notebook.lean import lean
 from rcilab.notebook.look import PHASE_TONES, block, problem, soft, verdict, write
 from rcilab.notebook.mode_fields import ModeFields
+from rcilab.notebook.pace_desk import PaceDesk
+from rcilab.notebook.pace_fields import PaceFields
 from rcilab.notebook.parameter_desk import ParameterDesk
 from rcilab.notebook.part import Part
 from rcilab.notebook.ready import obstacle
@@ -45,16 +47,18 @@ class RunPanel(Part):
         self._heart = Heart()
         self._ending = threading.Event()
         self._watcher: threading.Thread | None = None
-        self.target = ipywidgets.Dropdown(
-            description=text("run.robot"), options=[(text(f"robot.{name}"), name) for name in _TARGETS],
-            layout=ipywidgets.Layout(width="24em"),
+        self.target = lean(
+            ipywidgets.Dropdown, description=text("run.robot"),
+            options=[(text(f"robot.{name}"), name) for name in _TARGETS],
+            layout={"width": "24em"},
         )  # fmt: skip
-        self.address = ipywidgets.Text(
-            description=text("run.address"), placeholder="rci://192.168.0.160:1337", tooltip=text("run.address_hint"),
+        self.address = lean(
+            ipywidgets.Text, description=text("run.address"), placeholder="rci://192.168.0.160:1337",
+            tooltip=text("run.address_hint"),
             layout=ipywidgets.Layout(width="24em", display="none"),
         )  # fmt: skip
-        self.connect = self._button("run.connect", self._on_connect, icon="plug")
-        self.disconnect = self._button("run.disconnect", self._on_disconnect)
+        self.connect = self._button("run.connect", self._on_connect, icon="plug", own=True)
+        self.disconnect = self._button("run.disconnect", self._on_disconnect, own=True)
         self.power_on = self._button("run.power_on", lambda: self._robot.power(True), icon="power-off")
         self.power_off = self._button("run.power_off", lambda: self._robot.power(False))
         self.recover = self._button("run.recover", lambda: self._robot.recover())
@@ -63,25 +67,29 @@ class RunPanel(Part):
         self.stop.add_class("rl-stop")
         self.yes = self._button("run.confirm", self._move, style="danger")
         self.no = self._button("run.cancel", self._forget_question)
-        self.progress = ipywidgets.FloatProgress(
-            min=0.0, max=1.0, layout=ipywidgets.Layout(width="100%", visibility="hidden")
+        self.progress = lean(
+            ipywidgets.FloatProgress, min=0.0, max=1.0, layout=ipywidgets.Layout(width="100%", visibility="hidden")
         )
         self._said, self._where, self._plan, self._question = block(), block(), block(), block()
         self._health, self._outcome = block(), block()
+        self._running = 0.0  # [s] Planned duration of the motion under way.
+        self._pacing = PaceDesk(self.state)
+        self.pace = PaceFields(self.state, text, self._pacing)
         self._desk = ParameterDesk(self.state)
         self.modes = ModeFields(self.state, text, self._desk)
-        self._answers = ipywidgets.HBox([self.yes, self.no], layout=ipywidgets.Layout(display="none"))
-        self._choice = ipywidgets.VBox([self.target, self.address])
+        self._answers = lean(ipywidgets.HBox, [self.yes, self.no], layout=ipywidgets.Layout(display="none"))
+        self._choice = lean(ipywidgets.VBox, [self.target, self.address], layout=ipywidgets.Layout())
         self.build([
             self._heart.widget,
             self._choice,
-            ipywidgets.HBox([self.connect, self.disconnect]),
+            lean(ipywidgets.HBox, [self.connect, self.disconnect]),
             self._said,
             self._where,
-            ipywidgets.HBox([self.power_on, self.power_off, self.recover]),
+            lean(ipywidgets.HBox, [self.power_on, self.power_off, self.recover]),
             self.modes.choice,
             self._plan,
-            ipywidgets.HBox([self.execute, self.stop]),
+            lean(ipywidgets.HBox, [self.execute, *self.pace.buttons, self.stop]),
+            *self.pace.fields,
             self._question,
             self._answers,
             self.progress,
@@ -98,9 +106,7 @@ class RunPanel(Part):
 
     def halt(self) -> None:
         """Brings the robot to rest; from any thread, without waiting."""
-        robot = self.state.robot
-        if robot is not None:
-            robot.stop()
+        self.state.halt()
 
     def end(self) -> None:
         """Brings a motion to rest and ends the processes that were started here."""
@@ -129,6 +135,7 @@ class RunPanel(Part):
 
     def _take(self, robot: RobotSide) -> None:
         self._desk.forget()
+        self._pacing.forget()
         self.state.robot = robot
         self._heart.start()
         self._ending.clear()
@@ -158,11 +165,15 @@ class RunPanel(Part):
             for outcome in robot.outcomes():
                 self._take_in(outcome)
             self._desk.tick(robot)
+            self._pacing.tick(robot)
             self.state.tell("robot")
 
     def _take_in(self, outcome: Outcome) -> None:
         if outcome.what == "control":
             self._desk.take(outcome.error)
+            return
+        if outcome.what == "pace":
+            self._pacing.take(outcome.error)
             return
         if outcome.what == "execute":
             self.state.take_run(outcome.run, outcome.error)
@@ -189,8 +200,10 @@ class RunPanel(Part):
         self._forget_question()
         reason, plan = obstacle(self.state), self.state.plan
         if reason is None and plan is not None:
+            self.state.exhibit(None)
             self.state.look_at(None)
             write(self._outcome, "")
+            self._running = plan.motion.duration
             self._robot.execute(plan)
 
     def _forget_question(self) -> None:
@@ -225,6 +238,7 @@ class RunPanel(Part):
             told, word = ("good", "check.passed") if plan.report.ok else ("bad", "check.failed")
             write(self._plan, verdict(told, text(word), text("plan.ready", duration=f"{plan.motion.duration:.3f}")))
         self._show_progress(status, is_moving)
+        self.pace.show(status)
         self.modes.show(status)
         write(self._health, "" if status is None else health_html(status, text))
 
@@ -232,20 +246,22 @@ class RunPanel(Part):
         return self.text("run.virtual") if robot.name == VIRTUAL else robot.name
 
     def _show_progress(self, status: SupervisorStatus | None, is_moving: bool) -> None:
-        shown = is_moving and status is not None and bool(status.motion_duration)
-        self.progress.layout.visibility = "visible" if shown else "hidden"
-        if shown and status is not None and status.motion_duration:
-            share = (status.motion_time or 0.0) / status.motion_duration
-            self.progress.value = min(max(share, 0.0), 1.0) if math.isfinite(share) else 0.0
+        place = None if status is None or not is_moving else status.motion_place
+        self.progress.layout.visibility = "hidden" if place is None or not self._running else "visible"
+        if place is not None and self._running:
+            self.progress.value = min(max(place / self._running, 0.0), 1.0)
 
-    def _button(self, code: str, act: Callable[[], object], *, icon: str = "", style: str = "") -> Any:
+    def _button(
+        self, code: str, act: Callable[[], object], *, icon: str = "", style: str = "", own: bool = False
+    ) -> Any:
         hint = f"{code}_hint"
-        button = ipywidgets.Button(
+        button = lean(
+            ipywidgets.Button,
             description=self.text(code),
             tooltip=self.text(hint) if self.text.has(hint) else self.text(code),
             icon=icon,
             button_style=style,
-            layout=ipywidgets.Layout(width="auto"),
+            layout=ipywidgets.Layout(width="auto") if own else {"width": "auto"},
         )
 
         def press(_: object) -> None:

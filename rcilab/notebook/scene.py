@@ -106,7 +106,7 @@ class Scene(Part):
         self._write_frame(f'srcdoc="{html.escape(self._make_film().html())}"')
 
     def _make_film(self) -> Preview:
-        plan = self.state.plan
+        plan = self.state.seen_arm
         return Preview(self.state.goal if plan is None else plan.motion, self.model, live=False, height=self.height)
 
 
@@ -130,7 +130,8 @@ class _LivePicture:
     def draw(self) -> None:
         """Puts the three arms where they belong now."""
         state, status = self._state, self._state.status
-        moment = None if state.moment is None or state.plan is None else state.plan.motion.at(state.moment).q
+        seen = state.seen_arm
+        moment = None if state.moment is None or seen is None else seen.motion.at(state.moment).q
         robot = None if status is None else status.q
         solid = state.goal if robot is None and moment is None else moment if robot is None else robot
         assert solid is not None
@@ -144,7 +145,7 @@ class _LivePicture:
 
     def draw_path(self) -> None:
         """Draws the way of the tool, coloured by how hard the joints are driven."""
-        plan = self._state.plan
+        plan = self._state.seen_arm
         if plan is self._path:
             return
         if self._path is not None:

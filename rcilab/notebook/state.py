@@ -6,22 +6,18 @@ the library's own calls; here is only who hears of it.
 
 from __future__ import annotations
 
+import sys
 import threading
 import weakref
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, TypeGuard
 
 from numpy.typing import ArrayLike
 
 from rcilab.arrays import JointVector, as_vector, frozen
-from rcilab.client.control_settings import ControlSettings
-from rcilab.client.session import RobotSession
-from rcilab.conformance.check import check
 from rcilab.errors import InvalidValueError, KinematicsError, RcilabError
 from rcilab.model import RobotModel, require_model
-from rcilab.motion.cartesian import plan_line
-from rcilab.motion.motion import Motion, require_motion
 from rcilab.posing.planning import Plan, PlannableLaw, make_plan, picture
 from rcilab.posing.reach import Reach, judge_joints, judge_pose
 from rcilab.spatial import Pose
@@ -30,6 +26,10 @@ from rcilab.words.errors import tell
 from rcilab.words.text import Message, message
 
 if TYPE_CHECKING:
+    from rcilab.client.control_settings import ControlSettings
+    from rcilab.client.session import RobotSession
+    from rcilab.motion.motion import Motion
+    from rcilab.notebook.exhibition import Exhibition
     from rcilab.notebook.robot_side import RobotSide
     from rcilab.recording.run import Run
     from rcilab.supervisor import SupervisorStatus
@@ -61,10 +61,14 @@ class LabState:
         self.no_plan: Message | None = None
         self.moment: float | None = None
         """Time of the plan that is looked at, [s]; None looks at the arm as it is."""
+        self.exhibition: Exhibition | None = None
+        """A fault that is looked at in place of the plan, until somebody plans, poses or executes."""
         self.run: Run | None = None
         self.error: RcilabError | None = None
         """Why the last execution did not reach its end; None when it did."""
         self.speed = 0.5
+        self.pace = 1.0
+        """Part of its planned speed that a motion runs at."""
         self.law: PlannableLaw = "jerk_limited"
         self.way: Way = "joint"
         self.mode: Mode = "joint_position"
@@ -106,11 +110,26 @@ class LabState:
         status = self.status
         return self._rest if status is None or status.q_c is None else frozen(status.q_c)
 
+    @property
+    def seen(self) -> Plan | None:
+        """What timeline and curves show: the plan, or what led to the fault on show."""
+        return self.plan if self.exhibition is None else self.exhibition.plan
+
+    @property
+    def seen_arm(self) -> Plan | None:
+        """Where the scene shows the arm at a moment."""
+        return self.plan if self.exhibition is None else self.exhibition.scene
+
+    @property
+    def seen_run(self) -> Run | None:
+        """What happened beside what is seen."""
+        return self.run if self.exhibition is None else self.exhibition.run
+
     def start_from(self, q: ArrayLike) -> None:
         """Says where the arm stands while no robot is connected, shape (n,), [rad]."""
         with self.lock:
             self._rest = frozen(as_vector(q, self.model.n, "q", "rad"))
-            self.plan, self.no_plan, self.moment = None, None, None
+            self.plan, self.no_plan, self.moment, self.exhibition = None, None, None, None
             self.tell("plan", "moment", "goal")
 
     def pose(self, q: ArrayLike) -> None:
@@ -161,6 +180,9 @@ class LabState:
 
     def take_motion(self, motion: Motion) -> None:
         """Takes a motion that was planned elsewhere; it is judged as any other."""
+        from rcilab.conformance.check import check
+        from rcilab.motion.motion import require_motion
+
         require_motion(motion)
         report = check(motion, self.model, mode=self.mode)
         self.show(replace(picture(self.model, motion, report), mode=self.mode, complete=True))
@@ -181,7 +203,7 @@ class LabState:
         """Shows a plan, or why there is none."""
         with self.lock:
             self.plan, self.no_plan = (made, None) if isinstance(made, Plan) else (None, made)
-            self.run, self.moment = None, None
+            self.run, self.moment, self.exhibition = None, None, None
             self.tell("plan", "moment")
 
     def take_run(self, run: Run | None, error: RcilabError | None = None) -> None:
@@ -190,16 +212,31 @@ class LabState:
             self.run, self.error = run, error
             self.tell("run")
 
+    def halt(self) -> None:
+        """Brings the robot to rest; from any thread, without waiting."""
+        robot = self.robot
+        if robot is not None:
+            robot.stop()
+
     def look_at(self, moment: float | None) -> None:
-        """Looks at a time of the plan, [s]; None looks at the arm as it is."""
+        """Looks at a time of what is seen, [s]; None looks at the arm as it is."""
         with self.lock:
-            if self.plan is None:
+            if self.seen is None:
                 moment = None
             elif moment is not None:
-                moment = min(max(moment, 0.0), self.plan.motion.duration)
+                moment = min(max(moment, 0.0), self.seen.motion.duration)
             if moment != self.moment:
                 self.moment = moment
                 self.tell("moment")
+
+    def exhibit(self, exhibition: Exhibition | None) -> None:
+        """Looks at the moment of a fault in place of the plan; None looks at the plan again."""
+        with self.lock:
+            if exhibition is None and self.exhibition is None:
+                return
+            self.exhibition = exhibition
+            self.moment = None if exhibition is None else exhibition.moment
+            self.tell("plan", "moment")
 
     def leave_arm(self, q: ArrayLike) -> None:
         """Says where the robot stood when it was disconnected; what is planned stays."""
@@ -212,6 +249,7 @@ class LabState:
         return self.plan is not None and bool(abs(self.plan.motion.goal - self.goal).max() < 1e-6)
 
     def _look_away(self) -> None:
+        self.exhibit(None)
         if self.moment is not None:
             self.moment = None
             self.tell("moment")
@@ -221,6 +259,9 @@ class LabState:
         return replace(made, short=self.reach.short) if isinstance(made, Plan) else made
 
     def _line(self) -> Plan | Message:
+        from rcilab.conformance.check import check
+        from rcilab.motion.cartesian import plan_line
+
         try:
             motion = plan_line(self.model, self.here, self.model.forward(self.goal), speed=self.speed)
             return picture(self.model, motion, check(motion, self.model, start=self.here, distance=None))
@@ -243,10 +284,16 @@ def state_of(subject: object) -> LabState:
     """
     if isinstance(subject, LabState):
         return subject
-    if isinstance(subject, RobotSession):
+    if _is_session(subject):
         shared = _of_session.get(id(subject))
         if shared is None:
             shared = _of_session[id(subject)] = LabState(subject.model, subject)
         return shared
     shared = getattr(subject, "state", None)
     return shared if isinstance(shared, LabState) else LabState(require_model(subject))
+
+
+def _is_session(subject: object) -> TypeGuard[RobotSession]:
+    """Returns whether it is a session, without loading what one is made of: then nobody can have made it."""
+    module = sys.modules.get("rcilab.client.session")
+    return module is not None and isinstance(subject, module.RobotSession)

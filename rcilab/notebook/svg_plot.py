@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rcilab.arrays import Array
 from rcilab.notebook.look import esc
-from rcilab.notebook.plot import JOINT_COLORS
+from rcilab.notebook.palette import JOINT_COLORS
 from rcilab.views.plots import Frame
 
 _WIDTH, _HEIGHT = 420.0, 168.0  # Units of a panel; the browser scales it to its place.

@@ -11,6 +11,7 @@ import numpy as np
 from rcilab.errors import KinematicsError
 from rcilab.kinematics.solutions import Solutions
 from rcilab.notebook.arc_circle import draw_circle
+from rcilab.notebook.lean import lean
 from rcilab.notebook.look import block, head, soft, verdict, write
 from rcilab.notebook.number_field import NumberField
 from rcilab.notebook.part import Part
@@ -41,21 +42,17 @@ class TargetPanel(Part):
             for index, name in enumerate(_NAMES)
         ]  # fmt: skip
         self._reach, self._table, self._circle = block(), block(), block()
-        self.branches = ipywidgets.Dropdown(
-            description=text("target.branch"), tooltip=text("target.branch_hint"),
+        self.branches = lean(ipywidgets.Dropdown, description=text("target.branch"), tooltip=text("target.branch_hint"),
             layout=ipywidgets.Layout(width="22em"), style={"description_width": "8em"},
         )  # fmt: skip
         self._solutions: Solutions | None = None
         self.branches.observe(self._on_branch, names="value")
         pairs = [
-            ipywidgets.VBox(
-                [
-                    ipywidgets.HBox([self.fields[i].row, self.fields[i + 3].row]),
-                    self.fields[i].said,
-                    self.fields[i + 3].said,
-                ]
+            lean(
+                ipywidgets.VBox,
+                [lean(ipywidgets.HBox, [*first.cells, *second.cells]), first.said, second.said],
             )
-            for i in range(3)
+            for first, second in zip(self.fields[:3], self.fields[3:], strict=True)
         ]
         rows: list[Any] = [block(head(text("target.pose", in_mm="mm", in_deg="deg"))), *pairs, self._reach]
         self.psi: Any = None
@@ -68,20 +65,19 @@ class TargetPanel(Part):
 
     def _arm_angle_rows(self) -> list[Any]:
         text = self.text
-        self.psi = ipywidgets.FloatSlider(
-            description="ψ", min=-180.0, max=180.0, step=1.0, readout=False, tooltip=text("target.psi_hint"),
-            layout=ipywidgets.Layout(width="16em"), style={"description_width": "1.5em"},
+        self.psi = lean(
+            ipywidgets.FloatSlider, description="ψ", min=-180.0, max=180.0, step=1.0, readout=False,
+            tooltip=text("target.psi_hint"),
+            layout={"width": "16em"}, style={"description_width": "1.5em"},
         )  # fmt: skip
         self.psi.observe(self._on_psi, names="value")
         self._psi_field = NumberField(text, "", "deg", -180.0, 180.0, self._turn)
-        side = ipywidgets.VBox([
-            ipywidgets.HBox([self.psi, self._psi_field.row], layout=ipywidgets.Layout(align_items="center")),
+        side = lean(ipywidgets.VBox, [
+            lean(ipywidgets.HBox, [self.psi, *self._psi_field.cells], layout={"align_items": "center"}),
             self._psi_field.said,
             block(soft(text("target.psi_hint"))),
         ])  # fmt: skip
-        row = ipywidgets.HBox(
-            [self._circle, side], layout=ipywidgets.Layout(align_items="center", flex_flow="row wrap")
-        )
+        row = lean(ipywidgets.HBox, [self._circle, side], layout={"align_items": "center", "flex_flow": "row wrap"})
         return [block(head(text("target.psi_title", in_deg="deg"))), row]
 
     def _taker(self, index: int) -> Any:

@@ -6,6 +6,7 @@ from typing import Any
 
 import ipywidgets
 
+from rcilab.notebook.lean import lean
 from rcilab.notebook.look import block, write
 from rcilab.notebook.part import Part
 
@@ -23,39 +24,44 @@ class Timeline(Part):
 
     def __init__(self, subject: object, *, language: str = "en") -> None:
         super().__init__(subject, language)
-        self.play = ipywidgets.Play(
+        self.play = lean(
+            ipywidgets.Play,
             min=0,
             max=1,
             interval=_INTERVAL,
             step=_INTERVAL,
             show_repeat=False,
             tooltip=self.text("timeline.play_hint"),
-            layout=ipywidgets.Layout(flex="0 0 auto", width="6em"),
+            layout={"flex": "0 0 auto", "width": "6em"},
         )
-        self.slider = ipywidgets.IntSlider(
+        self.slider = lean(
+            ipywidgets.IntSlider,
             min=0,
             max=1,
             readout=False,
             tooltip=self.text("timeline.scrub_hint"),
-            layout=ipywidgets.Layout(flex="1 1 auto", min_width="130px"),
+            layout={"flex": "1 1 auto", "min_width": "130px"},
         )
-        self.rate = ipywidgets.Dropdown(
+        self.rate = lean(
+            ipywidgets.Dropdown,
             description=self.text("timeline.rate"),
             options=[(f"{rate:g} ×", rate) for rate in _RATES],
             value=1.0,
-            layout=ipywidgets.Layout(width="8.5em"),
+            layout={"width": "8.5em"},
             style={"description_width": "3.6em"},
         )
-        self.live = ipywidgets.Button(
+        self.live = lean(
+            ipywidgets.Button,
             description=self.text("timeline.live"),
             tooltip=self.text("timeline.live_hint"),
-            layout=ipywidgets.Layout(width="auto"),
+            layout={"width": "auto"},
         )
         self._clock = block(width="9em")
         self._link = ipywidgets.jslink((self.play, "value"), (self.slider, "value"))
-        row = ipywidgets.HBox(
+        row = lean(
+            ipywidgets.HBox,
             [self.play, self.slider, self._clock, self.rate, self.live],
-            layout=ipywidgets.Layout(align_items="center", flex_flow="row wrap"),
+            layout={"align_items": "center", "flex_flow": "row wrap"},
         )
         self.build([row], width="100%")
         self._writing = False
@@ -79,7 +85,7 @@ class Timeline(Part):
         self._link.close()
 
     def _on_plan(self) -> None:
-        plan = self.state.plan
+        plan = self.state.seen
         last = 1 if plan is None else max(round(1000.0 * plan.motion.duration), 1)
         self._writing = True
         try:
@@ -100,10 +106,11 @@ class Timeline(Part):
 
     def _look_away(self) -> None:
         self.play.playing = False
+        self.state.exhibit(None)
         self.state.look_at(None)
 
     def _show(self) -> None:
-        plan, moment = self.state.plan, self.state.moment
+        plan, moment = self.state.seen, self.state.moment
         self.live.disabled = moment is None
         if plan is None:
             write(self._clock, "")

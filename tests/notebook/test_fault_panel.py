@@ -7,14 +7,18 @@ import math
 import os
 import re
 import threading
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
+import pytest
 
 import rcilab
 from rcilab.faults import Fault
+from rcilab.gallery import Exhibit
 from rcilab.language import LANGUAGES
-from rcilab.notebook import FaultPanel
+from rcilab.notebook import FaultPanel, MotionPlot, Scene, Timeline
+from rcilab.notebook.place import Place
 from rcilab.words.text import load_face
 from tests.waiting import wait_for
 
@@ -28,16 +32,30 @@ def text_of(widget: Any) -> str:
 def children() -> set[str]:
     found: set[str] = set()
     for task in os.listdir("/proc/self/task"):
-        with open(f"/proc/self/task/{task}/children", encoding="ascii") as file:
+        with (
+            suppress(FileNotFoundError),  # A thread has ended meanwhile.
+            open(f"/proc/self/task/{task}/children", encoding="ascii") as file,
+        ):
             found |= set(file.read().split())
     return found
 
 
-def test_a_fault_is_provoked_on_a_private_controller_and_the_session_is_left_alone() -> None:
+def require_at_moment(exhibit: Exhibit, scene: Scene, timeline: Timeline, plot: MotionPlot) -> None:
+    picture = scene._picture
+    assert picture is not None
+    assert timeline.moment == pytest.approx(exhibit.time)
+    assert timeline.slider.value == round(1000.0 * exhibit.time)
+    np.testing.assert_allclose(picture._arm._shown, exhibit.moved.at(exhibit.time).q)
+    assert 'class="rl-violation"' in plot.html
+    assert "left:" in plot._cursor.value
+    assert scene.state.plan is None  # It is never one to execute.
+
+
+def test_a_fault_is_provoked_on_a_private_controller_looked_at_and_the_session_is_left_alone() -> None:
     with rcilab.simulate(PRO7) as robot:
         before = robot.receive_state()
         own = children()
-        with FaultPanel(robot, language="zh") as panel:
+        with FaultPanel(robot, language="zh") as panel, Scene(panel, place=Place(way="loopback")) as scene:
             panel.fault.value = Fault.COMMAND_JOINT_ACCELERATION_DISCONTINUITY
             panel.provoke.click()
             assert panel.provoke.disabled
@@ -50,8 +68,24 @@ def test_a_fault_is_provoked_on_a_private_controller_and_the_session_is_left_alo
             for part in (panel.exhibit.told("cause", "zh"), *panel.exhibit.tell_way_out("zh"), panel.exhibit.script):
                 assert part in said
             assert "<circle" in panel._told.value
+            ticks = re.findall(r'text-anchor="end"[^>]*>([-0-9.e+]+)<', panel._told.value)
+            assert max(map(float, ticks)) > 1e4  # So are the ticks of its curve.
             assert panel.progress.layout.display == "none"
-            panel.fault.value = Fault.COLLISION
+            with Timeline(panel) as timeline, MotionPlot(panel) as plot:
+                require_at_moment(panel.exhibit, scene, timeline, plot)
+                timeline.slider.value = 0
+                panel.moment.click()
+                require_at_moment(panel.exhibit, scene, timeline, plot)
+                timeline.live.click()
+                assert timeline.moment is None
+                assert plot.html.count("<svg") == 0
+                panel.moment.click()
+                panel.state.pose(PRO7.home + 0.1)  # Something else is to be seen.
+                assert timeline.moment is None
+                panel.moment.click()
+                panel.fault.value = Fault.COLLISION
+                assert timeline.moment is None
+            assert panel.moment.layout.display == "none"
             assert "<circle" not in panel._told.value
             assert len(children() - own) == 1
         assert children() == own

@@ -11,10 +11,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from ipywidgets.widgets.widget import _instances
 
 import rcilab
 import rcilab.notebook
-from rcilab.errors import InvalidValueError
+from rcilab.errors import InvalidValueError, UsageError
 from rcilab.language import LANGUAGES, load_words
 from rcilab.notebook import (
     FaultPanel,
@@ -93,14 +94,48 @@ def said_by(widget: Any) -> Iterator[str]:
         yield from said_by(child)
 
 
+def open_tabs(lab: Lab) -> None:
+    for tab in range(len(lab.tabs.children)):
+        lab.tabs.selected_index = tab
+
+
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_no_place_in_a_sentence_is_left_unfilled(language: str) -> None:
     with Lab(PRO7, language=language, place=Place(way="loopback")) as made:
+        open_tabs(made)
         made.jog.q = GOAL
         made.plan.plan.click()
         texts = list(said_by(made.widget))
     assert len(texts) > 50
     assert [text for text in texts if re.search(r"\{[a-z_]+\}", text)] == []
+
+
+def test_what_is_on_a_tab_is_made_once_when_it_is_opened_or_asked_for_and_ends_with_the_lab() -> None:
+    with Lab(PRO7, place=Place(way="loopback")) as made:
+        assert [len(place.children) for place in made.tabs.children] == [1, 0, 0, 0, 0, 0]
+        made.tabs.selected_index = 2
+        assert made.tabs.children[2].children == (made.plan.widget,)
+        run = made.run
+        made.tabs.selected_index = 4
+        assert made.run is run
+        assert made.tabs.children[4].children == (run.widget,)
+    assert repr(run).endswith("closed>")
+    with pytest.raises(UsageError, match="run its cell again"):
+        made.faults  # noqa: B018  # Asking is what makes it.
+
+
+def test_a_session_is_looked_after_before_its_tab_is_opened() -> None:
+    with rcilab.simulate(PRO7) as robot, Lab(robot, place=Place(way="loopback")) as made:
+        assert made.tabs.selected_index == 0
+        assert made.state.robot is not None
+
+
+def test_the_lab_opens_with_few_messages() -> None:
+    # Each widget is a message to the browser.
+    with Lab(PRO7, place=Place(way="loopback")):
+        before = len(_instances)
+        with Lab(PRO7, place=Place(way="loopback")):
+            assert len(_instances) - before < 120
 
 
 def test_a_slider_moves_the_goal_and_its_ends_are_the_limits(fresh: Lab) -> None:

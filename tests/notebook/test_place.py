@@ -1,5 +1,9 @@
 from __future__ import annotations
 
+import sys
+from pathlib import Path
+from types import ModuleType
+
 import pytest
 
 from rcilab.notebook.place import Place, Server, Way, find_place
@@ -34,3 +38,17 @@ def test_an_address_goes_below_the_notebook_server_behind_a_proxy() -> None:
     place = find_place({"JUPYTERHUB_SERVICE_PREFIX": "/user/ann/"}, None, True)
     assert place.address("http://127.0.0.1:4711/static/?plain") == "/user/ann/proxy/4711/static/?plain"
     assert Place(way="loopback").address("http://127.0.0.1:4711/static/") == "http://127.0.0.1:4711/static/"
+
+
+def test_the_server_that_started_the_kernel_is_known_by_what_it_wrote(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("JUPYTER_RUNTIME_DIR", str(tmp_path))
+    monkeypatch.setitem(sys.modules, "ipykernel", ModuleType("ipykernel"))
+    file = tmp_path / "jpserver-4711.json"
+    file.write_text('{"hostname": "0.0.0.0", "base_url": "/arm/", "pid": 4711}', encoding="utf-8")
+    started = {"JPY_PARENT_PID": "4711"}
+    assert find_place(started, None, True) == Place(way="proxy", base="/arm/")
+    assert find_place({"JPY_PARENT_PID": "1"}, None, True).way == "loopback"  # Some other program started it.
+    file.write_text('{"hostname": "0.0', encoding="utf-8")
+    assert find_place(started, None, True).way == "loopback"

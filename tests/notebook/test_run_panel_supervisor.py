@@ -5,14 +5,17 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable
+from contextlib import ExitStack
 from typing import Any
 
 import numpy as np
 import pytest
 
 import rcilab
+from rcilab.errors import PlanningError, RcilabError
 from rcilab.notebook import FaultPanel, JogPanel, RunPanel
 from rcilab.notebook.robot_side import Outcome
+from rcilab.supervisor import SupervisorStatus
 
 PRO7 = rcilab.load_model("xMatePro7")
 
@@ -102,22 +105,78 @@ def test_a_session_is_driven_in_its_own_words_and_left_open() -> None:
         np.testing.assert_allclose(robot.state.q_c, PRO7.home + 0.05, atol=1e-9)
 
 
+@pytest.mark.parametrize("own", [True, False], ids=["control_process", "session"])
+def test_a_motion_is_held_gone_on_with_and_slowed_down_as_by_the_session(own: bool) -> None:
+    with ExitStack() as open_things:
+        robot = None if own else open_things.enter_context(rcilab.simulate(PRO7))
+        panel = open_things.enter_context(RunPanel(PRO7 if robot is None else robot))
+        pace = panel.pace
+        if own:
+            panel.connect.click()
+        power_on(panel)
+        assert pace.pause.disabled
+        panel.state.pose(PRO7.home - 0.6)
+        panel.state.speed = 0.1
+        panel.state.make_plan()
+        panel.execute.click()
+        wait_for(lambda: not pace.pause.disabled, "a motion that can be held")
+        pace.pause.click()
+        wait_for(lambda: pace.resume.layout.display is None, "the arm held")
+        wait_for(lambda: "Held" in pace._way.value, "that it is held, in words")
+        pace.field.box.value = "50"
+        assert pace.slider.value == 50.0
+        assert panel.state.status is not None
+        assert panel.state.status.pace == 0.0  # It keeps waiting.
+        pace.resume.click()
+        wait_for(lambda: "50 %" in pace._way.value, "half the speed")
+        assert pace.resume.layout.display == "none"
+        pace.slider.value = 100.0
+        wait_for(lambda: panel.state.status is not None and panel.state.status.pace == 1.0, "all of it")
+        panel.stop.click()
+        wait_for(lambda: pace.pause.disabled, "the end of the motion")
+        assert not pace._way.value
+
+
+def test_what_cannot_be_held_any_more_goes_on_and_says_so() -> None:
+    with RunPanel(PRO7) as panel:
+        robot = Real(PRO7.home, phase="moving", code="moving", motion_duration=1.0, motion_place=0.9)
+        robot.error = PlanningError("it arrives before")
+        panel._take(robot)  # type: ignore[arg-type]
+        panel.pace.pause.click()
+        wait_for(lambda: "Too late to hold" in panel.pace._way.value, "why not")
+        assert robot.paces == [0.0]
+        assert "rl-problem" in panel.pace._way.value
+
+
+def test_a_pace_that_is_none_is_refused_below_its_field() -> None:
+    with RunPanel(PRO7) as panel:
+        for typed in ("5", "120", "fast", "nan"):
+            panel.pace.field.box.value = typed
+            assert "rl-problem" in panel.pace.field.said.value
+            assert panel.state.pace == 1.0
+
+
 class Real:
     """A robot that is not virtual, as RunPanel sees it."""
 
     name, is_virtual = "rci://192.168.0.160:1337", False
 
-    def __init__(self, q: Any) -> None:
-        from rcilab.supervisor import SupervisorStatus
-
+    def __init__(self, q: Any, **how: Any) -> None:
         self.executed: list[Any] = []
-        self._status = SupervisorStatus(phase="idle", code="idle", q=q, q_c=q, powered=True)
+        self.paces: list[float] = []
+        self.error: RcilabError | None = None
+        self._status = SupervisorStatus(**{"phase": "idle", "code": "idle", "q": q, "q_c": q, "powered": True, **how})
 
     def status(self) -> Any:
         return self._status
 
     def execute(self, plan: Any) -> None:
         self.executed.append(plan)
+
+    def set_pace(self, pace: float) -> None:
+        self.paces.append(pace)
+        if self.error is not None:
+            raise self.error
 
     def outcomes(self) -> list[Outcome]:
         return []
