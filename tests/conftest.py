@@ -21,8 +21,8 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 LANES = {"pages": ("browser",), "loops": ("workbench", "supervisor")}
 """In the names of files whose tests draw, or run control processes at 1 kHz: a core has no room for two of a kind."""
-_ORDER = ("loops", "", "pages", "notebook")
-"""Loops wait more than they compute. Notebooks suffer beside them, and pages beside anything but one notebook."""
+_ORDER = ("loops", "", "notebook", "pages")
+"""Loops wait more than they compute. Notebooks suffer beside them, and pages beside anything."""
 
 
 def lane_of(file: str) -> str:
