@@ -12,11 +12,11 @@ from rcilab.background import Background
 from rcilab.errors import RcilabError
 from rcilab.faults import Fault
 from rcilab.gallery.exhibit import Exhibit
+from rcilab.gallery.exhibition import exhibition_of
 from rcilab.gallery.private_arm import PrivateArm
 from rcilab.gallery.shown import body_html, head_html
 from rcilab.gallery.table import FAULTS
 from rcilab.notebook.exhibit_plot import draw_exhibit
-from rcilab.notebook.exhibition import exhibition_of
 from rcilab.notebook.flight_recorder import record_html
 from rcilab.notebook.lean import lean
 from rcilab.notebook.look import block, esc, problem, soft, verdict, write

@@ -1,14 +1,12 @@
-"""A pace between the controls and the robot: handed over once the last change was taken, as the page does it."""
+"""The pace of a notebook's robot, from the parts to the robot."""
 
 from __future__ import annotations
 
-from rcilab.errors import PlanningError, RcilabError
+from rcilab.errors import RcilabError
 from rcilab.notebook.robot_side import RobotSide
 from rcilab.notebook.state import LabState
-from rcilab.supervisor import SupervisorStatus
-from rcilab.words.text import Message, message
-
-_SAME_PACE = 1e-3
+from rcilab.supervisor.pace_wish import PaceWish, is_running, tell_pace_refusal
+from rcilab.words.text import Message
 
 
 class PaceDesk:
@@ -20,8 +18,8 @@ class PaceDesk:
 
     def __init__(self, state: LabState) -> None:
         self._state = state
-        self._wish: float | None = None  # A pace that waits until the last change was taken.
-        self._is_under_way = False
+        self._wish = PaceWish()
+        self._asked: float | None = None  # What the robot was asked for and has not taken yet.
         self._was_running = False
         self.refusal: Message | None = None
         """Why the motion goes on as it is."""
@@ -30,56 +28,43 @@ class PaceDesk:
         """Wants motions to run at part of their planned speed; one that is held keeps waiting."""
         with self._state.lock:
             self._state.pace = pace
-            status = self._state.status
-            if status is not None and is_running(status) and status.code == "moving":
-                self._wish = pace
+            self._wish.choose(pace, self._state.status)
             self._state.tell("robot")
 
     def pause(self) -> None:
         """Holds the motion under way."""
         with self._state.lock:
-            self._wish = 0.0
+            self._wish.hold()
 
     def resume(self) -> None:
         """Goes on with a motion that is held."""
         with self._state.lock:
-            self._wish = self._state.pace
+            self._wish.go_on(self._state.pace)
 
     def tick(self, robot: RobotSide) -> None:
-        """Hands over what is wanted now; of a slider's many only the newest counts."""
+        """Hands over what is wanted now."""
         status = robot.status()
         running, before = is_running(status), self._was_running
         self._was_running = running
+        if running and not before:
+            self.refusal = None
         with self._state.lock:
-            if running and not before:
-                self.refusal = None
-                if self._wish is None and self._state.pace < 1.0:
-                    self._wish = self._state.pace
-            if self._is_under_way:
-                return
-            wish, self._wish = self._wish, None
-        if wish is None or not running or abs(wish - status.pace) < _SAME_PACE:
+            pace = self._wish.due(status, self._state.pace, is_under_way=self._asked is not None)
+        if pace is None:
             return
-        self.refusal, self._is_under_way = None, True
+        self.refusal, self._asked = None, pace
         try:
-            robot.set_pace(wish)
-        except PlanningError:
-            self._is_under_way = False
-            self.refusal = message("pace.no_pause" if wish == 0.0 else "pace.no_change")
+            robot.set_pace(pace)
         except RcilabError as error:
             self.take(error)
 
     def take(self, error: RcilabError | None) -> None:
         """Takes note of what became of a change."""
-        self._is_under_way = False
-        if error is not None and is_running(self._state.status):
-            self.refusal = message("pace.late")
+        pace, self._asked = self._asked, None
+        if error is not None and pace is not None:
+            self.refusal = tell_pace_refusal(error, pace, self._state.status)
 
     def forget(self) -> None:
         """Expects nothing any more: another robot comes."""
-        self._wish, self._is_under_way, self._was_running, self.refusal = None, False, False, None
-
-
-def is_running(status: SupervisorStatus | None) -> bool:
-    """Returns whether a motion is under way whose pace can change."""
-    return status is not None and status.code in ("moving", "moving.held") and status.motion_duration is not None
+        self._wish.forget()
+        self._asked, self._was_running, self.refusal = None, False, None

@@ -10,9 +10,10 @@ from rcilab.motion.pacing import SLOWEST_PACE
 from rcilab.notebook.lean import lean
 from rcilab.notebook.look import block, problem, soft, write
 from rcilab.notebook.number_field import NumberField
-from rcilab.notebook.pace_desk import PaceDesk, is_running
+from rcilab.notebook.pace_desk import PaceDesk
 from rcilab.notebook.state import LabState
 from rcilab.supervisor import SupervisorStatus
+from rcilab.supervisor.pace_wish import is_running
 from rcilab.words.text import Text
 
 _STEP = 5.0  # [%]

@@ -28,8 +28,8 @@ from rcilab.words.text import Message, message
 if TYPE_CHECKING:
     from rcilab.client.control_settings import ControlSettings
     from rcilab.client.session import RobotSession
+    from rcilab.gallery.exhibition import Exhibition
     from rcilab.motion.motion import Motion
-    from rcilab.notebook.exhibition import Exhibition
     from rcilab.notebook.robot_side import RobotSide
     from rcilab.recording.run import Run
     from rcilab.supervisor import SupervisorStatus

@@ -34,8 +34,8 @@ def plan_obstacle(plan: Plan | None, q_c: JointVector | None) -> Message | None:
         return message("ready.no_plan")
     if not plan.report.ok:
         return message("ready.violations", count=len(plan.report.violations))
-    if q_c is None or float(np.abs(q_c - plan.starts_at).max()) > _SAME_PLACE:
-        return message("ready.elsewhere")
+    if q_c is None or not _is_at(q_c, plan.starts_at):
+        return message("ready.done" if q_c is not None and _is_at(q_c, plan.motion.goal) else "ready.elsewhere")
     return None
 
 
@@ -52,3 +52,7 @@ def ask_to_move(plan: Plan, address: str) -> Message:
         angle=f"{travel[joint]:.1f}",
         mm=f"{1000.0 * float(np.linalg.norm(plan.path[-1] - plan.path[0])):.0f}",
     )
+
+
+def _is_at(q: JointVector, place: JointVector) -> bool:
+    return float(np.abs(q - place).max()) <= _SAME_PLACE

@@ -28,9 +28,7 @@ def test_plan_check_execute_and_the_arm_arrives(page):
         "a recording",
     )
     assert not page.button("Execute").is_enabled(), "a certificate that was used up must not be pressable again"
-    page.wait(
-        lambda: "no longer stands where this plan starts" in page.tab.locator(".rl-why").inner_text(), "the reason"
-    )
+    page.wait(lambda: "where this plan ends" in page.tab.locator(".rl-why").inner_text(), "the reason")
 
 
 def stop_in_mid_motion(page, press) -> None:

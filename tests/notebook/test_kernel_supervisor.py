@@ -6,13 +6,15 @@ import ast
 import os
 import time
 from collections.abc import Iterator
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
-from jupyter_client.blocking.client import BlockingKernelClient
-from jupyter_client.manager import KernelManager, start_new_kernel
 
 from tests.waiting import wait_for
+
+if TYPE_CHECKING:
+    from jupyter_client.blocking.client import BlockingKernelClient
+    from jupyter_client.manager import KernelManager
 
 MAKE = """
 import os, threading, time, rcilab
@@ -81,6 +83,8 @@ class Kernel:
 
 @pytest.fixture(scope="module")
 def kernel() -> Iterator[Kernel]:
+    from jupyter_client.manager import start_new_kernel
+
     manager, client = start_new_kernel(startup_timeout=60)
     yield Kernel(manager, client)
     client.stop_channels()

@@ -13,10 +13,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import nbformat
 import numpy as np
 import pytest
-from jupyter_client.blocking.client import BlockingKernelClient
 
 import rcilab
 
@@ -49,6 +47,8 @@ def find_chromium() -> str | None:
 @pytest.fixture(scope="module")
 def jupyter(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, Path]]:
     """Address of a notebook with one cell in a JupyterLab that `rcilab lab` has opened, and its runtime folder."""
+    import nbformat
+
     folder = tmp_path_factory.mktemp("lab")
     (folder / "notes").mkdir()
     kernel = {"kernelspec": {"name": "python3", "display_name": "Python 3", "language": "python"}}
@@ -197,6 +197,8 @@ def test_a_tab_that_is_closed_stops_the_arm(page: Any, jupyter: tuple[str, Path]
     button(page, "Execute").click()
     page.locator(".rl-chip", has_text=re.compile("^moving$")).wait_for()
     page.close()
+    from jupyter_client.blocking.client import BlockingKernelClient
+
     client = BlockingKernelClient(connection_file=str(next(jupyter[1].glob("kernel-*.json"))))
     client.load_connection_file()
     client.start_channels()

@@ -208,9 +208,9 @@ def test_execute_runs_the_plan_records_it_and_then_asks_for_a_new_one(bench, ask
     rows = np.clip(np.rint(recording.t * 1000.0).astype(int) - recording.delay, 0, len(plan.q) - 1)
     assert recording.delay > 1  # The play-out, taken out where plan and actual are compared.
     assert np.median(np.abs(recording.q_c - plan.q[rows])[:, 0]) < 1e-9
-    assert obstacle(bench.store.state, bench.session.status()).code == "ready.elsewhere"
+    assert obstacle(bench.store.state, bench.session.status()).code == "ready.done"
     ask(requests.Drive(what="execute"))
-    assert told(bench) == "ready.elsewhere"
+    assert told(bench) == "ready.done"
 
 
 def test_stop_ends_a_motion_and_says_so(bench, ask):

@@ -78,8 +78,8 @@ def test_a_fault_is_shown_at_its_moment_and_the_plan_of_the_page_is_kept(bench: 
     assert show.exhibit.fault is Fault.COMMAND_JOINT_ACCELERATION_DISCONTINUITY
     assert bench.state.plan is own
     seen = exhibited(bench.state, scene=True)
-    assert seen.plan is show.scene
-    assert [row.id for row in show.plan.report.rows if not row.ok and row.fault] == ["joint.jerk"]
+    assert seen.plan is show.exhibition.scene
+    assert [row.id for row in show.exhibition.plan.report.rows if not row.ok and row.fault] == ["joint.jerk"]
     assert (
         np.abs(
             seen.plan.motion.at(seen.place * seen.plan.motion.duration).q - show.exhibit.moved.q[show.exhibit.sample]
@@ -107,9 +107,13 @@ def test_the_controlled_stop_after_the_fault_is_shown_too_and_its_moment_marked(
     assert recording.moment == exhibit.time == exhibit.cycles["t"][-1]
     assert 0.1 < recording.t[-1] - exhibit.time <= 0.3
     assert np.abs(recording.dq[-1]).max() < 1e-3, "it stands still"
-    assert 0.0 < bench.state.place == show.moment < 1.0
-    assert show.scene.motion.duration == show.plan.motion.duration == pytest.approx(recording.t[-1], abs=2e-3)
-    frame = build_frame(plan_curves(show.plan.motion, "q"), None, MODEL.limits.joint, "q", 0)
+    assert 0.0 < bench.state.place == show.place < 1.0
+    assert (
+        show.exhibition.scene.motion.duration
+        == show.exhibition.plan.motion.duration
+        == pytest.approx(recording.t[-1], abs=2e-3)
+    )
+    frame = build_frame(plan_curves(show.exhibition.plan.motion, "q"), None, MODEL.limits.joint, "q", 0)
     marked = mark_moment(frame, exhibit.time)
     assert np.abs(marked.t[marked.violated & ~frame.violated] - exhibit.time).min() < 0.02
 

@@ -41,7 +41,7 @@ class LearnActions:
             case "close":
                 self._close()
             case "moment" if self._learn.show is not None:
-                self._store.update(place=self._learn.show.moment, playing=False)
+                self._store.update(place=self._learn.show.place, playing=False)
             case "script":
                 self._set(is_script_shown=not self._learn.is_script_shown)
             case "lesson" if request.name in LESSONS:
@@ -96,7 +96,7 @@ class LearnActions:
         beside = None if state.plan is None else state.plan.motion
         show = make_show(result, beside)
         self._set(provoking=None, show=show)
-        self._store.update(place=show.moment, playing=False)
+        self._store.update(place=show.place, playing=False)
 
     def _close(self) -> None:
         if self._learn.show is not None:

@@ -10,7 +10,7 @@ import numpy as np
 from rcilab.clock import CYCLE_TIME
 from rcilab.faults import Fault
 from rcilab.gallery import Exhibit
-from rcilab.posing.planning import Plan, picture
+from rcilab.gallery.exhibition import Exhibition, exhibition_of
 from rcilab.workbench.text import Message
 
 if TYPE_CHECKING:
@@ -21,20 +21,21 @@ if TYPE_CHECKING:
 class Show:
     """A fault on show, as timeline and scene draw it."""
 
-    exhibit: Exhibit
-    plan: Plan
-    """What was commanded, the wrong command too. It is never one to execute."""
-    scene: Plan
-    """Where the arm is to be seen."""
+    exhibition: Exhibition
     recording: Recording
     """What the arm did."""
     beside: object
     """The motion that was planned on the page when it opened; another one closes the show."""
 
     @property
-    def moment(self) -> float:
+    def exhibit(self) -> Exhibit:
+        """The fault."""
+        return self.exhibition.exhibit
+
+    @property
+    def place(self) -> float:
         """Where the timeline stands at the fault, 0 to 1; behind it comes the controlled stop."""
-        return self.exhibit.sample * CYCLE_TIME / max(self.plan.motion.duration, CYCLE_TIME)
+        return self.exhibition.moment / max(self.exhibition.plan.motion.duration, CYCLE_TIME)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -62,20 +63,12 @@ class LearnState:
 
 
 def make_show(exhibit: Exhibit, beside: object) -> Show:
-    """Returns a fault as timeline and scene draw it."""
-    from rcilab.conformance import check
-    from rcilab.motion import Motion
+    """Returns a fault as the page shows it."""
     from rcilab.workbench.store import Recording
-
-    def draw(motion: Motion) -> Plan:
-        judged = Motion.from_samples(motion.q[: exhibit.sample + 1])  # From there on the way is the controller's.
-        return picture(exhibit.model, motion, check(judged, exhibit.model, distance=None))
 
     rows = exhibit.whole
     return Show(
-        exhibit=exhibit,
-        plan=draw(exhibit.commanded),
-        scene=draw(exhibit.moved),
+        exhibition=exhibition_of(exhibit),
         recording=Recording(
             t=np.array(rows["t"]), q=rows["q"], q_c=rows["q_c"], dq=rows["dq"], delay=0, moment=exhibit.time
         ),
@@ -88,4 +81,5 @@ def exhibited(state: UiState, *, scene: bool = False) -> UiState:
     show = state.learn.show
     if show is None:
         return state
-    return replace(state, plan=show.scene if scene else show.plan, recording=show.recording)
+    seen = show.exhibition.scene if scene else show.exhibition.plan
+    return replace(state, plan=seen, recording=show.recording)

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, cast
 
 from rcilab.client.control_settings import control_ranges, standard_control
 from rcilab.client.setup import RobotSetup
-from rcilab.errors import PlanningError, RcilabError
+from rcilab.errors import RcilabError
 from rcilab.motion.pacing import SLOWEST_PACE
 from rcilab.posing.driving import SECOND_THOUGHT, ask_to_send
 from rcilab.state import MODES, Mode
+from rcilab.supervisor.pace_wish import PaceWish, is_running, tell_pace_refusal
 from rcilab.words.number import parse_number
 from rcilab.workbench import requests
 from rcilab.workbench.run.driving import control_field, is_pending
@@ -23,9 +24,7 @@ from rcilab.workbench.store import Store
 from rcilab.workbench.text import Message, message
 
 if TYPE_CHECKING:
-    from rcilab.supervisor import Ticket
-
-_SAME_PACE = 1e-3
+    from rcilab.supervisor import SupervisorStatus, Ticket
 
 
 class ModeActions:
@@ -34,10 +33,9 @@ class ModeActions:
     def __init__(self, store: Store, session: Session) -> None:
         self._store, self._session = store, session
         self._post = SetupPost(session, self._refuse)
-        self._changing: Ticket | None = None
-        self._wish: float | None = None  # A pace that waits until the last change was taken.
+        self._wish = PaceWish()
+        self._changing: tuple[float, Ticket] | None = None  # A pace that the robot has not taken yet.
         self._asked_to_send = -math.inf
-        self._code = ""
         self._arm = store.state.model.name
 
     def set_drive(self, request: requests.SetDrive) -> None:
@@ -53,18 +51,17 @@ class ModeActions:
         if request.pace is not None and math.isfinite(request.pace):
             pace = min(max(request.pace, SLOWEST_PACE), 1.0)
             self._store.update(drive=replace(self._store.state.drive, pace=pace))
-            if status.code == "moving" and status.motion_place is not None:
-                self._wish = pace
+            self._wish.choose(pace, status)
 
     def pause(self) -> None:
         """Holds the motion under way."""
         if self._require_motion():
-            self._wish = 0.0
+            self._wish.hold()
 
     def resume(self) -> None:
         """Goes on with a motion that is held."""
         if self._require_motion():
-            self._wish = self._store.state.drive.pace
+            self._wish.go_on(self._store.state.drive.pace)
 
     def type_field(self, request: requests.TypeField) -> None:
         """Takes a typed parameter, or says beside the field what is wrong with it."""
@@ -104,17 +101,14 @@ class ModeActions:
         """Looks what became of what was sent, tells our own controller what is new, changes the pace."""
         state, status = self._store.state, self._session.status()
         if state.model.name != self._arm:
-            self._arm, self._wish = state.model.name, None
+            self._arm = state.model.name
+            self._wish.forget()
             self._post.forget()
         self._post.collect()
         state = self._store.state
         if state.target == "virtual" and state.drive.refusal is None and status.phase == "idle":
             self._send()
-        is_new = status.code == "moving" and self._code not in ("moving", "moving.held")
-        self._code = status.code
-        if is_new and state.drive.pace < 1.0:
-            self._wish = state.drive.pace
-        self._change_pace(status.code, status.pace)
+        self._change_pace(status)
 
     def _send(self) -> None:
         state = self._store.state
@@ -125,27 +119,26 @@ class ModeActions:
         self._store.update(drive=replace(self._store.state.drive, refusal=why))
 
     def _require_motion(self) -> bool:
-        if self._session.status().code in ("moving", "moving.held"):
+        if is_running(self._session.status()):
             return True
         self._store.say("warn", message("pace.nothing"))
         return False
 
-    def _change_pace(self, code: str, pace: float) -> None:
-        """Hands the wish of now over once the last change was taken; of a slider's many only the newest counts."""
-        changing, self._changing = self._changing, None
-        if changing is not None and not changing.done:
-            self._changing = changing
-            return
-        if changing is not None and changing.error is not None and code in ("moving", "moving.held"):
-            self._store.say("warn", message("pace.late"))
-        wish, self._wish = self._wish, None
-        if wish is None or code not in ("moving", "moving.held") or abs(wish - pace) < _SAME_PACE:
+    def _change_pace(self, status: SupervisorStatus) -> None:
+        if self._changing is not None and self._changing[1].done:
+            (pace, ticket), self._changing = self._changing, None
+            self._tell_pace(ticket.error, pace)
+        is_under_way = self._changing is not None
+        wish = self._wish.due(status, self._store.state.drive.pace, is_under_way=is_under_way)
+        if wish is None:
             return
         supervisor = self._session.supervisor()
         try:
-            self._changing = supervisor.pause() if wish == 0.0 else supervisor.set_pace(wish)
-        except PlanningError:
-            self._store.say("warn", message("pace.no_pause" if wish == 0.0 else "pace.no_change"))
-        except RcilabError:
-            if self._session.status().code in ("moving", "moving.held"):
-                self._store.say("warn", message("pace.late"))
+            self._changing = wish, supervisor.set_pace(wish) if wish else supervisor.pause()
+        except RcilabError as error:
+            self._tell_pace(error, wish)
+
+    def _tell_pace(self, error: RcilabError | None, pace: float) -> None:
+        refusal = None if error is None else tell_pace_refusal(error, pace, self._session.status())
+        if refusal is not None:
+            self._store.say("warn", refusal)

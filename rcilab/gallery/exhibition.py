@@ -1,10 +1,11 @@
-"""A provoked fault as the parts of a notebook look at it: what was commanded, where the arm was, what it did."""
+"""A provoked fault as scene, timeline and curves draw it: what was commanded, where the arm was, what it did."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from rcilab.clock import CYCLE_TIME
 from rcilab.posing.planning import Plan, picture
 
 if TYPE_CHECKING:
@@ -27,8 +28,8 @@ class Exhibition:
 
     @property
     def moment(self) -> float:
-        """When the fault was reported, [s]."""
-        return self.exhibit.time
+        """When the fault was reported, on the clock of `plan`, [s]."""
+        return self.exhibit.sample * CYCLE_TIME
 
 
 def exhibition_of(exhibit: Exhibit) -> Exhibition:
