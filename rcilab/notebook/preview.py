@@ -124,7 +124,7 @@ class Preview(Closing):
         return f"<Preview of {self._model.name}, {self.url or 'static'}>"
 
     def _repr_html_(self) -> str:
-        told = self._text("preview.nothing", code="<code>preview(..., live=False)</code>")
+        told = self._text("preview.nothing", call="<code>preview(..., live=False)</code>")
         style = f"width: 100%; height: {self._height}px; border: none"
         if self.url is None:
             return f'<iframe srcdoc="{html.escape(self.html())}" style="{style}"></iframe>'
