@@ -14,6 +14,7 @@ from rcilab.notebook.lean import lean
 from rcilab.notebook.look import block, verdict, write
 from rcilab.notebook.number_field import NumberField
 from rcilab.notebook.part import Part
+from rcilab.notebook.slider_echo import is_echo
 from rcilab.words.rounding import fixed
 
 _STEP_DEG = 0.5
@@ -106,8 +107,9 @@ class JogPanel(Part):
         return f'<p class="rl-soft rl-num">{self.text("jog.tool")}: {", ".join(cells)}</p>'
 
     def _on_slider(self, change: Any) -> None:
-        if not self._writing:
-            self._move(self.sliders.index(change["owner"]), math.radians(change["new"]))
+        joint = self.sliders.index(change["owner"])
+        if not self._writing and not is_echo(change, math.degrees(self.state.goal[joint])):
+            self._move(joint, math.radians(change["new"]))
 
     def _taker(self, joint: int) -> Any:
         return lambda degrees: self._move(joint, math.radians(degrees))

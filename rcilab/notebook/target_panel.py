@@ -15,6 +15,7 @@ from rcilab.notebook.lean import lean
 from rcilab.notebook.look import block, head, soft, verdict, write
 from rcilab.notebook.number_field import NumberField
 from rcilab.notebook.part import Part
+from rcilab.notebook.slider_echo import is_echo
 from rcilab.posing.reach import margin
 from rcilab.spatial import Pose
 
@@ -96,7 +97,8 @@ class TargetPanel(Part):
         self.state.aim(self.state.target, psi=math.radians(degrees))
 
     def _on_psi(self, change: Any) -> None:
-        if not self._writing:
+        psi = self.state.arm_angle
+        if not self._writing and (psi is None or not is_echo(change, math.degrees(psi))):
             self._turn(change["new"])
 
     def _on_branch(self, change: Any) -> None:

@@ -40,15 +40,14 @@ class Timeline(Part):
             max=1,
             readout=False,
             tooltip=self.text("timeline.scrub_hint"),
-            layout={"flex": "1 1 auto", "min_width": "130px"},
+            layout={"flex": "1 1 auto", "min_width": "80px"},
         )
         self.rate = lean(
             ipywidgets.Dropdown,
-            description=self.text("timeline.rate"),
+            tooltip=self.text("timeline.rate"),
             options=[(f"{rate:g} ×", rate) for rate in _RATES],
             value=1.0,
-            layout={"width": "8.5em"},
-            style={"description_width": "3.6em"},
+            layout={"width": "5em"},
         )
         self.live = lean(
             ipywidgets.Button,
@@ -56,7 +55,7 @@ class Timeline(Part):
             tooltip=self.text("timeline.live_hint"),
             layout={"width": "auto"},
         )
-        self._clock = block(width="9em")
+        self._clock = block(width="8.5em")
         self._link = ipywidgets.jslink((self.play, "value"), (self.slider, "value"))
         row = lean(
             ipywidgets.HBox,

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from rcilab.arrays import JointVector, as_vector, frozen
 from rcilab.errors import InvalidValueError, KinematicsError
 from rcilab.model import RobotModel, require_model
+from rcilab.notebook.slider_echo import is_echo
 from rcilab.notebook.spoken import chosen_language
 from rcilab.words.rounding import fixed
 from rcilab.words.text import Text
@@ -91,11 +92,11 @@ class JointSliders:
         self._report()
 
     def _on_slider(self, change: Any) -> None:
-        if self._setting:
+        joint = self.sliders.index(change["owner"])
+        if self._setting or is_echo(change, math.degrees(self._q[joint])):
             return
         limits = self._model.limits.joint
         q = self._q.copy()
-        joint = self.sliders.index(change["owner"])
         q[joint] = np.clip(math.radians(change["new"]), limits.lower[joint], limits.upper[joint])
         self._q = frozen(q)
         self._report()

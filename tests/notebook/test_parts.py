@@ -204,6 +204,21 @@ def test_the_circle_is_the_librarys(fresh: Lab) -> None:
     assert fresh.target._circle.value.count("<title>") == len(arcs)
 
 
+def test_what_a_browser_rounds_to_the_steps_of_a_slider_moves_nothing(fresh: Lab) -> None:
+    fresh.tabs.selected_index = 1
+    fresh.jog.q = q = PRO7.home + 0.3
+    fresh.plan._speed_field.box.value = "40.3"
+    before = fresh.state.speed
+    for slider in (*fresh.jog.sliders, fresh.target.psi, fresh.plan.speed):
+        slider.value = round(slider.value / slider.step) * slider.step  # As noUiSlider does with what it is given.
+    np.testing.assert_array_equal(fresh.state.goal, q)
+    assert fresh.state.speed == before == pytest.approx(0.403)
+    for slider in (fresh.jog.sliders[0], fresh.plan.speed):
+        slider.value += slider.step
+    assert np.degrees(fresh.state.goal[0]) == pytest.approx(17.5)
+    assert fresh.state.speed == pytest.approx(0.41)
+
+
 def test_plan_check_and_plot_show_the_same_motion_as_the_library(fresh: Lab) -> None:
     fresh.jog.q = GOAL
     fresh.plan.speed.value = 40.0

@@ -31,6 +31,16 @@ def test_moving_one_slider_poses_the_arm_in_radians() -> None:
     np.testing.assert_array_equal(sliders.q, expected)
 
 
+def test_what_a_browser_rounds_to_the_steps_of_a_slider_moves_nothing() -> None:
+    sliders = JointSliders(PRO7)
+    sliders.q = PRO7.home + 0.3
+    angle = math.degrees(sliders.q[0])
+    sliders.sliders[0].value = round(2.0 * angle) / 2.0  # As noUiSlider does with what it is given.
+    np.testing.assert_array_equal(sliders.q, PRO7.home + 0.3)
+    sliders.sliders[0].value += 0.5
+    assert math.degrees(sliders.q[0]) == round(2.0 * angle) / 2.0 + 0.5
+
+
 def test_the_arm_is_shown_where_it_begins_and_home_and_zero_lead_back() -> None:
     shown: list[np.ndarray] = []
     start = np.full(7, 0.3)
