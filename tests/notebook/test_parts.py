@@ -203,6 +203,7 @@ def test_what_a_browser_rounds_to_the_steps_of_a_slider_moves_nothing(fresh: Lab
     fresh.jog.q = q = PRO7.home + 0.3
     fresh.plan._speed_field.box.value = "40.3"
     before = fresh.state.speed
+    fresh.jog.sliders[1].value = round(np.degrees(PRO7.home[1]))  # What it showed before, told back late.
     for slider in (*fresh.jog.sliders, fresh.target.psi, fresh.plan.speed):
         slider.value = round(slider.value / slider.step) * slider.step  # As noUiSlider does with what it is given.
     np.testing.assert_array_equal(fresh.state.goal, q)
