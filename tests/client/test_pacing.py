@@ -33,6 +33,7 @@ def test_a_motion_of_a_session_is_held_and_gone_on_with():
         wait_for(lambda: moved)
         with pytest.raises(InvalidValueError, match="pace"):
             robot.set_pace(0.01)
+        wait_for(lambda: robot.under_way.place > 0.05)  # It moves by then.
         before = robot.under_way
         assert before is not None
         assert (before.pace, before.mode) == (1.0, "joint_impedance")
