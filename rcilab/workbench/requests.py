@@ -28,7 +28,8 @@ class MoveJoint(Request):
 class PoseGoal(Request):
     """Pose the goal in a named way."""
 
-    name: Literal["zero", "home", "here", "undo"]
+    name: Literal["zero", "home", "here", "start", "undo"]
+    """"start" is where the plan begins, or its program."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -211,6 +211,9 @@ def test_execute_runs_the_plan_records_it_and_then_asks_for_a_new_one(bench, ask
     assert obstacle(bench.store.state, bench.session.status()).code == "ready.done"
     ask(requests.Drive(what="execute"))
     assert told(bench) == "ready.done"
+    ask(requests.PoseGoal(name="start"))
+    assert abs(float(bench.store.state.plan.motion.goal[0]) - start) < 1e-9
+    assert obstacle(bench.store.state, bench.session.status()) is None
 
 
 def test_stop_ends_a_motion_and_says_so(bench, ask):

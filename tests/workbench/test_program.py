@@ -22,7 +22,7 @@ from rcilab.workbench.program import actions as program_actions
 from rcilab.workbench.program import planning as program_planning
 from rcilab.workbench.program.actions import ProgramActions
 from rcilab.workbench.program.draft import draft_of, number_at, tell_place, time_at
-from rcilab.workbench.run.readiness import obstacle
+from rcilab.workbench.run.readiness import may_go_back, may_plan_again, obstacle
 from rcilab.workbench.store import Store, UiState
 from rcilab.workbench.text import Text
 from tests.waiting import wait_for
@@ -337,6 +337,28 @@ def test_a_program_that_was_changed_since_is_not_executed(square):
     assert obstacle(square.state, status).code == "ready.program"
     square.plan()
     assert obstacle(square.state, status) is None
+
+
+def test_a_program_that_has_run_is_planned_again_or_one_goes_back_to_its_start(square):
+    away = HOME + 0.05
+    square.status.q_c = away
+    square.plan()  # The way to its start comes first.
+    end = square.state.plan.motion.goal
+    square.status.q_c = end
+    status = SimpleNamespace(phase="idle", code="idle", powered=True, q_c=end, setup=RobotSetup())
+    reason = obstacle(square.state, status)
+    assert reason.code == "ready.done_program"
+    assert may_plan_again(reason)
+    assert may_go_back(reason)
+    square.goal.pose_goal(requests.PoseGoal(name="start"))
+    plan = square.state.plan
+    assert plan.program is None
+    assert plan.motion.start == pytest.approx(end, abs=1e-12)
+    assert plan.motion.goal == pytest.approx(HOME, abs=1e-12)
+    square.plan()
+    assert obstacle(square.state, status) is None
+    status.q_c = away
+    assert obstacle(square.state, status).code == "ready.elsewhere_program"
 
 
 def test_a_program_for_another_tool_is_planned_and_judged_with_it_and_not_executed_with_this_one(bench):

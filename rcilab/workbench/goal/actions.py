@@ -63,6 +63,7 @@ class GoalActions:
             "zero": np.zeros(state.model.n),
             "home": state.model.home,
             "here": state.goal.q if here is None else here,
+            "start": state.goal.q if state.plan is None else _beginning(state.plan),
         }
         self._pose(frozen(named[request.name]))
         self._store.clear_problems("")
@@ -143,7 +144,6 @@ class GoalActions:
         self._store.remember()
         self._store.clear_problems(request.field)
         act()
-        self._store.update(typed=self._store.state.typed + 1)
 
     def set_speed(self, request: requests.SetSpeed) -> None:
         """Plans faster or slower."""
@@ -259,6 +259,11 @@ def initial_goal(model, q: JointVector) -> Goal:  # type: ignore[no-untyped-def]
     except KinematicsError:
         psi = None
     return Goal(q=q, target=model.forward(q), reach=judge_joints(model, q), psi=psi)
+
+
+def _beginning(plan: Plan) -> JointVector:
+    """Returns where a plan begins; of a program it is the program's start, not the way there, shape (n,), [rad]."""
+    return plan.motion.start if plan.program is None else np.array(plan.program.start)
 
 
 def _with_number(pose: Pose, index: int, value: float) -> Pose:

@@ -12,16 +12,21 @@ if TYPE_CHECKING:
     from rcilab.workbench.store import Recording, UiState
 
 
-def way_html(status: SupervisorStatus, text: Text) -> str:
-    """Returns how far a motion is and how fast it runs, in words and as a bar; nothing while none does."""
+def way_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
+    """Returns how far a motion, or the planning of a program, is, as a bar; nothing while neither is under way."""
+    if state.program.progress is not None:
+        return _bar(state.program.progress)
     if status.code not in ("moving", "moving.held") or status.motion_place is None or not status.motion_duration:
         return ""
     said = text("run.way", place=f"{status.motion_place:.1f}", pace=f"{100.0 * status.pace:.0f}")
     if status.code == "moving.held":
         said = text("run.held", place=f"{status.motion_place:.1f}")
     share = min(max(status.motion_place / status.motion_duration, 0.0), 1.0)
-    bar = f'<div class="rl-meter rl-way"><i style="width:{100.0 * share:.0f}%"></i></div>'
-    return f'<p class="rl-note" role="status">{esc(said)}</p>{bar}'
+    return f'<p class="rl-note" role="status">{esc(said)}</p>{_bar(share)}'
+
+
+def _bar(share: float) -> str:
+    return f'<div class="rl-meter rl-way"><i style="width:{100.0 * share:.0f}%"></i></div>'
 
 
 def outcome_html(state: UiState, text: Text) -> str:

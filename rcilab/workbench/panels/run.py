@@ -8,7 +8,7 @@ from rcilab.motion.pacing import SLOWEST_PACE
 from rcilab.workbench import requests
 from rcilab.workbench.panels.outcome import outcome_html, way_html
 from rcilab.workbench.panels.target import planned_html
-from rcilab.workbench.run.readiness import describe_move, is_moving, obstacle
+from rcilab.workbench.run.readiness import describe_move, is_moving, may_go_back, may_plan_again, obstacle
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, Html, Linked, esc, on_press
 
@@ -42,6 +42,12 @@ class RunPanel:
         self._cancel = gui.add_button(text("run.cancel"), color="gray", visible=False)
         on_press(self._cancel, ask, _drive("cancel"))
         self._reason = Html(gui)
+        self._again = gui.add_button(text("run.again"), icon="route", visible=False, hint=text("program.plan_hint"))
+        on_press(self._again, ask, lambda page: requests.PlanProgram(page=page))
+        self._back = gui.add_button(
+            text("run.back"), icon="arrow-back-up", color="gray", visible=False, hint=text("run.back_hint")
+        )
+        on_press(self._back, ask, lambda page: requests.PoseGoal(page=page, name="start"))
         self._pause = gui.add_button(
             text("run.pause"), icon="player-pause", color="orange", visible=False, hint=text("run.pause_hint")
         )
@@ -75,10 +81,11 @@ class RunPanel:
         self._execute.visible = question is None
         self._agree.visible = self._cancel.visible = question is not None
         self._reason.show("" if reason is None else f'<p class="rl-note rl-why">{esc(text.say(reason))}</p>')
+        self._again.visible, self._back.visible = may_plan_again(reason), may_go_back(reason)
         self._pause.visible, self._resume.visible = status.code == "moving", status.code == "moving.held"
         self._pause.disabled = status.motion_place is None
         self._pace.show(round(100.0 * state.drive.pace, 1))
-        self._way.show(way_html(status, text))
+        self._way.show(way_html(state, status, text))
         self._outcome.show("" if moving else outcome_html(state, text))
         self._plan.disabled = moving
         self._buttons["recover"].disabled = status.phase not in ("fault", "crashed", "lost")

@@ -14,6 +14,8 @@ from rcilab.workbench.text import Message, message
 if TYPE_CHECKING:
     from rcilab.supervisor import SupervisorStatus
 
+_OF_PROGRAMS = {"ready.done": "ready.done_program", "ready.elsewhere": "ready.elsewhere_program"}
+
 
 def obstacle(state: UiState, status: SupervisorStatus) -> Message | None:
     """Returns what stands in the way of Execute, or None when it may be pressed."""
@@ -44,7 +46,20 @@ def obstacle(state: UiState, status: SupervisorStatus) -> Message | None:
     untold = parameter_obstacle(state, status)
     if untold is not None:
         return untold
-    return plan_obstacle(state.plan, status.q_c)
+    reason = plan_obstacle(state.plan, status.q_c)
+    if reason is None or state.plan.program is None or reason.code not in _OF_PROGRAMS:
+        return reason
+    return message(_OF_PROGRAMS[reason.code])
+
+
+def may_plan_again(reason: Message | None) -> bool:
+    """Returns whether planning the program anew is what this obstacle asks for."""
+    return reason is not None and reason.code in ("ready.program", *_OF_PROGRAMS.values())
+
+
+def may_go_back(reason: Message | None) -> bool:
+    """Returns whether the plan has been carried out, so that a person may want to see it once more."""
+    return reason is not None and reason.code in ("ready.done", _OF_PROGRAMS["ready.done"])
 
 
 def describe_move(state: UiState) -> Message | None:
