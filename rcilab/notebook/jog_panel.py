@@ -14,6 +14,7 @@ from rcilab.notebook.lean import lean
 from rcilab.notebook.look import block, verdict, write
 from rcilab.notebook.number_field import NumberField
 from rcilab.notebook.part import Part
+from rcilab.notebook.slider_echo import SliderEcho
 from rcilab.words.rounding import fixed
 
 _STEP_DEG = 0.5
@@ -59,6 +60,7 @@ class JogPanel(Part):
             )
             for j in range(self.model.n)
         ]  # fmt: skip
+        self._echoes = [SliderEcho(slider) for slider in self.sliders]
         rows: list[Any] = []
         for slider, field in zip(self.sliders, self.fields, strict=True):
             slider.observe(self._on_slider, names="value")
@@ -82,8 +84,10 @@ class JogPanel(Part):
         state = self.state
         self._writing = True
         try:
-            for slider, field, angle in zip(self.sliders, self.fields, np.degrees(state.goal).tolist(), strict=True):
+            shown = np.degrees(state.goal).tolist()
+            for slider, echo, field, angle in zip(self.sliders, self._echoes, self.fields, shown, strict=True):
                 if abs(slider.value - angle) > 1e-9:
+                    echo.give(angle)
                     slider.value = angle
                 field.show(angle)
         finally:
@@ -106,8 +110,9 @@ class JogPanel(Part):
         return f'<p class="rl-soft rl-num">{self.text("jog.tool")}: {", ".join(cells)}</p>'
 
     def _on_slider(self, change: Any) -> None:
-        if not self._writing:
-            self._move(self.sliders.index(change["owner"]), math.radians(change["new"]))
+        joint = self.sliders.index(change["owner"])
+        if not self._writing and self._echoes[joint].is_hand(change["new"]):
+            self._move(joint, math.radians(change["new"]))
 
     def _taker(self, joint: int) -> Any:
         return lambda degrees: self._move(joint, math.radians(degrees))

@@ -10,6 +10,7 @@ from rcilab.notebook.lean import lean
 from rcilab.notebook.look import block, soft, verdict, write
 from rcilab.notebook.number_field import NumberField
 from rcilab.notebook.part import Part
+from rcilab.notebook.slider_echo import SliderEcho
 from rcilab.notebook.state import WAYS
 from rcilab.posing.planning import LAWS
 
@@ -67,7 +68,8 @@ class PlanPanel(Part):
         ], min_width="360px")  # fmt: skip
         self.way.observe(self._on_way, names="value")
         self.law.observe(self._on_law, names="value")
-        self.speed.observe(lambda change: self._set_speed(change["new"]), names="value")
+        self._echo = SliderEcho(self.speed)
+        self.speed.observe(self._on_speed, names="value")
         self.plan.on_click(lambda _: self.state.make_plan())
         self.slow_down.on_click(lambda _: self._slow_down())
         self._speed_field.show(100.0 * state.speed)
@@ -77,8 +79,13 @@ class PlanPanel(Part):
     def _set_speed(self, percent: float) -> None:
         self.state.speed = percent / 100.0
         if self.speed.value != percent:
+            self._echo.give(percent)
             self.speed.value = percent
         self._speed_field.show(percent)
+
+    def _on_speed(self, change: Any) -> None:
+        if self._echo.is_hand(change["new"]):
+            self._set_speed(change["new"])
 
     def _on_way(self, change: Any) -> None:
         self.state.way = change["new"]

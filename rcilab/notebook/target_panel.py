@@ -15,6 +15,7 @@ from rcilab.notebook.lean import lean
 from rcilab.notebook.look import block, head, soft, verdict, write
 from rcilab.notebook.number_field import NumberField
 from rcilab.notebook.part import Part
+from rcilab.notebook.slider_echo import SliderEcho
 from rcilab.posing.reach import margin
 from rcilab.spatial import Pose
 
@@ -70,6 +71,7 @@ class TargetPanel(Part):
             tooltip=text("target.psi_hint"),
             layout={"width": "16em"}, style={"description_width": "1.5em"},
         )  # fmt: skip
+        self._psi_echo = SliderEcho(self.psi)
         self.psi.observe(self._on_psi, names="value")
         self._psi_field = NumberField(text, "", "deg", -180.0, 180.0, self._turn)
         side = lean(ipywidgets.VBox, [
@@ -96,7 +98,7 @@ class TargetPanel(Part):
         self.state.aim(self.state.target, psi=math.radians(degrees))
 
     def _on_psi(self, change: Any) -> None:
-        if not self._writing:
+        if not self._writing and self._psi_echo.is_hand(change["new"]):
             self._turn(change["new"])
 
     def _on_branch(self, change: Any) -> None:
@@ -127,6 +129,7 @@ class TargetPanel(Part):
         if psi is not None:
             degrees = math.degrees(psi)
             if abs(self.psi.value - degrees) > 1e-6:
+                self._psi_echo.give(degrees)
                 self.psi.value = degrees
             self._psi_field.show(degrees)
         try:

@@ -40,15 +40,14 @@ class Timeline(Part):
             max=1,
             readout=False,
             tooltip=self.text("timeline.scrub_hint"),
-            layout={"flex": "1 1 auto", "min_width": "130px"},
+            layout={"flex": "1 1 64px", "width": "auto", "min_width": "64px"},
         )
         self.rate = lean(
             ipywidgets.Dropdown,
-            description=self.text("timeline.rate"),
+            tooltip=self.text("timeline.rate"),
             options=[(f"{rate:g} ×", rate) for rate in _RATES],
             value=1.0,
-            layout={"width": "8.5em"},
-            style={"description_width": "3.6em"},
+            layout={"width": "4.4em", "flex": "0 0 auto"},
         )
         self.live = lean(
             ipywidgets.Button,
@@ -56,7 +55,7 @@ class Timeline(Part):
             tooltip=self.text("timeline.live_hint"),
             layout={"width": "auto"},
         )
-        self._clock = block(width="9em")
+        self._clock = block(flex="0 0 auto", min_width="7em")
         self._link = ipywidgets.jslink((self.play, "value"), (self.slider, "value"))
         row = lean(
             ipywidgets.HBox,

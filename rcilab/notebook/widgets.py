@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from rcilab.arrays import JointVector, as_vector, frozen
 from rcilab.errors import InvalidValueError, KinematicsError
 from rcilab.model import RobotModel, require_model
+from rcilab.notebook.slider_echo import SliderEcho
 from rcilab.notebook.spoken import chosen_language
 from rcilab.words.rounding import fixed
 from rcilab.words.text import Text
@@ -55,6 +56,7 @@ class JointSliders:
             )
             for i in range(model.n)
         ]
+        self._echoes = [SliderEcho(slider) for slider in self.sliders]
         self.home = ipywidgets.Button(description=text("jog.home"), tooltip=text("jog.home_hint"))
         self.zero = ipywidgets.Button(description=text("jog.zero"), tooltip=text("jog.zero_hint"))
         self.pose = ipywidgets.HTML()
@@ -84,18 +86,19 @@ class JointSliders:
         self._q = frozen(q)
         self._setting = True
         try:
-            for slider, angle in zip(self.sliders, np.degrees(self._q).tolist(), strict=True):
+            for slider, echo, angle in zip(self.sliders, self._echoes, np.degrees(self._q).tolist(), strict=True):
+                echo.give(angle)
                 slider.value = angle
         finally:
             self._setting = False
         self._report()
 
     def _on_slider(self, change: Any) -> None:
-        if self._setting:
+        joint = self.sliders.index(change["owner"])
+        if self._setting or not self._echoes[joint].is_hand(change["new"]):
             return
         limits = self._model.limits.joint
         q = self._q.copy()
-        joint = self.sliders.index(change["owner"])
         q[joint] = np.clip(math.radians(change["new"]), limits.lower[joint], limits.upper[joint])
         self._q = frozen(q)
         self._report()

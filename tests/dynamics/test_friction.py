@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import mujoco
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -14,6 +13,9 @@ from rcilab.errors import InvalidValueError
 from rcilab.model import load_model
 from rcilab.robots import ROBOT_NAMES
 from rcilab.robots.mjcf import build_mjcf
+from tests.late import Late
+
+mujoco = Late("mujoco")
 
 TERMS = ("full", "inertial", "coriolis", "gravity", "friction")
 

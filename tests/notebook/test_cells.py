@@ -9,16 +9,15 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from ipywidgets.widgets.widget import _instances
 
 import rcilab
-from rcilab.notebook import cells, part
+from rcilab import notebook
+from rcilab.notebook import cells
 from rcilab.notebook.cells import Cells
-from rcilab.notebook.lab_widget import Lab
 from rcilab.notebook.place import Place
-from rcilab.notebook.run_panel import RunPanel
-from rcilab.notebook.scene import Scene
-from rcilab.notebook.timeline import Timeline
+from tests.late import Late
+
+widget = Late("ipywidgets.widgets.widget")
 
 PRO7 = rcilab.load_model("xMatePro7")
 HERE = Place(way="loopback")
@@ -116,27 +115,27 @@ def test_the_end_of_the_kernel_ends_everything(shell: Shell, owner: Cells) -> No
 def test_fifty_re_runs_leave_no_thread_no_socket_no_widget_and_no_process(
     shell: Shell, owner: Cells, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(part, "kernel_cells", lambda: owner)
+    monkeypatch.setattr("rcilab.notebook.part.kernel_cells", lambda: owner)
     monkeypatch.setattr(cells, "_kernel_cells", owner)
 
     def run_cell() -> None:
-        scene = Scene(PRO7, place=HERE)
-        Timeline(scene)
-        RunPanel(scene)
+        scene = notebook.Scene(PRO7, place=HERE)
+        notebook.Timeline(scene)
+        notebook.RunPanel(scene)
 
     def count() -> tuple[int, ...]:
         gc.collect()
-        return threading.active_count(), len(os.listdir("/proc/self/fd")), len(_instances), len(children())
+        return threading.active_count(), len(os.listdir("/proc/self/fd")), len(widget._instances), len(children())
 
     def run_everything(times: int) -> None:
         with monkeypatch.context() as patch:
             patch.setattr("rcilab.notebook.scene.ArmView", Unseen)
             for _ in range(times):
                 shell.run(run_cell, "cell")
-        shell.run(lambda: Lab(PRO7, place=HERE), "lab")
-        shell.run(lambda: Lab(PRO7, place=HERE), "lab")
-        shell.run(lambda: RunPanel(PRO7), "robot").connect.click()
-        assert shell.run(lambda: RunPanel(PRO7), "robot").state.robot is None
+        shell.run(lambda: notebook.Lab(PRO7, place=HERE), "lab")
+        shell.run(lambda: notebook.Lab(PRO7, place=HERE), "lab")
+        shell.run(lambda: notebook.RunPanel(PRO7), "robot").connect.click()
+        assert shell.run(lambda: notebook.RunPanel(PRO7), "robot").state.robot is None
 
     run_everything(1)  # What is opened once and for all, as by a library at its first use, is open from here on.
     once = count()

@@ -8,19 +8,22 @@ import os
 import re
 import threading
 from contextlib import suppress
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 
 import rcilab
+from rcilab import notebook
 from rcilab.faults import Fault
 from rcilab.gallery import Exhibit
 from rcilab.language import LANGUAGES
-from rcilab.notebook import FaultPanel, MotionPlot, Scene, Timeline
 from rcilab.notebook.place import Place
 from rcilab.words.text import load_face
 from tests.waiting import wait_for
+
+if TYPE_CHECKING:
+    from rcilab.notebook import MotionPlot, Scene, Timeline
 
 PRO7 = rcilab.load_model("xMatePro7")
 
@@ -55,7 +58,10 @@ def test_a_fault_is_provoked_on_a_private_controller_looked_at_and_the_session_i
     with rcilab.simulate(PRO7) as robot:
         before = robot.receive_state()
         own = children()
-        with FaultPanel(robot, language="zh") as panel, Scene(panel, place=Place(way="loopback")) as scene:
+        with (
+            notebook.FaultPanel(robot, language="zh") as panel,
+            notebook.Scene(panel, place=Place(way="loopback")) as scene,
+        ):
             panel.fault.value = Fault.COMMAND_JOINT_ACCELERATION_DISCONTINUITY
             panel.provoke.click()
             assert panel.provoke.disabled
@@ -71,7 +77,7 @@ def test_a_fault_is_provoked_on_a_private_controller_looked_at_and_the_session_i
             ticks = re.findall(r'text-anchor="end"[^>]*>([-0-9.e+]+)<', panel._told.value)
             assert max(map(float, ticks)) > 1e4  # So are the ticks of its curve.
             assert panel.progress.layout.display == "none"
-            with Timeline(panel) as timeline, MotionPlot(panel) as plot:
+            with notebook.Timeline(panel) as timeline, notebook.MotionPlot(panel) as plot:
                 require_at_moment(panel.exhibit, scene, timeline, plot)
                 timeline.slider.value = 0
                 panel.moment.click()
@@ -96,7 +102,7 @@ def test_a_fault_is_provoked_on_a_private_controller_looked_at_and_the_session_i
 
 def test_who_cancels_or_closes_sees_nothing_and_leaves_nothing_behind() -> None:
     own, threads = children(), threading.active_count()
-    with FaultPanel(PRO7) as panel:
+    with notebook.FaultPanel(PRO7) as panel:
         panel.provoke.click()
         panel.cancel.click()
         wait_for(lambda: not panel.provoke.disabled, 10.0, "the button again")
@@ -107,7 +113,7 @@ def test_who_cancels_or_closes_sees_nothing_and_leaves_nothing_behind() -> None:
 
 
 def test_an_arm_of_six_axes_is_told_which_fault_it_cannot_have() -> None:
-    with FaultPanel(rcilab.load_model("xMate7")) as panel:
+    with notebook.FaultPanel(rcilab.load_model("xMate7")) as panel:
         panel.fault.value = Fault.ACTUAL_CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION
         assert panel.provoke.disabled
         assert "7 axes" in text_of(panel._told)

@@ -7,31 +7,25 @@ import time
 from collections.abc import Callable, Iterator
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from ipywidgets.widgets.widget import _instances
 
 import rcilab
 import rcilab.notebook
+from rcilab import notebook
 from rcilab.errors import InvalidValueError, UsageError
 from rcilab.language import LANGUAGES, load_words
-from rcilab.notebook import (
-    FaultPanel,
-    JogPanel,
-    Lab,
-    MotionPlot,
-    PlanPanel,
-    ReportView,
-    RunPanel,
-    Scene,
-    TargetPanel,
-    Timeline,
-)
 from rcilab.notebook.place import Place
 from rcilab.words.text import load_face
 from tests.catalogues import require_equal
+from tests.late import Late
+
+if TYPE_CHECKING:
+    from rcilab.notebook import Lab
+
+widget = Late("ipywidgets.widgets.widget")
 
 PRO7 = rcilab.load_model("xMatePro7")
 XMATE3 = rcilab.load_model("xMate3")
@@ -40,7 +34,7 @@ GOAL = PRO7.home + np.array([0.5, -0.4, 0.3, -0.6, 0.4, -0.5, 0.6])
 
 @pytest.fixture(scope="module")
 def lab() -> Iterator[Lab]:
-    with Lab(PRO7, place=Place(way="loopback")) as made:
+    with notebook.Lab(PRO7, place=Place(way="loopback")) as made:
         yield made
 
 
@@ -101,7 +95,7 @@ def open_tabs(lab: Lab) -> None:
 
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_no_place_in_a_sentence_is_left_unfilled(language: str) -> None:
-    with Lab(PRO7, language=language, place=Place(way="loopback")) as made:
+    with notebook.Lab(PRO7, language=language, place=Place(way="loopback")) as made:
         open_tabs(made)
         made.jog.q = GOAL
         made.plan.plan.click()
@@ -111,7 +105,7 @@ def test_no_place_in_a_sentence_is_left_unfilled(language: str) -> None:
 
 
 def test_what_is_on_a_tab_is_made_once_when_it_is_opened_or_asked_for_and_ends_with_the_lab() -> None:
-    with Lab(PRO7, place=Place(way="loopback")) as made:
+    with notebook.Lab(PRO7, place=Place(way="loopback")) as made:
         assert [len(place.children) for place in made.tabs.children] == [1, 0, 0, 0, 0, 0]
         made.tabs.selected_index = 2
         assert made.tabs.children[2].children == (made.plan.widget,)
@@ -125,17 +119,17 @@ def test_what_is_on_a_tab_is_made_once_when_it_is_opened_or_asked_for_and_ends_w
 
 
 def test_a_session_is_looked_after_before_its_tab_is_opened() -> None:
-    with rcilab.simulate(PRO7) as robot, Lab(robot, place=Place(way="loopback")) as made:
+    with rcilab.simulate(PRO7) as robot, notebook.Lab(robot, place=Place(way="loopback")) as made:
         assert made.tabs.selected_index == 0
         assert made.state.robot is not None
 
 
 def test_the_lab_opens_with_few_messages() -> None:
     # Each widget is a message to the browser.
-    with Lab(PRO7, place=Place(way="loopback")):
-        before = len(_instances)
-        with Lab(PRO7, place=Place(way="loopback")):
-            assert len(_instances) - before < 120
+    with notebook.Lab(PRO7, place=Place(way="loopback")):
+        before = len(widget._instances)
+        with notebook.Lab(PRO7, place=Place(way="loopback")):
+            assert len(widget._instances) - before < 120
 
 
 def test_a_slider_moves_the_goal_and_its_ends_are_the_limits(fresh: Lab) -> None:
@@ -204,6 +198,22 @@ def test_the_circle_is_the_librarys(fresh: Lab) -> None:
     assert fresh.target._circle.value.count("<title>") == len(arcs)
 
 
+def test_what_a_browser_rounds_to_the_steps_of_a_slider_moves_nothing(fresh: Lab) -> None:
+    fresh.tabs.selected_index = 1
+    fresh.jog.q = q = PRO7.home + 0.3
+    fresh.plan._speed_field.box.value = "40.3"
+    before = fresh.state.speed
+    fresh.jog.sliders[1].value = round(np.degrees(PRO7.home[1]))  # What it showed before, told back late.
+    for slider in (*fresh.jog.sliders, fresh.target.psi, fresh.plan.speed):
+        slider.value = round(slider.value / slider.step) * slider.step  # As noUiSlider does with what it is given.
+    np.testing.assert_array_equal(fresh.state.goal, q)
+    assert fresh.state.speed == before == pytest.approx(0.403)
+    for slider in (fresh.jog.sliders[0], fresh.plan.speed):
+        slider.value += slider.step
+    assert np.degrees(fresh.state.goal[0]) == pytest.approx(17.5)
+    assert fresh.state.speed == pytest.approx(0.41)
+
+
 def test_plan_check_and_plot_show_the_same_motion_as_the_library(fresh: Lab) -> None:
     fresh.jog.q = GOAL
     fresh.plan.speed.value = 40.0
@@ -260,22 +270,27 @@ def test_the_timeline_moves_cursor_and_arm_together(fresh: Lab) -> None:
 
 
 def test_parts_that_are_given_each_other_share_an_arm() -> None:
-    with JogPanel(XMATE3) as jog, MotionPlot(jog) as plot, ReportView(plot) as report, PlanPanel(jog) as plan:
+    with (
+        notebook.JogPanel(XMATE3) as jog,
+        notebook.MotionPlot(jog) as plot,
+        notebook.ReportView(plot) as report,
+        notebook.PlanPanel(jog) as plan,
+    ):
         jog.q = XMATE3.home + 0.2
         plan.plan.click()
         assert report.report is not None
         assert plot.html.count("<svg") == 4
-        with JogPanel(XMATE3) as other:
+        with notebook.JogPanel(XMATE3) as other:
             assert other.state is not jog.state
 
 
 def test_a_six_axis_arm_has_no_arm_angle() -> None:
-    with TargetPanel(XMATE3) as target:
+    with notebook.TargetPanel(XMATE3) as target:
         assert target.psi is None
 
 
 def test_where_nothing_is_live_a_film_is_shown_and_said() -> None:
-    with Scene(XMATE3, place=Place(way="static")) as scene:
+    with notebook.Scene(XMATE3, place=Place(way="static")) as scene:
         assert scene.url is None
         assert "srcdoc=" in scene._frame.value
         assert "jupyter-server-proxy" in text_of(scene._note)
@@ -285,35 +300,36 @@ def test_where_nothing_is_live_a_film_is_shown_and_said() -> None:
 
 
 def test_behind_a_proxy_the_frame_goes_through_it() -> None:
-    with Scene(XMATE3, place=Place(way="proxy", base="/user/ann/")) as scene:
+    with notebook.Scene(XMATE3, place=Place(way="proxy", base="/user/ann/")) as scene:
         assert 'src="/user/ann/proxy/' in scene._frame.value
 
 
 def test_a_viser_frame_shows_the_same_arm() -> None:
-    with Scene(XMATE3, view="viser", place=Place(way="loopback")) as scene:
+    with notebook.Scene(XMATE3, view="viser", place=Place(way="loopback")) as scene:
         assert scene.url is not None
         assert scene.url.startswith("http://127.0.0.1:")
         scene.state.pose(XMATE3.home + 0.1)
 
 
-@pytest.mark.parametrize("part", [JogPanel, Scene, MotionPlot, Timeline, RunPanel, FaultPanel])
-def test_what_is_no_arm_is_refused_in_words(part: Any) -> None:
+@pytest.mark.parametrize("name", ["JogPanel", "Scene", "MotionPlot", "Timeline", "RunPanel", "FaultPanel"])
+def test_what_is_no_arm_is_refused_in_words(name: str) -> None:
+    part = getattr(notebook, name)
     with pytest.raises(InvalidValueError, match="load_model"):
         part("xMatePro7")
 
 
 def test_every_part_shows_itself_in_chinese_and_closes_twice() -> None:
-    for part in (JogPanel, TargetPanel, PlanPanel, ReportView, MotionPlot, Timeline, RunPanel, FaultPanel):
-        made = part(XMATE3, language="zh")
+    for name in sorted(set(notebook.__all__) - {"Lab", "Scene"}):
+        made = getattr(notebook, name)(XMATE3, language="zh")
         assert "application/vnd.jupyter.widget-view+json" in made._repr_mimebundle_()
         made.close()
         made.close()
     with pytest.raises(InvalidValueError, match="language"):
-        JogPanel(XMATE3, language="xx")
+        notebook.JogPanel(XMATE3, language="xx")
 
 
 def test_a_fault_is_told_with_its_cause_and_remedy() -> None:
-    with FaultPanel(PRO7) as panel:
+    with notebook.FaultPanel(PRO7) as panel:
         panel.fault.value = rcilab.Fault.COLLISION
         told = text_of(panel._told)
         assert "kCollision" in told

@@ -3,19 +3,22 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from matplotlib.axes import Axes
-from matplotlib.colors import to_hex
-from matplotlib.figure import Figure
 
 import rcilab
 from rcilab.errors import InvalidValueError
 from rcilab.notebook.plot import JOINT_COLORS, VIOLATION_COLOR, plot
 from rcilab.notebook.preview import preview
-from rcilab.notebook.widgets import JointSliders
+from tests.late import Late
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+colors, widgets = Late("matplotlib.colors"), Late("rcilab.notebook.widgets")
 
 PRO7 = rcilab.load_model("xMatePro7")
 MOTION = rcilab.plan_joint(PRO7, PRO7.home, PRO7.home + np.array([0.5, -0.4, 0.3, -0.6, 0.7, -0.8, 1.0]))
@@ -24,7 +27,7 @@ TOO_FAST = rcilab.Motion.from_samples(MOTION.q[::2])
 
 def hatched(ax: Axes) -> list[tuple[float, float]]:
     """Spans of time that are marked as violated."""
-    spans = [patch for patch in ax.patches if to_hex(patch.get_facecolor()).upper() == VIOLATION_COLOR]
+    spans = [patch for patch in ax.patches if colors.to_hex(patch.get_facecolor()).upper() == VIOLATION_COLOR]
     boxes = [span.get_extents().transformed(ax.transData.inverted()) for span in spans]
     return [(box.x0, box.x1) for box in boxes]
 
@@ -162,6 +165,6 @@ def test_a_bare_joint_number_is_refused_in_words() -> None:
 
 
 def test_a_name_where_a_model_belongs_is_refused_by_previews_and_sliders_too() -> None:
-    for make in (lambda name: preview(MOTION, name), JointSliders):
+    for make in (lambda name: preview(MOTION, name), widgets.JointSliders):
         with pytest.raises(InvalidValueError, match=r"use load_model\('xMatePro7'\)"):
             make("xMatePro7")

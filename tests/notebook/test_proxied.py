@@ -11,20 +11,21 @@ import sys
 import time
 import urllib.request
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import ipykernel
 import pytest
-import umsgpack
-from tornado.httpclient import HTTPRequest
-from tornado.websocket import websocket_connect
 
 import rcilab
-from rcilab.notebook import Scene
+from rcilab import notebook
 from rcilab.notebook.place import find_place
+from tests.late import Late
 
-assert ipykernel  # What makes this process look like a kernel.
+if TYPE_CHECKING:
+    from tornado.httpclient import HTTPRequest
+
+httpclient, websocket, umsgpack = Late("tornado.httpclient"), Late("tornado.websocket"), Late("umsgpack")
 
 
 @pytest.fixture(scope="module")
@@ -57,11 +58,12 @@ def wait_for_server(runtime: Path, process: subprocess.Popen[bytes], log: Path) 
 
 
 def test_a_scene_is_live_through_the_proxy(server: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    import_module("ipykernel")  # What makes this process look like a kernel.
     monkeypatch.setenv("JUPYTER_RUNTIME_DIR", server["runtime"])
     place = find_place({"JPY_PARENT_PID": str(server["pid"])})
     assert (place.way, place.base) == ("proxy", "/arm/")
     model = rcilab.load_model("xMate3")
-    with Scene(model, place=place) as scene:
+    with notebook.Scene(model, place=place) as scene:
         found = re.search(r'src="(/arm/proxy/[^"]*)"', scene._frame.value)
         assert found is not None
         origin = f"http://127.0.0.1:{server['port']}"
@@ -70,13 +72,13 @@ def test_a_scene_is_live_through_the_proxy(server: dict[str, Any], monkeypatch: 
             page = answer.read().decode()
         assert 'new URL("../"' in page
         socket = "ws" + (origin + found[1]).removeprefix("http").split("static/")[0]
-        paths = asyncio.run(drawn(HTTPRequest(socket, headers={**keys, "Origin": origin})))
+        paths = asyncio.run(drawn(httpclient.HTTPRequest(socket, headers={**keys, "Origin": origin})))
         assert "/meshcat/arm/joint1" in paths
 
 
 async def drawn(request: HTTPRequest) -> set[str]:
     """Names of what the page is told first, until the arm is among it."""
-    socket = await websocket_connect(request)
+    socket = await websocket.websocket_connect(request)
     paths: set[str] = set()
     while "/meshcat/arm/joint1" not in paths:
         message = await asyncio.wait_for(socket.read_message(), 20.0)

@@ -3,23 +3,27 @@
 from __future__ import annotations
 
 import re
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 
 import rcilab
+from rcilab import notebook
 from rcilab.client.control_settings import ControlSettings, standard_control
 from rcilab.language import LANGUAGES
-from rcilab.notebook import RunPanel
 from rcilab.notebook.robot_side import BusyError, Outcome
-from rcilab.notebook.robot_words import tell_refusal
 from rcilab.posing.driving import PARTS_OF_MODE
 from rcilab.state import MODES
 from rcilab.supervisor import SupervisorStatus
 from rcilab.words.text import Text
+from tests.late import Late
 from tests.waiting import wait_for
 
+if TYPE_CHECKING:
+    from rcilab.notebook import RunPanel
+
+robot_words = Late("rcilab.notebook.robot_words")
 PRO7 = rcilab.load_model("xMatePro7")
 
 
@@ -45,7 +49,7 @@ def run_in(panel: RunPanel, mode: str, speed: float, way: float) -> Any:
 
 
 def test_a_parameter_is_typed_acknowledged_and_the_arm_follows_in_its_mode() -> None:
-    with RunPanel(PRO7) as panel:
+    with notebook.RunPanel(PRO7) as panel:
         assert [name for _, name in panel.modes.mode.options] == list(MODES)
         panel.connect.click()
         wait_for(lambda: not panel.power_on.disabled, 30.0, "a robot that can be powered")
@@ -68,7 +72,7 @@ def test_a_parameter_is_typed_acknowledged_and_the_arm_follows_in_its_mode() -> 
 
 
 def test_a_session_is_told_only_what_was_typed_and_is_driven_in_every_mode() -> None:
-    with rcilab.simulate(PRO7) as robot, RunPanel(robot) as panel:
+    with rcilab.simulate(PRO7) as robot, notebook.RunPanel(robot) as panel:
         robot.power_on()
         panel.modes.mode.value = "cartesian_impedance"
         panel.modes.folders["desired_wrench"].selected_index = 0
@@ -114,7 +118,7 @@ class Real:
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_a_robot_is_told_parameters_after_a_second_press_only(language: str) -> None:
     text = Text(language, "rcilab.notebook")
-    with RunPanel(PRO7, language=language) as panel:
+    with notebook.RunPanel(PRO7, language=language) as panel:
         robot = Real()
         panel._take(robot)  # type: ignore[arg-type]
         panel.state.pose(PRO7.home + 0.1)
@@ -145,11 +149,11 @@ def test_refusals_are_told_in_the_language_of_the_panel() -> None:
     for language in LANGUAGES:
         text = Text(language, "rcilab.notebook")
         for error in errors:
-            said = text.say(tell_refusal(error, PRO7))
+            said = text.say(robot_words.tell_refusal(error, PRO7))
             assert str(error) not in said
             assert not re.search(r"\b(status|what|error|robot)\.[a-zA-Z_]+", said), said
     panda = rcilab.load_model("Panda")
-    with RunPanel(panda, language="zh") as panel:
+    with notebook.RunPanel(panda, language="zh") as panel:
         panel.connect.click()
         assert "RCI" in text_of(panel._outcome)
         assert "Franka" not in text_of(panel._outcome)

@@ -7,16 +7,19 @@ import re
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 
 import rcilab
+from rcilab import notebook
 from rcilab.errors import PlanningError, RcilabError
-from rcilab.notebook import FaultPanel, JogPanel, RunPanel
 from rcilab.notebook.robot_side import Outcome
 from rcilab.supervisor import SupervisorStatus
+
+if TYPE_CHECKING:
+    from rcilab.notebook import RunPanel
 
 PRO7 = rcilab.load_model("xMatePro7")
 
@@ -40,7 +43,7 @@ def power_on(panel: RunPanel) -> None:
 
 
 def test_power_execute_stop_and_what_came_of_it_in_a_process_of_its_own() -> None:
-    with RunPanel(PRO7) as panel, JogPanel(panel) as jog, FaultPanel(panel) as faults:
+    with notebook.RunPanel(PRO7) as panel, notebook.JogPanel(panel) as jog, notebook.FaultPanel(panel) as faults:
         assert panel.execute.disabled
         panel.connect.click()
         power_on(panel)
@@ -76,7 +79,7 @@ def test_power_execute_stop_and_what_came_of_it_in_a_process_of_its_own() -> Non
 
 
 def test_a_page_that_falls_silent_stops_the_arm(monkeypatch: pytest.MonkeyPatch) -> None:
-    with rcilab.simulate(PRO7) as robot, RunPanel(robot) as panel:
+    with rcilab.simulate(PRO7) as robot, notebook.RunPanel(robot) as panel:
         power_on(panel)
         panel.state.pose(PRO7.home + 0.3)
         panel.state.speed = 0.05
@@ -94,14 +97,14 @@ def test_a_page_that_falls_silent_stops_the_arm(monkeypatch: pytest.MonkeyPatch)
 
 def test_a_session_is_driven_in_its_own_words_and_left_open() -> None:
     with rcilab.simulate(PRO7) as robot:
-        with RunPanel(robot) as panel:
+        with notebook.RunPanel(robot) as panel:
             assert panel.connect.layout.display == "none"
             power_on(panel)
             panel.state.pose(PRO7.home + 0.05)
             panel.state.make_plan()
             panel.execute.click()
             wait_for(lambda: panel.state.run is not None, "the run")
-            with JogPanel(robot) as jog:
+            with notebook.JogPanel(robot) as jog:
                 assert jog.state is panel.state
         np.testing.assert_allclose(robot.state.q_c, PRO7.home + 0.05, atol=1e-9)
 
@@ -110,7 +113,7 @@ def test_a_session_is_driven_in_its_own_words_and_left_open() -> None:
 def test_a_motion_is_held_gone_on_with_and_slowed_down_as_by_the_session(own: bool) -> None:
     with ExitStack() as open_things:
         robot = None if own else open_things.enter_context(rcilab.simulate(PRO7))
-        panel = open_things.enter_context(RunPanel(PRO7 if robot is None else robot))
+        panel = open_things.enter_context(notebook.RunPanel(PRO7 if robot is None else robot))
         pace = panel.pace
         if own:
             panel.connect.click()
@@ -141,7 +144,7 @@ def test_a_motion_is_held_gone_on_with_and_slowed_down_as_by_the_session(own: bo
 
 
 def test_what_cannot_be_held_any_more_goes_on_and_says_so() -> None:
-    with RunPanel(PRO7) as panel:
+    with notebook.RunPanel(PRO7) as panel:
         robot = Real(PRO7.home, phase="moving", code="moving", motion_duration=1.0, motion_place=0.9)
         robot.error = PlanningError("it arrives before")
         panel._take(robot)  # type: ignore[arg-type]
@@ -152,7 +155,7 @@ def test_what_cannot_be_held_any_more_goes_on_and_says_so() -> None:
 
 
 def test_a_pace_that_is_none_is_refused_below_its_field() -> None:
-    with RunPanel(PRO7) as panel:
+    with notebook.RunPanel(PRO7) as panel:
         for typed in ("5", "120", "fast", "nan"):
             panel.pace.field.box.value = typed
             assert "rl-problem" in panel.pace.field.said.value
@@ -190,7 +193,7 @@ class Real:
 
 
 def test_a_robot_is_moved_after_an_explicit_yes_only_and_by_no_drag() -> None:
-    with RunPanel(PRO7) as panel, JogPanel(panel) as jog:
+    with notebook.RunPanel(PRO7) as panel, notebook.JogPanel(panel) as jog:
         robot = Real(PRO7.home)
         panel._take(robot)  # type: ignore[arg-type]
         jog.sliders[0].value = 20.0
@@ -212,7 +215,7 @@ def test_a_robot_is_moved_after_an_explicit_yes_only_and_by_no_drag() -> None:
 
 
 def test_an_address_that_is_none_is_refused_beside_the_button() -> None:
-    with RunPanel(PRO7) as panel:
+    with notebook.RunPanel(PRO7) as panel:
         panel.target.value = "address"
         panel.connect.click()
         assert "rl-problem" in panel._said.value

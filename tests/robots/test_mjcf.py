@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import mujoco
 import numpy as np
 import pytest
 
@@ -14,6 +13,9 @@ from rcilab.robots import ROBOT_NAMES
 from rcilab.robots.files import write_model
 from rcilab.robots.mjcf import build_mjcf
 from rcilab.spatial import Pose
+from tests.late import Late
+
+mujoco = Late("mujoco")
 
 arms = pytest.mark.parametrize("name", ROBOT_NAMES)
 
