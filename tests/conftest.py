@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -33,6 +35,22 @@ def lane_of(file: str) -> str:
 def place_of(scope: str) -> int:
     """Returns when a piece of work comes: places of `_ORDER`."""
     return _ORDER.index(scope if scope in LANES else "notebook" if "notebook" in scope else "")
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection(session: pytest.Session) -> None:
+    """Where workers stand side by side, each loads its own part of the tests before it collects all of them.
+
+    To compile a test's assertions takes longer than everything else in collecting it, and in a fresh clone nobody has
+    done it yet: one after the other they would do the same work at the same time.
+    """
+    worker = os.environ.get("PYTEST_XDIST_WORKER", "")
+    if not worker.startswith("gw"):
+        return
+    count = int(os.environ["PYTEST_XDIST_WORKER_COUNT"])
+    for path in sorted(Path(__file__).parent.rglob("test_*.py"))[int(worker[2:]) % count :: count]:
+        with suppress(Exception):  # It is told where the tests are collected.
+            pytest.Module.from_parent(session, path=path).obj  # noqa: B018
 
 
 @pytest.hookimpl(optionalhook=True)

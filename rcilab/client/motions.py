@@ -16,6 +16,8 @@ from rcilab.client.filters import CommandFilter, LowPass, RateLimiter
 from rcilab.client.following import Progress, follow, follow_poses, report_progress
 from rcilab.client.start_check import describe_start_mismatch, require_motion
 from rcilab.client.streaming import MotionStream
+from rcilab.client.under_way import UnderWay
+from rcilab.clock import CYCLE_TIME
 from rcilab.errors import UsageError
 from rcilab.motion.pacing import PacedMotion, as_planned, require_pace
 from rcilab.recording.run import Run
@@ -51,8 +53,8 @@ class Motions(RciCommands):
     ) -> Run:
         """Streams a motion and returns what became of it. Checks it first, by the conditions of the mode.
 
-        From another thread, `pause`, `resume` and `set_pace` change how fast it runs. In torque mode the arm follows
-        softly, see `rcilab.client.commanding`.
+        From another thread, `pause`, `resume` and `set_pace` change how fast it runs, and `under_way` tells how far it
+        is. In torque mode the arm follows softly, see `rcilab.client.commanding`.
 
         Args:
             motion: The motion; it must begin at the commanded angles of the arm, `state.q_c`.
@@ -86,6 +88,17 @@ class Motions(RciCommands):
                 return replace(run, plan=self._paced[0].as_motion())
             finally:
                 self._paced = None
+
+    @property
+    def under_way(self) -> UnderWay | None:
+        """Place and pace of the motion that `execute` runs in another thread; None while it runs none."""
+        under_way = self._paced
+        if under_way is None:
+            return None
+        paced, stream, mode = under_way
+        cycle = stream.cycle
+        time = cycle * CYCLE_TIME
+        return UnderWay(time=time, duration=paced.duration, place=paced.place_at(cycle), pace=paced.pace, mode=mode)
 
     def pause(self) -> None:
         """Holds the motion that `execute` runs in another thread, along its way and within all limits.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from operator import lt
 
 from rcilab.conformance.breach import Breach, faults_of
 from rcilab.conformance.condition import AnyLimits, Condition
@@ -31,10 +30,12 @@ class BoundRows:
     def judge(self, values: Sequence[float]) -> tuple[Fault, ...]:
         """Returns the faults that values raise, in wire order; every value has to be strictly between its bounds.
 
-        No NaN is. Every cycle asks this of some seventy numbers; a loop in Python would take half as long again.
+        No NaN is. Every cycle asks this of some ninety numbers; one loop with both bounds is faster than two maps.
         """
-        is_fine = all(map(lt, self._lower, values)) and all(map(lt, values, self._upper))
-        return () if is_fine else faults_of(self.broken(values))
+        for lower, value, upper in zip(self._lower, values, self._upper, strict=False):
+            if not lower < value < upper:
+                return faults_of(self.broken(values))
+        return ()
 
     def broken(self, values: Sequence[float]) -> list[Breach]:
         """Returns what values break; no values break nothing."""

@@ -215,6 +215,15 @@ def explain_source(row: Condition, language: Language = "en") -> str:
     return load_catalogue(language).get(f"source.{row.source}", row.source)
 
 
+def explain_formula(row: Condition, language: Language = "en") -> str:
+    """Returns what a condition demands; formulas without words in them are the same in every language.
+
+    Raises:
+        InvalidValueError: There is no such language.
+    """
+    return load_catalogue(language).get(f"formula.{row.formula}", row.formula)
+
+
 def explain_limit(source: str, language: Language = "en") -> str:
     """Returns where a limit was taken from; sources without other words keep their English ones.
 

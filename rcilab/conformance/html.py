@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from rcilab.conformance.catalogue import Language, say
 from rcilab.conformance.explain import (
+    explain_formula,
     explain_place,
     explain_quantity,
     explain_source,
@@ -57,7 +58,7 @@ def _row(row: ConditionResult, language: Language) -> str:
     if language != "en":
         place, quantity = explain_place(row, language), explain_quantity(row.condition, language)
     unit = escape(row.unit).replace("^2", "²").replace("^3", "³")
-    name = f'<span title="{escape(row.condition.formula)}">{escape(quantity)}</span>'
+    name = f'<span title="{escape(explain_formula(row.condition, language))}">{escape(quantity)}</span>'
     if row.necessity == "recommended":
         name += f" <i>{say(language, 'html.recommended')}</i>"
     mark = f'<b style="color:{COLORS[row.verdict]}">{say(language, f"html.{row.verdict}")}</b>'

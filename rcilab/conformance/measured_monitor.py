@@ -40,6 +40,11 @@ class MeasuredMonitor:
         self._rows = BoundRows(MEASURED_CONDITIONS, limits)
         self.reset([0.0] * self._n)
 
+    @property
+    def has_box(self) -> bool:
+        """Whether there is a box at all: without one nobody needs the tool's position."""
+        return self._box is not None
+
     def reset(self, q: Sequence[float]) -> None:
         """Forgets the past: the arm is at `q`, and what it does there shows in the next step.
 

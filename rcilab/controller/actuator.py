@@ -28,6 +28,8 @@ from rcilab.model import RobotModel
 from rcilab.protocols import rci
 from rcilab.safety_box import SafetyBox, active_box
 
+_DRIVES = {"position": Drive.POSITION, "braked": Drive.BRAKED}
+
 
 class Law(Enum):
     """How a reference becomes a setpoint."""
@@ -42,6 +44,8 @@ class Law(Enum):
     def __init__(self, words: str) -> None:
         self.yields: Final = words not in ("position", "braked")
         """Whether the arm may be elsewhere than it was told, so that a stop has to begin from where it really is."""
+        self.drive: Final = _DRIVES.get(words, Drive.TORQUE)
+        """What it drives the joints with."""
         self.leads: Final = words in ("torque", "guide")
         """Whether the arm goes where forces take it and commanded angles only follow."""
 
@@ -91,20 +95,16 @@ class Actuator:
         """
         if law is not self._law:
             self._law, self._damper = law, Damper()
-        match law:
-            case Law.POSITION:
-                return Setpoint(Drive.POSITION, commanded.q, commanded.dq, commanded.ddq, None, commanded.arrays)
-            case Law.BRAKED:
-                return Setpoint(Drive.BRAKED, commanded.q, commanded.dq, commanded.ddq)
-            case Law.TORQUE:
-                torque = [0.0] * len(commanded.q) if tau is None else tau
-                return Setpoint(Drive.TORQUE, commanded.q, commanded.dq, commanded.ddq, torque)
-            case _:
-                torque = self._compliance(law, commanded, tool_c, measured)
-                box = guiding_box(self._settings)
-                if box is not None:
-                    torque = torque + wall_torque(self._model, measured, box, self._settings.cartesian_stiffness)
-                return Setpoint(Drive.TORQUE, commanded.q, commanded.dq, commanded.ddq, torque)
+        if not law.yields:
+            return Setpoint(law.drive, commanded.q, commanded.dq, commanded.ddq, None, commanded.arrays)
+        if law is Law.TORQUE:
+            torque = [0.0] * len(commanded.q) if tau is None else tau
+        else:
+            torque = self._compliance(law, commanded, tool_c, measured)
+            box = guiding_box(self._settings)
+            if box is not None:
+                torque = torque + wall_torque(self._model, measured, box, self._settings.cartesian_stiffness)
+        return Setpoint(law.drive, commanded.q, commanded.dq, commanded.ddq, torque)
 
     def _compliance(
         self, law: Law, commanded: CommandedMotion, tool_c: ToolMotion, measured: Measurement

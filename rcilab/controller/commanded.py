@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from operator import sub
+from struct import Struct
 
 import numpy as np
 
-from rcilab.arrays import JointVector, sealed
+from rcilab.arrays import JointVector
 from rcilab.clock import CYCLE_TIME
 from rcilab.limits import JointLimits
 from rcilab.motion.differences import derivatives_from_differences, differences_from_derivatives
@@ -37,6 +38,7 @@ class CommandedMotion:
         self._hardest = JOIN_SHARE * limits.acceleration
         self._acceleration: list[float] = limits.acceleration.tolist()
         self._jerk: list[float] = limits.jerk.tolist()
+        self._pack = Struct(f"{3 * len(q)}d").pack
         self.version = 0
         self._arrays: tuple[JointVector, JointVector, JointVector] | None = None
         self._arrays_version = -1
@@ -47,7 +49,7 @@ class CommandedMotion:
         """q, dq and ddq as read-only arrays, made once a cycle for all who compute with them."""
         if self._arrays is None or self._arrays_version != self.version:
             n = len(self.q)
-            rows = sealed(np.array([*self.q, *self.dq, *self.ddq]))  # One list: numpy is slow to look into several.
+            rows = np.frombuffer(self._pack(*self.q, *self.dq, *self.ddq))  # numpy looks at each float of a list twice.
             self._arrays, self._arrays_version = (rows[:n], rows[n : 2 * n], rows[2 * n :]), self.version
         return self._arrays
 

@@ -44,6 +44,9 @@ _PRESSED = {
     rci.SafetyStop.ESTOP: Remark("an emergency stop was pressed", "estop"),
     rci.SafetyStop.GSTOP: Remark("the safety gate was opened", "gstop"),
 }
+_WAITING = (Phase.STARTING, Phase.RECOVERING)
+_MOVING = (Phase.MOVING, Phase.STOPPING)
+_BRAKED = (Phase.OFF, Phase.REFLEX, Phase.USER_STOPPED, Phase.RECOVERING)
 _IDLE_MODES = (ControllerMode.OTHER, MotionGeneratorMode.IDLE)
 _REPORTED = (
     rci.CommandCode.SET_COOR,
@@ -134,7 +137,7 @@ class ControlCycle:
     @property
     def is_moving(self) -> bool:
         """Whether the arm moves, or listens for commands that would make it."""
-        return self.phase in (Phase.MOVING, Phase.STOPPING) or not self._arm.commanded.is_at_rest
+        return self.phase in _MOVING or not self._arm.commanded.is_at_rest
 
     @property
     def wants_commands(self) -> bool:
@@ -253,7 +256,7 @@ class ControlCycle:
         if law is not Law.TORQUE:
             self._tau = None
         self._arm.move(law, self._tau, has_moved=self._has_moved)
-        if self.phase in (Phase.MOVING, Phase.STOPPING):
+        if self.phase in _MOVING:
             # Our own stop is one of the joints: how the tool turns meanwhile is nobody's command.
             faults, reason = self._arm.watch.judge(is_commanded=self.phase is Phase.MOVING or self._drain > 0)
             if faults:
@@ -266,9 +269,11 @@ class ControlCycle:
     def _count_down(self) -> None:
         if self._countdown > 0:
             self._countdown -= 1
-        if self._countdown == 0 and self.phase is Phase.STARTING:
+        if self._countdown > 0 or self.phase not in _WAITING:
+            return
+        if self.phase is Phase.STARTING:
             self.happen(Event.MODES_SHOWN)
-        if self._countdown == 0 and self.phase is Phase.RECOVERING and self._arm.commanded.is_at_rest:
+        elif self._arm.commanded.is_at_rest:
             self.happen(Event.RECOVERED)
 
     def _raise(self, faults: tuple[Fault, ...], reason: Remark) -> None:
@@ -307,10 +312,9 @@ class ControlCycle:
         if phase is Phase.GUIDING:
             return Law.GUIDE
         if phase is Phase.MOVING or (phase is Phase.STOPPING and self._drain > 0):
-            is_over = self._mode.law is Law.TORQUE and self.playout.is_finished  # Nobody holds the arm any more.
+            is_over = self._mode.law.leads and self.playout.is_finished  # Nobody holds the arm any more.
             return Law.POSITION if is_over else self._mode.law
-        is_braked = phase in (Phase.OFF, Phase.REFLEX, Phase.USER_STOPPED, Phase.RECOVERING)
-        return Law.BRAKED if is_braked and self._arm.may_be_braked else Law.POSITION
+        return Law.BRAKED if phase in _BRAKED and self._arm.may_be_braked else Law.POSITION
 
     def _report(self) -> RobotState:
         controller_mode, motion_mode = self._shown

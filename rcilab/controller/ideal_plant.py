@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.arrays import JointVector, frozen, sealed
+from rcilab.arrays import JointVector, frozen, scalar, sealed
 from rcilab.clock import CYCLE_TIME
 from rcilab.controller.plant import Drive, Measurement, Setpoint
 from rcilab.controller.push import Push
@@ -23,6 +23,8 @@ from rcilab.errors import UsageError
 from rcilab.model import RobotModel
 from rcilab.safety_box import SafetyBox
 from rcilab.spatial import Pose
+
+_CYCLE, _HALF = scalar(CYCLE_TIME), scalar(CYCLE_TIME / 2.0)  # [s]
 
 
 class IdealPlant:
@@ -119,17 +121,16 @@ class IdealPlant:
         Accelerations are those of the middle of the millisecond, so that a free swing keeps its energy; the step in q
         is the new velocity's, so that measured velocities are the backward differences of measured angles.
         """
-        h, gravity = CYCLE_TIME, self._model.rigid_body.gravity
         q, dq = self._measurement.q, self._measurement.dq
         outside = self._push.torque(q) if self._push.is_active else None
         tau = tau_c if outside is None else tau_c + outside
         accelerate = self._body.weightless_acceleration if self._mounted is None else self._acceleration
         ddq = accelerate(q, dq, tau)
-        ddq = accelerate(q + (h / 2.0) * dq, dq + (h / 2.0) * ddq, tau)
-        dq = dq + h * ddq
-        q = q + h * dq
+        ddq = accelerate(q + _HALF * dq, dq + _HALF * ddq, tau)
+        dq = dq + _CYCLE * ddq
+        q = q + _CYCLE * dq
         self._rests = False
-        self._measurement = Measurement(sealed(q), sealed(dq), sealed(tau_c + gravity(q)))
+        self._measurement = Measurement(sealed(q), sealed(dq), sealed(tau_c + self._model.rigid_body.gravity(q)))
         return self._measurement
 
     def _acceleration(self, q: JointVector, dq: JointVector, tau: JointVector) -> JointVector:

@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.arrays import Array, JointVector, sealed
+from rcilab.arrays import Array, JointVector, scalar, sealed
 from rcilab.controller.mujoco_obstacles import Obstacles
 from rcilab.controller.plant import Drive, Measurement, Setpoint
 from rcilab.controller.push import Push
@@ -41,7 +41,8 @@ FRICTION_KNOWN = 0.9  # Share of the friction that the drives compensate; no dri
 PEAK_TORQUE = 4.0  # Times the manual's torque limit, what a drive adds at most; a choice, see above
 BRAKE_TIME = 0.02  # [s] time constant of the brakes; a choice
 
-_BACK, _AHEAD = KP * TIMESTEP, 1.0 - KD * TIMESTEP  # [1/s], [1]
+_KP, _KD, _STEP = scalar(KP), scalar(KD), scalar(TIMESTEP)
+_BACK, _AHEAD = scalar(KP * TIMESTEP), scalar(1.0 - KD * TIMESTEP)  # [1/s], [1]
 _BRAKES_HOLD = 1e-4  # [rad/s] below this closed brakes hold
 _STILL_SPEED = 1e-7  # [rad/s] below this a resting arm is said to rest
 _STILL_ERROR = 1e-9  # [rad] nearer than this to its setpoint a resting arm is said to be there
@@ -135,7 +136,7 @@ class MuJoCoPlant:
         # What is left of the motor torque behind rotor and friction, brought to the end of the millisecond.
         loss = self._friction * self._dq
         if self._rotors_are_felt:
-            loss += self._rotors * ((self._dq - dq) / TIMESTEP)
+            loss += self._rotors * ((self._dq - dq) / _STEP)
         self._measurement = self._measure(motor - loss + (self._bias - bias))
         self._settle(setpoint)
         return self._measurement
@@ -150,7 +151,7 @@ class MuJoCoPlant:
         # The setpoint is where the arm is to be at the end of this millisecond; q and dq are those of its beginning:
         # ddq_c + KD (dq_c - h ddq_c - dq) + KP (q_c - h dq_c - q), with the two steps back taken out of the brackets.
         q_c, dq_c, ddq_c = setpoint.as_arrays()
-        return self._times_inertia(KP * (q_c - q) + KD * (dq_c - dq) - _BACK * dq_c + _AHEAD * ddq_c)
+        return self._times_inertia(_KP * (q_c - q) + _KD * (dq_c - dq) - _BACK * dq_c + _AHEAD * ddq_c)
 
     def _settle(self, setpoint: Setpoint) -> None:
         """Lets an arm that has come to rest be at rest: its last 1e-7 rad/s would otherwise never end."""

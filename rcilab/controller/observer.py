@@ -12,13 +12,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from rcilab.arrays import Array, JointVector, frozen, sealed
+from rcilab.arrays import Array, JointVector, frozen, scalar, sealed
 from rcilab.clock import CYCLE_TIME
 from rcilab.controller.plant import Measurement
 from rcilab.model import RobotModel
 
 BANDWIDTH = 200.0  # [rad/s] of the residual: a push shows with a time constant of 5 ms; a choice
-_GAIN = BANDWIDTH * CYCLE_TIME / (1.0 + BANDWIDTH * CYCLE_TIME)
+_CYCLE = scalar(CYCLE_TIME)  # [s]
+_SHARE = BANDWIDTH * CYCLE_TIME / (1.0 + BANDWIDTH * CYCLE_TIME)  # of what is new, in one cycle
+_GAIN = scalar(_SHARE)
 _NOTHING = 1e-6  # [N m] A residual this small is rounding: it is called zero.
 _DAMPING = 2.5e-5 * np.eye(6)  # [m^2, rad^2] keeps the wrench finite at a singularity
 
@@ -56,7 +58,7 @@ class Observer:
             self.reset(measured)
             return self._answer
         if measured is not last:
-            self._raw = self._unexplained(measured, (measured.dq - last.dq) / CYCLE_TIME)
+            self._raw = self._unexplained(measured, (measured.dq - last.dq) / _CYCLE)
             self._last, self._is_static = measured, False
         elif not self._is_static:  # The same measurement again: its velocity has not changed.
             self._raw = self._unexplained(measured, self._zeros)
@@ -65,7 +67,7 @@ class Observer:
         if tau_ext is self._raw:
             return self._answer
         step = _GAIN * (self._raw - tau_ext)
-        is_there = _is_tiny(step, _GAIN * _NOTHING)
+        is_there = _is_tiny(step, _SHARE * _NOTHING)
         self._answer = self._answered(self._raw if is_there else sealed(tau_ext + step), measured)
         return self._answer
 
@@ -83,4 +85,4 @@ class Observer:
 
 def _is_tiny(vector: Array, bound: float) -> bool:
     values = vector.tolist()
-    return -bound < min(values) and max(values) < bound
+    return -bound < values[0] < bound and -bound < min(values) and max(values) < bound  # The first mostly tells.

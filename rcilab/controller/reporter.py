@@ -26,7 +26,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rcilab.arrays import Array, JointVector, frozen, sealed
+from rcilab.arrays import Array, JointVector, frozen, scalar, sealed
 from rcilab.clock import CYCLE_TIME
 from rcilab.controller.commanded import CommandedMotion
 from rcilab.controller.drive_report import DriveReport
@@ -39,6 +39,7 @@ from rcilab.protocols.rci import ForceFrame
 from rcilab.spatial import Rotation9
 from rcilab.state import ControllerMode, MotionGeneratorMode, RobotMode, RobotState, build_state
 
+_CYCLE = scalar(CYCLE_TIME)  # [s]
 _STANDING = 1e-6  # [m/s] Below this the tool has no direction of its path.
 _ALONG = 0.999  # Cosine of an angle above which two directions count as parallel.
 
@@ -81,7 +82,8 @@ class StateReporter:
         at_tool = not any(self._T_tool_force.parts[1])
         self._is_wrench_at_tool = at_tool and self._force_frame is ForceFrame.WORLD
         self._drives = DriveReport(model, settings.torque_report_filter)
-        self._body: dict[str, Any] | None = None
+        self._body: tuple[Any, ...] | None = None
+        self._tau_c = self._zeros
         self._readings: Readings | None = None
         self._version = -1
         self._is_settled = False
@@ -103,7 +105,7 @@ class StateReporter:
             body = self._body = self._compute(readings)
             self._readings, self._version = readings, readings.commanded.version
         modes = (motion_generator_mode, controller_mode, robot_mode)
-        return build_state((message_id, *body.values(), faults, success_rate, *modes))
+        return build_state((message_id, *body, faults, success_rate, *modes))
 
     def _is_same(self, readings: Readings) -> bool:
         last = self._readings
@@ -115,18 +117,19 @@ class StateReporter:
             and readings.commanded.version == self._version
         )
 
-    def _compute(self, readings: Readings) -> dict[str, Any]:
+    def _compute(self, readings: Readings) -> tuple[Any, ...]:
         """Returns the fields of a state between its number and its faults, in their order."""
         commanded, tool_c, measured, tool, tau_commanded, _, wrench = readings
-        last, before, h = self._body, self._readings, CYCLE_TIME
+        before = self._readings
         q_c, dq_c, ddq_c = commanded.arrays
         if tau_commanded is not None:
             tau_c = frozen(tau_commanded)
         else:
             tau_c = self._model.rigid_body.shared_torque(q_c, dq_c, ddq_c)
         dtau_c = self._zeros
-        if last is not None and before is not None and (tau_commanded is None) == (before.tau_c is None):
-            dtau_c = (tau_c - last["tau_c"]) / h
+        if before is not None and (tau_commanded is None) == (before.tau_c is None):
+            dtau_c = (tau_c - self._tau_c) / _CYCLE
+        self._tau_c = tau_c
         is_new = before is None or measured is not before.measured
         drives = self._drives
         theta, dtheta, motor_tau, tau_filtered, motor_tau_filtered = drives.step(measured, commanded.is_at_rest)
@@ -134,31 +137,31 @@ class StateReporter:
             commanded.is_at_rest and tool_c.is_at_rest and drives.is_settled and not is_new and not dtau_c.any()
         )
         tool_rates_c = sealed(np.array([*tool_c.twist, *tool_c.acceleration]))
-        return {
-            "q": measured.q,
-            "q_c": q_c,
-            "dq": measured.dq,
-            "dq_c": dq_c,
-            "ddq_c": ddq_c,
-            "T_base_tool": tool.matrix,
-            "T_base_tool_c": tool_c.matrix,
-            "tool_velocity_c": tool_rates_c[:6],
-            "tool_acceleration_c": tool_rates_c[6:],
-            "psi": tool.psi,
-            "psi_c": tool_c.psi,
-            "dpsi_c": tool_c.dpsi,
-            "ddpsi_c": tool_c.ddpsi,
-            "tau": measured.tau,
-            "tau_filtered": tau_filtered,
-            "tau_c": tau_c,
-            "dtau_c": dtau_c,
-            "tau_ext_in_base": wrench,
-            "tau_ext_in_stiff": self._in_force_frame(wrench, tool, tool_c.twist[:3]),
-            "theta": theta,
-            "dtheta": dtheta,
-            "motor_tau": motor_tau,
-            "motor_tau_filtered": motor_tau_filtered,
-        }
+        return (
+            measured.q,
+            q_c,
+            measured.dq,
+            dq_c,
+            ddq_c,
+            tool.matrix,
+            tool_c.matrix,
+            tool_rates_c[:6],
+            tool_rates_c[6:],
+            tool.psi,
+            tool_c.psi,
+            tool_c.dpsi,
+            tool_c.ddpsi,
+            measured.tau,
+            tau_filtered,
+            tau_c,
+            dtau_c,
+            wrench,
+            self._in_force_frame(wrench, tool, tool_c.twist[:3]),
+            theta,
+            dtheta,
+            motor_tau,
+            motor_tau_filtered,
+        )
 
     def _in_force_frame(self, wrench: Array, tool: ToolMotion, velocity: Sequence[float]) -> Array:
         """Returns a wrench on the tool (base axes, tool's origin) at the force frame's origin, in its type's axes."""

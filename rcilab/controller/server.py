@@ -15,12 +15,10 @@ from __future__ import annotations
 
 import os
 import sys
-from collections import deque
 from collections.abc import Callable
 
 from rcilab.awake import AwakeCores
 from rcilab.clock import CYCLE_TIME, SystemClock
-from rcilab.controller.answers import Reply
 from rcilab.controller.config import ControllerConfig
 from rcilab.controller.cycle import ControlCycle
 from rcilab.controller.endpoint import (
@@ -37,22 +35,15 @@ from rcilab.controller.faulty_network import FaultyNetwork
 from rcilab.controller.pace import Pace
 from rcilab.controller.plant import Plant
 from rcilab.controller.plants import build_plant
+from rcilab.controller.request_desk import RequestDesk
 from rcilab.controller.stalls import StallPlan
-from rcilab.controller.state_machine import Event, Phase, When
+from rcilab.controller.state_machine import Event, Phase
 from rcilab.controller.surroundings import Mishaps, Surroundings
 from rcilab.controller.world_port import WorldPort
-from rcilab.errors import DecodeError, UsageError
+from rcilab.errors import UsageError
 from rcilab.faults import Fault
 from rcilab.model import load_model, require_rci
-from rcilab.protocols.rci import (
-    COMMAND_SIZE,
-    Connect,
-    Request,
-    decode_command,
-    decode_request,
-    encode_response,
-    encode_state,
-)
+from rcilab.protocols.rci import COMMAND_SIZE, decode_command, encode_state
 from rcilab.realtime import enter_realtime, leave_realtime
 from rcilab.words.text import Remark
 
@@ -111,8 +102,6 @@ class ControllerServer:
         self._log = log if log is not None else _to_stderr
         self._clock = SystemClock()
         self._pace = Pace(self._clock.now())
-        self._requests: deque[bytes] = deque()
-        self._pending: tuple[Request, int, Reply] | None = None
         self._is_ending = False
         self._next_look = 0.0
         self._cores = AwakeCores()
@@ -120,6 +109,7 @@ class ControllerServer:
         self._endpoint = Endpoint(config)
         states_network = config.network if config.states_network is None else config.states_network
         self._network = FaultyNetwork(self._endpoint, self._clock, config.network, states_network)
+        self._desk = RequestDesk(self.cycle, self._endpoint, self._network)
         self._stalls = StallPlan()
         self._surroundings = Surroundings(
             self.cycle, self._network, self._stalls, self._clock, lambda: Mishaps(self.missed, self.misfits)
@@ -276,7 +266,7 @@ class ControllerServer:
         A request may then show one state later, which matters to no arm at rest.
         """
         cycle = self.cycle
-        is_quiet = cycle.phase in _QUIET and self._pending is None and self._endpoint.has_client
+        is_quiet = cycle.phase in _QUIET and not self._desk.is_waiting and self._endpoint.has_client
         return is_quiet and not (cycle.is_moving or self.config.lockstep)
 
     def _step(self, due: float) -> None:
@@ -292,11 +282,7 @@ class ControllerServer:
         self._send_state()
         if self.cycle.is_moving is not was_moving and not self.config.lockstep:
             self._tell_slip()
-        if self._pending is not None and self.cycle.is_settled:
-            request, command_id, reply = self._pending
-            self._pending = None
-            self._answer(request, command_id, reply)
-            self._serve()
+        self._desk.settle()
         self._look_for_parent()
 
     def _look_for_parent(self) -> None:
@@ -346,8 +332,7 @@ class ControllerServer:
                     else:
                         self.misfits += 1
                 case FrameArrived(frame):
-                    self._requests.append(frame)
-                    self._serve()
+                    self._desk.take(frame)
                 case ClientJoined(address):
                     self._warn_of_other_target(address)
                     self._send_state()  # Before anything else: the vendor's client waits for it a few milliseconds.
@@ -359,30 +344,6 @@ class ControllerServer:
                 case ClientRefused(address, holder):
                     self._log(f"refused a second client from {address}: {holder} is connected; one at a time")
 
-    def _serve(self) -> None:
-        """Handles requests in order, up to one whose answer has to wait."""
-        while self._requests and self._pending is None:
-            frame = self._requests.popleft()
-            try:
-                command_id, request = decode_request(frame)
-            except DecodeError as error:
-                self._requests.clear()
-                self._network.drop_client(f"sent bytes that are no RCI: {error}")
-                return
-            reply = self.cycle.handle(request)
-            if isinstance(request, Connect):
-                self._endpoint.redirect_states(request.udp_port)
-            # Idle modes are to be seen before StopMove is answered, so even an arm at rest answers after a cycle.
-            if reply.when is When.AT_REST:
-                self._pending = (request, command_id, reply)
-            else:
-                self._answer(request, command_id, reply)
-
-    def _answer(self, request: Request, command_id: int, reply: Reply) -> None:
-        self._network.send_frame(encode_response(request.code, command_id, self.cycle.conclude(reply)))
-        if reply.ends_connection:
-            self._network.drop_client("asked for a reboot")
-
     def _warn_of_other_target(self, address: str) -> None:
         target = self._endpoint.fixed_host
         if target not in (None, address):
@@ -393,8 +354,7 @@ class ControllerServer:
 
     def _lose_client(self, reason: str) -> None:
         was_moving = self.cycle.phase in (Phase.MOVING, Phase.STOPPING, Phase.GUIDING)
-        self._requests.clear()
-        self._pending = None
+        self._desk.clear()
         self.cycle.happen(Event.CLIENT_LOST)
         if was_moving:
             self._log(f"the client {reason} in mid-motion: the arm comes to rest")

@@ -16,7 +16,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rcilab.arrays import Array, JointVector, Matrix
+from rcilab.arrays import Array, JointVector, Matrix, scalar
 from rcilab.controller.compliance import DAMPING_RATIO, Damper, design_damping
 from rcilab.controller.plant import Measurement
 from rcilab.dynamics.rigid_body import ToolTerms
@@ -25,9 +25,8 @@ from rcilab.spatial import Pose, turn_between
 
 NULL_FREQUENCY = 5.0  # [rad/s] of the spring that holds the elbow of a 7-axis arm; soft, a choice
 NULL_DAMPING = 2.0 * DAMPING_RATIO * NULL_FREQUENCY  # [1/s]
-_DAMPED_INVERSE = 1e-4 * np.eye(
-    6
-)  # [1/kg] keeps feed-forward finite at a singularity; off it, below 0.1 % of it are lost
+_PULL, _DRAG = scalar(NULL_FREQUENCY**2), scalar(NULL_DAMPING)  # [1/s^2], [1/s]
+_DAMPED_INVERSE = 1e-4 * np.eye(6)  # [1/kg] keeps feed-forward finite at a singularity; off it, it costs below 0.1 %
 
 
 def joint_impedance(
@@ -136,7 +135,7 @@ def _reference(
     J = terms.jacobian
     wanted = np.array([*twist, *acc])
     if model.n == 7:
-        free = NULL_FREQUENCY**2 * (q_null - measured.q) - NULL_DAMPING * measured.dq
+        free = _PULL * (q_null - measured.q) - _DRAG * measured.dq
     else:
         free = np.zeros(model.n)
     wanted[6:] -= terms.acceleration(free) if any(twist) or any(acc) else J.dot(free)

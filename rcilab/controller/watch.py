@@ -23,6 +23,7 @@ YIELDING_ALLOWANCE = 8.0
 """How much more acceleration than under the position servo a yielding arm may have. A choice: the light last joints of
 an arm that is pushed with 30 N, or told a torque of a few N m, are thrown harder than any command could ask for."""
 
+_ANYWHERE = (0.0, 0.0, 0.0)
 _NO_REASON = Remark("")
 
 
@@ -101,7 +102,8 @@ class Watch:
         monitor, tool = self._monitor, self.tool
         assert monitor is not None
         twist, psi = (tool.twist, tool.psi) if self._judges_tool and is_commanded else (None, None)
-        faults = monitor.step(self._q, self._dq, tool.position, twist, psi)
+        position = tool.position if monitor.has_box else _ANYWHERE
+        faults = monitor.step(self._q, self._dq, position, twist, psi)
         reasons = [describe_breaches(monitor.broken())] if faults else []
         collision = self.find_collision(self._thresholds)
         if collision is not None:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from rcilab.arrays import Array, JointVector, frozen
 from rcilab.conformance.condition import Condition
+from rcilab.conformance.explain import explain_formula, explain_source
 from rcilab.controller.fault_stop import FAULT_STOP, Offender
 from rcilab.faults import Fault
 from rcilab.gallery.recipe import Recipe
@@ -163,6 +164,7 @@ class Exhibit:
             InvalidValueError: There is no such language.
         """
         row = self.condition
+        formula, source = explain_formula(row, language), explain_source(row, language)
         number = say(
             language, "number", value=f"{self.value:.4g}", bound=f"{self.bound:.4g}", unit=row.unit,
             time=f"{self.time:.3f}",
@@ -171,7 +173,7 @@ class Exhibit:
             (
                 f"{self.fault.manual_name}: {self.told('cause', language)}",
                 f"  {say(language, 'head.sent')} {self.told('sent', language)}",
-                f"  {say(language, 'head.condition')} {row.formula}; {self.place}: {number} [{row.source}]",
+                f"  {say(language, 'head.condition')} {formula}; {self.place}: {number} [{source}]",
                 f"  {say(language, 'head.remedy')} {self.told('remedy', language)}",
                 f"  {say(language, 'head.way_out')} {' → '.join(self.tell_way_out(language))}",
             )

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rcilab.arrays import Array
-from rcilab.conformance.explain import explain_source
+from rcilab.conformance.explain import explain_formula, explain_source
 from rcilab.words.errors import tell_note
 from rcilab.words.shown import unit_name, with_unit
 
@@ -56,7 +56,10 @@ def body_html(exhibit: Exhibit, text: Text) -> str:
     rows = (
         ("learn.cause", escape(restate(exhibit.told("cause", language)))),
         ("learn.remedy", escape(restate(exhibit.told("remedy", language)))),
-        ("learn.condition", f"{escape(row.formula)}<br><span class='rl-dim'>{escape(source)}</span>"),
+        (
+            "learn.condition",
+            f"{escape(explain_formula(row, language))}<br><span class='rl-dim'>{escape(source)}</span>",
+        ),
         ("learn.manual", escape(text("learn.section", section=exhibit.section, number=exhibit.fault.value))),
         ("learn.way_out", f'<ol class="rl-steps-out">{steps}</ol>{executed}'),
         ("learn.said", f"<code>{escape(text.tell(tell_note(exhibit.said)))}</code>"),

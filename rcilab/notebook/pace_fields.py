@@ -69,9 +69,7 @@ class PaceFields:
 
     def _tell_way(self, status: SupervisorStatus, is_held: bool) -> str:
         pace = f"{100.0 * status.pace:.0f}"
-        if status.motion_place is None:
-            return self._text("run.held_somewhere") if is_held else self._text("run.at_pace", pace=pace)
-        place = f"{status.motion_place:.1f}"
+        place = f"{status.motion_place or 0.0:.1f}"
         return self._text("run.held", place=place) if is_held else self._text("run.way", place=place, pace=pace)
 
     def _on_slider(self, change: Any) -> None:

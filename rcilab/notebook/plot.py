@@ -20,7 +20,10 @@ from rcilab.model import RobotModel, require_model
 from rcilab.motion.motion import Motion, require_motion
 from rcilab.notebook.installed import require_installed
 from rcilab.notebook.palette import JOINT_COLORS
+from rcilab.notebook.spoken import chosen_language
+from rcilab.notebook.writing import writing
 from rcilab.views.plots import QUANTITIES, recorded_curves
+from rcilab.words.text import Text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -50,7 +53,14 @@ class _Panel:
     """What happened, shape (M, n): measured angles and velocities, differences of the commanded angles; or None."""
 
 
-def plot(motion: Motion, model: RobotModel, run: Run | None = None, *, joints: Sequence[int] | None = None) -> Figure:
+def plot(
+    motion: Motion,
+    model: RobotModel,
+    run: Run | None = None,
+    *,
+    joints: Sequence[int] | None = None,
+    language: str | None = None,
+) -> Figure:
     """Draws angle, velocity, acceleration and jerk of a motion against the arm's limits.
 
     Velocity, acceleration and jerk are backward differences at 1 ms, because those are what the controller judges. Grey
@@ -65,37 +75,44 @@ def plot(motion: Motion, model: RobotModel, run: Run | None = None, *, joints: S
         model: The arm it is for; its limits are drawn.
         run: What came of it on a robot, as `execute` returned it.
         joints: Numbers of the joints to draw, from 1; None draws all.
+        language: "en" or "zh"; that of the notebook when absent. Without a Chinese font here it is English.
 
     Raises:
         InvalidValueError: A joint number is none of this arm's, or an argument is something else altogether.
         UsageError: matplotlib is not installed.
     """
+    chosen = chosen_language(language)
     require_installed("matplotlib", "plot")
     require_motion(motion)
     require_model(model)
     if run is not None:
         _require_run(run)
-    chosen = _joint_indices(joints, model.n)
+    indices = _joint_indices(joints, model.n)
+    with writing(chosen) as written:
+        return _draw(motion, model, run, indices, Text(written, "rcilab.notebook"))
+
+
+def _draw(motion: Motion, model: RobotModel, run: Run | None, chosen: Sequence[int], text: Text) -> Figure:
     report = check(motion, model)
     panels = _panels(motion, model.limits.joint, run)
     figure = _new_figure(len(panels) + (run is not None))
     axes: list[Axes] = list(figure.axes)
     for panel, ax in zip(panels, axes, strict=False):
-        _draw_panel(ax, panel, run, chosen)
+        _draw_panel(ax, panel, run, chosen, text)
         _shade_violations(ax, panel, report.violations, chosen)
     if run is not None:
-        _draw_error(axes[-1], run, chosen)
+        _draw_error(axes[-1], run, chosen, text)
     axes[0].secondary_yaxis("right", functions=(np.degrees, np.radians)).set_ylabel("[deg]")
     axes[0].legend(
         loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=len(chosen) + 1, frameon=False, fontsize="small"
     )
-    axes[-1].set_xlabel("time [s]" if run is None else f"time [s], the robot's delay of {run.delay} ms taken out")
+    axes[-1].set_xlabel(text("plot.time") if run is None else text("figure.delayed", delay=run.delay))
     axes[-1].set_xlim(
         0.0,
         max(motion.duration, float(_plan_times(run)[-1]) if run is not None and len(run.t) else 0.0)
         + HOLD_SAMPLES * CYCLE_TIME,
     )
-    figure.suptitle(_title(model, motion, report.violations), fontsize="medium")
+    figure.suptitle(_title(model, motion, report.violations, text), fontsize="medium")
     return figure
 
 
@@ -142,7 +159,7 @@ def _backward_differences(q: Array, order: int) -> Array:
     return np.diff(path, n=order, axis=0) / CYCLE_TIME**order
 
 
-def _draw_panel(ax: Axes, panel: _Panel, run: Run | None, joints: Sequence[int]) -> None:
+def _draw_panel(ax: Axes, panel: _Panel, run: Run | None, joints: Sequence[int], text: Text) -> None:
     times = CYCLE_TIME * np.arange(len(panel.values))
     planned: dict[str, Any] = {"linewidth": 1.3}
     if run is not None and panel.actual is not None:
@@ -150,7 +167,8 @@ def _draw_panel(ax: Axes, panel: _Panel, run: Run | None, joints: Sequence[int])
         for joint in joints:
             ax.plot(_plan_times(run), panel.actual[:, joint], color=_color(joint), linewidth=3.0, alpha=0.45)
     for joint in joints:
-        ax.plot(times, panel.values[:, joint], color=_color(joint), label=f"joint {joint + 1}", **planned)
+        label = text("check.joint", joint=joint + 1)
+        ax.plot(times, panel.values[:, joint], color=_color(joint), label=label, **planned)
     ax.set_ylabel(f"{QUANTITIES[panel.condition.order]} [{panel.condition.unit.replace('^2', '²').replace('^3', '³')}]")
     ax.margins(x=0.0)
     ax.grid(visible=True, color="#E0E0E0", linewidth=0.6)
@@ -213,11 +231,11 @@ def _require_run(run: object) -> None:
         raise InvalidValueError("run", run, "is no run; execute returns one")
 
 
-def _draw_error(ax: Axes, run: Run, joints: Sequence[int]) -> None:
+def _draw_error(ax: Axes, run: Run, joints: Sequence[int], text: Text) -> None:
     error = 1e3 * run.error
     for joint in joints:
         ax.plot(_plan_times(run), error[:, joint], color=_color(joint), linewidth=1.0)
-    ax.set_ylabel("actual - plan [mrad]")
+    ax.set_ylabel(text("figure.error"))
     ax.margins(x=0.0)
     ax.grid(visible=True, color="#E0E0E0", linewidth=0.6)
 
@@ -226,14 +244,12 @@ def _color(joint: int) -> str:
     return JOINT_COLORS[joint % len(JOINT_COLORS)]
 
 
-def _title(model: RobotModel, motion: Motion, violations: Sequence[Violation]) -> str:
-    verdict = "inside all limits"
-    if violations:
-        # A jump shows in one first difference, two second and three third ones: within HOLD_SAMPLES cycles it is one.
-        reach = HOLD_SAMPLES * CYCLE_TIME
-        places = len(_union((v.time - CYCLE_TIME, v.time + v.count * CYCLE_TIME + reach) for v in violations))
-        verdict = f"beyond a limit at {places} {'place' if places == 1 else 'places'}, hatched"
-    return f"{model.name}, {motion.duration:.3f} s: {verdict}"
+def _title(model: RobotModel, motion: Motion, violations: Sequence[Violation], text: Text) -> str:
+    # A jump shows in one first difference, two second and three third ones: within HOLD_SAMPLES cycles it is one.
+    reach = HOLD_SAMPLES * CYCLE_TIME
+    count = len(_union((v.time - CYCLE_TIME, v.time + v.count * CYCLE_TIME + reach) for v in violations))
+    code = "figure.inside" if not count else "figure.beyond_one" if count == 1 else "figure.beyond"
+    return text(code, model=model.name, duration=f"{motion.duration:.3f}", count=count)
 
 
 def _joint_indices(joints: Sequence[int] | None, n: int) -> list[int]:

@@ -18,8 +18,10 @@ from rcilab.errors import UsageError
 from rcilab.model import RobotModel, require_model
 from rcilab.notebook.installed import require_installed
 from rcilab.notebook.place import find_place
+from rcilab.notebook.spoken import chosen_language
 from rcilab.robots.upright import upright_joints
 from rcilab.views.arm_view import ArmView
+from rcilab.words.text import Text
 
 if TYPE_CHECKING:
     from rcilab.motion.motion import Motion
@@ -43,13 +45,24 @@ class Preview(Closing):
         model: The arm.
         live: Whether to serve it.
         height: Height in the notebook, [px].
+        language: "en" or "zh"; that of the notebook when absent.
 
     Raises:
-        InvalidValueError: The pose is not n finite numbers, or the motion is for another number of joints.
+        InvalidValueError: The pose is not n finite numbers, the motion is for another number of joints, or the language
+            is none.
         UsageError: meshcat is not installed.
     """
 
-    def __init__(self, what: Motion | ArrayLike, model: RobotModel, *, live: bool = True, height: int = HEIGHT) -> None:
+    def __init__(
+        self,
+        what: Motion | ArrayLike,
+        model: RobotModel,
+        *,
+        live: bool = True,
+        height: int = HEIGHT,
+        language: str | None = None,
+    ) -> None:
+        self._text = Text(chosen_language(language), "rcilab.notebook")
         require_installed("meshcat", "preview")
         require_model(model)
         motion = _motion_in(what)
@@ -111,13 +124,13 @@ class Preview(Closing):
         return f"<Preview of {self._model.name}, {self.url or 'static'}>"
 
     def _repr_html_(self) -> str:
+        told = self._text("preview.nothing", call="<code>preview(..., live=False)</code>")
         style = f"width: 100%; height: {self._height}px; border: none"
         if self.url is None:
             return f'<iframe srcdoc="{html.escape(self.html())}" style="{style}"></iframe>'
         return (
             f'<iframe src="{self.url}" style="{style}"></iframe>'
-            f'<p><small><a href="{self.url}" target="_blank">{self.url}</a>; nothing to see? Where the kernel is on '
-            "another machine, use <code>preview(..., live=False)</code>.</small></p>"
+            f'<p><small><a href="{self.url}" target="_blank">{self.url}</a> {told}</small></p>'
         )
 
     def _animate(self, motion: Motion | None) -> None:
@@ -139,7 +152,12 @@ class Preview(Closing):
 
 
 def preview(
-    motion: Motion | ArrayLike, model: RobotModel, *, live: bool | None = None, height: int = HEIGHT
+    motion: Motion | ArrayLike,
+    model: RobotModel,
+    *,
+    live: bool | None = None,
+    height: int = HEIGHT,
+    language: str | None = None,
 ) -> Preview:
     """Returns a 3D scene that plays a motion, or shows a pose, inside the notebook.
 
@@ -149,13 +167,14 @@ def preview(
         live: Served by the kernel (True) or part of the notebook (False); None serves it wherever the browser can
             reach the kernel, see `rcilab.notebook.place`.
         height: Height in the notebook, [px].
+        language: "en" or "zh"; that of the notebook when absent.
 
     Raises:
         InvalidValueError: The pose is not n finite numbers.
     """
     if live is None:
         live = find_place().way != "static"
-    return Preview(motion, model, live=live, height=height)
+    return Preview(motion, model, live=live, height=height, language=language)
 
 
 def aim_camera(visualizer: Any) -> None:

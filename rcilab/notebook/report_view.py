@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rcilab.conformance.explain import explain_place, explain_source, explain_violation
+from rcilab.conformance.explain import explain_formula, explain_place, explain_source, explain_violation
 from rcilab.conformance.report import ConditionResult, Report
 from rcilab.notebook.look import Tone, block, esc, soft, verdict, write
 from rcilab.notebook.part import Part
@@ -66,12 +66,12 @@ class ReportView(Part):
         facts += [explain_place(row, text.language)] if row.links is not None else []
         facts.append(f"t = {row.time:.3f} s")
         fault = "" if condition.fault is None else " · " + text("check.raises", fault=condition.fault.manual_name)
-        source = explain_source(condition, text.language)
+        formula, source = explain_formula(condition, text.language), explain_source(condition, text.language)
         return (
             f'<div class="rl-card rl-{tone}"><div class="rl-row"><b>{esc(text(f"condition.{condition.id}"))}</b>'
             f'<span class="rl-soft">{esc(text("necessity." + condition.necessity))}</span>'
             f'<span class="rl-push">{esc(text(word))}</span><span class="rl-num">{100.0 * row.ratio:.1f} %</span></div>'
             f'<div class="rl-meter"><i style="width:{min(100.0, 100.0 * row.ratio):.1f}%"></i></div>'
             f'<div class="rl-num">{esc(" · ".join(facts))}</div>'
-            f'<div class="rl-soft">{esc(condition.formula)} — {esc(source + fault)}</div></div>'
+            f'<div class="rl-soft">{esc(formula)} — {esc(source + fault)}</div></div>'
         )

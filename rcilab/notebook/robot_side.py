@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from rcilab.client.control_settings import ControlSettings, give_control
 from rcilab.client.session import RobotSession
 from rcilab.client.setup import RobotSetup
+from rcilab.client.under_way import UnderWay
 from rcilab.errors import ConnectionLostError, RcilabError, UsageError
 from rcilab.recording.live import LiveRecording, RunFacts
 from rcilab.recording.run import Run
@@ -245,8 +246,7 @@ class SessionRobot:
         self._worker: threading.Thread | None = None
         self._what = ""
         self._done: list[Outcome] = []
-        self._time: tuple[float, float] = (0.0, 0.0)
-        self._pace: float | None = None  # None: the motion runs as it was planned.
+        self._way: UnderWay | None = None  # Of the running or last motion.
         self._powered: bool | None = None
         self._held = RobotSetup()  # What it was told from here.
         self._power_seen = float("-inf")
@@ -262,7 +262,9 @@ class SessionRobot:
         return self._last
 
     def _look(self) -> SupervisorStatus:
-        is_moving = self._is_busy and self._what == "execute"
+        way = self._session.under_way
+        is_moving = way is not None or (self._is_busy and self._what == "execute")
+        self._way = way = way or self._way
         try:
             state = self._session.state if is_moving else self._session.receive_state(_WAIT, max_age=_FRESH)
             if not is_moving:
@@ -272,7 +274,7 @@ class SessionRobot:
         except UsageError:  # Another cell moves the arm, or the session was closed.
             return self._last
         phase = "fault" if state.faults else "moving" if is_moving else "idle"
-        is_held = phase == "moving" and self._pace == 0.0
+        is_held = phase == "moving" and way is not None and way.pace == 0.0
         return SupervisorStatus(
             phase=phase,
             code="moving.held" if is_held else phase,
@@ -289,10 +291,7 @@ class SessionRobot:
             rate_hz=1000.0,
             message_id=state.message_id,
             setup=self._held,
-            motion_time=self._time[0] if self._time[1] else None,
-            motion_duration=self._time[1] or None,
-            motion_place=self._time[0] if self._time[1] and self._pace is None else None,  # Who paces tells no place.
-            pace=1.0 if self._pace is None else self._pace,
+            **_tell_way(way),
         )
 
     def power(self, on: bool) -> None:
@@ -306,9 +305,8 @@ class SessionRobot:
     def execute(self, plan: Plan) -> None:
         """Streams a checked motion in a thread of the kernel."""
         certificate = plan.report.require().certificate
-        go, told = self._session.execute, self._on_progress
-        self._time, self._pace = (0.0, 0.0), None
-        self._do("execute", lambda: go(plan.motion, certificate, progress=told, mode=plan.mode))
+        go, self._way = self._session.execute, None
+        self._do("execute", lambda: go(plan.motion, certificate, mode=plan.mode))
 
     def set_control(self, control: ControlSettings) -> None:
         """Tells the controller parameters of the modes."""
@@ -325,7 +323,6 @@ class SessionRobot:
             self._session.set_pace(pace)
         else:
             self._session.pause()
-        self._pace = pace
         self._done.append(Outcome(what="pace"))
 
     def stop(self) -> None:
@@ -374,8 +371,12 @@ class SessionRobot:
             self._powered = self._session.motor_state()
             self._power_seen = time.monotonic()
 
-    def _on_progress(self, t: float, duration: float) -> None:
-        self._time = (t, duration)
+
+def _tell_way(way: UnderWay | None) -> dict[str, Any]:
+    if way is None:
+        return {}
+    names = {"motion_time": way.time, "motion_duration": way.duration, "motion_place": way.place}
+    return {**names, "pace": way.pace, "mode": way.mode}
 
 
 def _has_world(session: RobotSession) -> bool:

@@ -9,11 +9,13 @@ from rcilab.closing import Closing
 from rcilab.errors import UsageError
 from rcilab.model import RobotModel, require_model
 from rcilab.motion.motion import Motion, require_motion
+from rcilab.notebook.spoken import chosen_language
 from rcilab.views.arm_view import ArmView
 from rcilab.views.gate import Gate
 from rcilab.views.guarded_server import GuardedServer, listen
 from rcilab.views.viser_scene import ViserScene
 from rcilab.views.viser_stage import furnish, place_camera
+from rcilab.words.text import Text
 
 LOOPBACK = "127.0.0.1"
 _TICK = 1.0 / 30.0  # [s] As often as a slider sends, and more than software rendering shows.
@@ -31,12 +33,14 @@ class PreviewPage(Closing):
         motion: What to play.
         model: The arm.
         port: TCP port on loopback; 0 takes any free one.
+        language: "en" or "zh"; that of the notebook when absent.
 
     Raises:
+        InvalidValueError: There is no such language.
         UsageError: The port is taken.
     """
 
-    def __init__(self, motion: Motion, model: RobotModel, *, port: int = 0) -> None:
+    def __init__(self, motion: Motion, model: RobotModel, *, port: int = 0, language: str | None = None) -> None:
         require_motion(motion)
         require_model(model)
         self._motion = motion
@@ -45,11 +49,12 @@ class PreviewPage(Closing):
         ArmView(scene, "goal", model, "plan").show(motion.goal)
         self._arm = ArmView(scene, "arm", model)
         self._arm.show(motion.start)
+        text = Text(chosen_language(language), "rcilab.notebook")
         gui = self._door.viser.gui
         last = max(math.ceil(1e3 * motion.duration) / 1e3, _TICK)
-        self._play = gui.add_checkbox("Play", True)
-        self._slider = gui.add_slider("Time [s]", min=0.0, max=last, step=0.001, initial_value=0.0)
-        self._speed = gui.add_dropdown("Speed", ("1", "0.5", "0.25", "0.1"))
+        self._play = gui.add_checkbox(text("timeline.play"), True)
+        self._slider = gui.add_slider(text("timeline.time"), min=0.0, max=last, step=0.001, initial_value=0.0)
+        self._speed = gui.add_dropdown(text("timeline.rate"), ("1", "0.5", "0.25", "0.1"))
         self._closed = threading.Event()
         self._player = threading.Thread(target=self._run, name="rcilab preview", daemon=True)
         self._player.start()
@@ -95,18 +100,20 @@ class PreviewPage(Closing):
             self._slider.value = shown = round(t, 3)
 
 
-def serve_preview(motion: Motion, model: RobotModel, *, port: int = 0) -> PreviewPage:
+def serve_preview(motion: Motion, model: RobotModel, *, port: int = 0, language: str | None = None) -> PreviewPage:
     """Returns a page on loopback that plays a motion; in a notebook it shows itself as a link and a frame.
 
     Args:
         motion: What to play.
         model: The arm.
         port: TCP port on loopback; 0 takes any free one.
+        language: "en" or "zh"; that of the notebook when absent.
 
     Raises:
+        InvalidValueError: There is no such language.
         UsageError: The port is taken.
     """
-    return PreviewPage(motion, model, port=port)
+    return PreviewPage(motion, model, port=port, language=language)
 
 
 def open_page(port: int) -> tuple[GuardedServer, int]:

@@ -13,10 +13,11 @@ from numpy.typing import ArrayLike
 from rcilab.arrays import JointVector, as_vector, frozen
 from rcilab.errors import InvalidValueError, KinematicsError
 from rcilab.model import RobotModel, require_model
+from rcilab.notebook.spoken import chosen_language
 from rcilab.words.rounding import fixed
+from rcilab.words.text import Text
 
 _STEP_DEG = 0.5
-_POSITION_FORMAT = "x {:.1f}, y {:.1f}, z {:.1f} mm; roll {:.1f}, pitch {:.1f}, yaw {:.1f}°"
 
 
 class JointSliders:
@@ -28,9 +29,10 @@ class JointSliders:
         show: Called with the joint angles, shape (n,), [rad], at the start and at every change: `preview.show`, say.
         continuous: Whether a slider reports while it is dragged, or once when it is let go. Take False where `show`
             is slow; ipywidgets drops what comes too fast, so dragging is safe either way.
+        language: "en" or "zh"; that of the notebook when absent.
 
     Raises:
-        InvalidValueError: q is not n angles inside the limits, or the model is no model.
+        InvalidValueError: q is not n angles inside the limits, the model is no model, or the language is none.
     """
 
     def __init__(
@@ -40,17 +42,21 @@ class JointSliders:
         *,
         show: Callable[[JointVector], object] | None = None,
         continuous: bool = True,
+        language: str | None = None,
     ) -> None:
         self._model = require_model(model)
+        self._text = text = Text(chosen_language(language), "rcilab.notebook")
         self._show = show
         self._setting = False
         limits = model.limits.joint
         self.sliders = [
-            _joint_slider(i + 1, math.degrees(limits.lower[i]), math.degrees(limits.upper[i]), continuous)
+            _joint_slider(
+                text("jog.joint", joint=i + 1), math.degrees(limits.lower[i]), math.degrees(limits.upper[i]), continuous
+            )
             for i in range(model.n)
         ]
-        self.home = ipywidgets.Button(description="Home", tooltip="A comfortable pose away from limits")
-        self.zero = ipywidgets.Button(description="Zero", tooltip="Every joint at 0°: the arm stands upright")
+        self.home = ipywidgets.Button(description=text("jog.home"), tooltip=text("jog.home_hint"))
+        self.zero = ipywidgets.Button(description=text("jog.zero"), tooltip=text("jog.zero_hint"))
         self.pose = ipywidgets.HTML()
         self._q = self._checked(model.home if q is None else q)
         for slider in self.sliders:
@@ -97,14 +103,18 @@ class JointSliders:
     def _report(self) -> None:
         T_base_tool = self._model.forward(self._q)
         numbers = np.concatenate((1e3 * T_base_tool.position, np.degrees(T_base_tool.rpy)))
-        text = _POSITION_FORMAT.format(*(np.round(numbers, 1) + 0.0))  # Adding 0 turns -0.0 into 0.0.
+        names = [self._text(f"target.{name}") for name in ("x", "y", "z", "roll", "pitch", "yaw")]
+        told = [
+            f"{name} {number:.1f}" for name, number in zip(names, np.round(numbers, 1) + 0.0, strict=True)
+        ]  # No -0.0.
+        parts = [f"{', '.join(told[:3])} mm", f"{', '.join(told[3:])}°"]
         if self._model.n == 7:
             try:
                 psi = math.degrees(self._model.arm_angle(self._q))
-                text += f"; arm angle {fixed(psi, 1)}°"
+                parts.append(f"{self._text('jog.arm_angle')} {fixed(psi, 1)}°")
             except KinematicsError:  # Stretched or straight above the base: there is no elbow to measure.
-                text += "; no arm angle here (singular)"
-        self.pose.value = f"<code>tool in base: {text}</code>"
+                parts.append(self._text("jog.no_arm_angle"))
+        self.pose.value = f"<code>{self._text('jog.tool')}: {'; '.join(parts)}</code>"
         if self._show is not None:
             self._show(self._q)
 
@@ -119,9 +129,9 @@ class JointSliders:
         return angles
 
 
-def _joint_slider(number: int, lower: float, upper: float, continuous: bool) -> Any:
+def _joint_slider(name: str, lower: float, upper: float, continuous: bool) -> Any:
     return ipywidgets.FloatSlider(
-        description=f"joint {number}",
+        description=name,
         min=lower,
         max=upper,
         step=_STEP_DEG,

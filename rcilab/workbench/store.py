@@ -166,8 +166,6 @@ class UiState:
     notice: Notice | None = None
     problems: Mapping[str, Message] = field(default_factory=lambda: MappingProxyType({}))
     """What is wrong with typed numbers, by field."""
-    typed: int = 0
-    """Counts accepted typed values, so that fields are rewritten in their own spelling."""
 
 
 class Store:

@@ -16,6 +16,8 @@ Ask: TypeAlias = Callable[[Request], None]
 
 _HAND_AWAY = 0.6  # [s] A choice: a control touched less long ago is not written to.
 _TYPING_PAUSE = 0.7  # [s] A choice: a typed number counts when no key came for so long.
+_ANSWER = 0.2  # [s] A choice: what a typed number came to stands in the state after that.
+_STANDS = 3.0  # [s] A choice: so long a number that was taken stands as it was typed; to write is to disturb the hand.
 
 
 def on_press(button: Any, ask: Ask, make: Callable[[int | None], Request]) -> None:
@@ -72,35 +74,42 @@ class NumberField:
         self._handle, self._ask, self.field = handle, ask, field
         self._unit = unit or Unit("", 1.0)
         self._typed: tuple[float, str, int | None, str] | None = None
-        self._counted = 0
+        self._committed = float("-inf")
+        self._answer: str | None = None  # What the state made of it.
 
         @handle.on_update
         async def _(event: Any) -> None:
             if event.client_id is not None:
                 self._typed = (time.monotonic(), event.target.value, event.client_id, self.field)
 
-    def show(self, text: str, problem: Message | None, counted: int) -> None:
+    def show(self, text: str, problem: Message | None) -> None:
         """Commits what was typed, or writes the state's number; called at the display's rate.
 
         Args:
             text: The state's number as it is to be shown, in degrees or millimetres where it has a unit of the page.
             problem: What is wrong with the typed number; it is then left as it is.
-            counted: `UiState.typed`.
         """
         typed = self._typed
         if typed is not None:
             if time.monotonic() - typed[0] < _TYPING_PAUSE and typed[3] == self.field:
                 return
-            self._typed = None
-            self._counted = counted
+            is_shown = typed[3] == self.field
+            self._committed = time.monotonic() if is_shown else float("-inf")
+            self._typed, self._answer = None, None
             self._ask(TypeField(page=typed[2], field=typed[3], text=self._unit.complete(typed[1])))
-            self._waiting = time.monotonic()
             return
-        if problem is not None or time.monotonic() - getattr(self, "_waiting", 0.0) < 0.2:
-            return  # The answer to what was just typed is still on its way, or it was no.
         said = self._unit.restate(text)
-        if self._handle.value != said:
+        if problem is None and not self._stands(said) and self._handle.value != said:
             self._handle.value = said
+
+    def _stands(self, said: str) -> bool:
+        """Returns whether what was typed is left as it is: the answer is on its way, or has not changed since."""
+        past = time.monotonic() - self._committed
+        if past < _ANSWER:
+            return True
+        if self._answer is None:
+            self._answer = said
+        return past < _STANDS and said == self._answer
 
 
 class Html:

@@ -75,8 +75,14 @@ class BenchPage:
         self.wait(lambda: self.status.phase == "idle" and bool(self.status.powered), "a powered, idle arm", 30.0)
         ask(requests.SetView(name="language", value="en"))
         ask(requests.SetSpeed(speed=0.5))
+
+        def is_here() -> bool:
+            if self.state.plan is not None:  # Also by what a slider of the last test has only now told.
+                ask(requests.PoseGoal(name="here"))
+            return self.state.plan is None and self.state.language == "en"
+
         ask(requests.PoseGoal(name="here"))
-        self.wait(lambda: self.state.plan is None and self.state.language == "en", "a goal where the arm is")
+        self.wait(is_here, "a goal where the arm is")
         self.wait(lambda: self.status.phase == "idle", "an idle arm")
         self.wait(lambda: self.state.lease.holder is not None, "the controls in this page's hand")
         self.open_tab("Jog")
@@ -138,13 +144,25 @@ class BenchPage:
         return bool(self.tab.evaluate("name => !!__viserMutable.nodeRefFromName[name]", node))
 
     def project(self, node: str, offset: tuple[float, float, float]) -> tuple[float, float]:
-        x, y = self.tab.evaluate(_PROJECT, [node, list(offset)])
-        return x, y
+        """Where on the page a point of a node is, [px], once neither it nor the camera moves."""
+        at = [0.0, 0.0]
+
+        def rests() -> bool:
+            before, at[:] = list(at), self.tab.evaluate(_PROJECT, [node, list(offset)])
+            return abs(at[0] - before[0]) + abs(at[1] - before[1]) < 0.5
+
+        self.wait(rests, f"{node} to stand still on the page")
+        return at[0], at[1]
+
+    def frame(self) -> int:
+        """How many frames of the scene have been drawn."""
+        return self.tab.evaluate("__viserTestpoints.rendererInfo.render.frame")
 
     def drag(self, start: tuple[float, float], end: tuple[float, float], steps: int = 8) -> None:
         mouse = self.tab.mouse
         mouse.move(*start)
-        self.tab.wait_for_timeout(500)  # The gizmo notices the mouse on its next drawn frame.
+        drawn = self.frame()
+        self.wait(lambda: self.frame() >= drawn + 2, "frames in which the gizmo notices the mouse")
         mouse.down()
         for step in range(1, steps + 1):
             share = step / steps

@@ -14,7 +14,7 @@ import pytest
 from rcilab.conformance import CONDITION_TABLES, CONDITIONS, Violation, check
 from rcilab.conformance.catalogue import Language, Phrase, load_catalogue, say
 from rcilab.conformance.condition import Condition
-from rcilab.conformance.explain import explain_source, explain_violation
+from rcilab.conformance.explain import explain_formula, explain_source, explain_violation
 from rcilab.conformance.html import report_html
 from rcilab.conformance.wording import advise
 from rcilab.errors import InvalidValueError
@@ -58,6 +58,16 @@ def violation_of(row: Condition, count: int = 25, model: RobotModel = MODEL) -> 
 
 def test_every_language_has_the_same_keys_and_places_to_fill():
     require_equal(load_catalogue, LANGUAGES, may_be_blank={"gap"})
+
+
+def test_a_formula_with_words_in_it_has_them_in_every_language():
+    symbols = {"T", "x", "q", "v", "dv", "dq", "ddq", "psi", "dpsi", "omega", "domega", "pi", "sign"}
+    for row in (*CONDITIONS, *FRANKA_CONDITIONS):
+        assert explain_formula(row) == row.formula
+        said = re.findall(r"[A-Za-z][\w,]*", explain_formula(row, "zh"), re.ASCII)
+        assert [word for word in said if "_" not in word and word not in symbols] == []
+    worded = {row.formula for row in (*CONDITIONS, *FRANKA_CONDITIONS)}
+    assert {key.removeprefix("formula.") for key in load_catalogue("zh") if key.startswith("formula.")} <= worded
 
 
 def test_no_key_stands_twice_in_a_catalogue():

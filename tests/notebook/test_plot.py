@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from typing import Any
@@ -35,6 +36,24 @@ def main_axes(figure: Figure) -> list[Axes]:
 def test_four_panels_show_the_signals_in_si_units() -> None:
     labels = [ax.get_ylabel() for ax in main_axes(plot(MOTION, PRO7))]
     assert labels == ["q [rad]", "dq [rad/s]", "ddq [rad/s²]", "jerk [rad/s³]"]
+
+
+def test_it_is_written_in_chinese_where_there_is_a_font_for_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    def words(language: str | None = None) -> str:
+        figure = plot(TOO_FAST, PRO7, joints=[1], language=language)
+        ax = main_axes(figure)[0]
+        return figure.get_suptitle() + main_axes(figure)[-1].get_xlabel() + ax.get_legend().get_texts()[0].get_text()
+
+    assert "hatched" in words()
+    monkeypatch.setenv("JPY_SESSION_NAME", "01_first_motion.zh.ipynb")
+    monkeypatch.setattr("rcilab.notebook.writing.chinese_font", lambda: None)
+    assert "hatched" in words()
+    monkeypatch.setattr("rcilab.notebook.writing.chinese_font", lambda: "A Font")
+    assert re.search(r"以斜线标出.*时间.*关节 1", words())
+    assert "hatched" in words("en")
+    family = plot(MOTION, PRO7)._suptitle.get_fontfamily()  # type: ignore[attr-defined]
+    assert family[-1] == "A Font"
+    assert len(family) > 1  # The usual one writes what it can.
 
 
 def test_every_joint_is_drawn_with_every_sample_and_a_colour_of_its_own() -> None:

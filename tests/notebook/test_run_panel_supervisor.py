@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -122,13 +123,15 @@ def test_a_motion_is_held_gone_on_with_and_slowed_down_as_by_the_session(own: bo
         wait_for(lambda: not pace.pause.disabled, "a motion that can be held")
         pace.pause.click()
         wait_for(lambda: pace.resume.layout.display is None, "the arm held")
-        wait_for(lambda: "Held" in pace._way.value, "that it is held, in words")
+        wait_for(lambda: re.search(r"Held at \d+\.\d s of the plan", pace._way.value), "where it is held, in words")
         pace.field.box.value = "50"
         assert pace.slider.value == 50.0
         assert panel.state.status is not None
         assert panel.state.status.pace == 0.0  # It keeps waiting.
         pace.resume.click()
         wait_for(lambda: "50 %" in pace._way.value, "half the speed")
+        assert panel.state.status.motion_place is not None
+        assert panel.state.status.motion_place < (panel.state.status.motion_time or 0.0)
         assert pace.resume.layout.display == "none"
         pace.slider.value = 100.0
         wait_for(lambda: panel.state.status is not None and panel.state.status.pace == 1.0, "all of it")

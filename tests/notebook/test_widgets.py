@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -66,6 +67,17 @@ def test_the_pose_is_told_in_millimetres_and_degrees() -> None:
     sliders.home.click()
     assert "arm angle 0.0°" in sliders.pose.value
     assert "-0.0" not in sliders.pose.value
+
+
+def test_the_notebook_decides_the_language_unless_somebody_else_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("JPY_SESSION_NAME", "01_first_motion.zh.ipynb")
+    chinese, english = JointSliders(PRO7), JointSliders(PRO7, language="en")
+    assert [slider.description for slider in chinese.sliders[:2]] == ["关节 1", "关节 2"]
+    assert (chinese.zero.description, english.zero.description) == ("零位", "Zero")
+    assert not re.search(r"[a-z]{3}", chinese.pose.value.replace("code", "")), chinese.pose.value
+    assert "Tool in base" in english.pose.value
+    with pytest.raises(InvalidValueError, match="language"):
+        JointSliders(PRO7, language="fr")
 
 
 def test_angles_beyond_a_limit_are_refused_by_joint_and_bound() -> None:

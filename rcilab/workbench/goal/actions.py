@@ -144,7 +144,6 @@ class GoalActions:
         self._store.remember()
         self._store.clear_problems(request.field)
         act()
-        self._store.update(typed=self._store.state.typed + 1)
 
     def set_speed(self, request: requests.SetSpeed) -> None:
         """Plans faster or slower."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rcilab.conformance.explain import explain_place, explain_source
+from rcilab.conformance.explain import explain_formula, explain_place, explain_source
 from rcilab.words.shown import value_against_bound
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import esc
@@ -51,7 +51,7 @@ def row_html(row: ConditionResult, model: RobotModel, chosen: str, text: Text) -
         f'<div class="rl-meter"><i style="width:{min(100.0, 100.0 * row.ratio):.1f}%"></i></div>'
         f'<div class="rl-facts"><span class="rl-badge">{esc(text("necessity." + condition.necessity))}</span> '
         f"{esc(' · '.join(facts))}</div>"
-        f'<div class="rl-source">{esc(condition.formula)} — {esc(source)}{fault}</div></div>'
+        f'<div class="rl-source">{esc(explain_formula(condition, text.language))} — {esc(source)}{fault}</div></div>'
     )
 
 

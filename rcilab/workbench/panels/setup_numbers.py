@@ -77,7 +77,7 @@ class SetupNumbersPanel:
             for field, name in zip(fields, FIELD_NAMES[part], strict=True):
                 number = read_field(setup, part, name)
                 said = f"{number + 0.0:.6g}" if part == "load" and name in INERTIA_NAMES else shown(number)
-                field.show(said, state.problems.get(field.field), state.typed)
+                field.show(said, state.problems.get(field.field))
                 labels.append((field.field, f"{self._rows[part][name]}: {self._label(name)}"))
             self._problems[part].show(problems_html(state, self._text, labels))
 

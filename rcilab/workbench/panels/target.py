@@ -48,10 +48,10 @@ class TargetPanel:
         labels: list[tuple[str, str]] = []
         for field in self._fields:
             name = field.field.partition(".")[2]
-            field.show(shown(numbers[name]), state.problems.get(field.field), state.typed)
+            field.show(shown(numbers[name]), state.problems.get(field.field))
             labels.append((field.field, self._text(f"target.{name}")))
         wxyz = self._wxyz
-        wxyz.show(quaternion_text(target.wxyz), state.problems.get(wxyz.field), state.typed)
+        wxyz.show(quaternion_text(target.wxyz), state.problems.get(wxyz.field))
         labels.append((wxyz.field, self._text("target.wxyz")))
         self._problems.show(problems_html(state, self._text, labels))
         self._reach.show(reach_html(state, self._text))

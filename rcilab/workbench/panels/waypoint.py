@@ -88,7 +88,7 @@ class WaypointPanel:
         labels = []
         for name, field in self._fields.items():
             field.field = f"program.{key}.{name}"
-            field.show(values.get(name, ""), state.problems.get(field.field), state.typed)
+            field.show(values.get(name, ""), state.problems.get(field.field))
             labels.append((field.field, self._text(f"program.field.{name}")))
         self._problems.show(problems_html(state, self._text, labels) + self._note(waypoint))
 

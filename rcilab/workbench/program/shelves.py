@@ -85,7 +85,6 @@ class Shelves:
         """Says what is wrong with what was typed; returns whether nothing is."""
         if problem is None:
             self._store.clear_problems(name)
-            self._store.update(typed=self._store.state.typed + 1)
             return True
         self._store.complain(name, problem)
         return False

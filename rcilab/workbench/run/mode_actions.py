@@ -78,7 +78,7 @@ class ModeActions:
             return
         drive = state.drive.with_number(state.model, part, place, parsed.value)
         self._store.clear_problems(request.field)
-        self._store.update(drive=drive, typed=state.typed + 1)
+        self._store.update(drive=drive)
 
     def press(self, request: requests.PressControl) -> None:
         """Sends the parameters, or takes those that a controller wakes up with."""
@@ -87,7 +87,7 @@ class ModeActions:
             control = standard_control(state.model.limits)
             drive = replace(state.drive, control=control, refusal=None)
             self._store.clear_problems("control.")
-            self._store.update(drive=drive, typed=state.typed + 1)
+            self._store.update(drive=drive)
             return
         if state.target != "virtual" and now - self._asked_to_send > SECOND_THOUGHT:
             self._asked_to_send = now

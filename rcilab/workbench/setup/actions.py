@@ -221,7 +221,7 @@ class SetupActions:
                 if isinstance(state.plan, Plan):
                     changes["plan"] = replace(state.plan, path=tool_path(model, state.plan.motion), short=None)
         changes["setup"] = replace(setup, asked=None, refusal=None, can_undo=bool(self._past))
-        self._store.update(**changes, typed=state.typed + 1)
+        self._store.update(**changes)
 
 
 def is_setup_field(field: str) -> bool:

@@ -1,0 +1,76 @@
+"""The client's requests, one after the other: handled, answered, some of them only once the arm is at rest."""
+
+from __future__ import annotations
+
+from collections import deque
+
+from rcilab.controller.answers import Reply
+from rcilab.controller.cycle import ControlCycle
+from rcilab.controller.endpoint import Endpoint
+from rcilab.controller.faulty_network import FaultyNetwork
+from rcilab.controller.state_machine import When
+from rcilab.errors import DecodeError
+from rcilab.protocols.rci import Connect, Request, decode_request, encode_response
+
+
+class RequestDesk:
+    """Handles requests in order; one whose answer has to wait holds up those behind it. Owned by the server's loop.
+
+    Args:
+        cycle: What grants or refuses them.
+        endpoint: Where states go, as `Connect` asks.
+        network: What carries the answers.
+    """
+
+    def __init__(self, cycle: ControlCycle, endpoint: Endpoint, network: FaultyNetwork) -> None:
+        self._cycle = cycle
+        self._endpoint = endpoint
+        self._network = network
+        self._frames: deque[bytes] = deque()
+        self._pending: tuple[Request, int, Reply] | None = None
+
+    @property
+    def is_waiting(self) -> bool:
+        """Whether a request was granted whose answer is not due yet."""
+        return self._pending is not None
+
+    def take(self, frame: bytes) -> None:
+        """Takes a request as it came, and handles it when it is its turn."""
+        self._frames.append(frame)
+        self._serve()
+
+    def settle(self) -> None:
+        """Gives the answer that had to wait if it is due, and goes on to the requests behind it."""
+        if self._pending is not None and self._cycle.is_settled:
+            waited, self._pending = self._pending, None
+            self._answer(*waited)
+            self._serve()
+
+    def clear(self) -> None:
+        """Forgets everything: who asked is gone."""
+        self._frames.clear()
+        self._pending = None
+
+    def _serve(self) -> None:
+        """Handles requests in order, up to one whose answer has to wait."""
+        while self._frames and self._pending is None:
+            frame = self._frames.popleft()
+            try:
+                command_id, request = decode_request(frame)
+            except DecodeError as error:
+                self._frames.clear()
+                self._network.drop_client(f"sent bytes that are no RCI: {error}")
+                return
+            reply = self._cycle.handle(request)
+            if isinstance(request, Connect):
+                self._endpoint.redirect_states(request.udp_port)
+            # Idle modes are to be seen before StopMove is answered, so even an arm at rest answers after a cycle.
+            if reply.when is When.AT_REST:
+                self._pending = (request, command_id, reply)
+            else:
+                self._answer(request, command_id, reply)
+
+    def _answer(self, request: Request, command_id: int, reply: Reply) -> None:
+        self._network.send_frame(encode_response(request.code, command_id, self._cycle.conclude(reply)))
+        if reply.ends_connection:
+            self._network.drop_client("asked for a reboot")

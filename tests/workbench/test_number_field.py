@@ -1,0 +1,99 @@
+"""A typed number: taken after a pause, and not written over under the hand that typed it."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from rcilab.workbench import widgets
+from rcilab.workbench.requests import Request, TypeField
+from rcilab.workbench.text import message
+from rcilab.workbench.widgets import NumberField
+
+
+class Box:
+    """A text box as viser has it: tells of every key, and keeps what was written into it."""
+
+    def __init__(self) -> None:
+        self.value = ""
+        self._hear: Callable[[Any], Any] | None = None
+
+    def on_update(self, hear: Callable[[Any], Any]) -> Callable[[Any], Any]:
+        self._hear = hear
+        return hear
+
+    def type(self, text: str) -> None:
+        self.value = text
+        assert self._hear is not None
+        asyncio.run(self._hear(SimpleNamespace(client_id=1, target=self)))
+
+
+@pytest.fixture
+def now(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
+    clock = SimpleNamespace(time=100.0)
+    monkeypatch.setattr(widgets, "time", SimpleNamespace(monotonic=lambda: clock.time))
+    return clock
+
+
+def make() -> tuple[Box, NumberField, list[Request]]:
+    box, asked = Box(), []
+    return box, NumberField(box, asked.append, "joint.1"), asked
+
+
+def test_a_number_counts_once_the_typing_has_paused_and_stands_as_it_was_typed(now: SimpleNamespace) -> None:
+    box, field, asked = make()
+    field.show("30.00", None)
+    assert box.value == "30.00"
+    for text in ("1", "10"):
+        box.type(text)
+        now.time += 0.5
+        field.show("30.00", None)
+    assert asked == []
+    now.time += 0.3
+    field.show("30.00", None)
+    assert asked == [TypeField(page=1, field="joint.1", text="10")]
+    now.time += 0.1
+    field.show("30.00", None)
+    assert box.value == "10", "the answer may still be on its way"
+    for _ in range(20):
+        now.time += 0.12
+        field.show("10.00", None)
+        assert box.value == "10", "somebody may be about to type on"
+    now.time += 1.0
+    field.show("10.00", None)
+    assert box.value == "10.00"
+    assert len(asked) == 1
+
+
+def test_what_becomes_another_number_meanwhile_is_shown_at_once(now: SimpleNamespace) -> None:
+    box, field, _ = make()
+    box.type("10")
+    for seconds, number in ((0.8, "30.00"), (0.3, "10.00")):
+        now.time += seconds
+        field.show(number, None)
+    assert box.value == "10"
+    field.show("12.50", None)  # A drag, an undo.
+    assert box.value == "12.50"
+
+
+def test_what_is_wrong_is_left_as_it_is(now: SimpleNamespace) -> None:
+    box, field, _ = make()
+    box.type("abc")
+    for _ in range(60):
+        now.time += 0.1
+        field.show("30.00", message("number.not_a_number", typed="abc"))
+    assert box.value == "abc"
+
+
+def test_a_field_that_becomes_another_ones_shows_that_one_at_once(now: SimpleNamespace) -> None:
+    box, field, asked = make()
+    box.type("10")
+    field.field = "joint.2"
+    field.show("55.00", None)
+    assert asked == [TypeField(page=1, field="joint.1", text="10")]
+    field.show("55.00", None)
+    assert box.value == "55.00"
