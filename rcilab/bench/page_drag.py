@@ -10,6 +10,7 @@ from rcilab.bench.bare import bare_page
 from rcilab.bench.browser import find_chromium
 from rcilab.bench.measure import Absent, Measurement, summarise
 from rcilab.bench.tab import Tab, no_browser, open_tab
+from rcilab.errors import DeadlineError
 from rcilab.model import load_model
 from rcilab.views.arm_view import ArmView
 from rcilab.views.viser_scene import ViserScene
@@ -28,6 +29,8 @@ _HANDLE = """(() => { const m = __viserMutable, x = m.nodeRefFromName['/target']
   return [r.left + (v.x + 1) / 2 * r.width, r.top + (1 - v.y) / 2 * r.height]; })()""".replace(
     "SCALE", str(0.9 * _SCALE)
 )
+_PLACE = "__viserMutable.nodeRefFromName['/target'].matrixWorld.elements.join()"
+_GRASPS, _GRASP = 5, 8.0  # [s] A page that is busy may see the mouse before the handle is under it: then once more.
 _WATCH = """(() => { const read = () => __viserMutable.nodeRefFromName['NODE'].matrixWorld.elements.join();
   let moved = 0; window.__late = []; let before = read(), frame = 0;
   addEventListener('pointermove', () => { if (!moved) moved = performance.now(); }, true);
@@ -79,11 +82,8 @@ def _drag(tab: Tab, url: str, follower: str) -> list[float]:
     nodes = " && ".join(f"window.__viserMutable?.nodeRefFromName?.['{name}']" for name in ("/target", follower))
     tab.wait("the scene", f"!!({nodes})")
     time.sleep(3.0)  # Shaders are compiled and meshes uploaded while the first frames are drawn.
-    x, y = tab.evaluate(_HANDLE)
+    x, y = _take_hold(tab)
     tab.evaluate(_WATCH.replace("NODE", follower))
-    tab.mouse("mouseMoved", x, y)
-    time.sleep(0.5)  # The gizmo notices the mouse on its next drawn frame.
-    tab.mouse("mousePressed", x, y)
     for move in range(-_FIRST, _MOVES):
         if move == 0:
             time.sleep(_REST)
@@ -94,3 +94,24 @@ def _drag(tab: Tab, url: str, follower: str) -> list[float]:
         time.sleep(_PAUSE)
     tab.mouse("mouseReleased", x, y)
     return [1e-3 * float(one) for one in tab.evaluate("__late")]
+
+
+def _take_hold(tab: Tab) -> tuple[float, float]:
+    """Presses the mouse on the target's handle and returns where, once the target is seen to follow it, [px].
+
+    Raises:
+        DeadlineError: It never does.
+    """
+    for _ in range(_GRASPS):
+        x, y = tab.evaluate(_HANDLE)  # Anew: the camera may have stepped back since.
+        tab.mouse("mouseMoved", x, y)
+        time.sleep(0.5)  # The gizmo notices the mouse on its next drawn frame.
+        tab.mouse("mousePressed", x, y)
+        before, deadline = tab.evaluate(_PLACE), time.monotonic() + _GRASP
+        tab.mouse("mouseMoved", x + 3.0, y + 1.5)
+        while time.monotonic() < deadline:
+            if tab.evaluate(_PLACE) != before:
+                return x, y
+            time.sleep(0.1)
+        tab.mouse("mouseReleased", x, y)
+    raise DeadlineError(f"bench: the target did not follow the mouse in {_GRASPS} tries; look at `rcilab doctor`")

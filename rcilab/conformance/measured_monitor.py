@@ -103,7 +103,8 @@ def _low_passed(state: list[float], new: Sequence[float] | None, old: Sequence[f
     """Returns the filtered difference one cycle later; from rest when there is nothing to take a difference of."""
     if new is None or old is None:
         return [0.0] * len(state)
-    return [x + _SHARE * ((a - b) / CYCLE_TIME - x) for x, a, b in zip(state, new, old, strict=False)]
+    triples = zip(state, new, old)  # noqa: B905  # As in `BoundRows`.
+    return [x + _SHARE * ((a - b) / CYCLE_TIME - x) for x, a, b in triples]
 
 
 def _norms(values: Sequence[float]) -> tuple[float, float]:

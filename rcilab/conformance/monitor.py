@@ -9,7 +9,7 @@ from rcilab.conformance.bound_rows import BoundRows
 from rcilab.conformance.breach import Breach
 from rcilab.conformance.condition import Condition
 from rcilab.conformance.conditions import JOINT_CONDITIONS
-from rcilab.conformance.spans import spans
+from rcilab.conformance.spans import EVEN, spans
 from rcilab.errors import InvalidValueError
 from rcilab.faults import Fault
 from rcilab.limits import JointLimits
@@ -29,6 +29,7 @@ class JointMonitor:
         dq: Their first backward difference over one cycle, [rad/s].
         ddq: The second, [rad/s^2].
         jerk: The third, [rad/s^3].
+        is_even: Whether the last differences are over single cycles, with no gap in their reach.
 
     Args:
         limits: Bounds of the joints. The monitor starts at rest at zero; `reset` places it.
@@ -56,6 +57,7 @@ class JointMonitor:
         self.dq = self._numbers(dq, "dq") if dq is not None else [0.0] * self._n
         self.ddq = self._numbers(ddq, "ddq") if ddq is not None else [0.0] * self._n
         self.jerk = [0.0] * self._n
+        self.is_even = True
         self._spacing = (1, 1)
 
     def step(self, q_c: Sequence[float], cycles: int = 1) -> tuple[Fault, ...]:
@@ -68,10 +70,11 @@ class JointMonitor:
             q_c: Commanded joint angles, at least n numbers (a 6-axis arm ignores the wire's seventh), [rad].
             cycles: Cycles since the last step, 1 or more.
         """
-        first, second, third = spans(cycles, self._spacing)
+        first, second, third = times = spans(cycles, self._spacing)
+        self.is_even = times is EVEN
         self._spacing = (cycles, self._spacing[0])
         q = list(q_c[: self._n])
-        dq = [(new - old) / first for new, old in zip(q, self.q, strict=True)]
+        dq = [change / first for change in map(sub, q, self.q)]
         ddq = [change / second for change in map(sub, dq, self.dq)]
         jerk = [change / third for change in map(sub, ddq, self.ddq)]
         self.q, self.dq, self.ddq, self.jerk = q, dq, ddq, jerk

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from rcilab.clock import CYCLE_TIME
 
-_EVEN = (CYCLE_TIME, CYCLE_TIME, CYCLE_TIME)
+EVEN = (CYCLE_TIME, CYCLE_TIME, CYCLE_TIME)
+"""The times of commands that come every cycle."""
 
 
 def spans(cycles: int, before: tuple[int, int]) -> tuple[float, float, float]:
@@ -19,5 +20,5 @@ def spans(cycles: int, before: tuple[int, int]) -> tuple[float, float, float]:
     """
     last, oldest = before
     if cycles == last == oldest == 1:
-        return _EVEN
+        return EVEN
     return cycles * CYCLE_TIME, (cycles + last) * CYCLE_TIME / 2.0, (cycles + last + oldest) * CYCLE_TIME / 3.0

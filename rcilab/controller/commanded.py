@@ -62,10 +62,15 @@ class CommandedMotion:
         self._stop: Iterator[list[float]] | None = None
         self.version += 1
 
-    def move(self, q: Sequence[float]) -> None:
-        """Takes the commanded angles of this cycle."""
+    def move(self, q: list[float], differences: tuple[list[float], list[float]] | None = None) -> None:
+        """Takes the commanded angles of this cycle.
+
+        Args:
+            q: n plain floats, [rad].
+            differences: Their first and second backward difference, [rad/s], [rad/s^2], from whoever took them already.
+        """
         self._stop = None
-        self._advance(list(q))
+        self._advance(q, differences)
 
     def come_to_rest(self) -> None:
         """Takes one cycle of the fastest stop inside the limits; planned at the first call, repeated calls play it.
@@ -92,13 +97,16 @@ class CommandedMotion:
         self._stop = None
         self.version += 1
 
-    def _advance(self, q: list[float]) -> None:
+    def _advance(self, q: list[float], differences: tuple[list[float], list[float]] | None = None) -> None:
+        dq, ddq = differences or self._differences(q)
+        self.q, self.dq, self.ddq = q, dq, ddq
+        self.is_at_rest = not any(dq) and not any(ddq)
+        self.version += 1
+
+    def _differences(self, q: list[float]) -> tuple[list[float], list[float]]:
         h = CYCLE_TIME
         dq = [(new - old) / h for new, old in zip(q, self.q, strict=True)]
-        self.ddq = [change / h for change in map(sub, dq, self.dq)]
-        self.q, self.dq = q, dq
-        self.is_at_rest = not any(dq) and not any(self.ddq)
-        self.version += 1
+        return dq, [change / h for change in map(sub, dq, self.dq)]
 
     def _plan(self) -> Iterator[list[float]]:
         if self._may_stand_still():

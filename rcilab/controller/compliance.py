@@ -14,13 +14,13 @@ How an arm vibrates changes with its pose, and that takes longer than a cycle: a
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
 from rcilab.arrays import JointVector, Matrix
+from rcilab.dynamics.symmetric_solver import vibration_modes
 
 DAMPING_RATIO = 0.7  # of critical; a choice: some 5 % overshoot
 FASTEST_MODE = 600.0  # [rad/s] w times 1 ms stays at 0.6; computed torques become unstable at about 1.0; a choice
@@ -55,15 +55,12 @@ def design_damping(mass_inverse: Matrix, stiffness: Matrix, slowest: float = SLO
         stiffness: Of the springs, in joint space, symmetric, shape (n, n), [N m/rad].
         slowest: Least angular frequency that damping is computed with, [rad/s].
     """
-    F = np.linalg.cholesky(mass_inverse)
-    eigenvalues, V = np.linalg.eigh(F.T @ stiffness @ F)
-    U = F @ V
-    back = np.linalg.solve(F.T, V)  # M U.
-    squares = eigenvalues.tolist()
-    gains = [2.0 * DAMPING_RATIO * math.sqrt(min(max(square, slowest**2), FASTEST_MODE**2)) for square in squares]
+    modes = vibration_modes(mass_inverse, stiffness)
+    squares, back = modes.squares, modes.momenta
+    gains = 2.0 * DAMPING_RATIO * np.sqrt(np.minimum(np.maximum(squares, slowest**2), FASTEST_MODE**2))
     slowing = None
     if squares[-1] > FASTEST_MODE**2:
-        slowing = back * [max(0.0, 1.0 - FASTEST_MODE**2 / square) if square > 0.0 else 0.0 for square in squares] @ U.T
+        slowing = back * (1.0 - FASTEST_MODE**2 / np.maximum(squares, FASTEST_MODE**2)) @ modes.shapes.T
     return Damping(back * gains @ back.T, slowing)
 
 

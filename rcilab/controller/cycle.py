@@ -294,7 +294,7 @@ class ControlCycle:
             self._has_moved = True
             self._tau = step.tau
             if step.q is not None:
-                self._arm.commanded.move(step.q)
+                self._arm.commanded.move(step.q, step.differences)
         return step
 
     def _count_losses(self, step: Step, playback: Playback) -> Step:

@@ -99,9 +99,12 @@ def name_number(text: Text, part: ControlPart, place: int) -> str:
 
 
 def said_ranges(ranges: tuple[Range, ...]) -> str:
-    """Returns units and ranges in brackets: one for all, or one for each that differs."""
-    found = dict.fromkeys(f"{item.low:g}…{item.high:g} {item.unit}" for item in ranges)
-    return f"[{', '.join(found)}]"
+    """Returns ranges and units in brackets, each once: "[0…75, 60, 45 N·m]" where only the upper ends differ."""
+    ends: dict[tuple[float, str], dict[str, None]] = {}
+    for item in ranges:
+        ends.setdefault((item.low, item.unit), {})[f"{item.high:g}"] = None
+    said = (f"{low:g}…{', '.join(highs)} {unit}" for (low, unit), highs in ends.items())
+    return f"[{', '.join(said)}]"
 
 
 def held_rows(mode: Mode, held: ControlSettings | None, own: ControlSettings, text: Text) -> list[tuple[str, str]]:

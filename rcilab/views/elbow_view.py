@@ -69,6 +69,8 @@ class ElbowView:
     def __init__(self, scene: Scene, root: str = "/elbow") -> None:
         self._scene, self.root = scene, root
         self._shown = False
+        self._drawn: set[str] = set()
+        self._hidden: set[str] = set()
         scene.add_frame(root, visible=False)
 
     def show(self, circle: ElbowCircle, psi: float, arcs: Iterable[DrawableArc], dexterity: Array) -> None:
@@ -85,6 +87,10 @@ class ElbowView:
             by_kind[arc.kind] += _strokes(arc.kind, arc.start, arc.end)
         with self._scene.batch():
             for kind, strokes in by_kind.items():
+                self._see(kind, bool(strokes))
+                if not strokes and kind in self._drawn:
+                    continue  # A page would draw lines without length like any others.
+                self._drawn.add(kind)
                 ends = _fill(strokes)
                 points = circle.points(ends.ravel(), OUTWARD).reshape(-1, 2, 3)
                 colors = np.broadcast_to(np.array(ARC_COLORS[kind], dtype=float), points.shape)
@@ -105,6 +111,11 @@ class ElbowView:
     def remove(self) -> None:
         """Takes it out of the scene."""
         self._scene.remove(self.root)
+
+    def _see(self, kind: str, visible: bool) -> None:
+        if kind in self._drawn and visible == (kind in self._hidden):
+            self._hidden ^= {kind}
+            self._scene.set_visible(f"{self.root}/{kind}", visible)
 
 
 def free_colors(psi: Array, dexterity: Array) -> Array:

@@ -184,7 +184,7 @@ _LARGE = 1e7
 
 def plain_number(value: float, digits: int = 4) -> str:
     """Returns a number with so many digits, without an exponent where it can be read without."""
-    text = f"{value:.{digits}g}"
+    text = f"{value + 0.0:.{digits}g}"  # No "-0".
     if "e" not in text or not math.isfinite(value):
         return text
     if 1.0 <= abs(value) < _LARGE:

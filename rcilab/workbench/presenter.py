@@ -55,6 +55,9 @@ if TYPE_CHECKING:
 
 _PERIOD = 1.0 / 30.0  # [s] A choice: the display's rate is enough, and it leaves the processor to the robot.
 _AT_REST = 0.12  # [s] A choice: so often counters and clocks are shown while nothing else changes.
+_READ = 0.25
+"""[s] A choice: while a hand drags the goal in the scene, numbers and plots come so long after the arm, as plots do
+anyway (`panels/plots.py`): a page that draws in software shows the arm once it has applied all that came with it."""
 _MAIN_WIDTH, _TIMELINE_WIDTH = 352, 380  # [px]
 _TABS = (
     ("tab.jog", "adjustments-horizontal", JogPanel, ToolJogPanel, PosesPanel),
@@ -91,6 +94,9 @@ class Presenter:
         self._theme = ""
         self._shown: tuple[object, ...] = ()
         self._next = 0.0
+        self._goal: object = None
+        self._owed: float | None = None  # [s] Since when the panels show another goal.
+        self._told: tuple[object, ...] = ()
         self._ending = threading.Event()
         self._thread: threading.Thread | None = None
         self.errors: list[BaseException] = []
@@ -114,12 +120,12 @@ class Presenter:
         shown, now = (state, *_traits(status)), time.monotonic()
         if shown == self._shown and now < self._next:
             return False
-        self._draw(state, status)
-        self._shown, self._next = shown, now + _AT_REST
+        is_whole = self._draw(state, status)
+        self._shown, self._next = shown, now + (_AT_REST if is_whole else _PERIOD)
         return True
 
-    def _draw(self, state: UiState, status: SupervisorStatus) -> None:
-        """Shows a snapshot: first what is in the scene, since a hand may be dragging it."""
+    def _draw(self, state: UiState, status: SupervisorStatus) -> bool:
+        """Shows a snapshot, first what is in the scene: a hand may be dragging it. Returns whether that was all."""
         if _looks(state) != self._built:
             self._build(state)
         if state.theme != self._theme:
@@ -128,9 +134,24 @@ class Presenter:
         seen = exhibited(state)
         self._stage.show(exhibited(state, scene=True), status, self._text)
         self._marks.show(seen)
+        is_whole = not self._can_wait(state, status)
+        if is_whole:
+            self._show_panels(state, seen, status)
+        self._live.publish(**status_values(seen, status, self._text, self._timeline.end))
+        return is_whole
+
+    def _can_wait(self, state: UiState, status: SupervisorStatus) -> bool:
+        """Returns whether numbers and plots give way to the arm that follows a hand; news of the robot never do."""
+        if state.goal is self._goal or not self._stage.is_held or self._told != _traits(status):
+            return False
+        now = time.monotonic()
+        self._owed = now if self._owed is None else self._owed
+        return now - self._owed < _READ
+
+    def _show_panels(self, state: UiState, seen: UiState, status: SupervisorStatus) -> None:
+        self._goal, self._told, self._owed = state.goal, _traits(status), None
         for panel in self._panels:
             panel.show(seen if panel is self._timeline else state, status)
-        self._live.publish(**status_values(seen, status, self._text, self._timeline.end))
 
     def _build(self, state: UiState) -> None:
         """Makes the panels anew: another language, unit or theme has other words, another arm other joints."""

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from browser.page import close_toasts
 from rcilab.workbench import requests
+from rcilab.workbench.text import message
 
 
 def test_plan_check_execute_and_the_arm_arrives(page):
@@ -29,6 +31,29 @@ def test_plan_check_execute_and_the_arm_arrives(page):
     )
     assert not page.button("Execute").is_enabled(), "a certificate that was used up must not be pressable again"
     page.wait(lambda: "where this plan ends" in page.tab.locator(".rl-why").inner_text(), "the reason")
+    start = page.state.plan.motion.start
+    page.button("Back to the start").click()
+    page.wait(lambda: np.abs(page.state.plan.motion.goal - start).max() < 1e-9, "a plan back to the start")
+    page.wait(lambda: page.button("Execute").is_enabled(), "the way back")
+    page.wait(lambda: not page.button("Back to the start").is_visible(), "only the next step to be offered")
+
+
+def test_a_page_that_is_loaded_anew_opens_its_tab_and_says_what_it_missed(page):
+    page.open_tab("Check")
+    page.wait(lambda: is_open(page, "Check"), "the tab to open")
+    page.tab.wait_for_timeout(200)  # The page looks at its tabs every 50 ms.
+    page.tab.goto("about:blank")
+    page.bench.store.say("warn", message("notice.stopped"))
+    page.tab.goto(f"{page.bench.url}?fixedDpr=0.2")
+    page.wait(lambda: "Stopped" in page.toast(), "what was said meanwhile")
+    page.wait_until_drawn()
+    close_toasts(page.tab)
+    page.wait(lambda: is_open(page, "Check"), "the tab that was open")
+
+
+def is_open(page, name: str) -> bool:
+    tab = page.tab.get_by_role("tab", name=name)
+    return tab.count() == 1 and tab.get_attribute("aria-selected") == "true"
 
 
 def stop_in_mid_motion(page, press) -> None:

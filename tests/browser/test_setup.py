@@ -33,5 +33,5 @@ def test_a_tool_is_typed_the_controller_reports_it_and_the_box_is_dragged_and_ta
     page.button("Undo").click()
     page.wait(lambda: page.state.setup.wanted.tool.position[2] == 0.0, "the tool as it was")
     page.wait(lambda: page.button("Undo").is_disabled(), "nothing more to undo")
-    choose(page, "Part", "none")
+    choose(page, "Part", "choose …")
     page.wait(lambda: pending_parts(page.state, page.status) == (), "the controller to have the first set-up")

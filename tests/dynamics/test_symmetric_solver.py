@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rcilab.dynamics.symmetric_solver import SymmetricSolver
+from rcilab.dynamics.symmetric_solver import SymmetricSolver, vibration_modes
+from rcilab.model import load_model
 
 
 @given(size=st.integers(2, 8), seed=st.integers(0, 10**6))
@@ -35,3 +36,17 @@ def test_it_says_whether_the_matrix_was_positive_definite(size: int, seed: int) 
     assert solver.has_solved
     solver.solve(A - 1.01 * np.linalg.eigvalsh(A)[0] * np.eye(size), np.ones(size))
     assert not solver.has_solved
+
+
+@pytest.mark.parametrize("name", ["xMatePro7", "xMate3"])
+def test_modes_are_those_of_springs_on_the_arm(name: str) -> None:
+    model, rng = load_model(name), np.random.default_rng(5)
+    for q in model.home + rng.normal(scale=0.5, size=(20, model.n)):
+        M, J = model.rigid_body.mass_matrix(q), model.jacobian(q)
+        K = J.T @ (rng.uniform(0.0, 3000.0, size=(6, 1)) * J)
+        squares, U, momenta = vibration_modes(model.rigid_body.mass_inverse(q), K)
+        assert (np.diff(squares) >= 0.0).all()
+        # Up to rounding, times the condition of M.
+        np.testing.assert_allclose(U.T @ M @ U, np.eye(model.n), atol=1e-9)
+        np.testing.assert_allclose(U.T @ K @ U / squares[-1], np.diag(squares) / squares[-1], atol=1e-9)
+        np.testing.assert_allclose(momenta, M @ U, atol=1e-9)

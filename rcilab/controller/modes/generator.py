@@ -49,6 +49,8 @@ class Step(NamedTuple):
     """Broken conditions, in wire order; then nothing of this step is given to the arm."""
     reason: Remark = NOTHING
     """What broke, in words and numbers."""
+    differences: tuple[list[float], list[float]] | None = None
+    """First and second backward difference of `q` over one cycle, [rad/s], [rad/s^2], where they are known already."""
 
 
 class MotionGenerator(Protocol):
@@ -149,4 +151,5 @@ class JointReference:
             breaches += self._box.broken()
         if faults:
             return Step(faults=tuple(sorted(faults)), reason=describe_breaches(breaches))
-        return Step(q)
+        monitor = self._monitor
+        return Step(q, differences=(monitor.dq, monitor.ddq) if monitor.is_even else None)

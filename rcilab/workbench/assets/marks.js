@@ -24,13 +24,18 @@
         if (!NAMES.has(name)) return;
         mark(inner, "in-" + name);
         mark(outer, name);
-        const mate = { triples: [".mantine-TextInput-root", "box"], trios: ["button", "button"] }[name];
+        const mates = { triples: [".mantine-TextInput-root", "box"], trios: ["button", "button"], buttons: [".rl-verdict", "verdict"] };
+        const mate = mates[name];
         if (mate) for (const child of outer.children) if (child.querySelector(mate[0])) mark(child, mate[1]);
         if (name === "bare") mark(outer.parentElement.closest(".mantine-Paper-root"), "around-bare");
       });
     });
     root.querySelectorAll(".mantine-Flex-root > div:first-child").forEach((box) => { if (box.querySelector("label")) mark(box, "label"); });
     root.querySelectorAll("div > p > label:empty").forEach((label) => mark(label.parentElement.parentElement, "nameless"));
+    root.querySelectorAll(".mantine-Paper-root").forEach((group) => {
+      const before = group.previousElementSibling, last = before && before.lastElementChild;
+      if (last && last.matches(".rl-verdict, .rl-note, .rl-table, .rl-meter")) mark(before, "above-group");
+    });
     root.querySelectorAll('[role="tablist"]').forEach((tabs) => {
       mark(tabs.parentElement, "tabs");
       if (tabs.children.length >= MANY) mark(tabs, "many");

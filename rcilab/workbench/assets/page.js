@@ -7,7 +7,11 @@
     return getContext.call(this, kind, kind === "2d" ? { willReadFrequently: true, ...options } : options);
   };
 
-  let live = null, said = {}, bar, chips, stop, take, question, toast, me = null, notice = null, greeted = false, hideTimer = 0;
+  // What a window has when it is loaded anew: the open tab, and which notice it has seen last.
+  const recall = (name) => { try { return JSON.parse(sessionStorage.getItem("rcilab." + name)); } catch { return null; } };
+  const keep = (name, value) => { try { sessionStorage.setItem("rcilab." + name, JSON.stringify(value)); } catch { /* Then not. */ } };
+
+  let live = null, said = {}, bar, chips, stop, take, question, toast, me = null, notice = recall("notice"), greeted = false, hideTimer = 0;
 
   const send = (message) => {
     if (live && live.readyState === WebSocket.OPEN) { live.send(JSON.stringify(message)); return true; }
@@ -122,7 +126,7 @@
     if (news.chips) draw(news.chips);
     if (news.notice && news.notice.serial !== notice) {
       if (greeted || notice !== null) show(news.notice);  // What was said before this page came is no news to it.
-      notice = news.notice.serial;
+      keep("notice", notice = news.notice.serial);
     }
     if (!greeted && said.stopHint) sayOnce();
     greeted = true;
@@ -149,17 +153,20 @@
   const size = () => send({ kind: "size", height: window.innerHeight });
   window.addEventListener("resize", size);
 
-  // Another language builds the tabs anew; the one that was open is opened again.
-  let first = null, chosen = 0, count = 0;
+  // Another language or a reload builds the tabs anew; the one that was open is opened again.
+  let first = null, chosen = Number(recall("tab")) || 0, count = 0;
   const keepTab = () => {
     const lists = [...document.querySelectorAll('[role="tablist"]')];
     const list = lists.sort((a, b) => b.children.length - a.children.length)[0];
     const found = list ? [...list.querySelectorAll('[role="tab"]')] : [];
     if (found.length < 4 || found.length < count) return;
-    if (found[0] !== first && first !== null && chosen > 0) {  // viser's tabs hear keys and fingers, not click().
+    if (found[0] !== first && chosen > 0) {
+      if (found.length <= chosen) return;  // They come one by one.
+      // viser's tabs hear keys and fingers, not click().
       found[chosen].dispatchEvent(new KeyboardEvent("keydown", { key: "Enter", bubbles: true }));
     } else {
-      chosen = Math.max(0, found.findIndex((tab) => tab.getAttribute("aria-selected") === "true"));
+      const open = Math.max(0, found.findIndex((tab) => tab.getAttribute("aria-selected") === "true"));
+      if (open !== chosen) keep("tab", chosen = open);
     }
     first = found[0];
     count = found.length;

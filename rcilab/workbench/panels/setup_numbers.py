@@ -44,7 +44,8 @@ class SetupNumbersPanel:
         self._rows: dict[str, dict[str, str]] = {}
         self._seen: dict[str, Linked] = {}
         for part in SETUP_PARTS:
-            folder = gui.add_folder(text(f"setup.part.{part}"), visible=state.setup.edited == part)
+            title = text(f"setup.part.{part}")
+            folder = gui.add_folder(title[:1].upper() + title[1:], visible=state.setup.edited == part)
             with folder:
                 gui.add_html('<i class="rl-triples"></i>')
                 if part == "box":

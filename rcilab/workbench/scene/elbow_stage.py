@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from typing import TYPE_CHECKING, Any
 
 from rcilab.robots.mesh import revolve
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from rcilab.workbench.store import UiState
 
 _HANDLE = "/elbow/handle"
+_HAND_AWAY = 0.6  # [s]
 _RADIUS = 0.034  # [m]
 _COLOR, _SNAPPED_COLOR = (18, 120, 108), (214, 48, 38)
 
@@ -39,6 +41,7 @@ class ElbowStage:
         self._view = ElbowView(drawing)
         self._drawn: Elbow | None = None
         self._is_red = False
+        self._touched = float("-inf")
         steps = [math.pi * (step / 12.0 - 0.5) for step in range(13)]
         profile = [(max(_RADIUS * math.cos(a), 0.0), _RADIUS * math.sin(a)) for a in steps]
         ball = revolve(profile, segments=24)
@@ -47,6 +50,11 @@ class ElbowStage:
         self._label: Any = server.scene.add_label(
             "/elbow_label", "", anchor="bottom-center", depth_test=False, font_screen_scale=1.0, visible=False
         )
+
+    @property
+    def is_held(self) -> bool:
+        """Whether a hand moves the elbow, or has just let go of it."""
+        return time.monotonic() - self._touched <= _HAND_AWAY
 
     def show(self, state: UiState, status: SupervisorStatus, text: Text) -> None:
         """Draws the circle of the goal; while the arm moves there is none."""
@@ -77,6 +85,7 @@ class ElbowStage:
         self._label.remove()
 
     async def _hear(self, event: Any) -> None:
+        self._touched = time.monotonic()
         self._ask(
             requests.DragElbow(
                 page=event.client_id,

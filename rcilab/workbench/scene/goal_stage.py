@@ -68,13 +68,18 @@ class GoalStage:
                 )
             )
 
+    @property
+    def is_held(self) -> bool:
+        """Whether a hand moves the handles, or has just let go of them."""
+        return time.monotonic() - self._touched <= _HAND_AWAY
+
     def show(self, state: UiState, text: Text) -> None:
         """Follows the goal, unless a hand is moving the handles."""
         goal = state.goal
         away = hides_target(state)
         if self._gizmo.visible == away:
             self._gizmo.visible = self._mark.visible = self._label.visible = not away
-        if time.monotonic() - self._touched > _HAND_AWAY:
+        if not self.is_held:
             position, wxyz = goal.target.position, goal.target.wxyz
             if np.abs(np.asarray(self._gizmo.position) - position).max() > 1e-7:
                 self._gizmo.position = position

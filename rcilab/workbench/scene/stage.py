@@ -48,6 +48,11 @@ class Stage:
         self._visible: dict[str, bool] = {}
         place_camera(server)
 
+    @property
+    def is_held(self) -> bool:
+        """Whether a hand drags the goal, or has just let go of it."""
+        return self._built is not None and (self._goal.is_held or self._elbow.is_held)
+
     def show(self, state: UiState, status: SupervisorStatus, text: Text) -> None:
         """Draws what has changed."""
         wanted = (state.model.name, state.quality)
