@@ -9,14 +9,11 @@ from __future__ import annotations
 import ast
 import os
 import re
-from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
-
-from tests.notebook.warm_kernels import WarmKernels
 
 if TYPE_CHECKING:
     import nbformat
@@ -66,15 +63,6 @@ def with_solved_exercises(path: Path) -> nbformat.NotebookNode:
             cells.append(nbformat.v4.new_code_cell(next(pending) + CHECK + cell.source.split(CHECK)[1]))
     notebook.cells = cells
     return notebook
-
-
-@pytest.fixture(scope="module")
-def warm_kernels() -> Iterator[None]:
-    kernels = WarmKernels()
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("jupyter_client.provisioning.local_provisioner.launch_kernel", kernels.launch)
-        yield
-    kernels.close()
 
 
 @cache
@@ -147,7 +135,6 @@ def test_a_chinese_lesson_has_the_code_of_the_english_one(path: Path) -> None:
     assert solutions(path) == solutions(english)
 
 
-@pytest.mark.usefixtures("warm_kernels")
 @pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem)
 def test_a_lesson_runs_and_its_exercises_can_be_solved(path: Path) -> None:
     assert len(exercises(path)) == len(solutions(path)) == EXERCISES
@@ -157,7 +144,6 @@ def test_a_lesson_runs_and_its_exercises_can_be_solved(path: Path) -> None:
     assert shown(notebook, "image/png") or shown(notebook, "text/html")
 
 
-@pytest.mark.usefixtures("warm_kernels")
 def test_the_first_lesson_shows_what_it_talks_about() -> None:
     notebook = run_lesson(LESSONS[0])
     assert "refused: ConformanceError" in printed(notebook)
