@@ -33,7 +33,9 @@
     root.querySelectorAll(".mantine-Flex-root > div:first-child").forEach((box) => { if (box.querySelector("label")) mark(box, "label"); });
     root.querySelectorAll("div > p > label:empty").forEach((label) => mark(label.parentElement.parentElement, "nameless"));
     root.querySelectorAll(".mantine-Paper-root").forEach((group) => {
-      const before = group.previousElementSibling, last = before && before.lastElementChild;
+      let before = group.previousElementSibling;
+      while (before && !before.childElementCount) before = before.previousElementSibling;  // A piece of HTML that says nothing.
+      const last = before && before.lastElementChild;
       if (last && last.matches(".rl-verdict, .rl-note, .rl-table, .rl-meter")) mark(before, "above-group");
     });
     root.querySelectorAll('[role="tablist"]').forEach((tabs) => {

@@ -75,13 +75,13 @@ def plot_contents(
     return tuple(data), tuple(series), bands
 
 
-def plot_axes(theme: Theme, *, last: bool, space: int) -> tuple[Any, ...]:
-    """Returns the axes of a plot; only the last one of a column says the time."""
+def plot_axes(theme: Theme, *, last: bool, space: int, size: int = 46) -> tuple[Any, ...]:
+    """Returns the axes of a plot; only the last one of a column says the time. `size`: width of the numbers, [px]."""
     ink, grid = _AXIS[theme]
     look = {"font": "11px system-ui, sans-serif", "stroke": ink, "grid": {"stroke": grid, "width": 1}}
     ticks = {"size": 3, "stroke": grid, "width": 1}
     x: Any = {**look, "size": 22, "gap": 2, "ticks": ticks} if last else {"show": False}
-    return x, {**look, "size": 46, "gap": 3, "space": space, "ticks": ticks}
+    return x, {**look, "size": size, "gap": 3, "space": space, "ticks": ticks}
 
 
 def legend_html(joint: int, n: int, text: Text, theme: Theme, *, has_actual: bool) -> str:
