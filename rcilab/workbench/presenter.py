@@ -56,8 +56,8 @@ if TYPE_CHECKING:
 _PERIOD = 1.0 / 30.0  # [s] A choice: the display's rate is enough, and it leaves the processor to the robot.
 _AT_REST = 0.12  # [s] A choice: so often counters and clocks are shown while nothing else changes.
 _READ = 0.25
-"""[s] A choice: while a hand drags the goal in the scene, numbers and plots come so long after the arm, as plots do
-anyway (`panels/plots.py`): a page that draws in software shows the arm once it has applied all that came with it."""
+"""[s] A choice: where the scene is drawn lightly and a hand drags the goal in it, numbers and plots come so long after
+the arm: a page that draws in software shows the arm once it has applied all that came with it."""
 _MAIN_WIDTH, _TIMELINE_WIDTH = 352, 380  # [px]
 _TABS = (
     ("tab.jog", "adjustments-horizontal", JogPanel, ToolJogPanel, PosesPanel),
@@ -142,7 +142,8 @@ class Presenter:
 
     def _can_wait(self, state: UiState, status: SupervisorStatus) -> bool:
         """Returns whether numbers and plots give way to the arm that follows a hand; news of the robot never do."""
-        if state.goal is self._goal or not self._stage.is_held or self._told != _traits(status):
+        is_dragged = state.goal is not self._goal and self._stage.is_held
+        if state.quality != "light" or not is_dragged or self._told != _traits(status):
             return False
         now = time.monotonic()
         self._owed = now if self._owed is None else self._owed
