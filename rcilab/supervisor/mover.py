@@ -73,7 +73,7 @@ class Mover:
             mismatch = describe_start_mismatch(rows[0], link.latest.q_c)
             if mismatch is not None:
                 raise UsageError(mismatch).coded("elsewhere")
-            model.rigid_body.motion_torque(link.latest.q, link.latest.dq, link.latest.dq)  # Loads it now.
+            model.rigid_body.motion_torque(link.latest.q, link.latest.dq, link.latest.dq)  # Builds it now.
         self._publisher.begin_motion(request["duration"])
         self._publisher.say("moving", "moving")
         self._stream, self._softly = MotionStream(rows, mode, model, self._publisher.on_cycle), None

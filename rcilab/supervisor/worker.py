@@ -74,6 +74,7 @@ class Worker:
             np.full(self._settings.n, 0.1),
             np.zeros(self._settings.n),
         )  # The first one loads the planner; the next one must be quick.
+        self._model.rigid_body.gravity(self._model.home)  # Loads its library: from a cold disk that takes seconds.
         granted = enter_realtime(PRIORITY)
         self._publisher.update(is_fifo=granted.policy == "SCHED_FIFO", memory_locked=granted.memory_locked)
         if granted.warning:

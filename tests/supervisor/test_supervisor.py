@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -78,6 +80,13 @@ def test_status_says_what_runs_and_how_punctual_it_is(supervisor):
     assert status.robot_mode is RobotMode.IDLE
     assert status.lateness.p50 <= status.lateness.p99 <= status.lateness.p999 <= status.lateness.max
     assert status.lateness.histogram.sum() == status.lateness.cycles > 0
+
+
+def test_libraries_are_loaded_before_the_first_state_and_not_by_the_first_motion():
+    with Supervisor(MODEL) as fresh:
+        loaded = Path(f"/proc/{fresh.status().worker_pid}/maps").read_text(encoding="utf-8")
+        for library in ("pinocchio", "ruckig"):
+            assert library in loaded
 
 
 def test_stop_ends_in_one_controlled_stop_and_the_next_motion_can_begin(supervisor):
