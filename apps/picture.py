@@ -27,7 +27,7 @@ from rcilab.workbench.app import Workbench, WorkbenchConfig
 
 FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 VIEW, FILM = (1280, 800), (960, 600)  # [px]
-STEP = 130  # [ms] A frame of a movement is shown so long.
+STEP = 100  # [ms] A frame of a movement is shown so long.
 START = (-40.0, 25.0, 0.0, 95.0, 0.0, 60.0, 0.0)  # [deg]
 GOAL = (-52.0, 35.0, -14.0, 78.0, 18.0, 55.0, 10.0)  # [deg]
 BOX = {"xmin": -450, "ymin": -480, "zmin": 0, "xmax": 800, "ymax": 600, "zmax": 1050}  # [mm]
