@@ -74,7 +74,7 @@ class JointMonitor:
         self.is_even = times is EVEN
         self._spacing = (cycles, self._spacing[0])
         q = list(q_c[: self._n])
-        dq = [change / first for change in map(sub, q, self.q)]
+        dq = [(new - old) / first for new, old in zip(q, self.q, strict=True)]
         ddq = [change / second for change in map(sub, dq, self.dq)]
         jerk = [change / third for change in map(sub, ddq, self.ddq)]
         self.q, self.dq, self.ddq, self.jerk = q, dq, ddq, jerk

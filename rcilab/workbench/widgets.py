@@ -14,7 +14,7 @@ from rcilab.workbench.text import Message
 
 Ask: TypeAlias = Callable[[Request], None]
 
-_HAND_AWAY = 0.6  # [s] A choice: a control touched less long ago is not written to.
+HAND_AWAY = 0.6  # [s] A choice: a control touched less long ago is not written to.
 _TYPING_PAUSE = 0.7  # [s] A choice: a typed number counts when no key came for so long.
 _ANSWER = 0.2  # [s] A choice: what a typed number came to stands in the state after that.
 _STANDS = 3.0  # [s] A choice: so long a number that was taken stands as it was typed; to write is to disturb the hand.
@@ -56,7 +56,7 @@ class Linked:
 
     def show(self, value: Any) -> None:
         """Writes the state's value, unless a person is moving the control."""
-        if self.handle.value != value and time.monotonic() - self._touched > _HAND_AWAY:
+        if self.handle.value != value and time.monotonic() - self._touched > HAND_AWAY:
             self.handle.value = value
 
 

@@ -127,3 +127,9 @@ def test_reset_forgets_the_past():
 def test_a_reset_to_the_wrong_number_of_joints_is_refused():
     with pytest.raises(InvalidValueError, match="needs 7 numbers"):
         JointMonitor(MODELS[0].limits.joint).reset([0.0] * 6)
+
+
+def test_a_command_of_too_few_joints_is_never_judged_by_those_that_are_there() -> None:
+    monitor = JointMonitor(load_model("xMatePro7").limits.joint)
+    with pytest.raises(ValueError, match="longer"):
+        monitor.step([0.0] * 6)

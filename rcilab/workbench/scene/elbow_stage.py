@@ -13,7 +13,7 @@ from rcilab.workbench import requests
 from rcilab.workbench.goal.elbow import Elbow
 from rcilab.workbench.run.readiness import is_moving
 from rcilab.workbench.text import Text
-from rcilab.workbench.widgets import Ask
+from rcilab.workbench.widgets import HAND_AWAY, Ask
 
 if TYPE_CHECKING:
     import viser
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from rcilab.workbench.store import UiState
 
 _HANDLE = "/elbow/handle"
-_HAND_AWAY = 0.6  # [s]
 _RADIUS = 0.034  # [m]
 _COLOR, _SNAPPED_COLOR = (18, 120, 108), (214, 48, 38)
 
@@ -54,7 +53,7 @@ class ElbowStage:
     @property
     def is_held(self) -> bool:
         """Whether a hand moves the elbow, or has just let go of it."""
-        return time.monotonic() - self._touched <= _HAND_AWAY
+        return time.monotonic() - self._touched <= HAND_AWAY
 
     def show(self, state: UiState, status: SupervisorStatus, text: Text) -> None:
         """Draws the circle of the goal; while the arm moves there is none."""

@@ -10,7 +10,7 @@ import numpy as np
 from rcilab.workbench import requests
 from rcilab.workbench.scene.setup_stage import hides_target
 from rcilab.workbench.text import Text
-from rcilab.workbench.widgets import Ask
+from rcilab.workbench.widgets import HAND_AWAY, Ask
 
 if TYPE_CHECKING:
     import viser
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
 TONE_COLORS = {"good": (38, 166, 91), "warn": (240, 150, 20), "bad": (214, 48, 38)}
 _VIA_COLOR = (11, 111, 194)
-_HAND_AWAY = 0.6  # [s]
 _GIZMO_SCALE = 0.26  # [m]
 
 
@@ -71,7 +70,7 @@ class GoalStage:
     @property
     def is_held(self) -> bool:
         """Whether a hand moves the handles, or has just let go of them."""
-        return time.monotonic() - self._touched <= _HAND_AWAY
+        return time.monotonic() - self._touched <= HAND_AWAY
 
     def show(self, state: UiState, text: Text) -> None:
         """Follows the goal, unless a hand is moving the handles."""

@@ -17,7 +17,7 @@ from rcilab.views.viser_scene import ViserScene
 from rcilab.workbench import requests
 from rcilab.workbench.setup.wanted import ON_FLANGE
 from rcilab.workbench.text import Text
-from rcilab.workbench.widgets import Ask
+from rcilab.workbench.widgets import HAND_AWAY, Ask
 
 if TYPE_CHECKING:
     import viser
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from rcilab.workbench.store import UiState
 
 _OUTSIDE_COLOR = (190, 0, 10)  # Lines are drawn paler than their colour.
-_HAND_AWAY = 0.6  # [s]
 _SCALES = {"box": 0.24, "tool": 0.17, "load": 0.17, "force": 0.17}  # [m]
 _HANDLE = 0.026  # [m]
 _SIGNS = np.array([(-1, 0, 0), (0, -1, 0), (0, 0, -1), (1, 0, 0), (0, 1, 0), (0, 0, 1)], dtype=float)
@@ -129,7 +128,7 @@ class SetupStage:
             self._handled = box
             for face, place in enumerate(_SIGNS * 0.5 * np.array(box.size)):
                 self._drawing.set_transform(f"/safety_box/handle{face}", position=place.tolist())
-        if self._gizmo is None or time.monotonic() - self._touched < _HAND_AWAY:
+        if self._gizmo is None or time.monotonic() - self._touched < HAND_AWAY:
             return
         pose = _pose_of(state, self._edited)
         if np.abs(np.asarray(self._gizmo.position) - pose.position).max() > 1e-7:
