@@ -21,6 +21,7 @@ CHROMIUM_FLAGS = (
     "--use-gl=angle",
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
+    "--disable-gpu-rasterization",  # Off wherever there is no such processor; Debian's launcher switches it on.
     "--disable-background-networking",
     "--disable-component-update",
     "--disable-sync",
