@@ -29,6 +29,7 @@ _HANDLE = """(() => { const m = __viserMutable, x = m.nodeRefFromName['/target']
   return [r.left + (v.x + 1) / 2 * r.width, r.top + (1 - v.y) / 2 * r.height]; })()""".replace(
     "SCALE", str(0.9 * _SCALE)
 )
+_IS_THERE = "!!window.__viserMutable?.nodeRefFromName?.['NODE']"
 _PLACE = "__viserMutable.nodeRefFromName['/target'].matrixWorld.elements.join()"
 _GRASPS, _GRASP = 5, 8.0  # [s] A page that is busy may see the mouse before the handle is under it: then once more.
 _WATCH = """(() => { const read = () => __viserMutable.nodeRefFromName['NODE'].matrixWorld.elements.join();
@@ -79,10 +80,10 @@ def _drag_bare(browser: str) -> list[float]:
 def _drag(tab: Tab, url: str, follower: str) -> list[float]:
     """Returns how long each move of a drag took to show, [s]."""
     tab.open(url)
-    nodes = " && ".join(f"window.__viserMutable?.nodeRefFromName?.['{name}']" for name in ("/target", follower))
-    tab.wait("the scene", f"!!({nodes})")
+    tab.wait("the scene", _IS_THERE.replace("NODE", "/target"))
     time.sleep(3.0)  # Shaders are compiled and meshes uploaded while the first frames are drawn.
     x, y = _take_hold(tab)
+    tab.wait("the arm that follows", _IS_THERE.replace("NODE", follower))
     tab.evaluate(_WATCH.replace("NODE", follower))
     for move in range(-_FIRST, _MOVES):
         if move == 0:

@@ -90,13 +90,12 @@ class BenchPage:
         self.wait(lambda: self.state.language == "en", "the page's own language")
         self.wait(lambda: self.status.phase == "idle", "an idle arm")
         self.wait(lambda: self.state.lease.holder is not None, "the controls in this page's hand")
-        self.open_tab("Jog")
+        if not self.rows().is_visible():
+            self.open_tab("Jog")
         self.wait(lambda: self.alerts() == [], "no complaint of an earlier test")
 
     def open_tab(self, name: str) -> None:
-        tab = self.tab.get_by_role("tab", name=name)
-        if tab.get_attribute("aria-selected") != "true":
-            tab.click()
+        self.tab.get_by_role("tab", name=name).click()
 
     def covered_tabs(self) -> list[str]:
         """The tabs in whose middle something else would take a click."""
@@ -141,8 +140,11 @@ class BenchPage:
     def tool_pose(self, arm: str) -> np.ndarray | None:
         """Pose of an arm's tool in its base as the page's scene holds it, (4, 4)."""
         n = self.state.model.n
-        node = f"/{arm}" + "".join(f"/joint{i}" for i in range(1, n + 1)) + "/flange/tool"
-        numbers = self.tab.evaluate(_RELATIVE, [f"/{arm}", node])
+        return self.pose_in(f"/{arm}", f"/{arm}" + "".join(f"/joint{i}" for i in range(1, n + 1)) + "/flange/tool")
+
+    def pose_in(self, root: str, node: str) -> np.ndarray | None:
+        """Pose of a node in another one as the page's scene holds it, (4, 4); None while one of them is missing."""
+        numbers = self.tab.evaluate(_RELATIVE, [root, node])
         return None if numbers is None else np.array(numbers).reshape(4, 4)
 
     def shows(self, arm: str, q: np.ndarray, tolerance: float = 1e-5) -> bool:

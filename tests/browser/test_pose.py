@@ -43,7 +43,8 @@ def test_a_typed_negative_fraction_keeps_its_sign(page):
 
 
 def test_dragging_the_gizmo_brings_the_tool_to_it(page):
-    page.wait(lambda: page.shows("candidate", page.state.goal.q), "the gizmo where the goal is")
+    target = page.state.goal.target.matrix
+    page.wait(lambda: np.allclose(page.pose_in("/live", "/target"), target, atol=1e-5), "the gizmo where the goal is")
     start = np.array(page.state.goal.target.position)
     scale = 0.26
     page.drag(page.project("/target", (0, 0, 0.9 * scale)), page.project("/target", (0, 0, 0.6 * scale)))

@@ -172,6 +172,15 @@
     count = found.length;
   };
 
+  // What somebody opens while the tabs are built anew holds: on the old ones too, and before the new ones are all there.
+  const openTab = (event) => {
+    const tab = event.isTrusted && event.target.closest ? event.target.closest('[role="tab"]') : null;
+    if (!tab || (event.type === "keydown" && event.key !== "Enter" && event.key !== " ")) return;
+    const found = [...tab.closest('[role="tablist"]').querySelectorAll('[role="tab"]')];
+    if (found.length >= 4) keep("tab", chosen = found.indexOf(tab));
+  };
+  for (const kind of ["pointerdown", "keydown"]) document.addEventListener(kind, openTab, true);
+
   // The time cursor: one line in every plot whose x axis is the motion's time; a click there moves it.
   const follow = () => {
     const cursor = said.cursor;

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from rcilab.arrays import JointVector
 from rcilab.views.arm_view import ArmView
 from rcilab.views.viser_scene import ViserScene
 from rcilab.views.viser_stage import furnish, place_camera
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from rcilab.supervisor import SupervisorStatus
     from rcilab.workbench.store import UiState
 
+_Ghost = Literal["commanded", "candidate", "plan"]
 _CANDIDATE_COLORS = {"good": (46, 180, 124), "warn": (240, 165, 40), "bad": (225, 62, 52), "peek": (130, 86, 225)}
 _SAME_POSE = 2e-3  # [rad] A choice: ghosts closer than this to the arm would only flicker on its surface.
 _STRAYED, _BACK = 0.01, 0.006
@@ -45,7 +47,8 @@ class Stage:
         self._server, self._ask = server, ask
         self._built: tuple[str, str] | None = None
         self._look = self._theme = ""
-        self._visible: dict[str, bool] = {}
+        self._ghosts: dict[_Ghost, ArmView] = {}
+        self._visible: set[_Ghost] = set()
         place_camera(server)
 
     @property
@@ -64,9 +67,9 @@ class Stage:
         self._theme = state.theme
         if state.model.T_flange_tool is not self._tool:
             self._tool = state.model.T_flange_tool
-            for arm in self._arms:
+            for arm in (self._live, *self._ghosts.values()):
                 arm.show_tool(self._tool)
-        live = status.q
+        self._model, live = state.model, status.q
         if live is None:  # Nothing is connected: what stands there is the run that is looked at.
             replayed = replayed_pose(state)
             live = state.goal.q if replayed is None else replayed
@@ -85,19 +88,16 @@ class Stage:
         server, full = self._server, state.quality == "full"
         if self._built is not None:
             self._setup.remove()
-            for part in (self._goal, self._elbow, self._ribbon, self._extras, self._grip, *self._arms):
+            for part in (self._goal, self._elbow, self._ribbon, self._extras, self._grip, self._live):
                 part.remove()
+            for ghost in self._ghosts.values():
+                ghost.remove()
         furnish(server, full=full, dark=state.theme == "dark")
-        drawing = ViserScene(server, shadows=full)
-        model = state.model
+        drawing = self._drawing = ViserScene(server, shadows=full)
+        self._model = model = state.model
         self._live = ArmView(drawing, "live", model, "live", quality="fine" if full else "coarse")
-        self._commanded = ArmView(drawing, "commanded", model, "commanded")
-        self._candidate = ArmView(drawing, "candidate", model, "candidate")
-        self._ghost = ArmView(drawing, "plan", model, "plan")
-        self._arms = (self._live, self._commanded, self._candidate, self._ghost)
-        self._visible, self._look = {}, ""
-        for name, arm in (("commanded", self._commanded), ("candidate", self._candidate), ("plan", self._ghost)):
-            self._see(name, arm, False)
+        self._ghosts, self._look = {}, ""
+        self._visible.clear()
         self._grip = Grip(server, drawing, self._live, self._ask)
         self._setup = SetupStage(server, drawing, self._live, self._ask)
         self._goal = GoalStage(server, state, self._ask)
@@ -109,11 +109,8 @@ class Stage:
     def _show_commanded(self, status: SupervisorStatus, live: np.ndarray) -> None:
         """Draws where the arm is told to be, once that is somewhere else."""
         told = status.q_c if status.q is not None else None
-        bound = _BACK if self._visible.get("commanded") else _STRAYED
-        seen = False
-        if told is not None and (seen := _apart(told, live) > bound):
-            self._commanded.show(told)
-        self._see("commanded", self._commanded, seen)
+        bound = _BACK if "commanded" in self._visible else _STRAYED
+        self._see("commanded", told, told is not None and _apart(told, live) > bound)
 
     def _show_candidate(self, state: UiState, status: SupervisorStatus, live: np.ndarray) -> None:
         """Draws the goal, or the branch of it that is under the mouse."""
@@ -123,27 +120,32 @@ class Stage:
         if peek is not None and solutions is not None and peek < len(solutions):
             q, look = solutions[peek], "peek"
         stands = (status.q is not None or look == "peek") and _apart(q, live) > _SAME_POSE
-        self._see("candidate", self._candidate, stands and not is_moving(status))
-        self._candidate.show(q)
-        if look != self._look:
+        self._see("candidate", q, stands and not is_moving(status))
+        if look != self._look and "candidate" in self._ghosts:
             self._look = look
-            self._candidate.set_look(color=_CANDIDATE_COLORS[look])
+            self._ghosts["candidate"].set_look(color=_CANDIDATE_COLORS[look])
 
     def _show_plan(self, state: UiState, status: SupervisorStatus, live: np.ndarray) -> None:
         plan = state.plan
         if plan is None or is_moving(status) or not (state.playing or 0.0 < state.place < 1.0):
-            self._see("plan", self._ghost, False)
+            self._see("plan", None, False)
             return
         q = plan.motion.at(state.place * plan.motion.duration).q
-        shown = _apart(q, live) > _SAME_POSE
-        self._see("plan", self._ghost, shown)
-        if shown:
-            self._ghost.show(q)
+        self._see("plan", q, _apart(q, live) > _SAME_POSE)
 
-    def _see(self, name: str, arm: ArmView, visible: bool) -> None:
-        if self._visible.get(name) != visible:
-            self._visible[name] = visible
-            arm.set_visible(visible)
+    def _see(self, name: _Ghost, q: JointVector | None, visible: bool) -> None:
+        """Shows a ghost in a pose, or hides it; makes it when it is first seen: no page that opens waits for it."""
+        if visible and name not in self._ghosts:
+            self._ghosts[name] = ArmView(self._drawing, name, self._model, name)
+            self._visible.add(name)
+        if name not in self._ghosts:
+            return
+        ghost = self._ghosts[name]
+        if q is not None:
+            ghost.show(q)
+        if visible != (name in self._visible):
+            self._visible.symmetric_difference_update((name,))
+            ghost.set_visible(visible)
 
 
 def _apart(a: np.ndarray, b: np.ndarray) -> float:
