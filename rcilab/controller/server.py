@@ -43,7 +43,7 @@ from rcilab.controller.world_port import WorldPort
 from rcilab.errors import UsageError
 from rcilab.faults import Fault
 from rcilab.model import load_model, require_rci
-from rcilab.protocols.rci import COMMAND_SIZE, decode_command, encode_state
+from rcilab.protocols.rci import COMMAND_SIZE, decode_command
 from rcilab.realtime import enter_realtime, leave_realtime
 from rcilab.words.text import Remark
 
@@ -180,7 +180,7 @@ class ControllerServer:
         self._stalls.replace(self.config.stalls, self._pace.deadline)
         last_moment: float | None = None
         farewell = 0
-        is_ready = False
+        is_ready = has_served = False
         while True:
             self._stand_still(self._stalls.take(self._clock.now()))
             if self._is_ending and last_moment is None:
@@ -194,11 +194,14 @@ class ControllerServer:
                 self._await_command()
                 self._pace.restart(self._clock.now())
             else:
-                lead = CYCLE_TIME if self._is_idle else LEAD_TIME
-                self._await(self._pace.next(self._clock.now()) - lead)
+                due = self._pace.next(self._clock.now())
+                if not self._is_idle:
+                    self._await(due - LEAD_TIME)
+                elif not has_served:
+                    self._poll(0.0)
                 if self._pace.puts_off(self.cycle.is_starved):
                     continue
-            self._step(self._pace.deadline)
+            has_served = self._step(self._pace.deadline)
             if not is_ready:
                 is_ready = True
                 on_ready()
@@ -269,8 +272,11 @@ class ControllerServer:
         is_quiet = cycle.phase in _QUIET and not self._desk.is_waiting and self._endpoint.has_client
         return is_quiet and not (cycle.is_moving or self.config.lockstep)
 
-    def _step(self, due: float) -> None:
-        """Lives through a cycle and sends its state when it is due, or at once when that is over."""
+    def _step(self, due: float) -> bool:
+        """Lives through a cycle and sends its state when it is due, or at once when that is over.
+
+        Returns whether the sockets were served until then.
+        """
         was_moving = self.cycle.is_moving
         is_idle = self._is_idle
         self._catch_up()
@@ -284,6 +290,7 @@ class ControllerServer:
             self._tell_slip()
         self._desk.settle()
         self._look_for_parent()
+        return is_idle
 
     def _look_for_parent(self) -> None:
         if self.config.parent_pid is not None and self._clock.now() >= self._next_look:
@@ -321,7 +328,7 @@ class ControllerServer:
                 )
 
     def _send_state(self) -> None:
-        self._network.send_state(encode_state(self.cycle.state))
+        self._network.send_state(self.cycle.datagram)
 
     def _take(self, arrivals: list[Arrival]) -> None:
         for arrival in arrivals:

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from rcilab.arrays import Array, JointVector, Matrix
 from rcilab.client.address import parse_address
 from rcilab.client.commands import RciCommands
 from rcilab.client.link import Link
@@ -64,7 +65,7 @@ class Worker:
         self._is_ending = False
         self._model = load_model(self._settings.name, tool=self._settings.T_flange_tool)
         self._guide: HandGuide | None = None
-        self._told: tuple[bytes, bytes] | None = None  # Joint angles and pose that the tool was last found from.
+        self._told: tuple[JointVector, Matrix] | None = None  # Joint angles and pose that the tool was last found from.
 
     def run(self) -> int:
         """Lives until asked to end or until the supervisor is gone; returns the exit code."""
@@ -126,8 +127,8 @@ class Worker:
 
     def _show_tool(self, state: RobotState) -> None:
         """Shows the tool that follows from joint angles and pose; at rest both stay, and there is nothing to do."""
-        told = (state.q_c.tobytes(), state.T_base_tool_c.tobytes())
-        if told == self._told:
+        told = (state.q_c, state.T_base_tool_c)
+        if self._told is not None and all(map(_is_same, told, self._told)):
             return
         self._told = told
         with suppress(InvalidValueError):  # A controller may report no pose before it is ready.
@@ -272,6 +273,10 @@ class Worker:
             self._link.close()
             self._link = None
             self._publisher.update(powered=None)
+
+
+def _is_same(numbers: Array, others: Array) -> bool:
+    return numbers is others or numbers.tobytes() == others.tobytes()
 
 
 def _names(faults: Sequence[object]) -> str:
