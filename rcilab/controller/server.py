@@ -182,7 +182,9 @@ class ControllerServer:
         farewell = 0
         is_ready = has_served = False
         while True:
-            self._stand_still(self._stalls.take(self._clock.now()))
+            stall = self._stalls.take(self._clock.now())
+            if stall > 0.0:
+                self._stand_still(stall)
             if self._is_ending and last_moment is None:
                 last_moment = self._clock.now() + GRACE
                 farewell = self._say_farewell()
@@ -195,10 +197,8 @@ class ControllerServer:
                 self._pace.restart(self._clock.now())
             else:
                 due = self._pace.next(self._clock.now())
-                if not self._is_idle:
-                    self._await(due - LEAD_TIME)
-                elif not has_served:
-                    self._poll(0.0)
+                if not (self._is_idle and has_served):
+                    self._await(due - (CYCLE_TIME if self._is_idle else LEAD_TIME))
                 if self._pace.puts_off(self.cycle.is_starved):
                     continue
             has_served = self._step(self._pace.deadline)
@@ -219,7 +219,7 @@ class ControllerServer:
     def _stand_still(self, duration: float) -> None:
         """Does nothing at all for so long, [s], as a controller whose clock stalls; an end asked for goes before."""
         until = self._clock.now() + duration
-        while duration > 0.0 and self._clock.now() < until and not self._is_ending:
+        while self._clock.now() < until and not self._is_ending:
             self._clock.sleep_until(min(until, self._clock.now() + _LOOK))
 
     def _poll(self, timeout: float) -> None:
@@ -300,6 +300,8 @@ class ControllerServer:
 
     def _catch_up(self) -> None:
         """Lives through cycles that nobody sees, when more commands wait than should."""
+        if not self.cycle.wants_commands:
+            return
         playout = self.cycle.playout
         extra = len(playout) - 1 - self.config.prefill_cycles if self.config.lockstep else int(playout.work_off())
         for _ in range(extra):

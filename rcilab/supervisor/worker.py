@@ -42,7 +42,7 @@ from rcilab.supervisor.settings import parse_settings
 from rcilab.supervisor.setup_letter import parse_setup
 
 SILENCE = 0.3  # [s] without a state while idle before the connection counts as lost; a choice below half a second.
-_LOOK = 0.02  # [s] Longest wait in the idle loop.
+_LOOK = 0.02  # [s] Longest wait in the idle loop, and between looks for the supervisor.
 
 
 class Worker:
@@ -63,6 +63,7 @@ class Worker:
         self._link: Link | None = None
         self._address = ""
         self._is_ending = False
+        self._next_look = 0.0
         self._model = load_model(self._settings.name, tool=self._settings.T_flange_tool)
         self._guide: HandGuide | None = None
         self._told: tuple[JointVector, Matrix] | None = None  # Joint angles and pose that the tool was last found from.
@@ -81,13 +82,21 @@ class Worker:
         if granted.warning:
             print(granted.warning, file=sys.stderr, flush=True)
         try:
-            while not (self._is_ending or self._oversight.is_orphan):
+            while not (self._is_ending or self._is_orphan()):
                 self._listen()
                 self._serve()
                 self._mind_guiding()
         finally:
             self._disconnect()
         return 0
+
+    def _is_orphan(self) -> bool:
+        """Returns whether the supervisor is gone; without a connection the loop looks no more often either."""
+        now = time.monotonic()
+        if now < self._next_look:
+            return False
+        self._next_look = now + _LOOK
+        return self._oversight.is_orphan
 
     def _listen(self) -> None:
         """Takes in what the robot says while nothing moves."""
