@@ -46,7 +46,7 @@ class Recorder:
         self._pack = struct.Struct(f"<Qdqqdd{4 * n}dIIBBB5x{2 * n + 17}d").pack_into
         self._pack_start = struct.Struct("<Qdqqd").pack_into
         self._pack_lost = struct.Struct("<I").pack_into
-        self._lost_offset = int(dtype.fields["lost"][1]) if dtype.fields is not None else 0
+        self._lost_offset = struct.calcsize(f"<Qdqqdd{4 * n}dI")
         self._nothing = (math.nan,) * n
 
     def write(

@@ -163,7 +163,7 @@ class StateDecoder:
     def decode(self, data: bytes, n: int) -> RobotState:
         """Returns what `decode_state` does, and raises what it raises."""
         body = data[_DOUBLES_OFFSET:STATE_SIZE]
-        if n == self._n and body == self._body and len(data) >= STATE_SIZE:
+        if n == self._n and body == self._body:
             return build_state((_ID.unpack_from(data)[0], *self._values))
         values = _decode_values(data, n)
         self._n, self._body, self._values = n, body, values[1:]
