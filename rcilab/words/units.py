@@ -97,7 +97,7 @@ class Units:
 
     def from_si(self, unit: str) -> tuple[float, str]:
         """Returns how many of its unit on the page one SI unit is, and that one's name: of rad/s^2, 57.3 and °/s²."""
-        raised = unit.replace("^2", "²").replace("^3", "³")
+        raised = unit.replace("^2", "²").replace("^3", "³").replace("N m", "N·m")
         if raised == "rad" or raised.startswith("rad/"):
             return (math.degrees(1.0), "°" + raised[3:]) if self.angle == "deg" else (1.0, raised)
         if raised == "m" or raised.startswith("m/"):
@@ -118,7 +118,7 @@ class Units:
             if len(set(texts)) == len(set(values)):
                 break
             texts = [plain_number(value, digits) for value in shown]
-        return tuple(texts)
+        return tuple(_EXPONENT.sub(_as_power, text) for text in texts)
 
     def with_unit(self, numbers: str, unit: str) -> str:
         """Returns what `numbers` has made of an SI unit, and its unit on the page behind."""
@@ -178,6 +178,8 @@ _TO_USUAL = {
     "rad": (math.degrees(1.0), "deg"), "deg": (1.0, "deg"), "°": (1.0, "deg"), "m": (1000.0, "mm"), "mm": (1.0, "mm"),
 }  # fmt: skip
 """How many degrees or millimetres one of these is."""
+_EXPONENT = re.compile(r"(\d[\d.]*)e([+-]\d+)")
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _LARGE = 1e7
 """From here on a number has an exponent."""
 
@@ -190,6 +192,11 @@ def plain_number(value: float, digits: int = 4) -> str:
     if 1.0 <= abs(value) < _LARGE:
         return f"{value:.0f}"
     return f"{value:.1e}" if digits <= 4 else text
+
+
+def _as_power(found: re.Match[str]) -> str:
+    power = str(int(found[2])).translate(_RAISED)
+    return f"10{power}" if float(found[1]) == 1.0 else f"{found[1]}·10{power}"
 
 
 def _rescale(said: str, scale: float) -> str:

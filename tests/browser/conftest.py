@@ -17,7 +17,8 @@ from browser.page import BenchPage, close_toasts
 
 FLAGS = (
     "--no-sandbox --no-first-run --use-gl=angle --use-angle=swiftshader --enable-unsafe-swiftshader "
-    "--disable-gpu-rasterization "  # Debian's launcher switches it on, which the processor then has to imitate.
+    # A graphics processor would have to be imitated: it is kept to what cannot do without, the scene.
+    "--disable-gpu-rasterization --disable-gpu-compositing "
     "--disable-background-networking --disable-component-update --disable-sync --disable-default-apps "
     "--disable-background-timer-throttling --disable-renderer-backgrounding "
     "--disable-backgrounding-occluded-windows --force-color-profile=srgb"

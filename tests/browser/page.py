@@ -27,6 +27,11 @@ _DRAWN = """() => window.__viserMutable && __viserMutable.nodeRefFromName
   && __viserMutable.nodeRefFromName['/live'] && __viserMutable.nodeRefFromName['/target']
   && __viserTestpoints.rendererInfo.render.frame > 3"""
 
+_COVERED = """() => [...document.querySelectorAll('#root [role=tab]')].filter((tab) => {
+  const r = tab.getBoundingClientRect();
+  return !tab.contains(document.elementFromPoint(r.left + r.width / 2, r.top + r.height / 2));
+}).map((tab) => tab.textContent)"""
+
 
 def close_toasts(tab) -> None:
     """Closes viser's notice about software rendering, which covers the top left of the scene."""
@@ -76,20 +81,26 @@ class BenchPage:
         ask(requests.SetView(name="language", value="en"))
         ask(requests.SetSpeed(speed=0.5))
 
-        def is_here() -> bool:
-            if self.state.plan is not None:  # Also by what a slider of the last test has only now told.
-                ask(requests.PoseGoal(name="here"))
-            return self.state.plan is None and self.state.language == "en"
-
-        ask(requests.PoseGoal(name="here"))
-        self.wait(is_here, "a goal where the arm is")
+        while True:  # Again when a slider of the last test has only now told what it had to.
+            before = self.state.goal
+            ask(requests.PoseGoal(name="here"))
+            self.wait(lambda before=before: self.state.goal is not before, "the goal to be posed")
+            if self.state.plan is None:
+                break
+        self.wait(lambda: self.state.language == "en", "the page's own language")
         self.wait(lambda: self.status.phase == "idle", "an idle arm")
         self.wait(lambda: self.state.lease.holder is not None, "the controls in this page's hand")
         self.open_tab("Jog")
         self.wait(lambda: self.alerts() == [], "no complaint of an earlier test")
 
     def open_tab(self, name: str) -> None:
-        self.tab.get_by_role("tab", name=name).click()
+        tab = self.tab.get_by_role("tab", name=name)
+        if tab.get_attribute("aria-selected") != "true":
+            tab.click()
+
+    def covered_tabs(self) -> list[str]:
+        """The tabs in whose middle something else would take a click."""
+        return self.tab.evaluate(_COVERED)
 
     def unfold(self, title: str) -> None:
         """Opens a group whose title begins so, where it is folded."""

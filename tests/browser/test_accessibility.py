@@ -18,6 +18,11 @@ _UNNAMED = """() => [...document.querySelectorAll('#root button, #root input:not
     || [...(c.labels || [])].some((l) => l.textContent.trim())
     || (c.getAttribute('aria-labelledby') || '').split(' ').some((id) => id && document.getElementById(id))))
   .map((c) => c.outerHTML.slice(0, 160))"""
+_UNSEEN = """() => [...document.querySelectorAll('#root .mantine-Button-root:not([data-variant=outline])')]
+  .filter((button) => !button.disabled)
+  .filter((button) => button.getClientRects().length)
+  .filter((button) => getComputedStyle(button).backgroundColor === 'rgba(0, 0, 0, 0)')
+  .map((button) => button.textContent)"""
 
 
 @pytest.fixture
@@ -41,21 +46,24 @@ def violations(page) -> list[str]:
     return [f"{rule['id']}: {node['html'][:140]}" for rule in worst for node in rule["nodes"]]
 
 
-def test_axe_finds_nothing_serious_in_light_and_dark_and_every_control_has_a_name(axe):
-    page = axe
-    names = [name for name in page.tab.get_by_role("tab").all_inner_texts() if name != "Timeline and plots"]
+def test_in_every_tab_controls_have_names_buttons_are_seen_stop_too_and_axe_finds_nothing_serious(axe):
+    page, tab = axe, axe.tab
+    page.plan_to(1, 20)  # With a plan there are more buttons to press.
+    names = [name for name in tab.get_by_role("tab").all_inner_texts() if name != "Timeline and plots"]
     assert len(names) >= 7
     for name in names:
         page.open_tab(name)
-        page.wait(lambda: page.tab.evaluate(_UNNAMED) == [], lambda: str(page.tab.evaluate(_UNNAMED)))
+        page.wait(lambda: tab.evaluate(_UNNAMED) == [], lambda: str(tab.evaluate(_UNNAMED)))
+        page.wait(lambda: tab.evaluate(_UNSEEN) == [], lambda: str(tab.evaluate(_UNSEEN)))
+        assert page.button("Stop").is_visible(), name
     assert violations(page) == []
     page.bench.conductor.ask(requests.SetView(name="theme", value="dark"))
-    page.wait(lambda: page.tab.evaluate("document.documentElement.dataset.rlTheme") == "dark", "a dark page")
-    page.wait(lambda: page.tab.evaluate(_UNNAMED) == [], "names in the new panels")
+    page.wait(lambda: tab.evaluate("document.documentElement.dataset.rlTheme") == "dark", "a dark page")
+    page.wait(lambda: tab.evaluate(_UNNAMED) == [], "names in the new panels")
     page.open_tab("Jog")
     assert violations(page) == []
     page.bench.conductor.ask(requests.SetView(name="theme", value="light"))
-    page.wait(lambda: page.tab.evaluate("document.documentElement.dataset.rlTheme") == "light", "a light page")
+    page.wait(lambda: tab.evaluate("document.documentElement.dataset.rlTheme") == "light", "a light page")
 
 
 def test_a_slider_has_its_joints_name_a_folder_opens_by_key_and_the_focus_is_seen(page):

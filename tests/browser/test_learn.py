@@ -33,6 +33,8 @@ def test_a_fault_is_provoked_beside_the_robot_and_shown_at_its_moment(page):
     page.wait(lambda: page.tab.locator(".rl-done").count() == 1, "a step that ticks itself off")
     page.button("Leave the lesson").click()
     page.wait(lambda: page.state.learn.lesson is None, "the end of the lesson")
+    page.wait(lambda: page.toast() != "", "what the step has to say")
+    assert page.covered_tabs() == []
 
 
 def test_a_row_leads_to_its_moment_and_a_slow_down_can_be_taken_back(page):

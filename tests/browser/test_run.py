@@ -87,12 +87,6 @@ def test_escape_does_the_same_even_while_a_text_field_has_the_focus(page):
     stop_in_mid_motion(page, press)
 
 
-def test_stop_is_in_sight_in_every_tab(page):
-    for name in ("Jog", "Target", "Check", "Run", "Settings"):
-        page.open_tab(name)
-        assert page.button("Stop").is_visible(), name
-
-
 def test_play_moves_only_the_translucent_arm(page):
     page.plan_to(2, float(np.degrees(page.status.q_c[1])) - 25.0)
     before = np.array(page.status.q_c)

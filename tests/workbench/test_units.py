@@ -73,9 +73,15 @@ def test_a_field_that_is_typed_back_moves_nothing_by_more_than_it_shows(value, u
 
 def test_other_units_stay():
     assert SI.unit("kg") == Unit("kg", 1.0)
-    assert SI.from_si("N m") == (1.0, "N m")
+    assert SI.from_si("N m/s") == (1.0, "N·m/s")
     assert Units().from_si("rad/s^2") == (pytest.approx(math.degrees(1.0)), "°/s²")
     assert Units().from_si("m/s") == (1000.0, "mm/s")
+
+
+def test_a_bound_that_means_nothing_at_all_is_no_computer_number():
+    assert Units().numbers("rad", 0.0, 1e-9) == ("0", "5.7·10⁻⁸")
+    assert Units().numbers("m", -2.0e-9, 1e-9) == ("-2.0·10⁻⁶", "10⁻⁶")
+    assert Units().numbers("m", 0.1234, 0.5) == ("123.4", "500")
 
 
 @pytest.mark.parametrize(
