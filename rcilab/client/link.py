@@ -11,9 +11,9 @@ from rcilab.errors import DeadlineError, DecodeError
 from rcilab.protocols.rci import (
     CommandPacket,
     Request,
+    StateDecoder,
     decode_header,
     decode_response,
-    decode_state,
     encode_command,
     encode_request,
 )
@@ -47,6 +47,7 @@ class Link:
         self.on_states: Callable[[list[RobotState]], None] = _ignore
         """Called at least every 0.05 s while the answer to a request is awaited, with the states that came in."""
         self._transport = transport
+        self._decoder = StateDecoder()
         self._command_id = 0
 
     @property
@@ -115,7 +116,7 @@ class Link:
         self._empty_ns = self.received_ns = time.monotonic_ns()
         for datagram in datagrams:
             try:
-                states.append(decode_state(datagram, self.n))
+                states.append(self._decoder.decode(datagram, self.n))
             except DecodeError:
                 self.undecodable += 1
         if states:

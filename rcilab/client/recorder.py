@@ -44,6 +44,9 @@ class Recorder:
         self._memory = memory
         self._rows: NDArray[np.void] = np.frombuffer(memory, dtype=dtype, count=capacity)
         self._pack = struct.Struct(f"<Qdqqdd{4 * n}dIIBBB5x{2 * n + 17}d").pack_into
+        self._pack_start = struct.Struct("<Qdqqd").pack_into
+        self._pack_lost = struct.Struct("<I").pack_into
+        self._lost_offset = struct.calcsize(f"<Qdqqdd{4 * n}dI")
         self._nothing = (math.nan,) * n
 
     def write(
@@ -78,6 +81,15 @@ class Recorder:
             faults, lost, *modes,
             *(tau or self._nothing), *pose, psi, *(command_tau or self._nothing),
         )  # fmt: skip
+        self.count += 1
+
+    def repeat(self, message_id: int, received_ns: int, lateness: float, lost: int) -> None:
+        """Writes the newest row once more, for a cycle of which only this is another; it was not answered."""
+        memory, size = self._memory, self._size
+        newest, place = (self.count - 1) % self.capacity * size, self.count % self.capacity * size
+        memory[place : place + size] = memory[newest : newest + size]
+        self._pack_start(memory, place, message_id, math.nan, received_ns, 0, lateness)
+        self._pack_lost(memory, place + self._lost_offset, lost)
         self.count += 1
 
     @property
@@ -122,6 +134,7 @@ class CycleLog:
         self._last_id: int | None = None
         self._origins: deque[int] = deque(maxlen=_GRID_CYCLES)
         self._nothing = (math.nan,) * recorder.n
+        self._idle_count = -1  # What the recorder counted when the newest row was one of no motion, and ours.
 
     def restart(self) -> None:
         """Forgets the grid and the last number: another connection begins."""
@@ -145,7 +158,7 @@ class CycleLog:
             sent_ns: When it was answered, monotonic, [ns]; 0 when it was not.
             command: What was sent in answer.
         """
-        self.state = state
+        before, self.state = self.state, state
         number = state.message_id
         lost = 0
         if self._last_id is None or number < self._last_id:
@@ -156,6 +169,19 @@ class CycleLog:
         self._last_id = number
         self._origins.append(received_ns - number * _CYCLE_NS)
         self.lateness = ((sent_ns or received_ns) - number * _CYCLE_NS - min(self._origins)) * 1e-9
+        is_idle = command is None and sent_ns == 0 and math.isnan(t)
+        if is_idle and self._idle_count == self.recorder.count and before is not None and _is_alike(state, before):
+            self.recorder.repeat(number, received_ns, self.lateness, lost)
+        else:
+            self._write(state, received_ns, t, sent_ns, command, lost)
+        if is_idle:
+            self._idle_count = self.recorder.count
+        if self._on_row is not None:
+            self._on_row(self)
+
+    def _write(
+        self, state: RobotState, received_ns: int, t: float, sent_ns: int, command: Command | None, lost: int
+    ) -> None:
         q, pose, psi, tau = self._nothing, _NO_POSE, math.nan, self._nothing
         if isinstance(command, JointPosition):
             q = command.q.tolist()
@@ -165,7 +191,7 @@ class CycleLog:
         elif isinstance(command, JointTorque):
             tau = command.tau.tolist()
         self.recorder.write(
-            number,
+            state.message_id,
             t,
             received_ns,
             sent_ns,
@@ -183,8 +209,21 @@ class CycleLog:
             psi,
             tau,
         )
-        if self._on_row is not None:
-            self._on_row(self)
+
+
+def _is_alike(state: RobotState, other: RobotState) -> bool:
+    """Returns whether a row shows the same of both: by identity, which is how a decoder gives what repeats."""
+    return (
+        state.q is other.q
+        and state.q_c is other.q_c
+        and state.dq is other.dq
+        and state.tau is other.tau
+        and state.faults == other.faults
+        and state.success_rate == other.success_rate
+        and state.robot_mode is other.robot_mode
+        and state.controller_mode is other.controller_mode
+        and state.motion_generator_mode is other.motion_generator_mode
+    )
 
 
 def _bits(faults: tuple[Fault, ...]) -> int:

@@ -6,7 +6,7 @@ from rcilab.arrays import JointVector, frozen
 from rcilab.clock import CYCLE_TIME
 from rcilab.controller.actuator import Actuator, Law
 from rcilab.controller.commanded import CommandedMotion
-from rcilab.controller.plant import Plant
+from rcilab.controller.plant import Measurement, Plant, Setpoint
 from rcilab.controller.reporter import Readings
 from rcilab.controller.settings import Settings
 from rcilab.controller.tool import ToolMotion
@@ -46,6 +46,7 @@ class Arm:
         self._law = Law.BRAKED
         self._dq_before = measured.dq
         self._standing = 0
+        self._setpoint: Setpoint | None = None
 
     @property
     def stands(self) -> bool:
@@ -57,6 +58,10 @@ class Arm:
         """Whether it was told to stay where it is and does: servos settle, and a yielding arm moves in any case."""
         may_rest = self.commanded.is_at_rest and not self._law.yields
         return may_rest and (self._standing > SETTLE_LIMIT or self.watch.measured.q.tolist() == self.commanded.q)
+
+    def has_settled(self, law: Law) -> bool:
+        """Returns whether nothing here counts time any more, and the law is the one it has stood under."""
+        return self._standing > SETTLE_LIMIT and law is self._law
 
     def reset(self, q: JointVector) -> None:
         """Puts the resting arm somewhere else."""
@@ -96,7 +101,30 @@ class Arm:
             commanded.come_to_rest()
         if not law.leads:
             self._move_tool()
-        measured = self.plant.step(self.actuator.setpoint(law, commanded, self.tool_c, last, tau))
+        self._setpoint = self.actuator.setpoint(law, commanded, self.tool_c, last, tau)
+        self._take(law, self.plant.step(self._setpoint))
+
+    def stay(self) -> bool:
+        """Lives through one millisecond of an arm that stands still; returns whether it still does.
+
+        Only after a cycle whose readings were those of the one before, and `has_settled`: then `move` would come to the
+        setpoint of that cycle, and to the same readings, unless the plant measures something else.
+        """
+        assert self._setpoint is not None
+        measured = self.plant.step(self._setpoint)
+        if measured is self.watch.measured:
+            return True
+        self._take(self._law, measured)
+        return False
+
+    def read(self, tau: list[float] | None) -> Readings:
+        """Returns what this cycle came to; `tau` are commanded torques, [N m], or None."""
+        watch = self.watch
+        return Readings(self.commanded, self.tool_c, watch.measured, watch.tool, tau, watch.tau_ext, watch.wrench)
+
+    def _take(self, law: Law, measured: Measurement) -> None:
+        """Takes what the plant has come to in this cycle."""
+        commanded, last = self.commanded, self.watch.measured
         if law.leads:
             commanded.move(measured.q.tolist())
             self._move_tool()
@@ -106,11 +134,6 @@ class Arm:
         self._law, self._dq_before = law, last.dq
         self._standing = self._standing + 1 if commanded.is_at_rest else 0
         self.watch.observe(measured, commanded, self.tool_c)
-
-    def read(self, tau: list[float] | None) -> Readings:
-        """Returns what this cycle came to; `tau` are commanded torques, [N m], or None."""
-        watch = self.watch
-        return Readings(self.commanded, self.tool_c, watch.measured, watch.tool, tau, watch.tau_ext, watch.wrench)
 
     def _is_slow(self) -> bool:
         speeds: list[float] = self.watch.measured.dq.tolist()

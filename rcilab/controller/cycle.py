@@ -46,6 +46,7 @@ _PRESSED = {
 }
 _WAITING = (Phase.STARTING, Phase.RECOVERING)
 _MOVING = (Phase.MOVING, Phase.STOPPING)
+_STILL = (Phase.OFF, Phase.IDLE, Phase.REFLEX, Phase.USER_STOPPED)
 _BRAKED = (Phase.OFF, Phase.REFLEX, Phase.USER_STOPPED, Phase.RECOVERING)
 _IDLE_MODES = (ControllerMode.OTHER, MotionGeneratorMode.IDLE)
 _REPORTED = (
@@ -116,7 +117,9 @@ class ControlCycle:
         self._requested = self._shown = _IDLE_MODES
         self._countdown = self._drain = 0
         self._has_moved = False
+        self._is_still = False
         self._message_id = 0
+        self._datagram: bytes | None = None
         self.state = self._report()
 
     @property
@@ -128,6 +131,13 @@ class ControlCycle:
     def plant(self) -> Plant:
         """What moves."""
         return self._arm.plant
+
+    @property
+    def datagram(self) -> bytes:
+        """The last reported state as it goes over the wire."""
+        if self._datagram is None:
+            self._datagram = rci.encode_state(self.state)
+        return self._datagram
 
     @property
     def is_settled(self) -> bool:
@@ -178,6 +188,7 @@ class ControlCycle:
 
     def reset(self, q: JointVector) -> None:
         """Puts the resting arm somewhere else: what a virtual robot can do and a real one cannot."""
+        self._is_still = False
         self._arm.reset(q)
 
     def receive(self, packet: rci.CommandPacket) -> None:
@@ -247,6 +258,15 @@ class ControlCycle:
                 which takes numbers for cycles, nothing is missing.
         """
         self._message_id += is_seen
+        if not self._is_still:
+            self._live()
+        elif self._arm.stay():
+            return self._repeat()
+        self.state, self._datagram = self._report(), None
+        self._is_still = self._reporter.has_repeated and self._may_stay_still()
+        return self.state
+
+    def _live(self) -> None:
         self._has_moved = False
         self._count_down()
         step = self._follow()
@@ -263,7 +283,16 @@ class ControlCycle:
                 self._raise(faults, reason)
         if self.phase is Phase.STOPPING and self._arm.stands and self._drain == 0:
             self.happen(Event.AT_REST)
-        self.state = self._report()
+
+    def _may_stay_still(self) -> bool:
+        """Returns whether the next cycle will be like this one, unless somebody asks for something or moves the arm."""
+        waits = self.phase in _STILL and self._countdown == 0 and self._drain == 0
+        return waits and self._arm.has_settled(self._current_law())
+
+    def _repeat(self) -> RobotState:
+        self.state = self._reporter.repeat(self._message_id)
+        if self._datagram is not None:
+            self._datagram = rci.renumber_state(self._datagram, self._message_id)
         return self.state
 
     def _count_down(self) -> None:
@@ -329,6 +358,7 @@ class ControlCycle:
         )
 
     def _enter(self, cell: Transition, *faults: Fault) -> None:
+        self._is_still = False
         for action in cell.actions:
             self._act(action, faults)
         if cell.phase is Phase.RECOVERING and self.phase is not Phase.RECOVERING:

@@ -109,13 +109,15 @@ class Endpoint:
         if self._connection is not None:
             sockets.append(self._connection)
         readable = select.select(sockets, (), (), 0.0 if self._arrivals else max(timeout, 0.0))[0]
+        if not (readable or self._arrivals):
+            return []
         if self._datagrams in readable:
             self._receive_datagrams()
         if self._connection is not None and self._connection in readable:
             self._receive_frames(self._connection)
         if self._listener in readable:
             self._accept()
-        ready_guests = [guest for guest in guests if guest in readable] if readable else []
+        ready_guests = [guest for guest in guests if guest in readable]
         if ready_guests:
             self._arrivals.append(GuestsReady(ready_guests))
         arrivals = list(self._arrivals)

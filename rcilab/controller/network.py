@@ -67,9 +67,8 @@ class DelayedDatagrams:
     """
 
     def __init__(self, faults: NetworkFaults, stream: str) -> None:
-        self.faults = faults
         self._stream = stream
-        self._impairment = Impairment(faults, stream)
+        self.replace(faults)
         self._waiting: list[tuple[float, int, bytes]] = []
         self._order = count()
 
@@ -81,7 +80,7 @@ class DelayedDatagrams:
     @property
     def is_clean(self) -> bool:
         """Whether nothing is wrong and nothing under way, so that datagrams may take the direct way."""
-        return not self._waiting and self.faults.spares_datagrams
+        return self._spares and not self._waiting
 
     def put(self, datagram: bytes, now: float) -> bool:
         """Sends a datagram on its way; returns whether it will arrive, be it spoiled."""
@@ -102,6 +101,7 @@ class DelayedDatagrams:
     def replace(self, faults: NetworkFaults) -> None:
         """Changes what is wrong; what is under way already arrives as it would have."""
         self.faults = faults
+        self._spares = faults.spares_datagrams
         self._impairment = Impairment(faults, self._stream)
 
 

@@ -64,6 +64,9 @@ class Readings(NamedTuple):
 class StateReporter:
     """Builds the state of each cycle; while nothing moves it repeats the last one. Owned by the controller's cycle.
 
+    Attributes:
+        has_repeated: Whether the last state had the arm as the one before it, and the next will if the arm stays.
+
     Args:
         model: The arm with its tool and load.
         settings: What the client has set.
@@ -87,6 +90,8 @@ class StateReporter:
         self._readings: Readings | None = None
         self._version = -1
         self._is_settled = False
+        self.has_repeated = False
+        self._rest: tuple[Any, ...] = ()
 
     def report(
         self,
@@ -101,11 +106,16 @@ class StateReporter:
     ) -> RobotState:
         """Returns the state of this cycle."""
         body = self._body
-        if body is None or not self._is_settled or not self._is_same(readings):
+        self.has_repeated = body is not None and self._is_settled and self._is_same(readings)
+        if body is None or not self.has_repeated:
             body = self._body = self._compute(readings)
             self._readings, self._version = readings, readings.commanded.version
-        modes = (motion_generator_mode, controller_mode, robot_mode)
-        return build_state((message_id, *body, faults, success_rate, *modes))
+        self._rest = (*body, faults, success_rate, motion_generator_mode, controller_mode, robot_mode)
+        return self.repeat(message_id)
+
+    def repeat(self, message_id: int) -> RobotState:
+        """Returns the state of a cycle that differs from the last one in its number only."""
+        return build_state((message_id, *self._rest))
 
     def _is_same(self, readings: Readings) -> bool:
         last = self._readings

@@ -43,7 +43,7 @@ from rcilab.controller.world_port import WorldPort
 from rcilab.errors import UsageError
 from rcilab.faults import Fault
 from rcilab.model import load_model, require_rci
-from rcilab.protocols.rci import COMMAND_SIZE, decode_command, encode_state
+from rcilab.protocols.rci import COMMAND_SIZE, decode_command
 from rcilab.realtime import enter_realtime, leave_realtime
 from rcilab.words.text import Remark
 
@@ -180,9 +180,11 @@ class ControllerServer:
         self._stalls.replace(self.config.stalls, self._pace.deadline)
         last_moment: float | None = None
         farewell = 0
-        is_ready = False
+        is_ready = has_served = False
         while True:
-            self._stand_still(self._stalls.take(self._clock.now()))
+            stall = self._stalls.take(self._clock.now())
+            if stall > 0.0:
+                self._stand_still(stall)
             if self._is_ending and last_moment is None:
                 last_moment = self._clock.now() + GRACE
                 farewell = self._say_farewell()
@@ -194,11 +196,12 @@ class ControllerServer:
                 self._await_command()
                 self._pace.restart(self._clock.now())
             else:
-                lead = CYCLE_TIME if self._is_idle else LEAD_TIME
-                self._await(self._pace.next(self._clock.now()) - lead)
+                due = self._pace.next(self._clock.now())
+                if not (self._is_idle and has_served):
+                    self._await(due - (CYCLE_TIME if self._is_idle else LEAD_TIME))
                 if self._pace.puts_off(self.cycle.is_starved):
                     continue
-            self._step(self._pace.deadline)
+            has_served = self._step(self._pace.deadline)
             if not is_ready:
                 is_ready = True
                 on_ready()
@@ -216,7 +219,7 @@ class ControllerServer:
     def _stand_still(self, duration: float) -> None:
         """Does nothing at all for so long, [s], as a controller whose clock stalls; an end asked for goes before."""
         until = self._clock.now() + duration
-        while duration > 0.0 and self._clock.now() < until and not self._is_ending:
+        while self._clock.now() < until and not self._is_ending:
             self._clock.sleep_until(min(until, self._clock.now() + _LOOK))
 
     def _poll(self, timeout: float) -> None:
@@ -269,8 +272,11 @@ class ControllerServer:
         is_quiet = cycle.phase in _QUIET and not self._desk.is_waiting and self._endpoint.has_client
         return is_quiet and not (cycle.is_moving or self.config.lockstep)
 
-    def _step(self, due: float) -> None:
-        """Lives through a cycle and sends its state when it is due, or at once when that is over."""
+    def _step(self, due: float) -> bool:
+        """Lives through a cycle and sends its state when it is due, or at once when that is over.
+
+        Returns whether the sockets were served until then.
+        """
         was_moving = self.cycle.is_moving
         is_idle = self._is_idle
         self._catch_up()
@@ -284,6 +290,7 @@ class ControllerServer:
             self._tell_slip()
         self._desk.settle()
         self._look_for_parent()
+        return is_idle
 
     def _look_for_parent(self) -> None:
         if self.config.parent_pid is not None and self._clock.now() >= self._next_look:
@@ -293,6 +300,8 @@ class ControllerServer:
 
     def _catch_up(self) -> None:
         """Lives through cycles that nobody sees, when more commands wait than should."""
+        if not self.cycle.wants_commands:
+            return
         playout = self.cycle.playout
         extra = len(playout) - 1 - self.config.prefill_cycles if self.config.lockstep else int(playout.work_off())
         for _ in range(extra):
@@ -321,7 +330,7 @@ class ControllerServer:
                 )
 
     def _send_state(self) -> None:
-        self._network.send_state(encode_state(self.cycle.state))
+        self._network.send_state(self.cycle.datagram)
 
     def _take(self, arrivals: list[Arrival]) -> None:
         for arrival in arrivals:

@@ -7,6 +7,7 @@ import time
 from dataclasses import replace
 from typing import Any
 
+from rcilab.arrays import Array
 from rcilab.client.recorder import CycleLog, Recorder
 from rcilab.clock import CYCLE_TIME
 from rcilab.spatial import Pose
@@ -38,6 +39,7 @@ class Publisher:
         self._rate_since = time.monotonic_ns()
         self._rate_from = self.recorder.count
         self._motion_cycle = 0
+        self._felt: Array | None = None  # What the block says of the wrench from outside.
         self.update()
 
     def restart(self) -> None:
@@ -71,8 +73,9 @@ class Publisher:
         self._words[Word.CYCLES] = count
         self._words[Word.LOST] = log.lost_total
         self._histogram.add(log.lateness)
-        if log.state is not None:
-            _WRENCH.pack_into(self._block.felt, 0, *log.state.tau_ext_in_base.tolist())
+        if log.state is not None and log.state.tau_ext_in_base is not self._felt:
+            self._felt = log.state.tau_ext_in_base
+            _WRENCH.pack_into(self._block.felt, 0, *self._felt.tolist())
         self.beat()
         is_timed = self.snapshot.motion_duration is not None and self.snapshot.phase in ("moving", "stopping")
         if is_timed and count % _SNAPSHOT_CYCLES == 0:

@@ -29,7 +29,8 @@ class RingReader:
             count = self._words[Word.CYCLES]
             if count == 0:
                 return None
-            row = self._copy(count - 1, count)
+            place = (count - 1) % RING_CYCLES
+            row = self._rows[place : place + 1].copy()
             if self._words[Word.CYCLES] - (count - 1) < RING_CYCLES:
                 return row
 

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from rcilab.arrays import Array, JointVector, Matrix
 from rcilab.client.address import parse_address
 from rcilab.client.commands import RciCommands
 from rcilab.client.link import Link
@@ -41,7 +42,7 @@ from rcilab.supervisor.settings import parse_settings
 from rcilab.supervisor.setup_letter import parse_setup
 
 SILENCE = 0.3  # [s] without a state while idle before the connection counts as lost; a choice below half a second.
-_LOOK = 0.02  # [s] Longest wait in the idle loop.
+_LOOK = 0.02  # [s] Longest wait in the idle loop, and between looks for the supervisor.
 
 
 class Worker:
@@ -62,9 +63,10 @@ class Worker:
         self._link: Link | None = None
         self._address = ""
         self._is_ending = False
+        self._next_look = 0.0
         self._model = load_model(self._settings.name, tool=self._settings.T_flange_tool)
         self._guide: HandGuide | None = None
-        self._told: tuple[bytes, bytes] | None = None  # Joint angles and pose that the tool was last found from.
+        self._told: tuple[JointVector, Matrix] | None = None  # Joint angles and pose that the tool was last found from.
 
     def run(self) -> int:
         """Lives until asked to end or until the supervisor is gone; returns the exit code."""
@@ -80,13 +82,21 @@ class Worker:
         if granted.warning:
             print(granted.warning, file=sys.stderr, flush=True)
         try:
-            while not (self._is_ending or self._oversight.is_orphan):
+            while not (self._is_ending or self._is_orphan()):
                 self._listen()
                 self._serve()
                 self._mind_guiding()
         finally:
             self._disconnect()
         return 0
+
+    def _is_orphan(self) -> bool:
+        """Returns whether the supervisor is gone; without a connection the loop looks no more often either."""
+        now = time.monotonic()
+        if now < self._next_look:
+            return False
+        self._next_look = now + _LOOK
+        return self._oversight.is_orphan
 
     def _listen(self) -> None:
         """Takes in what the robot says while nothing moves."""
@@ -126,8 +136,8 @@ class Worker:
 
     def _show_tool(self, state: RobotState) -> None:
         """Shows the tool that follows from joint angles and pose; at rest both stay, and there is nothing to do."""
-        told = (state.q_c.tobytes(), state.T_base_tool_c.tobytes())
-        if told == self._told:
+        told = (state.q_c, state.T_base_tool_c)
+        if self._told is not None and all(map(_is_same, told, self._told)):
             return
         self._told = told
         with suppress(InvalidValueError):  # A controller may report no pose before it is ready.
@@ -272,6 +282,10 @@ class Worker:
             self._link.close()
             self._link = None
             self._publisher.update(powered=None)
+
+
+def _is_same(numbers: Array, others: Array) -> bool:
+    return numbers is others or numbers.tobytes() == others.tobytes()
 
 
 def _names(faults: Sequence[object]) -> str:

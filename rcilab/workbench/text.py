@@ -35,6 +35,8 @@ class Text(text.Text):
 
     def __call__(self, code: str, **values: object) -> str:
         """Returns the words for a key; the key itself when the catalogues lack it (a test keeps them complete)."""
+        if not values:
+            return self._entries.get(code, code)
         said = self._embedded(self._entries.get(code, ""), values)
         return super().__call__(code, **self.units.values(said))
 

@@ -9,15 +9,18 @@ import subprocess
 import sys
 import threading
 from pathlib import Path
+from random import Random
 
 import numpy as np
 import pytest
 
 from rcilab.client.recorder import CycleLog, Recorder
+from rcilab.command import JointPosition
 from rcilab.cycle_file import cycle_dtype
 from rcilab.errors import ConnectionLostError, ControlError, UsageError, VersionMismatchError
 from rcilab.faults import Fault
 from rcilab.model import load_model
+from rcilab.protocols import rci
 from rcilab.spatial import Pose
 from rcilab.supervisor import lateness
 from rcilab.supervisor.failure import pack_failure, unpack_failure
@@ -212,6 +215,29 @@ def test_a_row_takes_what_was_written():
     assert row["command"].tolist() == six
     assert recorder.truncated
     assert recorder.rows()["message_id"].tolist() == [2, 3, 4, 5]
+
+
+def test_a_row_that_repeats_is_the_row_that_would_have_been_written():
+    random = Random(3)
+    decoder, quick, thorough = rci.StateDecoder(), CycleLog(Recorder(7, 50)), CycleLog(Recorder(7, 50))
+    body = bytearray(rci.STATE_SIZE)
+    number = 0
+    for _ in range(400):
+        if random.random() < 0.2:
+            body[random.randrange(8, rci.STATE.offset("motion_generator_mode"))] = random.randrange(2)
+        if random.random() < 0.02:
+            quick.restart()
+            thorough.restart()
+            number = 0
+        number += random.choice((1, 1, 1, 3))
+        datagram = number.to_bytes(8, "big") + bytes(body[8:])
+        arrived = number * 1_000_000 + random.randrange(400_000)
+        is_moving = random.random() < 0.2
+        answer = (0.1, arrived + 50, JointPosition(q=np.full(7, 0.3))) if is_moving else ()
+        quick.write(decoder.decode(datagram, 7), arrived, *answer)
+        thorough.write(rci.decode_state(datagram, 7), arrived, *answer)
+        assert quick.recorder.last(1).tobytes() == thorough.recorder.last(1).tobytes()
+        assert (quick.lateness, quick.lost_total) == (thorough.lateness, thorough.lost_total)
 
 
 def test_lateness_is_against_the_robot_s_grid_and_forgets_a_slip():

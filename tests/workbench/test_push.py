@@ -80,12 +80,16 @@ def actions(store, session, monkeypatch):
     monkeypatch.setattr(push_actions, "HeldPush", FakePush)
     monkeypatch.setattr(push_actions, "HOLD_TIMEOUT", 0.05)
     actions = PushActions(store, session)
-    actions.tick()
+    tick(actions)
     return actions
 
 
 def held(actions):
     return actions._push.held
+
+
+def tick(actions):
+    actions.tick(actions._session.status())
 
 
 def grab(actions, link: int, page: int = 1):
@@ -99,13 +103,13 @@ def grab(actions, link: int, page: int = 1):
 def test_a_held_button_pushes_where_and_as_hard_as_is_set_and_silence_ends_it(actions, store):
     actions.set_push(requests.SetPush(link=4, direction="-z", newtons=33.0))
     actions.hold(requests.HoldPush(page=1))
-    actions.tick()
+    tick(actions)
     wrench, link, point = held(actions)
     assert wrench == pytest.approx([0.0, 0.0, -33.0, 0.0, 0.0, 0.0])
     assert (link, point.tolist()) == (4, [0.0, 0.0, 0.0])
     assert store.state.push.acting.start == pytest.approx(place_of(MODEL, MODEL.home, 4, np.zeros(3)))
     time.sleep(0.06)
-    actions.tick()
+    tick(actions)
     assert held(actions) is None
     assert store.state.push.acting is None
 
@@ -119,18 +123,18 @@ def test_a_force_beyond_its_range_is_taken_at_the_bound_and_no_number_is_ignored
 
 def test_the_mouse_pulls_with_a_spring_that_goes_along_with_the_arm(actions, session):
     start = grab(actions, 5)
-    actions.tick()
+    tick(actions)
     wrench, link, point = held(actions)
     assert link == 5
     assert wrench[:3] == pytest.approx([0.0, 0.1 * SPRING, 0.0])
     assert point == pytest.approx(np.zeros(3), abs=1e-12)
     q = MODEL.home + np.array([0.05, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     session.shown = replace(OWN, q=q)
-    actions.tick()
+    tick(actions)
     moved = place_of(MODEL, q, 5, np.zeros(3))
     assert held(actions)[0][:3] == pytest.approx(SPRING * (start + (0.0, 0.1, 0.0) - moved))
     actions.pull(requests.PullArm(page=1, link=5, grabbed=(0, 0, 0), hand=(0, 0, 0), phase="end"))
-    actions.tick()
+    tick(actions)
     assert held(actions) is None
 
 
@@ -142,36 +146,36 @@ def test_a_spring_pulls_no_harder_than_a_hand():
 def test_who_loses_the_controls_or_goes_away_lets_go(actions, store, lease):
     grab(actions, 3)
     actions.hold(requests.HoldPush(page=1))
-    actions.tick()
+    tick(actions)
     assert held(actions) is not None
     store.update(lease=lease)
-    actions.tick()
+    tick(actions)
     assert held(actions) is None
 
 
 def test_numbers_that_are_none_take_hold_of_nothing(actions):
     for link, hand in ((3, (math.nan, 0.0, 0.0)), (8, (0.0, 0.0, 0.0)), (0, (0.0, 0.0, 0.0))):
         actions.pull(requests.PullArm(page=1, link=link, grabbed=(0, 0, 0), hand=hand, phase="start"))
-        actions.tick()
+        tick(actions)
         assert held(actions) is None
 
 
 def test_in_the_ideal_plant_a_drag_turns_the_camera_unless_the_arm_is_guided(actions, store, session):
     store.update(plant="ideal")
     grab(actions, 3)
-    actions.tick()
+    tick(actions)
     assert held(actions) is None
     session.shown = replace(OWN, phase="moving", code="moving.guided")
     grab(actions, 3)
-    actions.tick()
+    tick(actions)
     assert held(actions) is not None
 
 
 def test_an_arm_at_an_address_cannot_be_pushed_and_that_is_said(actions, store, session):
     session.shown = replace(OWN, target="rci://192.168.0.160:1337", world_address=None)
-    actions.tick()
+    tick(actions)
     actions.hold(requests.HoldPush(page=1))
-    actions.tick()
+    tick(actions)
     assert store.state.notice.text.code == "push.no_world"
     assert store.state.push.acting is None
 

@@ -57,7 +57,14 @@ from rcilab.protocols.rci.responses import (
     SafetyStopResponse,
     StatusResponse,
 )
-from rcilab.protocols.rci.state_packet import STATE, STATE_SIZE, decode_state, encode_state
+from rcilab.protocols.rci.state_packet import (
+    STATE,
+    STATE_SIZE,
+    StateDecoder,
+    decode_state,
+    encode_state,
+    renumber_state,
+)
 from rcilab.protocols.rci.statuses import (
     CommandCode,
     DragSpace,
@@ -82,7 +89,7 @@ __all__ = [
     "SetCartImpDesiredTau", "SetCartesianImpedance", "SetCartesianLimit", "SetCollisionBehavior", "SetCoor", "SetDO",
     "SetFcCoor", "SetFilters", "SetJointImpedance", "SetJointLimit", "SetLoad", "SetMotorPower",
     "SetTorqueFilterCutOffFrequency", "SettingStatus", "StartDrag", "StartMotionMode", "StartMove", "StartStatus",
-    "Status", "StatusResponse", "StopDrag", "StopMove", "StopStatus", "build_command", "decode_command",
+    "StateDecoder", "Status", "StatusResponse", "StopDrag", "StopMove", "StopStatus", "build_command", "decode_command",
     "decode_header", "decode_request", "decode_response", "decode_state", "encode_command", "encode_request",
-    "encode_response", "encode_state",
+    "encode_response", "encode_state", "renumber_state",
 ]  # fmt: skip

@@ -7,6 +7,7 @@ runs per cycle.
 from __future__ import annotations
 
 from struct import Struct
+from typing import Any
 
 import numpy as np
 
@@ -133,6 +134,11 @@ def encode_state(state: RobotState) -> bytes:
     return datagram
 
 
+def renumber_state(datagram: bytes, message_id: int) -> bytes:
+    """Returns the datagram of a state that is the same but for its number."""
+    return _ID.pack(message_id) + datagram[_DOUBLES_OFFSET:]
+
+
 def decode_state(data: bytes, n: int) -> RobotState:
     """Returns the state in a datagram; its arrays are read-only views of the datagram.
 
@@ -143,6 +149,29 @@ def decode_state(data: bytes, n: int) -> RobotState:
     Raises:
         DecodeError: Too short, or with a mode that does not exist.
     """
+    return build_state(_decode_values(data, n))
+
+
+class StateDecoder:
+    """Decodes one stream of states: one that repeats the last but for its number shares its arrays."""
+
+    def __init__(self) -> None:
+        self._n = 0
+        self._body: bytes = b""
+        self._values: tuple[Any, ...] = ()
+
+    def decode(self, data: bytes, n: int) -> RobotState:
+        """Returns what `decode_state` does, and raises what it raises."""
+        body = data[_DOUBLES_OFFSET:STATE_SIZE]
+        if n == self._n and body == self._body:
+            return build_state((_ID.unpack_from(data)[0], *self._values))
+        values = _decode_values(data, n)
+        self._n, self._body, self._values = n, body, values[1:]
+        return build_state(values)
+
+
+def _decode_values(data: bytes, n: int) -> tuple[Any, ...]:
+    """Returns the values of a state's fields, in their order."""
     if len(data) < STATE_SIZE:
         raise DecodeError(f"robot state of {len(data)} bytes, needs {STATE_SIZE}", len(data))
     data = bytes(data)
@@ -153,7 +182,7 @@ def decode_state(data: bytes, n: int) -> RobotState:
         modes = _MOTION_MODES[motion_mode], _CONTROLLER_MODES[controller_mode], _ROBOT_MODES[robot_mode]
     except KeyError:
         raise _unknown_mode(motion_mode, controller_mode) from None
-    values = (
+    return (
         _ID.unpack_from(data)[0],
         x[_Q : _Q + n],
         x[_Q_C : _Q_C + n],
@@ -182,7 +211,6 @@ def decode_state(data: bytes, n: int) -> RobotState:
         success_rate,
         *modes,
     )
-    return build_state(values)
 
 
 def _unknown_mode(motion_mode: int, controller_mode: int) -> DecodeError:

@@ -138,9 +138,10 @@ class RobotJog:
         Args:
             axis: What is held; None: nothing.
         """
-        ticket, status = self._ticket, self._session.status()
+        ticket = self._ticket
         if ticket is None:
             return True
+        status = self._session.status()
         if status.q_c is not None and status.dq is not None:
             speed = float(np.abs(status.dq).max())
             if axis is not None or speed > STILL:

@@ -41,7 +41,7 @@ class SetupNumbersPanel:
         self._folders: dict[str, Any] = {}
         self._fields: dict[str, list[NumberField]] = {}
         self._problems: dict[str, Html] = {}
-        self._rows: dict[str, dict[str, str]] = {}
+        self._named: dict[str, list[tuple[str, str]]] = {}  # Each field, and what it is called beside a problem.
         self._seen: dict[str, Linked] = {}
         for part in SETUP_PARTS:
             title = text(f"setup.part.{part}")
@@ -73,18 +73,16 @@ class SetupNumbersPanel:
         for part, seen in self._seen.items():
             seen.show(part in setup.seen)
         for part, fields in self._fields.items():
-            labels = []
             for field, name in zip(fields, FIELD_NAMES[part], strict=True):
                 number = read_field(setup, part, name)
                 said = f"{number + 0.0:.6g}" if part == "load" and name in INERTIA_NAMES else shown(number)
                 field.show(said, state.problems.get(field.field))
-                labels.append((field.field, f"{self._rows[part][name]}: {self._label(name)}"))
-            self._problems[part].show(problems_html(state, self._text, labels))
+            self._problems[part].show(problems_html(state, self._text, self._named[part]))
 
     def _build_numbers(self, gui: Any, part: str) -> None:
         text = self._text
         self._fields[part] = []
-        self._rows[part] = {name: text(f"setup.row.{row}") for row, names in _ROWS[part] for name in names}
+        self._named[part] = []
         for row, names in _ROWS[part]:
             gui.add_html(f'<p class="rl-rowname">{esc(text(f"setup.row.{row}"))}</p>')
             for name in names:
@@ -92,6 +90,7 @@ class SetupNumbersPanel:
                 unit = None if name == "mass" or name in INERTIA_NAMES else "deg" if name in POSE_NAMES[3:] else "mm"
                 field = f"setup.{part}.{name}"
                 self._fields[part].append(NumberField(box, self._ask, field, text.unit(unit) if unit else None))
+                self._named[part].append((field, f"{text(f'setup.row.{row}')}: {self._label(name)}"))
         self._problems[part] = Html(gui)
 
     def _build_axes(self, gui: Any, ask: Ask) -> None:

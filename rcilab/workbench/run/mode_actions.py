@@ -95,24 +95,26 @@ class ModeActions:
             return
         self._asked_to_send = -math.inf
         self._store.update(drive=replace(state.drive, refusal=None))
-        self._send()
+        self._send(self._session.status())
 
-    def tick(self) -> None:
+    def tick(self, status: SupervisorStatus) -> None:
         """Looks what became of what was sent, tells our own controller what is new, changes the pace."""
-        state, status = self._store.state, self._session.status()
-        if state.model.name != self._arm:
-            self._arm = state.model.name
+        name = self._store.state.model.name
+        if name != self._arm:
+            self._arm = name
             self._wish.forget()
             self._post.forget()
-        self._post.collect()
+        if self._post.is_underway:
+            self._post.collect()
+            status = self._session.status()  # What was acknowledged in the meantime is not sent again.
         state = self._store.state
         if state.target == "virtual" and state.drive.refusal is None and status.phase == "idle":
-            self._send()
+            self._send(status)
         self._change_pace(status)
 
-    def _send(self) -> None:
+    def _send(self, status: SupervisorStatus) -> None:
         state = self._store.state
-        if not self._post.is_underway and is_pending(state, self._session.status()):
+        if not self._post.is_underway and is_pending(state, status):
             self._post.send(RobotSetup(control=state.drive.control))
 
     def _refuse(self, why: Message) -> None:

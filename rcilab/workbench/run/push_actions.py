@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -26,6 +27,9 @@ from rcilab.workbench.run.pushing import (
 from rcilab.workbench.session import Session
 from rcilab.workbench.store import Store
 from rcilab.workbench.telling import tell_error
+
+if TYPE_CHECKING:
+    from rcilab.supervisor import SupervisorStatus
 
 _NO_MOMENT = (0.0, 0.0, 0.0)
 
@@ -91,9 +95,9 @@ class PushActions:
         elif self._grip is not None and self._grip.page == request.page:
             self._grip = replace(self._grip, hand=numbers[1])
 
-    def tick(self) -> None:
+    def tick(self, status: SupervisorStatus) -> None:
         """Presses on the arm where it is now, or lets go of it; says what went wrong."""
-        status, state = self._session.status(), self._store.state
+        state = self._store.state
         self._follow(status.world_address)
         self._drop_stale()
         acting, point = None, np.zeros(3)

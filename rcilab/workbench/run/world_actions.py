@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from rcilab.client.world import World
 from rcilab.client.world_watch import WorldWatch
@@ -15,6 +16,9 @@ from rcilab.workbench.session import Session
 from rcilab.workbench.store import Store
 from rcilab.workbench.telling import tell_error
 from rcilab.workbench.text import message
+
+if TYPE_CHECKING:
+    from rcilab.supervisor import SupervisorStatus
 
 
 class WorldActions:
@@ -51,9 +55,9 @@ class WorldActions:
             watch.ask(Press(request.button))
             self._store.say("warn" if request.button != "none" else "good", message(f"safety.{request.button}_done"))
 
-    def tick(self) -> None:
+    def tick(self, status: SupervisorStatus) -> None:
         """Follows the controller of now and what it says of itself; another one has a good network."""
-        address = self._session.status().world_address
+        address = status.world_address
         if address != self._address:
             self.close()
             self._address = address

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import replace
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -33,6 +33,9 @@ from rcilab.workbench.setup.post import SetupPost
 from rcilab.workbench.setup.wanted import FORCE_AXES, SetupState, name_parts, pending_parts
 from rcilab.workbench.store import Goal, Store
 from rcilab.workbench.text import Message, message
+
+if TYPE_CHECKING:
+    from rcilab.supervisor import SupervisorStatus
 
 _UNDO_DEPTH = 100
 _HAND_GONE = 1.0  # [s] A choice: a drag that was not heard of for so long has ended, whatever became of its page.
@@ -147,7 +150,7 @@ class SetupActions:
             self._store.update(setup=replace(setup, refusal=None))
         elif request.what == "confirm" and setup.asked is setup.wanted:
             self._store.update(setup=replace(setup, asked=None))
-            self._send()
+            self._send(self._session.status())
 
     def restore(self, setup: RobotSetup) -> None:
         """Takes a set-up over that was edited before; a foreign robot is not told without being asked about."""
@@ -156,25 +159,27 @@ class SetupActions:
         if parts:
             self._take(replace(now, wanted=now.wanted.updated(setup), touched=now.touched | parts), parts)
 
-    def tick(self) -> None:
+    def tick(self, status: SupervisorStatus) -> None:
         """Looks what became of a set-up that was sent, and tells our own controller what is new."""
-        state, status = self._store.state, self._session.status()
-        if state.model.name != self._arm:
-            self._arm, self._past, self._told = state.model.name, [], 0
+        name = self._store.state.model.name
+        if name != self._arm:
+            self._arm, self._past, self._told = name, [], 0
             self._post.forget()
-        self._post.collect()
+        if self._post.is_underway:
+            self._post.collect()
+            status = self._session.status()  # What was acknowledged in the meantime is not sent again.
         state = self._store.state
         told, self._told = self._told, status.setup_times  # Another supervisor counts anew.
         if self._told > told:
             self._store.say("good", message("setup.sent_again", what=name_parts(status.setup.parts)))
         is_held = time.monotonic() - self._dragged < _HAND_GONE
         if state.target == "virtual" and not is_held and state.setup.refusal is None and status.phase == "idle":
-            self._send()
+            self._send(status)
 
-    def _send(self) -> None:
+    def _send(self, status: SupervisorStatus) -> None:
         """Tells the controller every part that it has not taken yet."""
         state = self._store.state
-        parts = pending_parts(state, self._session.status())
+        parts = pending_parts(state, status)
         if parts and not self._post.is_underway:
             self._post.send(state.setup.wanted.only(parts))
 
