@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
 from rcilab.closing import Closing
-from rcilab.views import icons, loop_event
+from rcilab.views import assignments, icons, loop_event
 from rcilab.views.gate import COOKIE, Gate
 from rcilab.views.message_guard import LARGEST_MESSAGE, MessageGuard
 
@@ -74,6 +74,7 @@ class GuardedServer(Closing):
         self._decorate = decorate
         self._routes = dict(routes or {})
         loop_event.install()
+        assignments.install()
         icons.install()
         with self._serving(bound), _quiet():
             self.viser: viser.ViserServer = viser.ViserServer(host=gate.host, port=gate.port, verbose=False)
