@@ -20,6 +20,10 @@ settings.load_profile("rcilab")
 sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
+# Whoever imports nbformat gets jsonschema, which then builds a grammar of international web addresses: 1.7 s of every
+# worker, for a format that no notebook uses. jsonschema leaves it out where the library is missing.
+sys.modules.setdefault("rfc3987_syntax", None)  # pyright: ignore[reportArgumentType]
+
 
 LANES = {"pages": ("browser",), "loops": ("workbench", "supervisor")}
 """In the names of files whose tests draw, or run control processes at 1 kHz: a core has no room for two of a kind."""

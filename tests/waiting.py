@@ -16,5 +16,5 @@ def wait_for(condition: Callable[[], T], timeout: float = SOON, what: str = "it"
     deadline = time.monotonic() + timeout
     while not (found := condition()):
         assert time.monotonic() < deadline, f"{what} did not happen within {timeout:g} s"
-        time.sleep(0.005)
+        time.sleep(0.01)
     return found

@@ -22,7 +22,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     if not arguments or (arguments[0].startswith("-") and arguments[0] not in ("-h", "--help", "--version")):
         arguments.insert(0, "workbench")
     try:
-        args = _build_parser().parse_args(arguments)
+        # Whoever names a command waits for that one only; what is wrong is answered with all of them.
+        args = _build_parser(arguments[:1] if arguments[0] in COMMANDS else COMMANDS).parse_args(arguments)
         return int(args.run(args) or 0)
     except RcilabError as error:
         print(f"rcilab: {error}", file=sys.stderr)
@@ -31,7 +32,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _INTERRUPTED
 
 
-def _build_parser() -> argparse.ArgumentParser:
+def _build_parser(commands: Sequence[str] = COMMANDS) -> argparse.ArgumentParser:
     from rcilab import __version__
 
     parser = argparse.ArgumentParser(
@@ -40,7 +41,7 @@ def _build_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"rcilab {__version__}")
     subparsers = parser.add_subparsers(metavar="COMMAND", required=True)
-    for command in COMMANDS:
+    for command in commands:
         module = import_module(f"rcilab.cli.{command}")
         module.add_parser(subparsers)
     return parser

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
 from rcilab.closing import Closing
-from rcilab.views import loop_event, same_value
+from rcilab.views import assignments, icons, loop_event
 from rcilab.views.gate import COOKIE, Gate
 from rcilab.views.message_guard import LARGEST_MESSAGE, MessageGuard
 
@@ -74,7 +74,8 @@ class GuardedServer(Closing):
         self._decorate = decorate
         self._routes = dict(routes or {})
         loop_event.install()
-        same_value.install()
+        assignments.install()
+        icons.install()
         with self._serving(bound), _quiet():
             self.viser: viser.ViserServer = viser.ViserServer(host=gate.host, port=gate.port, verbose=False)
         sockets = self.viser._websock_server  # What is called on it below has no public spelling in viser 1.1.

@@ -50,7 +50,7 @@ def test_the_table_names_machine_median_and_target(capsys: pytest.CaptureFixture
 @pytest.mark.realtime
 def test_the_loop_streams_and_reports_every_figure(capsys: pytest.CaptureFixture[str]) -> None:
     """Only that it runs and reports: how late this machine is on this day is no verdict on the code."""
-    main(["bench", "control_loop", "--seconds", "2", "--json"])
+    main(["bench", "control_loop", "--seconds", "0.5", "--json"])
     _, found = json.loads(capsys.readouterr().out)
     assert found["name"] == "control_loop"
     for figure in ("p50", "p99", "p99.9", "max", "late by more than 1 ms", "lost", "success rate"):

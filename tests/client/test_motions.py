@@ -67,7 +67,7 @@ def swing(mode: str, duration: float, jump_at: float = np.inf, jump: float = 0.0
 
 @pytest.mark.parametrize("mode", MODES)
 def test_a_callback_runs_to_its_end_in_every_mode(robot, mode):
-    run = robot.control(swing(mode, 0.4), mode)
+    run = robot.control(swing(mode, 0.25), mode)
     state = robot.state
     assert run.stopped is None
     assert run.faults == ()
@@ -87,10 +87,10 @@ def test_a_callback_runs_to_its_end_in_every_mode(robot, mode):
 
 @pytest.mark.parametrize("mode", MODES)
 def test_a_stop_in_any_mode_is_no_fault_and_the_next_motion_runs(robot, mode):
-    good = swing(mode, 0.6)
+    good = swing(mode, 0.4)
 
     def callback(state, t):
-        if t >= 0.25:
+        if t >= 0.15:
             robot.stop()
         return good(state, t)
 
@@ -98,7 +98,7 @@ def test_a_stop_in_any_mode_is_no_fault_and_the_next_motion_runs(robot, mode):
     assert run.stopped == "on request"
     assert run.faults == ()
     assert np.abs(robot.state.dq).max() < 1e-3
-    assert robot.control(swing(mode, 0.3), mode).stopped is None
+    assert robot.control(swing(mode, 0.2), mode).stopped is None
 
 
 @pytest.mark.parametrize(
@@ -113,7 +113,7 @@ def test_a_stop_in_any_mode_is_no_fault_and_the_next_motion_runs(robot, mode):
 )
 def test_a_jump_is_told_with_numbers_and_record_and_the_same_session_goes_on(robot, tmp_path, mode, fault, numbers):
     with pytest.raises(ControlError, match=numbers) as caught:
-        robot.control(swing(mode, 0.4, jump_at=0.2), mode)
+        robot.control(swing(mode, 0.25, jump_at=0.12), mode)
     error = caught.value
     assert fault in error.faults
     error.save(tmp_path / "flight.npz")
@@ -124,14 +124,14 @@ def test_a_jump_is_told_with_numbers_and_record_and_the_same_session_goes_on(rob
     robot.recover()
     robot.power_on()
     assert robot.state.faults == ()
-    run = robot.control(swing(mode, 0.3), mode)  # The vendor's object would throw the old error here.
+    run = robot.control(swing(mode, 0.2), mode)  # The vendor's object would throw the old error here.
     assert (run.stopped, run.faults) == (None, ())
 
 
 @pytest.mark.parametrize("mode", ["joint_position", "joint_impedance"])
 @pytest.mark.parametrize("options", [{"rate_limit": "manual"}, {"rate_limit": "sdk", "cut_off": 50.0}])
 def test_a_rate_limit_makes_a_motion_of_a_jump_and_it_ends_at_its_command(robot, mode, options):
-    run = robot.control(swing(mode, 0.3, jump_at=0.1, jump=0.002), mode, **options)
+    run = robot.control(swing(mode, 0.2, jump_at=0.1, jump=0.002), mode, **options)
     assert run.faults == ()
     assert run.command[-1][0] - HOME[0] == pytest.approx(0.052, abs=1e-12)
 
@@ -150,9 +150,9 @@ def test_a_first_torque_beyond_the_rate_is_refused_and_named(robot):
 
 
 def test_the_blocking_moves_go_there_by_the_s_profile(robot):
-    assert robot.move_j(HOME + 0.1, speed=0.5).plan.law == "s_profile"
+    assert robot.move_j(HOME + 0.1, speed=0.8).plan.law == "s_profile"
     assert np.abs(robot.state.q_c - HOME - 0.1).max() < 1e-12
-    robot.move_j(HOME, speed=0.5)
+    robot.move_j(HOME, speed=0.8)
     goal = Pose(T_HOME.position + [0.0, 0.1, 0.0], T_HOME.wxyz)
     run = robot.move_l(goal, speed=0.3)
     path = build_line(T_HOME, goal)

@@ -14,7 +14,7 @@ from tests.peers.endurance import require_led
 from tests.peers.kinematics import Model
 from tests.peers.robot import ControlException, Output, Robot
 
-SECONDS = 1.25  # [s] of simulated time, one swing; the long versions are in tests/endurance.
+SECONDS = 1.0  # [s] of simulated time, one swing; the long versions are in tests/endurance.
 NEAR = tuple(angle + 0.02 for angle in programs.START[7])  # [rad] So that the move before a program takes 0.2 s.
 
 

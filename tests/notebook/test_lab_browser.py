@@ -20,6 +20,7 @@ import rcilab
 
 FLAGS = (
     "--no-sandbox --no-first-run --use-gl=angle --use-angle=swiftshader --enable-unsafe-swiftshader "
+    "--disable-gpu-rasterization "  # Debian's launcher switches it on, which the processor then has to imitate.
     "--disable-background-networking --disable-component-update --disable-sync --disable-default-apps "
     "--disable-background-timer-throttling --disable-renderer-backgrounding --disable-backgrounding-occluded-windows"
 ).split()

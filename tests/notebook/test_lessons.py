@@ -30,7 +30,7 @@ SOLUTION = re.compile(r"<details>.*?```python\n(.*?)```\n</details>", re.DOTALL)
 
 
 def read(path: Path) -> nbformat.NotebookNode:
-    import nbformat  # Takes 2 s, which other workers need not wait for.
+    import nbformat  # Which other workers need not wait for.
 
     return nbformat.read(path, as_version=4)
 

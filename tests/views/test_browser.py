@@ -23,6 +23,7 @@ FLAGS = [
     "--use-gl=angle",
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
+    "--disable-gpu-rasterization",  # Debian's launcher switches it on, which the processor then has to imitate.
     "--disable-background-networking",
     "--disable-component-update",
     "--disable-renderer-backgrounding",

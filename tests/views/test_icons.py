@@ -1,0 +1,48 @@
+"""The buttons' icons are viser's own, and its archive is opened once."""
+
+from __future__ import annotations
+
+from io import BytesIO
+from string import ascii_uppercase
+from zipfile import ZipFile
+
+import pytest
+
+from rcilab.views import icons
+
+
+@pytest.mark.parametrize("name", ["player-play", "x", "arrow-back-up", "hand-finger"])
+def test_an_icon_is_the_one_that_viser_reads(name: str) -> None:
+    from viser._icons import svg_from_icon
+
+    assert icons.svg_of(name) == svg_from_icon.__wrapped__(name)
+
+
+def test_an_icon_that_does_not_exist_is_an_error() -> None:
+    with pytest.raises(KeyError, match="no-such-icon"):
+        icons.svg_of("no-such-icon")
+
+
+def test_a_page_of_more_icons_than_viser_remembers_opens_the_archive_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    import viser
+
+    opened: list[BytesIO] = []
+
+    def counted(file: BytesIO) -> ZipFile:
+        opened.append(file)
+        return ZipFile(file)
+
+    monkeypatch.setattr(icons, "ZipFile", counted)
+    icons.install()
+    icons.svg_of.cache_clear()
+    icons._archive.cache_clear()
+    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    try:
+        kinds = ("LETTER", "CIRCLE_LETTER")
+        names = [getattr(viser.Icon, f"{kind}_{letter}") for kind in kinds for letter in ascii_uppercase]
+        buttons = [server.gui.add_button(name, icon=name) for name in names]
+        buttons[0].icon = viser.Icon.X
+    finally:
+        server.stop()
+    assert len(opened) == 1
+    assert icons.svg_of.cache_info().currsize == len(names) + 1
