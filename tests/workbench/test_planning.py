@@ -10,6 +10,7 @@ import pytest
 from rcilab.errors import CertificateError
 from rcilab.model import load_model
 from rcilab.posing.planning import Plan, make_plan
+from rcilab.workbench import requests
 from rcilab.workbench.goal import actions as goal_actions
 from rcilab.workbench.goal.actions import GoalActions, initial_goal
 from rcilab.workbench.store import Store, UiState
@@ -61,3 +62,21 @@ def test_a_goal_that_rests_is_looked_at_for_collisions_and_one_that_is_dragged_i
     settled = store.state.plan
     actions.settle()
     assert store.state.plan is settled
+
+
+def test_a_target_in_a_hand_has_come_to_rest_when_it_is_let_go_or_after_a_longer_pause(monkeypatch):
+    now = [100.0]
+    monkeypatch.setattr(goal_actions, "time", SimpleNamespace(monotonic=lambda: now[0]))
+    store = Store(UiState(model=MODEL, goal=initial_goal(MODEL, HOME)))
+    actions = GoalActions(store, SimpleNamespace(status=lambda: SimpleNamespace(phase="idle", q_c=HOME)))
+    position, wxyz = tuple(store.state.goal.target.position - (0.0, 0.05, 0.05)), tuple(store.state.goal.target.wxyz)
+
+    def is_looked_at(ended: bool, after: float) -> bool:
+        actions.move_target(requests.MoveTarget(position=position, wxyz=wxyz, ended=ended))
+        now[0] += after
+        actions.settle()
+        return store.state.plan.complete
+
+    assert not is_looked_at(ended=False, after=0.9 * goal_actions.RESTED)
+    assert is_looked_at(ended=False, after=1.1 * goal_actions.RESTED)
+    assert is_looked_at(ended=True, after=1.1 * goal_actions.SETTLED)

@@ -26,7 +26,8 @@ QUATERNION = "wxyz"
 """Name of the field that takes all four numbers of the orientation."""
 FURTHEST = 3.0  # [m] A choice: no arm of ours reaches half as far, and the gizmo should stay in sight.
 SLOWEST = 0.01
-SETTLED = 0.15  # [s] A choice: a goal that has not moved for so long is no longer dragged.
+SETTLED = 0.15  # [s] A choice: a goal that has not moved for so long has come to rest.
+RESTED = 0.6  # [s] The same of a target that a hand still holds: it has only paused, and looks at the arm.
 
 
 class GoalActions:
@@ -37,6 +38,7 @@ class GoalActions:
         self._stale = False  # The goal has changed while the arm was moving.
         self._planned = 0.0  # [s] When the last plan was made.
         self._due: float | None = None  # [s] When a path of the tool is to be planned.
+        self._is_held = False  # A hand has the target and has not let go of it.
 
     def move_joint(self, request: requests.MoveJoint) -> None:
         """Poses one joint of the candidate arm."""
@@ -76,6 +78,7 @@ class GoalActions:
         if math.hypot(*request.wxyz) < 1e-6:
             return
         position = [min(max(number, -FURTHEST), FURTHEST) for number in request.position]
+        self._is_held = not request.ended
         if request.ended:
             self._store.clear_problems("pose.")
         self._aim(Pose(position, request.wxyz))
@@ -204,7 +207,7 @@ class GoalActions:
         if self._due is not None and time.monotonic() >= self._due:
             self.plan(requests.Plan())
             state = self._store.state
-        if state.plan is None or time.monotonic() - self._planned < SETTLED:
+        if state.plan is None or time.monotonic() - self._planned < (RESTED if self._is_held else SETTLED):
             return
         judged = state.plan.completed(state.drive.mode)
         if judged is not state.plan:
