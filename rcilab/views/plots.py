@@ -24,7 +24,7 @@ QUANTITIES: tuple[Quantity, ...] = ("q", "dq", "ddq", "jerk")
 
 _WIDENED = 3  # Points that a marked violation reaches to both sides: one bad cycle is still some pixels wide.
 _FARTHEST = 3.0  # Multiple of the limit that a plot reaches at most; `rcilab.check` gives the number beyond.
-_LEAST_ERROR = 0.01  # [deg or mm] Smallest range of a plot of errors, for its ticks to be readable. A choice.
+_LEAST_ERROR = 0.02  # [deg or mm] Smallest range of a plot of errors, for its ticks to be readable. A choice.
 _ROUND_ENDS = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 15.0, 20.0, 25.0, 30.0, 40.0, 50.0, 60.0)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from typing import TYPE_CHECKING, Any, cast
 
@@ -19,6 +20,7 @@ from rcilab.views.plots import (
     recorded_curves,
 )
 from rcilab.views.tool_curves import TOOL_QUANTITIES, ToolQuantity, tool_curves, tool_limit
+from rcilab.words.units import Units
 from rcilab.workbench.panels.plot_contents import legend_html, plot_axes, plot_contents
 from rcilab.workbench.text import Text
 from rcilab.workbench.view_actions import PLOTS, has_plot
@@ -35,6 +37,7 @@ _SI = {
 }  # fmt: skip
 _ERRORS = ("error", "tool")
 """There once a motion has been executed."""
+_LEAST_ERROR = {"error": math.radians(0.02), "tool": 2e-5}  # [rad, m] A choice: with less, ticks would be rounded.
 _OTHER_HEIGHT = 46 + 62 + 170 + 30  # [px] Bar, window head, strip and choices, legend.
 _HINT = 44  # [px] What to do first takes more room than the clock that stands in its place later.
 _TITLE, _TIMES = 20, 26  # [px] A plot's title, and the times below the last one.
@@ -111,7 +114,7 @@ class Plots:
         self._visible = visible
 
     def _draw(self, state: UiState, name: str) -> None:
-        factor, unit = self._text.units.from_si(_SI[name])
+        factor, unit = shown_unit(name, self._text.units)
         joint = 0 if name in (*TOOL_QUANTITIES, "tool") else state.plot_joint
         if name in _ERRORS:
             frame = self._error_frame(state, name, factor)
@@ -166,9 +169,17 @@ class Plots:
         t, tracking = _times(recording), recording.tracking
         last = last_time(*(plan_curves(p.motion, "q") for p in (state.plan,) if p is not None), Curves(t=t, values=t))
         if name == "tool":
-            return build_error_frame(t, factor * tracking.position[:, None], last, least=factor * 1e-5)
+            return build_error_frame(t, factor * tracking.position[:, None], last, least=factor * _LEAST_ERROR[name])
         errors = tracking.joint if not joint else tracking.joint[:, joint - 1 : joint]
-        return build_error_frame(t, factor * errors, last, least=factor * 1.7e-4)
+        return build_error_frame(t, factor * errors, last, least=factor * _LEAST_ERROR[name])
+
+
+def shown_unit(name: str, units: Units) -> tuple[float, str]:
+    """Returns how many of its unit in a plot one SI unit is, and that one's name."""
+    factor, unit = units.from_si(_SI[name])
+    if name in _ERRORS and factor == 1.0:  # Errors are small, and a plot's numbers end three digits behind the point.
+        return 1e3, f"m{unit}"
+    return factor, unit
 
 
 def _wanted(state: UiState) -> tuple[str, ...]:
