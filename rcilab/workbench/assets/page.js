@@ -154,7 +154,7 @@
   window.addEventListener("resize", size);
 
   // Another language or a reload builds the tabs anew; the one that was open is opened again.
-  let first = null, chosen = Number(recall("tab")) || 0, count = 0;
+  let first = null, chosen = Number(recall("tab")) || 0, count = 0, pressed = -Infinity;
   const keepTab = () => {
     const lists = [...document.querySelectorAll('[role="tablist"]')];
     const list = lists.sort((a, b) => b.children.length - a.children.length)[0];
@@ -166,7 +166,8 @@
       found[chosen].dispatchEvent(new KeyboardEvent("keydown", { key: "Enter", bubbles: true }));
     } else {
       const open = Math.max(0, found.findIndex((tab) => tab.getAttribute("aria-selected") === "true"));
-      if (open !== chosen) keep("tab", chosen = open);
+      // A busy page shows a tab long after it was pressed.
+      if (open !== chosen && performance.now() - pressed > 3000) keep("tab", chosen = open);
     }
     first = found[0];
     count = found.length;
@@ -177,7 +178,9 @@
     const tab = event.isTrusted && event.target.closest ? event.target.closest('[role="tab"]') : null;
     if (!tab || (event.type === "keydown" && event.key !== "Enter" && event.key !== " ")) return;
     const found = [...tab.closest('[role="tablist"]').querySelectorAll('[role="tab"]')];
-    if (found.length >= 4) keep("tab", chosen = found.indexOf(tab));
+    if (found.length < 4) return;
+    pressed = performance.now();
+    keep("tab", chosen = found.indexOf(tab));
   };
   for (const kind of ["pointerdown", "keydown"]) document.addEventListener(kind, openTab, true);
 
