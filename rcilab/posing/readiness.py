@@ -35,8 +35,13 @@ def plan_obstacle(plan: Plan | None, q_c: JointVector | None) -> Message | None:
     if not plan.report.ok:
         return message("ready.violations", count=len(plan.report.violations))
     if q_c is None or not _is_at(q_c, plan.starts_at):
-        return message("ready.done" if q_c is not None and _is_at(q_c, plan.motion.goal) else "ready.elsewhere")
+        return message("ready.done" if q_c is not None and is_done(plan, q_c) else "ready.elsewhere")
     return None
+
+
+def is_done(plan: Plan, q_c: JointVector) -> bool:
+    """Returns whether the arm, commanded to be at q_c, [rad], stands where a plan ends."""
+    return _is_at(q_c, plan.motion.goal)
 
 
 def ask_to_move(plan: Plan, address: str) -> Message:

@@ -15,9 +15,12 @@ from rcilab.model import load_model
 from rcilab.motion import Motion, Program, Waypoint
 from rcilab.spatial import Pose
 from rcilab.workbench import requests
+from rcilab.workbench.check.freshness import outdated
+from rcilab.workbench.check.state import CheckState, Slowed
 from rcilab.workbench.goal.actions import GoalActions, initial_goal
 from rcilab.workbench.panels.program import read_row
 from rcilab.workbench.panels.program_list import list_html
+from rcilab.workbench.panels.target import planned_html
 from rcilab.workbench.program import actions as program_actions
 from rcilab.workbench.program import planning as program_planning
 from rcilab.workbench.program.actions import ProgramActions
@@ -337,6 +340,60 @@ def test_a_program_that_was_changed_since_is_not_executed(square):
     assert obstacle(square.state, status).code == "ready.program"
     square.plan()
     assert obstacle(square.state, status) is None
+
+
+def test_a_program_that_plans_no_longer_is_never_shown_as_passed(square):
+    square.plan()
+    text = Text("en")
+    assert text("check.passed") in planned_html(square.state, text)
+    square.type("x", "2900")
+    assert outdated(square.state).code == "ready.program"
+    square.plan()
+    assert square.program.tone == "bad"
+    changed = outdated(square.state)
+    assert changed.code == "ready.program_fails"
+    assert text.say(square.program.answer) in text.say(changed)
+    assert text("check.passed") not in planned_html(square.state, text)
+    status = SimpleNamespace(phase="idle", code="idle", powered=True, q_c=HOME, setup=RobotSetup())
+    assert obstacle(square.state, status) == changed
+    assert may_plan_again(changed)
+    square.edit("undo")
+    square.plan()
+    assert outdated(square.state) is None
+
+
+def test_whoever_poses_the_goal_is_told_once_that_this_takes_the_place_of_the_programs_plan(square):
+    square.plan()
+    square.goal.move_joint(requests.MoveJoint(joint=0, angle=0.2))
+    assert square.state.plan.program is None
+    assert square.told == "plan.replaced"
+    serial = square.state.notice.serial
+    square.goal.move_joint(requests.MoveJoint(joint=0, angle=0.3))
+    assert square.state.notice.serial == serial
+    square.plan()
+    square.status.q_c = square.state.plan.motion.goal  # It has been carried out: nothing is lost.
+    square.goal.move_joint(requests.MoveJoint(joint=0, angle=0.4))
+    assert square.state.notice.serial == serial
+
+
+def test_what_is_said_of_the_way_to_the_start_goes_when_the_arm_does(square):
+    square.status.q_c = HOME + 0.05
+    square.plan()
+    assert square.program.answer.code == "program.approach"
+    square.status.phase = "moving"
+    square.actions.tick()
+    assert square.program.answer is None
+
+
+def test_a_plan_that_was_stretched_and_is_made_anew_says_that_it_is_fast_again(square):
+    square.plan()
+    plan = square.state.plan
+    square.store.update(check=CheckState(slowed=Slowed(before=plan, after=plan, speed=0.5)))
+    square.plan()
+    assert square.program.answer.code == "program.unslowed"
+    square.store.update(check=CheckState())
+    square.plan()
+    assert square.program.answer is None
 
 
 def test_a_program_that_has_run_is_planned_again_or_one_goes_back_to_its_start(square):

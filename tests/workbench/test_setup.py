@@ -94,7 +94,7 @@ def test_an_edit_makes_the_plan_stale_in_words_and_undo_makes_it_good_again(benc
     assert reason.code == "ready.stale"
     assert "tool, load" in Text("en").say(reason)
     for language in ("en", "zh"):
-        assert Text(language)("setup.stale") in planned_html(state, Text(language))
+        assert Text(language)("check.outdated") in planned_html(state, Text(language))
     ask(requests.Drive(what="execute"))
     assert told(bench) == "ready.stale"
     ask(requests.PressSetup(what="undo"))

@@ -40,6 +40,8 @@ class CheckActions:
             self._program.cancel(requests.CancelProgram())
         elif request.what == "undo":
             self._undo()
+        elif request.what == "again":
+            self._plan_again(plan)
         elif plan is None:
             self._store.say("warn", message("check.nothing"))
         elif request.what == "row":
@@ -48,11 +50,6 @@ class CheckActions:
             self._slow_down(plan)
         elif request.what == "explain":
             self._explain(plan)
-        elif request.what == "again":
-            if plan.program is None:
-                self._goal.plan(requests.Plan())
-            else:
-                self._program.plan(requests.PlanProgram())
 
     def tick(self) -> None:
         """Shows how far something is, and what came of it; forgets what is about another plan."""
@@ -96,6 +93,13 @@ class CheckActions:
         shown = plots if plot is None else plots | {plot}
         self._store.update(place=min(max(place, 0.0), 1.0), playing=False, plot_joint=row.joint, plots=shown)
         self._set(sought=self._check.sought + 1, row=name)
+
+    def _plan_again(self, plan: Plan | None) -> None:
+        """Plans what the plan was of: the program, or the way to the goal."""
+        if plan is None or plan.program is None:
+            self._goal.plan(requests.Plan())
+        else:
+            self._program.plan(requests.PlanProgram())
 
     def _slow_down(self, plan: Plan) -> None:
         state = self._store.state

@@ -12,6 +12,7 @@ from rcilab.arrays import JointVector, frozen
 from rcilab.errors import KinematicsError
 from rcilab.posing.planning import LAWS, PATH_KINDS, Plan, make_plan
 from rcilab.posing.reach import judge_joints, judge_pose
+from rcilab.posing.readiness import is_done
 from rcilab.spatial import Pose
 from rcilab.words.number import parse_number, parse_quaternion
 from rcilab.workbench import requests
@@ -195,6 +196,8 @@ class GoalActions:
         box = state.setup.wanted.box
         made = make_plan(state.model, start, state.goal.q, state.speed, state.law, box, state.way, state.via)
         self._planned = time.monotonic()
+        if state.plan is not None and state.plan.program is not None and not is_done(state.plan, start):
+            self._store.say("warn", message("plan.replaced"))
         if isinstance(made, Plan):
             made = replace(made, short=state.goal.reach.short)
             self._store.update(plan=made, no_plan=None, recording=None, place=0.0, playing=False)

@@ -7,10 +7,10 @@ import time
 from typing import TYPE_CHECKING, Any
 
 from rcilab.workbench import requests
-from rcilab.workbench.panels.check_rows import rows_html
+from rcilab.workbench.check.freshness import outdated
+from rcilab.workbench.panels.check_rows import count_unheeded, rows_html
 from rcilab.workbench.run.readiness import is_moving
-from rcilab.workbench.setup.wanted import name_parts
-from rcilab.workbench.text import Text
+from rcilab.workbench.text import Message, Text
 from rcilab.workbench.widgets import Ask, Html, esc, on_press
 
 if TYPE_CHECKING:
@@ -74,13 +74,13 @@ class CheckPanel:
         self._bar.value = round(100.0 * (check.progress if planning is None else planning), 1)
         self._cancel.visible = busy
         self._undo.visible = check.slowed is not None and not busy
-        stale = () if plan is None else plan.stale_parts(state.model, state.setup.wanted.box)
-        self._again.visible = bool(stale)
-        self._slow.disabled = plan is None or busy or bool(stale) or is_moving(status)
+        changed = outdated(state)
+        self._again.visible = changed is not None and not busy
+        self._slow.disabled = plan is None or busy or changed is not None or is_moving(status)
         self._explain.disabled = plan is None or busy
         if self._tools.visible is (plan is None):
             self._tools.visible = plan is not None
-        wanted = (plan, stale, check.answer, check.explained, check.row, state.no_plan)
+        wanted = (plan, changed, check.answer, check.explained, check.row, state.no_plan)
         if wanted == self._drawn:
             return
         self._drawn = wanted
@@ -90,15 +90,15 @@ class CheckPanel:
             self._answer.show("")
             self._table.show("")
             return
-        self._verdict.show(self._headline(plan, stale))
+        self._verdict.show(self._headline(plan, changed))
         self._answer.show(self._answers(state, plan))
         self._table.show(rows_html(plan.report, plan.model, check.row, self._text))
 
-    def _headline(self, plan: Plan, stale: tuple[str, ...]) -> str:
+    def _headline(self, plan: Plan, changed: Message | None) -> str:
         text, report = self._text, plan.report
-        unheeded = sum(not row.ok for row in report.rows if row.condition.necessity == "recommended")
-        if stale:
-            headline = ("warn", "▲ ", "setup.stale", text("setup.stale_why", what=text.say(name_parts(stale))))
+        unheeded = count_unheeded(report)
+        if changed is not None:
+            headline = ("warn", "▲ ", "check.outdated", text.say(changed))
         elif report.ok:
             code = "check.passed_unheeded" if unheeded else "check.passed_long"
             headline = ("good", "", "check.passed", text(code, count=unheeded))

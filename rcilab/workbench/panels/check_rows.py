@@ -26,6 +26,11 @@ def rows_html(report: Report, model: RobotModel, chosen: str, text: Text) -> str
     return f'<div class="rl-cards rl-pick">{"".join(row_html(row, model, chosen, text) for row in rows)}</div>'
 
 
+def count_unheeded(report: Report) -> int:
+    """Returns how many recommended conditions are exceeded."""
+    return sum(not row.ok for row in report.rows if row.condition.necessity == "recommended")
+
+
 def row_html(row: ConditionResult, model: RobotModel, chosen: str, text: Text) -> str:
     """Returns one row."""
     condition, tone = row.condition, row_tone(row)

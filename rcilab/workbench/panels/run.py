@@ -64,6 +64,14 @@ class RunPanel:
             gui.add_html('<i class="rl-buttons"></i>')
             self._plan = gui.add_button(text("run.plan"), icon="route", color="gray", hint=text("target.plan_hint"))
             on_press(self._plan, ask, lambda page: requests.Plan(page=page))
+            self._to_target = gui.add_button(
+                text("run.to_target"),
+                icon="current-location",
+                color="gray",
+                visible=False,
+                hint=text("run.to_target_hint"),
+            )
+            on_press(self._to_target, ask, lambda page: requests.Plan(page=page))
             for what, icon, color in _BUTTONS:
                 button = gui.add_button(text(f"run.{what}"), icon=icon, color=color, hint=text(f"run.{what}_hint"))
                 on_press(button, ask, _drive(what))
@@ -87,7 +95,9 @@ class RunPanel:
         self._pace.show(round(100.0 * state.drive.pace, 1))
         self._way.show(way_html(state, status, text))
         self._outcome.show("" if moving else outcome_html(state, text))
-        self._plan.disabled = moving
+        is_program = state.plan is not None and state.plan.program is not None
+        self._plan.visible, self._to_target.visible = not is_program, is_program
+        self._plan.disabled = self._to_target.disabled = moving
         self._buttons["recover"].disabled = status.phase not in ("fault", "crashed", "lost")
         self._buttons["power_on"].disabled = moving or status.powered is not False
         self._buttons["power_off"].disabled = moving or status.powered is not True

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 from rcilab.client.setup import SETUP_PARTS
 from rcilab.workbench import requests
+from rcilab.workbench.check.freshness import outdated
 from rcilab.workbench.setup.wanted import (
     describe_held,
     describe_part,
     differing_tool,
-    name_parts,
     pending_parts,
     setup_obstacle,
 )
@@ -48,7 +48,7 @@ class SetupPanel:
             )
             on_press(self._undo, ask, _press("undo"))
             self._again = gui.add_button(text("setup.check"), icon="clipboard-check", hint=text("setup.check_hint"))
-            on_press(self._again, ask, self._plan_again)
+            on_press(self._again, ask, lambda page: requests.Check(page=page, what="again"))
             choices = {text("setup.nothing"): "", **{text(f"setup.part.{part}"): part for part in SETUP_PARTS}}
             self._choices = {part: label for label, part in choices.items()}
             edited = gui.add_dropdown(
@@ -58,13 +58,9 @@ class SetupPanel:
                 edited, ask, lambda v, p: requests.SetSetup(page=p, name="edited", value=choices.get(v, ""))
             )
 
-    def _plan_again(self, page: int | None) -> requests.Request:
-        return requests.PlanProgram(page=page) if self._is_program else requests.Plan(page=page)
-
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows state and controller."""
         text, setup = self._text, state.setup
-        self._is_program = state.plan is not None and state.plan.program is not None
         pending, foreign = pending_parts(state, status), state.target != "virtual"
         question = setup.asked is setup.wanted and bool(pending)
         self._verdict.show(self._verdict_html(state, status))
@@ -73,15 +69,9 @@ class SetupPanel:
         self._agree.visible = self._cancel.visible = question
         self._undo.disabled = not setup.can_undo
         self._edited.show(self._choices[setup.edited])
-        stale = () if state.plan is None else state.plan.stale_parts(state.model, setup.wanted.box)
-        self._again.disabled = not stale
-        said = text.say(name_parts(stale)) if stale else ""
-        self._stale.show(
-            f'<p class="rl-verdict rl-warn"><b>{esc(text("setup.stale"))}</b> '
-            f"{esc(text('setup.stale_why', what=said))}</p>"
-            if stale
-            else ""
-        )
+        changed = outdated(state)
+        self._again.disabled = changed is None
+        self._stale.show("" if changed is None else _verdict("warn", text("check.outdated"), text.say(changed)))
         self._table.show(self._table_html(state, status))
 
     def _verdict_html(self, state: UiState, status: SupervisorStatus) -> str:

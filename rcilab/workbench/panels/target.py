@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rcilab.words.rounding import fixed
+from rcilab.workbench.check.freshness import outdated
 from rcilab.workbench.goal.actions import POSE_FIELDS, QUATERNION
+from rcilab.workbench.panels.check_rows import count_unheeded
 from rcilab.workbench.panels.jog import problems_html, reach_html
-from rcilab.workbench.setup.wanted import name_parts
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, Html, NumberField, esc, shown
 
@@ -67,10 +68,9 @@ def planned_html(state: UiState, text: Text) -> str:
     """Returns one line about the plan: how long it takes and whether it passed, or why there is none."""
     if state.plan is None:
         return f'<p class="rl-note">{esc(text.say(state.no_plan)) if state.no_plan else ""}</p>'
-    stale = state.plan.stale_parts(state.model, state.setup.wanted.box)
-    if stale:
-        said = text("setup.stale_why", what=text.say(name_parts(stale)))
-        return f'<p class="rl-verdict rl-warn"><b>{esc(text("setup.stale"))}</b> {esc(said)}</p>'
+    changed = outdated(state)
+    if changed is not None:
+        return f'<p class="rl-verdict rl-warn"><b>▲ {esc(text("check.outdated"))}</b> {esc(text.say(changed))}</p>'
     plan, report = state.plan, state.plan.report
     tone, word = ("good", "check.passed") if report.ok else ("bad", "check.failed")
     code = "target.planned" if plan.kind == "joint" else f"target.planned.{plan.kind}"
@@ -79,6 +79,9 @@ def planned_html(state: UiState, text: Text) -> str:
     if plan.short is not None:
         said += " " + text("target.leads_short", short=text.say(plan.short))
         tone, word = (tone, word) if not report.ok else ("warn", "target.not_there")
+    unheeded = count_unheeded(report) if report.ok else 0
+    if unheeded:
+        said += " " + text("target.unheeded", count=unheeded)
     if plan.note is not None:
         said += " " + text.say(plan.note)
     return f'<p class="rl-verdict rl-{tone}"><b>{esc(text(word))}</b> {esc(said)}</p>'

@@ -117,6 +117,12 @@ class ProgramActions:
             self._finish(*self._planner.take())
         elif self._planner.progress != self._shelves.state.progress:
             self._shelves.set(progress=self._planner.progress)
+        elif (
+            self._shelves.state.answer is not None
+            and self._shelves.state.tone != "bad"
+            and is_moving(self._session.status())
+        ):
+            self._shelves.set(tone="good", answer=None)  # It tells where the arm was before it moved.
 
     def close(self) -> None:
         """Ends what is being planned."""
@@ -130,6 +136,15 @@ class ProgramActions:
         self._shelves.set(progress=None)
         return True
 
+    def _tells_of_start(self) -> bool:
+        """Returns whether what is said about the plan holds only as long as the arm stands where it stood."""
+        return self._shelves.state.answer is not None and self._shelves.state.tone != "bad"
+
+    def _was_stretched(self) -> bool:
+        """Returns whether the plan of now is slower than the speeds of its program say."""
+        plan, slowed = self._store.state.plan, self._store.state.check.slowed
+        return slowed is not None and slowed.draft is None and plan is not None and plan.program is not None
+
     def _finish(self, job: Job, result: Plan | Message | RcilabError) -> None:
         steps = job.draft.steps
         if isinstance(result, Message):
@@ -142,10 +157,13 @@ class ProgramActions:
                 tone="bad", answer=message("plan.failed", error=tell(result)), failed=failed, planned=None
             )
             return
-        self._store.update(plan=result, no_plan=None, recording=None, place=0.0, playing=False, asked=None)
         tone, answer, failed = "good", [], None
+        if self._was_stretched():
+            tone, answer = "warn", [message("program.unslowed")]
+        self._store.update(plan=result, no_plan=None, recording=None, place=0.0, playing=False, asked=None)
         if is_led_in(result):
-            tone, answer = "warn", [_tell_approach(job, result)]
+            tone = "warn"
+            answer.append(_tell_approach(job, result))
         if result.motion.notes:
             tone = "warn"
             answer += [message("program.notes", text=tell_note(note)) for note in result.motion.notes]

@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from rcilab.posing.readiness import arm_obstacle, ask_to_move, plan_obstacle
+from rcilab.workbench.check.freshness import outdated
 from rcilab.workbench.run.driving import parameter_obstacle
-from rcilab.workbench.setup.wanted import name_parts, setup_obstacle
+from rcilab.workbench.setup.wanted import setup_obstacle
 from rcilab.workbench.store import UiState
 from rcilab.workbench.telling import tell_status
 from rcilab.workbench.text import Message, message
@@ -32,14 +33,9 @@ def obstacle(state: UiState, status: SupervisorStatus) -> Message | None:
         return resting
     if state.plan is None:
         return plan_obstacle(None, status.q_c)
-    program = state.program
-    if state.plan.program is not None and program.planned is not program.draft:
-        return message("ready.program")
-    if state.plan.program is not None and not program.draft.has_tool_of(state.model):
-        return message("ready.program_tool")
-    stale = state.plan.stale_parts(state.model, state.setup.wanted.box)
-    if stale:
-        return message("ready.stale", what=name_parts(stale))
+    changed = outdated(state)
+    if changed is not None:
+        return changed
     unset = setup_obstacle(state, status)
     if unset is not None:
         return unset
@@ -54,7 +50,7 @@ def obstacle(state: UiState, status: SupervisorStatus) -> Message | None:
 
 def may_plan_again(reason: Message | None) -> bool:
     """Returns whether planning the program anew is what this obstacle asks for."""
-    return reason is not None and reason.code in ("ready.program", *_OF_PROGRAMS.values())
+    return reason is not None and reason.code in ("ready.program", "ready.program_fails", *_OF_PROGRAMS.values())
 
 
 def may_go_back(reason: Message | None) -> bool:
