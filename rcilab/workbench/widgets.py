@@ -7,6 +7,9 @@ import time
 from collections.abc import Callable
 from typing import Any, TypeAlias
 
+import numpy as np
+
+from rcilab.spatial import Pose
 from rcilab.words.rounding import fixed
 from rcilab.words.units import Unit
 from rcilab.workbench.requests import Request, TypeField
@@ -134,3 +137,9 @@ def esc(text: object) -> str:
 def shown(number: float) -> str:
     """Returns a number for a field: two decimals, and never "-0.00"."""
     return fixed(float(number), 2)
+
+
+def shown_pose(pose: Pose) -> tuple[str, ...]:
+    """Returns x, y, z [mm] and roll, pitch, yaw [deg] for fields; a half turn is 180, whichever way rounding led."""
+    turns = [shown(degrees) for degrees in np.degrees(pose.rpy)]
+    return (*(shown(1000.0 * place) for place in pose.position), *("180.00" if t == "-180.00" else t for t in turns))

@@ -42,6 +42,22 @@ def test_a_typed_negative_fraction_keeps_its_sign(page):
     page.wait(lambda: field.input_value() == "-0.25", "the field to show -0.25")
 
 
+def test_numbers_typed_without_any_pause_between_fields_all_count(page):
+    page.open_tab("Target")
+    page.pose_field("x").click()
+    page.tab.keyboard.press("ControlOrMeta+a")
+    page.tab.keyboard.type("412")
+    for number in ("175", "23"):  # Roll, then y: viser alone would hear of "4" and of nothing typed into roll.
+        page.tab.keyboard.press("Tab")
+        page.tab.keyboard.type(number)
+    page.wait(
+        lambda: np.allclose([*page.state.goal.target.position[:2], page.state.goal.target.rpy[0]],
+                            [0.412, 0.023, np.radians(175.0)], atol=1e-9),
+        lambda: f"412, 175, 23 to be taken: {page.state.goal.target}",
+    )  # fmt: skip
+    assert page.pose_field("x").input_value() in ("412", "412.00")
+
+
 def test_dragging_the_gizmo_brings_the_tool_to_it(page):
     target = page.state.goal.target.matrix
     page.wait(lambda: np.allclose(page.pose_in("/live", "/target"), target, atol=1e-5), "the gizmo where the goal is")

@@ -362,6 +362,14 @@ def test_a_program_that_plans_no_longer_is_never_shown_as_passed(square):
     assert outdated(square.state) is None
 
 
+def test_a_bad_number_stays_complained_about_while_a_good_one_is_typed_beside_it(square):
+    assert square.type("x", "far") is not None
+    assert square.type("y", "120") is None
+    assert f"program.{square.program.selected}.x" in square.state.problems
+    square.edit("undo")
+    assert not square.state.problems
+
+
 def test_whoever_poses_the_goal_is_told_once_that_this_takes_the_place_of_the_programs_plan(square):
     square.plan()
     square.goal.move_joint(requests.MoveJoint(joint=0, angle=0.2))

@@ -12,7 +12,7 @@ from rcilab.workbench.goal.actions import POSE_FIELDS, QUATERNION
 from rcilab.workbench.panels.check_rows import count_unheeded
 from rcilab.workbench.panels.jog import problems_html, reach_html
 from rcilab.workbench.text import Text
-from rcilab.workbench.widgets import Ask, Html, NumberField, esc, shown
+from rcilab.workbench.widgets import Ask, Html, NumberField, esc, shown_pose
 
 if TYPE_CHECKING:
     from rcilab.supervisor import SupervisorStatus
@@ -44,12 +44,11 @@ class TargetPanel:
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows the goal."""
         target = state.goal.target
-        values = (*(target.position * 1000.0), *np.degrees(target.rpy))
-        numbers: dict[str, float] = dict(zip(POSE_FIELDS, values, strict=True))
+        numbers = dict(zip(POSE_FIELDS, shown_pose(target), strict=True))
         labels: list[tuple[str, str]] = []
         for field in self._fields:
             name = field.field.partition(".")[2]
-            field.show(shown(numbers[name]), state.problems.get(field.field))
+            field.show(numbers[name], state.problems.get(field.field))
             labels.append((field.field, self._text(f"target.{name}")))
         wxyz = self._wxyz
         wxyz.show(quaternion_text(target.wxyz), state.problems.get(wxyz.field))

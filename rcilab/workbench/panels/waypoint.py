@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from rcilab.motion.waypoint import Waypoint
 from rcilab.workbench import requests
 from rcilab.workbench.goal.actions import POSE_FIELDS
@@ -14,7 +12,7 @@ from rcilab.workbench.panels.jog import problems_html
 from rcilab.workbench.program.draft import TYPES, target_of
 from rcilab.workbench.program.fields import VIA_FIELDS, arm_angle_of
 from rcilab.workbench.text import Text
-from rcilab.workbench.widgets import Ask, Html, Linked, NumberField, esc, on_press, shown
+from rcilab.workbench.widgets import Ask, Html, Linked, NumberField, esc, on_press, shown, shown_pose
 
 if TYPE_CHECKING:
     from rcilab.model import RobotModel
@@ -119,8 +117,7 @@ def _values(waypoint: Waypoint, arm: RobotModel) -> dict[str, str]:
         "psi": "" if psi is None else shown(math.degrees(psi)),
     }  # fmt: skip
     if target is not None:
-        numbers = (*(1000.0 * target.position), *np.degrees(target.rpy))
-        values |= {name: shown(number) for name, number in zip(POSE_FIELDS, numbers, strict=True)}
+        values |= dict(zip(POSE_FIELDS, shown_pose(target), strict=True))
     if waypoint.via is not None:
         values |= {name: shown(1000.0 * number) for name, number in zip(VIA_FIELDS, waypoint.via, strict=True)}
     return values

@@ -76,7 +76,7 @@ class EditActions:
             made = proposed(waypoint, name, request.text, self._draft.arm(self._store.state.model))
             if made is not None and self._shelves.answer(request.field, made if isinstance(made, Message) else None):
                 assert isinstance(made, Waypoint)
-                self._shelves.change(self._draft.changed(int(key), made), int(key))
+                self._shelves.change(self._draft.changed(int(key), made), int(key), typed=True)
 
     @property
     def _draft(self) -> Draft:

@@ -63,11 +63,19 @@ class Shelves:
         elif found.state.draft.steps:
             self._store.say("good", message("program.back", count=len(found.state.draft.steps), model=model))
 
-    def change(self, draft: Draft, selected: int | None) -> None:
-        """Exchanges the program; what it was can be had back."""
-        shelf = self._shelf
+    def change(self, draft: Draft, selected: int | None, *, typed: bool = False) -> None:
+        """Exchanges the program; what it was can be had back.
+
+        Args:
+            draft: The new one.
+            selected: Key of the step that is selected from then on.
+            typed: Whether a number was typed: what is wrong with other typed ones stands beside them as before.
+        """
+        shelf, problems = self._shelf, self._store.state.problems
         shelf.past, shelf.future = [*shelf.past[-_UNDO_DEPTH:], self.draft], []
         self._exchange(draft, selected)
+        if typed:
+            self._store.update(problems=problems)
 
     def undo(self) -> None:
         """Takes the last change back."""
