@@ -12,6 +12,7 @@ from rcilab.workbench.learn.state import exhibited
 from rcilab.workbench.live import LiveChannel
 from rcilab.workbench.page import dress
 from rcilab.workbench.panels import Panel
+from rcilab.workbench.panels.arm_now import ArmNowPanel
 from rcilab.workbench.panels.branches import BranchesPanel
 from rcilab.workbench.panels.check import CheckPanel
 from rcilab.workbench.panels.elbow import ElbowPanel
@@ -60,12 +61,23 @@ _READ = 0.25
 the arm: a page that draws in software shows the arm once it has applied all that came with it."""
 _MAIN_WIDTH, _TIMELINE_WIDTH = 352, 380  # [px]
 _TABS = (
-    ("tab.jog", "adjustments-horizontal", JogPanel, ToolJogPanel, PosesPanel),
+    ("tab.jog", "adjustments-horizontal", JogPanel, ToolJogPanel, ArmNowPanel, PosesPanel),
     ("tab.target", "current-location", TargetPanel, ElbowPanel, BranchesPanel, WayPanel),
     ("tab.program", "list-numbers", ProgramPanel, WaypointPanel, ProgramFilePanel),
     ("tab.setup", "tool", SetupPanel, SetupNumbersPanel),
     ("tab.check", "clipboard-check", CheckPanel),
-    ("tab.run", "player-play", RunPanel, RecordingPanel, WherePanel, ModePanel, PushPanel, LabPanel, HealthPanel),
+    (
+        "tab.run",
+        "player-play",
+        RunPanel,
+        ArmNowPanel,
+        RecordingPanel,
+        WherePanel,
+        ModePanel,
+        PushPanel,
+        LabPanel,
+        HealthPanel,
+    ),
     ("tab.learn", "school", LearnLessonPanel, LearnPanel, LearnExhibitPanel),
     ("tab.settings", "settings", SettingsPanel, ExtrasPanel, RunsFolderPanel),
 )

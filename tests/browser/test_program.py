@@ -19,8 +19,8 @@ def writing(page):
     page.wait(lambda: page.state.plan is not None, "a target to add")
     page.open_tab("Program")
     page.wait(lambda: page.tab.get_by_text("No waypoints yet").is_visible(), "an empty program")
-    page.button("From the target").click()
-    page.button("From the arm").click()
+    page.button("Add from target").click()
+    page.button("Add from arm").click()
     page.wait(lambda: page.tab.get_by_role("option").count() == 2, "two rows")
     yield page
     page.bench.conductor.ask(requests.EditProgram(what="clear"))

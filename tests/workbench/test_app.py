@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from rcilab.errors import InvalidValueError, ModelError, UsageError
+from rcilab.model import load_model
+from rcilab.posing.planning import make_plan
+from rcilab.words.units import Units
 from rcilab.workbench import requests
 from rcilab.workbench.app import Workbench, WorkbenchConfig
+from rcilab.workbench.panels.arm_now import arm_html
 from rcilab.workbench.panels.target import planned_html
-from rcilab.workbench.run.readiness import obstacle
+from rcilab.workbench.run.readiness import obstacle, time_shown
 from rcilab.workbench.text import Text
 from tests.workbench.opened import opened, told, wait
 
@@ -200,6 +205,7 @@ def test_execute_runs_the_plan_records_it_and_then_asks_for_a_new_one(bench, ask
     ask(requests.Drive(what="execute"))
     wait(lambda: told(bench) == "notice.arrived", "the arrival")
     assert np.abs(bench.session.status().q_c - goal).max() < 1e-9
+    wait(lambda: bench.store.state.place == 1.0, "the preview to stand where the arm has arrived")
     recording = bench.store.state.recording
     assert recording is not None
     duration = bench.store.state.plan.motion.duration
@@ -224,10 +230,31 @@ def test_stop_ends_a_motion_and_says_so(bench, ask):
     wait(lambda: bench.session.status().phase == "moving", "the arm to move")
     ask(requests.ChooseRobot(model="xMate3"))
     assert told(bench) == "notice.moving"
+    wait(lambda: (bench.session.status().motion_place or 0.0) > 0.2, "a part of the way")
     ask(requests.Drive(what="stop"))
     wait(lambda: told(bench) == "notice.stopped", "the stop to be told")
     assert bench.session.status().phase == "idle"
     assert abs(float(bench.session.status().q_c[0]) - start) < 0.7
+    wait(lambda: 0.0 < bench.store.state.place < 0.9, "the preview to stand where the arm has left the plan")
+
+
+def test_while_the_arm_moves_the_timeline_is_where_the_arm_is(bench):
+    plan = make_plan(bench.store.state.model, np.zeros(7), np.full(7, 0.2), 0.5, "jerk_limited")
+    state = replace(bench.store.state, plan=plan, place=0.25)
+    still, moving = (replace(bench.session.status(), phase=phase, motion_place=0.1) for phase in ("idle", "moving"))
+    assert time_shown(state, still) == pytest.approx(0.25 * plan.motion.duration)
+    assert time_shown(state, moving) == 0.1
+    assert time_shown(replace(state, plan=None), still) == 0.0
+
+
+def test_where_the_arm_is_stands_beside_the_goal_in_the_units_of_the_page():
+    model, q = load_model("xMatePro7"), np.radians([10.0, 20.0, -0.04, 40.0, 0.0, 60.0, 0.0])
+    shown = arm_html(model, q, Text("en"))
+    assert all(f"<td>{angle}</td>" in shown for angle in ("10.0", "20.0", "0.0", "40.0"))
+    assert f"x {1000.0 * model.forward(q).position[0]:.1f} mm" in shown
+    assert "<td>0.175</td>" in arm_html(model, q, Text("en", Units("rad", "m")))
+    assert Text("zh")("arm.unknown") in arm_html(model, None, Text("zh"))
+    assert Text("en")("arm.unknown") in arm_html(model, q[:6], Text("en"))
 
 
 def test_an_address_that_is_none_is_answered_and_nothing_is_lost(bench, ask):

@@ -159,6 +159,7 @@
     const lists = [...document.querySelectorAll('[role="tablist"]')];
     const list = lists.sort((a, b) => b.children.length - a.children.length)[0];
     const found = list ? [...list.querySelectorAll('[role="tab"]')] : [];
+    if (found.length >= 4) document.documentElement.dataset.rlReady = "";
     if (found.length < 4 || found.length < count) return;
     if (found[0] !== first && chosen > 0) {
       if (found.length <= chosen) return;  // They come one by one.

@@ -13,7 +13,7 @@ from rcilab.workbench.panels.jog import problems_html
 from rcilab.workbench.panels.program_list import list_html
 from rcilab.workbench.panels.target import planned_html
 from rcilab.workbench.program.draft import Draft, number_at, tell_place
-from rcilab.workbench.run.readiness import is_moving
+from rcilab.workbench.run.readiness import is_moving, time_shown
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, Html, Linked, NumberField, esc, on_press
 
@@ -86,7 +86,7 @@ class ProgramPanel:
         text, program = self._text, state.program
         draft = program.draft if program.draft.model == state.model.name else Draft(model=state.model.name)
         plan = state.plan if state.plan is not None and program.planned is draft and state.plan.program else None
-        t = 0.0 if plan is None else state.place * plan.motion.duration
+        t = time_shown(state, status)
         running = None if plan is None else number_at(plan, t)
         drawn = (draft, program.selected, program.failed, running, state.model)
         if drawn != self._drawn:  # Where each waypoint is takes a while to compute.

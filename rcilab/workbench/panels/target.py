@@ -44,7 +44,7 @@ class TargetPanel:
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows the goal."""
         target = state.goal.target
-        numbers = dict(zip(POSE_FIELDS, shown_pose(target), strict=True))
+        numbers: dict[str, str] = dict(zip(POSE_FIELDS, shown_pose(target), strict=True))
         labels: list[tuple[str, str]] = []
         for field in self._fields:
             name = field.field.partition(".")[2]
@@ -80,7 +80,7 @@ def planned_html(state: UiState, text: Text) -> str:
         tone, word = (tone, word) if not report.ok else ("warn", "target.not_there")
     unheeded = count_unheeded(report) if report.ok else 0
     if unheeded:
-        said += " " + text("target.unheeded", count=unheeded)
+        said += " · " + text("target.unheeded", count=unheeded)
     if plan.note is not None:
         said += " " + text.say(plan.note)
     return f'<p class="rl-verdict rl-{tone}"><b>{esc(text(word))}</b> {esc(said)}</p>'

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from rcilab.clock import CYCLE_TIME
 from rcilab.workbench import requests
+from rcilab.workbench.check.freshness import outdated
 from rcilab.workbench.panels.plots import Plots
 from rcilab.workbench.program.draft import tell_place
+from rcilab.workbench.run.readiness import time_shown
 from rcilab.workbench.text import Text
 from rcilab.workbench.view_actions import PLOTS, RATES, has_plot
 from rcilab.workbench.widgets import Ask, Html, Linked, esc, on_press
@@ -56,7 +59,8 @@ class TimelinePanel:
         text = self._text
         self._play.label = text("timeline.hold" if state.playing else "timeline.play")
         self._play.disabled = state.plan is None
-        self._scrub.show(round(100.0 * state.place, 1))
+        duration = 0.0 if state.plan is None else state.plan.motion.duration
+        self._scrub.show(round(100.0 * min(time_shown(state, status) / max(duration, CYCLE_TIME), 1.0), 1))
         self._scrub.handle.disabled = state.plan is None
         self._rate.show(self._rates[state.rate])
         self._joint.show(self._joints[state.plot_joint])
@@ -83,13 +87,14 @@ class TimelinePanel:
         if state.plan is None:
             return f'<p class="rl-note rl-welcome">{esc(text("timeline.nothing"))}</p>'
         duration = state.plan.motion.duration
-        t, kinds = state.place * duration, text("timeline.plan_only")
+        t, kinds = min(time_shown(state, status), duration), text("timeline.plan_only")
         if state.recording is not None:
             kinds = text("timeline.kinds", delay=state.recording.delay)
             if status.q is None:
                 kinds = text("timeline.replayed")
         where = tell_place(state.plan, t)
         kinds = kinds if where is None else text.say(where)
+        kinds = kinds if outdated(state) is None else f"▲ {text('check.outdated')}"
         return f'<p class="rl-clock"><b>{t:.3f}</b> / {duration:.3f} s<span>{esc(kinds)}</span></p>'
 
 

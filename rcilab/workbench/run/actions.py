@@ -8,6 +8,7 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from rcilab.clock import CYCLE_TIME
 from rcilab.errors import CertificateError, ConnectionLostError, ControlError, RcilabError
 from rcilab.model import load_model
 from rcilab.posing.reach import Tone
@@ -46,6 +47,7 @@ class RobotActions:
         self._untouched: Goal | None = store.state.goal  # The goal that nobody has posed yet.
         self._incident = 0
         self._phase = ""
+        self._reached: float | None = None  # [s] How far along the plan the moving arm is.
         self._guided = False
         self._asked_to_guide = -math.inf
 
@@ -180,6 +182,7 @@ class RobotActions:
             self._store.say("warn", message("notice.operator"))
         self._guided = is_guided(status) or (self._guided and status.phase == "stopping")
         before, self._phase = self._phase, status.phase
+        self._follow(status)
         self._record(status)
         if not self._placed and status.q_c is not None:
             self._placed = True
@@ -190,6 +193,16 @@ class RobotActions:
         if may_power and not self._powered:
             self._switch_on(status)
         return "rested" if before in ("moving", "stopping") and not is_moving(status) else None
+
+    def _follow(self, status: SupervisorStatus) -> None:
+        """Leaves the preview where the arm has left the plan."""
+        plan = self._store.state.plan
+        if is_moving(status):
+            self._reached = status.motion_place if status.motion_place is not None else self._reached
+        elif self._reached is not None and plan is not None:
+            place = min(self._reached / max(plan.motion.duration, CYCLE_TIME), 1.0)
+            self._reached = None
+            self._store.update(place=place)
 
     def _switch_on(self, status: SupervisorStatus) -> None:
         """Has the virtual arm's motors switched on, and tries again until that has succeeded once."""

@@ -66,6 +66,13 @@ def describe_move(state: UiState) -> Message | None:
     return ask_to_move(plan, state.target)
 
 
+def time_shown(state: UiState, status: SupervisorStatus) -> float:
+    """Returns where in the plan's time, [s], scrubber and cursor stand: where the arm is while it moves along it."""
+    if is_moving(status) and status.motion_place is not None:
+        return status.motion_place
+    return 0.0 if state.plan is None else state.place * state.plan.motion.duration
+
+
 def is_moving(status: SupervisorStatus) -> bool:
     """Returns whether the arm is being moved by us."""
     return status.phase in ("moving", "stopping")

@@ -144,7 +144,7 @@ class Stage:
         if q is not None:
             ghost.show(q)
         if visible != (name in self._visible):
-            self._visible.symmetric_difference_update((name,))
+            (self._visible.add if visible else self._visible.discard)(name)
             ghost.set_visible(visible)
 
 
