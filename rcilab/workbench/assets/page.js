@@ -11,6 +11,7 @@
   const recall = (name) => { try { return JSON.parse(sessionStorage.getItem("rcilab." + name)); } catch { return null; } };
   const keep = (name, value) => { try { sessionStorage.setItem("rcilab." + name, JSON.stringify(value)); } catch { /* Then not. */ } };
 
+  const SHOWN = 7000;  // [ms] A choice: long enough to read a notice twice.
   let live = null, said = {}, bar, chips, stop, take, question, toast, me = null, notice = recall("notice"), greeted = false, hideTimer = 0;
 
   const send = (message) => {
@@ -27,7 +28,7 @@
     toast.textContent = message.text;
     toast.className = "rl-shown rl-" + message.tone;
     clearTimeout(hideTimer);
-    hideTimer = setTimeout(() => { toast.className = ""; }, 7000);
+    hideTimer = setTimeout(() => { toast.className = ""; }, SHOWN);
   };
 
   const build = () => {
@@ -91,13 +92,18 @@
     question.setAttribute("aria-label", asked.text);
   };
 
-  // Said once to everybody who opens the page for the first time: what Esc does, and what it is not.
-  const sayOnce = () => {
+  // Said once in a browser, and each time in one that keeps nothing.
+  const sayOnce = (name, text) => {
     try {
-      if (localStorage.getItem("rcilab.stop")) return;
-      localStorage.setItem("rcilab.stop", "said");
-    } catch { /* A browser that keeps nothing is told each time. */ }
-    show({ tone: "info", text: said.stopHint });
+      if (!text || localStorage.getItem("rcilab." + name)) return;
+      localStorage.setItem("rcilab." + name, "said");
+    } catch { /* Then again. */ }
+    show({ tone: "info", text });
+  };
+  // What Esc does and what it is not; after that, in place of viser's own notice, what helps a page without a graphics card.
+  const welcome = () => {
+    sayOnce("stop", said.stopHint);
+    setTimeout(() => { if (document.getElementById("webgl-software-rendering")) sayOnce("software", said.software); }, SHOWN + 1000);
   };
 
   const draw = (list) => {
@@ -128,7 +134,7 @@
       if (greeted || notice !== null) show(news.notice);  // What was said before this page came is no news to it.
       keep("notice", notice = news.notice.serial);
     }
-    if (!greeted && said.stopHint) sayOnce();
+    if (!greeted && said.stopHint) welcome();
     greeted = true;
     if ("holder" in news || "take" in news || "question" in news) hold();
     if (news.viser) document.documentElement.dataset.rlViser = news.viser;

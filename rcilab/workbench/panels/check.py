@@ -42,7 +42,7 @@ class CheckPanel:
             self._slow = gui.add_button(text("check.slow"), icon="gauge", hint=text("check.slow_hint"))
             on_press(self._slow, ask, lambda page: requests.Check(page=page, what="slow"))
             self._undo = gui.add_button(
-                text("check.undo"), icon="arrow-back-up", color="gray", hint=text("check.undo_hint"), visible=False
+                text("check.undo"), icon="arrow-back-up", color="gray", hint=text("check.undo_hint"), disabled=True
             )
             on_press(self._undo, ask, lambda page: requests.Check(page=page, what="undo"))
             self._explain = gui.add_button(
@@ -73,7 +73,7 @@ class CheckPanel:
         self._bar.visible = busy and now - self._began > _MOMENT
         self._bar.value = round(100.0 * (check.progress if planning is None else planning), 1)
         self._cancel.visible = busy
-        self._undo.visible = check.slowed is not None and not busy
+        self._undo.disabled = check.slowed is None or busy
         changed = outdated(state)
         self._again.visible = changed is not None and not busy
         self._slow.disabled = plan is None or busy or changed is not None or is_moving(status)

@@ -31,6 +31,7 @@ def status_values(state: UiState, status: SupervisorStatus, text: Text, cursor_e
         "stop": text("stop.label"),
         "stopHint": text("stop.note"),
         "lost": text("bar.lost"),
+        "software": text("bar.software") if state.quality == "full" else "",
         "chips": _chips(state, status, text),
         "cursor": _cursor(state, status, cursor_end),
         "theme": state.theme,
