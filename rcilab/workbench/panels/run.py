@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from rcilab.motion.pacing import SLOWEST_PACE
 from rcilab.workbench import requests
+from rcilab.workbench.check.freshness import outdated
 from rcilab.workbench.panels.outcome import outcome_html, way_html
 from rcilab.workbench.panels.target import planned_html
 from rcilab.workbench.run.readiness import describe_move, is_moving, may_go_back, may_plan_again, obstacle
@@ -88,7 +89,8 @@ class RunPanel:
         self._question.show(said and f'<p class="rl-verdict rl-warn" role="alert">{said}</p>')
         self._execute.visible = question is None
         self._agree.visible = self._cancel.visible = question is not None
-        self._reason.show("" if reason is None else f'<p class="rl-note rl-why">{esc(text.say(reason))}</p>')
+        unsaid = None if reason == outdated(state) else reason
+        self._reason.show("" if unsaid is None else f'<p class="rl-note rl-why">{esc(text.say(unsaid))}</p>')
         self._again.visible, self._back.visible = may_plan_again(reason), may_go_back(reason)
         self._pause.visible, self._resume.visible = status.code == "moving", status.code == "moving.held"
         self._pause.disabled = status.motion_place is None
