@@ -12,11 +12,38 @@ from rcilab.conformance.start import StartState
 from rcilab.errors import PlanningError
 from rcilab.model import RobotModel
 from rcilab.motion.motion import Motion
-from rcilab.motion.pacing import PacedMotion, changed_pace
+from rcilab.motion.pacing import PacedMotion, begun_at, changed_pace, require_pace
 from rcilab.state import Mode
 
 _ATTEMPTS = 12  # Candidates that are judged in full; a choice.
 _PAST = 3  # Rows that the differences of a row reach back to.
+
+
+def plan_start(motion: Motion, pace: float, model: RobotModel, mode: Mode) -> PacedMotion:
+    """Returns a motion that runs at a pace from its first row on, judged by the conditions of its mode.
+
+    The way is the one that was judged, so safety box and distances need no other look; at 1 nothing does.
+
+    Args:
+        motion: The motion, judged as planned.
+        pace: `SLOWEST_PACE` to 1.
+        model: The arm, with its tool and load.
+        mode: How it is commanded.
+
+    Raises:
+        InvalidValueError: The pace is out of range.
+        PlanningError: At this pace it breaks a condition that it keeps as planned, as torques may that hold the arm.
+    """
+    paced = begun_at(motion, require_pace(pace))
+    if not paced.changed:
+        return paced
+    broken = _breaches(paced, model, mode)
+    if broken:
+        raise PlanningError(
+            f"at {100 * pace:.0f} % of its speed this motion would break a condition ({broken[0].condition.id} at "
+            f"t = {broken[0].time:.3f} s) that it keeps as planned; choose another pace"
+        ).coded("pace_breaks", pace=f"{100 * pace:.0f}", id=broken[0].condition.id, time=f"{broken[0].time:.3f}")
+    return paced
 
 
 def plan_pace(paced: PacedMotion, cycle: int, pace: float, model: RobotModel, mode: Mode) -> PacedMotion:

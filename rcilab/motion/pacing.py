@@ -80,6 +80,31 @@ def as_planned(motion: Motion) -> PacedMotion:
     return PacedMotion(motion=motion, q=motion.q, place=place, rate=sealed(np.ones(count)), drate=still, ddrate=still)
 
 
+def begun_at(motion: Motion, pace: float) -> PacedMotion:
+    """Returns a motion that runs at a pace from its first row on; as planned at 1.
+
+    Args:
+        motion: The motion; it begins and ends at rest.
+        pace: Above 0, to 1.
+    """
+    if pace == 1.0:
+        return as_planned(motion)
+    count = int(np.ceil(motion.duration / (pace * CYCLE_TIME) - _ROUNDING)) + 1
+    place = np.minimum(pace * CYCLE_TIME * np.arange(count), motion.duration)
+    place[-1] = motion.duration
+    still = sealed(np.zeros(count))
+    return PacedMotion(
+        motion=motion,
+        q=sealed(np.concatenate((motion.q[:1], _rows(motion, place[1:])))),
+        place=sealed(place),
+        rate=sealed(np.full(count, pace)),
+        drate=still,
+        ddrate=still,
+        pace=pace,
+        changed=1,
+    )
+
+
 def require_pace(pace: object) -> float:
     """Returns a pace if it is one.
 

@@ -67,7 +67,9 @@ class ArmRequests:
         """Asks for motor power to be taken away."""
         return self._ask("power off", kind="power", on=False)
 
-    def execute(self, motion: Motion, certificate: Certificate, mode: Mode = "joint_position") -> Ticket:
+    def execute(
+        self, motion: Motion, certificate: Certificate, mode: Mode = "joint_position", *, pace: float = 1.0
+    ) -> Ticket:
         """Streams a checked motion; the ticket is done when the arm stands still again.
 
         Args:
@@ -75,12 +77,17 @@ class ArmRequests:
             certificate: From `check(motion, model, mode=mode).certificate`.
             mode: How the arm is commanded: the same way as joint angles, as poses of the tool, or as torques; see
                 `rcilab.client.commanding`.
+            pace: Part of its planned speed that it runs at from the beginning, 0.1 to 1; `set_pace` changes it later.
 
         Raises:
+            InvalidValueError: The pace is out of range.
+            PlanningError: At this pace it would break a condition, or last too long.
             CertificateError: The certificate is missing, or does not fit the motion, the model, or where the arm is.
             UsageError: The arm is moving, no controller is connected, nobody is at the controls, the motion takes more
                 than 300 s, or the controller has not taken the set-up it was told last.
         """
+        from rcilab.conformance.pacing import plan_start
+
         require_admissible(
             motion,
             certificate,
@@ -90,11 +97,12 @@ class ArmRequests:
             box=self._setup.wanted.box,
             mode=mode,
         )
+        paced = plan_start(motion, pace, self.model, mode)
         with self._lock:
             self._require_block()
             self._setup.require_given()
-            self._pace.begin(motion, self.model, mode)
-            return self._ask("execute", kind="execute", rows=len(motion), duration=motion.duration, mode=mode)
+            self._pace.begin(paced, self.model, mode)
+            return self._ask("execute", kind="execute", rows=len(paced.q), duration=paced.duration, mode=mode)
 
     def pause(self) -> Ticket:
         """Holds the motion under way, along its way and within all limits; done once that is handed over.

@@ -8,14 +8,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from rcilab.errors import PlanningError, RcilabError, UsageError
-from rcilab.motion.pacing import PacedMotion, as_planned
+from rcilab.motion.pacing import PacedMotion
 from rcilab.state import Mode
 from rcilab.supervisor.layout import MOTION_ROWS, MOTION_TIME, ControlBlock
 from rcilab.supervisor.ticket import Ticket
 
 if TYPE_CHECKING:
     from rcilab.model import RobotModel
-    from rcilab.motion import Motion
 
 LEADS = (120, 400, 1500, 5000)  # Cycles from now on which another pace begins: what planning it may take.
 HANDING_OVER = 40  # Cycles between now and the first row that is exchanged.
@@ -50,12 +49,18 @@ class PaceDesk:
         self.mode: Mode = "joint_position"
         self._before: tuple[Ticket, PacedMotion | None, list[HandedOver]] | None = None
 
-    def begin(self, motion: Motion, model: RobotModel, mode: Mode) -> None:
-        """Takes note of a motion that begins and writes its rows into the block, from the first place on."""
-        rows = motion.q
+    def begin(self, paced: PacedMotion, model: RobotModel, mode: Mode) -> None:
+        """Takes note of a motion that begins and writes its rows into the block, from the first place on.
+
+        Raises:
+            PlanningError: There is no room: at its pace the motion lasts too long.
+        """
+        rows = paced.q
+        if len(rows) > MOTION_ROWS:
+            raise _too_long(paced)
         self._block.motion[: len(rows)] = rows
         self._in_use = [HandedOver(0, 0, len(rows))]
-        self.paced, self._model, self.mode = as_planned(motion), model, mode
+        self.paced, self._model, self.mode = paced, model, mode
         self._before = None
 
     def plan(self, pace: float, lead: int, cycle: int) -> PacedMotion:
@@ -92,10 +97,7 @@ class PaceDesk:
         tail = changed.q[first:]
         place = _free_place(used, len(tail))
         if place is None:
-            raise PlanningError(
-                f"at this pace the motion would last {changed.duration:.0f} s; {MOTION_TIME:g} s at most can be handed "
-                "over, less what is being streamed; choose a faster one"
-            ).coded("pace_long", duration=f"{changed.duration:.0f}", most=f"{MOTION_TIME:g}")
+            raise _too_long(changed)
         self._block.motion[place : place + len(tail)] = tail
         return HandedOver(first, place, len(tail))
 
@@ -118,6 +120,13 @@ class PaceDesk:
         self._before = None
         if ticket.error is not None:
             self.paced, self._in_use = paced, in_use
+
+
+def _too_long(paced: PacedMotion) -> PlanningError:
+    return PlanningError(
+        f"at this pace the motion would last {paced.duration:.0f} s; {MOTION_TIME:g} s at most can be handed over, "
+        "less what is being streamed; choose a faster one"
+    ).coded("pace_long", duration=f"{paced.duration:.0f}", most=f"{MOTION_TIME:g}")
 
 
 def _free_place(used: list[HandedOver], count: int) -> int | None:

@@ -7,7 +7,7 @@ import pytest
 
 from rcilab.clock import CYCLE_TIME
 from rcilab.conformance import check
-from rcilab.conformance.pacing import plan_pace
+from rcilab.conformance.pacing import plan_pace, plan_start
 from rcilab.errors import InvalidValueError, PlanningError
 from rcilab.model import load_model
 from rcilab.motion import Motion, plan_joint, plan_line
@@ -76,10 +76,35 @@ def test_what_has_arrived_has_no_pace():
         plan_pace(as_planned(motion), len(motion) + 10, 0.0, MODEL, "joint_position")
 
 
+@pytest.mark.parametrize("mode", ["joint_position", "cartesian_position"])
+@pytest.mark.parametrize("plan", [joint_motion, line])
+@pytest.mark.parametrize("pace", [0.1, 0.37, 0.9])
+def test_begun_at_a_pace_it_is_never_faster_and_goes_the_same_way(plan, pace, mode):
+    motion = plan(0.4)
+    slow = plan_start(motion, pace, MODEL, mode)
+    assert slow.duration == pytest.approx(motion.duration / pace, abs=CYCLE_TIME)
+    rates = np.abs(np.diff(slow.q, axis=0)).max(axis=0) / CYCLE_TIME
+    assert (rates <= 1.0001 * pace * np.abs(motion.dq).max(axis=0) + 1e-6).all()
+    assert np.array_equal(slow.q[0], motion.q[0])
+    assert np.array_equal(slow.q[-1], motion.goal)
+    for row in range(0, len(slow.q) - 1, 97):
+        assert slow.q[row] == pytest.approx(motion.at(float(slow.place[row])).q, abs=1e-12)
+    assert check(slow.as_motion(), MODEL, distance=None, mode=mode).ok
+    fast = plan_pace(slow, 200, 1.0, MODEL, mode)
+    assert np.array_equal(fast.q[-1], motion.goal)
+    assert fast.duration < slow.duration
+
+
+def test_what_breaks_a_condition_at_its_pace_is_refused():
+    with pytest.raises(PlanningError, match=r"torque\.rate at t = .* choose another pace"):
+        plan_start(joint_motion(0.8), 0.9, MODEL, "torque")  # Nor would it be allowed as planned.
+
+
 def test_nothing_asked_for_leaves_the_motion_itself():
     motion = joint_motion(0.5)
     paced = as_planned(motion)
     assert paced.as_motion() is motion
+    assert plan_start(motion, 1.0, MODEL, "joint_position").as_motion() is motion
     assert paced.q is motion.q
     assert paced.place_at(10) == pytest.approx(10 * CYCLE_TIME)
     assert not paced.holds

@@ -106,6 +106,23 @@ def test_held_gone_on_with_slower_and_arrived(supervisor, mode):
         assert np.array_equal(rows["command"], sent)
 
 
+def test_a_motion_that_is_to_run_slowly_does_so_from_its_first_row_on(supervisor):
+    motion, certificate = planned(supervisor)
+    with pytest.raises(InvalidValueError, match="pace"):
+        supervisor.execute(motion, certificate, pace=0.01)
+    ticket = supervisor.execute(motion, certificate, pace=0.3)
+    wait_until_at(supervisor, 0.2)
+    assert supervisor.status().pace == 0.3
+    assert supervisor.status().motion_place == pytest.approx(0.3 * supervisor.status().motion_time, abs=0.05)
+    ticket.wait(SOON)
+    assert supervisor.status().q_c == pytest.approx(motion.goal, abs=1e-7)
+    rows = moved_rows(supervisor)
+    assert len(rows) > len(motion) / 0.31
+    sent = rows["command"][np.diff(rows["message_id"], prepend=0) == 1]
+    fastest = np.abs(np.diff(sent, axis=0)).max(axis=0) / 1e-3
+    assert (fastest < 0.31 * np.abs(motion.dq).max(axis=0)).all()
+
+
 def test_a_held_motion_is_stopped_as_any_other(supervisor):
     motion, certificate = planned(supervisor, speed=0.1, size=4.0)
     ticket = supervisor.execute(motion, certificate)

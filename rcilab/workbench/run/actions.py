@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from rcilab.clock import CYCLE_TIME
-from rcilab.errors import CertificateError, ConnectionLostError, ControlError, RcilabError
+from rcilab.errors import CertificateError, ConnectionLostError, ControlError, PlanningError, RcilabError
 from rcilab.model import load_model
 from rcilab.posing.reach import Tone
 from rcilab.workbench import requests
@@ -233,8 +233,8 @@ class RobotActions:
         supervisor = self._session.supervisor()
         supervisor.drain()
         try:
-            ticket = supervisor.execute(state.plan.motion, certificate, mode)
-        except CertificateError as error:
+            ticket = supervisor.execute(state.plan.motion, certificate, mode, pace=state.drive.pace)
+        except (CertificateError, PlanningError) as error:
             self._store.say("warn", tell_error(error))
             return
         self._arrival = state.plan.short
