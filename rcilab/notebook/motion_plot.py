@@ -23,6 +23,7 @@ from rcilab.views.plots import (
     plan_curves,
     recorded_curves,
 )
+from rcilab.words.plot_scale import plot_scale
 
 _BUCKETS = 200  # Of time; each shows its smallest and largest value, so no spike is lost.
 _UNITS: dict[Quantity, str] = {"q": "deg", "dq": "deg/s", "ddq": "deg/s²", "jerk": "deg/s³"}
@@ -108,7 +109,7 @@ class MotionPlot(Part):
         joint = int(self.joint.value)
         errors = np.degrees(np.nan_to_num(run.error))
         chosen = errors[:, joint - 1 : joint] if joint else errors
-        frame = build_error_frame(times, chosen, last, _BUCKETS)
+        frame = build_error_frame(times, chosen, last, plot_scale("error").least, _BUCKETS)
         return Panel(title=self.text("plot.error"), unit="deg", frame=frame)
 
     def _point(self) -> None:

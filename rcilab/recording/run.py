@@ -17,6 +17,7 @@ from rcilab.clock import CYCLE_TIME
 from rcilab.faults import FAULT_COUNT, Fault
 from rcilab.recording.setup import Setup
 from rcilab.recording.tracking import Tracking, compute_tracking
+from rcilab.words.units import USUAL, Units
 
 if TYPE_CHECKING:
     from rcilab.conformance import Report
@@ -230,6 +231,7 @@ class Run:
         *,
         progress: Callable[[float], None] | None = None,
         language: str = "en",
+        units: Units = USUAL,
     ) -> None:
         """Writes the run to a file; its ending chooses the format.
 
@@ -246,6 +248,7 @@ class Run:
             file: Its name; an existing file is replaced.
             progress: Told the share that is done, 0 to 1.
             language: Of the HTML page, "en" or "zh".
+            units: Of the HTML page; numbers for programs are SI.
 
         Raises:
             InvalidValueError: The ending is unknown, or the file cannot be written.
@@ -253,7 +256,7 @@ class Run:
         """
         from rcilab.recording.export import save_run
 
-        save_run(self, file, progress=progress, language=language)
+        save_run(self, file, progress=progress, language=language, units=units)
 
     def to_pandas(self) -> Any:
         """Returns the columns of the CSV as a `pandas.DataFrame`, indexed by t; units stand in `.attrs["units"]`.

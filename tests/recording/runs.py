@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -40,6 +41,13 @@ def some_long_run(times: int = 60) -> Run:
     cycles = np.tile(some_cycles(), times)
     cycles["t"], cycles["message_id"] = 1e-3 * np.arange(len(cycles)), 5 + np.arange(len(cycles))
     return build_run(cycles, plan=None, model=MODEL, setup=SETUP)
+
+
+def some_ideal_run() -> Run:
+    """An arm that is exactly where it is told to be."""
+    cycles = some_cycles().copy()
+    cycles["q"] = cycles["q_c"]
+    return build_run(cycles, plan=PLAN, model=MODEL, setup=replace(SETUP, plant="ideal"))
 
 
 def some_run(**facts) -> Run:

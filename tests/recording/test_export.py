@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from rcilab.recording.export import export_run
-from tests.recording.runs import OFFSET, SETUP, some_run
+from rcilab.words.units import Units
+from tests.recording.runs import OFFSET, SETUP, some_ideal_run, some_run
 
 RUN = some_run()
 
@@ -91,6 +92,22 @@ def test_progress_ends_at_one_and_never_goes_back():
         export_run(RUN, ending, progress=shares.append)
         assert shares == sorted(shares)
         assert shares[-1] == 1.0
+
+
+def content_of(page: bytes):
+    return json.loads(page.decode().split('id="content">')[1].split("</script>")[0])
+
+
+def test_the_page_is_drawn_in_the_units_of_the_workbench_and_never_finer_than_its_plots():
+    si = content_of(export_run(some_ideal_run(), ".html", units=Units(angle="rad", length="m")))
+    assert [chart["unit"] for chart in si["charts"]] == ["rad", "rad/s", "N·m", "mrad", "mm"]
+    assert si["facts"]["errors"][1] == ["J2", "0.000000 rad", "0.000000 rad"]
+    assert si["run"]["limits"]["q"][1] == pytest.approx(RUN.model.limits.joint.upper)
+    usual = content_of(export_run(some_ideal_run(), ".html"))
+    assert [chart["unit"] for chart in usual["charts"]] == ["°", "°/s", "N·m", "°", "mm"]
+    assert usual["charts"][3]["least"] == pytest.approx(0.02)
+    assert usual["path"]["worst_told"] == "0.02 mm"  # Not 1.0e-9 mm.
+    assert content_of(export_run(RUN, ".html"))["path"]["worst_told"] == "0.63 mm"
 
 
 def test_the_page_asks_for_nothing_from_elsewhere_and_speaks_both_languages():

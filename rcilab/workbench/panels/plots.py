@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from typing import TYPE_CHECKING, Any, cast
 
@@ -20,7 +19,7 @@ from rcilab.views.plots import (
     recorded_curves,
 )
 from rcilab.views.tool_curves import TOOL_QUANTITIES, ToolQuantity, tool_curves, tool_limit
-from rcilab.words.units import Units
+from rcilab.words.plot_scale import ERRORS, PlotScale, plot_scale
 from rcilab.workbench.panels.plot_contents import legend_html, plot_axes, plot_contents
 from rcilab.workbench.text import Text
 from rcilab.workbench.view_actions import PLOTS, has_plot
@@ -31,13 +30,6 @@ if TYPE_CHECKING:
 
 _REDRAW_TIME = 0.25  # [s] A choice: plots are redrawn at most so often while something is dragged or moves.
 _LEISURE = 8.0  # A choice: and take at most an eighth of the time, however long the motion is.
-_SI = {
-    "q": "rad", "dq": "rad/s", "ddq": "rad/s^2", "jerk": "rad/s^3", "tau": "N m", "speed": "m/s",
-    "acceleration": "m/s^2", "psi": "rad", "error": "rad", "tool": "m",
-}  # fmt: skip
-_ERRORS = ("error", "tool")
-"""There once a motion has been executed."""
-_LEAST_ERROR = {"error": math.radians(0.02), "tool": 2e-5}  # [rad, m] A choice: with less, ticks would be rounded.
 _OTHER_HEIGHT = 46 + 62 + 170 + 30  # [px] Bar, window head, strip and choices, legend.
 _HINT = 44  # [px] What to do first takes more room than the clock that stands in its place later.
 _TITLE, _TIMES = 20, 26  # [px] A plot's title, and the times below the last one.
@@ -114,16 +106,17 @@ class Plots:
         self._visible = visible
 
     def _draw(self, state: UiState, name: str) -> None:
-        factor, unit = shown_unit(name, self._text.units)
+        scale = plot_scale(name, self._text.units)
+        factor, unit = scale.factor, scale.unit
         joint = 0 if name in (*TOOL_QUANTITIES, "tool") else state.plot_joint
-        if name in _ERRORS:
-            frame = self._error_frame(state, name, factor)
+        if name in ERRORS:
+            frame = self._error_frame(state, name, scale)
         elif name in TOOL_QUANTITIES:
             frame = self._tool_frame(state, cast("ToolQuantity", name), factor)
         else:
             frame = self._joint_frame(state, cast("Quantity", name), factor)
             unit = unit if joint else self._text("plot.percent")
-        if name not in _ERRORS:
+        if name not in ERRORS:
             self.end = frame.end
         if state.recording is not None and state.recording.moment is not None:
             frame = mark_moment(frame, state.recording.moment)
@@ -136,9 +129,9 @@ class Plots:
         if plot.series != series:
             plot.series = series
         plot.data = data
-        scale = {"x": {"time": False, "range": (0.0, frame.end)}, "y": {"range": reach}}
-        if plot.scales != scale:
-            plot.scales = scale
+        scales = {"x": {"time": False, "range": (0.0, frame.end)}, "y": {"range": reach}}
+        if plot.scales != scales:
+            plot.scales = scales
 
     def _joint_frame(self, state: UiState, name: Quantity, factor: float) -> Frame:
         plan, recording, actual = state.plan, state.recording, None
@@ -161,25 +154,16 @@ class Plots:
             actual = tool_curves(state.model, _times(recording), q, name)
         return build_tool_frame(self._planned.get(name), actual, tool_limit(state.model.limits, name), factor)
 
-    def _error_frame(self, state: UiState, name: str, factor: float) -> Frame:
+    def _error_frame(self, state: UiState, name: str, scale: PlotScale) -> Frame:
         """Returns measured against planned of a finished motion: of the joints, or of the tool."""
         recording, joint = state.recording, state.plot_joint
         assert recording is not None
         assert recording.tracking is not None
         t, tracking = _times(recording), recording.tracking
         last = last_time(*(plan_curves(p.motion, "q") for p in (state.plan,) if p is not None), Curves(t=t, values=t))
-        if name == "tool":
-            return build_error_frame(t, factor * tracking.position[:, None], last, least=factor * _LEAST_ERROR[name])
         errors = tracking.joint if not joint else tracking.joint[:, joint - 1 : joint]
-        return build_error_frame(t, factor * errors, last, least=factor * _LEAST_ERROR[name])
-
-
-def shown_unit(name: str, units: Units) -> tuple[float, str]:
-    """Returns how many of its unit in a plot one SI unit is, and that one's name."""
-    factor, unit = units.from_si(_SI[name])
-    if name in _ERRORS and factor == 1.0:  # Errors are small, and a plot's numbers end three digits behind the point.
-        return 1e3, f"m{unit}"
-    return factor, unit
+        errors = tracking.position[:, None] if name == "tool" else errors
+        return build_error_frame(t, scale.factor * errors, last, scale.least)
 
 
 def _wanted(state: UiState) -> tuple[str, ...]:
@@ -187,7 +171,7 @@ def _wanted(state: UiState) -> tuple[str, ...]:
     return tuple(
         name
         for name in PLOTS
-        if name in state.plots and has_plot(state.model, name) and (finished or name not in _ERRORS)
+        if name in state.plots and has_plot(state.model, name) and (finished or name not in ERRORS)
     )
 
 
@@ -202,4 +186,4 @@ def _height(state: UiState, rows: int) -> int:
 
 
 def _axes(name: str, state: UiState, visible: tuple[str, ...]) -> tuple[Any, ...]:
-    return plot_axes(state.theme, last=name == (visible or PLOTS)[-1], space=16 if name in _ERRORS else 28)
+    return plot_axes(state.theme, last=name == (visible or PLOTS)[-1], space=16 if name in ERRORS else 28)
