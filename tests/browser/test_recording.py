@@ -14,6 +14,15 @@ from rcilab.workbench.run.keeper import whole_recording
 from tests.recording.runs import some_ideal_run, some_long_run, some_run
 
 
+def plot_numbers(page) -> list[list[str]]:
+    """The numbers beside every plot that is shown, upwards."""
+    return page.tab.evaluate(
+        "() => Object.values(__viserTestpoints.uplots).filter(({ chart }) => chart.root.offsetParent !== null)"
+        ".sort((a, b) => a.chart.root.getBoundingClientRect().top - b.chart.root.getBoundingClientRect().top)"
+        ".map(({ chart }) => (chart.axes[1]._values || []).map(String))"
+    )
+
+
 def test_a_run_is_shown_against_its_plan_and_downloaded(page, tmp_path):
     page.plan_to(1, 12.0 if page.status.q_c[0] <= 0 else -12.0)
     page.open_tab("Run")
@@ -24,6 +33,9 @@ def test_a_run_is_shown_against_its_plan_and_downloaded(page, tmp_path):
         lambda: "Ran to its end" in page.tab.locator(".rl-verdict:visible").all_inner_texts().__str__(), "its end"
     )
     page.wait(lambda: page.tab.locator(".rl-plot-title", has_text="Error of the tool").count() == 1, "a plot of errors")
+    page.wait(lambda: len(plot_numbers(page)) == 6, "six plots")
+    assert all(len(numbers) >= 2 for numbers in plot_numbers(page)), plot_numbers(page)
+    assert plot_numbers(page)[:4] == [["-100", "0", "100"]] * 4  # As low as they are on a small page.
     page.unfold("Recording")
     page.wait(lambda: page.button("CSV").is_enabled(), "exports to be pressable")
     with page.tab.expect_download(timeout=20_000) as coming:

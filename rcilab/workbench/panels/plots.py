@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import time
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
 from rcilab.clock import CYCLE_TIME
+from rcilab.views.plot_ticks import axis_ticks
 from rcilab.views.plots import (
     Curves,
     Frame,
@@ -32,7 +34,11 @@ _REDRAW_TIME = 0.25  # [s] A choice: plots are redrawn at most so often while so
 _LEISURE = 8.0  # A choice: and take at most an eighth of the time, however long the motion is.
 _OTHER_HEIGHT = 46 + 62 + 170 + 30  # [px] Bar, window head, strip and choices, legend.
 _HINT = 44  # [px] What to do first takes more room than the clock that stands in its place later.
+_MARGIN = 6  # [px] Above and below: half of a number that stands at the very end of an axis.
 _TITLE, _TIMES = 20, 26  # [px] A plot's title, and the times below the last one.
+
+_Reach: TypeAlias = tuple[float, float, tuple[float, ...]]
+"""Where the axis of a plot ends, below and above, and the limits in it."""
 
 
 class Plots:
@@ -52,6 +58,7 @@ class Plots:
         """Adds a plot of every kind; those that were not chosen stay hidden."""
         self._plots: dict[str, Any] = {}
         self._titles: dict[str, Html] = {}
+        self._reaches: dict[str, _Reach] = dict.fromkeys(PLOTS, (-112.0, 112.0, (-100.0, 100.0)))
         empty = build_frame(None, None, state.model.limits.joint, "q", 0)
         data, series, bands = plot_contents(empty, 0, state.model.n, state.theme)
         self._visible = _wanted(state)
@@ -63,10 +70,10 @@ class Plots:
                 bands=bands,
                 height=_height(state, len(self._visible)),
                 legend={"show": False},
-                scales={"x": {"time": False, "range": (0.0, 1.0)}, "y": {"range": (-112.0, 112.0)}},
+                scales={"x": {"time": False, "range": (0.0, 1.0)}, "y": {"range": self._reaches[name][:2]}},
                 cursor={"drag": {"x": False, "y": False}, "sync": {"key": "rcilab"}},
-                padding=(6, 12, 6, 0),  # Below: half of a tick's number that stands at the very end of the axis.
-                axes=_axes(name, state, self._visible),
+                padding=(_MARGIN, 12, _MARGIN, 0),
+                axes=self._axes(name, state, self._visible),
                 visible=name in self._visible,
             )
         self._legend = Html(gui)
@@ -76,13 +83,16 @@ class Plots:
         if state.plan is not self._plan:
             self._plan, self._planned = state.plan, {}
         visible = _wanted(state)
-        if visible != self._visible:
-            self._arrange(state, visible)
+        is_rearranged = visible != self._visible
+        if is_rearranged:
+            self._arrange(visible)
         height = _height(state, len(visible))
         for name in visible:
             wanted_height = height + (_TIMES if name == visible[-1] else 0)
             if self._plots[name].height != wanted_height:
-                self._plots[name].height = wanted_height
+                self._plots[name].height, is_rearranged = wanted_height, True
+        if is_rearranged:
+            self._fit(state, visible)
         wanted = (state.plan, state.recording, state.plot_joint, state.model, visible)
         now = time.monotonic()
         if wanted != self._drawn and now >= self._next:
@@ -93,16 +103,27 @@ class Plots:
             self._legend.show(
                 legend_html(state.plot_joint, state.model.n, self._text, state.theme, has_actual=has_actual)
             )
+            self._fit(state, visible)
             self._next = now + max(_REDRAW_TIME, _LEISURE * (time.monotonic() - now))
 
-    def _arrange(self, state: UiState, visible: tuple[str, ...]) -> None:
+    def _fit(self, state: UiState, visible: tuple[str, ...]) -> None:
+        """Gives every plot as many numbers as it is high enough for."""
+        for name in visible:
+            axes = self._axes(name, state, visible)
+            if self._plots[name].axes != axes:
+                self._plots[name].axes = axes
+
+    def _axes(self, name: str, state: UiState, visible: tuple[str, ...]) -> tuple[Any, ...]:
+        low, high, limits = self._reaches[name]
+        ticks = axis_ticks(low, high, _height(state, len(visible)) - 2 * _MARGIN, limits)
+        return plot_axes(state.theme, last=name == (visible or PLOTS)[-1], ticks=ticks)
+
+    def _arrange(self, visible: tuple[str, ...]) -> None:
         for name, plot in self._plots.items():
             if plot.visible != (name in visible):
                 plot.visible = name in visible
             if name not in visible:
                 self._titles[name].show("")
-        for name in {*self._visible[-1:], *visible[-1:]}:
-            self._plots[name].axes = _axes(name, state, visible)
         self._visible = visible
 
     def _draw(self, state: UiState, name: str) -> None:
@@ -122,14 +143,15 @@ class Plots:
             frame = mark_moment(frame, state.recording.moment)
         title = self._text(f"plot.{name}") + (f" · J{joint}" if joint else "") + f" [{unit}]"
         self._titles[name].show(f'<div class="rl-plot-title">{esc(title)}</div>')
-        reach = (0.0 if name in ("speed", "acceleration", "tool") else -frame.bound, frame.bound)
+        low = 0.0 if name in ("speed", "acceleration", "tool") else -frame.bound
+        self._reaches[name] = low, frame.bound, tuple(v for v in (frame.lower, frame.upper) if math.isfinite(v))
         is_tool = name in (*TOOL_QUANTITIES, "tool")
         data, series, _ = plot_contents(frame, joint, state.model.n, state.theme, is_tool=is_tool)
         plot = self._plots[name]
         if plot.series != series:
             plot.series = series
         plot.data = data
-        scales = {"x": {"time": False, "range": (0.0, frame.end)}, "y": {"range": reach}}
+        scales = {"x": {"time": False, "range": (0.0, frame.end)}, "y": {"range": (low, frame.bound)}}
         if plot.scales != scales:
             plot.scales = scales
 
@@ -183,7 +205,3 @@ def _height(state: UiState, rows: int) -> int:
     hint = 0 if state.plan is not None else _HINT
     spare = state.height - _OTHER_HEIGHT - hint - _TIMES - _TITLE * rows
     return max(72, min(int(spare / max(rows, 1)), 260)) // 4 * 4
-
-
-def _axes(name: str, state: UiState, visible: tuple[str, ...]) -> tuple[Any, ...]:
-    return plot_axes(state.theme, last=name == (visible or PLOTS)[-1], space=16 if name in ERRORS else 28)
