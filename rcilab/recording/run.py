@@ -16,7 +16,7 @@ from rcilab.arrays import Array, JointPath
 from rcilab.clock import CYCLE_TIME
 from rcilab.faults import FAULT_COUNT, Fault
 from rcilab.recording.setup import Setup
-from rcilab.recording.tracking import Tracking, compute_tracking
+from rcilab.recording.tracking import Tracking, compute_tracking, find_stop, last_compared
 from rcilab.words.units import USUAL, Units
 
 if TYPE_CHECKING:
@@ -141,17 +141,31 @@ class Run:
         wanted = self.command
         if self.plan is not None and not np.isfinite(wanted).any():  # Sent as poses: the plan says which angles.
             wanted = self._planned(0)
+            if self.stop_time is not None:
+                wanted[self.t >= self.stop_time] = np.nan
         return find_delay(self.q_c, wanted)
+
+    @property
+    def stop_time(self) -> float | None:
+        """When the arm stopped following its plan, [s]; None: it followed to its end.
+
+        That is when somebody began to bring it to rest, or when the controller showed a fault or ended the motion.
+        """
+        return find_stop(self.cycles)
 
     @property
     def error(self) -> JointPath:
         """Measured minus planned joint angles, shape (N, n), [rad], with the play-out delay taken out.
 
-        Without a plan, measured minus commanded.
+        NaN from `stop_time` on: an arm that is brought to rest leaves its plan on purpose. Without a plan, measured
+        minus commanded.
         """
         if self.plan is None:
             return self._lag()
-        return self.q - self._planned(self.delay)
+        delay = self.delay
+        error = self.q - self._planned(delay)
+        error[last_compared(self.cycles, delay) :] = np.nan
+        return error
 
     @property
     def planned(self) -> JointPath:
@@ -163,7 +177,7 @@ class Run:
 
     @property
     def tracking(self) -> Tracking:
-        """Error per joint and at the tool, over time, as RMS and as maximum; against the commands without a plan."""
+        """`error` per joint and at the tool, over time, as RMS and as maximum."""
         return compute_tracking(self.model, self.q, self.q - self.error)
 
     @property
@@ -196,8 +210,7 @@ class Run:
         return self.q - wanted
 
     def _largest_error(self) -> str:
-        """In words; of a motion that was stopped against the commands, because it left its plan on purpose."""
-        return f"{_degrees(self._lag() if self.stopped else self.error):.3g} deg"
+        return f"{_degrees(self.error):.3g} deg"
 
     @property
     def timing(self) -> Timing:

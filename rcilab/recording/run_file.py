@@ -247,8 +247,7 @@ def _build(blocks: tuple[Block, ...]) -> Run:
     dtype = np.dtype([(name, kind, tuple(shape)) for name, kind, shape in head["fields"]])
     if dtype.itemsize != head["bytes"]:
         raise ValueError(f"a cycle takes {head['bytes']} bytes, its fields {dtype.itemsize}")
-    if "q" not in (dtype.names or ()) or dtype != cycle_dtype(dtype["q"].shape[0]):
-        raise ValueError("its cycles have other fields than this version writes")
+    dtype = _known(dtype)
     parts = [_decode_cycles(block.payload, dtype) for block in blocks if block.kind == "CYCL"]
     cycles = np.concatenate(parts) if parts else np.zeros(0, dtype)
     cycles.flags.writeable = False
@@ -268,6 +267,22 @@ def _build(blocks: tuple[Block, ...]) -> Run:
         setup=Setup.from_dict(head["setup"]),
         is_complete=bool(tails),
     )
+
+
+def _known(dtype: np.dtype[np.void]) -> np.dtype[np.void]:
+    """Returns today's layout of a cycle for that of a file: what was reserved when it was written may have a name now.
+
+    Raises:
+        ValueError: The two do not fit.
+    """
+    ours = cycle_dtype(dtype["q"].shape[0]) if "q" in (dtype.names or ()) else None
+    if ours is None or ours.itemsize != dtype.itemsize or not _written(dtype).items() <= _written(ours).items():
+        raise ValueError("its cycles have other fields than this version writes")
+    return ours
+
+
+def _written(dtype: np.dtype[np.void]) -> dict[str, Any]:
+    return {name: field for name, field in _fields(dtype) if name != "reserved"}
 
 
 def _decode_cycles(payload: bytes, dtype: np.dtype[np.void]) -> NDArray[np.void]:

@@ -36,7 +36,8 @@ def test_a_csv_says_units_and_loses_no_digit():
     assert [float(row["q_plan[1] [rad]"]) for row in rows] == RUN.planned[:, 0].tolist()
     without = {name for name in rows[0] if "[" not in name.replace("[", "", 1) and not name.endswith("]")}
     assert without == {
-        "message_id", "success_rate", "faults", "lost", "robot_mode", "controller_mode", "motion_generator_mode"
+        "message_id", "success_rate", "faults", "lost", "braking", "robot_mode", "controller_mode",
+        "motion_generator_mode",
     }  # fmt: skip
     assert {"command_pose[1,4] [m]", "command_pose[1,1]", "tool_error [m]", "t [s]", "tau[7] [N m]"} <= set(rows[0])
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import struct
 import zlib
 from dataclasses import replace
@@ -16,7 +17,7 @@ from rcilab.recording.blocks import MAGIC, encode_block, encode_header
 from rcilab.recording.export import export_run
 from rcilab.recording.live import LiveRecording, RunFacts
 from rcilab.recording.run import Run
-from rcilab.recording.run_file import BLOCK_CYCLES, RunFile, decode_run
+from rcilab.recording.run_file import BLOCK_CYCLES, RunFile, RunWriter, decode_run
 from tests.recording.runs import MODEL, OFFSET, PLAN, SETUP, some_cycles, some_run
 
 
@@ -118,6 +119,20 @@ def test_what_was_written_before_a_crash_is_there(tmp_path):
     back = rcilab.load_run(path)
     assert same(back, run)
     assert (back.is_complete, back.stopped) == (True, "on request")
+
+
+def test_a_file_from_before_its_cycles_told_of_braking_is_read():
+    ours = cycle_dtype(7)
+    fields = [(name, field[0].base, field[0].shape) for name, field in ours.fields.items() if name != "braking"]
+    older = np.dtype([*((name, *rest) if name != "reserved" else (name, "u1", (5,)) for name, *rest in fields)])
+    stream, cycles = io.BytesIO(), some_cycles()
+    writer = RunWriter(stream, older, plan=PLAN, model=MODEL)
+    writer.add(cycles.view(older))
+    writer.finish()
+    back = decode_run(stream.getvalue())
+    assert back.cycles.dtype == ours
+    assert back.cycles.tobytes() == cycles.tobytes()
+    assert back.stop_time is None
 
 
 def test_other_files_are_refused_in_words(tmp_path):
