@@ -107,7 +107,7 @@ class MotionPlot(Part):
 
     def _error(self, run: Run, times: Any, last: float) -> Panel:
         joint = int(self.joint.value)
-        errors = np.degrees(np.nan_to_num(run.error))
+        errors = np.degrees(run.error)
         chosen = errors[:, joint - 1 : joint] if joint else errors
         frame = build_error_frame(times, chosen, last, plot_scale("error").least, _BUCKETS)
         return Panel(title=self.text("plot.error"), unit="deg", frame=frame)

@@ -1,4 +1,4 @@
-"""What the exported page says of a run in its two tables, in words."""
+"""What the exported page says of a run beside its errors: when, where and how it went, in words."""
 
 from __future__ import annotations
 
@@ -9,20 +9,8 @@ if TYPE_CHECKING:
     from rcilab.words.text import Text
 
 
-def error_rows(run: Run, text: Text) -> list[list[str]]:
-    """Returns how far joints and tool were from the plan: where, RMS and largest."""
-    tracking, units = run.tracking, text.units
-    pairs = zip(tracking.joint_rms, tracking.joint_max, strict=True)
-    rows = [[f"J{j}", *(units.angle_of(value, 4) for value in pair)] for j, pair in enumerate(pairs, start=1)]
-    if run.model is not None:
-        away = [units.length_of(value, 3) for value in (tracking.position_rms, tracking.position_max)]
-        turn = [units.angle_of(value, 4) for value in (tracking.rotation_rms, tracking.rotation_max)]
-        rows += [[text("table.tool"), *away], [text("table.turn"), *turn]]
-    return rows
-
-
 def fact_rows(run: Run, text: Text) -> list[list[str]]:
-    """Returns when, where and how it went: a name and what there is to say."""
+    """Returns rows of a table: a name and what there is to say."""
     setup, report = run.setup, run.report
     rows = [
         ("started", setup.started),

@@ -19,7 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rcilab.language import load_words
-from rcilab.recording.html_facts import error_rows, fact_rows
+from rcilab.recording.html_facts import fact_rows
+from rcilab.recording.tracking_words import error_rows, tracking_notes
 from rcilab.robots.shapes import ROLE_COLORS, build_shapes
 from rcilab.robots.upright import upright_flange, upright_joints
 from rcilab.words.plot_scale import ERRORS, PlotScale, plot_scale
@@ -28,6 +29,7 @@ from rcilab.words.units import plain_number
 if TYPE_CHECKING:
     from rcilab.model import RobotModel
     from rcilab.recording.run import Run
+    from rcilab.recording.tracking import Tracking
     from rcilab.words.text import Text
 
 _PATH_POINTS = 1200  # Of the drawn tool path; a choice.
@@ -36,14 +38,20 @@ _PLOTS = ("q", "dq", "tau", *ERRORS)
 
 def write_html(run: Run, stream: IO[bytes], text: Text) -> None:
     """Writes the page, in the language and the units of `text`."""
+    tracking = run.tracking
     packed, scales = _Packed(), {name: plot_scale(name, text.units) for name in _PLOTS}
     content = {
         "words": dict(load_words("rcilab.recording", text.language)),
-        "run": _pack_run(run, scales, packed),
+        "run": _pack_run(run, tracking, scales, packed),
         "charts": [_chart(name, scale, text) for name, scale in scales.items()],
         "arm": None if run.model is None else _pack_arm(run.model, packed),
-        "path": None if run.model is None else _pack_path(run, run.model, scales["tool"], packed),
-        "facts": {"errors": error_rows(run, text), "rows": fact_rows(run, text)},
+        "path": None if run.model is None else _pack_path(run, run.model, tracking, scales["tool"], packed),
+        "facts": {
+            "errors": error_rows(run, tracking, text),
+            "head": {"rms": text("tracking.rms"), "max": text("tracking.max")},
+            "notes": tracking_notes(run, tracking, text),
+            "rows": fact_rows(run, text),
+        },
     }
     arm = text("title.unknown") if run.model is None else text("title", arm=run.model.name)
     assets = files("rcilab.recording") / "assets"
@@ -89,9 +97,8 @@ def _chart(name: str, scale: PlotScale, text: Text) -> dict[str, Any]:
     return {"name": name, "title": text(f"plot.{name}"), **asdict(scale), "digits": scale.digits}
 
 
-def _pack_run(run: Run, scales: dict[str, PlotScale], packed: _Packed) -> dict[str, Any]:
+def _pack_run(run: Run, tracking: Tracking, scales: dict[str, PlotScale], packed: _Packed) -> dict[str, Any]:
     """Columns are laid one after the other, in the units they are drawn in: every signal of a joint is one piece."""
-    tracking = run.tracking
     factor = {name: scale.factor for name, scale in scales.items()}
     packs: dict[str, Any] = {
         "t": packed.add(run.t),
@@ -132,11 +139,13 @@ def _pack_arm(model: RobotModel, packed: _Packed) -> dict[str, Any]:
     }
 
 
-def _pack_path(run: Run, model: RobotModel, scale: PlotScale, packed: _Packed) -> dict[str, Any] | None:
+def _pack_path(
+    run: Run, model: RobotModel, tracking: Tracking, scale: PlotScale, packed: _Packed
+) -> dict[str, Any] | None:
     if len(run.q) < 2:
         return None
     rows = np.unique(np.linspace(0, len(run.q) - 1, min(_PATH_POINTS, len(run.q))).astype(np.intp))
-    error = scale.factor * run.tracking.position[rows]
+    error = scale.factor * tracking.position[rows]
     worst = max(float(np.nanmax(error, initial=0.0)), scale.least)
     place: dict[str, Any] = {
         "points": packed.add(model.position_path(run.q[rows])),

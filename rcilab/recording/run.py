@@ -71,6 +71,8 @@ class Run:
     """The arm, with its tool and load; None when it is not known."""
     setup: Setup = field(default_factory=Setup)
     """Where and how it was made."""
+    paced: bool = False
+    """Whether the pace was changed on the way: then `plan` is what was asked of the arm, at the times it was asked."""
     is_complete: bool = True
     """False when it was read from a file whose end is missing: all that came before is here."""
 
@@ -343,6 +345,7 @@ def build_run(
     realtime: bool = True,
     model: RobotModel | None = None,
     setup: Setup | None = None,
+    paced: bool = False,
 ) -> Run:
     """Returns the run in a recording: the rows from the first command on."""
     rows = cycles[np.isfinite(cycles["t"])]
@@ -355,6 +358,7 @@ def build_run(
         realtime=realtime,
         model=model,
         setup=setup or Setup(),
+        paced=paced,
     )
 
 

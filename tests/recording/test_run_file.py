@@ -35,6 +35,7 @@ def test_a_run_comes_back_as_it_was(tmp_path):
     assert back.model is not None
     assert back.model.fingerprint == MODEL.fingerprint  # Tool and load, too.
     assert (back.setup, back.stopped, back.realtime, back.is_complete) == (SETUP, "on request", True, True)
+    assert not back.paced
     assert back.report is not None
     assert back.report.ok
     assert repr(back) == repr(run)
@@ -49,7 +50,9 @@ def test_a_file_holds_the_plan_that_was_run_in_the_end_and_its_errors_are_right(
     live.add(some_cycles())
     run = live.finish(plan=PLAN)
     assert run is not None
-    for kept in (run, rcilab.load_run(path)):
+    rcilab.load_run(path).save(tmp_path / "again.rcirun")
+    for kept in (run, rcilab.load_run(path), rcilab.load_run(tmp_path / "again.rcirun")):
+        assert kept.paced
         assert kept.plan is not None
         assert np.array_equal(kept.plan.q, PLAN.q)
         assert kept.tracking is not None

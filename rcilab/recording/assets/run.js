@@ -87,7 +87,8 @@
       cells.forEach((text, k) => { const cell = element(k ? "td" : "th", text, line); if (!k && i < run.n) cell.style.setProperty("--c", COLORS[i % COLORS.length]); });
     });
   };
-  table(words["table.title"], [words["table.where"], words["table.rms"], words["table.max"]], facts.errors, "numbers");
+  table(words["table.title"], [words["table.where"], facts.head.rms, facts.head.max], facts.errors, "numbers");
+  if (facts.notes.length) { const cell = element("td", facts.notes.join(" "), element("tr", undefined, element("tfoot", undefined, $("tables").lastChild))); cell.colSpan = 3; }
   table(words["facts.title"], null, facts.rows, "facts");
   $("ended").textContent = facts.rows.map(([, value]) => value).slice(0, 2).join(" · ") + " — " + words.foot;
   if (scene && path) $("key").innerHTML = `${words.path}: 0<i></i>${path.worst_told}` + (signals.q_plan ? `<br>${words.ghost}` : "");
