@@ -93,8 +93,8 @@ def plot_axes(theme: Theme, *, last: bool, ticks: tuple[float, ...] | None = Non
     return x, {**look, "size": _NUMBERS, "gap": 3, "ticks": marks, **chosen}
 
 
-def legend_html(joint: int, n: int, text: Text, theme: Theme, *, has_actual: bool) -> str:
-    """Returns which colour and dash is which joint, and what dots, dashes and areas mean."""
+def legend_html(joint: int, n: int, text: Text, theme: Theme, *, has_actual: bool, is_paced: bool = False) -> str:
+    """Returns which colour and dash is which joint, what dots, dashes and areas mean, and at which pace the plan is."""
     joints = [joint - 1] if joint else range(n)
     swatches = "".join(
         f'<span><i class="rl-swatch{" rl-broken" if i >= _BROKEN else ""}" style="color:{joint_color(i, theme)}"></i>'
@@ -103,4 +103,5 @@ def legend_html(joint: int, n: int, text: Text, theme: Theme, *, has_actual: boo
     )
     signs = ("actual", "limit", "violation") if has_actual else ("limit", "violation")
     rest = "".join(f'<span class="rl-sign-{sign}">{esc(text("legend." + sign))}</span>' for sign in signs)
-    return f'<div class="rl-legend">{swatches}{rest}</div>'
+    paced = f"<span>{esc(text('legend.paced'))}</span>" if is_paced else ""
+    return f'<div class="rl-legend">{swatches}{rest}{paced}</div>'

@@ -23,11 +23,13 @@ from rcilab.views.plots import (
 from rcilab.views.tool_curves import TOOL_QUANTITIES, ToolQuantity, tool_curves, tool_limit
 from rcilab.words.plot_scale import ERRORS, PlotScale, plot_scale
 from rcilab.workbench.panels.plot_contents import legend_html, plot_axes, plot_contents
+from rcilab.workbench.run.played import paced_of, played_motion
 from rcilab.workbench.text import Text
 from rcilab.workbench.view_actions import PLOTS, has_plot
 from rcilab.workbench.widgets import Html, esc
 
 if TYPE_CHECKING:
+    from rcilab.motion import Motion
     from rcilab.workbench.store import Recording, UiState
 
 _REDRAW_TIME = 0.25  # [s] A choice: plots are redrawn at most so often while something is dragged or moves.
@@ -51,6 +53,8 @@ class Plots:
         self._visible: tuple[str, ...] = ()
         self._planned: dict[str, Curves] = {}
         self._plan: object = None
+        self._paced: object = None
+        self._motion: Motion | None = None  # The plan, at the times it was run at.
         self.end = 1.0
         """Where the time axis ends, [s]."""
 
@@ -80,8 +84,10 @@ class Plots:
 
     def show(self, state: UiState) -> None:
         """Redraws the plots when plan, recording or choice have changed."""
-        if state.plan is not self._plan:
-            self._plan, self._planned = state.plan, {}
+        paced = paced_of(state)
+        if state.plan is not self._plan or paced is not self._paced:
+            self._plan, self._paced = state.plan, paced
+            self._motion, self._planned = played_motion(state), {}
         visible = _wanted(state)
         is_rearranged = visible != self._visible
         if is_rearranged:
@@ -101,7 +107,14 @@ class Plots:
                 self._draw(state, name)
             has_actual = state.recording is not None
             self._legend.show(
-                legend_html(state.plot_joint, state.model.n, self._text, state.theme, has_actual=has_actual)
+                legend_html(
+                    state.plot_joint,
+                    state.model.n,
+                    self._text,
+                    state.theme,
+                    has_actual=has_actual,
+                    is_paced=paced is not None,
+                )
             )
             self._fit(state, visible)
             self._next = now + max(_REDRAW_TIME, _LEISURE * (time.monotonic() - now))
@@ -156,9 +169,9 @@ class Plots:
             plot.scales = scales
 
     def _joint_frame(self, state: UiState, name: Quantity, factor: float) -> Frame:
-        plan, recording, actual = state.plan, state.recording, None
-        if plan is not None and name not in self._planned:
-            self._planned[name] = plan_curves(plan.motion, name, state.model)
+        motion, recording, actual = self._motion, state.recording, None
+        if motion is not None and name not in self._planned:
+            self._planned[name] = plan_curves(motion, name, state.model)
         if recording is not None and name == "tau":
             actual = None if recording.tau is None else Curves(t=_times(recording), values=recording.tau)
         elif recording is not None:
@@ -168,9 +181,9 @@ class Plots:
         )
 
     def _tool_frame(self, state: UiState, name: ToolQuantity, factor: float) -> Frame:
-        plan, recording, actual = state.plan, state.recording, None
-        if plan is not None and name not in self._planned:
-            self._planned[name] = tool_curves(state.model, plan.motion.times, plan.motion.q, name)
+        motion, recording, actual = self._motion, state.recording, None
+        if motion is not None and name not in self._planned:
+            self._planned[name] = tool_curves(state.model, motion.times, motion.q, name)
         if recording is not None:  # Measured twice differentiated is noise: the acceleration is that of the commands.
             q = recording.q_c if name == "acceleration" else recording.q
             actual = tool_curves(state.model, _times(recording), q, name)
@@ -182,7 +195,9 @@ class Plots:
         assert recording is not None
         assert recording.tracking is not None
         t, tracking = _times(recording), recording.tracking
-        last = last_time(*(plan_curves(p.motion, "q") for p in (state.plan,) if p is not None), Curves(t=t, values=t))
+        last = last_time(
+            *(plan_curves(motion, "q") for motion in (self._motion,) if motion is not None), Curves(t=t, values=t)
+        )
         errors = tracking.joint if not joint else tracking.joint[:, joint - 1 : joint]
         errors = tracking.position[:, None] if name == "tool" else errors
         return build_error_frame(t, scale.factor * errors, last, scale.least)

@@ -1,0 +1,39 @@
+"""When a motion was where in its plan: it may have been run at another pace than it was planned with."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rcilab.clock import CYCLE_TIME
+
+if TYPE_CHECKING:
+    from rcilab.motion import Motion
+    from rcilab.motion.pacing import PacedMotion
+    from rcilab.workbench.store import UiState
+
+
+def paced_of(state: UiState) -> PacedMotion | None:
+    """Returns how the plan on the page was run, or is being run; None as planned, or not at all."""
+    paced = None if state.recording is None else state.recording.paced
+    return paced if paced is not None and state.plan is not None and paced.motion is state.plan.motion else None
+
+
+def played_motion(state: UiState) -> Motion | None:
+    """Returns the plan at the times it was run at, as what was recorded is to be compared with; None without a plan."""
+    paced = paced_of(state)
+    if paced is None or state.recording is None:
+        return None if state.plan is None else state.plan.motion
+    run = state.recording.run
+    return paced.as_motion() if run is None or run.plan is None else run.plan
+
+
+def played_at(state: UiState, moment: float) -> float:
+    """Returns when a moment of the plan was run, [s] since the first command."""
+    paced = paced_of(state)
+    return moment if paced is None else paced.time_at(moment)
+
+
+def moment_played(state: UiState, t: float) -> float:
+    """Returns which moment of the plan was run at a time, [s]."""
+    paced = paced_of(state)
+    return t if paced is None else paced.place_at(round(t / CYCLE_TIME))
