@@ -85,6 +85,8 @@ class MotionPlot(Part):
             self._point()
             return
         joint, limits, run = int(self.joint.value), self.model.limits.joint, state.seen_run
+        if run is not None and run.paced and run.plan is not None:
+            plan = run.plan  # As it was run, and so it is compared.
         times = None if run is None else run.t - run.delay * CYCLE_TIME
         panels: list[Panel] = []
         for quantity in self._quantities:
@@ -102,7 +104,8 @@ class MotionPlot(Part):
         self._end = panels[0].frame.end
         write(self._curves, draw(panels, joints, self.text("plot.time"), self.text("legend.limit")))
         delay = 0 if run is None else run.delay
-        write(self._kinds, "" if run is None else soft(self.text("plot.kinds", delay=delay)))
+        kinds = "plot.kinds" if run is None or not run.paced else "plot.kinds_paced"
+        write(self._kinds, "" if run is None else soft(self.text(kinds, delay=delay)))
         self._point()
 
     def _error(self, run: Run, times: Any, last: float) -> Panel:
@@ -113,8 +116,8 @@ class MotionPlot(Part):
         return Panel(title=self.text("plot.error"), unit="deg", frame=frame)
 
     def _point(self) -> None:
-        moment = self.state.moment
-        if moment is None or self.state.seen is None:
+        moment, run = self.state.moment, self.state.seen_run
+        if moment is None or self.state.seen is None or (run is not None and run.paced):  # The plan's own clock.
             write(self._cursor, "")
             return
         place = f"display:block;left:{100.0 * share_of(moment, self._end):.2f}%"
