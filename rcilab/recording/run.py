@@ -212,7 +212,9 @@ class Run:
         return self.q - wanted
 
     def _largest_error(self) -> str:
-        return f"{_degrees(self.error):.3g} deg"
+        """In words, and until when where it was stopped."""
+        stop = self.stop_time if self.plan is not None else None
+        return f"{_degrees(self.error):.3g} deg" + ("" if stop is None else f" until the stop at {stop:.3f} s")
 
     @property
     def timing(self) -> Timing:

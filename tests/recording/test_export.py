@@ -10,9 +10,10 @@ import math
 import numpy as np
 import pytest
 
+from rcilab.recording.columns import run_facts
 from rcilab.recording.export import export_run
 from rcilab.words.units import Units
-from tests.recording.runs import OFFSET, SETUP, some_ideal_run, some_run
+from tests.recording.runs import OFFSET, SETUP, some_ideal_run, some_run, some_stopped_run
 
 RUN = some_run()
 
@@ -76,15 +77,15 @@ def test_an_mcap_opens_with_the_mcap_reader_and_fits_its_schemas():
 
 
 def test_nothing_an_export_says_is_no_number_in_json():
-    facts = json.loads(json.dumps(some_facts(), allow_nan=False))
+    facts = json.loads(json.dumps(run_facts(RUN), allow_nan=False))
     assert facts["conforms"] is True
     assert math.isclose(facts["tool_error_max_m"], RUN.tracking.position_max)
 
 
-def some_facts():
-    from rcilab.recording.columns import run_facts
-
-    return run_facts(RUN)
+def test_the_facts_of_a_stopped_run_say_until_when_its_errors_count():
+    facts = json.loads(json.dumps(run_facts(some_stopped_run()), allow_nan=False))
+    assert facts["stop_time_s"] == pytest.approx(0.3)
+    assert max(facts["error_max_rad"]) == pytest.approx(OFFSET)
 
 
 def test_progress_ends_at_one_and_never_goes_back():
