@@ -22,6 +22,7 @@ from rcilab.views.plots import (
     last_time,
     plan_curves,
     recorded_curves,
+    streamed_curves,
 )
 from rcilab.words.plot_scale import plot_scale
 
@@ -85,12 +86,13 @@ class MotionPlot(Part):
             self._point()
             return
         joint, limits, run = int(self.joint.value), self.model.limits.joint, state.seen_run
-        if run is not None and run.paced and run.plan is not None:
+        is_paced = run is not None and run.paced
+        if run is not None and run.plan is not None and is_paced:
             plan = run.plan  # As it was run, and so it is compared.
         times = None if run is None else run.t - run.delay * CYCLE_TIME
         panels: list[Panel] = []
         for quantity in self._quantities:
-            planned = plan_curves(plan, quantity)
+            planned = streamed_curves(plan.q, quantity) if is_paced else plan_curves(plan, quantity)
             actual = None
             if run is not None and times is not None and len(times):
                 recorded = recorded_curves(run.t, run.q, run.q_c, run.dq, quantity)

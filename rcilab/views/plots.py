@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from rcilab.arrays import Array
+from rcilab.arrays import Array, JointPath
 from rcilab.clock import CYCLE_TIME
 
 if TYPE_CHECKING:
@@ -117,6 +117,26 @@ def plan_curves(motion: Motion, quantity: Quantity, model: RobotModel | None = N
         assert model is not None
         return Curves(t=motion.times, values=model.torque(motion.q, motion.dq, motion.ddq).full)
     return Curves(t=motion.times, values=getattr(motion, quantity))
+
+
+def streamed_curves(q: JointPath, quantity: Quantity, model: RobotModel | None = None) -> Curves:
+    """Returns a signal of rows that are streamed one a cycle, as the controller computes it: by backward differences.
+
+    What a fitted curve would make of a corner between two rows is more than the controller sees of it.
+
+    Args:
+        q: Commanded joint angles, shape (N, n), [rad].
+        quantity: Which signal.
+        model: The arm with its load, for the torque.
+    """
+    t: Array = np.linspace(0.0, CYCLE_TIME * (len(q) - 1), len(q))
+    if quantity == "q":
+        return Curves(t=t, values=q)
+    if quantity == "tau":
+        assert model is not None
+        rates = (backward_differences(t, q, order) for order in (1, 2))
+        return Curves(t=t, values=model.torque(q, *rates).full)
+    return Curves(t=t, values=backward_differences(t, q, {"dq": 1, "ddq": 2, "jerk": 3}[quantity]))
 
 
 def recorded_curves(t: Array, q: Array, q_c: Array, dq: Array, quantity: Quantity) -> Curves:

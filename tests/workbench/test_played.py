@@ -11,11 +11,11 @@ from rcilab.clock import CYCLE_TIME
 from rcilab.conformance.pacing import plan_pace
 from rcilab.motion.pacing import as_planned
 from rcilab.posing.planning import Plan, make_plan
-from rcilab.views.plots import plan_curves, recorded_curves
+from rcilab.views.plots import build_frame, plan_curves, recorded_curves, streamed_curves
 from rcilab.workbench.panels.plot_contents import legend_html
 from rcilab.workbench.panels.status import status_values
 from rcilab.workbench.run.keeper import as_recording
-from rcilab.workbench.run.played import moment_played, paced_of, played_at, played_motion
+from rcilab.workbench.run.played import moment_played, paced_of, played_at, played_path
 from rcilab.workbench.store import UiState
 from rcilab.workbench.text import Text
 from tests.recording.runs import some_cycles
@@ -37,15 +37,23 @@ def slowed() -> UiState:
     return replace(state, plan=plan, recording=as_recording(cycles, 0, paced))
 
 
-@pytest.mark.parametrize("quantity", ["q", "dq", "ddq"])
-def test_plan_and_actual_lie_on_each_other(slowed, quantity):
-    recording, motion = slowed.recording, played_motion(slowed)
-    planned = plan_curves(motion, quantity).values
-    actual = recorded_curves(recording.t, recording.q, recording.q_c, recording.dq, quantity).values
-    apart = np.abs(planned[CHANGED:] - actual[CHANGED:]).max()
-    at_first_pace = plan_curves(slowed.plan.motion, quantity).values
-    rows = min(len(at_first_pace), len(actual))
-    assert apart < 0.1 * np.abs(at_first_pace[CHANGED:rows] - actual[CHANGED:rows]).max()
+@pytest.mark.parametrize("quantity", ["q", "dq", "ddq", "jerk"])
+def test_plan_and_actual_lie_on_each_other_and_break_no_limit(slowed, quantity):
+    recording, (_, rows) = slowed.recording, played_path(slowed)
+    planned = streamed_curves(rows, quantity, slowed.model)
+    actual = recorded_curves(recording.t, recording.q, recording.q_c, recording.dq, quantity)
+    once = plan_curves(slowed.plan.motion, quantity)
+    count = min(len(once.t), len(actual.t))
+    before = np.abs(once.values[CHANGED:count] - actual.values[CHANGED:count]).max()
+    assert np.abs(planned.values - actual.values).max() < 0.02 * before
+    assert not build_frame(planned, actual, slowed.model.limits.joint, quantity, 0).violated.any()
+
+
+def test_the_torque_is_that_of_the_rows(slowed):
+    rows = played_path(slowed)[1]
+    still = streamed_curves(rows[-1:].repeat(5, axis=0), "tau", slowed.model).values[-1]
+    assert streamed_curves(rows, "tau", slowed.model).values.shape == rows.shape
+    assert still == pytest.approx(slowed.model.torque(rows[-1]).full)
 
 
 def test_the_cursor_stands_where_the_plan_was_when_it_was_run_and_a_click_finds_it_again(slowed):
@@ -70,5 +78,5 @@ def test_another_plan_has_its_own_times(slowed):
     assert isinstance(other, Plan)
     state = replace(slowed, plan=other)
     assert paced_of(state) is None
-    assert played_motion(state) is other.motion
+    assert played_path(state)[1] is other.motion.q
     assert played_at(state, 0.3) == moment_played(state, 0.3) == 0.3

@@ -19,17 +19,18 @@ from rcilab.views.plots import (
     mark_moment,
     plan_curves,
     recorded_curves,
+    streamed_curves,
 )
 from rcilab.views.tool_curves import TOOL_QUANTITIES, ToolQuantity, tool_curves, tool_limit
 from rcilab.words.plot_scale import ERRORS, PlotScale, plot_scale
 from rcilab.workbench.panels.plot_contents import legend_html, plot_axes, plot_contents
-from rcilab.workbench.run.played import paced_of, played_motion
+from rcilab.workbench.run.played import paced_of, played_path
 from rcilab.workbench.text import Text
 from rcilab.workbench.view_actions import PLOTS, has_plot
 from rcilab.workbench.widgets import Html, esc
 
 if TYPE_CHECKING:
-    from rcilab.motion import Motion
+    from rcilab.motion.pacing import PacedMotion
     from rcilab.workbench.store import Recording, UiState
 
 _REDRAW_TIME = 0.25  # [s] A choice: plots are redrawn at most so often while something is dragged or moves.
@@ -53,8 +54,7 @@ class Plots:
         self._visible: tuple[str, ...] = ()
         self._planned: dict[str, Curves] = {}
         self._plan: object = None
-        self._paced: object = None
-        self._motion: Motion | None = None  # The plan, at the times it was run at.
+        self._paced: PacedMotion | None = None
         self.end = 1.0
         """Where the time axis ends, [s]."""
 
@@ -86,8 +86,7 @@ class Plots:
         """Redraws the plots when plan, recording or choice have changed."""
         paced = paced_of(state)
         if state.plan is not self._plan or paced is not self._paced:
-            self._plan, self._paced = state.plan, paced
-            self._motion, self._planned = played_motion(state), {}
+            self._plan, self._paced, self._planned = state.plan, paced, {}
         visible = _wanted(state)
         is_rearranged = visible != self._visible
         if is_rearranged:
@@ -169,9 +168,13 @@ class Plots:
             plot.scales = scales
 
     def _joint_frame(self, state: UiState, name: Quantity, factor: float) -> Frame:
-        motion, recording, actual = self._motion, state.recording, None
-        if motion is not None and name not in self._planned:
-            self._planned[name] = plan_curves(motion, name, state.model)
+        plan, recording, actual = state.plan, state.recording, None
+        if plan is not None and name not in self._planned:
+            self._planned[name] = (
+                plan_curves(plan.motion, name, state.model)
+                if self._paced is None
+                else streamed_curves(self._paced.q, name, state.model)
+            )
         if recording is not None and name == "tau":
             actual = None if recording.tau is None else Curves(t=_times(recording), values=recording.tau)
         elif recording is not None:
@@ -181,9 +184,9 @@ class Plots:
         )
 
     def _tool_frame(self, state: UiState, name: ToolQuantity, factor: float) -> Frame:
-        motion, recording, actual = self._motion, state.recording, None
-        if motion is not None and name not in self._planned:
-            self._planned[name] = tool_curves(state.model, motion.times, motion.q, name)
+        path, recording, actual = played_path(state), state.recording, None
+        if path is not None and name not in self._planned:
+            self._planned[name] = tool_curves(state.model, *path, name)
         if recording is not None:  # Measured twice differentiated is noise: the acceleration is that of the commands.
             q = recording.q_c if name == "acceleration" else recording.q
             actual = tool_curves(state.model, _times(recording), q, name)
@@ -195,9 +198,8 @@ class Plots:
         assert recording is not None
         assert recording.tracking is not None
         t, tracking = _times(recording), recording.tracking
-        last = last_time(
-            *(plan_curves(motion, "q") for motion in (self._motion,) if motion is not None), Curves(t=t, values=t)
-        )
+        path = played_path(state)
+        last = last_time(None if path is None else Curves(t=path[0], values=path[1]), Curves(t=t, values=t))
         errors = tracking.joint if not joint else tracking.joint[:, joint - 1 : joint]
         errors = tracking.position[:, None] if name == "tool" else errors
         return build_error_frame(t, scale.factor * errors, last, scale.least)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from rcilab.clock import CYCLE_TIME
 
 if TYPE_CHECKING:
-    from rcilab.motion import Motion
+    from rcilab.arrays import Array, JointPath
     from rcilab.motion.pacing import PacedMotion
     from rcilab.workbench.store import UiState
 
@@ -18,13 +20,12 @@ def paced_of(state: UiState) -> PacedMotion | None:
     return paced if paced is not None and state.plan is not None and paced.motion is state.plan.motion else None
 
 
-def played_motion(state: UiState) -> Motion | None:
-    """Returns the plan at the times it was run at, as what was recorded is to be compared with; None without a plan."""
+def played_path(state: UiState) -> tuple[Array, JointPath] | None:
+    """Returns the rows of the plan, shape (N, n), [rad], and when they were run, shape (N,), [s]; None without one."""
     paced = paced_of(state)
-    if paced is None or state.recording is None:
-        return None if state.plan is None else state.plan.motion
-    run = state.recording.run
-    return paced.as_motion() if run is None or run.plan is None else run.plan
+    if paced is not None:
+        return np.linspace(0.0, paced.duration, len(paced.q)), paced.q
+    return None if state.plan is None else (state.plan.motion.times, state.plan.motion.q)
 
 
 def played_at(state: UiState, moment: float) -> float:
