@@ -15,10 +15,11 @@ from rcilab.views.plots import build_frame, plan_curves, recorded_curves, stream
 from rcilab.workbench.panels.plot_contents import legend_html
 from rcilab.workbench.panels.status import status_values
 from rcilab.workbench.run.keeper import as_recording
-from rcilab.workbench.run.played import moment_played, paced_of, played_at, played_path
+from rcilab.workbench.run.played import moment_played, paced_of, played_at, played_path, streamed_rows
+from rcilab.workbench.run.replay import replayed
 from rcilab.workbench.store import UiState
 from rcilab.workbench.text import Text
-from tests.recording.runs import some_cycles
+from tests.recording.runs import some_cycles, some_run
 from tests.workbench.test_telling import initial_state, status
 
 CHANGED = 200  # [cycles] At which the motion is slowed.
@@ -71,6 +72,13 @@ def test_the_legend_says_so_in_both_languages(slowed):
         text = Text(language)
         assert word in legend_html(0, 7, text, "light", has_actual=True, is_paced=True)
         assert word not in legend_html(0, 7, text, "light", has_actual=True)
+
+
+def test_a_run_from_a_file_is_drawn_as_it_was_streamed():
+    run = some_run(paced=True)
+    shown = replayed(initial_state(), run)
+    assert streamed_rows(shown) is run.plan.q
+    assert streamed_rows(replayed(initial_state(), some_run())) is None
 
 
 def test_another_plan_has_its_own_times(slowed):

@@ -24,13 +24,13 @@ from rcilab.views.plots import (
 from rcilab.views.tool_curves import TOOL_QUANTITIES, ToolQuantity, tool_curves, tool_limit
 from rcilab.words.plot_scale import ERRORS, PlotScale, plot_scale
 from rcilab.workbench.panels.plot_contents import legend_html, plot_axes, plot_contents
-from rcilab.workbench.run.played import paced_of, played_path
+from rcilab.workbench.run.played import played_path, streamed_rows
 from rcilab.workbench.text import Text
 from rcilab.workbench.view_actions import PLOTS, has_plot
 from rcilab.workbench.widgets import Html, esc
 
 if TYPE_CHECKING:
-    from rcilab.motion.pacing import PacedMotion
+    from rcilab.arrays import JointPath
     from rcilab.workbench.store import Recording, UiState
 
 _REDRAW_TIME = 0.25  # [s] A choice: plots are redrawn at most so often while something is dragged or moves.
@@ -54,7 +54,7 @@ class Plots:
         self._visible: tuple[str, ...] = ()
         self._planned: dict[str, Curves] = {}
         self._plan: object = None
-        self._paced: PacedMotion | None = None
+        self._streamed: JointPath | None = None  # What became of the plan at another pace.
         self.end = 1.0
         """Where the time axis ends, [s]."""
 
@@ -84,9 +84,9 @@ class Plots:
 
     def show(self, state: UiState) -> None:
         """Redraws the plots when plan, recording or choice have changed."""
-        paced = paced_of(state)
-        if state.plan is not self._plan or paced is not self._paced:
-            self._plan, self._paced, self._planned = state.plan, paced, {}
+        streamed = streamed_rows(state)
+        if state.plan is not self._plan or streamed is not self._streamed:
+            self._plan, self._streamed, self._planned = state.plan, streamed, {}
         visible = _wanted(state)
         is_rearranged = visible != self._visible
         if is_rearranged:
@@ -112,7 +112,7 @@ class Plots:
                     self._text,
                     state.theme,
                     has_actual=has_actual,
-                    is_paced=paced is not None,
+                    is_paced=streamed is not None,
                 )
             )
             self._fit(state, visible)
@@ -172,8 +172,8 @@ class Plots:
         if plan is not None and name not in self._planned:
             self._planned[name] = (
                 plan_curves(plan.motion, name, state.model)
-                if self._paced is None
-                else streamed_curves(self._paced.q, name, state.model)
+                if self._streamed is None
+                else streamed_curves(self._streamed, name, state.model)
             )
         if recording is not None and name == "tau":
             actual = None if recording.tau is None else Curves(t=_times(recording), values=recording.tau)

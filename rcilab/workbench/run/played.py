@@ -20,6 +20,15 @@ def paced_of(state: UiState) -> PacedMotion | None:
     return paced if paced is not None and state.plan is not None and paced.motion is state.plan.motion else None
 
 
+def streamed_rows(state: UiState) -> JointPath | None:
+    """Returns what was streamed of the plan on the page, shape (N, n), [rad], where its pace was changed; else None."""
+    paced, run = paced_of(state), None if state.recording is None else state.recording.run
+    if paced is not None:
+        return paced.q
+    is_it = run is not None and run.paced and state.plan is not None and run.plan is state.plan.motion
+    return state.plan.motion.q if is_it and state.plan is not None else None  # Read from a file.
+
+
 def played_path(state: UiState) -> tuple[Array, JointPath] | None:
     """Returns the rows of the plan, shape (N, n), [rad], and when they were run, shape (N,), [s]; None without one."""
     paced = paced_of(state)
