@@ -29,6 +29,7 @@ def cycle_dtype(n: int) -> np.dtype[np.void]:
     faults                  the error bits as one number, bit k = `Fault(k)`
     lost                    controller cycles between the previous row and this one that never reached us
     robot_mode, controller_mode, motion_generator_mode    as on the wire
+    braking                 1: what was sent in answer brings the arm to rest, whatever was planned
     tau                     measured joint torques, [N m], shape (n,)
     command_pose            pose of the tool in base sent in answer, [m], shape (4, 4); NaN when none was sent
     command_psi             arm angle sent with it, [rad]; NaN when none was sent
@@ -53,7 +54,8 @@ def cycle_dtype(n: int) -> np.dtype[np.void]:
             ("robot_mode", "u1"),
             ("controller_mode", "u1"),
             ("motion_generator_mode", "u1"),
-            ("reserved", "u1", (5,)),
+            ("braking", "u1"),
+            ("reserved", "u1", (4,)),
             ("tau", *vector),
             ("command_pose", "<f8", (4, 4)),
             ("command_psi", "<f8"),

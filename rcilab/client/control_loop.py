@@ -266,7 +266,7 @@ class ControlLoop:
         try:
             self._stop_move(surprise)
         finally:
-            self._link.on_states = others
+            self._link.on_states, self._log.braking = others, False
         if isinstance(surprise, ControlError):
             self._watch_standstill()
             surprise.stop = self._log.recorder.rows(first)
@@ -275,6 +275,7 @@ class ControlLoop:
 
     def _come_to_rest(self) -> None:
         way = self._brake.plan()
+        self._log.braking = True
         last_id = self._answered_id
         step = 0
         while step < len(way):

@@ -85,7 +85,8 @@ class Motions(RciCommands):
             try:
                 filters = [RateLimiter(self.model.limits)] if mode == "torque" else []
                 run = self._run(stream, mode, motion, filters)
-                return replace(run, plan=self._paced[0].as_motion())
+                paced = self._paced[0]
+                return replace(run, plan=paced.as_motion(), paced=bool(paced.changed))
             finally:
                 self._paced = None
 

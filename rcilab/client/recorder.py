@@ -43,7 +43,7 @@ class Recorder:
         memory = bytearray(capacity * self._size) if buffer is None else buffer
         self._memory = memory
         self._rows: NDArray[np.void] = np.frombuffer(memory, dtype=dtype, count=capacity)
-        self._pack = struct.Struct(f"<Qdqqdd{4 * n}dIIBBB5x{2 * n + 17}d").pack_into
+        self._pack = struct.Struct(f"<Qdqqdd{4 * n}dIIBBBB4x{2 * n + 17}d").pack_into
         self._pack_start = struct.Struct("<Qdqqd").pack_into
         self._pack_lost = struct.Struct("<I").pack_into
         self._lost_offset = struct.calcsize(f"<Qdqqdd{4 * n}dI")
@@ -68,6 +68,8 @@ class Recorder:
         pose: Sequence[float] = _NO_POSE,
         psi: float = math.nan,
         command_tau: Sequence[float] | None = None,
+        *,
+        braking: bool = False,
     ) -> None:
         """Writes one row; see `cycle_dtype` for the meaning.
 
@@ -78,7 +80,7 @@ class Recorder:
             self.count % self.capacity * self._size,
             message_id, t, received_ns, sent_ns, lateness, success_rate,
             *q, *q_c, *dq, *command,
-            faults, lost, *modes,
+            faults, lost, *modes, braking,
             *(tau or self._nothing), *pose, psi, *(command_tau or self._nothing),
         )  # fmt: skip
         self.count += 1
@@ -131,6 +133,8 @@ class CycleLog:
         """Controller cycles whose state never arrived."""
         self.state: RobotState | None = None
         """The state of the newest row."""
+        self.braking = False
+        """Whether what is sent just now brings the arm to rest; the control loop says so."""
         self._last_id: int | None = None
         self._origins: deque[int] = deque(maxlen=_GRID_CYCLES)
         self._nothing = (math.nan,) * recorder.n
@@ -208,6 +212,7 @@ class CycleLog:
             pose,
             psi,
             tau,
+            braking=self.braking,
         )
 
 

@@ -67,6 +67,10 @@ class PacedMotion:
         """Returns where in the plan a cycle is, [s]."""
         return float(self.place[min(max(cycle, 0), len(self.place) - 1)])
 
+    def time_at(self, place: float) -> float:
+        """Returns when it is at a place in the plan for the first time, [s]; the last row's time where it never is."""
+        return min(int(np.searchsorted(self.place, place - _ROUNDING)), len(self.place) - 1) * CYCLE_TIME
+
     def as_motion(self) -> Motion:
         """Returns what is commanded as a motion of its own; the one that was planned as long as nothing has changed."""
         return Motion.from_samples(self.q) if self.changed else self.motion

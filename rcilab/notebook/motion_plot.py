@@ -22,7 +22,9 @@ from rcilab.views.plots import (
     last_time,
     plan_curves,
     recorded_curves,
+    streamed_curves,
 )
+from rcilab.words.plot_scale import plot_scale
 
 _BUCKETS = 200  # Of time; each shows its smallest and largest value, so no spike is lost.
 _UNITS: dict[Quantity, str] = {"q": "deg", "dq": "deg/s", "ddq": "deg/s²", "jerk": "deg/s³"}
@@ -84,10 +86,13 @@ class MotionPlot(Part):
             self._point()
             return
         joint, limits, run = int(self.joint.value), self.model.limits.joint, state.seen_run
+        is_paced = run is not None and run.paced
+        if run is not None and run.plan is not None and is_paced:
+            plan = run.plan  # As it was run, and so it is compared.
         times = None if run is None else run.t - run.delay * CYCLE_TIME
         panels: list[Panel] = []
         for quantity in self._quantities:
-            planned = plan_curves(plan, quantity)
+            planned = streamed_curves(plan.q, quantity) if is_paced else plan_curves(plan, quantity)
             actual = None
             if run is not None and times is not None and len(times):
                 recorded = recorded_curves(run.t, run.q, run.q_c, run.dq, quantity)
@@ -101,19 +106,20 @@ class MotionPlot(Part):
         self._end = panels[0].frame.end
         write(self._curves, draw(panels, joints, self.text("plot.time"), self.text("legend.limit")))
         delay = 0 if run is None else run.delay
-        write(self._kinds, "" if run is None else soft(self.text("plot.kinds", delay=delay)))
+        kinds = "plot.kinds" if run is None or not run.paced else "plot.kinds_paced"
+        write(self._kinds, "" if run is None else soft(self.text(kinds, delay=delay)))
         self._point()
 
     def _error(self, run: Run, times: Any, last: float) -> Panel:
         joint = int(self.joint.value)
-        errors = np.degrees(np.nan_to_num(run.error))
+        errors = np.degrees(run.error)
         chosen = errors[:, joint - 1 : joint] if joint else errors
-        frame = build_error_frame(times, chosen, last, _BUCKETS)
+        frame = build_error_frame(times, chosen, last, plot_scale("error").least, _BUCKETS)
         return Panel(title=self.text("plot.error"), unit="deg", frame=frame)
 
     def _point(self) -> None:
-        moment = self.state.moment
-        if moment is None or self.state.seen is None:
+        moment, run = self.state.moment, self.state.seen_run
+        if moment is None or self.state.seen is None or (run is not None and run.paced):  # The plan's own clock.
             write(self._cursor, "")
             return
         place = f"display:block;left:{100.0 * share_of(moment, self._end):.2f}%"

@@ -9,6 +9,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -27,6 +28,7 @@ from rcilab.supervisor.supervisor import VIRTUAL
 
 if TYPE_CHECKING:
     from rcilab.model import RobotModel
+    from rcilab.motion import Motion
     from rcilab.posing.planning import Plan
 
 _FRESH = 0.04  # [s] A state that is younger is not asked for again.
@@ -214,9 +216,16 @@ class SupervisedRobot:
             if what == "execute" and self._live is not None:
                 live, self._live = self._live, None
                 live.add(self._reader.drain())
-                run = live.finish(None if ticket.error is None else str(ticket.error))
+                run = live.finish(None if ticket.error is None else str(ticket.error), self._paced())
             done.append(Outcome(what=what, run=run, error=ticket.error))
         return done
+
+    def _paced(self) -> Motion | None:
+        """Returns what was asked of the arm where the pace was changed on the way; None as planned."""
+        with suppress(RcilabError):  # Its control process has gone.
+            paced = self._supervisor.paced
+            return paced.as_motion() if paced is not None and paced.changed else None
+        return None
 
     def close(self) -> None:
         """Brings a running motion to rest and ends the processes."""

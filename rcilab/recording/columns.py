@@ -16,8 +16,8 @@ def run_columns(run: Run) -> list[Column]:
     """Returns every number of a run as a column: those of the recording, then plan and error.
 
     q_plan[j] is what the plan asked of the instant that is measured, the play-out delay taken out; error[j] is
-    measured minus planned (minus commanded, without a plan); tool_error and tool_turn are the tool's distance and
-    angle from where it was to be.
+    measured minus planned (minus commanded, without a plan), nan from `run.stop_time` on; tool_error and tool_turn are
+    the tool's distance and angle from where it was to be.
     """
     columns = cycle_columns(run.cycles)
     if run.plan is not None:
@@ -39,6 +39,8 @@ def run_facts(run: Run) -> dict[str, Any]:
         "duration_s": run.duration,
         "cycles": len(run.cycles),
         "stopped": run.stopped,
+        "stop_time_s": run.stop_time,
+        "paced": run.paced,
         "truncated": run.truncated,
         "complete": run.is_complete,
         "faults": [fault.manual_name for fault in run.faults],

@@ -10,7 +10,8 @@ from typing import IO, TYPE_CHECKING, TypeAlias
 
 from rcilab.cycle_file import write_csv, write_npz
 from rcilab.errors import InvalidValueError
-from rcilab.language import require_language
+from rcilab.words.text import Text
+from rcilab.words.units import USUAL, Units
 
 if TYPE_CHECKING:
     from rcilab.recording.run import Run
@@ -18,36 +19,53 @@ if TYPE_CHECKING:
 Progress: TypeAlias = Callable[[float], None]
 """Told the share that is done, 0 to 1."""
 
-_Writer: TypeAlias = "Callable[[Run, IO[bytes], Progress, str], None]"
+_Writer: TypeAlias = "Callable[[Run, IO[bytes], Progress, Text], None]"
 
 
-def save_run(run: Run, file: str | PathLike[str], *, progress: Progress | None = None, language: str = "en") -> None:
+def save_run(
+    run: Run,
+    file: str | PathLike[str],
+    *,
+    progress: Progress | None = None,
+    language: str = "en",
+    units: Units = USUAL,
+) -> None:
     """Writes a run to a file; see `Run.save`."""
     path = Path(fspath(file))
     require_ending(path.suffix)
     try:
         with path.open("wb") as stream:
-            write_export(run, path.suffix, stream, progress=progress, language=language)
+            write_export(run, path.suffix, stream, progress=progress, language=language, units=units)
     except OSError as error:
         raise InvalidValueError("file", fspath(file), f"cannot be written: {error.strerror}").coded(
             "file_unwritable", file=fspath(file)
         ) from error
 
 
-def export_run(run: Run, ending: str, *, progress: Progress | None = None, language: str = "en") -> bytes:
+def export_run(
+    run: Run, ending: str, *, progress: Progress | None = None, language: str = "en", units: Units = USUAL
+) -> bytes:
     """Returns a run in one of the forms of `ENDINGS`; see `Run.save`."""
     stream = BytesIO()
-    write_export(run, ending, stream, progress=progress, language=language)
+    write_export(run, ending, stream, progress=progress, language=language, units=units)
     return stream.getvalue()
 
 
 def write_export(
-    run: Run, ending: str, stream: IO[bytes], *, progress: Progress | None = None, language: str = "en"
+    run: Run,
+    ending: str,
+    stream: IO[bytes],
+    *,
+    progress: Progress | None = None,
+    language: str = "en",
+    units: Units = USUAL,
 ) -> None:
     """Writes a run to a stream in one of the forms of `ENDINGS`; what `progress` raises ends it."""
     write = WRITERS[require_ending(ending)]
     report = progress or (lambda share: None)
-    write(run, stream, report, require_language(language))
+    text = Text(language, "rcilab.recording")
+    text.units = units
+    write(run, stream, report, text)
     report(1.0)
 
 
@@ -62,41 +80,41 @@ def require_ending(ending: str) -> str:
     return ending
 
 
-def _rcirun(run: Run, stream: IO[bytes], progress: Progress, language: str) -> None:
+def _rcirun(run: Run, stream: IO[bytes], progress: Progress, text: Text) -> None:
     from rcilab.recording.run_file import write_run
 
     write_run(run, stream)
 
 
-def _csv(run: Run, stream: IO[bytes], progress: Progress, language: str) -> None:
+def _csv(run: Run, stream: IO[bytes], progress: Progress, text: Text) -> None:
     from rcilab.recording.columns import run_columns
 
-    text = TextIOWrapper(stream, encoding="utf-8", newline="")
-    write_csv(run_columns(run), text, progress)
-    text.flush()
-    text.detach()
+    lines = TextIOWrapper(stream, encoding="utf-8", newline="")
+    write_csv(run_columns(run), lines, progress)
+    lines.flush()
+    lines.detach()
 
 
-def _npz(run: Run, stream: IO[bytes], progress: Progress, language: str) -> None:
+def _npz(run: Run, stream: IO[bytes], progress: Progress, text: Text) -> None:
     write_npz(run.cycles, stream)
 
 
-def _parquet(run: Run, stream: IO[bytes], progress: Progress, language: str) -> None:
+def _parquet(run: Run, stream: IO[bytes], progress: Progress, text: Text) -> None:
     from rcilab.recording.frame import write_parquet
 
     write_parquet(run, stream, progress)
 
 
-def _mcap(run: Run, stream: IO[bytes], progress: Progress, language: str) -> None:
+def _mcap(run: Run, stream: IO[bytes], progress: Progress, text: Text) -> None:
     from rcilab.recording.mcap_file import write_mcap
 
     write_mcap(run, stream, progress)
 
 
-def _html(run: Run, stream: IO[bytes], progress: Progress, language: str) -> None:
+def _html(run: Run, stream: IO[bytes], progress: Progress, text: Text) -> None:
     from rcilab.recording.html_file import write_html
 
-    write_html(run, stream, language)
+    write_html(run, stream, text)
 
 
 WRITERS: dict[str, _Writer] = {

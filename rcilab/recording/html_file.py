@@ -11,40 +11,53 @@ import base64
 import gzip
 import html
 import json
+from dataclasses import asdict
 from importlib.resources import files
 from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rcilab.language import Language, load_words, require_language
+from rcilab.language import load_words
+from rcilab.recording.html_facts import fact_rows
+from rcilab.recording.tracking_words import error_rows, tracking_notes
 from rcilab.robots.shapes import ROLE_COLORS, build_shapes
 from rcilab.robots.upright import upright_flange, upright_joints
+from rcilab.words.plot_scale import ERRORS, PlotScale, plot_scale
+from rcilab.words.units import plain_number
 
 if TYPE_CHECKING:
     from rcilab.model import RobotModel
     from rcilab.recording.run import Run
+    from rcilab.recording.tracking import Tracking
+    from rcilab.words.text import Text
 
 _PATH_POINTS = 1200  # Of the drawn tool path; a choice.
+_PLOTS = ("q", "dq", "tau", *ERRORS)
 
 
-def write_html(run: Run, stream: IO[bytes], language: str = "en") -> None:
-    """Writes the page, its words in a language."""
-    known = require_language(language)
-    words = load_words("rcilab.recording", known)
-    packed = _Packed()
+def write_html(run: Run, stream: IO[bytes], text: Text) -> None:
+    """Writes the page, in the language and the units of `text`."""
+    tracking = run.tracking
+    packed, scales = _Packed(), {name: plot_scale(name, text.units) for name in _PLOTS}
     content = {
-        "words": dict(words),
-        "run": _pack_run(run, packed),
+        "words": dict(load_words("rcilab.recording", text.language)),
+        "run": _pack_run(run, tracking, scales, packed),
+        "charts": [_chart(name, scale, text) for name, scale in scales.items()],
         "arm": None if run.model is None else _pack_arm(run.model, packed),
-        "path": None if run.model is None else _pack_path(run, run.model, packed),
-        "facts": _facts(run, known),
+        "path": None if run.model is None else _pack_path(run, run.model, tracking, scales["tool"], packed),
+        "facts": {
+            "errors": error_rows(run, tracking, text),
+            "head": {"rms": text("tracking.rms"), "max": text("tracking.max")},
+            "notes": tracking_notes(run, tracking, text),
+            "rows": fact_rows(run, text),
+        },
     }
-    arm = words["title.unknown"] if run.model is None else words["title"].format(arm=run.model.name)
+    arm = text("title.unknown") if run.model is None else text("title", arm=run.model.name)
     assets = files("rcilab.recording") / "assets"
     page = (assets / "run.html").read_text(encoding="utf-8")
     parts = {
-        "LANGUAGE": known,
+        "LANGUAGE": text.language,
         "TITLE": html.escape(arm),
         "STYLE": (assets / "run.css").read_text(encoding="utf-8"),
         "CONTENT": json.dumps(content, ensure_ascii=False).replace("</", "<\\/"),
@@ -80,32 +93,35 @@ class _Packed:
         return base64.b64encode(gzip.compress(b"".join(self._parts), 6, mtime=0)).decode("ascii")
 
 
-def _pack_run(run: Run, packed: _Packed) -> dict[str, Any]:
-    """Columns are laid one after the other: every signal of a joint is one piece."""
-    tracking = run.tracking
-    planned_rate = None
-    if run.plan is not None:
-        rows = np.clip(np.rint(run.t * 1e3).astype(np.intp) - run.delay, 0, len(run.plan.dq) - 1)
-        planned_rate = run.plan.dq[rows]
+def _chart(name: str, scale: PlotScale, text: Text) -> dict[str, Any]:
+    return {"name": name, "title": text(f"plot.{name}"), **asdict(scale), "digits": scale.digits}
+
+
+def _pack_run(run: Run, tracking: Tracking, scales: dict[str, PlotScale], packed: _Packed) -> dict[str, Any]:
+    """Columns are laid one after the other, in the units they are drawn in: every signal of a joint is one piece."""
+    factor = {name: scale.factor for name, scale in scales.items()}
     packs: dict[str, Any] = {
         "t": packed.add(run.t),
-        "q": packed.add(np.degrees(run.q.T)),
-        "dq": packed.add(np.degrees(run.dq.T)),
+        "q": packed.add(factor["q"] * run.q.T),
+        "dq": packed.add(factor["dq"] * run.dq.T),
         "tau": packed.add(run.tau.T),
-        "error": packed.add(np.degrees(tracking.joint.T)),
-        "tool": packed.add(1000.0 * tracking.position),
+        "error": packed.add(factor["error"] * tracking.joint.T),
+        "tool": packed.add(factor["tool"] * tracking.position),
         "fault": packed.add(run.cycles["faults"] != 0, "u1"),
     }
-    if planned_rate is not None:
-        packs |= {"q_plan": packed.add(np.degrees(run.planned.T)), "dq_plan": packed.add(np.degrees(planned_rate.T))}
+    if run.plan is not None:
+        rows = np.clip(np.rint(run.t * 1e3).astype(np.intp) - run.delay, 0, len(run.plan.dq) - 1)
+        packs["q_plan"] = packed.add(factor["q"] * run.planned.T)
+        packs["dq_plan"] = packed.add(factor["dq"] * run.plan.dq[rows].T)
     limits = None
     if run.model is not None:
         joint = run.model.limits.joint
-        limits = {
-            "q": [np.degrees(joint.lower).tolist(), np.degrees(joint.upper).tolist()],
-            "dq": [(-np.degrees(joint.velocity)).tolist(), np.degrees(joint.velocity).tolist()],
-            "tau": [(-joint.torque).tolist(), joint.torque.tolist()],
+        bounds = {
+            "q": (joint.lower, joint.upper),
+            "dq": (-joint.velocity, joint.velocity),
+            "tau": (-joint.torque, joint.torque),
         }
+        limits = {name: [(factor[name] * side).tolist() for side in pair] for name, pair in bounds.items()}
     return {"n": run.q.shape[1], "arrays": packs, "limits": limits}
 
 
@@ -123,50 +139,20 @@ def _pack_arm(model: RobotModel, packed: _Packed) -> dict[str, Any]:
     }
 
 
-def _pack_path(run: Run, model: RobotModel, packed: _Packed) -> dict[str, Any] | None:
+def _pack_path(
+    run: Run, model: RobotModel, tracking: Tracking, scale: PlotScale, packed: _Packed
+) -> dict[str, Any] | None:
     if len(run.q) < 2:
         return None
     rows = np.unique(np.linspace(0, len(run.q) - 1, min(_PATH_POINTS, len(run.q))).astype(np.intp))
+    error = scale.factor * tracking.position[rows]
+    worst = max(float(np.nanmax(error, initial=0.0)), scale.least)
     place: dict[str, Any] = {
         "points": packed.add(model.position_path(run.q[rows])),
-        "error": packed.add(np.nan_to_num(1000.0 * run.tracking.position[rows])),
+        "error": packed.add(error),
+        "worst": worst,
+        "worst_told": f"{plain_number(worst, 2)} {scale.unit}",
     }
     if run.plan is not None:
         place["plan"] = packed.add(model.position_path(run.planned[rows]))
     return place
-
-
-def _facts(run: Run, language: Language) -> dict[str, Any]:
-    """Rows of the two tables, in words."""
-    words, tracking, timing, report = load_words("rcilab.recording", language), run.tracking, run.timing, run.report
-    rms, largest = np.degrees(tracking.joint_rms), np.degrees(tracking.joint_max)
-    errors = [[f"J{j + 1}", f"{rms[j]:.4f}°", f"{largest[j]:.4f}°"] for j in range(len(rms))]
-    if run.model is not None:
-        mm = [f"{1000.0 * value:.4f} mm" for value in (tracking.position_rms, tracking.position_max)]
-        turn = [f"{np.degrees(value):.4f}°" for value in (tracking.rotation_rms, tracking.rotation_max)]
-        errors += [[words["table.tool"], *mm], [words["table.turn"], *turn]]
-    ended = words["facts.goal"]
-    if run.faults:
-        ended = words["facts.faulted"].format(faults=", ".join(fault.manual_name for fault in run.faults))
-    elif not run.is_complete:
-        ended = words["facts.cut"]
-    elif run.stopped:
-        ended = words["facts.stopped"].format(why=run.stopped)
-    health = words["facts.lockstep"].format(lost=timing.lost)
-    if run.realtime:
-        health = words["facts.timing"].format(lost=timing.lost, late=timing.late, p99=timing.lateness_p99 * 1e6)
-    target = " · ".join(part for part in (run.setup.target, run.setup.plant, run.setup.mode) if part)
-    rows = [
-        (words["facts.started"], run.setup.started),
-        (words["facts.target"], target),
-        (words["facts.duration"], words["facts.cycles"].format(duration=run.duration, cycles=len(run.cycles))),
-        (words["facts.ended"], ended),
-        (words["facts.health"], health),
-        (words["facts.delay"], words["facts.delay_cycles"].format(delay=run.delay)),
-    ]
-    if report is not None:
-        verdict = words["facts.violates"].format(count=len(report.violations))
-        if report.ok:
-            verdict = words["facts.conforms"].format(share=100.0 * report.worst.ratio, id=report.worst.id)
-        rows.append((words["facts.check"], verdict))
-    return {"errors": errors, "rows": [list(row) for row in rows if row[1]]}

@@ -100,7 +100,14 @@ class LiveRecording:
         if file is not None:
             file.close(stopped=stopped, plan=plan)
         facts = self.facts
-        return build_run(cycles, plan=plan or facts.plan, stopped=stopped, model=facts.model, setup=facts.setup)
+        return build_run(
+            cycles,
+            plan=plan or facts.plan,
+            stopped=stopped,
+            model=facts.model,
+            setup=facts.setup,
+            paced=plan is not None,
+        )
 
     def _make_room(self, rows: NDArray[np.void]) -> None:
         needed = self._count + len(rows)

@@ -16,7 +16,8 @@ from rcilab.arrays import Array, JointPath
 from rcilab.clock import CYCLE_TIME
 from rcilab.faults import FAULT_COUNT, Fault
 from rcilab.recording.setup import Setup
-from rcilab.recording.tracking import Tracking, compute_tracking
+from rcilab.recording.tracking import Tracking, compute_tracking, find_stop, last_compared
+from rcilab.words.units import USUAL, Units
 
 if TYPE_CHECKING:
     from rcilab.conformance import Report
@@ -70,6 +71,8 @@ class Run:
     """The arm, with its tool and load; None when it is not known."""
     setup: Setup = field(default_factory=Setup)
     """Where and how it was made."""
+    paced: bool = False
+    """Whether the pace was changed on the way: then `plan` is what was asked of the arm, at the times it was asked."""
     is_complete: bool = True
     """False when it was read from a file whose end is missing: all that came before is here."""
 
@@ -140,17 +143,31 @@ class Run:
         wanted = self.command
         if self.plan is not None and not np.isfinite(wanted).any():  # Sent as poses: the plan says which angles.
             wanted = self._planned(0)
+            if self.stop_time is not None:
+                wanted[self.t >= self.stop_time] = np.nan
         return find_delay(self.q_c, wanted)
+
+    @property
+    def stop_time(self) -> float | None:
+        """When the arm stopped following its plan, [s]; None: it followed to its end.
+
+        That is when somebody began to bring it to rest, or when the controller showed a fault or ended the motion.
+        """
+        return find_stop(self.cycles)
 
     @property
     def error(self) -> JointPath:
         """Measured minus planned joint angles, shape (N, n), [rad], with the play-out delay taken out.
 
-        Without a plan, measured minus commanded.
+        NaN from `stop_time` on: an arm that is brought to rest leaves its plan on purpose. Without a plan, measured
+        minus commanded.
         """
         if self.plan is None:
             return self._lag()
-        return self.q - self._planned(self.delay)
+        delay = self.delay
+        error = self.q - self._planned(delay)
+        error[last_compared(self.cycles, delay) :] = np.nan
+        return error
 
     @property
     def planned(self) -> JointPath:
@@ -162,7 +179,7 @@ class Run:
 
     @property
     def tracking(self) -> Tracking:
-        """Error per joint and at the tool, over time, as RMS and as maximum; against the commands without a plan."""
+        """`error` per joint and at the tool, over time, as RMS and as maximum."""
         return compute_tracking(self.model, self.q, self.q - self.error)
 
     @property
@@ -195,8 +212,9 @@ class Run:
         return self.q - wanted
 
     def _largest_error(self) -> str:
-        """In words; of a motion that was stopped against the commands, because it left its plan on purpose."""
-        return f"{_degrees(self._lag() if self.stopped else self.error):.3g} deg"
+        """In words, and until when where it was stopped."""
+        stop = self.stop_time if self.plan is not None else None
+        return f"{_degrees(self.error):.3g} deg" + ("" if stop is None else f" until the stop at {stop:.3f} s")
 
     @property
     def timing(self) -> Timing:
@@ -230,6 +248,7 @@ class Run:
         *,
         progress: Callable[[float], None] | None = None,
         language: str = "en",
+        units: Units = USUAL,
     ) -> None:
         """Writes the run to a file; its ending chooses the format.
 
@@ -246,6 +265,7 @@ class Run:
             file: Its name; an existing file is replaced.
             progress: Told the share that is done, 0 to 1.
             language: Of the HTML page, "en" or "zh".
+            units: Of the HTML page; numbers for programs are SI.
 
         Raises:
             InvalidValueError: The ending is unknown, or the file cannot be written.
@@ -253,7 +273,7 @@ class Run:
         """
         from rcilab.recording.export import save_run
 
-        save_run(self, file, progress=progress, language=language)
+        save_run(self, file, progress=progress, language=language, units=units)
 
     def to_pandas(self) -> Any:
         """Returns the columns of the CSV as a `pandas.DataFrame`, indexed by t; units stand in `.attrs["units"]`.
@@ -327,6 +347,7 @@ def build_run(
     realtime: bool = True,
     model: RobotModel | None = None,
     setup: Setup | None = None,
+    paced: bool = False,
 ) -> Run:
     """Returns the run in a recording: the rows from the first command on."""
     rows = cycles[np.isfinite(cycles["t"])]
@@ -339,6 +360,7 @@ def build_run(
         realtime=realtime,
         model=model,
         setup=setup or Setup(),
+        paced=paced,
     )
 
 

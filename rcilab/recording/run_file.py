@@ -11,8 +11,9 @@ The file is a row of blocks (`blocks.py`), in this order:
     CYCL    u32 number of cycles, then zlib of their bytes, transposed: the first byte of every cycle, then the second
             byte of every cycle, and so on (neighbours are then alike and take a quarter of the room). Any number of
             these
-    TAIL    JSON: {"stopped": why the motion ended early or null, "truncated": whether the beginning is missing}.
-            A file without it was cut off: by a crash, by a full disk, or because it is still being written
+    TAIL    JSON: {"stopped": why the motion ended early or null, "truncated": whether the beginning is missing,
+            "paced": whether the pace was changed on the way}. A file without it was cut off: by a crash, by a full
+            disk, or because it is still being written
 
 All units are SI. Blocks of other kinds are left out by a reader.
 """
@@ -100,20 +101,29 @@ class RunWriter:
             self._waiting = self._waiting[BLOCK_CYCLES:]
         self._stream.flush()
 
-    def finish(self, *, stopped: str | None = None, truncated: bool = False, plan: Motion | None = None) -> None:
+    def finish(
+        self,
+        *,
+        stopped: str | None = None,
+        truncated: bool = False,
+        plan: Motion | None = None,
+        paced: bool = False,
+    ) -> None:
         """Writes what is left, and that the run ended properly.
 
         Args:
             stopped: Why it ended early; None: it did not.
             truncated: Whether the beginning is missing.
-            plan: What was asked of the arm in the end, where that is not what was planned.
+            plan: What was asked of the arm in the end, where that is not what was planned: another pace.
+            paced: Whether the plan that is written already is such a one.
         """
         if len(self._waiting):
             self._write(self._waiting)
             self._waiting = self._waiting[:0]
         if plan is not None:
             self._write_plan(plan)
-        self._stream.write(encode_block("TAIL", json.dumps({"stopped": stopped, "truncated": truncated}).encode()))
+        tail = {"stopped": stopped, "truncated": truncated, "paced": paced or plan is not None}
+        self._stream.write(encode_block("TAIL", json.dumps(tail).encode()))
         self._stream.flush()
 
     def _write_plan(self, plan: Motion) -> None:
@@ -182,7 +192,7 @@ def write_run(run: Run, stream: IO[bytes]) -> None:
         realtime=run.realtime,
     )
     writer.add(run.cycles)
-    writer.finish(stopped=run.stopped, truncated=run.truncated)
+    writer.finish(stopped=run.stopped, truncated=run.truncated, paced=run.paced)
 
 
 def load_run(file: str | PathLike[str]) -> Run:
@@ -247,8 +257,7 @@ def _build(blocks: tuple[Block, ...]) -> Run:
     dtype = np.dtype([(name, kind, tuple(shape)) for name, kind, shape in head["fields"]])
     if dtype.itemsize != head["bytes"]:
         raise ValueError(f"a cycle takes {head['bytes']} bytes, its fields {dtype.itemsize}")
-    if "q" not in (dtype.names or ()) or dtype != cycle_dtype(dtype["q"].shape[0]):
-        raise ValueError("its cycles have other fields than this version writes")
+    dtype = _known(dtype)
     parts = [_decode_cycles(block.payload, dtype) for block in blocks if block.kind == "CYCL"]
     cycles = np.concatenate(parts) if parts else np.zeros(0, dtype)
     cycles.flags.writeable = False
@@ -266,8 +275,25 @@ def _build(blocks: tuple[Block, ...]) -> Run:
         realtime=head["realtime"],
         model=None if head["arm"] is None else _build_arm(head["arm"]),
         setup=Setup.from_dict(head["setup"]),
+        paced=bool(tail.get("paced", len(plans) > 1)),
         is_complete=bool(tails),
     )
+
+
+def _known(dtype: np.dtype[np.void]) -> np.dtype[np.void]:
+    """Returns today's layout of a cycle for that of a file: what was reserved when it was written may have a name now.
+
+    Raises:
+        ValueError: The two do not fit.
+    """
+    ours = cycle_dtype(dtype["q"].shape[0]) if "q" in (dtype.names or ()) else None
+    if ours is None or ours.itemsize != dtype.itemsize or not _written(dtype).items() <= _written(ours).items():
+        raise ValueError("its cycles have other fields than this version writes")
+    return ours
+
+
+def _written(dtype: np.dtype[np.void]) -> dict[str, Any]:
+    return {name: field for name, field in _fields(dtype) if name != "reserved"}
 
 
 def _decode_cycles(payload: bytes, dtype: np.dtype[np.void]) -> NDArray[np.void]:

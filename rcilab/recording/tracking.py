@@ -6,8 +6,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rcilab.arrays import Array, JointPath
+from rcilab.clock import CYCLE_TIME
 
 if TYPE_CHECKING:
     from rcilab.model import RobotModel
@@ -15,7 +17,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Tracking:
-    """Measured against planned, with the play-out delay taken out. NaN where one of the two is missing."""
+    """Measured against planned, with the play-out delay taken out. NaN where there is nothing to compare with."""
 
     joint: JointPath
     """Error of every joint, shape (N, n), [rad]."""
@@ -74,6 +76,45 @@ def compute_tracking(model: RobotModel | None, q: JointPath, planned: JointPath)
     chord = np.linalg.norm(T[:, :3, :3] - T_plan[:, :3, :3], axis=(1, 2))
     rotation[known] = 2.0 * np.arcsin(np.clip(chord / (2.0 * np.sqrt(2.0)), 0.0, 1.0))
     return Tracking(joint=q - planned, position=position, rotation=rotation)
+
+
+def find_stop(cycles: NDArray[np.void]) -> float | None:
+    """Returns when an arm was no longer to follow its plan, [s]; None: it followed to its end.
+
+    Args:
+        cycles: See `cycle_dtype`.
+    """
+    places = [place for place in (_first_unplanned(cycles), _first(cycles["faults"])) if place is not None]
+    return float(cycles["t"][min(places)]) if places else None
+
+
+def last_compared(cycles: NDArray[np.void], delay: int) -> int:
+    """Returns the number of cycles that still show the plan: what was sent last is seen `delay` cycles later.
+
+    A controller with a fault stops at once, whatever it still has to play.
+
+    Args:
+        cycles: See `cycle_dtype`.
+        delay: Between a command and the state that shows it, [cycles].
+    """
+    fault, lost = _first(cycles["faults"]), _first_unplanned(cycles)
+    played = (
+        len(cycles) if lost is None else np.searchsorted(cycles["t"], cycles["t"][lost] + (delay - 0.5) * CYCLE_TIME)
+    )
+    return min(int(played), len(cycles) if fault is None else fault)
+
+
+def _first_unplanned(cycles: NDArray[np.void]) -> int | None:
+    """Returns the first row that was not answered by the plan: with a way to rest, or not at all any more."""
+    braking, answered = _first(cycles["braking"]), np.flatnonzero(cycles["sent_ns"])
+    if braking is not None or not answered.size or answered[-1] + 1 == len(cycles):
+        return braking
+    return int(answered[-1]) + 1
+
+
+def _first(marks: NDArray[np.integer]) -> int | None:
+    places = np.flatnonzero(marks)
+    return int(places[0]) if places.size else None
 
 
 def _rms(values: Array) -> float:

@@ -148,6 +148,7 @@ class Mover:
             if self._stream is not None and self._mode == "torque":
                 self._softly = reason
                 self._stream.stop()
+                self._log.braking = True
         return None if self._softly else reason
 
     def _answer(self) -> str | None:

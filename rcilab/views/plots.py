@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from rcilab.arrays import Array
+from rcilab.arrays import Array, JointPath
 from rcilab.clock import CYCLE_TIME
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ QUANTITIES: tuple[Quantity, ...] = ("q", "dq", "ddq", "jerk")
 
 _WIDENED = 3  # Points that a marked violation reaches to both sides: one bad cycle is still some pixels wide.
 _FARTHEST = 3.0  # Multiple of the limit that a plot reaches at most; `rcilab.check` gives the number beyond.
-_LEAST_ERROR = 0.02  # [deg or mm] Smallest range of a plot of errors, for its ticks to be readable. A choice.
+_LEAST_RANGE = 0.02  # Of a plot without limits, in the unit shown, for its ticks to be readable. A choice.
 _ROUND_ENDS = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 15.0, 20.0, 25.0, 30.0, 40.0, 50.0, 60.0)
 
 
@@ -119,6 +119,26 @@ def plan_curves(motion: Motion, quantity: Quantity, model: RobotModel | None = N
     return Curves(t=motion.times, values=getattr(motion, quantity))
 
 
+def streamed_curves(q: JointPath, quantity: Quantity, model: RobotModel | None = None) -> Curves:
+    """Returns a signal of rows that are streamed one a cycle, as the controller computes it: by backward differences.
+
+    What a fitted curve would make of a corner between two rows is more than the controller sees of it.
+
+    Args:
+        q: Commanded joint angles, shape (N, n), [rad].
+        quantity: Which signal.
+        model: The arm with its load, for the torque.
+    """
+    t: Array = np.linspace(0.0, CYCLE_TIME * (len(q) - 1), len(q))
+    if quantity == "q":
+        return Curves(t=t, values=q)
+    if quantity == "tau":
+        assert model is not None
+        rates = (backward_differences(t, q, order) for order in (1, 2))
+        return Curves(t=t, values=model.torque(q, *rates).full)
+    return Curves(t=t, values=backward_differences(t, q, {"dq": 1, "ddq": 2, "jerk": 3}[quantity]))
+
+
 def recorded_curves(t: Array, q: Array, q_c: Array, dq: Array, quantity: Quantity) -> Curves:
     """Returns a recorded signal: measured q and dq; ddq and jerk of the commands, as the controller computes them.
 
@@ -155,15 +175,15 @@ def bounds_of(limits: JointLimits, quantity: Quantity) -> tuple[Array, Array]:
     return -upper, upper
 
 
-def build_error_frame(t: Array, errors: Array, last: float, buckets: int = 240, least: float = _LEAST_ERROR) -> Frame:
+def build_error_frame(t: Array, errors: Array, last: float, least: float, buckets: int = 240) -> Frame:
     """Returns what a plot of errors shows: no limits, and an axis that reaches as far as the largest of them.
 
     Args:
         t: Times of the errors, [s], shape (N,).
         errors: One column a curve, in the unit to be shown, shape (N, k).
         last: Where the other plots end, [s], so that this one fits below them.
+        least: Smallest range of the axis to each side, in the unit to be shown; see `rcilab.words.plot_scale`.
         buckets: Number of buckets the time is cut into.
-        least: Smallest range of the axis, for its ticks to be readable, in the unit to be shown.
     """
     edges = np.linspace(0.0, last, buckets + 1)
     times = np.repeat(edges[:-1], 2)
@@ -266,7 +286,7 @@ def _frame(
     violated[-2:] = False  # The last two points span the empty rest of the axis.
     farthest = float(np.abs(curves).max())
     bounds = [abs(bound) for bound in (upper, lower) if np.isfinite(bound)]
-    limit = max(bounds) if bounds else max(farthest, _LEAST_ERROR)
+    limit = max(bounds) if bounds else max(farthest, _LEAST_RANGE)
     return Frame(
         t=t,
         end=float(t[-1]),

@@ -105,7 +105,7 @@ class Workbench:
             Heard(
                 stop=self.session.stop,
                 here=self._here,
-                seek=lambda place: ask(requests.Seek(place=place)),
+                seek=lambda share: ask(requests.Seek(place=self.presenter.place_at(share))),
                 size=lambda height: ask(requests.SetView(name="height", value=height)),
                 peek=lambda page, branch: ask(requests.Peek(page=page, index=branch if branch >= 0 else None)),
                 take=lambda page: ask(requests.TakeControls(page=page)),

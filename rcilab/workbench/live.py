@@ -28,7 +28,7 @@ class Heard:
     here: Callable[[int], None]
     """A page has answered a beat: somebody who could press Stop is there."""
     seek: Callable[[float], None]
-    """A place in the motion was clicked in a plot, 0 to 1."""
+    """A place on the time axis was clicked in a plot, 0 to 1."""
     size: Callable[[float], None]
     """Height of a page's window, [px], when it opens and when it changes."""
     peek: Callable[[int, int], None] = lambda page, branch: None

@@ -8,6 +8,7 @@ import time
 import traceback
 from typing import TYPE_CHECKING, Any
 
+from rcilab.clock import CYCLE_TIME
 from rcilab.workbench.learn.state import exhibited
 from rcilab.workbench.live import LiveChannel
 from rcilab.workbench.page import dress
@@ -42,6 +43,7 @@ from rcilab.workbench.panels.way import WayPanel
 from rcilab.workbench.panels.waypoint import WaypointPanel
 from rcilab.workbench.panels.where import WherePanel
 from rcilab.workbench.program.marks import ProgramMarks
+from rcilab.workbench.run.played import moment_played
 from rcilab.workbench.scene.stage import Stage
 from rcilab.workbench.session import Session
 from rcilab.workbench.store import Store
@@ -125,6 +127,13 @@ class Presenter:
         self._ending.set()
         if self._thread is not None:
             self._thread.join(5.0)
+
+    def place_at(self, share: float) -> float:
+        """Returns the place in the motion, 0 to 1, that stands at a part of the plots' time axis."""
+        state = exhibited(self._store.state)
+        if state.plan is None:
+            return 0.0
+        return moment_played(state, share * self._timeline.end) / max(state.plan.motion.duration, CYCLE_TIME)
 
     def show(self) -> bool:
         """Shows one snapshot, and returns whether there was anything to show; like the last it costs nothing."""

@@ -30,6 +30,7 @@ from rcilab.workbench.text import Message
 
 if TYPE_CHECKING:
     from rcilab.motion import Motion
+    from rcilab.motion.pacing import PacedMotion
     from rcilab.recording.run import Run
     from rcilab.recording.tracking import Tracking
     from rcilab.workbench.run.export_actions import Export
@@ -81,6 +82,8 @@ class Recording:
     """Cycles between a command and the state that shows it: the controller's play-out, and its answer."""
     run: Run | None = None
     """All of it, once the arm stands still."""
+    paced: PacedMotion | None = None
+    """How the plan was run, where its pace was changed on the way; None: as planned."""
     tracking: Tracking | None = None
     """How far the arm was from its plan, once it stands still."""
     file: str = ""

@@ -3,13 +3,24 @@
 from __future__ import annotations
 
 import csv
+import itertools
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from rcilab.recording.export import export_run
 from rcilab.workbench.run.keeper import whole_recording
-from tests.recording.runs import some_long_run, some_run
+from tests.recording.runs import some_ideal_run, some_long_run, some_run
+
+
+def plot_numbers(page) -> list[list[str]]:
+    """The numbers beside every plot that is shown, upwards."""
+    return page.tab.evaluate(
+        "() => Object.values(__viserTestpoints.uplots).filter(({ chart }) => chart.root.offsetParent !== null)"
+        ".sort((a, b) => a.chart.root.getBoundingClientRect().top - b.chart.root.getBoundingClientRect().top)"
+        ".map(({ chart }) => (chart.axes[1]._values || []).map(String))"
+    )
 
 
 def test_a_run_is_shown_against_its_plan_and_downloaded(page, tmp_path):
@@ -22,6 +33,9 @@ def test_a_run_is_shown_against_its_plan_and_downloaded(page, tmp_path):
         lambda: "Ran to its end" in page.tab.locator(".rl-verdict:visible").all_inner_texts().__str__(), "its end"
     )
     page.wait(lambda: page.tab.locator(".rl-plot-title", has_text="Error of the tool").count() == 1, "a plot of errors")
+    page.wait(lambda: len(plot_numbers(page)) == 6, "six plots")
+    assert all(len(numbers) >= 2 for numbers in plot_numbers(page)), plot_numbers(page)
+    assert plot_numbers(page)[:4] == [["-100", "0", "100"]] * 4  # As low as they are on a small page.
     page.unfold("Recording")
     page.wait(lambda: page.button("CSV").is_enabled(), "exports to be pressable")
     with page.tab.expect_download(timeout=20_000) as coming:
@@ -59,6 +73,45 @@ def test_a_long_export_is_cancelled_and_the_next_one_comes(page, tmp_path):
     assert len((tmp_path / "run.csv").read_text().splitlines()) == 1 + len(some_run().t)
     page.tab.remove_listener("download", note)
     page.bench.store.update(last_run=None)
+
+
+_NOTE_NUMBERS = """() => {
+  window.numbers = [];
+  const write = CanvasRenderingContext2D.prototype.fillText;
+  CanvasRenderingContext2D.prototype.fillText = function (said, x, y) {
+    const isNumber = this.textAlign === "right" && !this.font.includes("600");
+    if (isNumber) window.numbers.push({ said, left: x - this.measureText(said).width, y });
+    write.call(this, said, x, y);
+  };
+}"""
+"""Notes the numbers beside the axes of an exported page as they are written."""
+
+
+@pytest.mark.parametrize("size", [(1280, 800), (960, 420)])
+@pytest.mark.parametrize("run", [some_ideal_run(), some_run()], ids=["ideal", "lagging"])
+def test_every_axis_of_the_exported_page_says_numbers_that_differ_and_are_seen_whole(chromium, tmp_path, run, size):
+    file = Path(tmp_path / "run.html")
+    file.write_bytes(export_run(run, ".html"))
+    tab = chromium.new_page(viewport={"width": size[0], "height": size[1]})
+    tab.add_init_script(f"({_NOTE_NUMBERS})()")
+    tab.goto(file.as_uri())
+    tab.wait_for_selector("body[data-ready=yes]", state="attached", timeout=60_000)
+    tab.evaluate("window.numbers = []; document.getElementById('joint').dispatchEvent(new Event('change'))")
+    numbers = tab.evaluate("window.numbers")
+    tab.close()
+    plots: list[list[dict]] = []
+    for number in numbers:  # A plot says its numbers upwards; the next one begins further below.
+        if not plots or number["y"] > plots[-1][-1]["y"]:
+            plots.append([])
+        plots[-1].append(number)
+    assert len(plots) == 5
+    for plot in plots:
+        values = [float(number["said"]) for number in plot]
+        assert len(values) >= 2, values
+        assert values == sorted(set(values)), values
+        assert min(number["left"] for number in plot) >= 0.0
+        assert min(below["y"] - above["y"] for below, above in itertools.pairwise(plot)) >= 11.0  # [px] Of the font.
+        assert max(len(number["said"]) for number in plot) <= 6, values
 
 
 def test_the_exported_page_lives_without_a_network(chromium, tmp_path):

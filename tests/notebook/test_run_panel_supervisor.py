@@ -141,6 +141,12 @@ def test_a_motion_is_held_gone_on_with_and_slowed_down_as_by_the_session(own: bo
         panel.stop.click()
         wait_for(lambda: pace.pause.disabled, "the end of the motion")
         assert not pace._way.value
+        wait_for(lambda: panel.state.run is not None, "the run")
+        run = panel.state.run
+        assert run is not None
+        assert run.paced
+        assert run.stop_time is not None
+        assert run.tracking.joint_max.max() < 1e-6  # Against what was asked for: the hold, the pace, until the stop.
 
 
 def test_what_cannot_be_held_any_more_goes_on_and_says_so() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from rcilab.client.recorder import Recorder
 from rcilab.dynamics.payload import Payload
 from rcilab.model import load_model
-from rcilab.motion import plan_joint
+from rcilab.motion import plan_joint, plan_stop
 from rcilab.recording.run import Run, build_run
 from rcilab.recording.setup import Setup
 from rcilab.spatial import Pose
@@ -40,6 +41,26 @@ def some_long_run(times: int = 60) -> Run:
     cycles = np.tile(some_cycles(), times)
     cycles["t"], cycles["message_id"] = 1e-3 * np.arange(len(cycles)), 5 + np.arange(len(cycles))
     return build_run(cycles, plan=None, model=MODEL, setup=SETUP)
+
+
+def some_ideal_run() -> Run:
+    """An arm that is exactly where it is told to be."""
+    cycles = some_cycles().copy()
+    cycles["q"] = cycles["q_c"]
+    return build_run(cycles, plan=PLAN, model=MODEL, setup=replace(SETUP, plant="ideal"))
+
+
+def some_stopped_run(place: int = 300) -> Run:
+    """Somebody presses Stop: from a cycle on what is sent brings the arm to rest, and one cycle later it brakes."""
+    cycles = some_cycles().copy()
+    q, dq, ddq = PLAN.q[place - 1], PLAN.dq[place - 1], PLAN.ddq[place - 1]
+    way = plan_stop(MODEL.limits.joint, q, dq, ddq).q[1:]
+    cycles["command"][place:] = way[np.minimum(np.arange(len(cycles) - place), len(way) - 1)]
+    cycles["q_c"][place + 1 :] = cycles["command"][place:-1]
+    cycles["q"] = cycles["q_c"] + OFFSET * np.eye(7)[1]
+    cycles["braking"][place:] = 1
+    cycles = cycles[: place + len(way) + 5]
+    return build_run(cycles, plan=PLAN, model=MODEL, setup=SETUP, stopped="on request")
 
 
 def some_run(**facts) -> Run:

@@ -10,8 +10,10 @@ import math
 import numpy as np
 import pytest
 
+from rcilab.recording.columns import run_facts
 from rcilab.recording.export import export_run
-from tests.recording.runs import OFFSET, SETUP, some_run
+from rcilab.words.units import Units
+from tests.recording.runs import OFFSET, SETUP, some_ideal_run, some_run, some_stopped_run
 
 RUN = some_run()
 
@@ -35,7 +37,8 @@ def test_a_csv_says_units_and_loses_no_digit():
     assert [float(row["q_plan[1] [rad]"]) for row in rows] == RUN.planned[:, 0].tolist()
     without = {name for name in rows[0] if "[" not in name.replace("[", "", 1) and not name.endswith("]")}
     assert without == {
-        "message_id", "success_rate", "faults", "lost", "robot_mode", "controller_mode", "motion_generator_mode"
+        "message_id", "success_rate", "faults", "lost", "braking", "robot_mode", "controller_mode",
+        "motion_generator_mode",
     }  # fmt: skip
     assert {"command_pose[1,4] [m]", "command_pose[1,1]", "tool_error [m]", "t [s]", "tau[7] [N m]"} <= set(rows[0])
 
@@ -74,15 +77,15 @@ def test_an_mcap_opens_with_the_mcap_reader_and_fits_its_schemas():
 
 
 def test_nothing_an_export_says_is_no_number_in_json():
-    facts = json.loads(json.dumps(some_facts(), allow_nan=False))
+    facts = json.loads(json.dumps(run_facts(RUN), allow_nan=False))
     assert facts["conforms"] is True
     assert math.isclose(facts["tool_error_max_m"], RUN.tracking.position_max)
 
 
-def some_facts():
-    from rcilab.recording.columns import run_facts
-
-    return run_facts(RUN)
+def test_the_facts_of_a_stopped_run_say_until_when_its_errors_count():
+    facts = json.loads(json.dumps(run_facts(some_stopped_run()), allow_nan=False))
+    assert facts["stop_time_s"] == pytest.approx(0.3)
+    assert max(facts["error_max_rad"]) == pytest.approx(OFFSET)
 
 
 def test_progress_ends_at_one_and_never_goes_back():
@@ -91,6 +94,22 @@ def test_progress_ends_at_one_and_never_goes_back():
         export_run(RUN, ending, progress=shares.append)
         assert shares == sorted(shares)
         assert shares[-1] == 1.0
+
+
+def content_of(page: bytes):
+    return json.loads(page.decode().split('id="content">')[1].split("</script>")[0])
+
+
+def test_the_page_is_drawn_in_the_units_of_the_workbench_and_never_finer_than_its_plots():
+    si = content_of(export_run(some_ideal_run(), ".html", units=Units(angle="rad", length="m")))
+    assert [chart["unit"] for chart in si["charts"]] == ["rad", "rad/s", "N·m", "mrad", "mm"]
+    assert si["facts"]["errors"][1] == ["J2", "0.000000 rad", "0.000000 rad"]
+    assert si["run"]["limits"]["q"][1] == pytest.approx(RUN.model.limits.joint.upper)
+    usual = content_of(export_run(some_ideal_run(), ".html"))
+    assert [chart["unit"] for chart in usual["charts"]] == ["°", "°/s", "N·m", "°", "mm"]
+    assert usual["charts"][3]["least"] == pytest.approx(0.02)
+    assert usual["path"]["worst_told"] == "0.02 mm"  # Not 1.0e-9 mm.
+    assert content_of(export_run(RUN, ".html"))["path"]["worst_told"] == "0.63 mm"
 
 
 def test_the_page_asks_for_nothing_from_elsewhere_and_speaks_both_languages():

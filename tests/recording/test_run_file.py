@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import struct
 import zlib
 from dataclasses import replace
@@ -16,7 +17,7 @@ from rcilab.recording.blocks import MAGIC, encode_block, encode_header
 from rcilab.recording.export import export_run
 from rcilab.recording.live import LiveRecording, RunFacts
 from rcilab.recording.run import Run
-from rcilab.recording.run_file import BLOCK_CYCLES, RunFile, decode_run
+from rcilab.recording.run_file import BLOCK_CYCLES, RunFile, RunWriter, decode_run
 from tests.recording.runs import MODEL, OFFSET, PLAN, SETUP, some_cycles, some_run
 
 
@@ -34,6 +35,7 @@ def test_a_run_comes_back_as_it_was(tmp_path):
     assert back.model is not None
     assert back.model.fingerprint == MODEL.fingerprint  # Tool and load, too.
     assert (back.setup, back.stopped, back.realtime, back.is_complete) == (SETUP, "on request", True, True)
+    assert not back.paced
     assert back.report is not None
     assert back.report.ok
     assert repr(back) == repr(run)
@@ -48,7 +50,9 @@ def test_a_file_holds_the_plan_that_was_run_in_the_end_and_its_errors_are_right(
     live.add(some_cycles())
     run = live.finish(plan=PLAN)
     assert run is not None
-    for kept in (run, rcilab.load_run(path)):
+    rcilab.load_run(path).save(tmp_path / "again.rcirun")
+    for kept in (run, rcilab.load_run(path), rcilab.load_run(tmp_path / "again.rcirun")):
+        assert kept.paced
         assert kept.plan is not None
         assert np.array_equal(kept.plan.q, PLAN.q)
         assert kept.tracking is not None
@@ -118,6 +122,20 @@ def test_what_was_written_before_a_crash_is_there(tmp_path):
     back = rcilab.load_run(path)
     assert same(back, run)
     assert (back.is_complete, back.stopped) == (True, "on request")
+
+
+def test_a_file_from_before_its_cycles_told_of_braking_is_read():
+    ours = cycle_dtype(7)
+    fields = [(name, field[0].base, field[0].shape) for name, field in ours.fields.items() if name != "braking"]
+    older = np.dtype([*((name, *rest) if name != "reserved" else (name, "u1", (5,)) for name, *rest in fields)])
+    stream, cycles = io.BytesIO(), some_cycles()
+    writer = RunWriter(stream, older, plan=PLAN, model=MODEL)
+    writer.add(cycles.view(older))
+    writer.finish()
+    back = decode_run(stream.getvalue())
+    assert back.cycles.dtype == ours
+    assert back.cycles.tobytes() == cycles.tobytes()
+    assert back.stop_time is None
 
 
 def test_other_files_are_refused_in_words(tmp_path):

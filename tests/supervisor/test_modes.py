@@ -145,6 +145,11 @@ def test_a_motion_in_torques_is_brought_to_rest_along_a_way(supervisor):
     status = supervisor.status()
     assert (status.code, status.faults) == ("idle.stopped", ())
     assert np.abs(status.q - motion.goal).max() > 0.05
+    rows = moved_rows(supervisor)
+    first = int(rows["braking"].argmax())
+    assert 500 < first < len(rows) - 1
+    assert (rows["braking"][first:] == 1).all()
+    assert not supervisor.drain()["braking"].any()  # It stands.
 
 
 def test_parameters_are_acknowledged_and_told_again(supervisor):

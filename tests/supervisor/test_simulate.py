@@ -158,6 +158,11 @@ def test_stop_from_another_thread_ends_in_one_controlled_stop(robot):
     assert run.faults == ()
     assert 0.3 * motion.duration < run.duration
     assert np.abs(run.q[-1] - GOAL).max() > 0.01
+    assert run.stop_time is not None
+    assert 0.3 * motion.duration < run.stop_time < run.duration
+    planned = run.t < run.stop_time
+    assert np.array_equal(run.command[planned], motion.q[: planned.sum()])
+    assert run.tracking.joint_max.max() < 1e-9  # Until then; the braking is no error.
     assert np.array_equal(robot.state.q_c, run.q_c[-1])
     limits = MODEL.limits.joint
     assert (np.abs(np.diff(run.q_c, 2, axis=0)) / 1e-6 < limits.acceleration).all()

@@ -17,6 +17,7 @@ from rcilab.workbench import requests
 from rcilab.workbench.app import Workbench
 from rcilab.workbench.panels.health import histogram_html
 from rcilab.workbench.run.driving import control_field
+from rcilab.workbench.run.played import played_path
 from rcilab.workbench.text import Text, load_catalogue
 from tests.workbench.opened import opened, told, wait
 
@@ -148,6 +149,9 @@ def test_paused_gone_on_with_slower_and_recorded_as_it_was(idle):
     assert run.plan.duration > motion.duration + 0.5
     assert run.plan.goal == pytest.approx(motion.goal, abs=1e-9)
     assert np.degrees(np.nanmax(np.abs(run.tracking.joint))) < 2.0  # Against what was asked for, pauses and all.
+    assert run.paced
+    assert np.array_equal(played_path(idle.store.state)[1], run.plan.q)  # And so it is drawn.
+    assert idle.presenter.place_at(1.0) == 1.0
 
 
 def test_the_speed_of_the_slider_counts_from_the_start_and_a_pause_needs_a_motion(idle):

@@ -10,9 +10,7 @@ from hypothesis import strategies as st
 from rcilab.model import load_model
 from rcilab.motion import Motion, plan_joint
 from rcilab.views.plots import QUANTITIES, Curves, bounds_of, build_frame, decimate, plan_curves, recorded_curves
-from rcilab.words.units import Units
 from rcilab.workbench.panels.plot_contents import plot_contents
-from rcilab.workbench.panels.plots import shown_unit
 
 MODEL = load_model("xMatePro7")
 LIMITS = MODEL.limits.joint
@@ -99,11 +97,3 @@ def test_the_number_of_series_never_changes(joint):
     full = plot_contents(build_frame(plan_curves(motion, "q"), plan_curves(motion, "q"), LIMITS, "q", joint), joint, 7)
     assert len(empty[0]) == len(empty[1]) == len(full[0]) == len(full[1]) == 20
     assert len({len(column) for column in full[0]}) == 1
-
-
-def test_errors_are_shown_in_thousandths_where_a_page_is_in_radians_and_metres():
-    assert shown_unit("error", Units()) == (pytest.approx(np.degrees(1.0)), "°")
-    assert shown_unit("tool", Units()) == (1000.0, "mm")
-    assert shown_unit("error", Units(angle="rad", length="m")) == (1000.0, "mrad")
-    assert shown_unit("tool", Units(angle="rad", length="m")) == (1000.0, "mm")
-    assert shown_unit("q", Units(angle="rad", length="m")) == (1.0, "rad")

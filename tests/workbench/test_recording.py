@@ -62,6 +62,9 @@ def test_a_motion_is_recorded_whole_judged_against_its_plan_and_kept_in_a_file(b
     assert run.t[-1] >= run.plan.duration
     assert run.stopped is None
     assert recording.tracking.joint_max.max() < 1e-6  # The ideal plant is where it is told to be.
+    shown, end = bench.presenter, bench.presenter._timeline.end
+    assert end > run.plan.duration
+    assert shown.place_at(0.2) * run.plan.duration == pytest.approx(0.2 * end)  # A click goes where it was clicked.
     back = rcilab.load_run(recording.file)
     assert back.is_complete
     assert back.cycles.tobytes() == run.cycles.tobytes()

@@ -2,7 +2,7 @@
 "use strict";
 
 const COLORS = ["#0b6fc2", "#e07b00", "#1a9850", "#c2357a", "#7b52c7", "#8a6d3b", "#008b9a"];
-const LEFT = 58, RIGHT = 14, TITLE = 20, AXIS = 22;
+const LEFT = 58, RIGHT = 14, TITLE = 20, AXIS = 22, BETWEEN = 22;  // [px] The last one: from tick to tick, at least.
 
 class Plots {
   constructor(box, rows, t, faults, onSeek) {
@@ -67,17 +67,15 @@ class Plots {
       const v = set[j][i];
       if (v < low) low = v; if (v > high) high = v;
     }
-    if (!(low <= high)) { low = -1; high = 1; }
     if (limit && high - low > 0.25 * (limit[1] - limit[0])) { low = Math.min(low, limit[0]); high = Math.max(high, limit[1]); }
-    const least = row.least || 1e-9, spare = Math.max(0.08 * (high - low), least); low -= spare; high += spare;
-    if (row.positive) low = 0;
+    const { ticks, step } = scale(low, high, row, height);
+    low = ticks[0]; high = ticks[ticks.length - 1];
     const y = (v) => top + height * (high - v) / (high - low);
     g.save();
-    g.beginPath(); g.rect(LEFT, top, this.columns, height); g.clip();
+    g.beginPath(); g.rect(LEFT, top - 1, this.columns, height + 2); g.clip();  // A curve at the very end is seen whole.
     g.fillStyle = "#fbfcfe"; g.fillRect(LEFT, top, this.columns, height);
-    const step = nice((high - low) / Math.max(2, height / 30));
     g.lineWidth = 1; g.strokeStyle = "#e6ebf2";
-    for (let v = Math.ceil(low / step) * step; v <= high; v += step) line(g, LEFT, y(v), LEFT + this.columns, y(v));
+    for (const v of ticks) line(g, LEFT, y(v), LEFT + this.columns, y(v));
     if (limit) {
       g.fillStyle = "rgba(209,57,43,.08)"; g.fillRect(LEFT, top, this.columns, y(limit[1]) - top); g.fillRect(LEFT, y(limit[0]), this.columns, top + height - y(limit[0]));
       g.strokeStyle = "#d1392b"; g.setLineDash([5, 4]); limit.forEach((v) => line(g, LEFT, y(v), LEFT + this.columns, y(v))); g.setLineDash([]);
@@ -91,7 +89,7 @@ class Plots {
     g.restore();
     g.strokeStyle = "#d4dce6"; g.strokeRect(LEFT + 0.5, Math.round(top) + 0.5, this.columns, Math.round(height));
     g.fillStyle = "#6b7a90"; g.textAlign = "right";
-    for (let v = Math.ceil(low / step) * step; v <= high; v += step) g.fillText(label(v, step), LEFT - 6, y(v));
+    for (const v of ticks) g.fillText(label(v, step), LEFT - 6, y(v));
     g.fillStyle = "#33425a"; g.textAlign = "left"; g.font = "600 11.5px system-ui, sans-serif";
     g.fillText(`${row.title} [${row.unit}]`, LEFT, top - 9);
     g.font = "11px system-ui, sans-serif";
@@ -117,7 +115,11 @@ class Plots {
   drawTimes(g, top) {
     const [a, b] = this.range, step = nice((b - a) / 8);
     g.fillStyle = "#6b7a90"; g.textAlign = "center";
-    for (let v = Math.ceil(a / step) * step; v <= b + 1e-9; v += step) g.fillText(`${label(v, step)} s`, LEFT + (v - a) / (b - a) * this.columns, top + 11);
+    const most = this.columns + LEFT + RIGHT;
+    for (let v = Math.ceil(a / step) * step; v <= b + 1e-9; v += step) {
+      const said = `${label(v, step)} s`, half = g.measureText(said).width / 2 + 2;
+      g.fillText(said, Math.min(LEFT + (v - a) / (b - a) * this.columns, most - half), top + 11);
+    }
   }
 
   show(time) {  // The cursor and the values under it, over curves that stay as they are.
@@ -132,11 +134,24 @@ class Plots {
     this.rows.forEach((row, k) => {
       const chosen = this.curves(row);
       if (chosen.length !== 1 || i < 0) return;
-      g.fillStyle = "#0f1c2e"; g.fillText(`${row.actual[chosen[0]][i].toFixed(row.digits)} ${row.unit}`, LEFT + this.columns, k * each + TITLE - 9);
+      const v = row.actual[chosen[0]][i];
+      if (v === v) g.fillStyle = "#0f1c2e", g.fillText(`${fixed(v, row.digits)} ${row.unit}`, LEFT + this.columns, k * each + TITLE - 9);
     });
   }
 }
 
 function line(g, x0, y0, x1, y1) { g.beginPath(); g.moveTo(x0, y0); g.lineTo(x1, y1); g.stroke(); }
 function nice(step) { const p = 10 ** Math.floor(Math.log10(step)), m = step / p; return p * (m <= 1 ? 1 : m <= 2 ? 2 : m <= 5 ? 5 : 10); }
-function label(v, step) { return (Math.abs(v) < step * 1e-6 ? 0 : v).toFixed(Math.max(0, Math.min(6, -Math.floor(Math.log10(step))))); }
+function fixed(v, digits) { const said = v.toFixed(digits); return Number(said) === 0 ? said.replace("-", "") : said; }
+function label(v, step) { return fixed(v, Math.max(0, -Math.floor(Math.log10(step) + 1e-9))); }
+function scale(low, high, row, height) {  // The ticks of a plot: as many as fit, one at either end, around all its curves.
+  if (!(low <= high)) low = high = 0;
+  if (row.error) { high = Math.max(Math.abs(low), Math.abs(high), row.least); low = row.positive ? 0 : -high; }
+  else if (high - low < 2 * row.least) { const middle = (low + high) / 2; low = middle - row.least; high = middle + row.least; }
+  const most = Math.max(2, Math.floor(height / BETWEEN));  // Around zero there are two parts, however large.
+  let step = nice((high - low) / most);
+  while (count(low, high, step) > most) step = nice(step * 1.01);
+  const first = Math.floor(low / step + 1e-6);
+  return { step, ticks: Array.from({ length: count(low, high, step) + 1 }, (_, i) => (first + i) * step) };
+}
+function count(low, high, step) { return Math.max(1, Math.ceil(high / step - 1e-6) - Math.floor(low / step + 1e-6)); }

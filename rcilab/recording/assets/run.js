@@ -2,11 +2,11 @@
 (async () => {
   "use strict";
   const $ = (id) => document.getElementById(id);
-  const { words, run, arm, path, facts } = JSON.parse($("content").textContent);
+  const { words, run, charts: kinds, arm, path, facts } = JSON.parse($("content").textContent);
   const packed = Uint8Array.from(atob($("arrays").textContent), (c) => c.charCodeAt(0));
   const bytes = await new Response(new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"))).arrayBuffer();
-  const kinds = { "<f4": Float32Array, "<u4": Uint32Array, "u1": Uint8Array };
-  const array = (place) => new kinds[place.kind](bytes, place.at, place.count);
+  const types = { "<f4": Float32Array, "<u4": Uint32Array, "u1": Uint8Array };
+  const array = (place) => new types[place.kind](bytes, place.at, place.count);
   const rows = run.arrays.t.count, pieces = (place, n) => {
     const all = array(place);
     return Array.from({ length: n }, (_, j) => all.subarray(j * rows, (j + 1) * rows));
@@ -14,18 +14,16 @@
 
   const t = array(run.arrays.t), signals = {};
   for (const name of ["q", "dq", "tau", "error", "q_plan", "dq_plan"]) if (run.arrays[name]) signals[name] = pieces(run.arrays[name], run.n);
-  const limits = run.limits || {};
-  const charts = [
-    { title: words["plot.q"], unit: "°", actual: signals.q, plan: signals.q_plan, limits: limits.q, digits: 2, least: 1 },
-    { title: words["plot.dq"], unit: "°/s", actual: signals.dq, plan: signals.dq_plan, limits: limits.dq, digits: 2, least: 1 },
-    { title: words["plot.tau"], unit: "N m", actual: signals.tau, limits: limits.tau, digits: 2, least: 0.5 },
-    { title: words["plot.error"], unit: "°", actual: signals.error, digits: 4 },
-  ];
-  const tool = array(run.arrays.tool);
-  if (tool.some((x) => x === x)) charts.push({ title: words["plot.tool"], unit: "mm", actual: [tool], digits: 4, positive: true });
+  const limits = run.limits || {}, tool = array(run.arrays.tool);
+  signals.tool = [tool];
+  const charts = kinds.filter(({ name }) => name !== "tool" || tool.some((x) => x === x)).map((kind) => ({
+    ...kind, actual: signals[kind.name], plan: signals[`${kind.name}_plan`], limits: limits[kind.name],
+    error: kind.name === "error" || kind.name === "tool", positive: kind.name === "tool",
+  }));
+  const perRadian = kinds.find(({ name }) => name === "q").factor;
 
   let now = 0, playing = false, last = 0;
-  const end = rows ? t[rows - 1] : 0, radians = (set, i) => set.map((column) => column[i] * Math.PI / 180);
+  const end = rows ? t[rows - 1] : 0, radians = (set, i) => set.map((column) => column[i] / perRadian);
   const plots = new Plots($("plots"), charts, t, array(run.arrays.fault), (time) => { playing = false; go(time); });
   let scene = null;
   if (arm) {
@@ -89,10 +87,11 @@
       cells.forEach((text, k) => { const cell = element(k ? "td" : "th", text, line); if (!k && i < run.n) cell.style.setProperty("--c", COLORS[i % COLORS.length]); });
     });
   };
-  table(words["table.title"], [words["table.where"], words["table.rms"], words["table.max"]], facts.errors, "numbers");
+  table(words["table.title"], [words["table.where"], facts.head.rms, facts.head.max], facts.errors, "numbers");
+  if (facts.notes.length) { const cell = element("td", facts.notes.join(" "), element("tr", undefined, element("tfoot", undefined, $("tables").lastChild))); cell.colSpan = 3; }
   table(words["facts.title"], null, facts.rows, "facts");
   $("ended").textContent = facts.rows.map(([, value]) => value).slice(0, 2).join(" · ") + " — " + words.foot;
-  if (scene && path) $("key").innerHTML = `${words.path}: 0<i></i>${scene.worst.toPrecision(2)} mm` + (signals.q_plan ? `<br>${words.ghost}` : "");
+  if (scene && path) $("key").innerHTML = `${words.path}: 0<i></i>${path.worst_told}` + (signals.q_plan ? `<br>${words.ghost}` : "");
   const sign = (text, color, look = "") => { const s = element("span", "", $("legend")); const i = element("i", undefined, s); i.className = look; if (look !== "area") i.style.borderColor = color; s.append(text); };
   COLORS.slice(0, run.n).forEach((color, j) => sign(`J${j + 1}`, color));
   if (signals.q_plan) sign(words["legend.plan"], "#111827", "dash");

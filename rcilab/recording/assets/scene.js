@@ -116,15 +116,15 @@ class Scene {
   }
 
   makePaths(path, array) {
-    const points = array(path.points), error = array(path.error), most = Math.max(...error, 1e-9);
+    const points = array(path.points), error = array(path.error);
     const stops = [[20, 150, 160], [60, 175, 90], [240, 150, 20], [214, 48, 38]];
     const tint = (i) => {
-      const x = Math.min(Math.max(error[i] / most, 0), 1) * 3, k = Math.min(Math.floor(x), 2), f = x - k;
+      if (error[i] !== error[i]) return [0.55, 0.58, 0.63];  // Compared with nothing.
+      const x = Math.min(Math.max(error[i] / path.worst, 0), 1) * 3, k = Math.min(Math.floor(x), 2), f = x - k;
       return stops[k].map((c, d) => (c + (stops[k + 1][d] - c) * f) / 255);
     };
     const paths = [this.ribbon(points, tint, 3.2, 1)];
     if (path.plan) paths.unshift(this.ribbon(array(path.plan), () => [0.27, 0.55, 1], 6.5, 0.3));
-    this.worst = most;
     return paths;
   }
 

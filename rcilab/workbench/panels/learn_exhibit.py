@@ -40,7 +40,7 @@ class LearnExhibitPanel:
             data, series, bands=bands, height=_HEIGHT, legend={"show": False}, visible=False,
             scales={"x": {"time": False, "range": (0.0, 1.0)}, "y": {"range": (-1.2, 1.2)}},
             cursor={"drag": {"x": False, "y": False}}, padding=(6, 12, 0, 0),
-            axes=plot_axes(state.theme, last=True, space=26, size=58),  # A jerk has six digits in degrees.
+            axes=plot_axes(state.theme, last=True),
         )  # fmt: skip
         self._body = Html(gui)
         self._moment = gui.add_button(

@@ -18,6 +18,7 @@ COLORS = ("#0b6fc2", "#e07b00", "#1a9850", "#c2357a", "#7b52c7", "#8a6d3b", "#00
 _DARK_COLORS = ("#5aaef2", "#ffab40", "#5fd38d", "#ff7eb6", "#b79bff", "#d9bd82", "#3fd0e0")
 _BROKEN = 4  # Joints from here on, from 0, are drawn with gaps: seven colours are too many for some eyes.
 _GAPS = (9, 3)
+_NUMBERS = 58  # [px] Beside a plot: a jerk has six digits in degrees.
 _INK = {"light": "#111827", "dark": "#f3f6fa"}
 _AXIS = {"light": ("#51607a", "#e6ebf2"), "dark": ("#a9b6c8", "#3a4452")}
 _EDGE = {"light": "#d1392b", "dark": "#ff7b70"}
@@ -75,17 +76,25 @@ def plot_contents(
     return tuple(data), tuple(series), bands
 
 
-def plot_axes(theme: Theme, *, last: bool, space: int, size: int = 46) -> tuple[Any, ...]:
-    """Returns the axes of a plot; only the last one of a column says the time. `size`: width of the numbers, [px]."""
+def plot_axes(theme: Theme, *, last: bool, ticks: tuple[float, ...] | None = None) -> tuple[Any, ...]:
+    """Returns the axes of a plot.
+
+    Args:
+        theme: Of the page.
+        last: Whether it says the time: only the last one of a column does.
+        ticks: Which numbers stand beside it; None leaves that to uPlot.
+    """
     ink, grid = _AXIS[theme]
     look = {"font": "11px system-ui, sans-serif", "stroke": ink, "grid": {"stroke": grid, "width": 1}}
-    ticks = {"size": 3, "stroke": grid, "width": 1}
-    x: Any = {**look, "size": 22, "gap": 2, "ticks": ticks} if last else {"show": False}
-    return x, {**look, "size": size, "gap": 3, "space": space, "ticks": ticks}
+    marks = {"size": 3, "stroke": grid, "width": 1}
+    x: Any = {**look, "size": 22, "gap": 2, "ticks": marks} if last else {"show": False}
+    # uPlot leaves out an axis on which its own steps have less room than `space`, whatever the ticks.
+    chosen: Any = {"space": 26} if ticks is None else {"space": 1, "splits": ticks}
+    return x, {**look, "size": _NUMBERS, "gap": 3, "ticks": marks, **chosen}
 
 
-def legend_html(joint: int, n: int, text: Text, theme: Theme, *, has_actual: bool) -> str:
-    """Returns which colour and dash is which joint, and what dots, dashes and areas mean."""
+def legend_html(joint: int, n: int, text: Text, theme: Theme, *, has_actual: bool, is_paced: bool = False) -> str:
+    """Returns which colour and dash is which joint, what dots, dashes and areas mean, and at which pace the plan is."""
     joints = [joint - 1] if joint else range(n)
     swatches = "".join(
         f'<span><i class="rl-swatch{" rl-broken" if i >= _BROKEN else ""}" style="color:{joint_color(i, theme)}"></i>'
@@ -94,4 +103,5 @@ def legend_html(joint: int, n: int, text: Text, theme: Theme, *, has_actual: boo
     )
     signs = ("actual", "limit", "violation") if has_actual else ("limit", "violation")
     rest = "".join(f'<span class="rl-sign-{sign}">{esc(text("legend." + sign))}</span>' for sign in signs)
-    return f'<div class="rl-legend">{swatches}{rest}</div>'
+    paced = f"<span>{esc(text('legend.paced'))}</span>" if is_paced else ""
+    return f'<div class="rl-legend">{swatches}{rest}{paced}</div>'

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 import time
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
 from rcilab.clock import CYCLE_TIME
+from rcilab.views.plot_ticks import axis_ticks
 from rcilab.views.plots import (
     Curves,
     Frame,
@@ -18,29 +19,29 @@ from rcilab.views.plots import (
     mark_moment,
     plan_curves,
     recorded_curves,
+    streamed_curves,
 )
 from rcilab.views.tool_curves import TOOL_QUANTITIES, ToolQuantity, tool_curves, tool_limit
-from rcilab.words.units import Units
+from rcilab.words.plot_scale import ERRORS, PlotScale, plot_scale
 from rcilab.workbench.panels.plot_contents import legend_html, plot_axes, plot_contents
+from rcilab.workbench.run.played import played_path, streamed_rows
 from rcilab.workbench.text import Text
 from rcilab.workbench.view_actions import PLOTS, has_plot
 from rcilab.workbench.widgets import Html, esc
 
 if TYPE_CHECKING:
+    from rcilab.arrays import JointPath
     from rcilab.workbench.store import Recording, UiState
 
 _REDRAW_TIME = 0.25  # [s] A choice: plots are redrawn at most so often while something is dragged or moves.
 _LEISURE = 8.0  # A choice: and take at most an eighth of the time, however long the motion is.
-_SI = {
-    "q": "rad", "dq": "rad/s", "ddq": "rad/s^2", "jerk": "rad/s^3", "tau": "N m", "speed": "m/s",
-    "acceleration": "m/s^2", "psi": "rad", "error": "rad", "tool": "m",
-}  # fmt: skip
-_ERRORS = ("error", "tool")
-"""There once a motion has been executed."""
-_LEAST_ERROR = {"error": math.radians(0.02), "tool": 2e-5}  # [rad, m] A choice: with less, ticks would be rounded.
 _OTHER_HEIGHT = 46 + 62 + 170 + 30  # [px] Bar, window head, strip and choices, legend.
 _HINT = 44  # [px] What to do first takes more room than the clock that stands in its place later.
+_MARGIN = 6  # [px] Above and below: half of a number that stands at the very end of an axis.
 _TITLE, _TIMES = 20, 26  # [px] A plot's title, and the times below the last one.
+
+_Reach: TypeAlias = tuple[float, float, tuple[float, ...]]
+"""Where the axis of a plot ends, below and above, and the limits in it."""
 
 
 class Plots:
@@ -53,6 +54,7 @@ class Plots:
         self._visible: tuple[str, ...] = ()
         self._planned: dict[str, Curves] = {}
         self._plan: object = None
+        self._streamed: JointPath | None = None  # What became of the plan at another pace.
         self.end = 1.0
         """Where the time axis ends, [s]."""
 
@@ -60,6 +62,7 @@ class Plots:
         """Adds a plot of every kind; those that were not chosen stay hidden."""
         self._plots: dict[str, Any] = {}
         self._titles: dict[str, Html] = {}
+        self._reaches: dict[str, _Reach] = dict.fromkeys(PLOTS, (-112.0, 112.0, (-100.0, 100.0)))
         empty = build_frame(None, None, state.model.limits.joint, "q", 0)
         data, series, bands = plot_contents(empty, 0, state.model.n, state.theme)
         self._visible = _wanted(state)
@@ -71,26 +74,30 @@ class Plots:
                 bands=bands,
                 height=_height(state, len(self._visible)),
                 legend={"show": False},
-                scales={"x": {"time": False, "range": (0.0, 1.0)}, "y": {"range": (-112.0, 112.0)}},
+                scales={"x": {"time": False, "range": (0.0, 1.0)}, "y": {"range": self._reaches[name][:2]}},
                 cursor={"drag": {"x": False, "y": False}, "sync": {"key": "rcilab"}},
-                padding=(6, 12, 6, 0),  # Below: half of a tick's number that stands at the very end of the axis.
-                axes=_axes(name, state, self._visible),
+                padding=(_MARGIN, 12, _MARGIN, 0),
+                axes=self._axes(name, state, self._visible),
                 visible=name in self._visible,
             )
         self._legend = Html(gui)
 
     def show(self, state: UiState) -> None:
         """Redraws the plots when plan, recording or choice have changed."""
-        if state.plan is not self._plan:
-            self._plan, self._planned = state.plan, {}
+        streamed = streamed_rows(state)
+        if state.plan is not self._plan or streamed is not self._streamed:
+            self._plan, self._streamed, self._planned = state.plan, streamed, {}
         visible = _wanted(state)
-        if visible != self._visible:
-            self._arrange(state, visible)
+        is_rearranged = visible != self._visible
+        if is_rearranged:
+            self._arrange(visible)
         height = _height(state, len(visible))
         for name in visible:
             wanted_height = height + (_TIMES if name == visible[-1] else 0)
             if self._plots[name].height != wanted_height:
-                self._plots[name].height = wanted_height
+                self._plots[name].height, is_rearranged = wanted_height, True
+        if is_rearranged:
+            self._fit(state, visible)
         wanted = (state.plan, state.recording, state.plot_joint, state.model, visible)
         now = time.monotonic()
         if wanted != self._drawn and now >= self._next:
@@ -99,51 +106,75 @@ class Plots:
                 self._draw(state, name)
             has_actual = state.recording is not None
             self._legend.show(
-                legend_html(state.plot_joint, state.model.n, self._text, state.theme, has_actual=has_actual)
+                legend_html(
+                    state.plot_joint,
+                    state.model.n,
+                    self._text,
+                    state.theme,
+                    has_actual=has_actual,
+                    is_paced=streamed is not None,
+                )
             )
+            self._fit(state, visible)
             self._next = now + max(_REDRAW_TIME, _LEISURE * (time.monotonic() - now))
 
-    def _arrange(self, state: UiState, visible: tuple[str, ...]) -> None:
+    def _fit(self, state: UiState, visible: tuple[str, ...]) -> None:
+        """Gives every plot as many numbers as it is high enough for."""
+        for name in visible:
+            axes = self._axes(name, state, visible)
+            if self._plots[name].axes != axes:
+                self._plots[name].axes = axes
+
+    def _axes(self, name: str, state: UiState, visible: tuple[str, ...]) -> tuple[Any, ...]:
+        low, high, limits = self._reaches[name]
+        ticks = axis_ticks(low, high, _height(state, len(visible)) - 2 * _MARGIN, limits)
+        return plot_axes(state.theme, last=name == (visible or PLOTS)[-1], ticks=ticks)
+
+    def _arrange(self, visible: tuple[str, ...]) -> None:
         for name, plot in self._plots.items():
             if plot.visible != (name in visible):
                 plot.visible = name in visible
             if name not in visible:
                 self._titles[name].show("")
-        for name in {*self._visible[-1:], *visible[-1:]}:
-            self._plots[name].axes = _axes(name, state, visible)
         self._visible = visible
 
     def _draw(self, state: UiState, name: str) -> None:
-        factor, unit = shown_unit(name, self._text.units)
+        scale = plot_scale(name, self._text.units)
+        factor, unit = scale.factor, scale.unit
         joint = 0 if name in (*TOOL_QUANTITIES, "tool") else state.plot_joint
-        if name in _ERRORS:
-            frame = self._error_frame(state, name, factor)
+        if name in ERRORS:
+            frame = self._error_frame(state, name, scale)
         elif name in TOOL_QUANTITIES:
             frame = self._tool_frame(state, cast("ToolQuantity", name), factor)
         else:
             frame = self._joint_frame(state, cast("Quantity", name), factor)
             unit = unit if joint else self._text("plot.percent")
-        if name not in _ERRORS:
+        if name not in ERRORS:
             self.end = frame.end
         if state.recording is not None and state.recording.moment is not None:
             frame = mark_moment(frame, state.recording.moment)
         title = self._text(f"plot.{name}") + (f" · J{joint}" if joint else "") + f" [{unit}]"
         self._titles[name].show(f'<div class="rl-plot-title">{esc(title)}</div>')
-        reach = (0.0 if name in ("speed", "acceleration", "tool") else -frame.bound, frame.bound)
+        low = 0.0 if name in ("speed", "acceleration", "tool") else -frame.bound
+        self._reaches[name] = low, frame.bound, tuple(v for v in (frame.lower, frame.upper) if math.isfinite(v))
         is_tool = name in (*TOOL_QUANTITIES, "tool")
         data, series, _ = plot_contents(frame, joint, state.model.n, state.theme, is_tool=is_tool)
         plot = self._plots[name]
         if plot.series != series:
             plot.series = series
         plot.data = data
-        scale = {"x": {"time": False, "range": (0.0, frame.end)}, "y": {"range": reach}}
-        if plot.scales != scale:
-            plot.scales = scale
+        scales = {"x": {"time": False, "range": (0.0, frame.end)}, "y": {"range": (low, frame.bound)}}
+        if plot.scales != scales:
+            plot.scales = scales
 
     def _joint_frame(self, state: UiState, name: Quantity, factor: float) -> Frame:
         plan, recording, actual = state.plan, state.recording, None
         if plan is not None and name not in self._planned:
-            self._planned[name] = plan_curves(plan.motion, name, state.model)
+            self._planned[name] = (
+                plan_curves(plan.motion, name, state.model)
+                if self._streamed is None
+                else streamed_curves(self._streamed, name, state.model)
+            )
         if recording is not None and name == "tau":
             actual = None if recording.tau is None else Curves(t=_times(recording), values=recording.tau)
         elif recording is not None:
@@ -153,33 +184,25 @@ class Plots:
         )
 
     def _tool_frame(self, state: UiState, name: ToolQuantity, factor: float) -> Frame:
-        plan, recording, actual = state.plan, state.recording, None
-        if plan is not None and name not in self._planned:
-            self._planned[name] = tool_curves(state.model, plan.motion.times, plan.motion.q, name)
+        path, recording, actual = played_path(state), state.recording, None
+        if path is not None and name not in self._planned:
+            self._planned[name] = tool_curves(state.model, *path, name)
         if recording is not None:  # Measured twice differentiated is noise: the acceleration is that of the commands.
             q = recording.q_c if name == "acceleration" else recording.q
             actual = tool_curves(state.model, _times(recording), q, name)
         return build_tool_frame(self._planned.get(name), actual, tool_limit(state.model.limits, name), factor)
 
-    def _error_frame(self, state: UiState, name: str, factor: float) -> Frame:
+    def _error_frame(self, state: UiState, name: str, scale: PlotScale) -> Frame:
         """Returns measured against planned of a finished motion: of the joints, or of the tool."""
         recording, joint = state.recording, state.plot_joint
         assert recording is not None
         assert recording.tracking is not None
         t, tracking = _times(recording), recording.tracking
-        last = last_time(*(plan_curves(p.motion, "q") for p in (state.plan,) if p is not None), Curves(t=t, values=t))
-        if name == "tool":
-            return build_error_frame(t, factor * tracking.position[:, None], last, least=factor * _LEAST_ERROR[name])
+        path = played_path(state)
+        last = last_time(None if path is None else Curves(t=path[0], values=path[1]), Curves(t=t, values=t))
         errors = tracking.joint if not joint else tracking.joint[:, joint - 1 : joint]
-        return build_error_frame(t, factor * errors, last, least=factor * _LEAST_ERROR[name])
-
-
-def shown_unit(name: str, units: Units) -> tuple[float, str]:
-    """Returns how many of its unit in a plot one SI unit is, and that one's name."""
-    factor, unit = units.from_si(_SI[name])
-    if name in _ERRORS and factor == 1.0:  # Errors are small, and a plot's numbers end three digits behind the point.
-        return 1e3, f"m{unit}"
-    return factor, unit
+        errors = tracking.position[:, None] if name == "tool" else errors
+        return build_error_frame(t, scale.factor * errors, last, scale.least)
 
 
 def _wanted(state: UiState) -> tuple[str, ...]:
@@ -187,7 +210,7 @@ def _wanted(state: UiState) -> tuple[str, ...]:
     return tuple(
         name
         for name in PLOTS
-        if name in state.plots and has_plot(state.model, name) and (finished or name not in _ERRORS)
+        if name in state.plots and has_plot(state.model, name) and (finished or name not in ERRORS)
     )
 
 
@@ -199,7 +222,3 @@ def _height(state: UiState, rows: int) -> int:
     hint = 0 if state.plan is not None else _HINT
     spare = state.height - _OTHER_HEIGHT - hint - _TIMES - _TITLE * rows
     return max(72, min(int(spare / max(rows, 1)), 260)) // 4 * 4
-
-
-def _axes(name: str, state: UiState, visible: tuple[str, ...]) -> tuple[Any, ...]:
-    return plot_axes(state.theme, last=name == (visible or PLOTS)[-1], space=16 if name in _ERRORS else 28)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from rcilab.recording.tracking_words import error_rows, tracking_notes
 from rcilab.workbench import requests
 from rcilab.workbench.run.export_actions import ENDINGS
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, Html, Linked, esc, on_press
 
 if TYPE_CHECKING:
-    from rcilab.recording.tracking import Tracking
     from rcilab.supervisor import SupervisorStatus
     from rcilab.workbench.store import Recording, UiState
 
@@ -74,16 +74,18 @@ class RecordingPanel:
 
 
 def summary_html(recording: Recording | None, text: Text) -> str:
-    """Returns how far joints and tool were from the plan: RMS and largest, as a table."""
+    """Returns how far joints and tool were from the plan: RMS and largest, as a table, and what it compares."""
     if recording is None:
         return f'<p class="rl-note">{esc(text("record.nothing"))}</p>'
     run, tracking = recording.run, recording.tracking
     if run is None or tracking is None:
         return f'<p class="rl-note">{esc(text("record.running", cycles=len(recording.t)))}</p>'
-    return (
-        f'<table class="rl-table"><tr><th>{esc(text("record.error"))}</th><th>{esc(text("record.rms"))}</th>'
-        f"<th>{esc(text('record.max'))}</th></tr>{_rows(tracking, text)}</table>"
+    head = (text("record.error"), text("tracking.rms"), text("tracking.max"))
+    rows = "".join(
+        f"<tr><td>{esc(name)}</td><td>{a}</td><td>{b}</td></tr>" for name, a, b in error_rows(run, tracking, text)
     )
+    table = f'<table class="rl-table"><tr>{"".join(f"<th>{esc(title)}</th>" for title in head)}</tr>{rows}</table>'
+    return table + "".join(f'<p class="rl-note">{esc(note)}</p>' for note in tracking_notes(run, tracking, text))
 
 
 def progress_html(ending: str, share: float, text: Text) -> str:
@@ -91,16 +93,6 @@ def progress_html(ending: str, share: float, text: Text) -> str:
     percent = f"{100.0 * share:.0f}"
     said = esc(text("export.progress", kind=text(f"export.{ending[1:]}"), percent=percent))
     return f'<p class="rl-note" role="status">{said}</p><div class="rl-meter"><i style="width:{percent}%"></i></div>'
-
-
-def _rows(tracking: Tracking, text: Text) -> str:
-    units = text.units
-    pairs = zip(tracking.joint_rms, tracking.joint_max, strict=True)
-    rows = [(f"J{j}", *(units.angle_of(value, 4) for value in pair)) for j, pair in enumerate(pairs, start=1)]
-    away = [units.length_of(value, 3) for value in (tracking.position_rms, tracking.position_max)]
-    turn = [units.angle_of(value, 4) for value in (tracking.rotation_rms, tracking.rotation_max)]
-    rows += [(text("record.tool"), away[0], away[1]), (text("record.turn"), turn[0], turn[1])]
-    return "".join(f"<tr><td>{esc(name)}</td><td>{a}</td><td>{b}</td></tr>" for name, a, b in rows)
 
 
 def _export(ending: str):  # type: ignore[no-untyped-def]

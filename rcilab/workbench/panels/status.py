@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from rcilab.workbench.lease import PATIENCE, Lease
+from rcilab.workbench.run.played import played_at
 from rcilab.workbench.run.readiness import time_shown
 from rcilab.workbench.telling import phase_code, tell_status
 from rcilab.workbench.text import Text
@@ -102,4 +103,5 @@ def _chip(text: Text, name: str, value: str, tone: str = "", *, wide: bool = Fal
 def _cursor(state: UiState, status: SupervisorStatus, end: float) -> dict[str, float] | None:
     if state.plan is None or end <= 0.0:
         return None
-    return {"place": round(min(max(time_shown(state, status) / end, 0.0), 1.0), 4)}
+    t = played_at(state, time_shown(state, status))
+    return {"place": round(min(max(t / end, 0.0), 1.0), 4)}

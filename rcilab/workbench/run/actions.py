@@ -25,6 +25,7 @@ from rcilab.workbench.text import Message, message
 
 if TYPE_CHECKING:
     from rcilab.client.setup import RobotSetup
+    from rcilab.motion.pacing import PacedMotion
     from rcilab.supervisor import SupervisorStatus, Ticket
 
 _SECOND_THOUGHT = 10.0  # [s] A choice: a second press that comes later asks anew.
@@ -274,16 +275,20 @@ class RobotActions:
             return
         if not self._recording:
             return
-        self._keeper.add(rows)
+        self._keeper.add(rows, self._paced())
         if not is_moving(status) and not any(what == "execute" for what, _ in self._tickets):
             self._end_recording()
 
     def _end_recording(self) -> None:
         self._recording = False
-        paced = None
+        self._keeper.finish(self._stopped, self._paced())
+
+    def _paced(self) -> PacedMotion | None:
+        """Returns how the motion under way, or the last one, is run; None as planned."""
         with suppress(RcilabError):  # Its supervisor has gone.
             paced = self._session.supervisor().paced
-        self._keeper.finish(self._stopped, paced.as_motion() if paced is not None and paced.changed else None)
+            return paced if paced is not None and paced.changed else None
+        return None
 
     def close(self) -> None:
         """Ends a recording, so that its file has an end: the arm is about to be stopped where it still moves."""

@@ -89,7 +89,10 @@ class ExportActions:
             from rcilab.recording.export import write_export
 
             with TemporaryFile(prefix="rcilab-") as stream:  # A long run does not fit into memory as text.
-                write_export(run, ending, stream, progress=self._follow(ending), language=self._store.state.language)
+                told = self._store.state
+                write_export(
+                    run, ending, stream, progress=self._follow(ending), language=told.language, units=told.units
+                )
                 size = f"{max(stream.tell() / 1e6, 0.01):.2f}"
                 is_sent = self._deliver(page, file_name(run, ending), stream, self._unwanted.is_set)
             if self._unwanted.is_set():

@@ -17,7 +17,7 @@ from rcilab.workbench.store import Recording, Store
 from rcilab.workbench.text import message
 
 if TYPE_CHECKING:
-    from rcilab.motion import Motion
+    from rcilab.motion.pacing import PacedMotion
     from rcilab.posing.planning import Plan
     from rcilab.recording.run_file import RunFile
     from rcilab.workbench.store import UiState
@@ -43,8 +43,8 @@ class RunKeeper:
         facts = RunFacts(plan=plan.motion, model=state.model, setup=setup)
         self._live = LiveRecording(facts, self._open(state, plan, setup))
 
-    def add(self, rows: NDArray[np.void]) -> None:
-        """Adds cycles and shows them."""
+    def add(self, rows: NDArray[np.void], paced: PacedMotion | None = None) -> None:
+        """Adds cycles and shows them; `paced`: how the plan is run, where its pace was changed."""
         if self._live is None:
             return
         before = self._live.cycles
@@ -54,18 +54,19 @@ class RunKeeper:
             self._complain(error)
         cycles = self._live.cycles
         if cycles is not None and (before is None or len(cycles) > len(before)):
-            self._store.update(recording=as_recording(cycles, self._live.delay))
+            self._store.update(recording=as_recording(cycles, self._live.delay, paced))
 
-    def finish(self, stopped: str | None, plan: Motion | None = None) -> None:
+    def finish(self, stopped: str | None, paced: PacedMotion | None = None) -> None:
         """Ends the recording; from here on it can be exported.
 
         Args:
             stopped: Why the motion did not reach its end; None: it did.
-            plan: What was asked of the arm in the end, where that is not what was planned: another pace.
+            paced: How the plan was run, where its pace was changed.
         """
         if self._live is None:
             return
         live, self._live = self._live, None
+        plan = None if paced is None else paced.as_motion()
         run: Run | None = None
         try:
             run = live.finish(stopped, plan)
@@ -73,7 +74,7 @@ class RunKeeper:
             self._complain(error)
             run = live.finish(stopped, plan)  # Its file is given up now; the run in memory is whole.
         if run is not None:
-            recording = whole_recording(run, self._file)
+            recording = whole_recording(run, self._file, paced)
             self._store.update(recording=recording, last_run=recording)
 
     def _open(self, state: UiState, plan: Plan, setup: Setup) -> RunFile | None:
@@ -103,12 +104,20 @@ class RunKeeper:
         )
 
 
-def as_recording(cycles: NDArray[np.void], delay: int) -> Recording:
+def as_recording(cycles: NDArray[np.void], delay: int, paced: PacedMotion | None = None) -> Recording:
     """Returns what the plots need of a run that goes on."""
-    return Recording(t=cycles["t"], q=cycles["q"], q_c=cycles["q_c"], dq=cycles["dq"], tau=cycles["tau"], delay=delay)
+    return Recording(
+        t=cycles["t"],
+        q=cycles["q"],
+        q_c=cycles["q_c"],
+        dq=cycles["dq"],
+        tau=cycles["tau"],
+        delay=delay,
+        paced=paced,
+    )
 
 
-def whole_recording(run: Run, file: str = "") -> Recording:
+def whole_recording(run: Run, file: str = "", paced: PacedMotion | None = None) -> Recording:
     """Returns a finished run for plots, table and export."""
     return Recording(
         t=run.t,
@@ -118,6 +127,7 @@ def whole_recording(run: Run, file: str = "") -> Recording:
         tau=run.tau,
         delay=run.delay,
         run=run,
+        paced=paced,
         tracking=run.tracking,
         file=file,
     )

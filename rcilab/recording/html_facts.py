@@ -1,0 +1,43 @@
+"""What the exported page says of a run beside its errors: when, where and how it went, in words."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rcilab.recording.run import Run
+    from rcilab.words.text import Text
+
+
+def fact_rows(run: Run, text: Text) -> list[list[str]]:
+    """Returns rows of a table: a name and what there is to say."""
+    setup, report = run.setup, run.report
+    rows = [
+        ("started", setup.started),
+        ("target", " · ".join(part for part in (setup.target, setup.plant, setup.mode) if part)),
+        ("duration", text("facts.cycles", duration=run.duration, cycles=len(run.cycles))),
+        ("ended", _ended(run, text)),
+        ("health", _health(run, text)),
+        ("delay", text("facts.delay_cycles", delay=run.delay)),
+    ]
+    if report is not None:
+        verdict = text("facts.violates", count=len(report.violations))
+        if report.ok:
+            verdict = text("facts.conforms", share=100.0 * report.worst.ratio, id=report.worst.id)
+        rows.append(("check", verdict))
+    return [[text(f"facts.{name}"), said] for name, said in rows if said]
+
+
+def _ended(run: Run, text: Text) -> str:
+    if run.faults:
+        return text("facts.faulted", faults=", ".join(fault.manual_name for fault in run.faults))
+    if not run.is_complete:
+        return text("facts.cut")
+    return text("facts.stopped", why=run.stopped) if run.stopped else text("facts.goal")
+
+
+def _health(run: Run, text: Text) -> str:
+    timing = run.timing
+    if not run.realtime:
+        return text("facts.lockstep", lost=timing.lost)
+    return text("facts.timing", lost=timing.lost, late=timing.late, p99=timing.lateness_p99 * 1e6)

@@ -1,0 +1,36 @@
+"""How far an arm was from its plan, in words: the same table and the same sentences on the page and in its exports."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rcilab.recording.run import Run
+    from rcilab.recording.tracking import Tracking
+    from rcilab.words.text import Text
+
+_EXACT = 1e-6  # [rad] Less is rounding.
+
+
+def error_rows(run: Run, tracking: Tracking, text: Text) -> list[list[str]]:
+    """Returns how far joints and tool were from the plan: where, RMS and largest."""
+    units = text.units
+    pairs = zip(tracking.joint_rms, tracking.joint_max, strict=True)
+    rows = [[f"J{j}", *(units.angle_of(value, 4) for value in pair)] for j, pair in enumerate(pairs, start=1)]
+    if run.model is not None:
+        away = [units.length_of(value, 3) for value in (tracking.position_rms, tracking.position_max)]
+        turn = [units.angle_of(value, 4) for value in (tracking.rotation_rms, tracking.rotation_max)]
+        rows += [[text("tracking.tool"), *away], [text("tracking.turn"), *turn]]
+    return rows
+
+
+def tracking_notes(run: Run, tracking: Tracking, text: Text) -> list[str]:
+    """Returns what one has to know to read that table: what was compared, and why there may be no error at all."""
+    notes = []
+    if run.plan is not None and run.stop_time is not None:
+        notes.append(text("tracking.until", time=f"{run.stop_time:.3f}"))
+    if run.paced:
+        notes.append(text("tracking.paced"))
+    if run.setup.plant == "ideal" and tracking.joint_max.max(initial=0.0) < _EXACT:
+        notes.append(text("tracking.ideal"))
+    return notes

@@ -1,0 +1,52 @@
+"""The table of errors says what it compares and why it may be all zeros: on the page and in the exported file alike."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from rcilab.recording.export import export_run
+from rcilab.recording.tracking_words import tracking_notes
+from rcilab.words.text import Text
+from rcilab.workbench.panels.recording import summary_html
+from rcilab.workbench.run.keeper import whole_recording
+from rcilab.workbench.text import Text as PageText
+from tests.recording.runs import SETUP, some_ideal_run, some_run, some_stopped_run
+
+
+def notes(run, language: str = "en") -> list[str]:
+    """What the exported page says; the workbench must say the same."""
+    page = export_run(run, ".html", language=language).decode()
+    said = json.loads(page.split('id="content">')[1].split("</script>")[0])["facts"]["notes"]
+    shown = summary_html(whole_recording(run), PageText(language))
+    assert shown.count('<p class="rl-note">') == len(said)
+    assert all(note in shown for note in said)
+    assert said == tracking_notes(run, run.tracking, Text(language, "rcilab.recording"))
+    return said
+
+
+@pytest.mark.parametrize(("language", "word"), [("en", "follows exactly"), ("zh", "理想机械臂")])
+def test_zeros_of_the_ideal_arm_are_explained(language, word):
+    (note,) = notes(some_ideal_run(), language)
+    assert word in note
+    assert "MuJoCo" in note
+
+
+def test_an_arm_that_lags_is_not_called_exact_and_an_unknown_one_is_not_called_ideal():
+    assert notes(some_run()) == []  # MuJoCo.
+    assert notes(replace(some_run(), setup=replace(SETUP, plant="ideal"))) == []  # With an impedance it lags, too.
+    assert notes(replace(some_ideal_run(), setup=replace(SETUP, plant=""))) == []  # A controller somewhere.
+
+
+@pytest.mark.parametrize(("language", "words"), [("en", "until the stop at 0.300 s"), ("zh", "只比较到 0.300 秒")])
+def test_a_stopped_run_says_until_when_it_is_compared(language, words):
+    (note,) = notes(some_stopped_run(), language)
+    assert words in note
+
+
+@pytest.mark.parametrize(("language", "word"), [("en", "pace"), ("zh", "运行速度")])
+def test_a_run_at_another_pace_says_that_its_plan_has_other_times(language, word):
+    (note,) = notes(some_run(paced=True), language)
+    assert word in note
