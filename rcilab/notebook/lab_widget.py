@@ -41,7 +41,7 @@ class Lab(Part):
         subject: A model, a session, or another part to look at the same arm as.
         view: Of the scene, see `Scene`.
         height: Of the scene, [px].
-        language: "en" or "zh".
+        language: "en" or "zh"; when absent that of a part that is given, else that of the notebook.
         place: Where the browser is; found out when absent.
 
     Raises:
@@ -55,15 +55,15 @@ class Lab(Part):
         *,
         view: View = "auto",
         height: int = 440,
-        language: str = "en",
+        language: str | None = None,
         place: Place | None = None,
     ) -> None:
         super().__init__(subject, language)
         text = self.text
-        self.scene = Scene(self, view=view, height=height, language=language, place=place)
-        self.timeline = Timeline(self, language=language)
-        self.plot = MotionPlot(self, language=language)
-        self.jog = JogPanel(self, language=language)
+        self.scene = Scene(self, view=view, height=height, place=place)
+        self.timeline = Timeline(self)
+        self.plot = MotionPlot(self)
+        self.jog = JogPanel(self)
         self._parts: list[Part] = [self.scene, self.timeline, self.plot, self.jog]
         self._places: dict[str, Any] = {name: lean(ipywidgets.VBox, layout=_TAB) for name in _TABS.values()}
         self._places["jog"].children = (self.jog.widget,)
@@ -131,7 +131,7 @@ class Lab(Part):
     def _make(self, name: str, kind: str) -> Any:
         if self._closed:
             raise UsageError(f"this lab was closed, and {name} with it: run its cell again")
-        part = getattr(import_module("rcilab.notebook"), kind)(self, language=self.text.language)
+        part = getattr(import_module("rcilab.notebook"), kind)(self)
         self._parts.append(part)
         self._places[name].children = (part.widget,)
         return part
