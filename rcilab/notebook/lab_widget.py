@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import ipywidgets
 
 from rcilab.errors import UsageError
+from rcilab.notebook.at_once import hear_at_once
 from rcilab.notebook.jog_panel import JogPanel
 from rcilab.notebook.lean import lean
 from rcilab.notebook.look import PHASE_TONES, Tone, block, esc, write
@@ -79,6 +80,7 @@ class Lab(Part):
             ipywidgets.Button, description=text("run.stop"), tooltip=text("run.stop_hint"), button_style="danger",
             icon="stop", classes=("rl-stop",), layout={"width": "8em", "flex": "0 0 auto"},
         )  # fmt: skip
+        hear_at_once(self.stop)
         self.stop.on_click(lambda _: self.halt())
         self._title = block(flex="1 1 auto")
         bar = lean(ipywidgets.HBox, [self._title, self.stop], layout={"align_items": "center"})
