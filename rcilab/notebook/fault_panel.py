@@ -51,7 +51,7 @@ class FaultPanel(Part):
         self._ending = threading.Event()
         self._watcher: threading.Thread | None = None
         self.fault: Any = lean(
-            ipywidgets.Dropdown, description=text("fault.which"), layout={"width": "100%", "max_width": "46em"},
+            ipywidgets.Dropdown, description=text("fault.which"), layout={"width": "98%", "max_width": "46em"},
             options=[(f"{text(f'learn.fault.{fault.name}')} · {fault.manual_name}", fault) for fault in Fault],
         )  # fmt: skip
         self.provoke = self._button("fault.provoke", self._provoke, icon="bolt", tooltip=text("fault.provoke_hint"))

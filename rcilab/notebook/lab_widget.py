@@ -27,7 +27,8 @@ if TYPE_CHECKING:
     from rcilab.notebook.run_panel import RunPanel
     from rcilab.notebook.target_panel import TargetPanel
 
-_TAB = {"max_height": "540px", "overflow": "hidden auto"}  # No higher than the scene beside it, with its timeline.
+_FRAME = 20  # [px] A tab's own frame is higher than the timeline below the scene by so much.
+_LOWEST_TAB = 420  # [px] A choice: a smaller scene has higher tabs beside it.
 _TABS = {"jog": "jog", "target": "target", "plan": "plan", "check": "report", "run": "run", "faults": "faults"}
 """Words of each tab, and the attribute of what is on it."""
 
@@ -66,7 +67,11 @@ class Lab(Part):
         self.plot = MotionPlot(self)
         self.jog = JogPanel(self)
         self._parts: list[Part] = [self.scene, self.timeline, self.plot, self.jog]
-        self._places: dict[str, Any] = {name: lean(ipywidgets.VBox, layout=_TAB) for name in _TABS.values()}
+        # No higher than the scene beside it with its timeline: what is below stays where it is from tab to tab.
+        tab = {"max_height": f"{max(height - _FRAME, _LOWEST_TAB)}px", "overflow": "hidden auto"}
+        self._places: dict[str, Any] = {
+            name: lean(ipywidgets.VBox, layout=tab, classes=("rl-tab",)) for name in _TABS.values()
+        }
         self._places["jog"].children = (self.jog.widget,)
         self.tabs: Any = lean(
             ipywidgets.Tab,
