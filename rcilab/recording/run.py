@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from html import escape
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
@@ -194,8 +193,9 @@ class Run:
             wanted[:delay] = self.command[0]
         return self.q - wanted
 
-    def _largest_error(self) -> str:
-        """In words; of a motion that was stopped against the commands, because it left its plan on purpose."""
+    @property
+    def largest_error(self) -> str:
+        """The largest joint error, in words; of a stopped motion against its commands: it left its plan on purpose."""
         return f"{_degrees(self._lag() if self.stopped else self.error):.3g} deg"
 
     @property
@@ -268,7 +268,7 @@ class Run:
     def __repr__(self) -> str:
         facts = [f"{self.duration:.3f} s", f"{len(self.cycles)} cycles"]
         if len(self.cycles):
-            facts.append(f"largest error {self._largest_error()}")
+            facts.append(f"largest error {self.largest_error}")
             facts.append(f"success rate {float(self.success_rate[-1]):.3f}")
         if self.stopped:
             facts.append(f"stopped: {self.stopped}")
@@ -279,24 +279,9 @@ class Run:
         return f"<Run {', '.join(facts)}>"
 
     def _repr_html_(self) -> str:
-        timing = self.timing
-        rows = [
-            ("duration", f"{self.duration:.3f} s, {len(self.cycles)} cycles"),
-            ("ended", self.stopped or ("with a fault" if self.faults else "at its goal")),
-            ("faults", ", ".join(fault.name for fault in self.faults) or "none"),
-            ("largest error", self._largest_error()),
-            ("success rate", f"{float(self.success_rate[-1]):.3f}" if len(self.cycles) else "-"),
-            ("lost cycles", f"{timing.lost}"),
-        ]
-        if self.realtime:
-            rows.append(
-                ("lateness", f"median {timing.lateness_median * 1e6:.0f} µs, p99 {timing.lateness_p99 * 1e6:.0f} µs, "
-                             f"max {timing.lateness_max * 1e6:.0f} µs")
-            )  # fmt: skip
-        else:
-            rows.append(("timing", "lock-step: simulated milliseconds wait for each other"))
-        cells = "".join(f"<tr><th style='text-align:left'>{name}</th><td>{escape(v)}</td></tr>" for name, v in rows)
-        return f"<table><caption>Run</caption>{cells}</table>"
+        from rcilab.recording.run_html import run_html
+
+        return run_html(self)
 
 
 def find_delay(q_c: JointPath, command: JointPath) -> int:
