@@ -5,7 +5,6 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
-from dataclasses import replace
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from numpy.typing import ArrayLike
@@ -71,7 +70,7 @@ class Motions(RciCommands):
         """
         require_motion(motion, certificate)
         require_mode(mode)
-        with self._turn("execute"):
+        with self._setting_out("execute"):
             state = self.receive_state()
             mismatch = describe_start_mismatch(motion.q[0], state.q_c)
             if mismatch is not None:
@@ -84,9 +83,7 @@ class Motions(RciCommands):
             self._paced = as_planned(motion), stream, mode
             try:
                 filters = [RateLimiter(self.model.limits)] if mode == "torque" else []
-                run = self._run(stream, mode, motion, filters)
-                paced = self._paced[0]
-                return replace(run, plan=paced.as_motion(), paced=bool(paced.changed))
+                return self._run(stream, mode, motion, filters)
             finally:
                 self._paced = None
 
@@ -99,7 +96,14 @@ class Motions(RciCommands):
         paced, stream, mode = under_way
         cycle = stream.cycle
         time = cycle * CYCLE_TIME
-        return UnderWay(time=time, duration=paced.duration, place=paced.place_at(cycle), pace=paced.pace, mode=mode)
+        return UnderWay(
+            time=time,
+            duration=paced.duration,
+            place=paced.place_at(cycle),
+            planned=paced.motion.duration,
+            pace=paced.pace,
+            mode=mode,
+        )
 
     def pause(self) -> None:
         """Holds the motion that `execute` runs in another thread, along its way and within all limits.
@@ -179,7 +183,7 @@ class Motions(RciCommands):
             from rcilab.conformance import cartesian_limits
 
             filters.append(RateLimiter(cartesian_limits(self.model.limits, rate_limit)))
-        with self._turn("control"):
+        with self._setting_out("control"):
             return self._run(callback, mode, None, filters)
 
     def move_j(self, goal: ArrayLike, speed: float = 0.2, progress: Progress | None = None) -> Run:
@@ -200,7 +204,7 @@ class Motions(RciCommands):
         """
         from rcilab.motion import plan_joint
 
-        with self._turn("move_j"):
+        with self._setting_out("move_j"):
             state = self.receive_state()
             motion = plan_joint(self.model, state.q_c, goal, speed=speed, law="s_profile")
             self._require_allowed(motion, state)
@@ -228,7 +232,7 @@ class Motions(RciCommands):
         from rcilab.motion.cartesian import arm_angles
         from rcilab.motion.path import build_line
 
-        with self._turn("move_l"):
+        with self._setting_out("move_l"):
             state = self.receive_state()
             angles = arm_angles(self.model, state.q_c, psi)
             path = build_line(self.model.forward(state.q_c), goal, *angles)
@@ -257,7 +261,7 @@ class Motions(RciCommands):
         from rcilab.motion.cartesian import arm_angles
         from rcilab.motion.path import build_arc
 
-        with self._turn("move_c"):
+        with self._setting_out("move_c"):
             state = self.receive_state()
             angles = arm_angles(self.model, state.q_c, psi)
             path = build_arc(self.model.forward(state.q_c), via, goal, *angles)
@@ -278,7 +282,7 @@ class Motions(RciCommands):
         """Returns a fresh state."""
 
     @abstractmethod
-    def _turn(self, what: str) -> AbstractContextManager[None]:
+    def _setting_out(self, what: str) -> AbstractContextManager[None]:
         """Has the connection for itself."""
 
     @abstractmethod

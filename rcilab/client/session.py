@@ -7,7 +7,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from numpy.typing import ArrayLike
 
@@ -39,6 +39,8 @@ from rcilab.state import ControllerMode, Mode, RobotState
 if TYPE_CHECKING:
     from rcilab.model import RobotModel
     from rcilab.motion import Motion
+
+Ear: TypeAlias = Callable[[Run, BaseException | None], None]
 
 _CLOSED = "the session was closed while a motion ran"
 _CLOSE_TIMEOUT = 10.0  # [s] for another thread to bring its motion to rest; the slowest joint needs 0.4 s.
@@ -139,6 +141,8 @@ class RobotSession(Motions, Closing):
         self._partner = partner
         self._stop_reason: str | None = None
         self._moving = False
+        self._leaving = False  # A motion is being checked; from here on it can be stopped.
+        self._ears: tuple[Ear, ...] = ()
         self._closing = False
         self._closed = False
         self._busy = threading.RLock()  # Held by the thread that talks to the controller.
@@ -172,6 +176,29 @@ class RobotSession(Motions, Closing):
                 "rcilab controller prints it (world HOST:PORT), add ?world_port=PORT to the address"
             )
         return self._world
+
+    @property
+    def is_moving(self) -> bool:
+        """Whether a motion runs, in whichever thread; `under_way` tells more of one of `execute`."""
+        return self._moving
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether it was closed; a new one is needed then."""
+        return self._closing
+
+    def hear_runs(self, ear: Ear) -> Callable[[], None]:
+        """Has somebody told what became of every motion, as soon as it has ended; returns what ends that.
+
+        Args:
+            ear: Called in the thread that ran the motion, with its run and the error that ended it, or None.
+        """
+        self._ears = (*self._ears, ear)
+
+        def end() -> None:
+            self._ears = tuple(other for other in self._ears if other is not ear)
+
+        return end
 
     @property
     def state(self) -> RobotState:
@@ -260,9 +287,9 @@ class RobotSession(Motions, Closing):
     def stop(self) -> None:
         """Brings a running motion to rest within the limits; `execute` or `control` then returns its run.
 
-        May be called from another thread, or from a callback. Does nothing when nothing runs.
+        May be called from another thread, or from a callback. Does nothing when nothing runs, or is about to.
         """
-        if self._moving:
+        if self._moving or self._leaving:
             self._stop_reason = "on request"
 
     def recover(self) -> None:
@@ -302,7 +329,6 @@ class RobotSession(Motions, Closing):
     def _run(self, callback: Callback, mode: Mode, plan: Motion | None, filters: Sequence[CommandFilter] = ()) -> Run:
         time_needed = RECORD_TIME if plan is None else plan.duration
         recorder = Recorder(self.n, math.ceil(time_needed / CYCLE_TIME) + _SPARE_CYCLES)
-        self._stop_reason = None
         loop = ControlLoop(
             self._link,
             RciCommands(self._link),  # Not self: everybody else's commands are refused while a motion runs.
@@ -317,26 +343,51 @@ class RobotSession(Motions, Closing):
         self._mover = threading.get_ident()
         self._moving = True
         started_ns = time.time_ns()
+
+        def keep(stopped: str | None, error: BaseException | None = None) -> Run:
+            run = build_run(
+                recorder.rows(),
+                plan=plan if self._paced is None else self._paced[0].as_motion(),
+                paced=self._paced is not None and bool(self._paced[0].changed),
+                stopped=stopped,
+                truncated=recorder.truncated,
+                realtime=self._realtime,
+                model=self.model,
+                setup=Setup(target=self._link.name, mode=mode, started_ns=started_ns),
+            )
+            for ear in self._ears:
+                ear(run, error)
+            return run
+
         try:
             with punctual(self._realtime), one_core(self._partner):
                 reason = loop.run(callback)
-        finally:
-            self._moving = False
-            if self._closing:
-                self._disconnect()
-        return build_run(
-            recorder.rows(),
-            plan=plan,
-            stopped=reason,
-            truncated=recorder.truncated,
-            realtime=self._realtime,
-            model=self.model,
-            setup=Setup(target=self._link.name, mode=mode, started_ns=started_ns),
-        )
+        except BaseException as error:
+            self._rest()
+            if self._ears:
+                keep(str(error) or type(error).__name__, error)
+            raise
+        self._rest()
+        return keep(reason)
+
+    def _rest(self) -> None:
+        self._moving = False
+        if self._closing:
+            self._disconnect()
 
     def _request(self, request: Request, timeout: float | None = None) -> Any:
         with self._turn(type(request).__name__):
             return super()._request(request, timeout)
+
+    @contextmanager
+    def _setting_out(self, what: str) -> Iterator[None]:
+        """Has the connection for a motion; a stop while it is still being checked counts."""
+        with self._turn(what):
+            self._stop_reason, self._leaving = None, True
+            try:
+                yield
+            finally:
+                self._leaving = False
 
     @contextmanager
     def _turn(self, what: str) -> Iterator[None]:

@@ -17,6 +17,8 @@ class UnderWay:
     """How long it takes at the pace that it has, [s]; of a motion that is held, until it stands."""
     place: float
     """Where in its plan it is, [s]; behind `time` when it ran slower or was held."""
+    planned: float
+    """Where its plan ends, [s]."""
     pace: float
     """Part of its planned speed that it runs at, or comes to; 0 when it is held."""
     mode: Mode

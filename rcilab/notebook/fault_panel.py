@@ -36,10 +36,10 @@ class FaultPanel(Part):
 
     Args:
         subject: A model, a session, or another part to look at the same arm as.
-        language: "en" or "zh".
+        language: "en" or "zh"; when absent that of a part that is given, else that of the notebook.
     """
 
-    def __init__(self, subject: object, *, language: str = "en") -> None:
+    def __init__(self, subject: object, *, language: str | None = None) -> None:
         super().__init__(subject, language)
         text = self.text
         self.exhibit: Exhibit | None = None
@@ -51,7 +51,7 @@ class FaultPanel(Part):
         self._ending = threading.Event()
         self._watcher: threading.Thread | None = None
         self.fault: Any = lean(
-            ipywidgets.Dropdown, description=text("fault.which"), layout={"width": "100%", "max_width": "46em"},
+            ipywidgets.Dropdown, description=text("fault.which"), layout={"width": "98%", "max_width": "46em"},
             options=[(f"{text(f'learn.fault.{fault.name}')} · {fault.manual_name}", fault) for fault in Fault],
         )  # fmt: skip
         self.provoke = self._button("fault.provoke", self._provoke, icon="bolt", tooltip=text("fault.provoke_hint"))

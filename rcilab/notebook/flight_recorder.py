@@ -47,7 +47,7 @@ def record_html(state: LabState, text: Text) -> str:
 def _last_rows(state: LabState) -> NDArray[Any] | None:
     error, run = state.error, state.run
     record = getattr(error, "record", None)
-    if record is None and error is not None and run is not None:
+    if record is None and run is not None and (error is not None or run.stopped):
         record = run.cycles
     if record is None or not len(record):
         return None

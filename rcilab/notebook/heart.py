@@ -26,6 +26,7 @@ class Heart:
             ipywidgets.Play, min=0, max=2**30, interval=INTERVAL, show_repeat=False, classes=("rl-heart",)
         )
         self._heard: float | None = None
+        self._beat = 0.0
         self.widget.observe(self._on_beat, names="value")
 
     @property
@@ -42,6 +43,11 @@ class Heart:
             self._heard = time.monotonic()
         return time.monotonic() - self._heard > SILENCE
 
+    @property
+    def is_deaf(self) -> bool:
+        """Whether a cell runs and the kernel hears the page no more: a press there waits for the end of the cell."""
+        return self.was_seen and kernel_cells().is_running and time.monotonic() - self._beat > SILENCE
+
     def start(self) -> None:
         """Begins to listen."""
         self._heard = None
@@ -52,4 +58,4 @@ class Heart:
         self.widget.playing = False
 
     def _on_beat(self, change: Any) -> None:
-        self._heard = time.monotonic()
+        self._heard = self._beat = time.monotonic()

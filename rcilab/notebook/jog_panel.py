@@ -27,14 +27,14 @@ class JogPanel(Part):
         subject: A model, a session, or another part to look at the same arm as.
         q: Where to begin, shape (n,), [rad]; the arm's home, or the goal of the other part, when absent.
         continuous: Whether a slider reports while it is dragged, or once when it is let go.
-        language: "en" or "zh".
+        language: "en" or "zh"; when absent that of a part that is given, else that of the notebook.
 
     Raises:
         InvalidValueError: The subject is none, or q is not n angles inside the limits.
     """
 
     def __init__(
-        self, subject: object, q: ArrayLike | None = None, *, continuous: bool = True, language: str = "en"
+        self, subject: object, q: ArrayLike | None = None, *, continuous: bool = True, language: str | None = None
     ) -> None:
         super().__init__(subject, language)
         limits = self.model.limits.joint

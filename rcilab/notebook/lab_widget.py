@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import ipywidgets
 
 from rcilab.errors import UsageError
+from rcilab.notebook.at_once import hear_at_once
 from rcilab.notebook.jog_panel import JogPanel
 from rcilab.notebook.lean import lean
 from rcilab.notebook.look import PHASE_TONES, Tone, block, esc, write
@@ -26,7 +27,8 @@ if TYPE_CHECKING:
     from rcilab.notebook.run_panel import RunPanel
     from rcilab.notebook.target_panel import TargetPanel
 
-_TAB = {"max_height": "540px", "overflow": "hidden auto"}  # No higher than the scene beside it, with its timeline.
+_FRAME = 20  # [px] A tab's own frame is higher than the timeline below the scene by so much.
+_LOWEST_TAB = 420  # [px] A choice: a smaller scene has higher tabs beside it.
 _TABS = {"jog": "jog", "target": "target", "plan": "plan", "check": "report", "run": "run", "faults": "faults"}
 """Words of each tab, and the attribute of what is on it."""
 
@@ -41,7 +43,7 @@ class Lab(Part):
         subject: A model, a session, or another part to look at the same arm as.
         view: Of the scene, see `Scene`.
         height: Of the scene, [px].
-        language: "en" or "zh".
+        language: "en" or "zh"; when absent that of a part that is given, else that of the notebook.
         place: Where the browser is; found out when absent.
 
     Raises:
@@ -55,17 +57,21 @@ class Lab(Part):
         *,
         view: View = "auto",
         height: int = 440,
-        language: str = "en",
+        language: str | None = None,
         place: Place | None = None,
     ) -> None:
         super().__init__(subject, language)
         text = self.text
-        self.scene = Scene(self, view=view, height=height, language=language, place=place)
-        self.timeline = Timeline(self, language=language)
-        self.plot = MotionPlot(self, language=language)
-        self.jog = JogPanel(self, language=language)
+        self.scene = Scene(self, view=view, height=height, place=place)
+        self.timeline = Timeline(self)
+        self.plot = MotionPlot(self)
+        self.jog = JogPanel(self)
         self._parts: list[Part] = [self.scene, self.timeline, self.plot, self.jog]
-        self._places: dict[str, Any] = {name: lean(ipywidgets.VBox, layout=_TAB) for name in _TABS.values()}
+        # No higher than the scene beside it with its timeline: what is below stays where it is from tab to tab.
+        tab = {"max_height": f"{max(height - _FRAME, _LOWEST_TAB)}px", "overflow": "hidden auto"}
+        self._places: dict[str, Any] = {
+            name: lean(ipywidgets.VBox, layout=tab, classes=("rl-tab",)) for name in _TABS.values()
+        }
         self._places["jog"].children = (self.jog.widget,)
         self.tabs: Any = lean(
             ipywidgets.Tab,
@@ -79,6 +85,7 @@ class Lab(Part):
             ipywidgets.Button, description=text("run.stop"), tooltip=text("run.stop_hint"), button_style="danger",
             icon="stop", classes=("rl-stop",), layout={"width": "8em", "flex": "0 0 auto"},
         )  # fmt: skip
+        hear_at_once(self.stop)
         self.stop.on_click(lambda _: self.halt())
         self._title = block(flex="1 1 auto")
         bar = lean(ipywidgets.HBox, [self._title, self.stop], layout={"align_items": "center"})
@@ -131,7 +138,7 @@ class Lab(Part):
     def _make(self, name: str, kind: str) -> Any:
         if self._closed:
             raise UsageError(f"this lab was closed, and {name} with it: run its cell again")
-        part = getattr(import_module("rcilab.notebook"), kind)(self, language=self.text.language)
+        part = getattr(import_module("rcilab.notebook"), kind)(self)
         self._parts.append(part)
         self._places[name].children = (part.widget,)
         return part

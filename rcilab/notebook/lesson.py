@@ -5,6 +5,7 @@ from __future__ import annotations
 from rcilab.conformance.html import report_html
 from rcilab.language import Language
 from rcilab.notebook.spoken import language, shell
+from rcilab.recording.run_html import run_html
 
 __all__ = ["answer", "language"]
 
@@ -23,11 +24,12 @@ def answer(is_right: bool, fact: str) -> None:
 
 
 def _speak() -> None:
-    """Has reports shown in the language of the lesson."""
+    """Has reports and runs shown in the language of the lesson."""
     found, spoken = shell(), language()
     if found is not None and spoken != "en":
         html = found.display_formatter.formatters["text/html"]
         html.for_type_by_name("rcilab.conformance.report", "Report", lambda report: report_html(report, spoken))
+        html.for_type_by_name("rcilab.recording.run", "Run", lambda run: run_html(run, spoken))
 
 
 _speak()  # Every lesson imports this file, and has the same cells in both languages.

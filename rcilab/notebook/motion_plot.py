@@ -40,7 +40,7 @@ class MotionPlot(Part):
         subject: A model, a session, or another part to look at the same arm as.
         joint: The joint to show in its own unit, from 1; 0 shows all of them in percent of their limits.
         quantities: Which rows there are.
-        language: "en" or "zh".
+        language: "en" or "zh"; when absent that of a part that is given, else that of the notebook.
     """
 
     def __init__(
@@ -49,7 +49,7 @@ class MotionPlot(Part):
         *,
         joint: int = 0,
         quantities: tuple[Quantity, ...] = QUANTITIES,
-        language: str = "en",
+        language: str | None = None,
     ) -> None:
         super().__init__(subject, language)
         self._quantities = quantities

@@ -7,6 +7,7 @@ from typing import Any
 import ipywidgets
 
 from rcilab.motion.pacing import SLOWEST_PACE
+from rcilab.notebook.at_once import hear_at_once
 from rcilab.notebook.lean import lean
 from rcilab.notebook.look import block, problem, soft, write
 from rcilab.notebook.number_field import NumberField
@@ -46,6 +47,7 @@ class PaceFields:
             self.field.said,
             self._way,
         ]
+        hear_at_once(*self.buttons, self.slider, self.field.box)
         self.slider.observe(self._on_slider, names="value")
 
     def show(self, status: SupervisorStatus | None) -> None:

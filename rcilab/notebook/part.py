@@ -12,6 +12,7 @@ from rcilab.model import RobotModel
 from rcilab.notebook.cells import kernel_cells
 from rcilab.notebook.lean import lean
 from rcilab.notebook.look import close_tree, style_sheet
+from rcilab.notebook.spoken import chosen_language
 from rcilab.notebook.state import LabState, Topic, state_of
 from rcilab.words.text import Text
 
@@ -23,14 +24,15 @@ class Part(Closing):
 
     Args:
         subject: A model, a session, or another part to look at the same arm as.
-        language: "en" or "zh".
+        language: "en" or "zh"; when absent that of a part that is given, else that of the notebook.
 
     Raises:
         InvalidValueError: The subject is none of these, or the language is unknown.
     """
 
-    def __init__(self, subject: object, language: str = "en") -> None:
-        self.text = Text(language, _PACKAGE)
+    def __init__(self, subject: object, language: str | None = None) -> None:
+        neighbour = subject.text.language if isinstance(subject, Part) else None
+        self.text = Text(chosen_language(language, neighbour), _PACKAGE)
         self.state: LabState = state_of(subject)
         self._ends: list[Callable[[], None]] = []
         self._root: Any = None

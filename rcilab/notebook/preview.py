@@ -91,7 +91,9 @@ class Preview(Closing):
     @property
     def url(self) -> str | None:
         """Where the browser finds the viewer, to open it in a window of its own; None when it is not live."""
-        return self._place.address(self._scene.url) if self._live else None
+        if not self._live:
+            return None
+        return self._place.address(self._scene.url + ("" if self._moving else "?plain"))  # A pose needs no play button.
 
     def show(self, q: ArrayLike) -> None:
         """Puts the arm into a pose, shape (n,), [rad]; an animation ends.

@@ -13,6 +13,8 @@ def obstacle(state: LabState) -> Message | None:
     status = state.status
     if status is None:
         return message("ready.closed")
+    if status.phase == "closed" and state.session is not None:
+        return message("ready.session_closed")
     resting = arm_obstacle(status.phase, status.powered)
     if resting is not None or state.plan is None:
         return resting or plan_obstacle(None, status.q_c)

@@ -18,10 +18,10 @@ class ReportView(Part):
     Args:
         subject: A model, a session, or another part to look at the same arm as.
         report: A report of yours to show; the report of the plan when absent.
-        language: "en" or "zh".
+        language: "en" or "zh"; when absent that of a part that is given, else that of the notebook.
     """
 
-    def __init__(self, subject: object, report: Report | None = None, *, language: str = "en") -> None:
+    def __init__(self, subject: object, report: Report | None = None, *, language: str | None = None) -> None:
         super().__init__(subject, language)
         self._own = report
         self._verdict, self._rows = block(), block()

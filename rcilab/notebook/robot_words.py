@@ -66,6 +66,8 @@ def outcome_html(outcome: Outcome, model: RobotModel, status: SupervisorStatus |
             return verdict("warn", "▲", text("run.stopped"))
         why = message("notice.failed", what=message(f"what.{outcome.what}"), error=tell_refusal(error, model, status))
         return verdict("bad", "✗", text.say(why))
+    if run is not None and run.stopped:
+        return verdict("warn", "▲", text("run.stopped"))
     if run is not None and len(run.q):
         largest = float(np.degrees(np.abs(np.nan_to_num(run.error)).max()))
         return verdict("good", "✓", text("run.arrived", cycles=len(run.t), error=f"{largest:.3f}"))

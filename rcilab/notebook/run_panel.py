@@ -9,6 +9,7 @@ from typing import Any
 import ipywidgets
 
 from rcilab.errors import RcilabError
+from rcilab.notebook.at_once import hear_at_once
 from rcilab.notebook.heart import Heart
 from rcilab.notebook.lean import lean
 from rcilab.notebook.look import PHASE_TONES, block, problem, soft, verdict, write
@@ -18,8 +19,9 @@ from rcilab.notebook.pace_fields import PaceFields
 from rcilab.notebook.parameter_desk import ParameterDesk
 from rcilab.notebook.part import Part
 from rcilab.notebook.ready import obstacle
-from rcilab.notebook.robot_side import Outcome, RobotSide, SessionRobot, SupervisedRobot
+from rcilab.notebook.robot_side import Outcome, RobotSide, SupervisedRobot
 from rcilab.notebook.robot_words import health_html, name_phase, outcome_html, tell_refusal, tell_trouble
+from rcilab.notebook.session_robot import SessionRobot
 from rcilab.posing.readiness import ask_to_move
 from rcilab.supervisor import SupervisorStatus
 from rcilab.supervisor.supervisor import VIRTUAL
@@ -38,10 +40,10 @@ class RunPanel(Part):
 
     Args:
         subject: A model, a session, or another part to look at the same arm as.
-        language: "en" or "zh".
+        language: "en" or "zh"; when absent that of a part that is given, else that of the notebook.
     """
 
-    def __init__(self, subject: object, *, language: str = "en") -> None:
+    def __init__(self, subject: object, *, language: str | None = None) -> None:
         super().__init__(subject, language)
         text = self.text
         self._heart = Heart()
@@ -65,6 +67,7 @@ class RunPanel(Part):
         self.execute = self._button("run.execute", self._on_execute, icon="play", style="success")
         self.stop = self._button("run.stop", self.halt, icon="stop", style="danger")
         self.stop.add_class("rl-stop")
+        hear_at_once(self.stop, self._heart.widget)
         self.yes = self._button("run.confirm", self._move, style="danger")
         self.no = self._button("run.cancel", self._forget_question)
         self.progress = lean(
@@ -72,6 +75,7 @@ class RunPanel(Part):
         )
         self._said, self._where, self._plan, self._question = block(), block(), block(), block()
         self._health, self._outcome = block(), block()
+        self._was_cells = False
         self._running = 0.0  # [s] Planned duration of the motion under way.
         self._pacing = PaceDesk(self.state)
         self.pace = PaceFields(self.state, text, self._pacing)
@@ -177,7 +181,11 @@ class RunPanel(Part):
             return
         if outcome.what == "execute":
             self.state.take_run(outcome.run, outcome.error)
-        write(self._outcome, outcome_html(outcome, self.model, self.state.status, self.text))
+        said = outcome_html(outcome, self.model, self.state.status, self.text)
+        if outcome.what == "cell" and outcome.run is not None:
+            self.state.take_cell_run(outcome.run, outcome.error)
+            said += soft(self.text("run.of_cell"))
+        write(self._outcome, said)
 
     def _on_plan(self) -> None:
         self._forget_question()
@@ -230,7 +238,14 @@ class RunPanel(Part):
         tone = PHASE_TONES.get(phase, "none" if status is None else "bad")
         write(self._said, verdict(tone, name_phase(status, text), name))
         told = tell_trouble(status, text) or ("" if reason is None else text.say(reason))
-        write(self._where, "" if is_moving or not told else soft(told))
+        is_cells = isinstance(state.robot, SessionRobot) and state.robot.is_cells
+        if is_cells and not self._was_cells:
+            write(self._outcome, "")
+        self._was_cells = is_cells
+        if is_cells:
+            write(self._where, problem(text("run.deaf")) if self._heart.is_deaf else soft(text("run.by_cell")))
+        else:
+            write(self._where, "" if is_moving or not told else soft(told))
         plan = state.plan
         if plan is None:
             write(self._plan, "")
@@ -247,9 +262,11 @@ class RunPanel(Part):
 
     def _show_progress(self, status: SupervisorStatus | None, is_moving: bool) -> None:
         place = None if status is None or not is_moving else status.motion_place
-        self.progress.layout.visibility = "hidden" if place is None or not self._running else "visible"
-        if place is not None and self._running:
-            self.progress.value = min(max(place / self._running, 0.0), 1.0)
+        robot = self.state.robot
+        whole = robot.planned if isinstance(robot, SessionRobot) else self._running
+        self.progress.layout.visibility = "hidden" if place is None or not whole else "visible"
+        if place is not None and whole:
+            self.progress.value = min(max(place / whole, 0.0), 1.0)
 
     def _button(
         self, code: str, act: Callable[[], object], *, icon: str = "", style: str = "", own: bool = False

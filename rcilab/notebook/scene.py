@@ -40,7 +40,7 @@ class Scene(Part):
         view: "meshcat" or "viser", served on loopback; "static", a film inside the notebook; "auto" takes meshcat
             where the browser can reach the kernel (see `rcilab.notebook.place`), else the film.
         height: [px]
-        language: "en" or "zh".
+        language: "en" or "zh"; when absent that of a part that is given, else that of the notebook.
         place: Where the browser is; found out when absent.
 
     Raises:
@@ -54,7 +54,7 @@ class Scene(Part):
         *,
         view: View = "auto",
         height: int = 420,
-        language: str = "en",
+        language: str | None = None,
         place: Place | None = None,
     ) -> None:
         if view not in VIEWS:
@@ -107,7 +107,8 @@ class Scene(Part):
 
     def _make_film(self) -> Preview:
         plan = self.state.seen_arm
-        return Preview(self.state.goal if plan is None else plan.motion, self.model, live=False, height=self.height)
+        what = self.state.goal if plan is None else plan.motion
+        return Preview(what, self.model, live=False, height=self.height, language=self.text.language)
 
 
 class _LivePicture:

@@ -23,13 +23,17 @@ def language() -> Language:
     return "zh" if ".zh.ipynb" in os.environ.get(_SESSION, "") + _name_in_code() else "en"
 
 
-def chosen_language(asked: str | None) -> Language:
-    """Returns the language that was asked for, else that of the notebook.
+def chosen_language(asked: str | None, neighbour: Language | None = None) -> Language:
+    """Returns the language that was asked for, else that of what it is shown with, else that of the notebook.
+
+    Args:
+        asked: "en" or "zh"; None leaves it open.
+        neighbour: What the part speaks that this one was made from; None where there is none.
 
     Raises:
         InvalidValueError: There is no such language.
     """
-    return language() if asked is None else require_language(asked)
+    return neighbour or language() if asked is None else require_language(asked)
 
 
 def shell() -> Any:

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from rcilab.client.session import RobotSession
     from rcilab.gallery.exhibition import Exhibition
     from rcilab.motion.motion import Motion
+    from rcilab.notebook.cell_run import CellRun
     from rcilab.notebook.robot_side import RobotSide
     from rcilab.recording.run import Run
     from rcilab.supervisor import SupervisorStatus
@@ -61,9 +62,12 @@ class LabState:
         self.no_plan: Message | None = None
         self.moment: float | None = None
         """Time of the plan that is looked at, [s]; None looks at the arm as it is."""
-        self.exhibition: Exhibition | None = None
-        """A fault that is looked at in place of the plan, until somebody plans, poses or executes."""
+        self.exhibition: Exhibition | CellRun | None = None
+        """A fault, or what a cell did, looked at in place of the plan until somebody plans, poses or executes."""
         self.run: Run | None = None
+        """What came of the last execution."""
+        self.is_run_of_plan = True
+        """Whether it was one of the plan; a cell may have run something else."""
         self.error: RcilabError | None = None
         """Why the last execution did not reach its end; None when it did."""
         self.speed = 0.5
@@ -112,7 +116,7 @@ class LabState:
 
     @property
     def seen(self) -> Plan | None:
-        """What timeline and curves show: the plan, or what led to the fault on show."""
+        """What timeline and curves show: the plan, or what is on show in its place."""
         return self.plan if self.exhibition is None else self.exhibition.plan
 
     @property
@@ -123,7 +127,9 @@ class LabState:
     @property
     def seen_run(self) -> Run | None:
         """What happened beside what is seen."""
-        return self.run if self.exhibition is None else self.exhibition.run
+        if self.exhibition is not None:
+            return self.exhibition.run
+        return self.run if self.is_run_of_plan else None
 
     def start_from(self, q: ArrayLike) -> None:
         """Says where the arm stands while no robot is connected, shape (n,), [rad]."""
@@ -209,7 +215,17 @@ class LabState:
     def take_run(self, run: Run | None, error: RcilabError | None = None) -> None:
         """Shows what came of an execution beside its plan: the run, and why it did not reach its end."""
         with self.lock:
-            self.run, self.error = run, error
+            self.run, self.error, self.is_run_of_plan = run, error, True
+            self.tell("run")
+
+    def take_cell_run(self, run: Run, error: RcilabError | None = None) -> None:
+        """Shows what a cell did in place of the plan, which stays."""
+        from rcilab.notebook.cell_run import cell_run_of
+
+        seen = cell_run_of(run, self.model)
+        with self.lock:
+            self.run, self.error, self.is_run_of_plan = run, error, False
+            self.exhibit(seen)
             self.tell("run")
 
     def halt(self) -> None:
@@ -229,8 +245,8 @@ class LabState:
                 self.moment = moment
                 self.tell("moment")
 
-    def exhibit(self, exhibition: Exhibition | None) -> None:
-        """Looks at the moment of a fault in place of the plan; None looks at the plan again."""
+    def exhibit(self, exhibition: Exhibition | CellRun | None) -> None:
+        """Looks at a fault, or at what a cell did, in place of the plan; None looks at the plan again."""
         with self.lock:
             if exhibition is None and self.exhibition is None:
                 return

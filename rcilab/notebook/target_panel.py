@@ -29,10 +29,10 @@ class TargetPanel(Part):
 
     Args:
         subject: A model, a session, or another part to look at the same arm as.
-        language: "en" or "zh".
+        language: "en" or "zh"; when absent that of a part that is given, else that of the notebook.
     """
 
-    def __init__(self, subject: object, *, language: str = "en") -> None:
+    def __init__(self, subject: object, *, language: str | None = None) -> None:
         super().__init__(subject, language)
         text = self.text
         self.fields = [
@@ -69,16 +69,17 @@ class TargetPanel(Part):
         self.psi = lean(
             ipywidgets.FloatSlider, description="ψ", min=-180.0, max=180.0, step=1.0, readout=False,
             tooltip=text("target.psi_hint"),
-            layout={"width": "16em"}, style={"description_width": "1.5em"},
+            layout={"width": "98%"}, style={"description_width": "1.5em"},
         )  # fmt: skip
         self._psi_echo = SliderEcho(self.psi)
         self.psi.observe(self._on_psi, names="value")
         self._psi_field = NumberField(text, "", "deg", -180.0, 180.0, self._turn)
         side = lean(ipywidgets.VBox, [
-            lean(ipywidgets.HBox, [self.psi, *self._psi_field.cells], layout={"align_items": "center"}),
+            self.psi,
+            lean(ipywidgets.HBox, self._psi_field.cells, layout={"align_items": "center"}),
             self._psi_field.said,
             block(soft(text("target.psi_hint"))),
-        ])  # fmt: skip
+        ], layout={"flex": "1 1 170px", "min_width": "170px"})  # fmt: skip
         row = lean(ipywidgets.HBox, [self._circle, side], layout={"align_items": "center", "flex_flow": "row wrap"})
         return [block(head(text("target.psi_title", in_deg="deg"))), row]
 

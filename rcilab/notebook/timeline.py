@@ -19,10 +19,10 @@ class Timeline(Part):
 
     Args:
         subject: A model, a session, or another part to look at the same arm as.
-        language: "en" or "zh".
+        language: "en" or "zh"; when absent that of a part that is given, else that of the notebook.
     """
 
-    def __init__(self, subject: object, *, language: str = "en") -> None:
+    def __init__(self, subject: object, *, language: str | None = None) -> None:
         super().__init__(subject, language)
         self.play = lean(
             ipywidgets.Play,

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from html import escape
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
@@ -211,10 +210,16 @@ class Run:
             wanted[:delay] = self.command[0]
         return self.q - wanted
 
-    def _largest_error(self) -> str:
+    @property
+    def largest_error(self) -> float:
+        """The largest joint error, [rad]; 0.0 where nothing is compared."""
+        return float(np.nanmax(np.abs(self.error), initial=0.0))
+
+    def _told_error(self) -> str:
         """In words, and until when where it was stopped."""
         stop = self.stop_time if self.plan is not None else None
-        return f"{_degrees(self.error):.3g} deg" + ("" if stop is None else f" until the stop at {stop:.3f} s")
+        told = f"{math.degrees(self.largest_error):.3g} deg"
+        return told if stop is None else f"{told} until the stop at {stop:.3f} s"
 
     @property
     def timing(self) -> Timing:
@@ -288,7 +293,7 @@ class Run:
     def __repr__(self) -> str:
         facts = [f"{self.duration:.3f} s", f"{len(self.cycles)} cycles"]
         if len(self.cycles):
-            facts.append(f"largest error {self._largest_error()}")
+            facts.append(f"largest error {self._told_error()}")
             facts.append(f"success rate {float(self.success_rate[-1]):.3f}")
         if self.stopped:
             facts.append(f"stopped: {self.stopped}")
@@ -299,24 +304,9 @@ class Run:
         return f"<Run {', '.join(facts)}>"
 
     def _repr_html_(self) -> str:
-        timing = self.timing
-        rows = [
-            ("duration", f"{self.duration:.3f} s, {len(self.cycles)} cycles"),
-            ("ended", self.stopped or ("with a fault" if self.faults else "at its goal")),
-            ("faults", ", ".join(fault.name for fault in self.faults) or "none"),
-            ("largest error", self._largest_error()),
-            ("success rate", f"{float(self.success_rate[-1]):.3f}" if len(self.cycles) else "-"),
-            ("lost cycles", f"{timing.lost}"),
-        ]
-        if self.realtime:
-            rows.append(
-                ("lateness", f"median {timing.lateness_median * 1e6:.0f} µs, p99 {timing.lateness_p99 * 1e6:.0f} µs, "
-                             f"max {timing.lateness_max * 1e6:.0f} µs")
-            )  # fmt: skip
-        else:
-            rows.append(("timing", "lock-step: simulated milliseconds wait for each other"))
-        cells = "".join(f"<tr><th style='text-align:left'>{name}</th><td>{escape(v)}</td></tr>" for name, v in rows)
-        return f"<table><caption>Run</caption>{cells}</table>"
+        from rcilab.recording.run_html import run_html
+
+        return run_html(self)
 
 
 def find_delay(q_c: JointPath, command: JointPath) -> int:
@@ -362,8 +352,3 @@ def build_run(
         setup=setup or Setup(),
         paced=paced,
     )
-
-
-def _degrees(error: JointPath) -> float:
-    finite = np.abs(error[np.isfinite(error)])
-    return math.degrees(float(finite.max())) if finite.size else 0.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from typing import TYPE_CHECKING
 
 from rcilab.client.control_loop import SILENCE
@@ -18,7 +19,7 @@ SILENCE_IN_LOCKSTEP = 5.0  # [s] A busy machine may pause a controller that has 
 
 
 def simulate(model: RobotModel, *, plant: str = "ideal", lockstep: bool = True) -> RobotSession:
-    """Returns a session with a simulated arm; closing the session ends the simulation.
+    """Returns a session with a simulated arm; closing the session, or dropping it, ends the simulation.
 
     Args:
         model: The arm, with its tool and load; the virtual controller is told of both.
@@ -59,6 +60,7 @@ def simulate(model: RobotModel, *, plant: str = "ideal", lockstep: bool = True) 
     except BaseException:
         session.close()
         raise
+    weakref.finalize(session, controller.end)  # A cell that runs again drops the session of its last run.
     return session
 
 

@@ -50,6 +50,13 @@ panel._show()
 panel.execute.click()
 until(lambda: panel.state.status.phase == "moving" and (panel.state.status.motion_time or 0.0) > 0.02)
 """
+SESSION = """
+robot = rcilab.simulate(model)
+robot.power_on()
+beside = RunPanel(robot)
+motion = rcilab.plan_joint(model, robot.state.q_c, model.home + 0.5, speed=0.005)  # Minutes, if nobody stops it.
+beside.stop.comm.comm_id
+"""
 STANDS = """
 until(lambda: panel.state.error is not None)
 panel.state.status.phase, panel.state.status.motion_time < panel.state.plan.motion.duration - 1.0
@@ -65,6 +72,12 @@ class Kernel:
     def run(self, code: str) -> Any:
         """Runs a cell and returns its value."""
         return self.value_of(self.client.execute(code))
+
+    def open_subshell(self) -> str:
+        """Returns the name of a thread that hears messages while a cell runs; JupyterLab has one for all widgets."""
+        control = self.client.control_channel
+        control.send(self.client.session.msg("create_subshell_request", {}))
+        return control.get_msg(timeout=20)["content"]["subshell_id"]
 
     def value_of(self, message: str) -> Any:
         value: Any = None
@@ -114,6 +127,19 @@ def test_an_interrupt_stops_the_arm_whether_a_cell_runs_or_not(kernel: Kernel) -
     with pytest.raises(AssertionError, match="KeyboardInterrupt"):
         kernel.value_of(sleeping)
     assert kernel.run(STANDS) == ("idle", True)
+
+
+def test_stop_is_heard_while_the_cell_that_moves_the_arm_runs(kernel: Kernel) -> None:
+    subshell = kernel.open_subshell()
+    stop = kernel.run(MAKE + SESSION)
+    moving = kernel.client.execute("robot.execute(motion).stopped")
+    time.sleep(0.5)  # Soon or late, a press counts from the start of the call on.
+    press = {"comm_id": stop, "data": {"method": "custom", "content": {"event": "click"}}}
+    message = kernel.client.session.msg("comm_msg", press)
+    message["header"]["subshell_id"] = subshell  # As JupyterLab sends it.
+    kernel.client.shell_channel.send(message)
+    assert kernel.value_of(moving) == "on request"
+    kernel.run("beside.close(); robot.close()")
 
 
 def test_a_kernel_that_is_killed_takes_the_control_process_with_it(kernel: Kernel) -> None:

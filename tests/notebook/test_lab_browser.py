@@ -29,6 +29,7 @@ from rcilab.notebook import Lab
 model = rcilab.load_model("xMatePro7")
 lab = Lab(model, height=240)
 lab"""
+LESSON = "01_first_motion.zh.ipynb"
 PRO7 = rcilab.load_model("xMatePro7")
 TOOL = "/".join(["meshcat", "arm", *(f"joint{i}" for i in range(1, 8)), "flange", "tool"])
 WORLD = """(path) => {
@@ -55,6 +56,7 @@ def jupyter(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, Pat
     kernel = {"kernelspec": {"name": "python3", "display_name": "Python 3", "language": "python"}}
     note = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(CELL)], metadata=kernel)
     nbformat.write(note, folder / "notes" / "lab.ipynb")
+    shutil.copy(Path(__file__).parents[2] / "notebooks" / LESSON, folder / "notes")
     environment = {**os.environ, "JUPYTER_RUNTIME_DIR": str(folder / "runtime")}
     environment |= {f"JUPYTER_{name}_DIR": str(folder / name) for name in ("CONFIG", "DATA")}
     environment["JUPYTERLAB_SETTINGS_DIR"] = str(folder / "settings")
@@ -122,7 +124,7 @@ def wait_for(page: Any, condition: Callable[[], bool], what: str, timeout: float
 def run_all(page: Any) -> None:
     """Presses Run, Run All Cells, until the cell runs: JupyterLab drops what is asked before it has a kernel."""
     page.get_by_text("(ipykernel) | Idle").wait_for()
-    prompt = page.locator(".jp-Cell .jp-InputPrompt").first
+    prompt = page.locator(".jp-CodeCell .jp-InputPrompt").first
 
     def begun() -> bool:
         page.keyboard.press("Escape")
@@ -214,3 +216,26 @@ def test_a_tab_that_is_closed_stops_the_arm(page: Any, jupyter: tuple[str, Path]
         time.sleep(0.2)
     client.stop_channels()
     assert float(left) > 2.0  # It was to go on so long.
+
+
+@pytest.mark.browser
+def test_the_first_lesson_runs_in_its_language_and_its_slider_moves_the_arm(
+    page: Any, jupyter: tuple[str, Path]
+) -> None:
+    tab = page.context.new_page()
+    tab.set_viewport_size({"width": 1280, "height": 2600})  # Cells out of sight are not there.
+    tab.goto(jupyter[0].replace("lab/tree/lab.ipynb", f"lab/workspaces/lesson/tree/{LESSON}"))
+    run_all(tab)
+    handle = tab.locator(".widget-hslider .noUi-handle").first
+    handle.wait_for()
+    assert tab.locator(".widget-hslider .widget-label").first.inner_text() == "关节 1"
+    wait_for(tab, lambda: shows(tab, PRO7.home), "the arm at home in the preview")
+    handle.focus()
+    for _ in range(60):
+        tab.keyboard.press("ArrowRight")
+    goal = PRO7.home.copy()
+    goal[0] = np.radians(30.0)
+    wait_for(tab, lambda: shows(tab, goal), "the arm where the slider put it")
+    wait_for(tab, lambda: tab.get_by_text("(ipykernel) | Idle").count() == 1, "the end of the lesson")
+    assert tab.locator("[data-mime-type='application/vnd.jupyter.stderr']").count() == 0
+    tab.close()

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
+from rcilab.cycle_file import cycle_dtype
+from rcilab.notebook import lesson
 from rcilab.notebook.lesson import answer, language
+from rcilab.recording.run import build_run
 
 SESSION = "JPY_SESSION_NAME"
 
@@ -38,3 +42,20 @@ def test_an_answer_is_told_in_the_readers_language(monkeypatch, capsys) -> None:
     monkeypatch.setenv(SESSION, "01_first_motion.ipynb")
     answer(False, "T = 0.700 s")
     assert capsys.readouterr().out == "✓ 正确: T = 1.952 s\n✗ not yet: T = 0.700 s\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "word"), [("01_first_motion.zh.ipynb", "成功率"), ("01_first_motion.ipynb", "success rate")]
+)
+def test_a_run_is_shown_in_the_readers_language(monkeypatch, name: str, word: str) -> None:
+    from IPython.core.formatters import HTMLFormatter
+
+    formatter = HTMLFormatter()
+    shell = SimpleNamespace(display_formatter=SimpleNamespace(formatters={"text/html": formatter}), user_ns={})
+    monkeypatch.setenv(SESSION, name)
+    monkeypatch.setattr(lesson, "shell", lambda: shell)
+    lesson._speak()
+    run = build_run(np.zeros(0, cycle_dtype(7)), plan=None, realtime=False)
+    shown = formatter(run)
+    assert shown is not None
+    assert word in shown

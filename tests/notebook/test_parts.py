@@ -104,6 +104,27 @@ def test_no_place_in_a_sentence_is_left_unfilled(language: str) -> None:
     assert [text for text in texts if re.search(r"\{[a-z_]+\}", text)] == []
 
 
+@pytest.mark.parametrize("name", notebook.__all__)
+def test_a_part_speaks_as_the_notebook_unless_somebody_says_otherwise(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("JPY_SESSION_NAME", "01_first_motion.zh.ipynb")
+    make = getattr(notebook, name)
+    with make(PRO7) as chinese, make(PRO7, language="en") as english, make(english) as beside:
+        assert [part.text.language for part in (chinese, english, beside)] == ["zh", "en", "en"]
+        with make(english, language="zh") as told:
+            assert told.text.language == "zh"
+            assert told.state is english.state
+
+
+def test_every_tab_of_a_lab_speaks_as_the_lab(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("JPY_SESSION_NAME", "05_s_curves_and_limits.zh.ipynb")
+    with notebook.Lab(PRO7, place=Place(way="loopback")) as made:
+        open_tabs(made)
+        assert {part.text.language for part in made._parts} == {"zh"}
+        assert "关节 1" in list(said_by(made.widget))
+
+
 def test_what_is_on_a_tab_is_made_once_when_it_is_opened_or_asked_for_and_ends_with_the_lab() -> None:
     with notebook.Lab(PRO7, place=Place(way="loopback")) as made:
         assert [len(place.children) for place in made.tabs.children] == [1, 0, 0, 0, 0, 0]

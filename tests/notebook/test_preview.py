@@ -108,6 +108,8 @@ def test_showing_a_pose_ends_the_animation(live: Preview) -> None:
     live.show(q)
     (animation,) = [command for command in commands(live.html()) if command["type"] == "set_animation"]
     assert animation["animations"] == []
+    assert live.url is not None
+    assert live.url.endswith("/?plain")  # The viewer's own menu has nothing to play.
     np.testing.assert_allclose(flange_of(live.html()), PRO7.forward(q).matrix, atol=1e-6)
 
 

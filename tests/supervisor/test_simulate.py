@@ -223,6 +223,16 @@ def test_closing_ends_the_private_controller():
         robot.execute(plan_joint(MODEL, MODEL.home, GOAL))
 
 
+def test_a_session_that_is_dropped_takes_its_controller_along():
+    # As in a notebook, when the cell that says `robot = simulate(model)` runs again.
+    robot = simulate(MODEL)
+    pid = robot._partner
+    assert os.path.exists(f"/proc/{pid}")
+    with pytest.warns(ResourceWarning):  # Its sockets, too, were left to themselves.
+        del robot
+    assert not os.path.exists(f"/proc/{pid}")
+
+
 def test_a_controller_that_is_killed_in_mid_motion_is_noticed_although_it_keeps_no_time():
     killed: list[float] = []
 

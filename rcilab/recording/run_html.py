@@ -1,0 +1,49 @@
+"""A run as a small table for notebooks."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from html import escape
+from typing import TYPE_CHECKING
+
+from rcilab.language import load_words, require_language
+
+if TYPE_CHECKING:
+    from rcilab.recording.run import Run
+
+
+def _error(run: Run, words: Mapping[str, str]) -> str:
+    """Returns the largest error, and until when it was compared where the arm was stopped."""
+    told, stop = f"{math.degrees(run.largest_error):.3g} deg", run.stop_time
+    return told if stop is None or run.plan is None else words["card.until"].format(error=told, time=stop)
+
+
+def run_html(run: Run, language: str = "en") -> str:
+    """Returns a table of how long a run took, how it ended, how near it was and how punctual.
+
+    Raises:
+        InvalidValueError: There is no such language.
+    """
+    words, timing = load_words("rcilab.recording", require_language(language)), run.timing
+    ended = run.stopped or words["card.fault" if run.faults else "card.goal"]
+    rows = [
+        ("duration", words["card.cycles"].format(duration=run.duration, cycles=len(run.cycles))),
+        ("ended", ended),
+        ("faults", ", ".join(fault.name for fault in run.faults) or words["card.none"]),
+        ("error", _error(run, words)),
+        ("success", f"{float(run.success_rate[-1]):.3f}" if len(run.cycles) else "-"),
+        ("lost", f"{timing.lost}"),
+    ]
+    if run.realtime:
+        median, p99, largest = (
+            1e6 * time for time in (timing.lateness_median, timing.lateness_p99, timing.lateness_max)
+        )
+        rows.append(("late", words["card.lateness"].format(median=median, p99=p99, max=largest)))
+    else:
+        rows.append(("timing", words["card.lockstep"]))
+    cells = "".join(
+        f"<tr><th style='text-align:left'>{words[f'card.{name}']}</th><td>{escape(value)}</td></tr>"
+        for name, value in rows
+    )
+    return f"<table><caption>{words['card.title']}</caption>{cells}</table>"
