@@ -148,7 +148,8 @@ class Presenter:
     def _draw(self, state: UiState, status: SupervisorStatus) -> bool:
         """Shows a snapshot, first what is in the scene: a hand may be dragging it. Returns whether that was all."""
         if _looks(state) != self._built:
-            self._build(state)
+            with self._server.atomic():  # In one piece: a wake of viser's loop a message doubles the time it takes.
+                self._build(state)
         if state.theme != self._theme:
             self._theme = state.theme
             dress(self._server, state.theme)

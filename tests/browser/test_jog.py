@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 import pytest
 
@@ -37,10 +39,13 @@ def press(page, name: str) -> None:
 def require_rest(page) -> None:
     """Waits until the arm stands for longer than any pause between two words of a button that is held."""
 
+    there, since = np.array(page.status.q_c), time.monotonic()
+
     def rests() -> bool:
-        there = np.array(page.status.q_c)
-        page.tab.wait_for_timeout(500)
-        return np.array_equal(page.status.q_c, there)
+        nonlocal there, since
+        if not np.array_equal(page.status.q_c, there):
+            there, since = np.array(page.status.q_c), time.monotonic()
+        return time.monotonic() - since > 0.5
 
     page.wait(rests, "the arm to stand")
 
