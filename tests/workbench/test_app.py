@@ -17,6 +17,7 @@ from rcilab.workbench import requests
 from rcilab.workbench.app import Workbench, WorkbenchConfig
 from rcilab.workbench.panels.arm_now import arm_html
 from rcilab.workbench.panels.target import planned_html
+from rcilab.workbench.panels.timeline import TimelinePanel
 from rcilab.workbench.run.readiness import obstacle, time_shown
 from rcilab.workbench.text import Text
 from tests.workbench.opened import opened, told, wait
@@ -130,6 +131,8 @@ def test_a_target_out_of_reach_has_no_ways_and_its_plan_says_how_far_short_it_en
         assert str(state.plan.short.values["mm"]) in shown
     ask(requests.ChooseBranch(index=0))
     assert bench.store.state.goal is state.goal
+    caption = TimelinePanel(Text("en"), lambda request: None)._read(state, bench.session.status())
+    assert f"ends {Text('en').say(state.plan.short)} short of the target" in caption
     ask(requests.SetSpeed(speed=1.0))
     ask(requests.Drive(what="execute"))
     wait(lambda: told(bench) == "notice.arrived_short", "the arrival short of the target")

@@ -142,6 +142,11 @@ def test_every_button_step_and_lesson_has_words() -> None:
     assert sorted(wanted - known) == []
 
 
+def run_that(stopped: str | None) -> Recording:
+    run, none = SimpleNamespace(is_complete=True, stopped=stopped, faults=()), np.zeros((1, 7))
+    return Recording(t=np.zeros(1), q=none, q_c=none, dq=none, delay=0, run=run)
+
+
 def test_the_first_lesson_ticks_itself_off(bench: Bench) -> None:
     bench.press("lesson", name="first")
     assert bench.step() == 0
@@ -157,8 +162,9 @@ def test_the_first_lesson_ticks_itself_off(bench: Bench) -> None:
     bench.step()
     bench.step()
     bench.status.phase = "idle"
-    none = np.zeros((1, 7))
-    bench.store.update(last_run=Recording(t=np.zeros(1), q=none, q_c=none, dq=none, delay=0, run=SimpleNamespace()))
+    bench.store.update(last_run=run_that("Stop was pressed"))
+    assert bench.step() == 4  # Halfway is no arrival.
+    bench.store.update(last_run=run_that(None))
     assert bench.step() == 5
     assert bench.state.notice is not None
     assert Text("en").say(bench.state.notice.text) == "✓ Done. That was it."

@@ -54,7 +54,8 @@ def _moving(then: UiState, now: UiState, status: SupervisorStatus) -> bool:
 
 
 def _arrived(then: UiState, now: UiState, status: SupervisorStatus) -> bool:
-    return now.last_run is not None and now.last_run.run is not None and not is_moving(status)
+    run = None if now.last_run is None else now.last_run.run
+    return run is not None and run.is_complete and not run.stopped and not run.faults and not is_moving(status)
 
 
 def _fast(then: UiState, now: UiState, status: SupervisorStatus) -> bool:

@@ -103,4 +103,5 @@ def bead_words(bead: Bead, text: Text) -> str:
     worst = bead.violations[0]
     joint = f" J{worst.joint}" if worst.joint else ""
     more = f" +{len(bead.violations) - 1}" if len(bead.violations) > 1 else ""
-    return f"◆ {text('condition.' + worst.condition.id)}{joint} · {worst.worst_time:.2f} s{more}"
+    broken = text("scene.broken", condition=text("condition." + worst.condition.id))
+    return f"◆ {broken}{joint} · {worst.worst_time:.2f} s{more}"
