@@ -78,12 +78,16 @@ class Plan:
 
         Args:
             model: The arm as it is now.
-            box: The safety box that is in force now; without one, a plan that was judged inside a box is as good.
+            box: The safety box that is in force now; without one, a plan that was kept inside a box is as good.
         """
         then, now = self.model.fingerprint, model.fingerprint
         changed = [part for part in ("tool", "load") if then[part] != now[part]]
         bound, judged = active_box(box), active_box(self.box)
-        if bound is not None and (judged is None or not _is_same_box(bound, judged)):
+        if bound is None:
+            is_changed = judged is not None and any(v.condition.signal == "position" for v in self.report.violations)
+        else:
+            is_changed = judged is None or not _is_same_box(bound, judged)
+        if is_changed:
             changed.append("box")
         return tuple(changed)
 

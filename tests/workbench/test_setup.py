@@ -17,7 +17,9 @@ from rcilab.supervisor import SupervisorStatus
 from rcilab.supervisor.launch import start_controller
 from rcilab.workbench import requests
 from rcilab.workbench.app import Workbench
+from rcilab.workbench.check.freshness import outdated
 from rcilab.workbench.panels.check import CheckPanel
+from rcilab.workbench.panels.setup import SetupPanel
 from rcilab.workbench.panels.target import planned_html
 from rcilab.workbench.run.readiness import obstacle
 from rcilab.workbench.setup.fields import FACE_NAMES, FIELD_NAMES, faces, read_field, with_field
@@ -121,7 +123,11 @@ def test_a_motion_out_of_the_box_is_refused_before_it_runs(bench, ask):
     assert obstacle(state, bench.session.status()).code == "ready.violations"
     assert "on, 120 × 120 × 120 mm" == Text("en").say(describe_held(bench.session.status(), "box"))
     ask(requests.SetSetup(name="active", value=False))
+    gone = outdated(bench.store.state)
+    assert gone is not None
+    assert "safety box" in Text("en").say(gone)  # What broke the box is no verdict on an arm without one.
     ask(requests.Plan())
+    assert outdated(bench.store.state) is None
     wait(lambda: settled(bench), "the controller to have switched the box off")
     assert obstacle(bench.store.state, bench.session.status()) is None
 
@@ -244,6 +250,17 @@ def test_the_check_tab_says_that_its_report_is_out_of_date(bench, ask):
     panel = next(panel for panel in bench.presenter._panels if isinstance(panel, CheckPanel))
     wait(lambda: "Out of date" in panel._verdict._shown, "the tab to say so")
     assert panel._again.visible
+
+
+def test_after_check_again_the_setup_tab_has_a_verdict_on_the_plan(bench, ask):
+    ask(requests.MoveJoint(joint=0, angle=float(bench.session.status().q_c[0]) + 0.3))
+    type_in(ask, tool_z="100")
+    panel = next(panel for panel in bench.presenter._panels if isinstance(panel, SetupPanel))
+    wait(lambda: "Out of date" in panel._planned._shown, "the tab to say so")
+    ask(requests.Check(what="again"))
+    wait(lambda: "Passed" in panel._planned._shown, "a verdict")
+    assert panel._planned._shown == planned_html(bench.store.state, Text("en"))
+    assert panel._again.disabled
 
 
 def test_a_robot_that_is_not_ours_is_changed_only_after_a_second_yes(bench, ask):

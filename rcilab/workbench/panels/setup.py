@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from rcilab.client.setup import SETUP_PARTS
 from rcilab.workbench import requests
 from rcilab.workbench.check.freshness import outdated
+from rcilab.workbench.panels.target import planned_html
 from rcilab.workbench.setup.wanted import (
     describe_held,
     describe_part,
@@ -40,7 +41,7 @@ class SetupPanel:
         self._cancel = gui.add_button(text("run.cancel"), color="gray", visible=False)
         on_press(self._cancel, ask, _press("cancel"))
         self._table = Html(gui)
-        self._stale = Html(gui)
+        self._planned = Html(gui)
         with gui.add_folder(text("setup.edit_title")):
             gui.add_html('<i class="rl-buttons rl-setup-head"></i>')
             self._undo = gui.add_button(
@@ -69,9 +70,8 @@ class SetupPanel:
         self._agree.visible = self._cancel.visible = question
         self._undo.disabled = not setup.can_undo
         self._edited.show(self._choices[setup.edited])
-        changed = outdated(state)
-        self._again.disabled = changed is None
-        self._stale.show("" if changed is None else _verdict("warn", text("check.outdated"), text.say(changed)))
+        self._again.disabled = outdated(state) is None
+        self._planned.show(planned_html(state, text))
         self._table.show(self._table_html(state, status))
 
     def _verdict_html(self, state: UiState, status: SupervisorStatus) -> str:
