@@ -54,6 +54,17 @@ class SafetyBox:
             return max(dx, dy, dz)
         return hypot(dx if dx > 0.0 else 0.0, dy if dy > 0.0 else 0.0, dz if dz > 0.0 else 0.0)
 
+    def passed_face(self, position: Sequence[float] | Array) -> tuple[str, float]:
+        """Returns the face that a point lies farthest past, such as "+x", and how far, [m]; minus inside.
+
+        Args:
+            position: The point in the base frame, three numbers, [m].
+        """
+        local = self.T_base_box.rotation.T @ (np.asarray(position) - self.T_base_box.position)
+        beyond = np.abs(local) - 0.5 * np.array(self.size)
+        axis = int(beyond.argmax())
+        return ("+" if local[axis] >= 0.0 else "−") + "xyz"[axis], float(beyond[axis])
+
     def excess_path(self, positions: Array) -> Array:
         """Returns `excess` of many points.
 

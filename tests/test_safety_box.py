@@ -44,6 +44,14 @@ def test_excess_agrees_with_the_nearest_point_of_the_box(point):
     assert (excess <= 0.0) == bool((np.abs(local) <= half).all())
 
 
+@pytest.mark.parametrize(
+    ("point", "face", "distance"),
+    [((0.25, 0.1, -0.2), "+x", 0.05), ((0.23, -0.36, 0.5), "−y", 0.06), ((0.0, 0.0, -0.499), "−z", -0.001)],
+)
+def test_the_face_that_a_point_lies_farthest_past_is_named(point, face, distance):
+    assert TURNED.passed_face(at(*point)) == (face, pytest.approx(distance, abs=1e-12))
+
+
 def test_a_path_of_points_is_judged_as_each_of_them():
     points = np.random.default_rng(3).normal(scale=0.6, size=(200, 3))
     assert TURNED.excess_path(points) == pytest.approx([TURNED.excess(p) for p in points.tolist()], abs=1e-12)

@@ -132,6 +132,25 @@ def test_a_motion_out_of_the_box_is_refused_before_it_runs(bench, ask):
     assert obstacle(bench.store.state, bench.session.status()) is None
 
 
+def test_an_arm_that_stands_outside_the_box_is_told_so_in_setup_and_beside_execute(bench, ask):
+    ask(requests.MoveJoint(joint=0, angle=float(bench.session.status().q_c[0]) + 0.3))
+    x = 1000.0 * bench.store.state.model.forward(bench.session.status().q_c).position[0]
+    panel = next(panel for panel in bench.presenter._panels if isinstance(panel, SetupPanel))
+    ask(requests.SetSetup(name="active", value=True))
+    type_in(ask, box_xmax=f"{x + 0.5:.2f}")
+    assert obstacle(bench.store.state, bench.session.status()).code == "ready.stale"
+    wait(lambda: "Out of date" in panel._planned._shown, "Setup to look")
+    assert "Outside" not in panel._verdict._shown
+    type_in(ask, box_xmax=f"{x - 74.03:.2f}")
+    wait(lambda: "74.0 mm outside the safety box, past its +x face" in panel._verdict._shown, "Setup to say so")
+    ask(requests.Check(what="again"))
+    reason = obstacle(bench.store.state, bench.session.status())
+    assert (reason.code, dict(reason.values)) == ("ready.outside", {"mm": "74.0", "face": "+x"})
+    assert "74.0 mm" in Text("zh").say(reason)
+    ask(requests.SetSetup(name="active", value=False))
+    wait(lambda: "Outside" not in panel._verdict._shown, "Setup to take it back")
+
+
 def test_a_drag_is_one_step_to_undo_and_is_sent_when_it_has_ended(bench, ask):
     before = wanted(bench).tool
     for step in range(1, 4):

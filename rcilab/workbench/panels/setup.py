@@ -14,6 +14,7 @@ from rcilab.workbench.setup.wanted import (
     differing_tool,
     pending_parts,
     setup_obstacle,
+    tool_outside,
 )
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, Html, Linked, esc, on_press
@@ -64,7 +65,7 @@ class SetupPanel:
         text, setup = self._text, state.setup
         pending, foreign = pending_parts(state, status), state.target != "virtual"
         question = setup.asked is setup.wanted and bool(pending)
-        self._verdict.show(self._verdict_html(state, status))
+        self._verdict.show(self._verdict_html(state, status) + self._outside_html(state, status))
         is_asked = bool(pending) and (foreign or setup.refusal is not None)
         self._send.visible = is_asked and not question
         self._agree.visible = self._cancel.visible = question
@@ -92,6 +93,14 @@ class SetupPanel:
         if not setup.touched:
             return f'<p class="rl-note">{esc(text("setup.untouched"))}</p>'
         return _verdict("good", text("setup.given"), text("setup.given_long"))
+
+    def _outside_html(self, state: UiState, status: SupervisorStatus) -> str:
+        """Returns that the arm itself stands outside the safety box, if it does."""
+        box = state.setup.wanted.box
+        if status.q_c is None or box is None or not box.active:
+            return ""
+        outside = tool_outside(state, state.model.forward(status.q_c).position)
+        return "" if outside is None else _verdict("bad", self._text("setup.arm_outside"), self._text.say(outside))
 
     def _table_html(self, state: UiState, status: SupervisorStatus) -> str:
         text, pending = self._text, pending_parts(state, status)

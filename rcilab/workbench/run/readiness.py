@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from rcilab.posing.readiness import arm_obstacle, ask_to_move, plan_obstacle
 from rcilab.workbench.check.freshness import outdated
 from rcilab.workbench.run.driving import parameter_obstacle
-from rcilab.workbench.setup.wanted import setup_obstacle
+from rcilab.workbench.setup.wanted import setup_obstacle, tool_outside
 from rcilab.workbench.store import UiState
 from rcilab.workbench.telling import tell_status
 from rcilab.workbench.text import Message, message
@@ -33,6 +33,9 @@ def obstacle(state: UiState, status: SupervisorStatus) -> Message | None:
         return resting
     if state.plan is None:
         return plan_obstacle(None, status.q_c)
+    outside = tool_outside(state, state.plan.path[0])
+    if outside is not None:
+        return outside
     changed = outdated(state)
     if changed is not None:
         return changed

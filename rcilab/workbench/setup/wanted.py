@@ -10,7 +10,7 @@ import numpy as np
 from rcilab.client.setup import SETUP_PARTS, ForceControlFrame, RobotSetup, SetupPart
 from rcilab.dynamics.payload import NO_LOAD, Payload
 from rcilab.protocols.rci import ForceFrame
-from rcilab.safety_box import SafetyBox
+from rcilab.safety_box import SafetyBox, active_box
 from rcilab.spatial import IDENTITY, Pose
 from rcilab.workbench.text import Message, message
 
@@ -22,6 +22,7 @@ ON_FLANGE: tuple[SetupPart, ...] = ("tool", "load", "force")
 FORCE_AXES = {"world": ForceFrame.WORLD, "tool": ForceFrame.TOOL, "path": ForceFrame.PATH}
 
 _SAME_PLACE, _SAME_TURN = 1e-4, 1e-3  # [m], elements of a rotation: within these the controller's tool is ours.
+_SEEN = 5e-5  # [m] Closer to a face than this, the tool stands on it: it would be 0.0 mm outside.
 _FIRST_SETUP = RobotSetup(
     box=SafetyBox(size=(1.6, 1.6, 1.3), T_base_box=Pose((0.0, 0.0, 0.66)), active=False),
     tool=IDENTITY,
@@ -72,6 +73,20 @@ def setup_obstacle(state: UiState, status: SupervisorStatus) -> Message | None:
     if state.target == "virtual":
         return message("ready.setup_pending")
     return message("ready.setup_unsent", what=name_parts(parts), address=state.target)
+
+
+def tool_outside(state: UiState, position: np.ndarray) -> Message | None:
+    """Returns how far outside the safety box a place of the tool is, and past which face; None inside or without one.
+
+    Args:
+        state: Of the page.
+        position: In base, shape (3,), [m].
+    """
+    box = active_box(state.setup.wanted.box)
+    if box is None:
+        return None
+    face, distance = box.passed_face(position)
+    return message("ready.outside", mm=f"{1000.0 * distance:.1f}", face=face) if distance > _SEEN else None
 
 
 def name_parts(parts: tuple[str, ...]) -> Message:
