@@ -80,12 +80,29 @@ class ConditionResult:
         return str(self.links) if self.links else self.condition.place(self.joint)
 
     @property
+    def shown(self) -> tuple[float, float]:
+        """Worst value and bound as people read them: one that only allows for rounding is 0, and what keeps it."""
+        condition = self.condition
+        if condition.is_measured or (condition.signal != "position" and condition.stage == "throughout"):
+            return self.value, self.bound
+        return 0.0 if self.ok and abs(self.value) <= abs(self.bound) else self.value, 0.0
+
+    @property
+    def has_share(self) -> bool:
+        """Whether `ratio` can be told as a part of the bound: not of 0, nor how far a distance has passed its bound."""
+        condition = self.condition
+        if condition.signal == "position" or condition.is_clearance:
+            return self.ok
+        return condition.stage == "throughout"
+
+    @property
     def texts(self) -> tuple[str, str, str]:
         """Worst value, bound and used part as text; what is to be zero at an end, and is, reads 0."""
+        used = share(self.ratio) if self.has_share else ""
         if self.condition.signal == "position":
-            return f"{self.value:.4g}", "0", share(self.ratio)
+            return f"{self.value:.4g}", "0", used
         if self.condition.stage == "throughout":
-            return *amount(self.value, self.bound), share(self.ratio)
+            return *amount(self.value, self.bound), used
         return "0" if self.ok else f"{self.value:.4g}", f"0 ± {abs(self.bound):g}", ""
 
     @property
@@ -271,6 +288,11 @@ class Report:
         from rcilab.conformance.slow_down import find_slow_down
 
         return find_slow_down(self, recommended=recommended, at_most=at_most)
+
+    @property
+    def broken_conditions(self) -> int:
+        """How many conditions the violations are of: one may be broken more than once, and by more than one joint."""
+        return len({violation.condition.id for violation in self.violations})
 
     def explain(self, language: Language = "en", units: Units | None = None, *, slowed: SlowDown | None = None) -> str:
         """Returns in whole sentences what is wrong, where, when and by how much, what it raises and what to do.

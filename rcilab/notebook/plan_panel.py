@@ -113,7 +113,7 @@ class PlanPanel(Part):
         tone, word = ("good", "check.passed") if report.ok else ("bad", "check.failed")
         said = text("plan.ready", duration=f"{plan.motion.duration:.3f}")
         if not report.ok:
-            said += " " + text("check.failed_long", count=len(report.violations))
+            said += " " + text("check.failed_long", conditions=report.broken_conditions, count=len(report.violations))
         elif plan.short is not None:
             tone, word = "warn", "target.not_there"
             said += " " + text("target.leads_short", short=text.say(plan.short))

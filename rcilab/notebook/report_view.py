@@ -47,7 +47,8 @@ class ReportView(Part):
             code = "check.passed_unheeded" if unheeded else "check.passed_long"
             said = verdict("good", text("check.passed"), text(code, count=unheeded))
         else:
-            said = verdict("bad", text("check.failed"), text("check.failed_long", count=len(report.violations)))
+            failed = text("check.failed_long", conditions=report.broken_conditions, count=len(report.violations))
+            said = verdict("bad", text("check.failed"), failed)
         write(self._verdict, said + soft(text("check.note")))
         broken = "".join(
             f"<li>{esc(explain_violation(violation, text.language))}</li>" for violation in report.violations[:_LISTED]
@@ -61,16 +62,17 @@ class ReportView(Part):
         word = "check.kept" if tone == "good" else "check.tight" if row.ok else "check.exceeded"
         if not row.ok and condition.necessity == "necessary":
             tone, word = "bad", "check.broken"
-        facts = [value_against_bound(row.value, row.bound, condition.unit, text)]
+        facts = [value_against_bound(*row.shown, condition.unit, text)]
         facts += [text("check.joint", joint=row.joint)] if row.joint else []
         facts += [explain_place(row, text.language)] if row.links is not None else []
         facts.append(f"t = {row.time:.3f} s")
+        share = f"{100.0 * row.ratio:.1f} %" if row.has_share else ""
         fault = "" if condition.fault is None else " · " + text("check.raises", fault=condition.fault.manual_name)
         formula, source = explain_formula(condition, text.language), explain_source(condition, text.language)
         return (
             f'<div class="rl-card rl-{tone}"><div class="rl-row"><b>{esc(text(f"condition.{condition.id}"))}</b>'
             f'<span class="rl-soft">{esc(text("necessity." + condition.necessity))}</span>'
-            f'<span class="rl-push">{esc(text(word))}</span><span class="rl-num">{100.0 * row.ratio:.1f} %</span></div>'
+            f'<span class="rl-push">{esc(text(word))}</span><span class="rl-num">{share}</span></div>'
             f'<div class="rl-meter"><i style="width:{min(100.0, 100.0 * row.ratio):.1f}%"></i></div>'
             f'<div class="rl-num">{esc(" · ".join(facts))}</div>'
             f'<div class="rl-soft">{esc(formula)} — {esc(source + fault)}</div></div>'

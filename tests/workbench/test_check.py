@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,12 +14,14 @@ from rcilab.conformance import CONDITIONS
 from rcilab.model import load_model
 from rcilab.motion import Program, Waypoint
 from rcilab.posing.planning import Plan
+from rcilab.safety_box import SafetyBox
 from rcilab.spatial import Pose
 from rcilab.words.units import Units
 from rcilab.workbench import requests
 from rcilab.workbench.check.actions import CheckActions, plot_of
 from rcilab.workbench.check.slowing import scaled, slow_to_goal
 from rcilab.workbench.goal.actions import GoalActions, initial_goal
+from rcilab.workbench.panels.check import CheckPanel
 from rcilab.workbench.panels.check_rows import row_tone, rows_html
 from rcilab.workbench.program.actions import ProgramActions
 from rcilab.workbench.program.draft import Draft, number_at
@@ -209,6 +212,26 @@ def test_rows_and_words_are_in_the_units_of_the_page(bench: Bench) -> None:
     assert f"{row.value:.4g} / {row.bound:.4g} rad/s" in rows_html(report, MODEL, "", radians)
     assert not re.search(r"\d ?rad", rows_html(report, MODEL, "", degrees))
     assert not re.search(r"\d ?(?:mm|°)", rows_html(report, MODEL, "", radians))
+
+
+def test_what_only_allows_for_rounding_is_0_and_the_verdict_counts_conditions_as_the_cards_do(bench: Bench) -> None:
+    box = SafetyBox(size=(1.0, 0.4, 1.5), T_base_box=Pose((0.5, 0.0, 0.5)))
+    setup = bench.state.setup
+    bench.store.update(setup=replace(setup, wanted=replace(setup.wanted, box=box)))
+    bench.goal.pose(HOME + np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]))
+    report = bench.plan.report
+    assert report.broken_conditions == 1
+    cards = rows_html(report, MODEL, "", Text("en"))
+    assert cards.count("rl-card rl-bad") == 1
+    card = next(card for card in cards.split('<div class="rl-card') if "Tool inside the safety box" in card)
+    assert " / 0 mm" in card
+    assert '<span class="rl-share"></span>' in card
+    assert "10⁻" not in cards
+    rest = next(card for card in cards.split('<div class="rl-card') if "Starts at the arm" in card)
+    assert "0 / 0°" in rest
+    assert "%" not in rest.partition("rl-meter")[0]
+    headline = CheckPanel(Text("en"), lambda request: None)._headline(bench.plan, None)
+    assert f"Broken conditions: 1 (occurrences: {len(report.violations)})." in headline
 
 
 def test_every_row_of_a_joint_or_the_tool_has_a_plot() -> None:

@@ -103,7 +103,8 @@ class CheckPanel:
             code = "check.passed_unheeded" if unheeded else "check.passed_long"
             headline = ("good", "", "check.passed", text(code, count=unheeded))
         else:
-            headline = ("bad", "", "check.failed", text("check.failed_long", count=len(report.violations)))
+            said = text("check.failed_long", conditions=report.broken_conditions, count=len(report.violations))
+            headline = ("bad", "", "check.failed", said)
         tone, sign, word, rest = headline
         note = text("check.note") if plan.complete else text("check.incomplete")
         return (

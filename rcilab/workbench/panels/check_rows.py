@@ -35,7 +35,7 @@ def row_html(row: ConditionResult, model: RobotModel, chosen: str, text: Text) -
     """Returns one row."""
     condition, tone = row.condition, row_tone(row)
     word = text("check.kept" if tone == "good" else "check.broken" if tone == "bad" else _AMBER[not row.ok])
-    facts = [value_against_bound(row.value, row.bound, condition.unit, text)]
+    facts = [value_against_bound(*row.shown, condition.unit, text)]
     if row.links is not None:
         facts.append(explain_place(row, text.language))
     elif row.joint:
@@ -52,7 +52,7 @@ def row_html(row: ConditionResult, model: RobotModel, chosen: str, text: Text) -
         f'<div class="rl-card rl-{tone}" role="button" tabindex="0" data-say="{esc(condition.id)}"{current} '
         f'title="{esc(text("check.row_hint"))}">'
         f'<div class="rl-line"><i class="rl-sign">{_SIGNS[tone]}</i><b>{esc(name)}</b>'
-        f'<span class="rl-word">{esc(word)}</span><span class="rl-share">{_share(row.ratio)}</span></div>'
+        f'<span class="rl-word">{esc(word)}</span><span class="rl-share">{_share(row)}</span></div>'
         f'<div class="rl-meter"><i style="width:{min(100.0, 100.0 * row.ratio):.1f}%"></i></div>'
         f'<div class="rl-facts"><span class="rl-badge">{esc(text("necessity." + condition.necessity))}</span> '
         f"{esc(' · '.join(facts))}</div>"
@@ -60,8 +60,10 @@ def row_html(row: ConditionResult, model: RobotModel, chosen: str, text: Text) -
     )
 
 
-def _share(ratio: float) -> str:
-    return f"{100.0 * ratio:.1f} %" if ratio < _MANY else f"{ratio:.0f} ×"
+def _share(row: ConditionResult) -> str:
+    if not row.has_share:
+        return ""
+    return f"{100.0 * row.ratio:.1f} %" if row.ratio < _MANY else f"{row.ratio:.0f} ×"
 
 
 def row_tone(row: ConditionResult) -> str:
