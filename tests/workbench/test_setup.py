@@ -19,8 +19,10 @@ from rcilab.workbench import requests
 from rcilab.workbench.app import Workbench
 from rcilab.workbench.check.freshness import outdated
 from rcilab.workbench.panels.check import CheckPanel
+from rcilab.workbench.panels.program_list import list_html
 from rcilab.workbench.panels.setup import SetupPanel
 from rcilab.workbench.panels.target import planned_html
+from rcilab.workbench.program.draft import target_of
 from rcilab.workbench.run.readiness import obstacle
 from rcilab.workbench.setup.fields import FACE_NAMES, FIELD_NAMES, faces, read_field, with_field
 from rcilab.workbench.setup.wanted import SetupState, describe_held, describe_part, pending_parts, setup_obstacle
@@ -149,6 +151,33 @@ def test_an_arm_that_stands_outside_the_box_is_told_so_in_setup_and_beside_execu
     assert "74.0 mm" in Text("zh").say(reason)
     ask(requests.SetSetup(name="active", value=False))
     wait(lambda: "Outside" not in panel._verdict._shown, "Setup to take it back")
+
+
+def test_another_tool_says_once_what_it_makes_of_a_program_and_that_is_what_it_does(bench, ask):
+    ask(requests.EditProgram(what="clear"))
+    for _ in range(2):
+        ask(requests.EditProgram(what="add", source="here"))
+    typed = bench.store.state.program.draft.steps[1].key
+    ask(requests.TypeField(field=f"program.{typed}.z", text="500"))
+    before = bench.store.state
+    taught, posed = before.program.draft.steps
+    ask(requests.MoveSetup(part="tool", position=(0.0, 0.0, 0.05), wxyz=NO_TURN))
+    said = bench.store.state.notice
+    assert said.text.code == "setup.program_moves"
+    ask(requests.MoveSetup(part="tool", position=(0.0, 0.0, 0.1), wxyz=NO_TURN, ended=True))
+    after = bench.store.state
+    assert after.notice is said
+    assert after.program.draft.steps == (taught, posed)
+    assert taught.waypoint.q is not None
+    assert posed.waypoint.q is None
+    flange = before.model.forward(taught.waypoint.q)
+    led = [target_of(step.waypoint, after.program.draft.arm(after.model)) for step in after.program.draft.steps]
+    assert led[0].is_close(flange @ Pose((0.0, 0.0, 0.1)), 1e-12)
+    assert led[1].position[2] == pytest.approx(0.5)
+    shown = list_html(after, after.program.draft, None, Text("en"))
+    assert f"<b>{1000.0 * led[0].position[2]:.0f}</b>" in shown
+    assert "<b>500</b>" in shown
+    ask(requests.EditProgram(what="clear"))
 
 
 def test_a_drag_is_one_step_to_undo_and_is_sent_when_it_has_ended(bench, ask):

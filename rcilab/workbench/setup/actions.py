@@ -31,7 +31,7 @@ from rcilab.workbench.setup.fields import (
 )
 from rcilab.workbench.setup.post import SetupPost
 from rcilab.workbench.setup.wanted import FORCE_AXES, SetupState, name_parts, pending_parts
-from rcilab.workbench.store import Goal, Store
+from rcilab.workbench.store import Goal, Store, UiState
 from rcilab.workbench.text import Message, message
 
 if TYPE_CHECKING:
@@ -51,6 +51,7 @@ class SetupActions:
         self._drag: tuple[int | None, str] | None = None  # Which page drags which part.
         self._dragged = -math.inf  # When it was last heard to.
         self._post = SetupPost(session, self._refuse)
+        self._told_of: object = None  # The program of which it was said what another tool makes of it.
         self._told = 0  # At how many connections the controller has taken a set-up, as far as that was said.
 
     def type_field(self, request: requests.TypeField) -> None:
@@ -210,6 +211,14 @@ class SetupActions:
         self._store.clear_problems(*(f"setup.{part}." for part in parts))
         self._take(replace(setup, wanted=before, touched=touched, inertia=None), parts)
 
+    def _tell_program(self, state: UiState) -> None:
+        """Says once of a program that goes with the tool of the page what another tool makes of it."""
+        draft = state.program.draft
+        is_here = draft.model == state.model.name and bool(draft.steps) and draft.tool is None
+        if is_here and draft is not self._told_of:
+            self._told_of = draft
+            self._store.say("warn", message("setup.program_moves"))
+
     def _take(self, setup: SetupState, parts: set[SetupPart]) -> None:
         """Exchanges the set-up and what depends on it: the arm's tool and load, goal, path. The plan may go stale."""
         state = self._store.state
@@ -217,6 +226,7 @@ class SetupActions:
         if parts & {"tool", "load"}:
             changes["model"] = model = setup.wanted.only(parts).applied_to(state.model)
             if "tool" in parts:
+                self._tell_program(state)
                 self._store.forget()  # Goals of another tool.
                 target = model.forward(state.goal.q)
                 reach = judge_joints(model, state.goal.q)
