@@ -174,6 +174,7 @@ def test_a_plan_that_leaves_the_box_has_a_bead_that_leads_to_its_moment(bench):
         assert "condition." not in bead_words(bead, Text(language))
     assert bead_words(bead, Text("en")).startswith("◆ broken: Tool inside the safety box · ")
     assert bead_words(bead, Text("zh")).startswith("◆ 违反：")
+    assert "broken: Tool inside the safety box</p>" in planned_html(bench.state, Text("en"))
     bench.scene.show_bead(requests.ShowBead(number=99))
     bench.goal.pose_goal(requests.PoseGoal(name="home"))
     bench.scene.tick()

@@ -21,7 +21,7 @@ from rcilab.workbench.check.freshness import outdated
 from rcilab.workbench.panels.check import CheckPanel
 from rcilab.workbench.panels.program_list import list_html
 from rcilab.workbench.panels.setup import SetupPanel
-from rcilab.workbench.panels.target import planned_html
+from rcilab.workbench.panels.target import TargetPanel, planned_html
 from rcilab.workbench.program.draft import target_of
 from rcilab.workbench.run.readiness import obstacle
 from rcilab.workbench.setup.fields import FACE_NAMES, FIELD_NAMES, faces, read_field, with_field
@@ -124,7 +124,11 @@ def test_a_motion_out_of_the_box_is_refused_before_it_runs(bench, ask):
     assert "cartesian.position" in {violation.condition.id for violation in state.plan.report.violations}
     assert obstacle(state, bench.session.status()).code == "ready.violations"
     assert "on, 120 × 120 × 120 mm" == Text("en").say(describe_held(bench.session.status(), "box"))
+    target = next(panel for panel in bench.presenter._panels if isinstance(panel, TargetPanel))
+    wait(lambda: "broken: Tool inside the safety box" in target._reach._shown, "the target's verdict to say so")
+    wait(lambda: bench.presenter._stage._ribbon._beads > 0, "a bead where it is broken")
     ask(requests.SetSetup(name="active", value=False))
+    wait(lambda: bench.presenter._stage._ribbon._beads == 0, "the bead to go")
     gone = outdated(bench.store.state)
     assert gone is not None
     assert "safety box" in Text("en").say(gone)  # What broke the box is no verdict on an arm without one.

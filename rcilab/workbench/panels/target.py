@@ -54,7 +54,8 @@ class TargetPanel:
         wxyz.show(quaternion_text(target.wxyz), state.problems.get(wxyz.field))
         labels.append((wxyz.field, self._text("target.wxyz")))
         self._problems.show(problems_html(state, self._text, labels))
-        self._reach.show(reach_html(state, self._text))
+        is_broken = state.plan is not None and not state.plan.report.ok  # Said here, too: below it is out of sight.
+        self._reach.show(reach_html(state, self._text) + (planned_html(state, self._text) if is_broken else ""))
 
 
 def quaternion_text(wxyz: np.ndarray) -> str:
@@ -78,6 +79,9 @@ def planned_html(state: UiState, text: Text) -> str:
     if plan.short is not None:
         said += " " + text("target.leads_short", short=text.say(plan.short))
         tone, word = (tone, word) if not report.ok else ("warn", "target.not_there")
+    if not report.ok:
+        worst, more = report.violations[0].condition.id, report.broken_conditions - 1
+        said += " · " + text("scene.broken", condition=text(f"condition.{worst}")) + (f" +{more}" if more else "")
     unheeded = count_unheeded(report) if report.ok else 0
     if unheeded:
         said += " · " + text("target.unheeded", count=unheeded)

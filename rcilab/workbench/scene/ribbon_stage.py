@@ -10,6 +10,7 @@ from rcilab.posing.planning import PATH_POINTS
 from rcilab.views.usage_colors import usage_colors
 from rcilab.views.viser_scene import ViserScene
 from rcilab.workbench import requests
+from rcilab.workbench.check.freshness import outdated
 from rcilab.workbench.scene.ribbon import Bead, Ribbon
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask
@@ -40,7 +41,7 @@ class RibbonStage:
 
     def __init__(self, server: viser.ViserServer, drawing: ViserScene, ask: Ask) -> None:
         self._scene, self._drawing, self._ask = server.scene, drawing, ask
-        self._drawn: tuple[Ribbon | None, str] = (None, "")
+        self._drawn: tuple[Ribbon | None, str, bool] = (None, "", False)
         self._beads = 0
         self._labels: list[Any] = []
         # There from the beginning: a page that renders in software can take seconds to mount a line that comes later.
@@ -50,8 +51,9 @@ class RibbonStage:
     def show(self, state: UiState, text: Text) -> None:
         """Draws the path of the newest plan."""
         ribbon = state.scene.ribbon if state.plan is not None else None
-        wanted = (ribbon, text.language)
-        if wanted[0] is self._drawn[0] and wanted[1] == self._drawn[1]:
+        is_old = state.learn.show is None and outdated(state) is not None  # What was broken may be kept by now.
+        wanted = (ribbon, text.language, is_old)
+        if wanted[0] is self._drawn[0] and wanted[1:] == self._drawn[1:]:
             return
         self._drawn = wanted
         if ribbon is not None:
@@ -60,7 +62,7 @@ class RibbonStage:
             shades = np.repeat(colors[:-1, None], 2, axis=1)
             self._drawing.add_segments("/path", ends, color=shades, thickness=_THICK)
         self._drawing.set_visible("/path", ribbon is not None)
-        self._exchange_beads(() if ribbon is None else ribbon.beads, text)
+        self._exchange_beads(() if ribbon is None or is_old else ribbon.beads, text)
 
     def remove(self) -> None:
         """Takes path and beads away."""

@@ -53,7 +53,7 @@ class SetupStage:
             "/safety_box_label", "", anchor="bottom-center", depth_test=False, font_screen_scale=1.0, visible=False
         )
         self._crossing: Any = server.scene.add_label(
-            "/outside_label", "", anchor="bottom-left", depth_test=False, font_screen_scale=1.0, visible=False
+            "/outside_label", "", anchor="top-left", depth_test=False, font_screen_scale=1.0, visible=False
         )
         self._lines = 0
 
