@@ -94,7 +94,7 @@ class TimelinePanel:
                 kinds = text("timeline.replayed")
         where = tell_place(state.plan, t)
         kinds = kinds if where is None else text.say(where)
-        kinds = kinds if outdated(state) is None else f"▲ {text('check.outdated')}"
+        kinds = kinds if state.learn.show is not None or outdated(state) is None else f"▲ {text('check.outdated')}"
         return f'<p class="rl-clock"><b>{t:.3f}</b> / {duration:.3f} s<span>{esc(kinds)}</span></p>'
 
 
