@@ -18,7 +18,7 @@ from rcilab.client.streaming import MotionStream
 from rcilab.client.under_way import UnderWay
 from rcilab.clock import CYCLE_TIME
 from rcilab.errors import UsageError
-from rcilab.motion.pacing import PacedMotion, as_planned, require_pace
+from rcilab.motion.pacing import PacedMotion, require_pace
 from rcilab.recording.run import Run
 from rcilab.spatial import Pose
 from rcilab.state import Mode, RobotState, require_mode
@@ -49,6 +49,7 @@ class Motions(RciCommands):
         progress: Progress | None = None,
         *,
         mode: Mode = "joint_position",
+        pace: float = 1.0,
     ) -> Run:
         """Streams a motion and returns what became of it. Checks it first, by the conditions of the mode.
 
@@ -60,16 +61,22 @@ class Motions(RciCommands):
             certificate: From an earlier `check(motion, model, mode=mode)`; then only its freshness is verified.
             progress: Told how far it is, about 20 times a second.
             mode: How the arm is commanded: the same way as joint angles, as poses of the tool, or as torques.
+            pace: Part of its planned speed that it runs at from the beginning, 0.1 to 1; `set_pace` changes it later.
 
         Raises:
+            InvalidValueError: The pace is out of range; nothing moved.
+            PlanningError: At this pace it would break a condition that it keeps as planned; nothing moved.
             ConformanceError: The motion breaks a condition; nothing moved.
             CertificateError: The certificate is for something else; nothing moved.
             UsageError: The motion starts elsewhere than the arm is; nothing moved.
             ControlError: The controller stopped it; `.faults` and `.record` say why. `recover()` leads on.
             ConnectionLostError: The controller is gone.
         """
+        from rcilab.conformance.pacing import plan_start
+
         require_motion(motion, certificate)
         require_mode(mode)
+        require_pace(pace)
         with self._setting_out("execute"):
             state = self.receive_state()
             mismatch = describe_start_mismatch(motion.q[0], state.q_c)
@@ -79,8 +86,9 @@ class Motions(RciCommands):
                 self._require_allowed(motion, state, mode)
             else:
                 certificate.verify(motion, self.model, state.q_c, self.safety_box, mode=mode)
-            stream = MotionStream(motion.q, mode, self.model, report_progress(motion, progress))
-            self._paced = as_planned(motion), stream, mode
+            paced = plan_start(motion, pace, self.model, mode)
+            stream = MotionStream(paced.q, mode, self.model, report_progress(paced.as_motion(), progress))
+            self._paced = paced, stream, mode
             try:
                 filters = [RateLimiter(self.model.limits)] if mode == "torque" else []
                 return self._run(stream, mode, motion, filters)

@@ -49,7 +49,7 @@ class PaceDesk:
         if running and not before:
             self.refusal = None
         with self._state.lock:
-            pace = self._wish.due(status, self._state.pace, is_under_way=self._asked is not None)
+            pace = self._wish.due(status, is_under_way=self._asked is not None)
         if pace is None:
             return
         self.refusal, self._asked = None, pace

@@ -77,8 +77,12 @@ class RobotSide(Protocol):
         """Clears the controller's faults."""
         ...
 
-    def execute(self, plan: Plan) -> None:
-        """Streams a checked motion in the mode that it was judged for."""
+    def execute(self, plan: Plan, pace: float = 1.0) -> None:
+        """Streams a checked motion in the mode that it was judged for, at part of its planned speed.
+
+        Raises:
+            PlanningError: At this pace it would break a condition.
+        """
         ...
 
     def set_control(self, control: ControlSettings) -> None:
@@ -158,7 +162,7 @@ class SupervisedRobot:
         act = self._supervisor.reconnect if lost else self._supervisor.recover
         self._tickets.append(("recover", act()))
 
-    def execute(self, plan: Plan) -> None:
+    def execute(self, plan: Plan, pace: float = 1.0) -> None:
         """Streams a checked motion; every cycle of it is kept."""
         certificate = plan.report.require().certificate
         assert certificate is not None  # A report that is ok has one.
@@ -171,7 +175,7 @@ class SupervisedRobot:
             started_ns=time.time_ns(),
         )
         self._live = LiveRecording(RunFacts(plan=plan.motion, model=self._model, setup=setup))
-        self._tickets.append(("execute", self._supervisor.execute(plan.motion, certificate, plan.mode)))
+        self._tickets.append(("execute", self._supervisor.execute(plan.motion, certificate, plan.mode, pace=pace)))
 
     def set_control(self, control: ControlSettings) -> None:
         """Tells the controller parameters of the modes."""

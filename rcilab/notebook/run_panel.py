@@ -8,7 +8,7 @@ from typing import Any
 
 import ipywidgets
 
-from rcilab.errors import RcilabError
+from rcilab.errors import PlanningError, RcilabError
 from rcilab.notebook.at_once import hear_at_once
 from rcilab.notebook.heart import Heart
 from rcilab.notebook.lean import lean
@@ -212,7 +212,10 @@ class RunPanel(Part):
             self.state.look_at(None)
             write(self._outcome, "")
             self._running = plan.motion.duration
-            self._robot.execute(plan)
+            try:
+                self._robot.execute(plan, self.state.pace)
+            except PlanningError as error:
+                write(self._outcome, problem(self.text.say(tell_refusal(error, self.state.model, self.state.status))))
 
     def _forget_question(self) -> None:
         write(self._question, "")

@@ -114,11 +114,11 @@ class SessionRobot:
         """Clears the controller's faults."""
         self._do("recover", self._session.recover)
 
-    def execute(self, plan: Plan) -> None:
+    def execute(self, plan: Plan, pace: float = 1.0) -> None:
         """Streams a checked motion in a thread of the kernel."""
         certificate = plan.report.require().certificate
         go, self._way = self._session.execute, None
-        self._do("execute", lambda: go(plan.motion, certificate, mode=plan.mode))
+        self._do("execute", lambda: go(plan.motion, certificate, mode=plan.mode, pace=pace))
 
     def set_control(self, control: ControlSettings) -> None:
         """Tells the controller parameters of the modes."""

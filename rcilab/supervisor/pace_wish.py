@@ -21,7 +21,6 @@ class PaceWish:
 
     def __init__(self) -> None:
         self._wish: float | None = None
-        self._was_running = False
 
     def choose(self, pace: float, status: SupervisorStatus | None) -> None:
         """Wants a pace for the motion under way; one that is held keeps waiting."""
@@ -36,26 +35,21 @@ class PaceWish:
         """Wants a motion that is held to go on at a pace."""
         self._wish = pace
 
-    def due(self, status: SupervisorStatus, standing: float, *, is_under_way: bool) -> float | None:
+    def due(self, status: SupervisorStatus, *, is_under_way: bool) -> float | None:
         """Returns the pace that the robot is to be asked for now, if any; to be called several times a second.
 
         Args:
             status: How the robot stands.
-            standing: The pace that a motion gets when it begins, 0 to 1.
             is_under_way: Whether the last change has not been taken yet; what is wanted meanwhile waits.
         """
-        running, before = is_running(status), self._was_running
-        self._was_running = running
-        if running and not before and self._wish is None and standing < 1.0:
-            self._wish = standing
         if is_under_way:
             return None
         wish, self._wish = self._wish, None
-        return None if wish is None or not running or abs(wish - status.pace) < _SAME_PACE else wish
+        return None if wish is None or not is_running(status) or abs(wish - status.pace) < _SAME_PACE else wish
 
     def forget(self) -> None:
         """Wants nothing any more: another robot comes."""
-        self._wish, self._was_running = None, False
+        self._wish = None
 
 
 def is_running(status: SupervisorStatus | None) -> bool:

@@ -9,6 +9,7 @@ import traceback
 from typing import TYPE_CHECKING, Any
 
 from rcilab.clock import CYCLE_TIME
+from rcilab.views.lasting_tab import LastingTab
 from rcilab.workbench.learn.state import exhibited
 from rcilab.workbench.live import LiveChannel
 from rcilab.workbench.page import dress
@@ -102,8 +103,7 @@ class Presenter:
         self._marks = ProgramMarks(server)
         self._text = Text(store.state.language, store.state.units)
         self._panels: list[Panel] = []
-        self._containers: list[Any] = []
-        self._window: Any = None  # Of the timeline.
+        self._tabs: list[LastingTab] = []  # Of the main panel, then that of the timeline's window.
         self._built: tuple[object, ...] | None = None
         self._theme = ""
         self._shown: tuple[object, ...] = ()
@@ -179,31 +179,32 @@ class Presenter:
     def _build(self, state: UiState) -> None:
         """Makes the panels anew: another language, unit or theme has other words, another arm other joints."""
         gui: Any = self._server.gui  # Icons are plain strings here, which viser's types do not allow.
-        for container in self._containers:
-            container.remove()
+        if not self._tabs:
+            self._lay_out(gui)
         self._text = Text(state.language, state.units)
         self._built = _looks(state)
         gui.set_panel_label(self._text("panel.main"))
-        tabs = gui.add_tab_group()
         self._panels = []
-        for label, icon, *kinds in _TABS:
-            with tabs.add_tab(self._text(label), icon):
+        for tab, (label, _, *kinds) in zip(self._tabs, _TABS, strict=False):
+            with tab.filled_anew(self._text(label)):
                 for kind in kinds:
                     panel = kind(self._text, self._ask)
                     panel.build(gui, state)
                     self._panels.append(panel)
         self._timeline = TimelinePanel(self._text, self._ask)
-        if self._window is None:  # It stays: a new one would lose its width, and where somebody has put it.
-            self._window = gui.add_panel()
-            self._window.dock_left()
-            self._window.set_width(_TIMELINE_WIDTH)
-            gui.main_panel.dock_right()
-            gui.main_panel.set_width(_MAIN_WIDTH)
-        timeline = self._window.add_tab(self._text("panel.timeline"), "timeline")
-        with timeline:
+        with self._tabs[-1].filled_anew(self._text("panel.timeline")):
             self._timeline.build(gui, state)
         self._panels.append(self._timeline)
-        self._containers = [tabs, timeline]
+
+    def _lay_out(self, gui: Any) -> None:
+        """Makes the places that panels fill; they stay as people have arranged them."""
+        group, window = gui.add_tab_group(), gui.add_panel()
+        window.dock_left()
+        window.set_width(_TIMELINE_WIDTH)
+        gui.main_panel.dock_right()
+        gui.main_panel.set_width(_MAIN_WIDTH)
+        self._tabs = [LastingTab(group.add_tab, icon) for _, icon, *_ in _TABS]
+        self._tabs.append(LastingTab(window.add_tab, "timeline"))
 
     def _run(self) -> None:
         while not self._ending.is_set():

@@ -88,6 +88,8 @@ class Recording:
     """How far the arm was from its plan, once it stands still."""
     file: str = ""
     """Where it is on disk; "" where it is not."""
+    is_left_alone: bool = False
+    """Whether it was stopped because no page answered."""
     moment: float | None = None
     """When what it is about happened, [s]: the fault of an exhibit; None for a motion like any other."""
 

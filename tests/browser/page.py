@@ -121,8 +121,9 @@ class BenchPage:
         return self.rows().locator(".mantine-TextInput-root input").nth(joint - 1)
 
     def pose_field(self, name: str):
-        place = ("x", "roll", "y", "pitch", "z", "yaw").index(name)
-        return self.tab.locator("div:has(> div > .rl-pairs)").locator(".mantine-TextInput-root input").nth(place)
+        place = ("x", "y", "z", "roll", "pitch", "yaw").index(name)
+        fields = self.tab.locator("div:has(> div > .rl-trios):visible").first  # Of the tab that is open.
+        return fields.locator(".mantine-TextInput-root input").nth(place)
 
     def alerts(self) -> list[str]:
         return self.tab.locator(".rl-problem").all_inner_texts()

@@ -47,14 +47,17 @@ def test_numbers_typed_without_any_pause_between_fields_all_count(page):
     page.pose_field("x").click()
     page.tab.keyboard.press("ControlOrMeta+a")
     page.tab.keyboard.type("412")
-    for number in ("175", "23"):  # Roll, then y: viser alone would hear of "4" and of nothing typed into roll.
+    for number in ("23", "500", "175"):  # viser alone would hear of "4" and of nothing typed into y.
         page.tab.keyboard.press("Tab")
         page.tab.keyboard.type(number)
     page.wait(
-        lambda: np.allclose([*page.state.goal.target.position[:2], page.state.goal.target.rpy[0]],
-                            [0.412, 0.023, np.radians(175.0)], atol=1e-9),
-        lambda: f"412, 175, 23 to be taken: {page.state.goal.target}",
-    )  # fmt: skip
+        lambda: np.allclose(
+            [*page.state.goal.target.position, page.state.goal.target.rpy[0]],
+            [0.412, 0.023, 0.5, np.radians(175.0)],
+            atol=1e-9,
+        ),
+        lambda: f"412, 23, 500, 175 to be taken: {page.state.goal.target}",
+    )
     assert page.pose_field("x").input_value() in ("412", "412.00")
 
 

@@ -64,6 +64,33 @@ def test_the_second_page_watches_asks_for_the_controls_and_is_given_them(page, c
     page.wait(lambda: page.state.lease.pages == (page.state.lease.holder,), "the controls back with the first page")
 
 
+def test_a_blind_click_on_a_tab_right_after_a_change_counts_and_nothing_moves(page):
+    page.open_tab("Settings")
+    names = ("Run", "Check", "Target")
+    boxes = {name: page.tab.get_by_role("tab", name=name).bounding_box() for name in names}
+    scene = page.tab.locator("canvas").first.bounding_box()
+    for name, label, option in zip(
+        names, ("Angles", "Theme", "Angles"), ("radians (rad)", "dark", "degrees (deg)"), strict=True
+    ):
+        page.open_tab("Settings")
+        page.tab.get_by_label(label, exact=True).or_(
+            page.tab.get_by_role("textbox", name=label, exact=True)
+        ).first.click()
+        page.tab.get_by_role("option", name=option, exact=True).click()
+        page.tab.mouse.click(boxes[name]["x"] + boxes[name]["width"] / 2, boxes[name]["y"] + boxes[name]["height"] / 2)
+        page.tab.wait_for_timeout(300)
+        page.wait(lambda name=name: is_chosen(page, name), f"{name} to be open")
+    page.wait(lambda: page.state.units.angle == "deg" and page.state.theme == "dark", "all changes")
+    page.tab.wait_for_timeout(500)
+    assert is_chosen(page, "Target")
+    assert page.tab.locator("canvas").first.bounding_box() == scene
+    page.bench.conductor.ask(requests.SetView(name="theme", value="light"))
+
+
+def is_chosen(page: BenchPage, name: str) -> bool:
+    return page.tab.get_by_role("tab", name=name).get_attribute("aria-selected") == "true"
+
+
 def test_units_change_everywhere_and_a_typed_number_keeps_its_sign(page):
     page.open_tab("Settings")
     change(page, "Angles", "radians (rad)", lambda: page.state.units.angle == "rad")

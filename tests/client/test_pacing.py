@@ -14,6 +14,21 @@ from rcilab.motion import plan_joint
 from tests.waiting import wait_for
 
 
+def test_a_motion_of_a_session_runs_slowly_from_its_first_row_on():
+    model = rcilab.load_model("xMate3")
+    motion = plan_joint(model, model.home, model.home + np.array([0.2, 0.1, 0.0, 0.0, 0.0, 0.2]), speed=0.5)
+    with rcilab.simulate(model) as robot:
+        robot.power_on()
+        with pytest.raises(InvalidValueError, match="pace"):
+            robot.execute(motion, pace=0.05)
+        run = robot.execute(motion, pace=0.25)
+    assert run.paced
+    assert run.plan.duration == pytest.approx(motion.duration / 0.25, abs=CYCLE_TIME)
+    assert np.abs(run.plan.dq).max() < 0.26 * np.abs(motion.dq).max()
+    assert np.nanmax(np.abs(run.error)) < 1e-9
+    assert run.q[-1] == pytest.approx(motion.goal, abs=1e-9)
+
+
 def test_a_motion_of_a_session_is_held_and_gone_on_with():
     model = rcilab.load_model("xMate3")
     with rcilab.simulate(model) as robot:

@@ -182,7 +182,7 @@ class Real:
     def status(self) -> Any:
         return self._status
 
-    def execute(self, plan: Any) -> None:
+    def execute(self, plan: Any, pace: float = 1.0) -> None:
         self.executed.append(plan)
 
     def set_pace(self, pace: float) -> None:

@@ -13,8 +13,8 @@ MOVING = SupervisorStatus(phase="moving", code="moving", motion_duration=3.0, pa
 HELD = replace(MOVING, code="moving.held", pace=0.0)
 
 
-def due(wish: PaceWish, status: SupervisorStatus, standing: float = 1.0, *, is_under_way: bool = False) -> float | None:
-    return wish.due(status, standing, is_under_way=is_under_way)
+def due(wish: PaceWish, status: SupervisorStatus, *, is_under_way: bool = False) -> float | None:
+    return wish.due(status, is_under_way=is_under_way)
 
 
 def test_of_many_wishes_only_the_newest_is_handed_over_and_only_once() -> None:
@@ -26,14 +26,13 @@ def test_of_many_wishes_only_the_newest_is_handed_over_and_only_once() -> None:
     assert due(wish, MOVING) is None
 
 
-def test_a_motion_begins_at_the_pace_that_was_chosen_before_it() -> None:
+def test_what_is_chosen_while_nothing_moves_is_no_wish_of_the_next_motion() -> None:
     wish = PaceWish()
     wish.choose(0.4, IDLE)
-    assert due(wish, IDLE, 0.4) is None
-    assert due(wish, MOVING, 0.4) == 0.4
-    assert due(wish, replace(MOVING, pace=0.4), 0.4) is None
-    assert due(wish, IDLE, 0.4) is None
-    assert due(wish, MOVING, 0.4) == 0.4, "the next motion too"
+    assert due(wish, IDLE) is None
+    assert due(wish, MOVING) is None, "it begins at the pace it is executed with"
+    wish.choose(0.4, MOVING)
+    assert due(wish, replace(MOVING, pace=0.4)) is None
 
 
 def test_a_held_motion_keeps_waiting_while_the_pace_is_chosen() -> None:
@@ -41,9 +40,9 @@ def test_a_held_motion_keeps_waiting_while_the_pace_is_chosen() -> None:
     wish.hold()
     assert due(wish, MOVING) == 0.0
     wish.choose(0.5, HELD)
-    assert due(wish, HELD, 0.5) is None
+    assert due(wish, HELD) is None
     wish.go_on(0.5)
-    assert due(wish, HELD, 0.5) == 0.5
+    assert due(wish, HELD) == 0.5
 
 
 @pytest.mark.parametrize("status", [IDLE, replace(MOVING, motion_duration=None)])

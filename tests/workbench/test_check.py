@@ -230,7 +230,7 @@ def test_what_only_allows_for_rounding_is_0_and_the_verdict_counts_conditions_as
     rest = next(card for card in cards.split('<div class="rl-card') if "Starts at the arm" in card)
     assert "0 / 0°" in rest
     assert "%" not in rest.partition("rl-meter")[0]
-    headline = CheckPanel(Text("en"), lambda request: None)._headline(bench.plan, None)
+    headline = CheckPanel(Text("en"), lambda request: None)._headline(bench.plan, None, None)
     assert f"Broken conditions: 1 (occurrences: {len(report.violations)})." in headline
 
 

@@ -159,37 +159,22 @@
   const size = () => send({ kind: "size", height: window.innerHeight });
   window.addEventListener("resize", size);
 
-  // Another language or a reload builds the tabs anew; the one that was open is opened again.
-  let first = null, chosen = Number(recall("tab")) || 0, count = 0, pressed = -Infinity;
+  // A page that is loaded anew opens the tab that was open.
+  let shown = null;
   const keepTab = () => {
     const lists = [...document.querySelectorAll('[role="tablist"]')];
     const list = lists.sort((a, b) => b.children.length - a.children.length)[0];
     const found = list ? [...list.querySelectorAll('[role="tab"]')] : [];
-    if (found.length >= 4) document.documentElement.dataset.rlReady = "";
-    if (found.length < 4 || found.length < count) return;
-    if (found[0] !== first && chosen > 0) {
-      if (found.length <= chosen) return;  // They come one by one.
+    const before = Number(recall("tab")) || 0;
+    if (found.length < 4 || (shown === null && found.length <= before)) return;  // They come one by one.
+    document.documentElement.dataset.rlReady = "";
+    const open = Math.max(0, found.findIndex((tab) => tab.getAttribute("aria-selected") === "true"));
+    if (shown === null && open !== before) {
       // viser's tabs hear keys and fingers, not click().
-      found[chosen].dispatchEvent(new KeyboardEvent("keydown", { key: "Enter", bubbles: true }));
-    } else {
-      const open = Math.max(0, found.findIndex((tab) => tab.getAttribute("aria-selected") === "true"));
-      // A busy page shows a tab long after it was pressed.
-      if (open !== chosen && performance.now() - pressed > 3000) keep("tab", chosen = open);
-    }
-    first = found[0];
-    count = found.length;
+      found[before].dispatchEvent(new KeyboardEvent("keydown", { key: "Enter", bubbles: true }));
+      shown = before;
+    } else if (open !== shown) keep("tab", shown = open);
   };
-
-  // What somebody opens while the tabs are built anew holds: on the old ones too, and before the new ones are all there.
-  const openTab = (event) => {
-    const tab = event.isTrusted && event.target.closest ? event.target.closest('[role="tab"]') : null;
-    if (!tab || (event.type === "keydown" && event.key !== "Enter" && event.key !== " ")) return;
-    const found = [...tab.closest('[role="tablist"]').querySelectorAll('[role="tab"]')];
-    if (found.length < 4) return;
-    pressed = performance.now();
-    keep("tab", chosen = found.indexOf(tab));
-  };
-  for (const kind of ["pointerdown", "keydown"]) document.addEventListener(kind, openTab, true);
 
   // The time cursor: one line in every plot whose x axis is the motion's time; a click there moves it.
   const follow = () => {

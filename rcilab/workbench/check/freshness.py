@@ -11,6 +11,15 @@ if TYPE_CHECKING:
     from rcilab.workbench.store import UiState
 
 
+def beside_program(state: UiState) -> Message | None:
+    """Returns that this plan is not the program's, which could not be planned; None where nobody would think so."""
+    plan, program = state.plan, state.program
+    fails = program.planned is None and program.tone == "bad" and program.answer is not None
+    if plan is None or plan.program is not None or not fails:
+        return None
+    return message("plan.not_program", answer=program.answer)
+
+
 def outdated(state: UiState) -> Message | None:
     """Returns why the plan no longer holds, or None: its program, tool, load or safety box has changed."""
     plan, program = state.plan, state.program

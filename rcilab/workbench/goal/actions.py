@@ -190,13 +190,14 @@ class GoalActions:
             self._due = time.monotonic() + SETTLED
             self._store.update(plan=None, no_plan=message("plan.soon"), recording=None, place=0.0, playing=False)
             return
-        self._make(state, frozen(status.q_c))
+        self._make(state, frozen(status.q_c), is_asked=request is not None)
 
-    def _make(self, state: UiState, start: JointVector) -> None:
+    def _make(self, state: UiState, start: JointVector, *, is_asked: bool) -> None:
         box = state.setup.wanted.box
         made = make_plan(state.model, start, state.goal.q, state.speed, state.law, box, state.way, state.via)
         self._planned = time.monotonic()
-        if state.plan is not None and state.plan.program is not None and not is_done(state.plan, start):
+        is_program = state.plan is not None and state.plan.program is not None
+        if is_program and not is_asked and state.plan is not None and not is_done(state.plan, start):
             self._store.say("warn", message("plan.replaced"))
         if isinstance(made, Plan):
             made = replace(made, short=state.goal.reach.short)

@@ -7,7 +7,7 @@ import time
 from typing import TYPE_CHECKING, Any
 
 from rcilab.workbench import requests
-from rcilab.workbench.check.freshness import outdated
+from rcilab.workbench.check.freshness import beside_program, outdated
 from rcilab.workbench.panels.check_rows import count_unheeded, rows_html
 from rcilab.workbench.run.readiness import is_moving
 from rcilab.workbench.text import Message, Text
@@ -80,7 +80,8 @@ class CheckPanel:
         self._explain.disabled = plan is None or busy
         if self._tools.visible is (plan is None):
             self._tools.visible = plan is not None
-        wanted = (plan, changed, check.answer, check.explained, check.row, state.no_plan)
+        aside = beside_program(state)
+        wanted = (plan, changed, aside, check.answer, check.explained, check.row, state.no_plan)
         if wanted == self._drawn:
             return
         self._drawn = wanted
@@ -90,11 +91,11 @@ class CheckPanel:
             self._answer.show("")
             self._table.show("")
             return
-        self._verdict.show(self._headline(plan, changed))
+        self._verdict.show(self._headline(plan, changed, aside))
         self._answer.show(self._answers(state, plan))
         self._table.show(rows_html(plan.report, plan.model, check.row, self._text))
 
-    def _headline(self, plan: Plan, changed: Message | None) -> str:
+    def _headline(self, plan: Plan, changed: Message | None, aside: Message | None) -> str:
         text, report = self._text, plan.report
         unheeded = count_unheeded(report)
         if changed is not None:
@@ -107,6 +108,8 @@ class CheckPanel:
             headline = ("bad", "", "check.failed", said)
         tone, sign, word, rest = headline
         note = text("check.note") if plan.complete else text("check.incomplete")
+        if aside is not None:
+            tone, rest = "warn" if report.ok else tone, f"{rest} {text.say(aside)}"
         return (
             f'<p class="rl-verdict rl-{tone} rl-big"><b>{sign}{esc(text(word))}</b> {esc(rest)}</p>'
             f'<p class="rl-note">{esc(note)}</p>'

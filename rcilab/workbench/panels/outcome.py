@@ -47,4 +47,6 @@ def _outcome(recording: Recording, text: Text) -> tuple[str, str, str]:
         return "bad", text("record.faulted", faults=faults), facts
     if not run.is_complete:
         return "warn", text("record.cut"), facts
-    return ("warn", text("record.stopped"), facts) if run.stopped else ("good", text("record.arrived"), facts)
+    if run.stopped:
+        return "warn", text("record.left_alone" if recording.is_left_alone else "record.stopped"), facts
+    return "good", text("record.arrived"), facts

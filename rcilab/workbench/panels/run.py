@@ -91,13 +91,14 @@ class RunPanel:
         self._agree.visible = self._cancel.visible = question is not None
         unsaid = None if reason == outdated(state) else reason
         self._reason.show("" if unsaid is None else f'<p class="rl-note rl-why">{esc(text.say(unsaid))}</p>')
-        self._again.visible, self._back.visible = may_plan_again(reason), may_go_back(reason)
+        is_program = state.plan is not None and state.plan.program is not None
+        self._again.visible = is_program and (may_plan_again(reason) or outdated(state) is not None)
+        self._back.visible = may_go_back(reason)
         self._pause.visible, self._resume.visible = status.code == "moving", status.code == "moving.held"
         self._pause.disabled = status.motion_place is None
         self._pace.show(round(100.0 * state.drive.pace, 1))
         self._way.show(way_html(state, status, text))
         self._outcome.show("" if moving else outcome_html(state, text))
-        is_program = state.plan is not None and state.plan.program is not None
         self._plan.visible, self._to_target.visible = not is_program, is_program
         self._plan.disabled = self._to_target.disabled = moving
         self._buttons["recover"].disabled = status.phase not in ("fault", "crashed", "lost")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rcilab.words.rounding import fixed
-from rcilab.workbench.check.freshness import outdated
+from rcilab.workbench.check.freshness import beside_program, outdated
 from rcilab.workbench.goal.actions import POSE_FIELDS, QUATERNION
 from rcilab.workbench.panels.check_rows import count_unheeded
 from rcilab.workbench.panels.jog import problems_html, reach_html
@@ -31,9 +31,8 @@ class TargetPanel:
         gui.add_html(f'<p class="rl-note">{esc(text("target.note"))}</p>')
         self._fields: list[NumberField] = []
         with gui.add_folder(text("target.pose")):
-            gui.add_html('<i class="rl-pairs"></i>')
-            for index in (0, 3, 1, 4, 2, 5):
-                name = POSE_FIELDS[index]
+            gui.add_html('<i class="rl-trios"></i>')
+            for index, name in enumerate(POSE_FIELDS):
                 box = gui.add_text(text(f"target.{name}"), "", hint=text("target.type_hint"))
                 self._fields.append(NumberField(box, ask, f"pose.{name}", text.unit("mm" if index < 3 else "deg")))
             box = gui.add_text(text("target.wxyz"), "", hint=text("target.wxyz_hint"))
@@ -85,6 +84,9 @@ def planned_html(state: UiState, text: Text) -> str:
     unheeded = count_unheeded(report) if report.ok else 0
     if unheeded:
         said += " · " + text("target.unheeded", count=unheeded)
+    aside = beside_program(state)
+    if aside is not None:
+        tone, said = "warn" if report.ok else tone, said + ". " + text.say(aside)
     if plan.note is not None:
-        said += " " + text.say(plan.note)
+        said += (" " if report.ok else ". ") + text.say(plan.note)
     return f'<p class="rl-verdict rl-{tone}"><b>{esc(text(word))}</b> {esc(said)}</p>'

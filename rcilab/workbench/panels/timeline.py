@@ -96,7 +96,7 @@ class TimelinePanel:
         kinds = kinds if where is None else text.say(where)
         if state.plan.short is not None and state.recording is None:
             kinds = text("timeline.short")
-        kinds = kinds if outdated(state) is None else f"▲ {text('check.outdated')}"
+        kinds = kinds if state.learn.show is not None or outdated(state) is None else f"▲ {text('check.outdated')}"
         return f'<p class="rl-clock"><b>{t:.3f}</b> / {duration:.3f} s<span>{esc(kinds)}</span></p>'
 
 

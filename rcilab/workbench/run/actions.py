@@ -41,6 +41,7 @@ class RobotActions:
         self._keeper = RunKeeper(store)
         self._recording = False
         self._stopped: str | None = None  # Why the recorded motion did not reach its end.
+        self._is_left_alone = False  # That is because no page answered.
         self._placed = False  # The goal stands where the arm was first seen.
         self._powered = False  # The virtual arm's motors have been switched on once.
         self._power_asked = float("-inf")
@@ -240,7 +241,7 @@ class RobotActions:
             return
         self._arrival = state.plan.short
         self._keeper.begin(state.plan)
-        self._recording, self._stopped = True, None
+        self._recording, self._stopped, self._is_left_alone = True, None, False
         self._tickets.append(("execute", ticket))
         self._store.update(recording=None, last_run=None, playing=False, asked=None)
 
@@ -264,8 +265,8 @@ class RobotActions:
         if isinstance(error, ConnectionLostError) or (isinstance(error, ControlError) and error.faults):
             return "bad", tell_error(error, self._session.status())
         if isinstance(error, ControlError) and what == "execute":
-            left_alone = self._session.status().code == "idle.operator"
-            return "warn", message("notice.operator" if left_alone else "notice.stopped")
+            self._is_left_alone = self._session.status().code == "idle.operator"
+            return "warn", message("notice.operator" if self._is_left_alone else "notice.stopped")
         return "bad", message("notice.refused", what=message(f"drive.{what}"), error=tell_error(error))
 
     def _record(self, status: SupervisorStatus) -> None:
@@ -281,7 +282,7 @@ class RobotActions:
 
     def _end_recording(self) -> None:
         self._recording = False
-        self._keeper.finish(self._stopped, self._paced())
+        self._keeper.finish(self._stopped, self._paced(), is_left_alone=self._is_left_alone)
 
     def _paced(self) -> PacedMotion | None:
         """Returns how the motion under way, or the last one, is run; None as planned."""

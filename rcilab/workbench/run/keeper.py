@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -56,12 +57,13 @@ class RunKeeper:
         if cycles is not None and (before is None or len(cycles) > len(before)):
             self._store.update(recording=as_recording(cycles, self._live.delay, paced))
 
-    def finish(self, stopped: str | None, paced: PacedMotion | None = None) -> None:
+    def finish(self, stopped: str | None, paced: PacedMotion | None = None, *, is_left_alone: bool = False) -> None:
         """Ends the recording; from here on it can be exported.
 
         Args:
             stopped: Why the motion did not reach its end; None: it did.
             paced: How the plan was run, where its pace was changed.
+            is_left_alone: Whether that is because no page answered.
         """
         if self._live is None:
             return
@@ -74,7 +76,7 @@ class RunKeeper:
             self._complain(error)
             run = live.finish(stopped, plan)  # Its file is given up now; the run in memory is whole.
         if run is not None:
-            recording = whole_recording(run, self._file, paced)
+            recording = replace(whole_recording(run, self._file, paced), is_left_alone=is_left_alone)
             self._store.update(recording=recording, last_run=recording)
 
     def _open(self, state: UiState, plan: Plan, setup: Setup) -> RunFile | None:

@@ -131,7 +131,7 @@ class ModeActions:
             (pace, ticket), self._changing = self._changing, None
             self._tell_pace(ticket.error, pace)
         is_under_way = self._changing is not None
-        wish = self._wish.due(status, self._store.state.drive.pace, is_under_way=is_under_way)
+        wish = self._wish.due(status, is_under_way=is_under_way)
         if wish is None:
             return
         supervisor = self._session.supervisor()
