@@ -19,6 +19,7 @@ LAYERS = [  # From the bottom. A part imports from lines below its own, and from
         "clock",
         "faults",
         "language",
+        "spoken",
         "franka_errors",
         "limits",
         "command",

@@ -330,8 +330,9 @@ class Report:
 
     def _repr_html_(self) -> str:
         from rcilab.conformance.html import report_html
+        from rcilab.spoken import language
 
-        return report_html(self)
+        return report_html(self, language())
 
     def _verdict(self) -> str:
         worst = self.worst

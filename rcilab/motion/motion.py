@@ -14,7 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 from rcilab.arrays import Array, JointPath, JointVector, as_number, as_path, as_vector, described, frozen
 from rcilab.clock import CYCLE_TIME
 from rcilab.errors import InvalidValueError
+from rcilab.language import Language
 from rcilab.motion.piecewise import DERIVATIVES, PiecewisePolynomial
+from rcilab.spoken import language
 from rcilab.words.text import Remark
 
 Law: TypeAlias = Literal["jerk_limited", "s_profile", "stop", "samples"]
@@ -22,6 +24,12 @@ Law: TypeAlias = Literal["jerk_limited", "s_profile", "stop", "samples"]
 or through rows that somebody else made."""
 
 LAWS: tuple[Law, ...] = ("jerk_limited", "s_profile", "stop", "samples")
+
+_CARD: dict[Language, tuple[str, str, str]] = {
+    "en": ("Motion, {law}: {duration:.3f} s at speed {speed:g} (angles in °)", "start", "goal"),
+    "zh": ("运动，{law}：{duration:.3f} s，速度 {speed:g}（角度以 ° 计）", "起点", "目标"),
+}
+"""How a motion shows itself in a notebook: its caption, and what its rows are called."""
 
 _ROUNDING = 1e-9
 """A duration that passes a cycle by less than this part of a cycle is that cycle, not the next one."""
@@ -260,11 +268,12 @@ class Motion:
         return f"<Motion {self.law}, {self.n} joints, {self.duration:.3f} s, speed {self.speed:g}>"
 
     def _repr_html_(self) -> str:
+        caption, start, goal = _CARD[language()]
         degrees = (
             f"<tr><th>{name}</th>" + "".join(f"<td>{angle:.1f}</td>" for angle in np.degrees(q)) + "</tr>"
-            for name, q in (("start", self.start), ("goal", self.goal))
+            for name, q in ((start, self.start), (goal, self.goal))
         )
-        title = f"Motion, {self.law}: {self.duration:.3f} s at speed {self.speed:g} (angles in °)"
+        title = caption.format(law=self.law, duration=self.duration, speed=self.speed)
         return f"<table><caption>{title}</caption>{''.join(degrees)}</table>"
 
     def _kept(self, name: str) -> Array:

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from rcilab.conformance.html import report_html
 from rcilab.language import Language
-from rcilab.notebook.spoken import language, shell
-from rcilab.recording.run_html import run_html
+from rcilab.spoken import language
 
 __all__ = ["answer", "language"]
 
@@ -21,15 +19,3 @@ def answer(is_right: bool, fact: str) -> None:
     """
     word = _WORDS[language()][bool(is_right)]
     print(f"{'✓' if is_right else '✗'} {word}: {fact}")
-
-
-def _speak() -> None:
-    """Has reports and runs shown in the language of the lesson."""
-    found, spoken = shell(), language()
-    if found is not None and spoken != "en":
-        html = found.display_formatter.formatters["text/html"]
-        html.for_type_by_name("rcilab.conformance.report", "Report", lambda report: report_html(report, spoken))
-        html.for_type_by_name("rcilab.recording.run", "Run", lambda run: run_html(run, spoken))
-
-
-_speak()  # Every lesson imports this file, and has the same cells in both languages.

@@ -12,8 +12,8 @@ from rcilab.model import RobotModel
 from rcilab.notebook.cells import kernel_cells
 from rcilab.notebook.lean import lean
 from rcilab.notebook.look import close_tree, style_sheet
-from rcilab.notebook.spoken import chosen_language
 from rcilab.notebook.state import LabState, Topic, state_of
+from rcilab.spoken import chosen_language
 from rcilab.words.text import Text
 
 _PACKAGE = "rcilab.notebook"

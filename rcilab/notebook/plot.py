@@ -20,8 +20,8 @@ from rcilab.model import RobotModel, require_model
 from rcilab.motion.motion import Motion, require_motion
 from rcilab.notebook.installed import require_installed
 from rcilab.notebook.palette import JOINT_COLORS
-from rcilab.notebook.spoken import chosen_language
 from rcilab.notebook.writing import writing
+from rcilab.spoken import chosen_language
 from rcilab.views.plots import QUANTITIES, recorded_curves
 from rcilab.words.text import Text
 

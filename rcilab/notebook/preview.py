@@ -18,8 +18,8 @@ from rcilab.errors import UsageError
 from rcilab.model import RobotModel, require_model
 from rcilab.notebook.installed import require_installed
 from rcilab.notebook.place import find_place
-from rcilab.notebook.spoken import chosen_language
 from rcilab.robots.upright import upright_joints
+from rcilab.spoken import chosen_language
 from rcilab.views.arm_view import ArmView
 from rcilab.words.text import Text
 

@@ -9,7 +9,7 @@ from rcilab.closing import Closing
 from rcilab.errors import UsageError
 from rcilab.model import RobotModel, require_model
 from rcilab.motion.motion import Motion, require_motion
-from rcilab.notebook.spoken import chosen_language
+from rcilab.spoken import chosen_language
 from rcilab.views.arm_view import ArmView
 from rcilab.views.gate import Gate
 from rcilab.views.guarded_server import GuardedServer, listen

@@ -14,7 +14,7 @@ from rcilab.arrays import JointVector, as_vector, frozen
 from rcilab.errors import InvalidValueError, KinematicsError
 from rcilab.model import RobotModel, require_model
 from rcilab.notebook.slider_echo import SliderEcho
-from rcilab.notebook.spoken import chosen_language
+from rcilab.spoken import chosen_language
 from rcilab.words.rounding import fixed
 from rcilab.words.text import Text
 

@@ -305,8 +305,9 @@ class Run:
 
     def _repr_html_(self) -> str:
         from rcilab.recording.run_html import run_html
+        from rcilab.spoken import language
 
-        return run_html(self)
+        return run_html(self, language())
 
 
 def find_delay(q_c: JointPath, command: JointPath) -> int:

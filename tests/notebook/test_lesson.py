@@ -7,8 +7,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from rcilab.conformance import check
 from rcilab.cycle_file import cycle_dtype
-from rcilab.notebook import lesson
+from rcilab.model import load_model
+from rcilab.motion import plan_joint
 from rcilab.notebook.lesson import answer, language
 from rcilab.recording.run import build_run
 
@@ -45,17 +47,17 @@ def test_an_answer_is_told_in_the_readers_language(monkeypatch, capsys) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "word"), [("01_first_motion.zh.ipynb", "成功率"), ("01_first_motion.ipynb", "success rate")]
+    ("name", "words"),
+    [
+        ("mine.zh.ipynb", ("成功率", "条件", "目标")),
+        ("mine.ipynb", ("success rate", "condition", "goal")),
+    ],
 )
-def test_a_run_is_shown_in_the_readers_language(monkeypatch, name: str, word: str) -> None:
-    from IPython.core.formatters import HTMLFormatter
-
-    formatter = HTMLFormatter()
-    shell = SimpleNamespace(display_formatter=SimpleNamespace(formatters={"text/html": formatter}), user_ns={})
+def test_what_shows_itself_speaks_as_any_notebook_does(monkeypatch, name: str, words: tuple[str, str, str]) -> None:
+    """Whether or not it is a lesson, and says so to nobody."""
     monkeypatch.setenv(SESSION, name)
-    monkeypatch.setattr(lesson, "shell", lambda: shell)
-    lesson._speak()
+    model = load_model("xMatePro7")
+    motion = plan_joint(model, model.home, model.home + 0.1)
     run = build_run(np.zeros(0, cycle_dtype(7)), plan=None, realtime=False)
-    shown = formatter(run)
-    assert shown is not None
-    assert word in shown
+    for shown, word in zip((run, check(motion, model), motion), words, strict=True):
+        assert word in shown._repr_html_()

@@ -1,4 +1,4 @@
-"""Which language a notebook is read in."""
+"""Which language a notebook is read in; whatever shows itself in one asks here."""
 
 from __future__ import annotations
 
@@ -38,11 +38,8 @@ def chosen_language(asked: str | None, neighbour: Language | None = None) -> Lan
 
 def shell() -> Any:
     """Returns IPython's shell; None outside of it."""
-    if "IPython" not in sys.modules:
-        return None
-    from IPython.core.getipython import get_ipython
-
-    return get_ipython()
+    module = sys.modules.get("IPython.core.getipython")  # Where there is a shell it has been imported.
+    return None if module is None else module.get_ipython()
 
 
 def _name_in_code() -> str:
