@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from rcilab.recording.export import export_run
+from rcilab.workbench import requests
 from rcilab.workbench.run.keeper import whole_recording
 from tests.recording.runs import some_ideal_run, some_long_run, some_run
 
@@ -24,6 +25,7 @@ def plot_numbers(page) -> list[list[str]]:
 
 
 def test_a_run_is_shown_against_its_plan_and_downloaded(page, tmp_path):
+    page.bench.conductor.ask(requests.SetView(name="plot_joint", value=0))
     page.plan_to(1, 12.0 if page.status.q_c[0] <= 0 else -12.0)
     page.open_tab("Run")
     page.wait(lambda: page.button("Execute").is_enabled(), "Execute to be pressable")
