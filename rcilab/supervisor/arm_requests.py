@@ -102,7 +102,8 @@ class ArmRequests:
             self._require_block()
             self._setup.require_given()
             self._pace.begin(paced, self.model, mode)
-            return self._ask("execute", kind="execute", rows=len(paced.q), duration=paced.duration, mode=mode)
+            duration = paced.duration if paced.changed else motion.duration  # As planned it may end within a cycle.
+            return self._ask("execute", kind="execute", rows=len(paced.q), duration=duration, mode=mode)
 
     def pause(self) -> Ticket:
         """Holds the motion under way, along its way and within all limits; done once that is handed over.
