@@ -167,7 +167,7 @@
     const found = list ? [...list.querySelectorAll('[role="tab"]')] : [];
     const before = Number(recall("tab")) || 0;
     if (found.length < 4 || (shown === null && found.length <= before)) return;  // They come one by one.
-    document.documentElement.dataset.rlReady = "";
+    if (shown === null) document.documentElement.dataset.rlReady = "";
     const open = Math.max(0, found.findIndex((tab) => tab.getAttribute("aria-selected") === "true"));
     if (shown === null && open !== before) {
       // viser's tabs hear keys and fingers, not click().
