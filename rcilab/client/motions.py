@@ -99,14 +99,8 @@ class Motions(RciCommands):
             streamed = PacedStream(paced, mode, self.model, report_progress(paced.as_motion(), progress))
             self._streamed = streamed
             try:
-                return self._runner.run(
-                    streamed.stream,
-                    mode,
-                    self.model,
-                    motion,
-                    filters=[RateLimiter(self.model.limits)] if mode == "torque" else [],
-                    replanned=lambda: streamed.paced.as_motion(),
-                )
+                filters = [RateLimiter(self.model.limits)] if mode == "torque" else []
+                return self._runner.run(streamed.stream, mode, self.model, streamed, filters)
             finally:
                 self._streamed = None
 

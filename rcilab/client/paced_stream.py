@@ -14,6 +14,7 @@ from rcilab.state import Mode
 
 if TYPE_CHECKING:
     from rcilab.model import RobotModel
+    from rcilab.motion import Motion
 
 PACE_LEADS = (100, 300, 1000, 4000)  # Cycles from now on which another pace begins: what planning it may take.
 HANDING_OVER = 30  # Cycles between the rows of now and the first of others.
@@ -40,6 +41,20 @@ class PacedStream:
         self.stream = MotionStream(paced.q, mode, model, on_cycle)
         self._mode: Mode = mode
         self._model = model
+
+    @property
+    def duration(self) -> float:
+        """How long it takes at the pace that it has, [s]; of a motion that is held, until it stands."""
+        return self.paced.duration
+
+    @property
+    def is_paced(self) -> bool:
+        """Whether it is run through in another way than planned."""
+        return self.paced.changed > 0
+
+    def as_motion(self) -> Motion:
+        """Returns what is commanded in all, as a motion."""
+        return self.paced.as_motion()
 
     @property
     def under_way(self) -> UnderWay:

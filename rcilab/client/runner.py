@@ -11,6 +11,7 @@ from rcilab.client.commands import RciCommands
 from rcilab.client.control_loop import SILENCE, Callback, ControlLoop
 from rcilab.client.filters import CommandFilter
 from rcilab.client.link import Link
+from rcilab.client.paced_stream import PacedStream
 from rcilab.client.punctual import punctual
 from rcilab.client.recorder import RECORD_TIME, CycleLog, Recorder
 from rcilab.client.turns import Turns
@@ -71,10 +72,8 @@ class Runner:
         callback: Callback,
         mode: Mode,
         model: RobotModel,
-        plan: Motion | None = None,
-        *,
+        plan: Motion | PacedStream | None = None,
         filters: Sequence[CommandFilter] = (),
-        replanned: Callable[[], Motion] | None = None,
     ) -> Run:
         """Runs the motion that has set out, and returns what became of it.
 
@@ -82,16 +81,15 @@ class Runner:
             callback: Gives the command for each state.
             mode: How the arm is commanded.
             model: The arm.
-            plan: What is to be commanded; None where only the callback knows.
+            plan: What is to be commanded, and may change on the way; None where only the callback knows.
             filters: What every command passes before it is sent.
-            replanned: Asked at the end what really was, where that may change on the way; else it was the plan.
 
         Raises:
             ControlError: The controller stopped it.
             ConnectionLostError: The controller is gone.
             Exception: Whatever the callback raised; the arm was brought to rest.
         """
-        time_needed = RECORD_TIME if plan is None else plan.duration
+        time_needed = RECORD_TIME + (0.0 if plan is None else plan.duration)  # It may be held on its way.
         recorder = Recorder(model.n, math.ceil(time_needed / CYCLE_TIME) + _SPARE_CYCLES)
         loop = ControlLoop(
             self._link,
@@ -107,11 +105,10 @@ class Runner:
         setup = Setup(target=self._link.name, mode=mode, started_ns=time.time_ns())
 
         def tell(stopped: str | None, error: BaseException | None = None) -> Run:
-            commanded = plan if replanned is None else replanned()
             run = build_run(
                 recorder.rows(),
-                plan=commanded,
-                paced=commanded is not plan,
+                plan=plan.as_motion() if isinstance(plan, PacedStream) else plan,
+                paced=isinstance(plan, PacedStream) and plan.is_paced,
                 stopped=stopped,
                 truncated=recorder.truncated,
                 realtime=self._realtime,
