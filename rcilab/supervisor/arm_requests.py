@@ -69,7 +69,7 @@ class ArmRequests:
 
     @property
     def stops(self) -> int:
-        """How often `stop` has been called since `start`. What was wanted before the last one moves nothing any more."""
+        """How often `stop` has been called since `start`; what was wanted before the last one moves nothing."""
         with self._lock:
             return 0 if self._block is None else self._block.words[Word.STOPS_ASKED]
 
