@@ -156,6 +156,17 @@ def test_the_ways_to_reach_a_target_are_listed_nearest_first_and_lead_where_they
     assert np.allclose(meant, away, atol=0.51)  # Shown in whole degrees.
 
 
+def test_a_page_that_is_known_gets_its_camera_back_and_no_other_does():
+    brought: list[int] = []
+    nothing = {name: lambda *_: None for name in ("stop", "here", "seek", "size", "take", "answer")}
+    live = LiveChannel(Heard(**nothing, home=brought.append))
+    page = live.hear(json.dumps({"kind": "hello", "page": 3, "key": live.introduce(3)}))
+    live.hear('{"kind": "home"}')
+    assert brought == []
+    live.hear('{"kind": "home"}', page)
+    assert brought == [3]
+
+
 def test_a_page_says_which_branch_is_under_the_mouse():
     heard: list[tuple[int, int]] = []
     live = LiveChannel(
