@@ -19,6 +19,7 @@ from rcilab.client.filters import CommandFilter
 from rcilab.client.identify import dh_lengths, identify_robot
 from rcilab.client.link import Link
 from rcilab.client.motions import Motions
+from rcilab.client.open_sessions import enlist
 from rcilab.client.opening import await_first_state, require_arm_there, require_timeout
 from rcilab.client.punctual import punctual
 from rcilab.client.recorder import RECORD_TIME, CycleLog, Recorder
@@ -147,6 +148,7 @@ class RobotSession(Motions, Closing):
         self._closed = False
         self._busy = threading.RLock()  # Held by the thread that talks to the controller.
         self._mover: int | None = None  # The thread that runs a motion.
+        enlist(self)
 
     @property
     def model(self) -> RobotModel:
@@ -284,13 +286,16 @@ class RobotSession(Motions, Closing):
             super().set_load(load.mass, load.center_of_mass, load.inertia)
             self._model = model
 
-    def stop(self) -> None:
+    def stop(self, reason: str = "on request") -> None:
         """Brings a running motion to rest within the limits; `execute` or `control` then returns its run.
 
         May be called from another thread, or from a callback. Does nothing when nothing runs, or is about to.
+
+        Args:
+            reason: What the run says in `stopped`; the first one counts.
         """
         if self._moving or self._leaving:
-            self._stop_reason = "on request"
+            self._stop_reason = self._stop_reason or reason
 
     def recover(self) -> None:
         """Clears the controller's faults and returns once they are gone.
