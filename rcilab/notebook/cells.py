@@ -52,6 +52,13 @@ class Cells:
         """Whether a cell runs at this moment."""
         return self._running.is_set()
 
+    @property
+    def is_calling(self) -> bool:
+        """Whether it is code that calls and goes on afterwards: a cell, or a program outside of a notebook."""
+        if self._shell is None:
+            return True
+        return self.is_running and threading.current_thread() is threading.main_thread()
+
     def adopt(self, thing: Owned) -> None:
         """Ties something to the cell that is running now; what a press makes between two cells ends with its maker."""
         cell = self._current()
