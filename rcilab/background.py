@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from concurrent.futures import Future
+from concurrent.futures import Future, wait
 from typing import Generic, TypeAlias, TypeVar
 
 from rcilab.errors import RcilabError
@@ -36,6 +36,12 @@ class Background(Generic[About, Result]):
     def is_done(self) -> bool:
         """Whether there is something to take."""
         return self._job is not None and self._job.outcome.done()
+
+    def wait(self, timeout: float) -> None:
+        """Returns once there is something to take, at the latest after a while, [s]; at once where there is no job."""
+        job = self._job
+        if job is not None:
+            wait([job.outcome], timeout)
 
     def start(self, about: About, run: Callable[[Tell], Result]) -> None:
         """Begins; what was being worked out is dropped.

@@ -15,6 +15,7 @@ from rcilab.client.control_loop import SILENCE
 from rcilab.client.identify import dh_lengths, identify_robot
 from rcilab.client.link import Link
 from rcilab.client.motions import Motions
+from rcilab.client.open_sessions import enlist
 from rcilab.client.opening import await_first_state, require_arm_there, require_timeout
 from rcilab.client.recovery import recover
 from rcilab.client.runner import Ear, Runner
@@ -123,6 +124,7 @@ class RobotSession(Motions, Closing):
         self._model = model
         self._safety_box: SafetyBox | None = None
         self._world = world
+        enlist(self)
 
     @property
     def model(self) -> RobotModel:
@@ -249,12 +251,15 @@ class RobotSession(Motions, Closing):
             super().set_load(load.mass, load.center_of_mass, load.inertia)
             self._model = model
 
-    def stop(self) -> None:
+    def stop(self, reason: str = "on request") -> None:
         """Brings a running motion to rest within the limits; `execute` or `control` then returns its run.
 
         May be called from another thread, or from a callback. Does nothing when nothing runs, or is about to.
+
+        Args:
+            reason: What the run says in `stopped`; the first one counts.
         """
-        self._turns.stop()
+        self._turns.stop(reason)
 
     def recover(self) -> None:
         """Clears the controller's faults and returns once they are gone.

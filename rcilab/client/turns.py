@@ -29,7 +29,7 @@ class Turns:
         self._busy = threading.RLock()  # Held by the thread whose turn it is.
         self._mover: int | None = None  # The thread that runs a motion.
         self._can_stop = False  # A motion is being checked, or runs.
-        self._shall_stop = False
+        self._reason: str | None = None  # Why the motion is to be brought to rest.
 
     @property
     def is_moving(self) -> bool:
@@ -40,7 +40,7 @@ class Turns:
         """Returns why the motion that runs is to be brought to rest; asked by its control loop in every cycle."""
         if self.is_closing:
             return _CLOSED
-        return "on request" if self._shall_stop else None
+        return self._reason
 
     @contextmanager
     def take(self, what: str) -> Iterator[None]:
@@ -65,7 +65,7 @@ class Turns:
     def set_out(self, what: str) -> Iterator[None]:
         """Has the connection for a motion; a stop while it is still being checked counts. Raises as `take` does."""
         with self.take(what):
-            self._shall_stop, self._can_stop = False, True
+            self._reason, self._can_stop = None, True
             try:
                 yield
             finally:
@@ -82,10 +82,14 @@ class Turns:
             if self.is_closing:
                 self._disconnect()
 
-    def stop(self) -> None:
-        """Has the motion brought to rest that runs or is about to; does nothing when there is none."""
+    def stop(self, reason: str) -> None:
+        """Has the motion brought to rest that runs or is about to; does nothing when there is none.
+
+        Args:
+            reason: What its run says; the first one counts.
+        """
         if self._can_stop:
-            self._shall_stop = True
+            self._reason = self._reason or reason
 
     def close(self) -> None:
         """Ends the connection after the turn that somebody has; a callback's own motion does so when it has ended."""

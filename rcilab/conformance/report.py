@@ -269,7 +269,13 @@ class Report:
         rest = f" (and {more} more)" if more else ""
         raise ConformanceError(f"{self.violations[0]}{rest}", self.violations)
 
-    def slow_down(self, *, recommended: bool = False, at_most: float | None = None) -> SlowDown:
+    def slow_down(
+        self,
+        *,
+        recommended: bool = False,
+        at_most: float | None = None,
+        progress: Callable[[float], None] | None = None,
+    ) -> SlowDown:
         """Returns the least slow-down of the motion that passes, or why none does.
 
         The curve stays the same and runs slower as a whole. The factor is found to 0.1 % and checked: the motion comes
@@ -281,13 +287,15 @@ class Report:
             recommended: Whether to meet the recommended conditions too, those that some slow-down meets.
             at_most: Largest factor to try, 1 or more; None is 20, or less for a motion that would then last more than
                 ten minutes.
+            progress: Called after every try with the part of the work that is done, 0 to 1, as far as that can be
+                known; what it raises ends the search.
 
         Raises:
             InvalidValueError: `at_most` is no number of at least 1.
         """
         from rcilab.conformance.slow_down import find_slow_down
 
-        return find_slow_down(self, recommended=recommended, at_most=at_most)
+        return find_slow_down(self, recommended=recommended, at_most=at_most, progress=progress)
 
     @property
     def broken_conditions(self) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import sqrt
 from typing import Literal, TypeAlias
@@ -25,6 +26,7 @@ LONGEST = 600.0  # [s]
 PRECISION = 1e-3
 """Part by which the factor may be larger than the least one."""
 
+_USUAL_TRIES = 6  # A choice: searches that were looked at took 2 to 13.
 _LOOK_BACK = 3  # [cycles] How long a third difference sees the start.
 _JUMP = 4.0
 """Times more than a smooth motion would have left at the largest factor: then it jumps. A choice."""
@@ -79,28 +81,37 @@ class SlowDown:
         return f"<SlowDown: {self}>"
 
 
-def find_slow_down(report: Report, *, recommended: bool = False, at_most: float | None = None) -> SlowDown:
+def find_slow_down(
+    report: Report,
+    *,
+    recommended: bool = False,
+    at_most: float | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> SlowDown:
     """Returns the least slow-down of a report's motion that passes, or why none does.
 
     Args:
         report: On the motion as it is.
         recommended: Whether to meet the recommended conditions too, those that some slow-down meets.
         at_most: Largest factor to try, 1 or more; None is `AT_MOST`, or what makes the motion last `LONGEST`.
+        progress: Called after every try with the part of the work that is done, 0 to 1; nobody knows how many tries
+            there will be, so it is an estimate. What it raises ends the search.
 
     Raises:
         InvalidValueError: `at_most` is no number of at least 1.
     """
-    return _Search(report, _largest(report.motion, at_most)).run(recommended)
+    return _Search(report, _largest(report.motion, at_most), progress or (lambda part: None)).run(recommended)
 
 
 class _Search:
     """One search, with the report it starts from and the largest factor it may try."""
 
-    def __init__(self, report: Report, at_most: float) -> None:
+    def __init__(self, report: Report, at_most: float, tell: Callable[[float], None]) -> None:
         self._report = report
         self._motion = report.motion
         self._at_most = at_most
         self._nothing = SlowDown(before=report.motion, at_most=at_most)
+        self._tell, self._tries = tell, 0
 
     def run(self, recommended: bool) -> SlowDown:
         """Returns the least slow-down that keeps the necessary conditions, and on demand the recommended ones."""
@@ -148,7 +159,12 @@ class _Search:
 
     def _at(self, factor: float, rows: tuple[Condition, ...]) -> list[ConditionResult]:
         """Returns those of the rows that are broken at a factor."""
-        return _broken(self._report.judge(self._motion.slowed(factor), rows)) if rows else []
+        if not rows:
+            return []
+        found = _broken(self._report.judge(self._motion.slowed(factor), rows))
+        self._tries += 1
+        self._tell(self._tries / (self._tries + _USUAL_TRIES))
+        return found
 
     def _obstacle(self, row: ConditionResult) -> Obstacle:
         """Returns why a row is still broken at the largest factor."""

@@ -44,17 +44,30 @@ class Cells:
             shell.events.register("pre_run_cell", self.begin)
             shell.events.register("post_run_cell", self.end)
             _hear_idle_interrupts(shell, self.halt)
+            if self._current() is not None:  # It has begun before anybody listened.
+                self._running.set()
 
     @property
     def is_running(self) -> bool:
         """Whether a cell runs at this moment."""
         return self._running.is_set()
 
+    @property
+    def is_calling(self) -> bool:
+        """Whether it is code that calls and goes on afterwards: a cell, or a program outside of a notebook."""
+        if self._shell is None:
+            return True
+        return self.is_running and threading.current_thread() is threading.main_thread()
+
     def adopt(self, thing: Owned) -> None:
         """Ties something to the cell that is running now; what a press makes between two cells ends with its maker."""
         cell = self._current()
         if cell is not None:
             self._owned.setdefault(cell, []).append(weakref.ref(thing))
+        self.keep(thing)
+
+    def keep(self, thing: Owned) -> None:
+        """Has something end with the kernel only."""
         self._keep[id(thing)] = thing
 
     def forget(self, thing: Owned) -> None:
@@ -106,6 +119,10 @@ def kernel_cells() -> Cells:
             shell = get_ipython()
         _kernel_cells = Cells(shell)
         atexit.register(_kernel_cells.close)
+        if getattr(shell, "kernel", None) is not None:
+            from rcilab.notebook.page_watch import PageWatch
+
+            _kernel_cells.keep(PageWatch())
     return _kernel_cells
 
 

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import threading
 from functools import partial
 from typing import Any
 
 import ipywidgets
 
-from rcilab.background import Background
 from rcilab.errors import RcilabError
 from rcilab.faults import Fault
 from rcilab.gallery.exhibit import Exhibit
@@ -19,12 +17,11 @@ from rcilab.gallery.table import FAULTS
 from rcilab.notebook.exhibit_plot import draw_exhibit
 from rcilab.notebook.flight_recorder import record_html
 from rcilab.notebook.lean import lean
+from rcilab.notebook.long_work import LongWork
 from rcilab.notebook.look import block, esc, problem, soft, verdict, write
 from rcilab.notebook.part import Part
 from rcilab.supervisor.telling import tell_error
 from rcilab.words.text import Text, message
-
-_LOOK = 0.1  # [s] Between two looks at what is being provoked.
 
 
 class FaultPanel(Part):
@@ -44,37 +41,36 @@ class FaultPanel(Part):
         text = self.text
         self.exhibit: Exhibit | None = None
         """The fault on show; None as long as none was provoked."""
+        self._failed = ""  # Why it could not be provoked.
         self._now, self._told, self._record = block(), block(), block()
         self._set: tuple[Fault, ...] | None = None
         self._arm = PrivateArm()
-        self._work: Background[Fault, Exhibit] = Background("rcilab-gallery")
-        self._ending = threading.Event()
-        self._watcher: threading.Thread | None = None
+        self._work: LongWork[Fault, Exhibit] = LongWork(text, "rcilab-gallery", self._take, self._tell)
         self.fault: Any = lean(
             ipywidgets.Dropdown, description=text("fault.which"), layout={"width": "98%", "max_width": "46em"},
             options=[(f"{text(f'learn.fault.{fault.name}')} · {fault.manual_name}", fault) for fault in Fault],
         )  # fmt: skip
         self.provoke = self._button("fault.provoke", self._provoke, icon="bolt", tooltip=text("fault.provoke_hint"))
-        self.cancel = self._button("learn.cancel", self.halt, icon="times")
+        self.progress, self.cancel = self._work.progress, self._work.cancel
         self.moment = self._button("learn.moment", self._look, icon="crosshairs", tooltip=text("learn.moment_hint"))
-        self.progress = lean(ipywidgets.FloatProgress, min=0.0, max=1.0, layout=ipywidgets.Layout(width="14em"))
         self._buttons = lean(
-            ipywidgets.HBox, [self.provoke, self.moment, self.progress, self.cancel], layout={"align_items": "center"}
+            ipywidgets.HBox,
+            [self.provoke, self.moment, self.progress, self.cancel],
+            layout={"align_items": "center"},
         )
         self.build([self._now, self.fault, self._buttons, self._told, self._record], min_width="360px")
         self.fault.observe(lambda _: self._on_fault(), names="value")
-        self._rest()
+        self._tell()
         self.hear("robot", self._show)
         self.hear("run", lambda: write(self._record, record_html(self.state, self.text)))
 
     def halt(self) -> None:
         """Gives up what is being provoked; the private arm is brought to rest beside."""
-        self._work.cancel()
+        self._work.give_up()
 
     def end(self) -> None:
         """Ends the private controller."""
-        self._end_watch()
-        self._work.cancel()
+        self._work.end()
         self._arm.close()
 
     def _show(self) -> None:
@@ -99,6 +95,7 @@ class FaultPanel(Part):
     def _on_fault(self) -> None:
         if self._shown is None:
             self.state.exhibit(None)
+        self._failed = ""
         self._tell()
 
     def _look(self) -> None:
@@ -106,8 +103,11 @@ class FaultPanel(Part):
         if self._shown is not None:
             self.state.exhibit(exhibition_of(self._shown))
 
-    def _tell(self, said: str = "") -> None:
+    def _tell(self) -> None:
         fault, text, exhibit = self.fault.value, self.text, self._shown
+        said = self._failed
+        if self._work.is_busy:
+            said = verdict("warn", "…", text("learn.provoking", fault=fault.manual_name))
         has_no_elbow = FAULTS[fault].needs_elbow and self.model.n != 7
         self.moment.layout.display = "none" if exhibit is None else None
         if exhibit is not None:
@@ -116,54 +116,22 @@ class FaultPanel(Part):
             note = text("fault.no_elbow", model=self.model.name) if has_no_elbow else text("fault.private")
             told = _card_html(fault, text) + soft(note)
         write(self._told, said + told)
-        self.provoke.disabled = has_no_elbow or self._work.progress is not None
+        self.provoke.disabled = has_no_elbow or self._work.is_busy
 
     def _provoke(self) -> None:
-        self._end_watch()
         fault: Fault = self.fault.value
-        self.exhibit = None
+        self.exhibit, self._failed = None, ""
         self.state.exhibit(None)
         self._work.start(fault, partial(self._arm.provoke, fault, self.model.name))
-        self._tell(verdict("warn", "…", self.text("learn.provoking", fault=fault.manual_name)))
-        self.progress.value = 0.0
-        self.progress.layout.display = self.cancel.layout.display = None
-        self._ending.clear()
-        self._watcher = threading.Thread(target=self._watch, name="rcilab-notebook-faults", daemon=True)
-        self._watcher.start()
+        self._tell()
 
-    def _watch(self) -> None:
-        """The watching thread: shows how far a provocation is, and what came of it."""
-        said = ""
-        try:
-            while not self._ending.wait(_LOOK):
-                if self._work.is_done:
-                    said = self._take(self._work.take()[1])
-                    return
-                share = self._work.progress
-                if share is None:  # Given up.
-                    return
-                self.progress.value = share
-        finally:
-            if not self._ending.is_set():
-                self._rest(said)
-
-    def _take(self, found: Exhibit | RcilabError) -> str:
+    def _take(self, fault: Fault, found: Exhibit | RcilabError) -> None:
         if isinstance(found, RcilabError):
-            return problem(self.text.say(message("learn.failed", error=tell_error(found))))
+            self._failed = problem(self.text.say(message("learn.failed", error=tell_error(found))))
+            return
         self.exhibit = found
         self.fault.value = found.fault
         self._look()
-        return ""
-
-    def _rest(self, said: str = "") -> None:
-        self.progress.layout.display = self.cancel.layout.display = "none"
-        self._tell(said)
-
-    def _end_watch(self) -> None:
-        self._ending.set()
-        watcher, self._watcher = self._watcher, None
-        if watcher is not None and watcher is not threading.current_thread():
-            watcher.join()
 
     def _button(self, code: str, act: Any, *, icon: str, tooltip: str = "") -> Any:
         said = self.text(code)

@@ -2,19 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import ipywidgets
 
+from rcilab.background import Tell
+from rcilab.conformance.slow_down import SlowDown
+from rcilab.errors import RcilabError
 from rcilab.notebook.lean import lean
-from rcilab.notebook.look import block, soft, verdict, write
+from rcilab.notebook.long_work import LongWork
+from rcilab.notebook.look import block, problem, soft, verdict, write
 from rcilab.notebook.number_field import NumberField
 from rcilab.notebook.part import Part
 from rcilab.notebook.slider_echo import SliderEcho
 from rcilab.notebook.state import WAYS
-from rcilab.posing.planning import LAWS
+from rcilab.posing.planning import LAWS, Plan, picture
+from rcilab.words.errors import tell
+from rcilab.words.text import Message, message
 
 _SLOWEST = 1.0  # [%]
+_UNSEEN = 0.3  # [s] A choice: what is planned sooner needs no bar; most are.
 
 
 class PlanPanel(Part):
@@ -57,20 +66,29 @@ class PlanPanel(Part):
             layout=ipywidgets.Layout(width="auto", display="none"),
         )  # fmt: skip
         self._said = block()
+        self._work: LongWork[Plan | None, Plan | Message | SlowDown] = LongWork(
+            text, "rcilab-plan", self._take, self._show, shown_after=_UNSEEN
+        )
+        self.progress, self.cancel = self._work.progress, self._work.cancel
+        self._slowed: tuple[Plan, SlowDown] | None = None  # What the last slow-down came to, beside the plan it left.
         self.build([
             self.way,
             lean(ipywidgets.HBox, [self.speed, *self._speed_field.cells], layout={"align_items": "center"}),
             self._speed_field.said,
             self.law,
             block(soft(text("target.law_hint"))),
-            lean(ipywidgets.HBox, [self.plan, self.slow_down]),
+            lean(
+                ipywidgets.HBox,
+                [self.plan, self.slow_down, self.progress, self.cancel],
+                layout={"align_items": "center"},
+            ),
             self._said,
         ], min_width="360px")  # fmt: skip
         self.way.observe(self._on_way, names="value")
         self.law.observe(self._on_law, names="value")
         self._echo = SliderEcho(self.speed)
         self.speed.observe(self._on_speed, names="value")
-        self.plan.on_click(lambda _: self.state.make_plan())
+        self.plan.on_click(lambda _: self._make_plan())
         self.slow_down.on_click(lambda _: self._slow_down())
         self._speed_field.show(100.0 * state.speed)
         self._ends.append(state.hear("goal", self._show))
@@ -94,16 +112,45 @@ class PlanPanel(Part):
     def _on_law(self, change: Any) -> None:
         self.state.law = change["new"]
 
+    def halt(self) -> None:
+        """Gives up what is being worked out."""
+        self._work.give_up()
+
+    def end(self) -> None:
+        """Ends what is being worked out."""
+        self._work.end()
+
+    def _make_plan(self) -> None:
+        self._begin(None, self.state.planning())
+
     def _slow_down(self) -> None:
         plan = self.state.plan
         if plan is not None:
-            found = plan.report.slow_down()
-            if found.motion is not None:
-                self.state.take_motion(found.motion)
+            self._begin(plan, lambda progress: plan.report.slow_down(progress=progress))
+
+    def _begin(self, about: Plan | None, run: Callable[[Tell], Plan | Message | SlowDown]) -> None:
+        self.plan.disabled = self.slow_down.disabled = True
+        self._work.start(about, run)
+        self._work.wait_if_code()
+
+    def _take(self, about: Plan | None, found: Plan | Message | SlowDown | RcilabError) -> None:
+        if isinstance(found, RcilabError):
+            self.state.show(message("plan.failed", error=tell(found)))
+        elif not isinstance(found, SlowDown):
+            self.state.show(found)
+        elif about is not None and about is self.state.plan:  # Else somebody has planned anew.
+            if found.motion is None or found.report is None:
+                self._slowed = about, found
+                return
+            seen = picture(self.model, found.motion, found.report, about.box)
+            slower = replace(seen, mode=about.mode, complete=True, short=about.short)
+            self._slowed = slower, found
+            self.state.show(slower)
 
     def _show(self) -> None:
         state, text = self.state, self.text
         plan = state.plan
+        self.plan.disabled = self.slow_down.disabled = self._work.is_busy
         self.slow_down.layout.display = "none" if plan is None or plan.report.ok else None
         if plan is None:
             said = "" if state.no_plan is None else verdict("warn", "▲", text.say(state.no_plan))
@@ -119,4 +166,11 @@ class PlanPanel(Part):
             said += " " + text("target.leads_short", short=text.say(plan.short))
         if not state.is_goal_of_plan and plan.short is None:
             said += " " + text("plan.moved")
-        write(self._said, verdict(tone, text(word), said))
+        write(self._said, verdict(tone, text(word), said) + self._told_of_slowing(plan))
+
+    def _told_of_slowing(self, plan: Plan) -> str:
+        if self._slowed is None or self._slowed[0] is not plan:
+            return ""
+        found = self._slowed[1]
+        said = found.explain(self.text.language)
+        return soft(said) if found.ok else problem(said)

@@ -110,6 +110,10 @@ class RobotSide(Protocol):
         """Says that somebody is at the notebook."""
         ...
 
+    def leave_alone(self) -> None:
+        """Says that nobody is at the notebook any more: a running motion is brought to rest."""
+        ...
+
     def outcomes(self) -> list[Outcome]:
         """Returns what has ended since the last call; to be called several times a second."""
         ...
@@ -197,6 +201,10 @@ class SupervisedRobot:
         """Says that somebody is at the notebook."""
         if self._opened.is_set():
             self._supervisor.set_operator_present(True)
+
+    def leave_alone(self) -> None:
+        """Brings a running motion to rest; without signs of life there is no other."""
+        self.stop()
 
     def outcomes(self) -> list[Outcome]:
         """Returns what has ended since the last call, and keeps the cycles of what goes on."""

@@ -55,19 +55,30 @@ def health_html(status: SupervisorStatus, text: Text) -> str:
     return head(text("run.health")) + table([], [[text(f"health.{name}"), value] for name, value in rows])
 
 
-def outcome_html(outcome: Outcome, model: RobotModel, status: SupervisorStatus | None, text: Text) -> str:
-    """Returns what came of something that was asked for."""
+def outcome_html(
+    outcome: Outcome, model: RobotModel, status: SupervisorStatus | None, text: Text, *, is_left_alone: bool = False
+) -> str:
+    """Returns what came of something that was asked for.
+
+    Args:
+        outcome: Of what.
+        model: The arm.
+        status: How the robot stands.
+        text: Words.
+        is_left_alone: Whether the page is gone: that is why a motion was stopped.
+    """
     error, run = outcome.error, outcome.run
+    stopped = verdict("warn", "▲", text("run.left_alone" if is_left_alone else "run.stopped"))
     if error is not None:
         faults = ", ".join(getattr(fault, "manual_name", str(fault)) for fault in getattr(error, "faults", ()))
         if faults:
             return verdict("bad", "✗", text("run.faulted", faults=faults))
         if outcome.what == "execute":
-            return verdict("warn", "▲", text("run.stopped"))
+            return stopped
         why = message("notice.failed", what=message(f"what.{outcome.what}"), error=tell_refusal(error, model, status))
         return verdict("bad", "✗", text.say(why))
     if run is not None and run.stopped:
-        return verdict("warn", "▲", text("run.stopped"))
+        return stopped
     if run is not None and len(run.q):
         largest = float(np.degrees(np.abs(np.nan_to_num(run.error)).max()))
         return verdict("good", "✓", text("run.arrived", cycles=len(run.t), error=f"{largest:.3f}"))

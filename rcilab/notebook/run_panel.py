@@ -10,7 +10,7 @@ import ipywidgets
 
 from rcilab.errors import PlanningError, RcilabError
 from rcilab.notebook.at_once import hear_at_once
-from rcilab.notebook.heart import Heart
+from rcilab.notebook.heart import kernel_heart
 from rcilab.notebook.lean import lean
 from rcilab.notebook.look import PHASE_TONES, block, problem, soft, verdict, write
 from rcilab.notebook.mode_fields import ModeFields
@@ -46,7 +46,7 @@ class RunPanel(Part):
     def __init__(self, subject: object, *, language: str | None = None) -> None:
         super().__init__(subject, language)
         text = self.text
-        self._heart = Heart()
+        self._heart = kernel_heart()
         self._ending = threading.Event()
         self._watcher: threading.Thread | None = None
         self.target = lean(
@@ -67,7 +67,7 @@ class RunPanel(Part):
         self.execute = self._button("run.execute", self._on_execute, icon="play", style="success")
         self.stop = self._button("run.stop", self.halt, icon="stop", style="danger")
         self.stop.add_class("rl-stop")
-        hear_at_once(self.stop, self._heart.widget)
+        hear_at_once(self.stop)
         self.yes = self._button("run.confirm", self._move, style="danger")
         self.no = self._button("run.cancel", self._forget_question)
         self.progress = lean(
@@ -84,7 +84,6 @@ class RunPanel(Part):
         self._answers = lean(ipywidgets.HBox, [self.yes, self.no], layout=ipywidgets.Layout(display="none"))
         self._choice = lean(ipywidgets.VBox, [self.target, self.address], layout=ipywidgets.Layout())
         self.build([
-            self._heart.widget,
             self._choice,
             lean(ipywidgets.HBox, [self.connect, self.disconnect]),
             self._said,
@@ -141,7 +140,6 @@ class RunPanel(Part):
         self._desk.forget()
         self._pacing.forget()
         self.state.robot = robot
-        self._heart.start()
         self._ending.clear()
         self._watcher = threading.Thread(target=self._watch, args=(robot,), name="rcilab-notebook-watch", daemon=True)
         self._watcher.start()
@@ -157,13 +155,13 @@ class RunPanel(Part):
             if last is not None:
                 self.state.leave_arm(last)
             robot.close()
-        self._heart.stop()
 
     def _watch(self, robot: RobotSide) -> None:
         """The watching thread: shows the robot, says that somebody is here, stops when nobody is any more."""
         while not self._ending.wait(_LOOK):
+            self._heart.beat()
             if self._heart.is_gone:
-                robot.stop()
+                robot.leave_alone()
             elif self._heart.was_seen:
                 robot.beat()
             for outcome in robot.outcomes():
@@ -181,7 +179,7 @@ class RunPanel(Part):
             return
         if outcome.what == "execute":
             self.state.take_run(outcome.run, outcome.error)
-        said = outcome_html(outcome, self.model, self.state.status, self.text)
+        said = outcome_html(outcome, self.model, self.state.status, self.text, is_left_alone=self._heart.is_gone)
         if outcome.what == "cell" and outcome.run is not None:
             self.state.take_cell_run(outcome.run, outcome.error)
             said += soft(self.text("run.of_cell"))

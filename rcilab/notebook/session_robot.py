@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from rcilab.client.control_settings import ControlSettings, give_control
 from rcilab.client.setup import RobotSetup
 from rcilab.errors import ConnectionLostError, RcilabError, UsageError
+from rcilab.notebook.page_watch import LEFT_ALONE
 from rcilab.notebook.robot_side import BusyError, Outcome
 from rcilab.supervisor import SupervisorStatus
 
@@ -143,6 +144,10 @@ class SessionRobot:
 
     def beat(self) -> None:
         """Does nothing: who looks after a session stops it by himself."""
+
+    def leave_alone(self) -> None:
+        """Brings a running motion to rest, whoever has started it."""
+        self._session.stop(LEFT_ALONE)
 
     def outcomes(self) -> list[Outcome]:
         """Returns what has ended since the last call."""

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Literal, TypeGuard
 from numpy.typing import ArrayLike
 
 from rcilab.arrays import JointVector, as_vector, frozen
+from rcilab.background import Tell
 from rcilab.errors import InvalidValueError, KinematicsError, RcilabError
 from rcilab.model import RobotModel, require_model
 from rcilab.posing.planning import Plan, PlannableLaw, make_plan, picture
@@ -40,6 +41,7 @@ Topic = Literal["goal", "plan", "moment", "robot", "run"]
 status; run: what came of an execution."""
 Way = Literal["joint", "line"]
 WAYS: tuple[Way, ...] = ("joint", "line")
+_PLANNED = 0.5  # Part of the work when a plan is to be judged; about what was seen.
 
 
 class LabState:
@@ -181,8 +183,23 @@ class LabState:
 
     def make_plan(self) -> None:
         """Plans from where the arm stands to the goal and judges it, collisions too."""
-        made = self._line() if self.way == "line" else self._joint()
-        self.show(made.completed(self.mode) if isinstance(made, Plan) else made)
+        self.show(self.planning()(lambda part: None))
+
+    def planning(self) -> Callable[[Tell], Plan | Message]:
+        """Returns what plans from where the arm stands now to the goal of now, and judges it, collisions too.
+
+        It takes its time, so it is not for a thread that somebody waits for.
+        """
+        with self.lock:
+            make = self._line() if self.way == "line" else self._joint()
+            mode = self.mode
+
+        def run(progress: Tell) -> Plan | Message:
+            made = make()
+            progress(_PLANNED)
+            return made.completed(mode) if isinstance(made, Plan) else made
+
+        return run
 
     def take_motion(self, motion: Motion) -> None:
         """Takes a motion that was planned elsewhere; it is judged as any other."""
@@ -270,19 +287,29 @@ class LabState:
             self.moment = None
             self.tell("moment")
 
-    def _joint(self) -> Plan | Message:
-        made = make_plan(self.model, self.here, self.goal, self.speed, self.law)
-        return replace(made, short=self.reach.short) if isinstance(made, Plan) else made
+    def _joint(self) -> Callable[[], Plan | Message]:
+        start, goal, speed, law, short = self.here, self.goal, self.speed, self.law, self.reach.short
 
-    def _line(self) -> Plan | Message:
-        from rcilab.conformance.check import check
-        from rcilab.motion.cartesian import plan_line
+        def make() -> Plan | Message:
+            made = make_plan(self.model, start, goal, speed, law)
+            return replace(made, short=short) if isinstance(made, Plan) else made
 
-        try:
-            motion = plan_line(self.model, self.here, self.model.forward(self.goal), speed=self.speed)
-            return picture(self.model, motion, check(motion, self.model, start=self.here, distance=None))
-        except RcilabError as error:
-            return message("plan.failed", error=tell(error))
+        return make
+
+    def _line(self) -> Callable[[], Plan | Message]:
+        start, goal, speed = self.here, self.goal, self.speed
+
+        def make() -> Plan | Message:
+            from rcilab.conformance.check import check
+            from rcilab.motion.cartesian import plan_line
+
+            try:
+                motion = plan_line(self.model, start, self.model.forward(goal), speed=speed)
+                return picture(self.model, motion, check(motion, self.model, start=start, distance=None))
+            except RcilabError as error:
+                return message("plan.failed", error=tell(error))
+
+        return make
 
 
 _of_session: weakref.WeakValueDictionary[int, LabState] = weakref.WeakValueDictionary()

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from rcilab.arrays import JointVector, as_vector, frozen
 from rcilab.errors import InvalidValueError, KinematicsError
 from rcilab.model import RobotModel, require_model
+from rcilab.notebook.cells import kernel_cells
 from rcilab.notebook.slider_echo import SliderEcho
 from rcilab.spoken import chosen_language
 from rcilab.words.rounding import fixed
@@ -46,6 +47,7 @@ class JointSliders:
         language: str | None = None,
     ) -> None:
         self._model = require_model(model)
+        kernel_cells()  # From now on it looks whether the page is there while an arm moves.
         self._text = text = Text(chosen_language(language), "rcilab.notebook")
         self._show = show
         self._setting = False

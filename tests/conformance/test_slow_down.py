@@ -186,3 +186,17 @@ def test_every_obstacle_has_a_sentence_in_both_languages():
         assert "关节 7，指令" in result.explain("zh")
     with pytest.raises(InvalidValueError, match="known: en, zh"):
         report.slow_down().explain("de")
+
+
+def test_a_search_tells_how_far_it_is_and_ends_when_nobody_wants_it_any_more() -> None:
+    told: list[float] = []
+    report = check(hurried(FULL, 2.0), MODEL)
+    report.slow_down(progress=told.append)
+    assert told == sorted(told)
+    assert 0.0 < told[0] < told[-1] < 1.0
+
+    def give_up(part: float) -> None:
+        raise InterruptedError
+
+    with pytest.raises(InterruptedError):
+        report.slow_down(progress=give_up)

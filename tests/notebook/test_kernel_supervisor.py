@@ -6,6 +6,8 @@ import ast
 import os
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from queue import Empty
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -25,16 +27,16 @@ def held():
     "Sockets, pipes and the like; files come and go, as IPython's history does."
     links = (f"/proc/self/fd/{fd}" for fd in os.listdir("/proc/self/fd"))
     return sum(os.path.islink(link) and not os.readlink(link).startswith("/") for link in links)
-"""
-PARTS = "scene = Scene(model); jog = JogPanel(scene)"
-COUNT = "len(_instances), threading.active_count(), held()"
-CONNECT = """
-panel = RunPanel(model)
 def until(condition):
     end = time.monotonic() + 30.0
     while not condition():
         assert time.monotonic() < end
         time.sleep(0.02)
+"""
+PARTS = "scene = Scene(model); jog = JogPanel(scene)"
+COUNT = "len(_instances), threading.active_count(), held()"
+CONNECT = """
+panel = RunPanel(model)
 panel.connect.click()
 until(lambda: not panel.power_on.disabled)
 panel.power_on.click()
@@ -57,6 +59,19 @@ beside = RunPanel(robot)
 motion = rcilab.plan_joint(model, robot.state.q_c, model.home + 0.5, speed=0.005)  # Minutes, if nobody stops it.
 beside.stop.comm.comm_id
 """
+PAGE = """
+from rcilab.notebook import heart
+from rcilab.notebook.at_once import hear_at_once
+from ipywidgets import Button
+heart.INTERVAL = 0.1  # Half a second of silence is enough.
+kernel_heart = heart.kernel_heart()
+kernel_heart.open()
+slow = Button()
+hear_at_once(slow)
+slow.on_click(lambda _: time.sleep(1.0))
+[widget.comm.comm_id for widget in (*kernel_heart._widgets[:2], slow)]
+"""
+CLICK: dict[str, Any] = {"method": "custom", "content": {"event": "click"}}
 STANDS = """
 until(lambda: panel.state.error is not None)
 panel.state.status.phase, panel.state.status.motion_time < panel.state.plan.motion.duration - 1.0
@@ -79,6 +94,23 @@ class Kernel:
         control.send(self.client.session.msg("create_subshell_request", {}))
         return control.get_msg(timeout=20)["content"]["subshell_id"]
 
+    def tell(self, comm: str, subshell: str, **data: Any) -> None:
+        """Says what a widget in the page would, the way JupyterLab sends it."""
+        message = self.client.session.msg("comm_msg", {"comm_id": comm, "data": data})
+        message["header"]["subshell_id"] = subshell
+        self.client.shell_channel.send(message)
+
+    def answer(self, question: str, answer: str, subshell: str, seconds: float) -> None:
+        """Is a page that sends every question back, for a while."""
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            with suppress(Empty):
+                message = self.client.get_iopub_msg(timeout=0.05)
+                content = message["content"]
+                assert message["msg_type"] != "execute_result", f"the cell has ended: {content}"
+                if message["msg_type"] == "comm_msg" and content["comm_id"] == question:
+                    self.tell(answer, subshell, method="update", state=content["data"]["state"], buffer_paths=[])
+
     def value_of(self, message: str) -> Any:
         value: Any = None
         while True:
@@ -94,14 +126,26 @@ class Kernel:
                 return value
 
 
-@pytest.fixture(scope="module")
-def kernel() -> Iterator[Kernel]:
+@contextmanager
+def start_kernel() -> Iterator[Kernel]:
     from jupyter_client.manager import start_new_kernel
 
     manager, client = start_new_kernel(startup_timeout=60)
     yield Kernel(manager, client)
     client.stop_channels()
     manager.shutdown_kernel(now=True)
+
+
+@pytest.fixture(scope="module")
+def kernel() -> Iterator[Kernel]:
+    with start_kernel() as started:
+        yield started
+
+
+@pytest.fixture
+def another_kernel() -> Iterator[Kernel]:
+    with start_kernel() as started:
+        yield started
 
 
 def test_a_cell_that_runs_again_leaves_no_widget_no_thread_and_no_socket(kernel: Kernel) -> None:
@@ -134,11 +178,26 @@ def test_stop_is_heard_while_the_cell_that_moves_the_arm_runs(kernel: Kernel) ->
     stop = kernel.run(MAKE + SESSION)
     moving = kernel.client.execute("robot.execute(motion).stopped")
     time.sleep(0.5)  # Soon or late, a press counts from the start of the call on.
-    press = {"comm_id": stop, "data": {"method": "custom", "content": {"event": "click"}}}
-    message = kernel.client.session.msg("comm_msg", press)
-    message["header"]["subshell_id"] = subshell  # As JupyterLab sends it.
-    kernel.client.shell_channel.send(message)
+    kernel.tell(stop, subshell, **CLICK)
     assert kernel.value_of(moving) == "on request"
+    kernel.run("beside.close(); robot.close()")
+
+
+def test_a_page_that_falls_silent_stops_what_a_cell_moves_and_one_that_nobody_hears_does_not(
+    another_kernel: Kernel,
+) -> None:
+    kernel = another_kernel
+    subshell = kernel.open_subshell()
+    kernel.run(MAKE + SESSION)
+    question, answer, slow = kernel.run(PAGE)
+    moving = kernel.client.execute("robot.execute(motion).stopped")
+    time.sleep(1.0)  # Nobody has ever answered, so nobody is missed.
+    kernel.answer(question, answer, subshell, 1.0)
+    kernel.tell(slow, subshell, **CLICK)  # Now who hears answers is busy, for twice as long as silence may last.
+    time.sleep(0.8)
+    kernel.answer(question, answer, subshell, 1.0)
+    assert kernel.value_of(moving) == "the notebook's page is gone"
+    kernel.run("until(lambda: 'page did not answer' in beside._outcome.value)")
     kernel.run("beside.close(); robot.close()")
 
 

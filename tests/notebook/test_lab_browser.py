@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 
 import rcilab
+from rcilab.notebook.page_watch import LEFT_ALONE
 
 FLAGS = (
     "--no-sandbox --no-first-run --use-gl=angle --use-angle=swiftshader --enable-unsafe-swiftshader "
@@ -29,6 +30,18 @@ from rcilab.notebook import Lab
 model = rcilab.load_model("xMatePro7")
 lab = Lab(model, height=240)
 lab"""
+CELLS = [
+    """import rcilab
+from rcilab.notebook import Scene
+model = rcilab.load_model("xMatePro7")
+robot = rcilab.simulate(model)
+robot.power_on()
+Scene(robot, height=240)""",
+    """open("begun", "w").close()
+run = robot.execute(rcilab.plan_joint(model, robot.state.q_c, model.home + 0.5, speed=0.005))
+with open("ended", "w") as file:
+    file.write(str(run.stopped))""",
+]
 LESSON = "01_first_motion.zh.ipynb"
 PRO7 = rcilab.load_model("xMatePro7")
 TOOL = "/".join(["meshcat", "arm", *(f"joint{i}" for i in range(1, 8)), "flange", "tool"])
@@ -54,8 +67,9 @@ def jupyter(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, Pat
     folder = tmp_path_factory.mktemp("lab")
     (folder / "notes").mkdir()
     kernel = {"kernelspec": {"name": "python3", "display_name": "Python 3", "language": "python"}}
-    note = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(CELL)], metadata=kernel)
-    nbformat.write(note, folder / "notes" / "lab.ipynb")
+    for name, cells in (("lab", [CELL]), ("cells", CELLS)):
+        note = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(cell) for cell in cells], metadata=kernel)
+        nbformat.write(note, folder / "notes" / f"{name}.ipynb")
     shutil.copy(Path(__file__).parents[2] / "notebooks" / LESSON, folder / "notes")
     environment = {**os.environ, "JUPYTER_RUNTIME_DIR": str(folder / "runtime")}
     environment |= {f"JUPYTER_{name}_DIR": str(folder / name) for name in ("CONFIG", "DATA")}
@@ -216,6 +230,26 @@ def test_a_tab_that_is_closed_stops_the_arm(page: Any, jupyter: tuple[str, Path]
         time.sleep(0.2)
     client.stop_channels()
     assert float(left) > 2.0  # It was to go on so long.
+
+
+@pytest.mark.browser
+def test_a_tab_that_is_closed_stops_what_a_cell_moves_but_not_one_without_timers(
+    page: Any, jupyter: tuple[str, Path]
+) -> None:
+    notes = jupyter[1].parent / "notes"
+    tab = page.context.new_page()
+    tab.goto(jupyter[0].replace("lab/tree/lab.ipynb", "lab/workspaces/cells/tree/cells.ipynb"))
+    run_all(tab)
+    wait_for(tab, (notes / "begun").exists, "the motion")
+    tab.evaluate("window.setTimeout = window.setInterval = window.requestAnimationFrame = () => 0")  # As if hidden.
+    time.sleep(4.0)  # Longer than a page may be silent.
+    assert not (notes / "ended").exists()
+    tab.close()
+    deadline = time.monotonic() + 15.0
+    while not (notes / "ended").exists() or not (notes / "ended").read_text():
+        assert time.monotonic() < deadline, "the arm goes on although nobody is there"
+        time.sleep(0.1)
+    assert (notes / "ended").read_text() == LEFT_ALONE
 
 
 @pytest.mark.browser

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import re
+import threading
 import time
 from collections.abc import Callable, Iterator
 from importlib.resources import files
 from pathlib import Path
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -264,6 +266,37 @@ def test_what_breaks_a_limit_is_shaded_explained_and_slowed_down_to_fit(fresh: L
     fresh.plan.slow_down.click()
     assert fresh.state.plan is not None
     assert fresh.state.plan.report.ok
+
+
+def test_what_takes_longer_shows_how_far_it_is_and_can_be_given_up(fresh: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
+    panel, go_on = fresh.plan, threading.Event()
+    fresh.jog.q = GOAL
+    panel.plan.click()
+    before = fresh.state.plan
+    assert before is not None
+    monkeypatch.setattr(
+        "rcilab.notebook.long_work.kernel_cells", lambda: SimpleNamespace(is_calling=False)
+    )  # A hand's.
+    monkeypatch.setattr("rcilab.notebook.state.make_plan", lambda *_: go_on.wait(20.0) and before)
+    panel.plan.click()
+    assert panel.plan.disabled
+    wait_for(lambda: panel.cancel.layout.display is None, what="Cancel")
+    panel.cancel.click()
+    wait_for(lambda: not panel.plan.disabled, what="the end of it")
+    assert panel.cancel.layout.display == panel.progress.layout.display == "none"
+    assert fresh.state.plan is before
+    panel.plan.click()
+    go_on.set()
+    wait_for(lambda: fresh.state.plan is not before, what="the plan")
+
+
+def test_a_motion_that_no_slow_down_mends_says_so(fresh: Lab) -> None:
+    fresh.state.take_motion(rcilab.Motion.from_samples(rcilab.plan_joint(PRO7, PRO7.home, GOAL, speed=1.0).q[::9]))
+    broken = fresh.state.plan
+    assert broken is not None
+    fresh.plan.slow_down.click()
+    assert fresh.state.plan is broken
+    assert broken.report.slow_down().explain("en") in text_of(fresh.plan._said)
 
 
 def test_a_straight_line_is_planned_or_refused_in_words(fresh: Lab) -> None:

@@ -15,6 +15,8 @@ import pytest
 import rcilab
 from rcilab import notebook
 from rcilab.errors import PlanningError, RcilabError
+from rcilab.notebook.heart import PATIENCE, Heart
+from rcilab.notebook.page_watch import LEFT_ALONE
 from rcilab.notebook.robot_side import Outcome
 from rcilab.supervisor import SupervisorStatus
 
@@ -79,19 +81,22 @@ def test_power_execute_stop_and_what_came_of_it_in_a_process_of_its_own() -> Non
 
 
 def test_a_page_that_falls_silent_stops_the_arm(monkeypatch: pytest.MonkeyPatch) -> None:
+    heart = Heart()
+    monkeypatch.setattr("rcilab.notebook.run_panel.kernel_heart", lambda: heart)
     with rcilab.simulate(PRO7) as robot, notebook.RunPanel(robot) as panel:
         power_on(panel)
         panel.state.pose(PRO7.home + 0.3)
         panel.state.speed = 0.05
         panel.state.make_plan()
-        panel._heart._on_beat({})  # A browser was there.
+        heart._on_answer({})  # A browser was there.
         panel.execute.click()
         wait_for(lambda: phase(panel) == "moving", "a motion")
-        monkeypatch.setattr("rcilab.notebook.heart.SILENCE", -1.0)  # And is not any more.
+        monkeypatch.setattr(heart, "_missed", PATIENCE)  # And is not any more.
         wait_for(lambda: panel.state.run is not None, "the run")
         run = panel.state.run
         assert run is not None
-        assert run.stopped
+        assert run.stopped == LEFT_ALONE
+        wait_for(lambda: "page did not answer" in panel._outcome.value, "why, in words")
     assert repr(robot).endswith("closed>")
 
 

@@ -75,9 +75,8 @@ def scaled(draft: Draft, scale: float) -> Draft:
 
 
 def _slower(plan: Plan, make: Callable[[float], Plan | None], least: float, tell: Tell) -> Slower:
-    tell(0.05)
     recommended = plan.report.ok
-    found = plan.completed().report.slow_down(recommended=recommended)
+    found = plan.completed().report.slow_down(recommended=recommended, progress=lambda part: tell(_FOUND * part))
     tell(_FOUND)
     if found.factor is None or found.factor <= 1.0:
         return Slower(found=found)
