@@ -108,14 +108,14 @@ class CartesianBrake:
 
     Args:
         limits: Bounds of the arm.
-        model: The arm, for what the joints allow; None looks at the tool's own bounds alone.
+        model: The arm, for what the joints allow.
     """
 
-    def __init__(self, limits: Limits, model: RobotModel | None = None) -> None:
+    def __init__(self, limits: Limits, model: RobotModel) -> None:
         self._limits = limits
         self._model = model
         self._poses: list[tuple[int, CartesianPosition]] = []
-        self._q: JointVector | None = None
+        self._q = model.home
 
     def begin(self, state: RobotState) -> None:
         """Starts from the arm standing at its commanded pose."""
@@ -159,11 +159,9 @@ class CartesianBrake:
         # The tool's bounds hold for the length of a vector, these here for each of its three coordinates.
         acceleration[:6] /= math.sqrt(3.0)
         jerk[:6] /= math.sqrt(3.0)
-        if self._model is not None and self._q is not None:
-            needed = _joint_shares(self._model, self._q)
-            joint = self._limits.joint
-            acceleration *= min(1.0, _JOINT_SHARE * float((joint.acceleration / (needed @ acceleration)).min()))
-            jerk *= min(1.0, _JOINT_SHARE * float((joint.jerk / (needed @ jerk)).min()))
+        needed, joint = _joint_shares(self._model, self._q), self._limits.joint
+        acceleration *= min(1.0, _JOINT_SHARE * float((joint.acceleration / (needed @ acceleration)).min()))
+        jerk *= min(1.0, _JOINT_SHARE * float((joint.jerk / (needed @ jerk)).min()))
         unused, far = np.zeros(7), np.full(7, _FAR)
         return JointLimits(
             lower=-far, upper=far, velocity=velocity, acceleration=acceleration, jerk=jerk, torque=unused,

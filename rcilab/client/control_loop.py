@@ -72,9 +72,9 @@ class ControlLoop:
         mode: How the controller shall follow.
         log: Where every cycle is written.
         watch: Asked in every cycle whether to stop.
-        silence: Time without a state that counts as a lost connection, [s].
-        model: The arm, for stopping a tool within what its joints allow; not needed in the other modes.
+        model: The arm, for stopping a tool within what its joints allow.
         filters: What every command of a callback passes before it is sent, in this order.
+        silence: Time without a state that counts as a lost connection, [s].
     """
 
     def __init__(
@@ -85,10 +85,10 @@ class ControlLoop:
         mode: ControllerMode,
         log: CycleLog,
         *,
-        watch: Watch = lambda t: None,
+        watch: Watch,
+        model: RobotModel,
+        filters: Sequence[CommandFilter],
         silence: float = SILENCE,
-        model: RobotModel | None = None,
-        filters: Sequence[CommandFilter] = (),
     ) -> None:
         if mode not in _MOTION_MODES:
             raise InvalidValueError("mode", mode, f"is no mode to move in; there are {[m.name for m in _MOTION_MODES]}")

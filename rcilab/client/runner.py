@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, TypeAlias
 
 from rcilab.client.commands import RciCommands
-from rcilab.client.control_loop import SILENCE, Callback, ControlLoop
+from rcilab.client.control_loop import Callback, ControlLoop
 from rcilab.client.filters import CommandFilter
 from rcilab.client.link import Link
 from rcilab.client.paced_stream import PacedStream
@@ -44,9 +44,7 @@ class Runner:
         partner: See above.
     """
 
-    def __init__(
-        self, link: Link, turns: Turns, *, realtime: bool = True, silence: float = SILENCE, partner: int | None = None
-    ) -> None:
+    def __init__(self, link: Link, turns: Turns, *, realtime: bool, silence: float, partner: int | None) -> None:
         self.partner = partner
         self._link = link
         self._turns = turns

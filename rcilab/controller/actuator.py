@@ -73,7 +73,6 @@ class Actuator:
     def begin_guiding(self, space: rci.DragSpace, kind: rci.DragType, measured: Measurement) -> None:
         """Remembers what a hand is to leave where it is now."""
         self._space, self._kind = space, kind
-        self._q_held = measured.q
         self._T_held = self._model.forward(measured.q)
 
     def setpoint(
@@ -124,7 +123,7 @@ class Actuator:
                 settings.desired_wrench,
                 damper=self._damper,
             )
-        return guide_torque(model, measured, self._space, self._kind, self._T_held, self._q_held, self._soft_limits)
+        return guide_torque(model, measured, self._space, self._kind, self._T_held, self._soft_limits)
 
 
 def guiding_box(settings: Settings) -> SafetyBox | None:

@@ -31,7 +31,6 @@ def guide_torque(
     space: rci.DragSpace,
     kind: rci.DragType,
     T_held: Pose,
-    q_held: JointVector,
     limits: JointLimits | None = None,
 ) -> JointVector:
     """Returns the torque on a guided arm, without gravity, shape (n,), [N m].
@@ -42,7 +41,6 @@ def guide_torque(
         space: In joint space every joint is free, and `kind` has no effect, as with the vendor's client.
         kind: What a Cartesian drag leaves free.
         T_held: Pose of the tool in base at the start of the drag.
-        q_held: Joint angles at the start of the drag, shape (n,), [rad].
         limits: Where the joints end; the arm's own limits when absent.
     """
     terms = model.rigid_body.tool_terms(measured.q, measured.dq)

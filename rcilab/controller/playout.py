@@ -26,7 +26,7 @@ from typing import NamedTuple
 
 from rcilab.protocols.rci import CommandPacket
 
-CAPACITY = 256  # Commands. Two and a half of the vendor client's worst bursts (about 92).
+CAPACITY = 256  # Commands in the queue; then the oldest gives way. 2.5 of the vendor client's worst bursts (about 92).
 WINDOW = 1000  # Cycles that the success rate looks back over, 1 s; a choice.
 STOCK_WINDOW = 100  # Cycles in which the lowest stock is looked for; longer than any jitter, a choice.
 SLACK = 5  # Cycles of delay more than wanted that are left alone: a client may be late with its first answer; a choice.
@@ -63,13 +63,11 @@ class Playout:
 
     Args:
         prefill: Cycles between the first command's arrival and its play-out.
-        capacity: Longest queue; the oldest command gives way to the newest.
     """
 
-    def __init__(self, prefill: int, capacity: int = CAPACITY) -> None:
+    def __init__(self, prefill: int) -> None:
         self._prefill = prefill
         self._queue: deque[CommandPacket] = deque()
-        self._capacity = capacity
         self.begin()
 
     def begin(self, *, most: int | None = None) -> None:
@@ -84,7 +82,7 @@ class Playout:
         self._countdown = self._prefill if self._stock is None else self._stock
         self._newest: CommandPacket | None = None
         self._lives = False
-        self._lowest, self._looked, self._excess = self._capacity, 0, 0
+        self._lowest, self._looked, self._excess = CAPACITY, 0, 0
         self._outcomes: deque[bool] = deque(maxlen=WINDOW)
         self._played_in_window = 0
         self._last_id = 0
@@ -126,7 +124,7 @@ class Playout:
         elif is_overtaken:
             self._put_in_place(packet)
         else:
-            if len(queue) >= self._capacity:
+            if len(queue) >= CAPACITY:
                 queue.popleft()
                 self.dropped += 1
             queue.append(packet)
@@ -200,7 +198,7 @@ class Playout:
         if self._looked >= STOCK_WINDOW:
             excess = self._lowest - self._prefill
             self._excess = excess if excess > SLACK else 0
-            self._looked, self._lowest = 0, self._capacity
+            self._looked, self._lowest = 0, CAPACITY
 
     def _skip_old(self) -> int:
         """Skips commands beyond the stock that is wanted; returns how many."""

@@ -29,7 +29,7 @@ def model(request: pytest.FixtureRequest) -> RobotModel:
 
 def guide(model: RobotModel, space: DragSpace, kind: DragType = DragType.FREE) -> Law:
     T = model.forward(model.home)
-    return lambda measured: guide_torque(model, measured, space, kind, T, model.home)
+    return lambda measured: guide_torque(model, measured, space, kind, T)
 
 
 def run(plant: Plant, law: Law, cycles: int, measured: Measurement | None = None) -> Measurement:

@@ -50,14 +50,9 @@ class Header(NamedTuple):
 
 
 class FrameReader:
-    """Cuts a TCP byte stream into frames, however the bytes were split or joined on the way.
+    """Cuts a TCP byte stream into frames, however the bytes were split or joined on the way."""
 
-    Args:
-        max_size: Longest frame to accept; a longer length means that the stream is not RCI.
-    """
-
-    def __init__(self, max_size: int = MAX_FRAME_SIZE) -> None:
-        self._max_size = max_size
+    def __init__(self) -> None:
         self._buffer = bytearray()
         self._consumed = 0
 
@@ -72,8 +67,8 @@ class FrameReader:
         frames: list[bytes] = []
         while len(self._buffer) >= _LENGTH.size:
             (length,) = _LENGTH.unpack_from(self._buffer)
-            if not HEADER.size <= length <= self._max_size:
-                raise DecodeError(f"frame length {length} is outside {HEADER.size} to {self._max_size}", self._consumed)
+            if not HEADER.size <= length <= MAX_FRAME_SIZE:
+                raise DecodeError(f"frame length {length} is outside {HEADER.size} to {MAX_FRAME_SIZE}", self._consumed)
             if len(self._buffer) < length:
                 break
             frames.append(bytes(self._buffer[:length]))

@@ -29,7 +29,6 @@ class SetupPanel:
 
     def __init__(self, text: Text, ask: Ask) -> None:
         self._text, self._ask = text, ask
-        self._is_program = False
 
     def build(self, gui: Any, state: UiState) -> None:
         """Adds the controls."""

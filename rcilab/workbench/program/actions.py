@@ -136,10 +136,6 @@ class ProgramActions:
         self._shelves.set(progress=None)
         return True
 
-    def _tells_of_start(self) -> bool:
-        """Returns whether what is said about the plan holds only as long as the arm stands where it stood."""
-        return self._shelves.state.answer is not None and self._shelves.state.tone != "bad"
-
     def _was_stretched(self) -> bool:
         """Returns whether the plan of now is slower than the speeds of its program say."""
         plan, slowed = self._store.state.plan, self._store.state.check.slowed
