@@ -6,6 +6,8 @@ import os
 import tempfile
 from pathlib import Path
 
+from rcilab.errors import InvalidValueError
+
 
 def write_whole(file: Path, text: str, *, survives_power_loss: bool = True) -> None:
     """Writes a text file, and the folders it is in; nothing of it is left where that fails.
@@ -30,3 +32,25 @@ def write_whole(file: Path, text: str, *, survives_power_loss: bool = True) -> N
     except BaseException:
         Path(temporary).unlink(missing_ok=True)
         raise
+
+
+def read_whole(file: Path, what: str, most: int = -1) -> bytes:
+    """Returns what is in a file.
+
+    Args:
+        file: Where.
+        what: What it should be, for the error: "program file".
+        most: Bytes that are read at most; -1 is all.
+
+    Raises:
+        InvalidValueError: There is none, or it cannot be read.
+    """
+    try:
+        with file.open("rb") as stream:
+            return stream.read(most)
+    except FileNotFoundError as error:
+        raise InvalidValueError(what, str(file), "does not exist").coded("no_file", file=str(file)) from error
+    except OSError as error:
+        raise InvalidValueError(what, str(file), f"cannot be read: {error.strerror}").coded(
+            "file_unreadable", file=str(file)
+        ) from error

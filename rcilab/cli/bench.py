@@ -7,6 +7,7 @@ import json
 import sys
 import textwrap
 from contextlib import redirect_stdout
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from rcilab.bench.rows import ROWS
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from rcilab.bench.measure import Absent, Measurement
+    from rcilab.bench.pace_watch import PaceWatch
 
 BENCHES = tuple(ROWS)
 """In the order they run; the slow ones last."""
@@ -56,13 +58,16 @@ def run(args: argparse.Namespace) -> int:
         print("[\n" + json.dumps(machine), end="", flush=True)
     else:
         _print_machine(machine)
-    kept, out = True, sys.stdout
+    from rcilab.bench.pace_watch import PaceWatch
+
+    kept, out, pace = True, sys.stdout, PaceWatch()
     for name in names:
         if not args.json and sys.stderr.isatty():
             print(f"{name} ...", end="\r", file=sys.stderr, flush=True)
-        with redirect_stdout(sys.stderr):  # What libraries have to say is no part of the list.
+        with redirect_stdout(sys.stderr), pace:  # What libraries have to say is no part of the list.
             for found in _measured(name, args.seconds):
                 kept = kept and found.ok is not False
+                found = replace(found, note=_with_pace(found.note, pace))
                 if args.json:
                     print(",\n" + json.dumps(found.as_json()), end="", file=out, flush=True)
                 else:
@@ -89,6 +94,17 @@ def _measured(name: str, seconds: float) -> Iterable[Measurement | Absent]:
     from rcilab.bench.apart import measure_apart
 
     return (measure_apart(name, seconds),)
+
+
+def _with_pace(note: str, pace: PaceWatch) -> str:
+    """Returns the note of a row, with a word about the machine where that was slow meanwhile."""
+    from rcilab.bench.pace_watch import SLOW
+
+    slowness = pace.slowness
+    if slowness < SLOW:
+        return note
+    word = f"meanwhile this machine took {slowness:.1f} times as long for the same Python as at its best"
+    return f"{note}; {word}" if note else word
 
 
 def _print_machine(machine: dict[str, Any]) -> None:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Sequence
-from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from numpy.typing import ArrayLike
@@ -13,12 +11,15 @@ from rcilab.client.commands import RciCommands
 from rcilab.client.control_loop import Callback
 from rcilab.client.filters import CommandFilter, LowPass, RateLimiter
 from rcilab.client.following import Progress, follow, follow_poses, report_progress
+from rcilab.client.link import Link
+from rcilab.client.paced_stream import PacedStream
+from rcilab.client.runner import Runner
 from rcilab.client.start_check import describe_start_mismatch, require_motion
-from rcilab.client.streaming import MotionStream
+from rcilab.client.turns import Turns
 from rcilab.client.under_way import UnderWay
-from rcilab.clock import CYCLE_TIME
 from rcilab.errors import UsageError
-from rcilab.motion.pacing import PacedMotion, require_pace
+from rcilab.limits import Limits
+from rcilab.motion.pacing import require_pace
 from rcilab.recording.run import Run
 from rcilab.spatial import Pose
 from rcilab.state import Mode, RobotState, require_mode
@@ -32,15 +33,23 @@ if TYPE_CHECKING:
 
 RateLimit: TypeAlias = Literal["manual", "sdk"]
 
-PACE_LEADS = (100, 300, 1000, 4000)  # Cycles from now on which another pace begins: what planning it may take.
-HANDING_OVER = 30  # Cycles between the rows of now and the first of others.
-
 
 class Motions(RciCommands):
-    """The motions of a session; see `RobotSession`."""
+    """The motions of a session; see `RobotSession`.
 
-    _paced: tuple[PacedMotion, MotionStream, Mode] | None = None
-    """What `execute` streams just now."""
+    Args:
+        link: The connection.
+        limits: Bounds of the arm.
+        turns: Whose turn it is on the connection.
+        runner: Runs motions on it.
+    """
+
+    def __init__(self, link: Link, limits: Limits, turns: Turns, runner: Runner) -> None:
+        super().__init__(link, limits)
+        self._turns = turns
+        self._runner = runner
+        self._streamed: PacedStream | None = None
+        """What `execute` streams just now."""
 
     def execute(
         self,
@@ -77,7 +86,7 @@ class Motions(RciCommands):
         require_motion(motion, certificate)
         require_mode(mode)
         require_pace(pace)
-        with self._setting_out("execute"):
+        with self._turns.set_out("execute"):
             state = self.receive_state()
             mismatch = describe_start_mismatch(motion.q[0], state.q_c)
             if mismatch is not None:
@@ -87,31 +96,19 @@ class Motions(RciCommands):
             else:
                 certificate.verify(motion, self.model, state.q_c, self.safety_box, mode=mode)
             paced = plan_start(motion, pace, self.model, mode)
-            stream = MotionStream(paced.q, mode, self.model, report_progress(paced.as_motion(), progress))
-            self._paced = paced, stream, mode
+            streamed = PacedStream(paced, mode, self.model, report_progress(paced.as_motion(), progress))
+            self._streamed = streamed
             try:
                 filters = [RateLimiter(self.model.limits)] if mode == "torque" else []
-                return self._run(stream, mode, motion, filters)
+                return self._runner.run(streamed.stream, mode, self.model, streamed, filters)
             finally:
-                self._paced = None
+                self._streamed = None
 
     @property
     def under_way(self) -> UnderWay | None:
         """Place and pace of the motion that `execute` runs in another thread; None while it runs none."""
-        under_way = self._paced
-        if under_way is None:
-            return None
-        paced, stream, mode = under_way
-        cycle = stream.cycle
-        time = cycle * CYCLE_TIME
-        return UnderWay(
-            time=time,
-            duration=paced.duration,
-            place=paced.place_at(cycle),
-            planned=paced.motion.duration,
-            pace=paced.pace,
-            mode=mode,
-        )
+        streamed = self._streamed
+        return None if streamed is None else streamed.under_way
 
     def pause(self) -> None:
         """Holds the motion that `execute` runs in another thread, along its way and within all limits.
@@ -140,20 +137,10 @@ class Motions(RciCommands):
         self._change_pace(require_pace(pace))
 
     def _change_pace(self, pace: float) -> None:
-        from rcilab.conformance.pacing import plan_pace
-
-        if self._paced is None:
+        streamed = self._streamed
+        if streamed is None:
             raise UsageError("no motion of execute() runs whose pace could change").coded("no_pace")
-        paced, stream, mode = self._paced
-        for lead in PACE_LEADS:
-            changed = plan_pace(paced, stream.cycle + lead, pace, self.model, mode)
-            first = min(stream.cycle + HANDING_OVER, changed.changed)  # What was to change before goes along.
-            if stream.switch(first, changed.q[first:], holds=changed.holds):
-                self._paced = changed, stream, mode
-                return
-        raise UsageError(
-            "this machine is too busy to change the pace of the motion in time; it goes on as it is"
-        ).coded("too_busy")
+        streamed.change_pace(pace)
 
     def control(
         self,
@@ -191,8 +178,8 @@ class Motions(RciCommands):
             from rcilab.conformance import cartesian_limits
 
             filters.append(RateLimiter(cartesian_limits(self.model.limits, rate_limit)))
-        with self._setting_out("control"):
-            return self._run(callback, mode, None, filters)
+        with self._turns.set_out("control"):
+            return self._runner.run(callback, mode, self.model, filters=filters)
 
     def move_j(self, goal: ArrayLike, speed: float = 0.2, progress: Progress | None = None) -> Run:
         """Moves to joint angles by the manual's S profile and returns when the arm is there: the vendor's MOVEJ.
@@ -212,11 +199,12 @@ class Motions(RciCommands):
         """
         from rcilab.motion import plan_joint
 
-        with self._setting_out("move_j"):
+        with self._turns.set_out("move_j"):
             state = self.receive_state()
             motion = plan_joint(self.model, state.q_c, goal, speed=speed, law="s_profile")
             self._require_allowed(motion, state)
-            return self._run(follow(motion.q, report_progress(motion, progress)), "joint_position", motion)
+            callback = follow(motion.q, report_progress(motion, progress))
+            return self._runner.run(callback, "joint_position", self.model, motion)
 
     def move_l(self, goal: Pose, speed: float = 0.2, psi: float | None = None, progress: Progress | None = None) -> Run:
         """Moves the tool straight to a pose by the manual's S profile, and returns when it is there: MOVEL.
@@ -240,7 +228,7 @@ class Motions(RciCommands):
         from rcilab.motion.cartesian import arm_angles
         from rcilab.motion.path import build_line
 
-        with self._setting_out("move_l"):
+        with self._turns.set_out("move_l"):
             state = self.receive_state()
             angles = arm_angles(self.model, state.q_c, psi)
             path = build_line(self.model.forward(state.q_c), goal, *angles)
@@ -269,7 +257,7 @@ class Motions(RciCommands):
         from rcilab.motion.cartesian import arm_angles
         from rcilab.motion.path import build_arc
 
-        with self._setting_out("move_c"):
+        with self._turns.set_out("move_c"):
             state = self.receive_state()
             angles = arm_angles(self.model, state.q_c, psi)
             path = build_arc(self.model.forward(state.q_c), via, goal, *angles)
@@ -289,14 +277,6 @@ class Motions(RciCommands):
     def receive_state(self) -> RobotState:
         """Returns a fresh state."""
 
-    @abstractmethod
-    def _setting_out(self, what: str) -> AbstractContextManager[None]:
-        """Has the connection for itself."""
-
-    @abstractmethod
-    def _run(self, callback: Callback, mode: Mode, plan: Motion | None, filters: Sequence[CommandFilter] = ()) -> Run:
-        """Runs a motion and returns what became of it."""
-
     def _require_allowed(self, motion: Motion, state: RobotState, mode: Mode = "joint_position") -> None:
         from rcilab.conformance import check
 
@@ -311,4 +291,4 @@ class Motions(RciCommands):
         motion = follow_path(self.model, state.q_c, path, speed)
         self._require_allowed(motion, state, "cartesian_position")
         callback = follow_poses(path, schedule(path, speed), with_psi, report_progress(motion, progress))
-        return self._run(callback, "cartesian_position", motion)
+        return self._runner.run(callback, "cartesian_position", self.model, motion)

@@ -2,51 +2,35 @@
 
 from __future__ import annotations
 
-import math
-import threading
-import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, TypeAlias
+from collections.abc import Callable
+from contextlib import ExitStack
+from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
 
 from rcilab.arrays import as_number
 from rcilab.client.address import parse_address
 from rcilab.client.commands import RciCommands
-from rcilab.client.control_loop import SILENCE, Callback, ControlLoop
-from rcilab.client.filters import CommandFilter
+from rcilab.client.control_loop import SILENCE
 from rcilab.client.identify import dh_lengths, identify_robot
 from rcilab.client.link import Link
 from rcilab.client.motions import Motions
 from rcilab.client.open_sessions import enlist
 from rcilab.client.opening import await_first_state, require_arm_there, require_timeout
-from rcilab.client.punctual import punctual
-from rcilab.client.recorder import RECORD_TIME, CycleLog, Recorder
 from rcilab.client.recovery import recover
+from rcilab.client.runner import Ear, Runner
 from rcilab.client.transport import SocketTransport
+from rcilab.client.turns import Turns
 from rcilab.client.world import World
-from rcilab.clock import CYCLE_TIME
 from rcilab.closing import Closing
 from rcilab.errors import ConnectionLostError, InvalidValueError, UsageError
-from rcilab.one_core import one_core
 from rcilab.protocols.rci import STATE_SIZE, Request
-from rcilab.recording.run import Run, build_run
-from rcilab.recording.setup import Setup
 from rcilab.safety_box import SafetyBox
 from rcilab.spatial import Pose
-from rcilab.state import ControllerMode, Mode, RobotState
+from rcilab.state import RobotState
 
 if TYPE_CHECKING:
     from rcilab.model import RobotModel
-    from rcilab.motion import Motion
-
-Ear: TypeAlias = Callable[[Run, BaseException | None], None]
-
-_CLOSED = "the session was closed while a motion ran"
-_CLOSE_TIMEOUT = 10.0  # [s] for another thread to bring its motion to rest; the slowest joint needs 0.4 s.
-_LOOK = 0.02  # [s] Longest wait for another thread's request before it is looked at again what that thread does.
-_SPARE_CYCLES = 2000  # Room in the recorder for what comes before and after the motion itself.
 
 
 def connect(address: str, model: RobotModel | None = None, timeout: float = 3.0) -> RobotSession:
@@ -77,7 +61,18 @@ def open_session(
     world: World | None = None,
     partner: int | None = None,
 ) -> RobotSession:
-    """Returns a session as `connect` does, with what only a simulation sets; see `RobotSession`."""
+    """Returns a session as `connect` does, with what only a simulation sets.
+
+    Args:
+        address: See `connect`, as the next two.
+        model: The arm.
+        timeout: [s].
+        realtime: False for a controller in lock-step, where timing means nothing.
+        silence: Time without a state, while moving, that counts as a lost connection, [s].
+        on_close: Called once when the session is closed, such as to end a private controller.
+        world: What surrounds a virtual robot; None where nothing of the kind is known.
+        partner: Process id of a controller on this machine that is in lock-step with us; None: it is not.
+    """
     place = parse_address(address)
     require_timeout(timeout)
     if model is not None:
@@ -97,9 +92,14 @@ def open_session(
         await_first_state(link, place, transport.local_address, timeout)
         if world is None and place.world_port is not None:
             world = World(place.host, place.world_port)
-        return RobotSession(
-            link, model, realtime=realtime, silence=silence, on_close=on_close, world=world, partner=partner
-        )
+        closing = ExitStack()
+        closing.callback(on_close)
+        if world is not None:
+            closing.callback(world.close)
+        closing.callback(link.close)
+        turns = Turns(closing.close)
+        runner = Runner(link, turns, realtime=realtime, silence=silence, partner=partner)
+        return RobotSession(link, model, turns, runner, world)
     except BaseException:
         transport.close()
         raise
@@ -114,40 +114,16 @@ class RobotSession(Motions, Closing):
     Args:
         link: The connection.
         model: The arm.
-        realtime: False for a controller in lock-step, where timing means nothing.
-        silence: Time without a state, while moving, that counts as a lost connection, [s].
-        on_close: Called once when the session is closed, such as to end a private controller.
+        turns: Whose turn it is on the connection; ends it when the session is closed.
+        runner: Runs motions on it.
         world: What surrounds a virtual robot; None where nothing of the kind is known.
-        partner: Process id of a controller on this machine that is in lock-step with us; None: it is not.
     """
 
-    def __init__(
-        self,
-        link: Link,
-        model: RobotModel,
-        *,
-        realtime: bool = True,
-        silence: float = SILENCE,
-        on_close: Callable[[], None] = lambda: None,
-        world: World | None = None,
-        partner: int | None = None,
-    ) -> None:
-        super().__init__(link, model.limits)
+    def __init__(self, link: Link, model: RobotModel, turns: Turns, runner: Runner, world: World | None) -> None:
+        super().__init__(link, model.limits, turns, runner)
         self._model = model
         self._safety_box: SafetyBox | None = None
-        self._realtime = realtime
-        self._silence = silence
-        self._on_close = on_close
         self._world = world
-        self._partner = partner
-        self._stop_reason: str | None = None
-        self._moving = False
-        self._leaving = False  # A motion is being checked; from here on it can be stopped.
-        self._ears: tuple[Ear, ...] = ()
-        self._closing = False
-        self._closed = False
-        self._busy = threading.RLock()  # Held by the thread that talks to the controller.
-        self._mover: int | None = None  # The thread that runs a motion.
         enlist(self)
 
     @property
@@ -182,12 +158,12 @@ class RobotSession(Motions, Closing):
     @property
     def is_moving(self) -> bool:
         """Whether a motion runs, in whichever thread; `under_way` tells more of one of `execute`."""
-        return self._moving
+        return self._turns.is_moving
 
     @property
     def is_closed(self) -> bool:
         """Whether it was closed; a new one is needed then."""
-        return self._closing
+        return self._turns.is_closing
 
     def hear_runs(self, ear: Ear) -> Callable[[], None]:
         """Has somebody told what became of every motion, as soon as it has ended; returns what ends that.
@@ -195,17 +171,12 @@ class RobotSession(Motions, Closing):
         Args:
             ear: Called in the thread that ran the motion, with its run and the error that ended it, or None.
         """
-        self._ears = (*self._ears, ear)
-
-        def end() -> None:
-            self._ears = tuple(other for other in self._ears if other is not ear)
-
-        return end
+        return self._runner.hear(ear)
 
     @property
     def state(self) -> RobotState:
         """The state of this very millisecond; inside a callback, the one that it was given."""
-        if self._moving and self._link.latest is not None:
+        if self._turns.is_moving and self._link.latest is not None:
             return self._link.latest
         return self.receive_state()
 
@@ -220,7 +191,7 @@ class RobotSession(Motions, Closing):
             UsageError: The session is closed, or a motion runs.
         """
         require_timeout(timeout)
-        with self._turn("receive_states"):
+        with self._turns.take("receive_states"):
             states = self._link.poll(timeout)
         if not states:
             raise self._no_state(timeout)
@@ -241,7 +212,7 @@ class RobotSession(Motions, Closing):
         require_timeout(timeout)
         if not as_number(max_age, "max_age", "s") >= 0.0:
             raise InvalidValueError("max_age", max_age, "must not be below 0 [s]")
-        with self._turn("receive_state"):
+        with self._turns.take("receive_state"):
             while self._link.poll(0.0):
                 pass
             if self._link.latest is not None and self._link.age <= max_age:
@@ -251,22 +222,16 @@ class RobotSession(Motions, Closing):
             raise self._no_state(timeout)
         return states[-1]
 
-    def _no_state(self, timeout: float) -> ConnectionLostError:
-        return ConnectionLostError(
-            f"{self._link.name}: no state within {timeout:g} s; look whether the controller runs and the cable is "
-            "in, then connect again"
-        )
-
     def set_coor(self, T_flange_tool: Pose) -> None:
         """Sets the tool by its pose in the flange frame; `model` has it from then on."""
-        with self._turn("SetCoor"):
+        with self._turns.take("SetCoor"):
             model = self._model.with_tool(T_flange_tool)
             super().set_coor(T_flange_tool)
             self._model = model
 
     def set_cartesian_limit(self, box: SafetyBox) -> None:
         """Sets the safety box that the origin of the tool must stay in, and whether it is watched."""
-        with self._turn("SetCartesianLimit"):
+        with self._turns.take("SetCartesianLimit"):
             super().set_cartesian_limit(box)
             self._safety_box = box
 
@@ -280,7 +245,7 @@ class RobotSession(Motions, Closing):
         """
         from rcilab.dynamics.payload import Payload
 
-        with self._turn("SetLoad"):
+        with self._turns.take("SetLoad"):
             load = Payload(mass=mass, center_of_mass=center_of_mass, inertia=inertia)  # type: ignore[arg-type]
             model = self._model.with_load(load)
             super().set_load(load.mass, load.center_of_mass, load.inertia)
@@ -294,8 +259,7 @@ class RobotSession(Motions, Closing):
         Args:
             reason: What the run says in `stopped`; the first one counts.
         """
-        if self._moving or self._leaving:
-            self._stop_reason = self._stop_reason or reason
+        self._turns.stop(reason)
 
     def recover(self) -> None:
         """Clears the controller's faults and returns once they are gone.
@@ -304,7 +268,7 @@ class RobotSession(Motions, Closing):
             CommandRejectedError: The controller refuses; the message says what it waits for.
             DeadlineError: It agreed, and the faults stayed.
         """
-        with self._turn("recover"):
+        with self._turns.take("recover"):
             recover(self, self._link)
 
     def close(self) -> None:
@@ -312,115 +276,23 @@ class RobotSession(Motions, Closing):
 
         The call that runs the motion returns its run. From inside a callback, the connection ends with the motion.
         """
-        self._closing = True
-        if self._moving and self._mover == threading.get_ident():
-            return
-        is_mine = self._busy.acquire(timeout=_CLOSE_TIMEOUT)
-        try:
-            self._disconnect()
-        finally:
-            if is_mine:
-                self._busy.release()
+        self._turns.close()
 
     def reboot(self) -> None:
         """Restarts the controller. The session is closed then: connect again once it is up."""
-        with self._turn("RebootRobot"):
+        with self._turns.take("RebootRobot"):
             super().reboot()
         self.close()
 
     def __repr__(self) -> str:
-        return f"<RobotSession {self.model.name} at {self._link.name}{', closed' if self._closed else ''}>"
-
-    def _run(self, callback: Callback, mode: Mode, plan: Motion | None, filters: Sequence[CommandFilter] = ()) -> Run:
-        time_needed = RECORD_TIME if plan is None else plan.duration
-        recorder = Recorder(self.n, math.ceil(time_needed / CYCLE_TIME) + _SPARE_CYCLES)
-        loop = ControlLoop(
-            self._link,
-            RciCommands(self._link),  # Not self: everybody else's commands are refused while a motion runs.
-            self.model.limits,
-            ControllerMode[mode.upper()],
-            CycleLog(recorder),
-            watch=lambda t: _CLOSED if self._closing else self._stop_reason,
-            silence=self._silence,
-            model=self.model,
-            filters=filters,
-        )
-        self._mover = threading.get_ident()
-        self._moving = True
-        started_ns = time.time_ns()
-
-        def keep(stopped: str | None, error: BaseException | None = None) -> Run:
-            run = build_run(
-                recorder.rows(),
-                plan=plan if self._paced is None else self._paced[0].as_motion(),
-                paced=self._paced is not None and bool(self._paced[0].changed),
-                stopped=stopped,
-                truncated=recorder.truncated,
-                realtime=self._realtime,
-                model=self.model,
-                setup=Setup(target=self._link.name, mode=mode, started_ns=started_ns),
-            )
-            for ear in self._ears:
-                ear(run, error)
-            return run
-
-        try:
-            with punctual(self._realtime), one_core(self._partner):
-                reason = loop.run(callback)
-        except BaseException as error:
-            self._rest()
-            if self._ears:
-                keep(str(error) or type(error).__name__, error)
-            raise
-        self._rest()
-        return keep(reason)
-
-    def _rest(self) -> None:
-        self._moving = False
-        if self._closing:
-            self._disconnect()
+        return f"<RobotSession {self.model.name} at {self._link.name}{', closed' if self.is_closed else ''}>"
 
     def _request(self, request: Request, timeout: float | None = None) -> Any:
-        with self._turn(type(request).__name__):
+        with self._turns.take(type(request).__name__):
             return super()._request(request, timeout)
 
-    @contextmanager
-    def _setting_out(self, what: str) -> Iterator[None]:
-        """Has the connection for a motion; a stop while it is still being checked counts."""
-        with self._turn(what):
-            self._stop_reason, self._leaving = None, True
-            try:
-                yield
-            finally:
-                self._leaving = False
-
-    @contextmanager
-    def _turn(self, what: str) -> Iterator[None]:
-        """Has the connection for itself: waits for another thread's request, not for a motion.
-
-        Raises:
-            UsageError: A motion runs, or the session is closed.
-        """
-        self._require_free(what)
-        while not self._busy.acquire(timeout=_LOOK):
-            self._require_free(what)
-        try:
-            self._require_free(what)  # Also where the lock is ours: a callback has it too.
-            yield
-        finally:
-            self._busy.release()
-
-    def _require_free(self, what: str) -> None:
-        if self._closing:
-            raise UsageError("this session is closed; connect again").coded("session_closed")
-        if self._moving:
-            said = f"a motion is running already: no {what} meanwhile; let it end, or stop() it first"
-            raise UsageError(said).coded("moving")
-
-    def _disconnect(self) -> None:
-        if not self._closed:
-            self._closed = True
-            self._link.close()
-            if self._world is not None:
-                self._world.close()
-            self._on_close()
+    def _no_state(self, timeout: float) -> ConnectionLostError:
+        return ConnectionLostError(
+            f"{self._link.name}: no state within {timeout:g} s; look whether the controller runs and the cable is "
+            "in, then connect again"
+        )

@@ -6,10 +6,11 @@ from typing import NamedTuple
 
 from rcilab.conformance.measured_conditions import ANGLE_ALLOWANCE, BOX_ALLOWANCE
 from rcilab.controller.actuator import guiding_box
+from rcilab.controller.arm import Arm
 from rcilab.controller.commanded import CommandedMotion
 from rcilab.controller.modes import MODES
 from rcilab.controller.settings import SIGNAL_COUNT, Settings
-from rcilab.controller.state_machine import Phase, When
+from rcilab.controller.state_machine import GROUNDED, POWER_OFF, Action, Phase, Transition, When, transition
 from rcilab.controller.watch import Watch
 from rcilab.kinematics.inverse import build_geometry
 from rcilab.kinematics.singularity import find_singularity
@@ -50,18 +51,27 @@ def answer_query(
             return None
 
 
-def judge_request(request: rci.Request, model: RobotModel, commanded: CommandedMotion) -> rci.Status | None:
-    """Returns why a request cannot be granted whatever the phase is, or None when nothing speaks against it."""
+def judge_request(request: rci.Request, phase: Phase, settings: Settings, arm: Arm) -> Transition | rci.Status:
+    """Returns what a request does, or the status that refuses it whatever its values do to the settings."""
+    cell = transition(phase, request.code)
+    refusal: rci.Status | None = None
     match request:
+        case rci.SetMotorPower(power=0):
+            return POWER_OFF[phase]
         case rci.SetMotorPower(power=power):
-            return None if power in (0, 1) else rci.SettingStatus.INVALID_ARGUMENT
-        case rci.StartMove():
-            return _judge_start(request, model, commanded)
+            refusal = None if power == 1 else rci.SettingStatus.INVALID_ARGUMENT
+        case rci.StartMove() if cell.status is rci.StartStatus.SUCCESS:  # What the phase says comes first.
+            refusal = _judge_start(request, arm.model, arm.commanded)
         case rci.StartDrag(space=space, type=kind):
             is_known = space in tuple(rci.DragSpace) and kind in tuple(rci.DragType)
-            return None if is_known else rci.SettingStatus.INVALID_ARGUMENT
+            refusal = None if is_known else rci.SettingStatus.INVALID_ARGUMENT
+        case rci.AutomaticErrorRecovery() if phase is Phase.REFLEX:
+            refusal = judge_recovery(settings, arm.watch)
+        case _ if request.code in GROUNDED and Action.APPLY in cell.actions and not arm.commanded.is_at_rest:
+            refusal = rci.SettingStatus.NOT_POSSIBLE
         case _:
-            return None
+            pass
+    return cell if refusal is None else refusal
 
 
 def _judge_start(request: rci.StartMove, model: RobotModel, commanded: CommandedMotion) -> rci.StartStatus | None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Literal, TypeAlias, get_args
 
 from rcilab.clock import CYCLE_TIME
-from rcilab.controller.cycle import PREFILL
+from rcilab.controller.client_motion import PREFILL
 from rcilab.errors import InvalidValueError
 from rcilab.protocols.world import LIMIT_TABLES, LimitTable, NetworkFaults, Stall
 

@@ -16,17 +16,15 @@ from dataclasses import replace
 from rcilab.arrays import JointVector
 from rcilab.conformance import LimitTable
 from rcilab.controller.actuator import Law
-from rcilab.controller.answers import Reply, answer_query, conclude, judge_recovery, judge_request
+from rcilab.controller.answers import Reply, answer_query, conclude, judge_request
 from rcilab.controller.arm import Arm
+from rcilab.controller.client_motion import LOST_LIMIT, PREFILL, ClientMotion
 from rcilab.controller.model_download import model_response
-from rcilab.controller.modes import MODES, Mode, build_generator
-from rcilab.controller.modes.generator import MotionGenerator, Step
-from rcilab.controller.modes.terms import build_terms
+from rcilab.controller.modes import MODES
 from rcilab.controller.plant import Plant
-from rcilab.controller.playout import Playback, Playout
 from rcilab.controller.reporter import StateReporter
 from rcilab.controller.settings import apply_request, default_settings
-from rcilab.controller.state_machine import GROUNDED, POWER_OFF, Action, Event, Phase, Transition, transition
+from rcilab.controller.state_machine import Action, Event, Phase, Transition, transition
 from rcilab.faults import Fault
 from rcilab.model import RobotModel
 from rcilab.protocols import rci
@@ -34,12 +32,7 @@ from rcilab.state import ControllerMode, MotionGeneratorMode, RobotState
 from rcilab.words.text import Remark
 
 MODE_DELAY = 200  # [cycles] After StartMove; by then the vendor client's buffer is full of idle states, which it skips.
-PREFILL = 10  # [cycles] Pauses of client and network that a motion survives unharmed, and its delay. Both ends on one
-# busy machine, even under SCHED_FIFO, were measured to pause for 5 to 10 ms now and then.
-TORQUE_PREFILL = 2  # [cycles] The same for torques, where the client closes the loop and delay makes it ring; a choice.
-LOST_LIMIT = 20  # [cycles] Lost commands in a row that are an instability (manual 4.6: usually 10 to 20).
 RECOVERY_TIME = 50  # [cycles] How long an error recovery takes at least; a choice.
-DRAIN_LIMIT = 300  # [cycles] How long queued commands are played after StopMove; longer than any queue.
 _PRESSED = {
     rci.SafetyStop.ESTOP: Remark("an emergency stop was pressed", "estop"),
     rci.SafetyStop.GSTOP: Remark("the safety gate was opened", "gstop"),
@@ -70,7 +63,6 @@ class ControlCycle:
         playout: The queue of commands, with its counts.
         ignored: Commands that came while none was wanted.
         safety_stop: Which emergency stop is pressed.
-        lost_limit: Lost cycles in a row that raise INSTABILITY_DETECTION; None never does.
         limit_table: Whose bounds of the tool's motion commands are judged by; counts from the next motion on.
 
     Args:
@@ -94,10 +86,7 @@ class ControlCycle:
         lost_limit: int | None = LOST_LIMIT,
         recovery_time: int = RECOVERY_TIME,
     ) -> None:
-        self.lost_limit = lost_limit
         self.limit_table: LimitTable = "manual"
-        self.playout = Playout(prefill)
-        self._torque_prefill = min(prefill, TORQUE_PREFILL) if torque_prefill is None else torque_prefill
         self.settings = default_settings(model.description)
         self.safety_stop: rci.SafetyStop = rci.SafetyStop.NONE
         self.phase = Phase.OFF
@@ -106,17 +95,13 @@ class ControlCycle:
         self.ignored = 0
         self._mode_delay = mode_delay
         self._recovery_time = recovery_time
-        self._loop_back = False
         self._model_response = model_response(model.description)  # Now: it takes longer than a cycle.
         self._arm = Arm(model, plant, self.settings)
         self._reporter = StateReporter(model, self.settings)
-        self._generator: MotionGenerator | None = None
-        self._mode = Mode(Law.POSITION, False)
-        self._tau: list[float] | None = None
-        self._drag = (rci.DragSpace.JOINT, rci.DragType.FREE)
+        self._motion = ClientMotion(self._arm, prefill, torque_prefill, lost_limit)
+        self.playout = self._motion.playout
         self._requested = self._shown = _IDLE_MODES
-        self._countdown = self._drain = 0
-        self._has_moved = False
+        self._countdown = 0
         self._is_still = False
         self._message_id = 0
         self._datagram: bytes | None = None
@@ -162,12 +147,11 @@ class ControlCycle:
     @property
     def loop_back(self) -> bool:
         """Whether every digital output is wired to the input of the same number."""
-        return self._loop_back
+        return self.settings.loop_back
 
     @loop_back.setter
     def loop_back(self, on: bool) -> None:
-        self._loop_back = on
-        self._wire()
+        self.settings = self.settings.with_loop_back(on)
 
     @property
     def auto_limit(self) -> bool:
@@ -193,7 +177,7 @@ class ControlCycle:
 
     def receive(self, packet: rci.CommandPacket) -> None:
         """Takes a command that came from the network; it is kept while a motion is under way."""
-        if self.phase is Phase.MOVING or self._drain > 0:
+        if self._motion.is_followed:
             self.playout.push(packet)
         else:
             self.ignored += 1
@@ -203,30 +187,12 @@ class ControlCycle:
         content = answer_query(request, self.phase, self.safety_stop, self.settings, self._model_response)
         if content is not None:
             return Reply(content)
-        cell = transition(self.phase, request.code)
-        refusal = judge_request(request, self.model, self._arm.commanded)
-        match request:
-            case rci.SetMotorPower(power=0):
-                cell = POWER_OFF[self.phase]
-            case rci.StartMove() if cell.status is rci.StartStatus.SUCCESS and refusal is None:
-                modes = ControllerMode(request.controller_mode), rci.StartMotionMode(request.motion_mode)
-                self._mode, self._requested = MODES[modes], (modes[0], modes[1].shown_as)
-            case rci.StartMove() if cell.status is not rci.StartStatus.SUCCESS:
-                refusal = None  # What the phase says comes first.
-            case rci.StartDrag() if refusal is None:
-                self._drag = rci.DragSpace(request.space), rci.DragType(request.type)
-            case rci.AutomaticErrorRecovery() if self.phase is Phase.REFLEX:
-                refusal = judge_recovery(self.settings, self._arm.watch)
-            case _:
-                pass
-        if refusal is not None:
-            return Reply(rci.StatusResponse(refusal))
-        if Action.APPLY in cell.actions:
-            if request.code in GROUNDED and not self._arm.commanded.is_at_rest:
-                return Reply(rci.StatusResponse(rci.SettingStatus.NOT_POSSIBLE))
-            if not self._apply(request):
-                return Reply(rci.StatusResponse(rci.SettingStatus.INVALID_ARGUMENT))
-        self._enter(cell)
+        cell = judge_request(request, self.phase, self.settings, self._arm)
+        if not isinstance(cell, Transition):
+            return Reply(rci.StatusResponse(cell))
+        if Action.APPLY in cell.actions and not self._apply(request):
+            return Reply(rci.StatusResponse(rci.SettingStatus.INVALID_ARGUMENT))
+        self._enter(cell, request=request)
         assert cell.status is not None
         return Reply(rci.StatusResponse(cell.status), cell.when, Action.REBOOT in cell.actions)
 
@@ -236,7 +202,7 @@ class ControlCycle:
 
     def happen(self, event: Event, *faults: Fault) -> None:
         """Takes an event that is not a client's request; `faults` are the bits that it may set."""
-        self._enter(transition(self.phase, event), *faults)
+        self._enter(transition(self.phase, event), faults=faults)
 
     def press_safety_stop(self, kind: rci.SafetyStop) -> None:
         """Presses an emergency stop or opens the safety gate, or ends either with NONE.
@@ -267,27 +233,27 @@ class ControlCycle:
         return self.state
 
     def _live(self) -> None:
-        self._has_moved = False
+        motion = self._motion
         self._count_down()
-        step = self._follow()
-        if step.faults:
+        step = motion.follow() if motion.is_followed else None
+        has_moved = step is not None and not step.faults
+        if step is not None and step.faults:
             self._raise(step.faults, step.reason)
         law = self._current_law()
         if law is not Law.TORQUE:
-            self._tau = None
-        self._arm.move(law, self._tau, has_moved=self._has_moved)
+            motion.tau = None
+        self._arm.move(law, motion.tau, has_moved=has_moved)
         if self.phase in _MOVING:
             # Our own stop is one of the joints: how the tool turns meanwhile is nobody's command.
-            faults, reason = self._arm.watch.judge(is_commanded=self.phase is Phase.MOVING or self._drain > 0)
+            faults, reason = self._arm.watch.judge(is_commanded=motion.is_followed)
             if faults:
                 self._raise(faults, reason)
-        if self.phase is Phase.STOPPING and self._arm.stands and self._drain == 0:
+        if self.phase is Phase.STOPPING and self._arm.stands and not motion.is_followed:
             self.happen(Event.AT_REST)
 
     def _may_stay_still(self) -> bool:
         """Returns whether the next cycle will be like this one, unless somebody asks for something or moves the arm."""
-        waits = self.phase in _STILL and self._countdown == 0 and self._drain == 0
-        return waits and self._arm.has_settled(self._current_law())
+        return self.phase in _STILL and self._countdown == 0 and self._arm.has_settled(self._current_law())
 
     def _repeat(self) -> RobotState:
         self.state = self._reporter.repeat(self._message_id)
@@ -309,47 +275,18 @@ class ControlCycle:
         self.reason = reason
         self.happen(Event.FAULT, *faults)
 
-    def _follow(self) -> Step:
-        """Plays what is due in this cycle; a step that raises faults is not followed."""
-        if self._drain > 0:
-            self._drain = self._drain - 1 if len(self.playout) else 0
-        if (self.phase is not Phase.MOVING and self._drain == 0) or self._generator is None:
-            return Step()
-        playback = self.playout.take(self._generator.is_next)
-        if playback.packet is None and not playback.is_lost:
-            return Step()
-        step = self._count_losses(self._generator.step(playback), playback)
-        if not step.faults:
-            self._has_moved = True
-            self._tau = step.tau
-            if step.q is not None:
-                self._arm.commanded.move(step.q, step.differences)
-        return step
-
-    def _count_losses(self, step: Step, playback: Playback) -> Step:
-        """Raises the instability of too many lost commands in a row."""
-        lost = self.playout.lost_in_row
-        if playback.is_lost and self.lost_limit is not None and lost >= self.lost_limit:
-            return Step(
-                faults=(Fault.INSTABILITY_DETECTION,),
-                reason=Remark(f"{lost} commands in a row were lost", "lost_in_row", count=lost),
-            )
-        return step
-
     def _current_law(self) -> Law:
-        phase = self.phase
-        if phase is Phase.GUIDING:
+        if self._motion.is_followed:
+            return self._motion.law
+        if self.phase is Phase.GUIDING:
             return Law.GUIDE
-        if phase is Phase.MOVING or (phase is Phase.STOPPING and self._drain > 0):
-            is_over = self._mode.law.leads and self.playout.is_finished  # Nobody holds the arm any more.
-            return Law.POSITION if is_over else self._mode.law
-        return Law.BRAKED if phase in _BRAKED and self._arm.may_be_braked else Law.POSITION
+        return Law.BRAKED if self.phase in _BRAKED and self._arm.may_be_braked else Law.POSITION
 
     def _report(self) -> RobotState:
         controller_mode, motion_mode = self._shown
         return self._reporter.report(
             self._message_id,
-            self._arm.read(self._tau),
+            self._arm.read(self._motion.tau),
             faults=self.faults,
             success_rate=self.playout.success_rate,
             motion_generator_mode=motion_mode,
@@ -357,35 +294,38 @@ class ControlCycle:
             robot_mode=self.phase.robot_mode,
         )
 
-    def _enter(self, cell: Transition, *faults: Fault) -> None:
+    def _enter(self, cell: Transition, *, request: rci.Request | None = None, faults: tuple[Fault, ...] = ()) -> None:
         self._is_still = False
         for action in cell.actions:
-            self._act(action, faults)
+            self._act(action, request, faults)
         if cell.phase is Phase.RECOVERING and self.phase is not Phase.RECOVERING:
             self._countdown = self._recovery_time
         self.phase = cell.phase
 
-    def _act(self, action: Action, faults: tuple[Fault, ...]) -> None:
+    def _act(self, action: Action, request: rci.Request | None, faults: tuple[Fault, ...]) -> None:
         match action:
             case Action.BEGIN:
-                self._countdown = self._mode_delay
-                self.playout.begin(most=self._torque_prefill if self._mode.law is Law.TORQUE else None)
+                assert isinstance(request, rci.StartMove)
+                modes = ControllerMode(request.controller_mode), rci.StartMotionMode(request.motion_mode)
+                self._requested, self._countdown = (modes[0], modes[1].shown_as), self._mode_delay
+                self._motion.prepare(MODES[modes])
             case Action.SHOW_MODES:
                 self._shown = self._requested
-                self._begin_motion()
+                self._motion.begin(self.settings, self.limit_table)
             case Action.HIDE_MODES:
                 self._shown = _IDLE_MODES
             case Action.DRAIN:
-                self._drain = DRAIN_LIMIT
+                self._motion.drain()
             case Action.DISCARD:
-                self._drain = 0
-                self.playout.clear()
+                self._motion.discard()
             case Action.SET_FAULTS:
                 self.faults = tuple(sorted({*self.faults, *faults}))
             case Action.CLEAR_FAULTS:
                 self.faults = ()
             case Action.GUIDE:
-                self._arm.actuator.begin_guiding(*self._drag, self._arm.watch.measured)
+                assert isinstance(request, rci.StartDrag)
+                space, kind = rci.DragSpace(request.space), rci.DragType(request.type)
+                self._arm.actuator.begin_guiding(space, kind, self._arm.watch.measured)
             case Action.REBOOT:
                 self.settings = self.settings.rebooted(self.model.description)
                 self._arm.configure(self.settings)
@@ -393,30 +333,12 @@ class ControlCycle:
             case Action.APPLY:
                 pass  # Done before, because it may fail.
 
-    def _begin_motion(self) -> None:
-        q, watch = list(self._arm.commanded.q), self._arm.watch
-        terms = build_terms(self._mode, self.model, self.settings, self.limit_table, watch.measured, watch.tool.pose)
-        self._generator = build_generator(self._mode, terms, q)
-        watch.begin(
-            terms.limits,
-            terms.box,
-            self.settings.collision_thresholds,
-            judges_tool=self._mode.is_cartesian,
-            yields=self._mode.law.yields,
-        )
-        self._tau = [0.0] * self.model.n if self._mode.law is Law.TORQUE else None
-
     def _apply(self, request: rci.Request) -> bool:
         settings = apply_request(self.settings, request, self.model.description)
         if settings is None:
             return False
         self.settings = settings
-        self._wire()
         self._arm.configure(settings)
         if request.code in _REPORTED:
             self._reporter.configure(self.model, settings)
         return True
-
-    def _wire(self) -> None:
-        if self._loop_back:
-            self.settings = replace(self.settings, inputs=self.settings.outputs)

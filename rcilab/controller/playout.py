@@ -6,7 +6,7 @@
   client and network. A burst (the vendor's client may answer 90 old states at once after StartMove) simply fills the
   queue; its old message ids do not matter.
 * Where ids advance one by one, they are cycle numbers. An empty queue is a lost cycle, and the command for it, when
-  it comes after all, is dropped: the arm has passed that place already.
+  it comes after all, is dropped as it comes: the arm has passed that place already.
 * A repeated id is the next command: the vendor's client answers the last state again when none came in time. A
   datagram that is the same in every number is the network's copy and dropped; it only shows that the client lives.
 * A command that was overtaken on its way is put back in its place.
@@ -88,7 +88,7 @@ class Playout:
         self._outcomes: deque[bool] = deque(maxlen=WINDOW)
         self._played_in_window = 0
         self._last_id = 0
-        self._extrapolated_through: int | None = None
+        self._was_lost = False  # The cycle `_last_id` had no command.
         self._surplus = 0
         self.is_playing = False
         self.is_finished = False
@@ -114,19 +114,22 @@ class Playout:
     def push(self, packet: CommandPacket) -> None:
         """Takes a command from the network."""
         queue, newest = self._queue, self._newest
-        behind = 0 if newest is None else newest.message_id - packet.message_id
-        if 0 < behind <= LONGEST_GAP:
-            self._put_in_place(packet)
-            return
         if packet == newest:
             self.copies += 1
             self._lives = True
             return
-        if len(queue) >= self._capacity:
-            queue.popleft()
-            self.dropped += 1
-        queue.append(packet)
-        self._newest = packet
+        is_overtaken = newest is not None and 0 < newest.message_id - packet.message_id <= LONGEST_GAP
+        if not is_overtaken:
+            self._newest = packet
+        if self._is_late(packet):
+            self.late += 1
+        elif is_overtaken:
+            self._put_in_place(packet)
+        else:
+            if len(queue) >= self._capacity:
+                queue.popleft()
+                self.dropped += 1
+            queue.append(packet)
 
     def work_off(self) -> bool:
         """Returns whether a cycle more is due now: many more commands than the prefill waited through the last window.
@@ -156,7 +159,6 @@ class Playout:
             self.is_playing = True
             self._skip_old()
             self._last_id = self._queue[0].message_id - 1
-        self._drop_late()
         self._look_for_excess()
         skipped = self._skip_old()
         lives, self._lives = self._lives, False
@@ -176,6 +178,11 @@ class Playout:
         elif ahead != 1:
             self._surplus = 0
         return self._play(packet, skipped)
+
+    def _is_late(self, packet: CommandPacket) -> bool:
+        """Returns whether the cycle that a command is for has passed already."""
+        behind = self._last_id - packet.message_id
+        return 0 <= behind <= LONGEST_GAP and (behind > 0 or self._was_lost) and self.is_playing
 
     def _put_in_place(self, packet: CommandPacket) -> None:
         """Takes a command that was overtaken."""
@@ -201,7 +208,7 @@ class Playout:
             return 0
         skipped = max(0, len(self._queue) - self._stock - 1)
         for _ in range(skipped):
-            self._last_id = self._queue.popleft().message_id
+            self._last_id, self._was_lost = self._queue.popleft().message_id, False
         return skipped
 
     def _wait_alive(self) -> Playback:
@@ -213,31 +220,19 @@ class Playout:
 
     def _play(self, packet: CommandPacket, skipped: int) -> Playback:
         self._queue.popleft()
-        self._last_id = packet.message_id
-        self._extrapolated_through = None
+        self._last_id, self._was_lost = packet.message_id, False
         self.lost_in_row = 0
         self.is_finished = packet.finished
         self._count(True)
         return Playback(packet, 1, False, skipped)
 
     def _lose(self, playback: Playback) -> Playback:
-        self._last_id += 1
-        self._extrapolated_through = self._last_id
+        self._last_id, self._was_lost = self._last_id + 1, True
         self.lost += 1
         self.lost_in_row += 1
         self.most_in_row = max(self.most_in_row, self.lost_in_row)
         self._count(False)
         return playback
-
-    def _drop_late(self) -> None:
-        queue, last = self._queue, self._last_id
-        while queue:
-            behind = last - queue[0].message_id
-            is_late = 0 <= behind <= LONGEST_GAP and (behind > 0 or self._extrapolated_through == last)
-            if not is_late:
-                return
-            queue.popleft()
-            self.late += 1
 
     def _count(self, played: bool) -> None:
         outcomes = self._outcomes

@@ -234,9 +234,14 @@ class ControllerServer:
                 return
 
     def _await_command(self) -> None:
-        """Serves the sockets until a command is there or lost on its way, the motion is over or patience is."""
+        """Serves the sockets until a command is there or lost on its way, the motion is over or patience is.
+
+        One that comes too late for its own cycle is not waited for any more, but tells that the client is back: whoever
+        is patient with it again lets it catch up.
+        """
         cycle = self.cycle
         is_first = not cycle.playout.is_playing
+        late = cycle.playout.late
         deadline = self._clock.now() + self._patience
         while True:
             remaining = min(deadline - self._clock.now(), _LOOK)
@@ -247,6 +252,9 @@ class ControllerServer:
                 return
             if self._network.has_lost:
                 return
+            if self._is_out_of_patience and cycle.playout.late > late:
+                self._is_out_of_patience = False
+                deadline = self._clock.now() + self._patience
             if is_first:
                 self._send_state()
             elif self._clock.now() >= deadline:

@@ -67,6 +67,8 @@ class Settings:
     outputs: tuple[bool, ...] = (False,) * SIGNAL_COUNT
     inputs: tuple[bool, ...] = (False,) * SIGNAL_COUNT
     """Levels of the digital inputs; nothing is wired to a virtual controller, they are set from outside."""
+    loop_back: bool = False
+    """Whether every digital output is wired to the input of the same number."""
     auto_limit: bool = False
     """Whether commanded joint angles are led to rest inside the soft limits instead of raising a fault beyond them.
     `auto_limit` of setJointLimit is not on the wire: it is set from outside."""
@@ -85,9 +87,14 @@ class Settings:
             raise InvalidValueError("digital input", signal, f"does not exist; needs 0 to {SIGNAL_COUNT - 1}")
         return replace(self, inputs=(*self.inputs[:signal], bool(level), *self.inputs[signal + 1 :]))
 
+    def with_loop_back(self, on: bool) -> Settings:
+        """Returns the settings with every digital output wired to its input, or none."""
+        return replace(self, loop_back=on, inputs=self.outputs if on else self.inputs)
+
     def rebooted(self, arm: RobotDescription) -> Settings:
         """Returns what is left after a reboot: the defaults, and what is wired or chosen outside of the controller."""
-        return replace(default_settings(arm), inputs=self.inputs, auto_limit=self.auto_limit)
+        kept = replace(default_settings(arm), inputs=self.inputs, auto_limit=self.auto_limit)
+        return kept.with_loop_back(self.loop_back)
 
 
 def default_settings(arm: RobotDescription) -> Settings:
@@ -157,8 +164,8 @@ def _judge(request: rci.Request, arm: RobotDescription, settings: Settings) -> d
         case rci.SetDO(signal=signal, level=level):
             if signal >= SIGNAL_COUNT:
                 return None
-            outputs = settings.outputs
-            return {"outputs": (*outputs[:signal], level, *outputs[signal + 1 :])}
+            outputs = (*settings.outputs[:signal], level, *settings.outputs[signal + 1 :])
+            return {"outputs": outputs, "inputs": outputs if settings.loop_back else settings.inputs}
         case _:
             return {}
 

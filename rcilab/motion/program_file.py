@@ -14,6 +14,7 @@ from rcilab.motion.lined_json import LONGEST, Node, read_json
 from rcilab.motion.program import Program
 from rcilab.motion.waypoint import ALLOWED, ALWAYS, WORDS, Waypoint, require_fit
 from rcilab.robots import RobotDescription, describe_robot
+from rcilab.whole_file import read_whole
 
 FORMAT = "rcilab program"
 VERSION = 1
@@ -62,15 +63,7 @@ def load_program(file: str | PathLike[str]) -> Program:
     if not isinstance(file, str | PathLike):
         raise InvalidValueError("program file", described(file), "is no file name")
     path = Path(fspath(file))
-    try:
-        with path.open("rb") as stream:
-            content = stream.read(LONGEST + 1)
-    except FileNotFoundError as error:
-        raise InvalidValueError("program file", str(path), "does not exist").coded("no_file", file=str(path)) from error
-    except OSError as error:
-        raise InvalidValueError("program file", str(path), f"cannot be read: {error.strerror}").coded(
-            "file_unreadable", file=str(path)
-        ) from error
+    content = read_whole(path, "program file", LONGEST + 1)
     return read_program(content, path.name)
 
 

@@ -17,6 +17,7 @@ from rcilab.motion.motion import Motion
 from rcilab.motion.spline import motion_through
 from rcilab.motion.storage import KIND
 from rcilab.motion.table import Table, read_table
+from rcilab.whole_file import read_whole
 
 AngleUnit: TypeAlias = Literal["rad", "deg"]
 
@@ -43,14 +44,7 @@ def load_samples(file: str | PathLike[str], *, rate_hz: float | None = None, uni
     path = Path(fspath(file))
     if path.suffix.lower() not in _READERS:
         raise InvalidValueError("samples", str(path), f"must end in {' or '.join(_READERS)}, which tells the format")
-    try:
-        content = path.read_bytes()
-    except FileNotFoundError as error:
-        raise InvalidValueError("samples", str(path), "does not exist").coded("no_file", file=str(path)) from error
-    except OSError as error:
-        raise InvalidValueError("samples", str(path), f"cannot be read: {error.strerror}").coded(
-            "file_unreadable", file=str(path)
-        ) from error
+    content = read_whole(path, "samples")
     times, q, place = _READERS[path.suffix.lower()](content, path.name, rate_hz is not None, unit)
     if times is None:
         if rate_hz is None:

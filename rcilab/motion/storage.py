@@ -13,6 +13,7 @@ from rcilab.errors import InvalidValueError, VersionMismatchError
 from rcilab.motion.archive import read_arrays
 from rcilab.motion.motion import Motion
 from rcilab.motion.piecewise import PiecewisePolynomial
+from rcilab.whole_file import read_whole
 
 KIND = "rcilab motion"
 VERSION = 1
@@ -90,14 +91,7 @@ def load_motion(file: str | PathLike[str] | BinaryIO) -> Motion:
 
 def _read(file: str | PathLike[str] | BinaryIO, name: str) -> dict[str, np.ndarray]:
     if isinstance(file, str | PathLike):
-        try:
-            content = Path(file).read_bytes()
-        except FileNotFoundError as error:
-            raise InvalidValueError("motion file", name, "does not exist").coded("no_file", file=name) from error
-        except OSError as error:
-            raise InvalidValueError("motion file", name, f"cannot be read: {error.strerror}").coded(
-                "file_unreadable", file=name
-            ) from error
+        content = read_whole(Path(file), "motion file")
     else:
         content = file.read()
     if not content:

@@ -41,6 +41,7 @@ from rcilab.recording.blocks import Block, decode_blocks, encode_block, encode_h
 from rcilab.recording.run import Run
 from rcilab.recording.setup import Setup
 from rcilab.spatial import Pose
+from rcilab.whole_file import read_whole
 
 if TYPE_CHECKING:
     from rcilab.conformance import Report
@@ -209,15 +210,7 @@ def load_run(file: str | PathLike[str]) -> Run:
         VersionMismatchError: It was written by another version of this format.
     """
     name = fspath(file)
-    try:
-        content = Path(name).read_bytes()
-    except FileNotFoundError as error:
-        raise InvalidValueError("run file", name, "does not exist").coded("no_file", file=name) from error
-    except OSError as error:
-        raise InvalidValueError("run file", name, f"cannot be read: {error.strerror}").coded(
-            "file_unreadable", file=name
-        ) from error
-    return decode_run(content, name)
+    return decode_run(read_whole(Path(name), "run file"), name)
 
 
 def decode_run(content: bytes, name: str = "stream") -> Run:

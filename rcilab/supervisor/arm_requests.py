@@ -67,10 +67,24 @@ class ArmRequests:
         """Asks for motor power to be taken away."""
         return self._ask("power off", kind="power", on=False)
 
+    @property
+    def stops(self) -> int:
+        """How often `stop` has been called since `start`; what was wanted before the last one moves nothing."""
+        with self._lock:
+            return 0 if self._block is None else self._block.words[Word.STOPS_ASKED]
+
     def execute(
-        self, motion: Motion, certificate: Certificate, mode: Mode = "joint_position", *, pace: float = 1.0
+        self,
+        motion: Motion,
+        certificate: Certificate,
+        mode: Mode = "joint_position",
+        *,
+        pace: float = 1.0,
+        stops: int | None = None,
     ) -> Ticket:
         """Streams a checked motion; the ticket is done when the arm stands still again.
+
+        It is judged once more before it is handed over, which takes up to some 0.2 s; a `stop` meanwhile counts.
 
         Args:
             motion: The motion.
@@ -78,16 +92,18 @@ class ArmRequests:
             mode: How the arm is commanded: the same way as joint angles, as poses of the tool, or as torques; see
                 `rcilab.client.commanding`.
             pace: Part of its planned speed that it runs at from the beginning, 0.1 to 1; `set_pace` changes it later.
+            stops: What `stops` was when somebody wanted this; None: they want it now.
 
         Raises:
             InvalidValueError: The pace is out of range.
             PlanningError: At this pace it would break a condition, or last too long.
             CertificateError: The certificate is missing, or does not fit the motion, the model, or where the arm is.
             UsageError: The arm is moving, no controller is connected, nobody is at the controls, the motion takes more
-                than 300 s, or the controller has not taken the set-up it was told last.
+                than 300 s, the controller has not taken the set-up it was told last, or a stop has come meanwhile.
         """
         from rcilab.conformance.pacing import plan_start
 
+        stops = self.stops if stops is None else stops
         require_admissible(
             motion,
             certificate,
@@ -99,7 +115,7 @@ class ArmRequests:
         )
         paced = plan_start(motion, pace, self.model, mode)
         with self._lock:
-            self._require_block()
+            self._require_unstopped(stops)
             self._setup.require_given()
             self._pace.begin(paced, self.model, mode)
             duration = paced.duration if paced.changed else motion.duration  # As planned it may end within a cycle.
@@ -165,7 +181,9 @@ class ArmRequests:
             raise UsageError("no motion runs whose pace could change").coded("no_pace")
         return cycle
 
-    def jog(self, kind: JogKind, values: ArrayLike, *, goes_on: Ticket | None = None) -> Ticket:
+    def jog(
+        self, kind: JogKind, values: ArrayLike, *, goes_on: Ticket | None = None, stops: int | None = None
+    ) -> Ticket:
         """Moves the arm as long as it is held: call it at least five times a second, and `release_jog` at the end.
 
         The first call begins a jog, the next ones go on with it, whatever direction they ask for: on-line re-planning
@@ -178,13 +196,15 @@ class ArmRequests:
             values: n joint velocities, [rad/s], or a twist of six numbers, linear first, [m/s, rad/s]; lowered to
                 what the limits allow.
             goes_on: Ticket of the jog to go on with: where that has ended meanwhile, as by `stop`, none is begun.
+            stops: What `stops` was when somebody wanted to begin a jog; None: they want it now.
 
         Returns:
             The ticket of the jog; it is done when the arm stands still and nobody jogs any more.
 
         Raises:
             InvalidValueError: The kind is unknown, or the values are not as many finite numbers as it needs.
-            UsageError: Another motion is under way, no controller is connected, or nobody is at the controls.
+            UsageError: Another motion is under way, no controller is connected, nobody is at the controls, or a stop
+                has come meanwhile.
         """
         command = build_jog(kind, values, self.model.n)
         with self._lock:
@@ -193,6 +213,7 @@ class ArmRequests:
             if goes_on is not None and goes_on.done:
                 raise UsageError("this jog has ended; begin another one").coded("jog_ended")
             if not is_under_way:
+                self._require_unstopped(stops)
                 self._setup.require_given()
                 require_ready(self.status(), is_operator_overdue=self._is_operator_overdue())
             hold_jog(block.jog, block.words, command)
@@ -206,7 +227,9 @@ class ArmRequests:
             if self._block is not None:
                 release_jog(self._block.words)
 
-    def start_guiding(self, space: GuideSpace = "joint", kind: GuideKind = "free") -> Ticket:
+    def start_guiding(
+        self, space: GuideSpace = "joint", kind: GuideKind = "free", *, stops: int | None = None
+    ) -> Ticket:
         """Frees the arm for a hand to guide it (startDrag), until `stop_guiding` or `stop`; done once it is free.
 
         The phase is "moving" meanwhile and the code "moving.guided". It ends like a motion when nobody is at the
@@ -215,14 +238,16 @@ class ArmRequests:
         Args:
             space: In joint space every joint is free, and `kind` has no effect.
             kind: What stays free in Cartesian space.
+            stops: What `stops` was when somebody wanted this; None: they want it now.
 
         Raises:
             InvalidValueError: There is no such space or kind.
-            UsageError: The arm is moving, no controller is connected, or nobody is at the controls.
+            UsageError: The arm is moving, no controller is connected, nobody is at the controls, or a stop has come
+                meanwhile.
         """
         require_guidable(space, kind)
         with self._lock:
-            self._require_block()
+            self._require_unstopped(stops)
             require_ready(self.status(), is_operator_overdue=self._is_operator_overdue())
             self._setup.require_given()
             return self._ask("start guiding", kind="start_guiding", space=space, type=kind)
@@ -238,6 +263,14 @@ class ArmRequests:
             release_jog(block.words)
             block.words[Word.STOPS_ASKED] += 1
             return self._ask("stop", kind="stop", number=block.words[Word.STOPS_ASKED])
+
+    def _require_unstopped(self, stops: int | None) -> None:
+        """Refuses what was wanted before the last stop, and all while not running; call with the lock."""
+        self._require_block()
+        if stops is not None and self.stops > stops:
+            raise UsageError("a stop came before the arm had begun to move; ask again if it is to move").coded(
+                "stopped_before"
+            )
 
     def set_up(self, setup: RobotSetup) -> Ticket:
         """Tells the controller a tool, a load, a safety box, a force-control frame; done once it has taken all of it.

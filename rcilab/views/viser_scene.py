@@ -160,7 +160,7 @@ def _turn(handle: Any, wxyz: Sequence[float]) -> None:
 
     Arms are turned joint by joint at the display's rate, and only joints that have moved.
     """
-    node, turned = handle._impl, tuple(map(float, wxyz))
+    node, turned = handle._impl, tuple(wxyz)
     node.wxyz[:] = turned
     node.api._queue_scene_message(_turned_message()(node.name, turned))
 

@@ -6,11 +6,13 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 if TYPE_CHECKING:
     import viser
 
 _CAMERA, _LOOK_AT = (1.80, -1.85, 1.22), (0.17, 0.02, 0.49)  # [m]
+_UP = (0.0, 0.0, 1.0)
 _FIELD_OF_VIEW = 0.75  # [rad] from the upper edge to the lower one
 _ROOM = 1.4  # [m] How much of the scene's width the arm and its target's handles take.
 
@@ -21,24 +23,34 @@ def place_camera(server: viser.ViserServer) -> None:
     camera.position, camera.look_at, camera.fov = _CAMERA, _LOOK_AT, _FIELD_OF_VIEW
 
 
-def keep_in_view(camera: viser.CameraHandle) -> None:
-    """Has a page's camera step back as far as the window, or the panels beside the scene, leave little room.
+class HomeView:
+    """A page's camera, and where it stands at first: further back as the window, or the panels, leave little room.
 
-    A camera that somebody has moved stays, until they reset the view.
+    A camera that somebody has moved stays, until they bring it back.
+
+    Args:
+        camera: Of a page that has just connected.
     """
-    placed = np.array(_CAMERA)
 
-    @camera.on_update
-    async def _(_camera: object) -> None:
-        nonlocal placed
-        if not any(np.allclose(camera.position, known, atol=1e-3) for known in (placed, _CAMERA)):
-            return
-        position = standing_place(camera.aspect)
-        if not np.allclose(camera.position, position, atol=1e-3):
-            placed = position
-            with camera.client.atomic():
-                camera.position = position
-                camera.look_at = np.array(_LOOK_AT)
+    def __init__(self, camera: viser.CameraHandle) -> None:
+        self._camera = camera
+        self._placed = np.array(_CAMERA)
+
+        @camera.on_update
+        async def _(_camera: object) -> None:
+            if self._stands_at(self._placed, _CAMERA) and not self._stands_at(standing_place(camera.aspect)):
+                self.go()
+
+    def go(self) -> None:
+        """Brings the camera there, upright, from wherever it is."""
+        camera, self._placed = self._camera, standing_place(self._camera.aspect)
+        with camera.client.atomic():
+            camera.position = self._placed
+            camera.look_at = np.array(_LOOK_AT)
+            camera.up_direction = _UP
+
+    def _stands_at(self, *places: ArrayLike) -> bool:
+        return any(np.allclose(self._camera.position, place, atol=1e-3) for place in places)
 
 
 def standing_place(aspect: float) -> np.ndarray:

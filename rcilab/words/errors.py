@@ -20,6 +20,11 @@ _REQUIREMENTS = frozenset(
     }
 )  # fmt: skip
 """What a value has to be, and is not: said alone, these name it first."""
+_PLACES = {"waypoint": "waypoint_error", "way": "way_error", "way_to_start": "way_error", "blend": "way_error"}
+"""What is not about a target: a waypoint of a program, or the way to one; and where its words for what is in
+`_ADVISING` are."""
+_ADVISING = frozenset({"too_far", "too_close", "no_angles", "joint_beyond", "no_motion"})
+"""Reasons whose words say what to do with the target."""
 _SHOWN = 40  # Characters of a value that is repeated.
 
 
@@ -42,11 +47,14 @@ def tell_note(note: str) -> Message | Finished:
     return message(f"remark.{note.code}", **_named(facts))
 
 
-def _tell_reason(error: RcilabError) -> Message | Finished:
+def _tell_reason(error: RcilabError, about: str = "error") -> Message | Finished:
     if not error.code:
         return Finished(str(error))
-    facts = {name: _tell_reason(fact) if isinstance(fact, RcilabError) else fact for name, fact in error.facts.items()}
-    return message(f"error.{error.code}", **_named(facts))
+    inner = _PLACES.get(error.code, about)
+    facts = {
+        name: _tell_reason(fact, inner) if isinstance(fact, RcilabError) else fact for name, fact in error.facts.items()
+    }
+    return message(f"{about if error.code in _ADVISING else 'error'}.{error.code}", **_named(facts))
 
 
 def _named(facts: Mapping[str, object]) -> dict[str, object]:

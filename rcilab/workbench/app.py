@@ -12,7 +12,7 @@ from typing import IO, TYPE_CHECKING
 from rcilab.model import load_model, require_rci
 from rcilab.views.gate import Gate
 from rcilab.views.guarded_server import GuardedServer
-from rcilab.views.viser_stage import keep_in_view
+from rcilab.views.viser_stage import HomeView
 from rcilab.workbench import requests, security
 from rcilab.workbench.conductor import Conductor
 from rcilab.workbench.goal.actions import initial_goal
@@ -88,6 +88,7 @@ class Workbench:
         self.server: viser.ViserServer
         self._stopped = threading.Event()
         self._opened = False
+        self._views: dict[int, HomeView] = {}  # By page. Owned by the event loop.
 
     @property
     def url(self) -> str:
@@ -110,6 +111,7 @@ class Workbench:
                 peek=lambda page, branch: ask(requests.Peek(page=page, index=branch if branch >= 0 else None)),
                 take=lambda page: ask(requests.TakeControls(page=page)),
                 answer=lambda page, yes: ask(requests.AnswerControls(page=page, yes=yes)),
+                home=self._bring_back,
             )
         )
         gate = Gate(host=self._config.host, port=self.port, token=self._config.token, title="this workbench")
@@ -150,13 +152,19 @@ class Workbench:
         @self.server.on_client_connect
         async def _(client: viser.ClientHandle) -> None:
             ask(requests.PageCame(page=client.client_id))
-            keep_in_view(client.camera)
+            self._views[client.client_id] = HomeView(client.camera)
             introduce(client, self.live.introduce(client.client_id))
 
         @self.server.on_client_disconnect
         async def _(client: viser.ClientHandle) -> None:
             ask(requests.PageWent(page=client.client_id))
             self.live.forget(client.client_id)
+            self._views.pop(client.client_id, None)
+
+    def _bring_back(self, page: int) -> None:
+        """Shows a page what it showed at first; what other pages see is theirs."""
+        if page in self._views:
+            self._views[page].go()
 
     def _here(self, page: int) -> None:
         """Hears that a page is there; only that of the operator counts for the robot side."""

@@ -7,6 +7,7 @@ import threading
 import time
 import traceback
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 from rcilab.errors import RcilabError
@@ -137,6 +138,8 @@ class Conductor:
 
     def ask(self, request: requests.Request) -> None:
         """Takes a request and returns at once; callable from any thread."""
+        if isinstance(request, requests.Moving):
+            request = replace(request, stops=self._session.stops)
         self._mailbox.put(request, _coalescing_key(request))
 
     def resume(self) -> None:

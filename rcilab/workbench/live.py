@@ -37,6 +37,8 @@ class Heard:
     """A page wants the controls."""
     answer: Callable[[int, bool], None]
     """A page was asked for the controls."""
+    home: Callable[[int], None] = lambda page: None
+    """A page wants its camera back where it was at first."""
 
 
 class LiveChannel:
@@ -107,6 +109,8 @@ class LiveChannel:
             _pass_on(said.get("branch"), -1.0, 99.0, lambda branch: self._heard.peek(page, int(branch)))
         elif kind == "take":
             self._heard.take(page)
+        elif kind == "home":
+            self._heard.home(page)
         elif kind == "answer" and isinstance(said.get("yes"), bool):
             self._heard.answer(page, said["yes"])
         return page

@@ -29,8 +29,8 @@ def decorate(index: bytes) -> bytes:
     """
     assets = files("rcilab.workbench") / "assets"
     style = (assets / "page.css").read_bytes()
-    names = ("page.js", "marks.js", "names.js", "rows.js", "pick.js", "branches.js", "folds.js", "retell.js")
-    script = b"\n".join((assets / name).read_bytes() for name in names)
+    scripts = ("page", "marks", "names", "rows", "pick", "branches", "folds", "retell", "labels")
+    script = b"\n".join((assets / f"{name}.js").read_bytes() for name in scripts)
     head = b"<style>" + style + b"</style><script>" + script + b"</script></head>"
     page = index.replace(b"<title>Viser</title>", b"<title>rcilab workbench</title>", 1)
     return page.replace(b"</head>", head, 1)

@@ -15,6 +15,14 @@ class Request:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Moving(Request):
+    """Something that may set the robot in motion. A stop that comes before it has done so undoes it."""
+
+    stops: int | None = None
+    """How many stops the robot side had heard of when the page asked; None: as many as when it is carried out."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class MoveJoint(Request):
     """Pose one joint of the goal."""
 
@@ -48,7 +56,7 @@ class SetJog(Request):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class JogButton(Request):
+class JogButton(Moving):
     """One of the buttons of the Jog tab."""
 
     axis: str
@@ -161,7 +169,7 @@ class SetLaw(Request):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Drive(Request):
+class Drive(Moving):
     """Something for the robot: what the buttons of the Run tab say."""
 
     what: Literal[

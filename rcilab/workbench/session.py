@@ -108,6 +108,12 @@ class Session:
             ):  # It is closed or has no connection: nothing of ours moves, and status says why.
                 current.stop()
 
+    @property
+    def stops(self) -> int:
+        """How often the supervisor of now was stopped; 0 where there is none."""
+        current = self._current
+        return 0 if current is None else current.stops
+
     def heartbeat(self) -> None:
         """Tells the control process that somebody is at the page; call it several times a second while it is so."""
         ready = self._ready

@@ -1,10 +1,11 @@
-"""The scene as a person meets it: the elbow's handle under the mouse, a way to stand looked at and taken."""
+"""The scene as a person meets it: elbow and ways to stand by mouse, words that stay inside, the camera brought back."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from rcilab.views.elbow_view import OUTWARD
+from rcilab.views.viser_stage import standing_place
 
 
 def test_dragging_the_elbow_turns_it_and_leaves_the_tool(page):
@@ -36,3 +37,41 @@ def test_a_way_to_stand_is_seen_under_the_mouse_and_taken_with_enter(page):
     other.focus()
     page.tab.keyboard.press("Enter")
     page.wait(lambda: np.abs(page.state.goal.q - q).max() < 1e-6, "the way to be taken")
+
+
+EDGES = """() => {
+  let scene = __viserMutable.nodeRefFromName['/live'];
+  while (scene.parent) scene = scene.parent;
+  const camera = __viserMutable.camera, V = camera.matrixWorldInverse.elements, P = camera.projectionMatrix.elements, found = [];
+  scene.traverse((mesh) => {
+    const uniforms = mesh.isMesh && mesh.material.uniforms;
+    if (!uniforms || !uniforms.uLabelData || uniforms.uAtlas || !mesh.geometry.attributes.aRect) return;
+    const { aLabelIndex, aRect, aParams } = mesh.geometry.attributes, data = uniforms.uLabelData.value.image.data;
+    for (let i = 0; i < mesh.geometry.instanceCount; i++) {
+      const [x, y, z, isShown] = data.slice(4 * aLabelIndex.array[i], 4 * aLabelIndex.array[i] + 4);
+      const depth = -(V[2] * x + V[6] * y + V[10] * z + V[14]), right = V[0] * x + V[4] * y + V[8] * z + V[12];
+      const scale = aParams.array[2 * i + 1] * (depth / 10) * uniforms.uFovScale.value * 800 / uniforms.uViewportHeight.value;
+      const [left, , width] = aRect.array.slice(4 * i, 4 * i + 4);
+      if (isShown) found.push((right + (left + width) * scale) * P[0] / depth, (right + left * scale) * P[0] / depth);
+    }
+  });
+  return found;
+}"""  # noqa: E501
+"""Where labels end and begin across the picture, which reaches from -1 to 1."""
+
+
+def test_words_stay_inside_the_scene_and_a_lost_camera_comes_back(page):
+    page.open_tab("Target")
+    page.pose_field("x").fill("600")
+    page.pose_field("y").fill("700")
+    page.wait(lambda: page.state.goal.reach.tone == "bad", "a long verdict at the edge of the scene")
+    page.wait(lambda: 0.9 < max(page.tab.evaluate(EDGES)) < 1.0, lambda: f"words up to it: {page.tab.evaluate(EDGES)}")
+    camera = next(iter(page.bench.server.get_clients().values())).camera
+    camera.position = (0.5, -1.5, -0.9)
+    page.wait(lambda: page.tab.evaluate("__viserMutable.camera.position.y") < -0.8, "a camera below the floor")
+    page.tab.locator("#rl-brand").click()
+    page.tab.keyboard.press("h")
+    page.wait(
+        lambda: abs(page.tab.evaluate("__viserMutable.camera.position.y") - standing_place(camera.aspect)[2]) < 0.01,
+        "the camera where the page opened it",
+    )

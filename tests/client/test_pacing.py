@@ -29,6 +29,16 @@ def test_a_motion_of_a_session_runs_slowly_from_its_first_row_on():
     assert run.q[-1] == pytest.approx(motion.goal, abs=1e-9)
 
 
+def test_a_motion_that_takes_longer_than_planned_is_recorded_from_its_first_cycle_on():
+    model = rcilab.load_model("xMate3")
+    motion = plan_joint(model, model.home, model.home + 0.2, speed=0.5)
+    with rcilab.simulate(model) as robot:
+        robot.power_on()
+        run = robot.execute(motion, pace=0.1)
+    assert not run.truncated
+    assert run.t[0] == 0.0
+
+
 def test_a_motion_of_a_session_is_held_and_gone_on_with():
     model = rcilab.load_model("xMate3")
     with rcilab.simulate(model) as robot:

@@ -94,6 +94,16 @@ def test_commands_for_cycles_that_were_lost_are_dropped_when_they_come_late() ->
     assert playout.success_rate == 3 / 6
 
 
+def test_a_command_that_comes_late_feeds_no_cycle() -> None:
+    playout = Playout(prefill=0)
+    playout.push(command(10))
+    take_ids(playout, 3)
+    playout.push(command(12))
+    assert playout.is_starved
+    playout.push(command(13))
+    assert not playout.is_starved
+
+
 def test_a_repeated_id_is_the_next_command() -> None:
     playout = Playout(prefill=0)
     for k in (5, 5, 5, 6):

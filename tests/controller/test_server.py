@@ -11,6 +11,7 @@ import math
 import socket
 import struct
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -401,6 +402,20 @@ def test_in_lock_step_a_client_may_stand_in_a_debugger() -> None:
         assert peer.ask(rci.StopMove()) is rci.StopStatus.SUCCESS
         assert peer.receive_live_state().faults == ()
         assert found.server.cycle.playout.lost == 0
+
+
+@pytest.mark.parametrize("thinking", [0.0, 0.003])
+def test_in_lock_step_a_client_that_fell_behind_catches_up(thinking: float) -> None:
+    with running(lockstep=True, lost_limit=None, patience=0.2) as found, Peer(found) as peer:
+        states = [peer.run(np.tile(MODEL.home, (20, 1)))]
+        states.append(peer.receive_state())  # Patience was over: the cycle of the first one is lost.
+        for _ in range(150):  # Every state gets its answer in turn.
+            time.sleep(thinking)
+            peer.send(states.pop(0).message_id, MODEL.home)
+            if not states:
+                states.append(peer.receive_state())
+        assert peer.ask(rci.StopMove()) is rci.StopStatus.SUCCESS
+    assert 1 <= found.server.cycle.playout.lost <= 25
 
 
 def test_in_lock_step_answers_to_repeated_states_do_not_stay_in_stock(lockstep: Running) -> None:

@@ -94,6 +94,13 @@ def test_whatever_leaves_a_motion_hides_its_modes_and_forgets_or_drains_its_comm
             assert {Action.DISCARD, Action.DRAIN} & {*cell.actions}
 
 
+def test_what_is_queued_is_played_no_longer_than_the_stop_takes() -> None:
+    cells = [*TABLE.items(), *(((phase, None), cell) for phase, cell in POWER_OFF.items())]
+    for (phase, _), cell in cells:
+        if phase is Phase.STOPPING and cell.phase is not Phase.STOPPING:
+            assert Action.DISCARD in cell.actions
+
+
 def test_only_the_delay_after_start_move_leads_into_a_motion() -> None:
     into = {(phase, trigger) for (phase, trigger), cell in TABLE.items() if cell.phase is Phase.MOVING != phase}
     assert into == {(Phase.STARTING, Event.MODES_SHOWN)}

@@ -226,7 +226,7 @@ def test_closing_ends_the_private_controller():
 def test_a_session_that_is_dropped_takes_its_controller_along():
     # As in a notebook, when the cell that says `robot = simulate(model)` runs again.
     robot = simulate(MODEL)
-    pid = robot._partner
+    pid = robot._runner.partner
     assert os.path.exists(f"/proc/{pid}")
     with pytest.warns(ResourceWarning):  # Its sockets, too, were left to themselves.
         del robot

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rcilab.conformance import check
+from rcilab.conformance import check, pacing
+from rcilab.conformance.pacing import plan_start
 from rcilab.errors import CertificateError, ConnectionLostError, ControlError, InvalidValueError, ModelError, UsageError
 from rcilab.model import load_model
 from rcilab.motion import plan_joint
@@ -108,6 +109,36 @@ def test_a_stop_without_a_motion_is_done_and_stops_nothing_later(supervisor):
     supervisor.stop().wait(SOON)
     begin(supervisor, speed=1.0)[1].wait(SOON)
     assert np.abs(supervisor.status().q - GOAL).max() <= 1e-12
+
+
+def test_a_stop_while_a_motion_is_judged_for_the_last_time_keeps_the_arm_where_it_is(supervisor, monkeypatch):
+    def stopped_meanwhile(*args):
+        supervisor.stop().wait(SOON)
+        return plan_start(*args)
+
+    monkeypatch.setattr(pacing, "plan_start", stopped_meanwhile)
+    with pytest.raises(UsageError, match="a stop came before the arm had begun to move"):
+        begin(supervisor)
+    monkeypatch.undo()
+    assert supervisor.status().phase == "idle"
+    assert np.array_equal(supervisor.status().q_c, MODEL.home)
+    begin(supervisor, speed=1.0)[1].wait(SOON)
+    assert np.abs(supervisor.status().q - GOAL).max() <= 1e-12
+
+
+def test_what_was_wanted_before_a_stop_moves_nothing(supervisor):
+    wanted = supervisor.stops
+    motion = plan_joint(MODEL, MODEL.home, GOAL)
+    supervisor.stop().wait(SOON)
+    for ask in (
+        lambda: supervisor.execute(motion, check(motion, MODEL).certificate, stops=wanted),
+        lambda: supervisor.jog("joint", [0.1, 0, 0, 0, 0, 0, 0], stops=wanted),
+        lambda: supervisor.start_guiding(stops=wanted),
+    ):
+        with pytest.raises(UsageError, match="a stop came before") as caught:
+            ask()
+        assert caught.value.code == "stopped_before"
+    assert supervisor.status().phase == "idle"
 
 
 def test_requests_in_mid_motion_are_refused_and_disturb_nothing(supervisor):

@@ -11,7 +11,7 @@ from string import Formatter
 import pytest
 
 import rcilab
-from rcilab.errors import CommandRejectedError, PlanningError, RcilabError, UsageError
+from rcilab.errors import CommandRejectedError, PlanningError, RcilabError, UnreachableError, UsageError
 from rcilab.language import LANGUAGES, load_words
 from rcilab.protocols.rci import (
     GuideStatus,
@@ -21,7 +21,7 @@ from rcilab.protocols.rci import (
     StopStatus,
 )
 from rcilab.supervisor.failure import pack_failure, unpack_failure
-from rcilab.words.errors import tell, tell_note
+from rcilab.words.errors import _ADVISING, tell, tell_note
 from rcilab.words.text import Finished, Message, Remark, Text
 
 
@@ -47,6 +47,29 @@ def test_every_code_has_words_and_whatever_fills_them():
         assert {code for code, _ in used} == known
         for code, facts in used:
             assert None in facts or places(words[f"error.{code}"]) <= facts, code
+
+
+def test_what_a_waypoint_asks_for_is_not_said_of_a_target():
+    reason = UnreachableError("out of reach", distance=0.02).coded("too_far", distance="20.0")
+    place = "900, 0, 300"
+    for language, target, waypoint in (("en", "target", "waypoint"), ("zh", "目标", "路点")):
+        text = Text(language, "rcilab.workbench")
+        said = {"": text.say(tell(reason))}
+        for code, facts in (("waypoint", {}), ("way", {"place": place}), ("blend", {"place": place})):
+            error = PlanningError("waypoint 2").coded(code, number=2, kind="line", reason=reason, **facts)
+            said[code] = text.say(tell(error))
+        assert target in said[""]
+        assert all(waypoint in said[code] and target not in said[code] for code in ("waypoint", "way", "blend"))
+
+
+@pytest.mark.parametrize("about", ["waypoint_error", "way_error"])
+def test_all_that_advises_has_its_words_for_programs_too(about):
+    for language in LANGUAGES:
+        words = load_words("rcilab.words", language)
+        found = {key.removeprefix(f"{about}.") for key in words if key.startswith(f"{about}.")}
+        assert found == _ADVISING
+        for code in found:
+            assert places(words[f"{about}.{code}"]) == places(words[f"error.{code}"])
 
 
 @pytest.mark.parametrize("kind", [SettingStatus, StartStatus, StopStatus, RecoveryStatus, GuideStatus])

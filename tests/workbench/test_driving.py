@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator
 
 import numpy as np
@@ -163,6 +164,29 @@ def test_the_speed_of_the_slider_counts_from_the_start_and_a_pause_needs_a_motio
     wait(lambda: idle.session.status().pace == pytest.approx(0.2), "the slow motion")
     idle.conductor.ask(requests.Drive(what="stop"))
     wait(lambda: idle.session.status().phase == "idle", "rest")
+
+
+def test_a_stop_undoes_what_was_pressed_before_it_and_not_yet_looked_at(idle, monkeypatch):
+    bench, is_busy, may_go_on = idle, threading.Event(), threading.Event()
+    plan(bench)
+    stands_at = bench.session.status().q_c
+
+    def be_busy(request):
+        is_busy.set()
+        may_go_on.wait(10.0)
+
+    monkeypatch.setitem(bench.conductor._actions, requests.ShowPlot, be_busy)
+    bench.conductor.ask(requests.ShowPlot(name="q", on=True))
+    assert is_busy.wait(10.0)
+    bench.conductor.ask(requests.Drive(what="execute"))
+    bench.session.stop()
+    may_go_on.set()
+    wait(lambda: "error.stopped_before" in str(bench.store.state.notice), "the word that it was stopped before")
+    assert bench.session.status().phase == "idle"
+    assert np.array_equal(bench.session.status().q_c, stands_at)
+    execute(bench)  # What is pressed after the stop goes.
+    bench.session.stop()
+    wait(lambda: bench.session.status().code == "idle.stopped", "a stopped arm")
 
 
 def test_the_cable_is_pulled_in_a_motion_and_plugged_in_again(idle):

@@ -49,14 +49,14 @@ class FakeSupervisor:
         self.motion = None
         self.ticket = SimpleNamespace(done=False, error=None)
 
-    def jog(self, kind, values, *, goes_on=None):
+    def jog(self, kind, values, *, goes_on=None, stops=None):
         self.held = kind, np.array(values)
         return self.ticket
 
     def release_jog(self) -> None:
         self.held = None
 
-    def execute(self, motion, certificate):
+    def execute(self, motion, certificate, *, stops=None):
         self.motion = motion
         return self.ticket
 

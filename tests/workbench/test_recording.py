@@ -5,21 +5,28 @@ from __future__ import annotations
 import os
 import signal
 from collections.abc import Iterator
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import rcilab
 from rcilab.errors import UsageError
+from rcilab.model import load_model
 from rcilab.recording.export import export_run
 from rcilab.recording.run_file import decode_run
+from rcilab.recording.setup import Setup
 from rcilab.workbench import requests
 from rcilab.workbench.app import Workbench, WorkbenchConfig
+from rcilab.workbench.goal.actions import initial_goal
 from rcilab.workbench.panels.outcome import outcome_html
 from rcilab.workbench.panels.recording import progress_html, summary_html
 from rcilab.workbench.run.export_actions import ENDINGS
+from rcilab.workbench.run.keeper import whole_recording
 from rcilab.workbench.run.readiness import obstacle
 from rcilab.workbench.run.replay import replayed_pose, require_replayable
+from rcilab.workbench.store import UiState
 from rcilab.workbench.text import Text
 from tests.recording.runs import some_run
 from tests.workbench.opened import told, wait
@@ -69,7 +76,7 @@ def test_a_motion_is_recorded_whole_judged_against_its_plan_and_kept_in_a_file(b
     assert back.is_complete
     assert back.cycles.tobytes() == run.cycles.tobytes()
     assert (back.setup.target, back.setup.plant) == ("virtual", "ideal")
-    assert "Ran to its end" in outcome_html(bench.store.state, Text("en"))
+    assert "Ran to its end" in outcome_html(bench.store.state, bench.session.status(), Text("en"))
     assert "J7" in summary_html(recording, Text("en"))
 
 
@@ -84,7 +91,7 @@ def test_a_motion_whose_control_process_is_killed_leaves_every_cycle_until_then(
     assert np.array_equal(np.diff(run.cycles["message_id"]), 1 + run.cycles["lost"][1:])
     assert "control process" in run.stopped
     assert rcilab.load_run(recording.file).cycles.tobytes() == run.cycles.tobytes()
-    assert "Stopped before its end" in outcome_html(bench.store.state, Text("en"))
+    assert "Stopped before its end" in outcome_html(bench.store.state, bench.session.status(), Text("en"))
 
 
 def test_exports_reach_the_page_that_asked_and_problems_are_told(bench, monkeypatch):
@@ -132,6 +139,24 @@ def test_exports_reach_the_page_that_asked_and_problems_are_told(bench, monkeypa
     bench.conductor.ask(requests.Export(page=7, ending=".csv"))
     wait(lambda: told(bench) == "export.nothing", "that there is nothing")
     assert len(sent) == 4
+
+
+def test_what_became_of_a_run_is_said_of_the_robot_that_made_it():
+    run = replace(some_run(), setup=Setup(target="virtual", plant="ideal"))
+    made = UiState(model=run.model, goal=initial_goal(run.model, run.model.home), last_run=whole_recording(run))
+    idle, text = SimpleNamespace(phase="idle"), Text("en")
+    assert "Last run: <b>Ran to its end" in outcome_html(made, idle, text)
+    assert "rl-good" in outcome_html(made, idle, text)
+    other = load_model("xMate3")
+    for elsewhere, status in (
+        (replace(made, plant="mujoco"), idle),
+        (replace(made, target="rci://192.168.0.160:1337"), idle),
+        (replace(made, model=other, goal=initial_goal(other, other.home)), idle),
+        (made, SimpleNamespace(phase="closed")),
+    ):
+        said = outcome_html(elsewhere, status, text)
+        assert "rl-verdict" not in said
+        assert f"virtual controller, ideal arm, {run.model.name}: Ran to its end" in said
 
 
 def test_a_run_is_replayed_with_nothing_connected_until_it_is_asked_for(monkeypatch):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -17,6 +18,7 @@ from rcilab.workbench import requests
 from rcilab.workbench.goal.actions import SETTLED, GoalActions, initial_goal
 from rcilab.workbench.goal.elbow import look_at_elbow, nearest_free
 from rcilab.workbench.live import Heard, LiveChannel
+from rcilab.workbench.panels.branches import BranchesPanel
 from rcilab.workbench.panels.elbow import ring_html
 from rcilab.workbench.panels.target import planned_html
 from rcilab.workbench.scene.actions import SceneActions
@@ -135,6 +137,34 @@ def test_every_goal_has_its_branches_and_one_can_be_looked_at_before_it_is_chose
     bench.aim(0.0, 0.05, 0.0)
     bench.scene.tick()
     assert bench.state.scene.peek is None
+
+
+def test_the_ways_to_reach_a_target_are_listed_nearest_first_and_lead_where_they_say(bench):
+    target = MODEL.forward(np.radians((100.0, 40.0, 95.0, 60.0, 80.0, 50.0, 20.0)))
+    bench.goal.move_target(requests.MoveTarget(position=tuple(target.position), wxyz=tuple(target.wxyz)))
+    solutions = np.array(list(bench.state.goal.reach.solutions))
+    panel, shown = BranchesPanel(Text("en"), lambda request: None), []
+    panel._rows = SimpleNamespace(show=shown.append)
+    here = np.radians((-100.0, 20.0, 0.0, 40.0, -90.0, 60.0, 0.0))
+    panel.show(bench.state, SimpleNamespace(q_c=here))
+    rows = re.findall(r'data-branch="(\d+)".*?<span>(\d+)</span>.*?<span>(\d+)°</span></div>', shown[0])
+    numbers, away = [int(number) for _, number, _ in rows], [float(angle) for _, _, angle in rows]
+    assert len(rows) == len(solutions) > 2
+    assert numbers == list(range(1, len(rows) + 1))
+    assert away == sorted(away)
+    meant = np.degrees(np.abs(solutions[[int(at) for at, _, _ in rows]] - np.round(here, 2)).max(axis=1))
+    assert np.allclose(meant, away, atol=0.51)  # Shown in whole degrees.
+
+
+def test_a_page_that_is_known_gets_its_camera_back_and_no_other_does():
+    brought: list[int] = []
+    nothing = {name: lambda *_: None for name in ("stop", "here", "seek", "size", "take", "answer")}
+    live = LiveChannel(Heard(**nothing, home=brought.append))
+    page = live.hear(json.dumps({"kind": "hello", "page": 3, "key": live.introduce(3)}))
+    live.hear('{"kind": "home"}')
+    assert brought == []
+    live.hear('{"kind": "home"}', page)
+    assert brought == [3]
 
 
 def test_a_page_says_which_branch_is_under_the_mouse():

@@ -11,8 +11,9 @@
   const recall = (name) => { try { return JSON.parse(sessionStorage.getItem("rcilab." + name)); } catch { return null; } };
   const keep = (name, value) => { try { sessionStorage.setItem("rcilab." + name, JSON.stringify(value)); } catch { /* Then not. */ } };
 
+  const NARROWEST = 240;  // [px] of the scene that a notice is shown over; else it is shown at the window's lower edge.
   const SHOWN = 7000;  // [ms] A choice: long enough to read a notice twice.
-  let live = null, said = {}, bar, chips, stop, take, question, toast, me = null, notice = recall("notice"), greeted = false, hideTimer = 0;
+  let live = null, said = {}, bar, chips, stop, home, take, question, toast, me = null, notice = recall("notice"), greeted = false, hideTimer = 0;
 
   const send = (message) => {
     if (live && live.readyState === WebSocket.OPEN) { live.send(JSON.stringify(message)); return true; }
@@ -24,11 +25,23 @@
     if (!send({ kind: "stop" })) show({ tone: "bad", text: said.lost || "Not connected: Stop was not sent." });
   };
 
+  const goHome = () => send({ kind: "home" });
+
   const show = (message) => {
     toast.textContent = message.text;
     toast.className = "rl-shown rl-" + message.tone;
+    place();
     clearTimeout(hideTimer);
     hideTimer = setTimeout(() => { toast.className = ""; }, SHOWN);
+  };
+
+  // Over the scene, wherever the panels have left it: that covers no tab, no button and no field.
+  const place = () => {
+    const canvas = document.querySelector("#root canvas[data-engine]"), scene = canvas && canvas.getBoundingClientRect();
+    const fits = Boolean(scene) && scene.width >= NARROWEST;
+    toast.classList.toggle("rl-below", !fits);
+    toast.style.left = fits ? `${scene.left + scene.width / 2}px` : "";
+    toast.style.maxWidth = fits ? `${Math.min(scene.width - 24, 640)}px` : "";
   };
 
   const build = () => {
@@ -48,7 +61,13 @@
     take.type = "button";
     take.hidden = true;
     take.addEventListener("click", () => send({ kind: "take" }));
-    bar.append(take, stop);
+    home = document.createElement("button");
+    home.id = "rl-home";
+    home.type = "button";
+    home.innerHTML = '<svg viewBox="0 0 24 24" fill="none" stroke="currentColor" stroke-width="2" stroke-linecap="round" ' +
+      'stroke-linejoin="round" aria-hidden="true"><path d="M4 11.5 12 4l8 7.5M6 10v9.5h4.5V14h3v5.5H18V10"/></svg>';
+    home.addEventListener("click", goHome);
+    bar.append(home, take, stop);
     question = document.createElement("div");
     question.id = "rl-question";
     question.hidden = true;
@@ -74,6 +93,8 @@
     stop.appendChild(key);
     stop.title = said.stopHint || "";
     stop.setAttribute("aria-label", said.stop || "Stop");
+    home.title = said.homeHint || "";
+    home.setAttribute("aria-label", said.home || "Home view");
   };
 
   // Which of the server's clients this page is; the key proves it. Python calls this as soon as viser is connected.
@@ -128,7 +149,7 @@
     const news = JSON.parse(event.data);
     if (news.beat) { send({ kind: "here" }); return; }
     Object.assign(said, news);
-    if ("stop" in news || "stopHint" in news) label();
+    if ("stop" in news || "stopHint" in news || "homeHint" in news) label();
     if (news.chips) draw(news.chips);
     if (news.notice && news.notice.serial !== notice) {
       if (greeted || notice !== null) show(news.notice);  // What was said before this page came is no news to it.
@@ -157,7 +178,7 @@
   window.addEventListener("rl-say", (event) => send(event.detail));  // What the other scripts of the page have to say.
 
   const size = () => send({ kind: "size", height: window.innerHeight });
-  window.addEventListener("resize", size);
+  window.addEventListener("resize", () => { size(); place(); });
 
   // A page that is loaded anew opens the tab that was open.
   let shown = null;
@@ -202,6 +223,21 @@
   window.addEventListener("keydown", (event) => {
     if (event.key === "Escape" && !event.repeat) pressStop();
   }, true);
+  // viser moves its camera by other letters; this one brings it back.
+  const isTyping = (target) => target instanceof Element && target.matches("input, textarea, select, [contenteditable]");
+  window.addEventListener("keydown", (event) => {
+    if (event.code === "KeyH" && !event.repeat && !event.ctrlKey && !event.altKey && !event.metaKey && !isTyping(event.target)) goHome();
+  });
+
+  // A hint lies on what is beside its field: none while somebody is at a field, until the mouse goes elsewhere.
+  let field = null;
+  const heed = (event) => {
+    field = isTyping(event.target) ? event.target : null;
+    document.documentElement.classList.toggle("rl-typing", field !== null);
+  };
+  window.addEventListener("keydown", heed, true);
+  window.addEventListener("pointerdown", heed, true);
+  window.addEventListener("pointerover", (event) => { if (field && event.target !== field && !event.buttons) heed(event); }, true);
 
   // A button that is held must not stay held when nobody would hear its release: when the window loses the focus, the
   // button goes out of sight (another tab), or the mouse comes back with no button down.

@@ -87,7 +87,7 @@ class JogActions:
             press.is_spent = not (self._robot.begin() if press.is_robot else self._begin_preview(axis))
         press.heard = now
         if press.is_robot and not press.is_spent:
-            press.is_spent = not self._robot.renew(axis)
+            press.is_spent = not self._robot.renew(axis, request.stops)
 
     def press(self, request: requests.PressJog) -> None:
         """Makes a step, or ends what was held: a button says so when it is released."""
@@ -97,7 +97,7 @@ class JogActions:
         if not state.jog.step:
             self.release()
         elif state.jog.robot:
-            self._robot.step(axis)
+            self._robot.step(axis, request.stops)
         else:
             self._step_goal(axis)
 

@@ -67,8 +67,13 @@ class RobotJog:
             self._store.remember()
         return True
 
-    def renew(self, axis: Axis) -> bool:
-        """Tells the control process that a button is still held; returns False when that moves nothing any more."""
+    def renew(self, axis: Axis, stops: int | None) -> bool:
+        """Tells the control process that a button is still held; returns False when that moves nothing any more.
+
+        Args:
+            axis: Which way.
+            stops: How many stops had been heard of when the button said so.
+        """
         state, status, ticket = self._store.state, self._session.status(), self._ticket
         if (ticket is not None and ticket.error is not None) or status.q_c is None or status.phase == "stopping":
             return False
@@ -89,7 +94,7 @@ class RobotJog:
             return False
         try:
             goes_on = None if ticket is None or ticket.done else ticket
-            self._ticket = self._session.supervisor().jog(kind, min(share, room) * values, goes_on=goes_on)
+            self._ticket = self._session.supervisor().jog(kind, min(share, room) * values, goes_on=goes_on, stops=stops)
         except RcilabError as error:
             change_jog(self._store, said=tell_error(error, status))
             return False
@@ -100,8 +105,13 @@ class RobotJog:
         with suppress(RcilabError):  # There is no supervisor, or none any more: nothing of ours moves.
             self._session.supervisor().release_jog()
 
-    def step(self, axis: Axis) -> None:
-        """Makes one step: a planned motion, judged like any other, collisions too."""
+    def step(self, axis: Axis, stops: int | None) -> None:
+        """Makes one step: a planned motion, judged like any other, collisions too.
+
+        Args:
+            axis: Which way.
+            stops: How many stops had been heard of when the button was pressed.
+        """
         state, status = self._store.state, self._session.status()
         reason = no_jog(state, status) or (message("ready.moving") if is_moving(status) else None)
         if reason is not None or status.q_c is None:
@@ -125,7 +135,7 @@ class RobotJog:
             change_jog(self._store, said=message("jog.unsafe", condition=broken))
             return
         try:
-            ticket = self._session.supervisor().execute(made.motion, report.certificate)
+            ticket = self._session.supervisor().execute(made.motion, report.certificate, stops=stops)
         except RcilabError as error:
             change_jog(self._store, said=tell_error(error, status))
             return

@@ -51,7 +51,8 @@ class BranchesPanel:
             code = "target.out_of_reach" if state.goal.reach.tone == "bad" else "target.no_branches"
             return f'<p class="rl-note">{esc(text(code))}</p>'
         here = state.goal.q if arm is None else arm
-        rows = "".join(self._row(number, q, here, state) for number, q in enumerate(solutions, start=1))
+        order = nearest_first(np.asarray(list(solutions)), here)
+        rows = "".join(self._row(number, at, solutions[at], here, state) for number, at in enumerate(order, start=1))
         heads = "".join(
             f"<span>{esc(text(f'target.head.{name}'))}</span>" for name in ("number", "margin", "worst", "away")
         )
@@ -63,7 +64,7 @@ class BranchesPanel:
             f'<p class="rl-note rl-dim">{esc(text("target.branch_point"))}</p>{rest}'
         )
 
-    def _row(self, number: int, q: np.ndarray, here: np.ndarray, state: UiState) -> str:
+    def _row(self, number: int, at: int, q: np.ndarray, here: np.ndarray, state: UiState) -> str:
         least = margin(state.model, q)
         chosen = float(np.abs(np.angle(np.exp(1j * (q - state.goal.q)))).max()) < 1e-6
         left, away = (self._text.units.angle_of(a, 0) for a in (least.angle, float(np.abs(q - here).max())))
@@ -72,7 +73,18 @@ class BranchesPanel:
         said = self._text("target.branch_said", number=cells[0], margin=cells[1], joint=cells[2], away=cells[3])
         return (
             f'<div class="rl-branch" role="option" tabindex="{0 if chosen or number == 1 else -1}" '
-            f'data-branch="{number - 1}" aria-selected="{str(chosen).lower()}" aria-label="{esc(said)}">'
+            f'data-branch="{at}" aria-selected="{str(chosen).lower()}" aria-label="{esc(said)}">'
             + "".join(f"<span>{esc(cell)}</span>" for cell in cells)
             + "</div>"
         )
+
+
+def nearest_first(solutions: np.ndarray, here: np.ndarray) -> list[int]:
+    """Returns which solution stands in which row: by how far the joint that moves most has to go.
+
+    Args:
+        solutions: Joint angles, shape (N, n), [rad].
+        here: Where the arm is, shape (n,), [rad].
+    """
+    away = np.abs(solutions - here).max(axis=1)
+    return sorted(range(len(solutions)), key=lambda at: (round(float(away[at]), 3), at))

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from rcilab.workbench.run.driving import destination
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import esc
 
 if TYPE_CHECKING:
+    from rcilab.recording.run import Run
     from rcilab.supervisor import SupervisorStatus
     from rcilab.workbench.store import Recording, UiState
 
@@ -29,13 +31,31 @@ def _bar(share: float) -> str:
     return f'<div class="rl-meter rl-way"><i style="width:{100.0 * share:.0f}%"></i></div>'
 
 
-def outcome_html(state: UiState, text: Text) -> str:
-    """Returns what became of the last motion; nothing before one has ended."""
+def outcome_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
+    """Returns what became of the last motion; nothing before one has ended.
+
+    It is a plain note where it says nothing about the robot of now, and names the one that it is about.
+    """
     recording = state.recording if state.recording is not None else state.last_run
     if recording is None or recording.run is None:
         return ""
     tone, ended, facts = _outcome(recording, text)
-    return f'<p class="rl-verdict rl-{tone}"><b>{esc(ended)}</b> {esc(facts)}</p>'
+    elsewhere = _elsewhere(recording.run, state, status, text)
+    if elsewhere:
+        return f'<p class="rl-note">{esc(text("record.last_on", where=elsewhere))} {esc(ended)} {esc(facts)}</p>'
+    last = "" if recording is state.recording else esc(text("record.last")) + " "
+    return f'<p class="rl-verdict rl-{tone}">{last}<b>{esc(ended)}</b> {esc(facts)}</p>'
+
+
+def _elsewhere(run: Run, state: UiState, status: SupervisorStatus, text: Text) -> str:
+    """Returns where a run was made, and with which arm, if that is not where motions go now; else ""."""
+    made, arm = run.setup, state.model.name if run.model is None else run.model.name
+    here = state.plant if state.target == "virtual" else state.target
+    there = made.plant if made.target == "virtual" else made.target
+    if there in ("", here) and arm == state.model.name and destination(state, status) != "preview":
+        return ""
+    where = text(f"where.{there}") if made.target == "virtual" and there else there
+    return ", ".join(filter(None, (where, arm)))
 
 
 def _outcome(recording: Recording, text: Text) -> tuple[str, str, str]:

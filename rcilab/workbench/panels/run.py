@@ -98,7 +98,7 @@ class RunPanel:
         self._pause.disabled = status.motion_place is None
         self._pace.show(round(100.0 * state.drive.pace, 1))
         self._way.show(way_html(state, status, text))
-        self._outcome.show("" if moving else outcome_html(state, text))
+        self._outcome.show("" if moving else outcome_html(state, status, text))
         self._plan.visible, self._to_target.visible = not is_program, is_program
         self._plan.disabled = self._to_target.disabled = moving
         self._buttons["recover"].disabled = status.phase not in ("fault", "crashed", "lost")

@@ -31,6 +31,8 @@ def status_values(state: UiState, status: SupervisorStatus, text: Text, cursor_e
         "language": state.language,
         "stop": text("stop.label"),
         "stopHint": text("stop.note"),
+        "home": text("bar.home"),
+        "homeHint": text("bar.home_hint"),
         "lost": text("bar.lost"),
         "software": text("bar.software") if state.quality == "full" else "",
         "chips": _chips(state, status, text),

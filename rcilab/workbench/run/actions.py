@@ -6,10 +6,11 @@ import math
 import time
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 from rcilab.clock import CYCLE_TIME
-from rcilab.errors import CertificateError, ConnectionLostError, ControlError, PlanningError, RcilabError
+from rcilab.errors import CertificateError, ConnectionLostError, ControlError, PlanningError, RcilabError, UsageError
 from rcilab.model import load_model
 from rcilab.posing.reach import Tone
 from rcilab.workbench import requests
@@ -56,7 +57,7 @@ class RobotActions:
     def drive(self, request: requests.Drive) -> None:
         """Passes one button of the Run tab on to the supervisor."""
         if request.what in ("execute", "confirm"):
-            self._execute(is_agreed=request.what == "confirm")
+            self._execute(is_agreed=request.what == "confirm", stops=request.stops)
             return
         if request.what == "cancel":
             self._store.update(asked=None)
@@ -80,14 +81,14 @@ class RobotActions:
             "power_on": supervisor.power_on,
             "power_off": supervisor.power_off,
             "reconnect": supervisor.reconnect,
-            "guide": self._guide,
+            "guide": partial(self._guide, request.stops),
             "unguide": supervisor.stop_guiding,
         }[request.what]
         ticket = act()
         if ticket is not None:
             self._tickets.append((request.what, ticket))
 
-    def _guide(self) -> Ticket | None:
+    def _guide(self, stops: int | None) -> Ticket | None:
         """Frees the arm for a hand to guide it; a real one only when that is asked for twice."""
         state, now = self._store.state, time.monotonic()
         unset = setup_obstacle(state, self._session.status())
@@ -100,7 +101,7 @@ class RobotActions:
             return None
         self._asked_to_guide = -math.inf
         space, kind = state.push.way.split(".")
-        return self._session.supervisor().start_guiding(space, kind)  # type: ignore[arg-type]  # One of WAYS.
+        return self._session.supervisor().start_guiding(space, kind, stops=stops)  # type: ignore[arg-type]  # One of WAYS.
 
     def choose_robot(self, request: requests.ChooseRobot) -> None:
         """Takes another arm, destination or plant; refused while the arm moves."""
@@ -217,7 +218,7 @@ class RobotActions:
             self._tickets.append(("power_on", self._session.supervisor().power_on()))
             self._power_asked = time.monotonic()
 
-    def _execute(self, *, is_agreed: bool) -> None:
+    def _execute(self, *, is_agreed: bool, stops: int | None) -> None:
         state = self._store.state
         mode = state.drive.mode
         if state.plan is not None and (not state.plan.complete or state.plan.mode != mode):
@@ -235,8 +236,8 @@ class RobotActions:
         supervisor = self._session.supervisor()
         supervisor.drain()
         try:
-            ticket = supervisor.execute(state.plan.motion, certificate, mode, pace=state.drive.pace)
-        except (CertificateError, PlanningError) as error:
+            ticket = supervisor.execute(state.plan.motion, certificate, mode, pace=state.drive.pace, stops=stops)
+        except (CertificateError, PlanningError, UsageError) as error:
             self._store.say("warn", tell_error(error))
             return
         self._arrival = state.plan.short

@@ -1,0 +1,129 @@
+"""One motion on a connection from StartMove to what became of it."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, TypeAlias
+
+from rcilab.client.commands import RciCommands
+from rcilab.client.control_loop import SILENCE, Callback, ControlLoop
+from rcilab.client.filters import CommandFilter
+from rcilab.client.link import Link
+from rcilab.client.paced_stream import PacedStream
+from rcilab.client.punctual import punctual
+from rcilab.client.recorder import RECORD_TIME, CycleLog, Recorder
+from rcilab.client.turns import Turns
+from rcilab.clock import CYCLE_TIME
+from rcilab.one_core import one_core
+from rcilab.recording.run import Run, build_run
+from rcilab.recording.setup import Setup
+from rcilab.state import ControllerMode, Mode
+
+if TYPE_CHECKING:
+    from rcilab.model import RobotModel
+    from rcilab.motion import Motion
+
+Ear: TypeAlias = Callable[[Run, BaseException | None], None]
+
+_SPARE_CYCLES = 2000  # Room in the recorder for what comes before and after the motion itself.
+
+
+class Runner:
+    """Runs motions on a connection, one at a time, and tells who listens what became of each.
+
+    Attributes:
+        partner: Process id of a controller on this machine that is in lock-step with us; None: it is not.
+
+    Args:
+        link: The connection.
+        turns: Whose turn it is on it.
+        realtime: False for a controller in lock-step, where timing means nothing.
+        silence: Time without a state, while moving, that counts as a lost connection, [s].
+        partner: See above.
+    """
+
+    def __init__(
+        self, link: Link, turns: Turns, *, realtime: bool = True, silence: float = SILENCE, partner: int | None = None
+    ) -> None:
+        self.partner = partner
+        self._link = link
+        self._turns = turns
+        self._realtime = realtime
+        self._silence = silence
+        self._ears: tuple[Ear, ...] = ()
+
+    def hear(self, ear: Ear) -> Callable[[], None]:
+        """Has somebody told of every motion, as soon as it has ended; returns what ends that.
+
+        Args:
+            ear: Called in the thread that ran the motion, with its run and the error that ended it, or None.
+        """
+        self._ears = (*self._ears, ear)
+
+        def end() -> None:
+            self._ears = tuple(other for other in self._ears if other is not ear)
+
+        return end
+
+    def run(
+        self,
+        callback: Callback,
+        mode: Mode,
+        model: RobotModel,
+        plan: Motion | PacedStream | None = None,
+        filters: Sequence[CommandFilter] = (),
+    ) -> Run:
+        """Runs the motion that has set out, and returns what became of it.
+
+        Args:
+            callback: Gives the command for each state.
+            mode: How the arm is commanded.
+            model: The arm.
+            plan: What is to be commanded, and may change on the way; None where only the callback knows.
+            filters: What every command passes before it is sent.
+
+        Raises:
+            ControlError: The controller stopped it.
+            ConnectionLostError: The controller is gone.
+            Exception: Whatever the callback raised; the arm was brought to rest.
+        """
+        time_needed = RECORD_TIME + (0.0 if plan is None else plan.duration)  # It may be held on its way.
+        recorder = Recorder(model.n, math.ceil(time_needed / CYCLE_TIME) + _SPARE_CYCLES)
+        loop = ControlLoop(
+            self._link,
+            RciCommands(self._link),  # Not the session's own: those are refused while a motion runs.
+            model.limits,
+            ControllerMode[mode.upper()],
+            CycleLog(recorder),
+            watch=self._turns.reason_to_stop,
+            silence=self._silence,
+            model=model,
+            filters=filters,
+        )
+        setup = Setup(target=self._link.name, mode=mode, started_ns=time.time_ns())
+
+        def tell(stopped: str | None, error: BaseException | None = None) -> Run:
+            run = build_run(
+                recorder.rows(),
+                plan=plan.as_motion() if isinstance(plan, PacedStream) else plan,
+                paced=isinstance(plan, PacedStream) and plan.is_paced,
+                stopped=stopped,
+                truncated=recorder.truncated,
+                realtime=self._realtime,
+                model=model,
+                setup=setup,
+            )
+            for ear in self._ears:
+                ear(run, error)
+            return run
+
+        try:
+            with self._turns.move(), punctual(self._realtime), one_core(self.partner):
+                stopped = loop.run(callback)
+        except BaseException as error:
+            if self._ears:
+                tell(str(error) or type(error).__name__, error)
+            raise
+        return tell(stopped)

@@ -1,0 +1,46 @@
+// Words in the scene stay inside it: viser draws a label from its anchor on, past the edge where a panel begins. Just
+// before a frame's labels are drawn, those that would be seen in part are moved until they are seen whole.
+// viser 1.1 has no public way to its labels; where they are not found as expected, they stay as viser has them.
+(() => {
+  "use strict";
+  const LOOK = 700, MARGIN = 6;  // [ms] between two looks for viser's labels; [px] A choice.
+  const isLabels = (node) => node.isMesh && node.material.uniforms && node.material.uniforms.uLabelData && !node.material.uniforms.uAtlas;
+  const topOf = (node) => { while (node && node.parent) node = node.parent; return node; };
+  let boxes = [], drawn = -1;  // The meshes of the labels' backgrounds: one instance a label.
+
+  // Returns how far to move what reaches from low to high so that it lies within -half to half; its beginning does at least.
+  const inward = (low, high, half) => Math.max(Math.min(0, half - high), -half - low);
+
+  const keepInside = (camera) => {
+    const { uLabelData, uFovScale, uViewportHeight, uIsOrtho } = boxes[0].material.uniforms;
+    const data = uLabelData.value.image.data, view = camera.matrixWorldInverse.elements, world = camera.matrixWorld.elements;
+    if (drawn === uLabelData.value.version || uIsOrtho.value > 0.5) return;  // Uploaded once a frame.
+    drawn = uLabelData.value.version;
+    for (const { geometry } of boxes) {
+      const { aLabelIndex, aRect, aParams } = geometry.attributes;
+      for (let i = 0; aLabelIndex && i < geometry.instanceCount; i++) {
+        const at = 4 * aLabelIndex.array[i], [x, y, z, isShown] = data.subarray(at, at + 4);
+        if (!isShown) continue;
+        const [right, up, back] = [0, 1, 2].map((k) => view[k] * x + view[4 + k] * y + view[8 + k] * z + view[12 + k]);
+        const halfWidth = -back / camera.projectionMatrix.elements[0], halfHeight = -back / camera.projectionMatrix.elements[5];
+        if (back >= 0) continue;  // Behind the camera.
+        const [isScreen, size] = aParams.array.subarray(2 * i, 2 * i + 2), [left, low, width, height] = aRect.array.subarray(4 * i, 4 * i + 4);
+        const scale = isScreen > 0.5 ? size * (-back / 10) * uFovScale.value * (800 / uViewportHeight.value) : size;  // As viser's shader.
+        const margin = MARGIN * 2 * halfHeight / uViewportHeight.value;
+        const [west, east] = [right + left * scale, right + (left + width) * scale], [south, north] = [up + low * scale, up + (low + height) * scale];
+        if (east < -halfWidth || west > halfWidth || north < -halfHeight || south > halfHeight) continue;  // Out of sight.
+        const dx = inward(west, east, halfWidth - margin), dy = inward(south, north, halfHeight - margin);
+        for (let k = 0; k < 3; k++) data[at + k] += dx * world[k] + dy * world[4 + k];
+      }
+    }
+  };
+
+  setInterval(() => {
+    const nodes = window.__viserMutable && window.__viserMutable.nodeRefFromName;
+    const scene = nodes && topOf(Object.values(nodes).find(Boolean));
+    if (!scene || (boxes.length && topOf(boxes[0]) === scene)) return;
+    boxes = [];
+    scene.traverse((node) => { if (isLabels(node)) boxes.push(node); });
+    for (const box of boxes) box.onBeforeRender = (renderer, _, camera) => keepInside(camera);
+  }, LOOK);
+})();
