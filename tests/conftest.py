@@ -27,8 +27,9 @@ sys.modules.setdefault("rfc3987_syntax", None)  # pyright: ignore[reportArgument
 
 LANES = {"pages": ("browser",), "loops": ("workbench", "supervisor")}
 """In the names of files whose tests draw, or run control processes at 1 kHz: a core has no room for two of a kind."""
-_ORDER = ("loops", "", "notebook", "pages")
-"""Loops wait more than they compute. Notebooks suffer beside them, and pages beside anything."""
+_ORDER = ("pages", "loops", "notebook", "")
+"""Pages take longest, and loops, which wait more than they compute, are what fits beside them. What only computes goes
+on any core that is left at the end, and comes in the smallest pieces."""
 
 
 def lane_of(file: str) -> str:
@@ -68,9 +69,24 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
             return lane_of(file) or file
 
         def _assign_work_unit(self, node: object) -> None:
+            if self._is_idle(node) and self._is_crowded():
+                return  # Asked again after every test.
             first = min(self.workqueue, key=place_of)  # The first of those that come first.
             self.workqueue.move_to_end(first, last=False)
             super()._assign_work_unit(node)
+
+        def mark_test_complete(self, node: object, item_index: int, duration: float = 0) -> None:
+            super().mark_test_complete(node, item_index, duration)
+            for other in filter(self._is_idle, self.nodes):
+                self._reschedule(other)
+
+        def _is_crowded(self) -> bool:
+            """Returns whether pages are drawn and every core has a worker: a further one would only slow them down."""
+            drawn = any(False in work.get("pages", {}).values() for work in self.assigned_work.values())
+            return drawn and sum(not self._is_idle(node) for node in self.nodes) >= (os.cpu_count() or 1)
+
+        def _is_idle(self, node: object) -> bool:
+            return not self._pending_of(self.assigned_work[node])
 
     return InLanes(config, log)
 

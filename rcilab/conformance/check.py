@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rcilab.arrays import Array, described
 from rcilab.clock import CYCLE_TIME
+from rcilab.conformance.catalogue import Phrase
 from rcilab.conformance.certificate import issue_certificate
 from rcilab.conformance.clearance_conditions import FAR, clearance_conditions
 from rcilab.conformance.condition import Condition
@@ -95,9 +96,9 @@ def _report(
     judge = _Judge(motion, model, start, box, distance, mode)
     results = [judge.judge(row) for row in rows]
     found = sorted((v for _, violations in results for v in violations), key=lambda v: -v.ratio)
-    words = "" if mode == "joint_position" else f", in mode {mode}"
+    facts = {"model": model.name, "law": motion.law, "duration": f"{motion.duration:.3f}", "speed": f"{motion.speed:g}"}
     return Report(
-        title=f"{model.name}, motion {motion.law} of {motion.duration:.3f} s at speed {motion.speed:g}{words}",
+        title=Phrase("title", **facts) if mode == "joint_position" else Phrase("title.in_mode", **facts, mode=mode),
         rows=tuple(result for result, _ in results),
         violations=tuple(v for v in found if v.condition.necessity == "necessary"),
         warnings=tuple(v for v in found if v.condition.necessity == "recommended"),

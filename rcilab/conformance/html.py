@@ -45,7 +45,7 @@ def report_html(report: Report, language: Language = "en") -> str:
         items += f"<li>{say(language, 'html.more', count=str(len(found) - _LISTED))}</li>"
     return (
         f'<div><b style="color:{COLORS[verdict]}">{escape(told)}</b>'
-        f"<br>{escape(report.title)}"
+        f"<br>{escape(report.title.text(language))}"
         f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
         + (f"<ul>{items}</ul>" if items else "")
         + "</div>"

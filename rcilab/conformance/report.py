@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from rcilab.conformance.catalogue import Language
+from rcilab.conformance.catalogue import Language, Phrase
 from rcilab.conformance.certificate import Certificate
 from rcilab.conformance.condition import AnyFault, Condition, Necessity
 from rcilab.conformance.start import StartState
@@ -219,7 +219,7 @@ class Report:
         judge: Judges another motion by some of the rows, for the same arm, start, safety box and mode.
     """
 
-    title: str
+    title: Phrase
     """Which motion on which arm, in words."""
     rows: tuple[ConditionResult, ...]
     """One a condition, in the manual's order."""

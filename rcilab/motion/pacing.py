@@ -21,7 +21,9 @@ from rcilab.arrays import Array, JointPath, as_number, sealed
 from rcilab.clock import CYCLE_TIME
 from rcilab.errors import InvalidValueError
 from rcilab.limits import JointLimits
-from rcilab.motion.motion import Motion
+from rcilab.motion.hermite import quintic
+from rcilab.motion.motion import Motion, standing
+from rcilab.motion.piecewise import PiecewisePolynomial
 
 SLOWEST_PACE = 0.1
 """A choice: what is slower is better planned anew."""
@@ -72,8 +74,24 @@ class PacedMotion:
         return min(int(np.searchsorted(self.place, place - _ROUNDING)), len(self.place) - 1) * CYCLE_TIME
 
     def as_motion(self) -> Motion:
-        """Returns what is commanded as a motion of its own; the one that was planned as long as nothing has changed."""
-        return Motion.from_samples(self.q) if self.changed else self.motion
+        """Returns what is commanded as a motion of its own; the one that was planned as long as nothing has changed.
+
+        At its rows velocity and acceleration are those of the plan at this pace, to rounding; between them it runs as
+        quintics.
+        """
+        if not self.changed:
+            return self.motion
+        if len(self.q) == 1:
+            return standing(self.q[0], law="samples")
+        rate, drate = self.rate[:, np.newaxis], self.drate[:, np.newaxis]
+        slope, bend = (self.motion.polynomial.sample(self.place, order) for order in (1, 2))
+        v, a = slope * rate, bend * rate**2 + slope * drate
+        v[-1] = a[-1] = 0.0
+        h = CYCLE_TIME
+        parts = quintic((self.q[:-1], v[:-1], a[:-1]), (self.q[1:], v[1:], a[1:]), h)
+        pieces = np.stack([part / h**power for power, part in enumerate(parts)], axis=2)
+        breaks = h * np.arange(len(self.q), dtype=np.float64)
+        return Motion(polynomial=PiecewisePolynomial(breaks, pieces), goal=self.q[-1], law="samples")
 
 
 def as_planned(motion: Motion) -> PacedMotion:

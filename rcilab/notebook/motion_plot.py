@@ -87,8 +87,6 @@ class MotionPlot(Part):
             return
         joint, limits, run = int(self.joint.value), self.model.limits.joint, state.seen_run
         is_paced = run is not None and run.paced
-        if run is not None and run.plan is not None and is_paced:
-            plan = run.plan  # As it was run, and so it is compared.
         times = None if run is None else run.t - run.delay * CYCLE_TIME
         panels: list[Panel] = []
         for quantity in self._quantities:
@@ -118,8 +116,8 @@ class MotionPlot(Part):
         return Panel(title=self.text("plot.error"), unit="deg", frame=frame)
 
     def _point(self) -> None:
-        moment, run = self.state.moment, self.state.seen_run
-        if moment is None or self.state.seen is None or (run is not None and run.paced):  # The plan's own clock.
+        moment = self.state.moment
+        if moment is None or self.state.seen is None:
             write(self._cursor, "")
             return
         place = f"display:block;left:{100.0 * share_of(moment, self._end):.2f}%"

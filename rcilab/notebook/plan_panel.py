@@ -126,7 +126,8 @@ class PlanPanel(Part):
     def _slow_down(self) -> None:
         plan = self.state.plan
         if plan is not None:
-            self._begin(plan, lambda progress: plan.report.slow_down(progress=progress))
+            report = plan.report  # What passes is slowed down for what is recommended, as on the page.
+            self._begin(plan, lambda progress: report.slow_down(recommended=report.ok, progress=progress))
 
     def _begin(self, about: Plan | None, run: Callable[[Tell], Plan | Message | SlowDown]) -> None:
         self.plan.disabled = self.slow_down.disabled = True
@@ -151,7 +152,7 @@ class PlanPanel(Part):
         state, text = self.state, self.text
         plan = state.plan
         self.plan.disabled = self.slow_down.disabled = self._work.is_busy
-        self.slow_down.layout.display = "none" if plan is None or plan.report.ok else None
+        self.slow_down.layout.display = None if plan is not None and self._is_to_slow_down(plan) else "none"
         if plan is None:
             said = "" if state.no_plan is None else verdict("warn", "▲", text.say(state.no_plan))
             write(self._said, said or soft(text("check.nothing")))
@@ -167,6 +168,11 @@ class PlanPanel(Part):
         if not state.is_goal_of_plan and plan.short is None:
             said += " " + text("plan.moved")
         write(self._said, verdict(tone, text(word), said) + self._told_of_slowing(plan))
+
+    def _is_to_slow_down(self, plan: Plan) -> bool:
+        """Whether the plan breaks a condition, or one that is only recommended and not the rest of a slow-down."""
+        is_rest = self._slowed is not None and self._slowed[0] is plan
+        return not plan.report.ok or (bool(plan.report.warnings) and not is_rest)
 
     def _told_of_slowing(self, plan: Plan) -> str:
         if self._slowed is None or self._slowed[0] is not plan:

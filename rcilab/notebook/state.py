@@ -70,6 +70,7 @@ class LabState:
         """What came of the last execution."""
         self.is_run_of_plan = True
         """Whether it was one of the plan; a cell may have run something else."""
+        self._ran: Plan | None = None  # The plan as it was run, where its pace was changed on the way.
         self.error: RcilabError | None = None
         """Why the last execution did not reach its end; None when it did."""
         self.speed = 0.5
@@ -118,13 +119,13 @@ class LabState:
 
     @property
     def seen(self) -> Plan | None:
-        """What timeline and curves show: the plan, or what is on show in its place."""
-        return self.plan if self.exhibition is None else self.exhibition.plan
+        """What timeline and curves show: the plan, as it was run if it was, or what is on show in its place."""
+        return self._ran or self.plan if self.exhibition is None else self.exhibition.plan
 
     @property
     def seen_arm(self) -> Plan | None:
         """Where the scene shows the arm at a moment."""
-        return self.plan if self.exhibition is None else self.exhibition.scene
+        return self._ran or self.plan if self.exhibition is None else self.exhibition.scene
 
     @property
     def seen_run(self) -> Run | None:
@@ -137,7 +138,7 @@ class LabState:
         """Says where the arm stands while no robot is connected, shape (n,), [rad]."""
         with self.lock:
             self._rest = frozen(as_vector(q, self.model.n, "q", "rad"))
-            self.plan, self.no_plan, self.moment, self.exhibition = None, None, None, None
+            self.plan, self.no_plan, self.moment, self.exhibition, self._ran = None, None, None, None, None
             self.tell("plan", "moment", "goal")
 
     def pose(self, q: ArrayLike) -> None:
@@ -226,13 +227,19 @@ class LabState:
         """Shows a plan, or why there is none."""
         with self.lock:
             self.plan, self.no_plan = (made, None) if isinstance(made, Plan) else (None, made)
-            self.run, self.moment, self.exhibition = None, None, None
+            self.run, self.moment, self.exhibition, self._ran = None, None, None, None
             self.tell("plan", "moment")
 
     def take_run(self, run: Run | None, error: RcilabError | None = None) -> None:
         """Shows what came of an execution beside its plan: the run, and why it did not reach its end."""
         with self.lock:
-            self.run, self.error, self.is_run_of_plan = run, error, True
+            self.run, self.error, self.is_run_of_plan, before = run, error, True, self._ran
+            self._ran = None
+            if run is not None and run.paced and run.plan is not None and self.plan is not None:
+                self._ran = picture(self.model, run.plan, self.plan.report, self.plan.box)
+            if self._ran is not before:  # Its times are others now.
+                self.moment = None
+                self.tell("plan", "moment")
             self.tell("run")
 
     def take_cell_run(self, run: Run, error: RcilabError | None = None) -> None:
@@ -241,7 +248,7 @@ class LabState:
 
         seen = cell_run_of(run, self.model)
         with self.lock:
-            self.run, self.error, self.is_run_of_plan = run, error, False
+            self.run, self.error, self.is_run_of_plan, self._ran = run, error, False, None
             self.exhibit(seen)
             self.tell("run")
 

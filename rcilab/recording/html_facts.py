@@ -33,7 +33,10 @@ def _ended(run: Run, text: Text) -> str:
         return text("facts.faulted", faults=", ".join(fault.manual_name for fault in run.faults))
     if not run.is_complete:
         return text("facts.cut")
-    return text("facts.stopped", why=run.stopped) if run.stopped else text("facts.goal")
+    if not run.stopped:
+        return text("facts.goal")
+    why = f"stop.{run.stopped}"
+    return text("facts.stopped", why=text(why) if text.has(why) else run.stopped)
 
 
 def _health(run: Run, text: Text) -> str:

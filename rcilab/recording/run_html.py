@@ -26,7 +26,9 @@ def run_html(run: Run, language: str = "en") -> str:
         InvalidValueError: There is no such language.
     """
     words, timing = load_words("rcilab.recording", require_language(language)), run.timing
-    ended = run.stopped or words["card.fault" if run.faults else "card.goal"]
+    ended = words["card.fault" if run.faults else "card.goal"]
+    if run.stopped:
+        ended = words.get(f"stop.{run.stopped}", run.stopped)
     rows = [
         ("duration", words["card.cycles"].format(duration=run.duration, cycles=len(run.cycles))),
         ("ended", ended),

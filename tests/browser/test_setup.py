@@ -14,7 +14,7 @@ def test_a_tool_is_typed_the_controller_reports_it_and_the_box_is_dragged_and_ta
     tab = page.tab
     page.open_tab("Setup")
     choose(page, "Part", "tool")
-    tab.locator("div:has(> div > .rl-triples):visible").locator(".mantine-TextInput-root input").nth(2).fill("120")
+    page.group("rl-triples").locator("visible=true").locator(".mantine-TextInput-root input").nth(2).fill("120")
     page.wait(lambda: abs(page.state.setup.wanted.tool.position[2] - 0.12) < 1e-9, "the typed tool")
     page.wait(lambda: pending_parts(page.state, page.status) == (), "the controller to have it")
     page.wait(lambda: "The controller has: 0, 0, 120 mm" in tab.locator(".rl-setup").inner_text(), "the report")

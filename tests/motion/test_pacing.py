@@ -63,6 +63,20 @@ def test_a_change_in_the_middle_of_a_change_continues_it():
     assert check(fast.as_motion(), MODEL, distance=None).ok
 
 
+@pytest.mark.parametrize("plan", [joint_motion, line])
+def test_as_a_motion_it_has_the_velocity_and_acceleration_of_the_plan_at_its_rate(plan):
+    motion = plan(0.4)
+    held = plan_pace(plan_start(motion, 0.6, MODEL, "joint_position"), 150, 0.0, MODEL, "joint_position")
+    paced = plan_pace(held, len(held.q) + 20, 1.0, MODEL, "joint_position")
+    run = paced.as_motion()
+    assert np.array_equal(run.q, paced.q)
+    for row in range(1, len(paced.q) - 1, 41):
+        there, rate, drate = motion.at(float(paced.place[row])), paced.rate[row], paced.drate[row]
+        assert run.dq[row] == pytest.approx(there.dq * rate, abs=1e-12)
+        assert run.ddq[row] == pytest.approx(there.ddq * rate**2 + there.dq * drate, abs=1e-9)
+    assert not run.dq[-1].any()
+
+
 def test_in_cartesian_modes_the_tool_is_judged_too():
     motion = line(0.6)
     held = plan_pace(as_planned(motion), 200, 0.0, MODEL, "cartesian_position")

@@ -12,6 +12,7 @@ from rcilab.cycle_file import cycle_dtype
 from rcilab.model import load_model
 from rcilab.motion import plan_joint
 from rcilab.notebook.lesson import answer, language
+from rcilab.notebook.page_watch import LEFT_ALONE
 from rcilab.recording.run import build_run
 
 SESSION = "JPY_SESSION_NAME"
@@ -61,3 +62,11 @@ def test_what_shows_itself_speaks_as_any_notebook_does(monkeypatch, name: str, w
     run = build_run(np.zeros(0, cycle_dtype(7)), plan=None, realtime=False)
     for shown, word in zip((run, check(motion, model), motion), words, strict=True):
         assert word in shown._repr_html_()
+    assert ("xMatePro7, motion" in check(motion, model)._repr_html_()) == (words[0] == "success rate")
+
+
+def test_why_a_run_was_stopped_is_said_in_the_readers_language(monkeypatch) -> None:
+    monkeypatch.setenv(SESSION, "mine.zh.ipynb")
+    rows = np.zeros(0, cycle_dtype(7))
+    assert "笔记本页面已不在" in build_run(rows, plan=None, realtime=False, stopped=LEFT_ALONE)._repr_html_()
+    assert "too hot" in build_run(rows, plan=None, realtime=False, stopped="too hot")._repr_html_()  # One's own reason.

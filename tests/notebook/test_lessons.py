@@ -1,7 +1,7 @@
 """Every lesson runs from top to bottom without a display; its exercises wait for an answer, its solutions are right.
 
 A lesson is executed once: its cells as they are, and after each exercise the same with the solution folded below it.
-The Chinese lessons have the same code, so they need not run.
+The Chinese lessons have the same code; that what it calls speaks Chinese is seen in `tests/endurance`.
 """
 
 from __future__ import annotations
@@ -86,6 +86,7 @@ def execute(notebook: nbformat.NotebookNode, path: Path) -> nbformat.NotebookNod
     from nbclient import NotebookClient
 
     environment = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")}
+    environment["JPY_SESSION_NAME"] = str(path)  # As Jupyter's server does; the language is read from it.
     resources = {"metadata": {"path": str(path.parent)}}
     return NotebookClient(notebook, timeout=60, resources=resources).execute(env=environment)
 

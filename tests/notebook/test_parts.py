@@ -290,6 +290,21 @@ def test_what_takes_longer_shows_how_far_it_is_and_can_be_given_up(fresh: Lab, m
     wait_for(lambda: fresh.state.plan is not before, what="the plan")
 
 
+def test_what_only_goes_against_advice_can_be_slowed_down_too(fresh: Lab) -> None:
+    fresh.jog.q = GOAL
+    fresh.plan.plan.click()
+    plan = fresh.state.plan
+    assert plan is not None
+    assert plan.report.ok
+    assert plan.report.warnings
+    assert fresh.plan.slow_down.layout.display is None
+    fresh.plan.slow_down.click()
+    slower = fresh.state.plan
+    assert slower is not None
+    assert len(slower.report.warnings) < len(plan.report.warnings)
+    assert fresh.plan.slow_down.layout.display == "none"
+
+
 def test_a_motion_that_no_slow_down_mends_says_so(fresh: Lab) -> None:
     fresh.state.take_motion(rcilab.Motion.from_samples(rcilab.plan_joint(PRO7, PRO7.home, GOAL, speed=1.0).q[::9]))
     broken = fresh.state.plan

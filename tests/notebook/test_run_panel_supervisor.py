@@ -152,6 +152,15 @@ def test_a_motion_is_held_gone_on_with_and_slowed_down_as_by_the_session(own: bo
         assert run.paced
         assert run.stop_time is not None
         assert run.tracking.joint_max.max() < 1e-6  # Against what was asked for: the hold, the pace, until the stop.
+        with notebook.Timeline(panel) as timeline, notebook.MotionPlot(panel) as plot:
+            assert run.plan is not None
+            assert timeline.slider.max == round(1000.0 * run.plan.duration)
+            timeline.moment = 1.0
+            assert "left:" in plot._cursor.value
+            assert panel.state.seen_arm is not None
+            np.testing.assert_array_equal(panel.state.seen_arm.motion.at(1.0).q, run.plan.at(1.0).q)
+            panel.state.make_plan()
+            assert timeline.slider.max < round(1000.0 * run.plan.duration)
 
 
 def test_what_cannot_be_held_any_more_goes_on_and_says_so() -> None:

@@ -36,7 +36,7 @@
       let before = group.previousElementSibling;
       while (before && !before.childElementCount) before = before.previousElementSibling;  // A piece of HTML that says nothing.
       const last = before && before.lastElementChild;
-      if (last && last.matches(".rl-verdict, .rl-note, .rl-table, .rl-meter")) mark(before, "above-group");
+      if (last && last.matches(".rl-verdict, .rl-note, .rl-table, .rl-meter, .rl-problem, .rl-slot")) mark(before, "above-group");
     });
     root.querySelectorAll('[role="tablist"]').forEach((tabs) => {
       mark(tabs.parentElement, "tabs");

@@ -96,7 +96,8 @@ class JogPanel:
             ends = float(limits.lower[joint]), float(limits.upper[joint])
             self._margins[joint].show(margin_html(float(state.goal.q[joint]), *ends, self._text))
         fields = [(field.field, f"J{number}") for number, field in enumerate(self._fields, start=1)]
-        self._said.show(problems_html(state, self._text, fields) + said_html(state, status, self._text))
+        said = problems_html(state, self._text, fields) + said_html(state, status, self._text)
+        self._said.show(f'<div class="rl-slot">{said}</div>')
 
 
 def add_jog_button(gui: Any, ask: Ask, label: str, axis: str, sign: int) -> None:

@@ -119,7 +119,7 @@ class ProgramPanel:
             said += f'<p class="rl-note">{esc(self._elsewhere(draft, status))}</p>'
         if program.answer is not None:
             said += f'<p class="rl-verdict rl-{program.tone}">{esc(text.say(program.answer))}</p>'
-        self._answer.show(said)
+        self._answer.show(f'<div class="rl-room">{said}</div>' if count else said)
 
     def _elsewhere(self, draft: Draft, status: SupervisorStatus) -> str:
         """Returns whether the program starts where the arm is, in words."""

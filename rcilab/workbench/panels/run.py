@@ -35,6 +35,10 @@ class RunPanel:
         """Adds the controls."""
         text, ask = self._text, self._ask
         self._planned = Html(gui)
+        pace = gui.add_slider(
+            text("run.pace"), 100.0 * SLOWEST_PACE, 100.0, 5.0, 100.0 * state.drive.pace, hint=text("run.pace_hint")
+        )
+        self._pace = Linked(pace, ask, lambda v, p: requests.SetDrive(page=p, pace=float(v) / 100.0))
         self._execute = gui.add_button(text("run.execute"), color=(23, 128, 68), icon="player-play", disabled=True)
         on_press(self._execute, ask, lambda page: requests.Drive(page=page, what="execute"))
         self._question = Html(gui)
@@ -42,6 +46,13 @@ class RunPanel:
         on_press(self._agree, ask, _drive("confirm"))
         self._cancel = gui.add_button(text("run.cancel"), color="gray", visible=False)
         on_press(self._cancel, ask, _drive("cancel"))
+        self._pause = gui.add_button(
+            text("run.pause"), icon="player-pause", color="orange", disabled=True, hint=text("run.pause_hint")
+        )
+        on_press(self._pause, ask, _drive("pause"))
+        self._resume = gui.add_button(text("run.resume"), icon="player-play", color="blue", visible=False)
+        on_press(self._resume, ask, _drive("resume"))
+        self._way, self._outcome = Html(gui), Html(gui)
         self._reason = Html(gui)
         self._again = gui.add_button(text("run.again"), icon="route", visible=False, hint=text("program.plan_hint"))
         on_press(self._again, ask, lambda page: requests.PlanProgram(page=page))
@@ -49,17 +60,6 @@ class RunPanel:
             text("run.back"), icon="arrow-back-up", color="gray", visible=False, hint=text("run.back_hint")
         )
         on_press(self._back, ask, lambda page: requests.PoseGoal(page=page, name="start"))
-        self._pause = gui.add_button(
-            text("run.pause"), icon="player-pause", color="orange", visible=False, hint=text("run.pause_hint")
-        )
-        on_press(self._pause, ask, _drive("pause"))
-        self._resume = gui.add_button(text("run.resume"), icon="player-play", color="blue", visible=False)
-        on_press(self._resume, ask, _drive("resume"))
-        pace = gui.add_slider(
-            text("run.pace"), 100.0 * SLOWEST_PACE, 100.0, 5.0, 100.0 * state.drive.pace, hint=text("run.pace_hint")
-        )
-        self._pace = Linked(pace, ask, lambda v, p: requests.SetDrive(page=p, pace=float(v) / 100.0))
-        self._way, self._outcome = Html(gui), Html(gui)
         self._buttons: dict[str, Any] = {}
         with gui.add_folder(text("run.robot")):
             gui.add_html('<i class="rl-buttons"></i>')
@@ -89,13 +89,14 @@ class RunPanel:
         self._question.show(said and f'<p class="rl-verdict rl-warn" role="alert">{said}</p>')
         self._execute.visible = question is None
         self._agree.visible = self._cancel.visible = question is not None
-        unsaid = None if reason == outdated(state) else reason
+        unsaid = None if moving or reason == outdated(state) else reason  # The bar says that it moves.
         self._reason.show("" if unsaid is None else f'<p class="rl-note rl-why">{esc(text.say(unsaid))}</p>')
         is_program = state.plan is not None and state.plan.program is not None
         self._again.visible = is_program and (may_plan_again(reason) or outdated(state) is not None)
         self._back.visible = may_go_back(reason)
-        self._pause.visible, self._resume.visible = status.code == "moving", status.code == "moving.held"
-        self._pause.disabled = status.motion_place is None
+        is_held = status.code == "moving.held"
+        self._pause.visible, self._resume.visible = not is_held, is_held  # There before they are needed: nothing moves.
+        self._pause.disabled = status.code != "moving" or status.motion_place is None
         self._pace.show(round(100.0 * state.drive.pace, 1))
         self._way.show(way_html(state, status, text))
         self._outcome.show("" if moving else outcome_html(state, status, text))

@@ -42,7 +42,7 @@ class SetupPanel:
         on_press(self._cancel, ask, _press("cancel"))
         self._table = Html(gui)
         self._planned = Html(gui)
-        with gui.add_folder(text("setup.edit_title")):
+        with gui.add_folder(text("setup.edit_title"), order=0.0):  # First: what is said about it must not move it.
             gui.add_html('<i class="rl-buttons rl-setup-head"></i>')
             self._undo = gui.add_button(
                 text("setup.undo"), icon="arrow-back-up", color="gray", hint=text("setup.undo_hint")

@@ -45,7 +45,8 @@ class SetupNumbersPanel:
         self._seen: dict[str, Linked] = {}
         for part in SETUP_PARTS:
             title = text(f"setup.part.{part}")
-            folder = gui.add_folder(title[:1].upper() + title[1:], visible=state.setup.edited == part)
+            title = title[:1].upper() + title[1:]
+            folder = gui.add_folder(title, visible=state.setup.edited == part, order=0.5)  # After the choice.
             with folder:
                 gui.add_html('<i class="rl-triples"></i>')
                 if part == "box":

@@ -37,7 +37,6 @@ class TargetPanel:
                 self._fields.append(NumberField(box, ask, f"pose.{name}", text.unit("mm" if index < 3 else "deg")))
             box = gui.add_text(text("target.wxyz"), "", hint=text("target.wxyz_hint"))
             self._wxyz = NumberField(box, ask, f"pose.{QUATERNION}")
-        self._problems = Html(gui)
         self._reach = Html(gui)
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:
@@ -52,9 +51,10 @@ class TargetPanel:
         wxyz = self._wxyz
         wxyz.show(quaternion_text(target.wxyz), state.problems.get(wxyz.field))
         labels.append((wxyz.field, self._text("target.wxyz")))
-        self._problems.show(problems_html(state, self._text, labels))
+        problems = problems_html(state, self._text, labels)
         is_broken = state.plan is not None and not state.plan.report.ok  # Said here, too: below it is out of sight.
-        self._reach.show(reach_html(state, self._text) + (planned_html(state, self._text) if is_broken else ""))
+        said = reach_html(state, self._text) + (planned_html(state, self._text) if is_broken else "")
+        self._reach.show(f'<div class="rl-slot">{problems or said}</div>')  # What is below stays where it is.
 
 
 def quaternion_text(wxyz: np.ndarray) -> str:

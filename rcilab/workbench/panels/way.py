@@ -38,7 +38,6 @@ class WayPanel:
                 speed = gui.add_slider("%", 1, 100, 1, 50, hint=text("target.speed_hint"))
                 self._speed = Linked(speed, ask, lambda v, p: requests.SetSpeed(page=p, speed=v / 100.0))
                 self._field = NumberField(gui.add_text("", "", hint=text("target.speed_hint")), ask, "speed")
-            self._problem = Html(gui)
             laws = {text(f"law.{law}"): law for law in LAWS}
             self._laws = {law: label for label, law in laws.items()}
             law = gui.add_dropdown(text("target.law"), tuple(laws))
@@ -46,7 +45,7 @@ class WayPanel:
             self._law = Linked(law, ask, lambda v, p: requests.SetLaw(page=p, law=laws.get(v, "")))
             self._plan = gui.add_button(text("target.plan"), icon="route", hint=text("target.plan_hint"))
             on_press(self._plan, ask, lambda page: requests.Plan(page=page))
-            self._planned = Html(gui)
+            self._problem, self._planned = Html(gui), Html(gui)
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows the choices and the plan."""

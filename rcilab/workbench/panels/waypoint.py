@@ -56,7 +56,6 @@ class WaypointPanel:
                 self._field(gui, name)
             self._button(gui, "via", "here", "map-pin")
             self._button(gui, "via", "target", "current-location")
-        self._problems = Html(gui)
         self._teach = gui.add_folder(text("program.teach"))
         with self._teach:
             gui.add_html('<i class="rl-buttons"></i>')
@@ -65,6 +64,7 @@ class WaypointPanel:
                 ("aim", "target", "eye"),
             ):  # fmt: skip
                 self._button(gui, what, source, icon)
+        self._problems = Html(gui)  # Last: it comes and goes.
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows the selected waypoint."""
