@@ -172,6 +172,17 @@ def button(page: Any, name: str) -> Any:
     return page.locator(".rl-root button:visible", has_text=re.compile(rf"^\s*{name}\s*$"))
 
 
+def turn_joint_1(page: Any, handle: Any) -> np.ndarray:
+    """Brings the joint from home to 30 degrees by the keys of its slider, and returns where the arm is seen then."""
+    handle.focus()
+    for _ in range(60):
+        page.keyboard.press("ArrowRight")
+    goal = PRO7.home.copy()
+    goal[0] = np.radians(30.0)
+    wait_for(page, lambda: shows(page, goal), "the arm where the slider put it")
+    return goal
+
+
 @pytest.mark.browser
 def test_a_person_runs_the_lab_moves_a_slider_executes_and_stops(page: Any) -> None:
     run_all(page)
@@ -180,12 +191,7 @@ def test_a_person_runs_the_lab_moves_a_slider_executes_and_stops(page: Any) -> N
     assert page.locator(".Toastify__toast").count() == 0  # Nothing has popped up.
 
     handle = page.locator(".widget-tab .noUi-handle:visible").first
-    handle.focus()
-    for _ in range(60):
-        page.keyboard.press("ArrowRight")
-    goal = PRO7.home.copy()
-    goal[0] = np.radians(30.0)
-    wait_for(page, lambda: shows(page, goal), "the arm where the slider put it")
+    goal = turn_joint_1(page, handle)
 
     page.get_by_role("tab", name="Run", exact=True).click()
     button(page, "Connect").click()
@@ -264,12 +270,7 @@ def test_the_first_lesson_runs_in_its_language_and_its_slider_moves_the_arm(
     handle.wait_for()
     assert tab.locator(".widget-hslider .widget-label").first.inner_text() == "关节 1"
     wait_for(tab, lambda: shows(tab, PRO7.home), "the arm at home in the preview")
-    handle.focus()
-    for _ in range(60):
-        tab.keyboard.press("ArrowRight")
-    goal = PRO7.home.copy()
-    goal[0] = np.radians(30.0)
-    wait_for(tab, lambda: shows(tab, goal), "the arm where the slider put it")
+    turn_joint_1(tab, handle)
     wait_for(tab, lambda: tab.get_by_text("(ipykernel) | Idle").count() == 1, "the end of the lesson")
     assert tab.locator("[data-mime-type='application/vnd.jupyter.stderr']").count() == 0
     tab.close()
