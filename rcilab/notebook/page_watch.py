@@ -2,6 +2,7 @@
 
 The page is asked from the first part, or the first sliders, that a notebook makes. Before, or where the kernel hears
 no page while a cell runs (VS Code, JupyterLab before 4.4, ipykernel before 7), nothing is known and nothing is stopped.
+Nor is it while a button of somebody's own runs the motion in the very thread that hears the page.
 """
 
 from __future__ import annotations

@@ -52,23 +52,30 @@ panel._show()
 panel.execute.click()
 until(lambda: panel.state.status.phase == "moving" and (panel.state.status.motion_time or 0.0) > 0.02)
 """
-SESSION = """
+ROBOT = """
 robot = rcilab.simulate(model)
 robot.power_on()
-beside = RunPanel(robot)
 motion = rcilab.plan_joint(model, robot.state.q_c, model.home + 0.5, speed=0.005)  # Minutes, if nobody stops it.
+"""
+SESSION = f"""{ROBOT}
+beside = RunPanel(robot)
 beside.stop.comm.comm_id
+"""
+THREAD = f"""{ROBOT}
+done = []
+threading.Thread(target=lambda: done.append(robot.execute(motion).stopped)).start()
+until(lambda: robot.is_moving)
 """
 PAGE = """
 from rcilab.notebook import heart
 from rcilab.notebook.at_once import hear_at_once
 from ipywidgets import Button
-heart.INTERVAL = 0.1  # Half a second of silence is enough.
+heart.INTERVAL = 0.2  # A second of silence is enough.
 kernel_heart = heart.kernel_heart()
 kernel_heart.open()
 slow = Button()
 hear_at_once(slow)
-slow.on_click(lambda _: time.sleep(1.0))
+slow.on_click(lambda _: time.sleep(2.0))
 [widget.comm.comm_id for widget in (*kernel_heart._widgets[:2], slow)]
 """
 CLICK: dict[str, Any] = {"method": "custom", "content": {"event": "click"}}
@@ -173,6 +180,13 @@ def test_an_interrupt_stops_the_arm_whether_a_cell_runs_or_not(kernel: Kernel) -
     assert kernel.run(STANDS) == ("idle", True)
 
 
+def test_an_interrupt_stops_what_a_thread_of_somebodys_own_moves(kernel: Kernel) -> None:
+    kernel.run(MAKE + PARTS + THREAD)
+    kernel.manager.interrupt_kernel()
+    assert kernel.run("until(lambda: done); done[0]") == "the kernel was interrupted"
+    kernel.run("robot.close()")
+
+
 def test_stop_is_heard_while_the_cell_that_moves_the_arm_runs(kernel: Kernel) -> None:
     subshell = kernel.open_subshell()
     stop = kernel.run(MAKE + SESSION)
@@ -191,10 +205,10 @@ def test_a_page_that_falls_silent_stops_what_a_cell_moves_and_one_that_nobody_he
     kernel.run(MAKE + SESSION)
     question, answer, slow = kernel.run(PAGE)
     moving = kernel.client.execute("robot.execute(motion).stopped")
-    time.sleep(1.0)  # Nobody has ever answered, so nobody is missed.
+    time.sleep(1.2)  # Nobody has ever answered, so nobody is missed.
     kernel.answer(question, answer, subshell, 1.0)
     kernel.tell(slow, subshell, **CLICK)  # Now who hears answers is busy, for twice as long as silence may last.
-    time.sleep(0.8)
+    time.sleep(1.6)
     kernel.answer(question, answer, subshell, 1.0)
     assert kernel.value_of(moving) == "the notebook's page is gone"
     kernel.run("until(lambda: 'page did not answer' in beside._outcome.value)")

@@ -30,18 +30,12 @@ from rcilab.notebook import Lab
 model = rcilab.load_model("xMatePro7")
 lab = Lab(model, height=240)
 lab"""
-CELLS = [
-    """import rcilab
-from rcilab.notebook import Scene
-model = rcilab.load_model("xMatePro7")
-robot = rcilab.simulate(model)
+SESSION = """robot = rcilab.simulate(model)
 robot.power_on()
-Scene(robot, height=240)""",
-    """open("begun", "w").close()
-run = robot.execute(rcilab.plan_joint(model, robot.state.q_c, model.home + 0.5, speed=0.005))
+motion = rcilab.plan_joint(model, robot.state.q_c, model.home + 0.5, speed=0.005)"""
+MOVE = """run = robot.execute(motion)
 with open("ended", "w") as file:
-    file.write(str(run.stopped))""",
-]
+    file.write(str(run.stopped))"""
 LESSON = "01_first_motion.zh.ipynb"
 PRO7 = rcilab.load_model("xMatePro7")
 TOOL = "/".join(["meshcat", "arm", *(f"joint{i}" for i in range(1, 8)), "flange", "tool"])
@@ -67,9 +61,8 @@ def jupyter(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, Pat
     folder = tmp_path_factory.mktemp("lab")
     (folder / "notes").mkdir()
     kernel = {"kernelspec": {"name": "python3", "display_name": "Python 3", "language": "python"}}
-    for name, cells in (("lab", [CELL]), ("cells", CELLS)):
-        note = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(cell) for cell in cells], metadata=kernel)
-        nbformat.write(note, folder / "notes" / f"{name}.ipynb")
+    note = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(CELL)], metadata=kernel)
+    nbformat.write(note, folder / "notes" / "lab.ipynb")
     shutil.copy(Path(__file__).parents[2] / "notebooks" / LESSON, folder / "notes")
     environment = {**os.environ, "JUPYTER_RUNTIME_DIR": str(folder / "runtime")}
     environment |= {f"JUPYTER_{name}_DIR": str(folder / name) for name in ("CONFIG", "DATA")}
@@ -213,20 +206,31 @@ def test_a_person_runs_the_lab_moves_a_slider_executes_and_stops(page: Any) -> N
 
 
 @pytest.mark.browser
-def test_a_tab_that_is_closed_stops_the_arm(page: Any, jupyter: tuple[str, Path]) -> None:
-    page.get_by_role("tab", name="Plan", exact=True).click()
-    button(page, "Plan there").click()
-    page.get_by_role("tab", name="Run", exact=True).click()
-    button(page, "Execute").click()
-    page.locator(".rl-chip", has_text=re.compile("^moving$")).wait_for()
-    page.close()
+def test_a_tab_that_is_closed_stops_what_panel_and_cell_move_but_not_one_without_timers(
+    page: Any, jupyter: tuple[str, Path]
+) -> None:
     from jupyter_client.blocking.client import BlockingKernelClient
 
     client = BlockingKernelClient(connection_file=str(next(jupyter[1].glob("kernel-*.json"))))
     client.load_connection_file()
     client.start_channels()
-    told = {"phase": "lab.state.status.phase", "left": "lab.state.plan.motion.duration - lab.state.status.motion_time"}
+    client.execute_interactive(SESSION, timeout=60)
+    page.get_by_role("tab", name="Plan", exact=True).click()
+    button(page, "Plan there").click()
+    page.get_by_role("tab", name="Run", exact=True).click()
+    button(page, "Execute").click()
+    page.locator(".rl-chip", has_text=re.compile("^moving$")).wait_for()
+    client.execute(MOVE)
+    page.evaluate("window.setTimeout = window.setInterval = window.requestAnimationFrame = () => 0")  # As if hidden.
+    time.sleep(4.0)  # Longer than a page may be silent.
+    ended = jupyter[1].parent / "notes" / "ended"
+    assert not ended.exists()
+    page.close()
     deadline = time.monotonic() + 20.0
+    while not ended.exists() or ended.read_text() != LEFT_ALONE:
+        assert time.monotonic() < deadline, "the cell's arm goes on although nobody is there"
+        time.sleep(0.1)
+    told = {"phase": "lab.state.status.phase", "left": "lab.state.plan.motion.duration - lab.state.status.motion_time"}
     while True:
         reply = client.execute_interactive("", user_expressions=told, timeout=30)
         phase, left = (reply["content"]["user_expressions"][name]["data"]["text/plain"] for name in told)
@@ -236,26 +240,6 @@ def test_a_tab_that_is_closed_stops_the_arm(page: Any, jupyter: tuple[str, Path]
         time.sleep(0.2)
     client.stop_channels()
     assert float(left) > 2.0  # It was to go on so long.
-
-
-@pytest.mark.browser
-def test_a_tab_that_is_closed_stops_what_a_cell_moves_but_not_one_without_timers(
-    page: Any, jupyter: tuple[str, Path]
-) -> None:
-    notes = jupyter[1].parent / "notes"
-    tab = page.context.new_page()
-    tab.goto(jupyter[0].replace("lab/tree/lab.ipynb", "lab/workspaces/cells/tree/cells.ipynb"))
-    run_all(tab)
-    wait_for(tab, (notes / "begun").exists, "the motion")
-    tab.evaluate("window.setTimeout = window.setInterval = window.requestAnimationFrame = () => 0")  # As if hidden.
-    time.sleep(4.0)  # Longer than a page may be silent.
-    assert not (notes / "ended").exists()
-    tab.close()
-    deadline = time.monotonic() + 15.0
-    while not (notes / "ended").exists() or not (notes / "ended").read_text():
-        assert time.monotonic() < deadline, "the arm goes on although nobody is there"
-        time.sleep(0.1)
-    assert (notes / "ended").read_text() == LEFT_ALONE
 
 
 @pytest.mark.browser
