@@ -163,3 +163,12 @@ def change(page: BenchPage, label: str, option: str, changed) -> None:
                 return
             page.tab.wait_for_timeout(100)
     raise AssertionError(f"{label} did not change to {option}")
+
+
+def test_the_tabs_stay_in_sight_of_a_long_panel_and_the_next_one_begins_at_its_top(page):
+    page.open_tab("Run")
+    panel = page.tab.locator('[data-rl~="tabbed"] > .mantine-ScrollArea-viewport')
+    page.wait(lambda: panel.evaluate("box => { box.scrollTop = 300; return box.scrollTop; }") > 100, "a long panel")
+    assert page.covered_tabs() == []
+    page.open_tab("Jog")
+    page.wait(lambda: panel.evaluate("box => box.scrollTop") == 0, "the top of the next panel")

@@ -40,7 +40,9 @@
     });
     root.querySelectorAll('[role="tablist"]').forEach((tabs) => {
       mark(tabs.parentElement, "tabs");
-      if (tabs.children.length >= MANY) mark(tabs, "many");
+      if (tabs.children.length < MANY) return;
+      mark(tabs, "many");
+      mark(tabs.closest(".mantine-ScrollArea-root"), "tabbed");
     });
     root.querySelectorAll(".mantine-Paper-root > svg.tabler-icon-chevron-down").forEach((icon) => {
       const head = icon.parentElement;

@@ -194,7 +194,11 @@
       // viser's tabs hear keys and fingers, not click().
       found[before].dispatchEvent(new KeyboardEvent("keydown", { key: "Enter", bubbles: true }));
       shown = before;
-    } else if (open !== shown) keep("tab", shown = open);
+    } else if (open !== shown) {
+      const panel = list.closest(".mantine-ScrollArea-root");
+      if (shown !== null && panel) panel.firstElementChild.scrollTop = 0;  // What another tab was scrolled by is not its own.
+      keep("tab", shown = open);
+    }
   };
 
   // The time cursor: one line in every plot whose x axis is the motion's time; a click there moves it.
