@@ -1,15 +1,25 @@
-"""The buttons' icons, out of an archive that is opened once.
+"""The buttons' icons, out of an archive that is opened once; and their hints, which travel in the icons.
 
 viser 1.1 remembers 32 icons and opens its archive of 6000 anew for every other one, which takes 30 ms; a page like
 ours has more than 32, so each time it was built that was a second and a half.
+
+It takes a hint for every control, and its page shows none over a button. Ours finds it in the icon (`names.js`).
 """
 
 from __future__ import annotations
 
-from functools import cache
+from collections.abc import Callable
+from contextvars import ContextVar
+from functools import cache, wraps
+from html import escape
 from io import BytesIO
 from typing import Any
 from zipfile import ZipFile
+
+HINT = "data-rl-hint"
+"""The attribute of an icon that says what its button does."""
+
+_hint: ContextVar[str | None] = ContextVar("hint", default=None)  # Of the button that is being made.
 
 
 def install() -> None:
@@ -17,8 +27,27 @@ def install() -> None:
     from viser import _gui_api, _gui_handles
 
     users: tuple[Any, ...] = (_gui_api, _gui_handles)  # Where viser 1.1 looks the function up.
+    if users[0].svg_from_icon is _hinting_svg_of:
+        return
     for module in users:
-        module.svg_from_icon = svg_of
+        module.svg_from_icon = _hinting_svg_of
+    gui: Any = _gui_api.GuiApi
+    for name in ("add_button", "add_upload_button"):
+        setattr(gui, name, _hinting(getattr(gui, name)))
+
+
+def _hinting(add: Callable[..., Any]) -> Callable[..., Any]:
+    """Returns a method that adds a button, with its hint known to who draws the icon."""
+
+    @wraps(add)
+    def add_hinted(self: Any, *args: Any, **options: Any) -> Any:
+        token = _hint.set(options.get("hint"))
+        try:
+            return add(self, *args, **options)
+        finally:
+            _hint.reset(token)
+
+    return add_hinted
 
 
 @cache
@@ -32,6 +61,12 @@ def svg_of(icon: str) -> str:
         KeyError: There is none of this name.
     """
     return _archive().read(f"{icon}.svg").decode()
+
+
+def _hinting_svg_of(icon: str) -> str:
+    """Returns an icon, with the hint of the button that is being made."""
+    hint, svg = _hint.get(), svg_of(icon)
+    return svg if hint is None else svg.replace("<svg", f'<svg {HINT}="{escape(hint)}"', 1)
 
 
 @cache

@@ -23,6 +23,8 @@ _UNSEEN = """() => [...document.querySelectorAll('#root .mantine-Button-root:not
   .filter((button) => button.getClientRects().length)
   .filter((button) => getComputedStyle(button).backgroundColor === 'rgba(0, 0, 0, 0)')
   .map((button) => button.textContent)"""
+_UNHINTED = """() => [...document.querySelectorAll('#root button:has(svg[data-rl-hint])')]
+  .filter((button) => button.title.length < 4).map((button) => button.textContent)"""
 
 
 @pytest.fixture
@@ -51,11 +53,15 @@ def test_in_every_tab_controls_have_names_buttons_are_seen_stop_too_and_axe_find
     page.plan_to(1, 20)  # With a plan there are more buttons to press.
     names = [name for name in tab.get_by_role("tab").all_inner_texts() if name != "Timeline and plots"]
     assert len(names) >= 7
+    hinted = 0
     for name in names:
         page.open_tab(name)
         page.wait(lambda: tab.evaluate(_UNNAMED) == [], lambda: str(tab.evaluate(_UNNAMED)))
         page.wait(lambda: tab.evaluate(_UNSEEN) == [], lambda: str(tab.evaluate(_UNSEEN)))
+        page.wait(lambda: tab.evaluate(_UNHINTED) == [], lambda: str(tab.evaluate(_UNHINTED)))
+        hinted += tab.evaluate("document.querySelectorAll('#root button[title] svg[data-rl-hint]').length")
         assert page.button("Stop").is_visible(), name
+    assert hinted > 20
     assert violations(page) == []
     page.bench.conductor.ask(requests.SetView(name="theme", value="dark"))
     page.wait(lambda: tab.evaluate("document.documentElement.dataset.rlTheme") == "dark", "a dark page")

@@ -46,3 +46,22 @@ def test_a_page_of_more_icons_than_viser_remembers_opens_the_archive_once(monkey
         server.stop()
     assert len(opened) == 1
     assert icons.svg_of.cache_info().currsize == len(names) + 1
+
+
+def test_the_hint_of_a_button_lies_in_its_icon_and_in_no_other() -> None:
+    import viser
+
+    icons.install()
+    icons.install()
+    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    try:
+        hinted = server.gui.add_button("Go", icon="player-play", hint='so "far" & <on>')
+        upload = server.gui.add_upload_button("Load", icon="upload", hint="a file")
+        plain = server.gui.add_button("Stay", icon="player-play")
+        html = [handle._impl.props._icon_html for handle in (hinted, upload, plain)]
+        assert f'{icons.HINT}="so &quot;far&quot; &amp; &lt;on&gt;"' in html[0]
+        assert html[0].count(icons.HINT) == html[1].count(icons.HINT) == 1
+        assert f'{icons.HINT}="a file"' in html[1]
+        assert html[2] == icons.svg_of("player-play")
+    finally:
+        server.stop()

@@ -1,6 +1,7 @@
 // Names for controls that viser leaves without one: its sliders say aria-label="" and the labels of its text boxes point
 // nowhere. A name is the label of the row, with the heading above where there is one; a box without a label is that of
-// the control before it. Folders open with a mouse only: they become buttons. All of it again whenever viser redraws.
+// the control before it. Folders open with a mouse only: they become buttons. The hint of a button lies in its icon
+// (views/icons.py), since viser shows none. All of it again whenever viser redraws.
 (() => {
   "use strict";
   const PAUSE = 200;  // [ms] A choice: between two looks, whatever changes meanwhile.
@@ -49,6 +50,12 @@
       }
     });
   };
+  const sweepHints = () => {
+    document.querySelectorAll("#root button svg[data-rl-hint]").forEach((icon) => {
+      const button = icon.closest("button"), hint = icon.dataset.rlHint;
+      if (button.title !== hint) button.title = hint;
+    });
+  };
   const FOLDER = "#root .mantine-Paper-root > .mantine-Paper-root:first-child:has(> svg.tabler-icon)";
   const sweepFolders = () => {
     document.querySelectorAll(FOLDER).forEach((head) => {
@@ -64,7 +71,7 @@
     head.click();
   });
   let timer = 0;
-  const later = () => { if (!timer) timer = setTimeout(() => { timer = 0; sweep(); sweepButtons(); sweepFolders(); }, PAUSE); };
+  const later = () => { if (!timer) timer = setTimeout(() => { timer = 0; sweep(); sweepButtons(); sweepHints(); sweepFolders(); }, PAUSE); };
   const watch = () => {
     new MutationObserver(later).observe(document.body, { childList: true, subtree: true, characterData: true, attributes: true, attributeFilter: ["aria-label"] });
     later();
