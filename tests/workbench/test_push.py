@@ -191,7 +191,7 @@ def test_guiding_that_ends_because_nobody_is_there_is_told(store, session):
 def test_a_real_arm_is_freed_only_when_asked_twice(store, session, monkeypatch):
     freed = []
     supervisor = SimpleNamespace(
-        start_guiding=lambda *way: freed.append(way) or SimpleNamespace(done=True, error=None),
+        start_guiding=lambda *way, stops: freed.append(way) or SimpleNamespace(done=True, error=None),
         **dict.fromkeys(("recover", "power_on", "power_off", "reconnect", "stop_guiding")),
     )
     monkeypatch.setattr(session, "supervisor", lambda: supervisor)
