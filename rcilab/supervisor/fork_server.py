@@ -152,7 +152,6 @@ def become(order: Order) -> None:
 def preload() -> None:
     """Loads what control processes and virtual controllers need. What fails here fails, and is told, in the copy."""
     with suppress(Exception):
-        import rcilab.cli.controller
         import rcilab.controller.server
         import rcilab.supervisor.worker  # noqa: F401
         from rcilab.model import load_model

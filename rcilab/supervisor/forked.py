@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import os
 import select
 import signal
@@ -68,6 +69,11 @@ class ForkServer:
         self._connection.close()
         self._process.returncode = 0  # Not our child.
 
+    def leave_behind(self) -> None:
+        """Leaves it to the end of this process, at which its connection ends, and not earlier: others may go on."""
+        self._connection.detach()
+        self._process.returncode = 0  # It is not waited for, and that is no mistake.
+
 
 _server: ForkServer | None = None
 _lock = threading.Lock()
@@ -96,6 +102,12 @@ def _forget() -> None:
     if _server is not None:
         _server.forget()
         _server = None
+
+
+@atexit.register
+def _leave_behind() -> None:
+    if _server is not None:
+        _server.leave_behind()
 
 
 os.register_at_fork(after_in_child=_forget)

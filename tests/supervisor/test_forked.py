@@ -61,10 +61,8 @@ def test_a_copy_works_in_our_environment_and_folder_as_they_are_now(run, monkeyp
 def test_a_copy_is_handed_the_files_that_belong_to_it_under_their_numbers_and_no_other(run):
     reader, writer = os.pipe()
     try:
-        child = run(
-            f"import os; print(os.write({writer}, b'hello'), [n for n in range(999) if os.path.exists(f'/dev/fd/{{n}}')])",
-            descriptors=[writer],
-        )
+        open_ones = "[n for n in range(999) if os.path.exists(f'/dev/fd/{n}')]"
+        child = run(f"import os; print(os.write({writer}, b'hello'), {open_ones})", descriptors=[writer])
         assert child.wait(SOON)
         assert child.read_output().splitlines()[0] == f"5 {sorted([0, 1, 2, writer])}"
         assert os.read(reader, 100) == b"hello"
@@ -166,3 +164,22 @@ def test_many_come_and_go_at_once_and_no_file_stays_open(run):
     assert set(os.listdir("/proc/self/fd")) <= before
     server = f"/proc/{fork_server().pid}/fd"
     wait_for(lambda: len(os.listdir(server)) < 10)
+
+
+LAST = """
+import atexit
+
+def finish():
+    print(controller.is_alive)
+    controller.end()
+
+atexit.register(finish)  # What is registered first is called last.
+from rcilab.supervisor.launch import start_controller
+controller = start_controller("xMatePro7")
+"""
+
+
+def test_at_the_interpreters_end_there_are_no_complaints_and_what_is_done_last_still_has_its_processes():
+    command = [sys.executable, "-X", "dev", "-c", LAST]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60.0)
+    assert (done.stdout, done.stderr) == ("True\n", "")
