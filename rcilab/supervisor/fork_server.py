@@ -131,7 +131,8 @@ def become(order: Order) -> None:
     code = 1
     try:
         os.setsid()  # Ctrl-C in the terminal is for the one who wanted it, who brings the arm to rest first.
-        Path("/proc/self/comm").write_text(f"rcilab {order.module.rpartition('.')[2]}"[:_NAME_SIZE])
+        with suppress(OSError):  # What `top` shows; it goes without.
+            Path("/proc/self/comm").write_text(f"rcilab {order.module.rpartition('.')[2]}"[:_NAME_SIZE])
         os.environ.clear()
         os.environ.update(order.environment)
         if order.folder is not None:
