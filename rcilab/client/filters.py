@@ -20,7 +20,6 @@ from rcilab.limits import Limits
 from rcilab.motion import LIMIT_MARGIN
 from rcilab.motion.path import slerp
 
-VENDOR_CUT_OFF = 100.0  # [Hz] The vendor's client filters with it unless told otherwise; 1000 switches it off.
 FILTER_OFF = 1000.0  # [Hz]
 
 _CATCH_UP = 300.0  # [1/s] What is behind is caught up with at most so much of itself a second; a choice.
@@ -145,7 +144,7 @@ class LowPass:
     """The first-order filter of the vendor's client, for every kind of command.
 
     Args:
-        cut_off: Cut-off frequency, [Hz]; `VENDOR_CUT_OFF` is what the vendor's client uses.
+        cut_off: Cut-off frequency, [Hz]; the vendor's client uses 100 unless told otherwise.
 
     Raises:
         InvalidValueError: The frequency is not above 0.

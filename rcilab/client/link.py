@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 from rcilab.client.transport import Transport
@@ -42,8 +43,6 @@ class Link:
         """When that was, monotonic, [ns]."""
         self._empty_ns = 0  # When the socket was last seen empty.
         self._latest_since_ns = 0  # When it was last empty before the newest state came.
-        self.undecodable = 0
-        """Datagrams of the right size that were no state."""
         self.on_states: Callable[[list[RobotState]], None] = _ignore
         """Called at least every 0.05 s while the answer to a request is awaited, with the states that came in."""
         self._transport = transport
@@ -115,10 +114,8 @@ class Link:
         datagrams = self._transport.receive_states()
         self._empty_ns = self.received_ns = time.monotonic_ns()
         for datagram in datagrams:
-            try:
+            with suppress(DecodeError):  # Of the right size, but no state.
                 states.append(self._decoder.decode(datagram, self.n))
-            except DecodeError:
-                self.undecodable += 1
         if states:
             self.latest = states[-1]
             self._latest_since_ns = empty_ns

@@ -27,6 +27,7 @@ from rcilab.motion.path import (
     circle_through,
 )
 from rcilab.motion.piecewise import join_pieces
+from rcilab.motion.range import require_inside
 from rcilab.motion.s_curve import plan_s_curve
 from rcilab.motion.time_law import TimeLaw
 from rcilab.spatial import Pose
@@ -323,16 +324,5 @@ def _require_start(model: RobotModel, start: ArrayLike, law: str) -> JointVector
     if law not in _LAWS:
         raise InvalidValueError("law", described(law), f"is unknown for a path; known: {', '.join(_LAWS)}")
     q = as_vector(start, model.n, "start", "rad")
-    limits = model.limits.joint
-    outside = np.flatnonzero(~((limits.lower < q) & (q < limits.upper)))
-    if outside.size:
-        i = int(outside[0])
-        raise PlanningError(
-            f"joint {i + 1}: start {math.degrees(q[i]):.2f} deg is not strictly between "
-            f"{math.degrees(limits.lower[i]):.2f} and {math.degrees(limits.upper[i]):.2f} deg"
-        ).coded("range", joint=i + 1, **_degrees(angle=q[i], low=limits.lower[i], high=limits.upper[i]))
+    require_inside("start", q, model.limits.joint)
     return q
-
-
-def _degrees(**angles: float) -> dict[str, str]:
-    return {name: f"{math.degrees(angle):.2f}" for name, angle in angles.items()}

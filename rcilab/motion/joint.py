@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import degrees
 from typing import Literal, Protocol
 
 import numpy as np
@@ -17,6 +16,7 @@ from rcilab.motion import _ruckig
 from rcilab.motion.margin import LIMIT_MARGIN
 from rcilab.motion.motion import Motion, standing
 from rcilab.motion.piecewise import PiecewisePolynomial, join_pieces
+from rcilab.motion.range import angle_text, require_inside
 from rcilab.motion.s_curve import STANDSTILL_DISTANCE, plan_s_curve, synchronize
 
 JointLaw = Literal["jerk_limited", "s_profile"]
@@ -90,8 +90,8 @@ def plan_joint(
         ).coded("span", low=f"{MIN_SPEED:g}", high="1")
     if not isinstance(law, str) or law not in _PLANNERS:
         raise InvalidValueError("law", law, f"is unknown; known: {', '.join(_PLANNERS)}")
-    _require_inside("start", start, limits)
-    _require_inside("goal", goal, limits)
+    require_inside("start", start, limits)
+    require_inside("goal", goal, limits)
     return _PLANNERS[law](limits, start, goal, speed, dq, ddq)
 
 
@@ -147,22 +147,6 @@ _Planner = Callable[[JointLimits, JointVector, JointVector, float, JointVector, 
 _PLANNERS: dict[str, _Planner] = {"jerk_limited": _plan_jerk_limited, "s_profile": _plan_s_profile}
 
 
-def _angle(value: float) -> str:
-    return f"{degrees(value):.2f}° ({value:.4f} rad)"
-
-
-def _require_inside(name: str, q: JointVector, limits: JointLimits) -> None:
-    outside = np.flatnonzero(~((limits.lower < q) & (q < limits.upper)))
-    if outside.size:
-        i = int(outside[0])
-        low, high = float(limits.lower[i]), float(limits.upper[i])
-        facts = {"angle": float(q[i]), "low": low, "high": high}
-        raise PlanningError(
-            f"joint {i + 1}: {name} {_angle(float(q[i]))} is not strictly between {_angle(low)} and {_angle(high)}; "
-            f"choose an angle between them"
-        ).coded("range", joint=i + 1, **{k: f"{degrees(v):.2f}" for k, v in facts.items()})
-
-
 def _require_possible(limits: JointLimits, dq: JointVector, ddq: JointVector) -> None:
     """Refuses a start state that is outside the limits, or that no jerk inside the limits keeps inside."""
     for name, value, bound, unit in (
@@ -190,7 +174,7 @@ def _require_room(curve: PiecewisePolynomial, limits: JointLimits) -> None:
         if outside.any():
             i = int(outside.argmax())
             raise PlanningError(
-                f"joint {i + 1}: would reach {_angle(float(angles[i]))} at t = {times[i]:.3f} s, past its limit "
-                f"{_angle(float(bounds[i]))}, because it starts too fast towards it; "
+                f"joint {i + 1}: would reach {angle_text(float(angles[i]))} at t = {times[i]:.3f} s, past its limit "
+                f"{angle_text(float(bounds[i]))}, because it starts too fast towards it; "
                 f"plan with a higher speed (it brakes harder), or stop first and plan from rest"
             )

@@ -18,6 +18,7 @@ from rcilab.motion.inverse_path import inverse_path
 from rcilab.motion.obstacle import examine
 from rcilab.motion.path import Path, build_arc, build_circle, build_line
 from rcilab.motion.program import Program
+from rcilab.motion.range import require_inside
 from rcilab.motion.s_curve import STANDSTILL_DISTANCE
 from rcilab.motion.waypoint import Waypoint, label, named_value
 from rcilab.spatial import Pose
@@ -91,7 +92,7 @@ def build_segments(
     """
     q = np.array(program.start)
     try:
-        _require_inside(model, q)
+        require_inside("start", q, model.limits.joint)
     except PlanningError as error:
         raise PlanningError(f"the start: {error}").coded("program_start", reason=error) from error
     segments: list[Segment] = []
@@ -139,7 +140,7 @@ def _positions(path: Path, shares: Array) -> Array:
 def _segment(model: RobotModel, q: JointVector, number: int, waypoint: Waypoint) -> Segment:
     if waypoint.type == "joint":
         goal = _joint_goal(model, q, waypoint)
-        _require_inside(model, goal)
+        require_inside("goal", goal, model.limits.joint)
         return Segment(
             number=number, waypoint=waypoint, start=q, goal=goal, path=None, knots=np.stack((q, goal))
         )  # fmt: skip
@@ -191,20 +192,3 @@ def _path(model: RobotModel, q: JointVector, waypoint: Waypoint) -> Path:
             return build_arc(T, Pose(waypoint.via), goal, *psis, orientation="start_to_goal")
         return build_arc(T, Pose(waypoint.via, waypoint.via_wxyz), goal, *psis, orientation="through_via")
     return build_line(T, goal, *psis)
-
-
-def _require_inside(model: RobotModel, q: JointVector) -> None:
-    limits = model.limits.joint
-    outside = np.flatnonzero(~((limits.lower < q) & (q < limits.upper)))
-    if outside.size:
-        i = int(outside[0])
-        raise PlanningError(
-            f"joint {i + 1} at {math.degrees(q[i]):.2f} deg is not strictly between "
-            f"{math.degrees(limits.lower[i]):.2f} and {math.degrees(limits.upper[i]):.2f} deg; choose one between them"
-        ).coded(
-            "range",
-            joint=i + 1,
-            angle=f"{math.degrees(q[i]):.2f}",
-            low=f"{math.degrees(limits.lower[i]):.2f}",
-            high=f"{math.degrees(limits.upper[i]):.2f}",
-        )

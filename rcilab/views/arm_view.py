@@ -71,12 +71,9 @@ class ArmView:
         scene: Where to draw.
         name: Name of the arm's root node, without slashes.
         model: The arm.
-        style: How it looks; `opacity` and `color` override parts of it.
-        opacity: From 0 to 1.
-        color: Colour of the housings, RGB 0-255; caps and flange become darker shades of it.
+        style: How it looks. A translucent arm has no base of its own: it stands in the live one's.
         quality: "fine" or "coarse" meshes; default coarse for translucent arms.
         axes_length: Length of the axes drawn at the tool, [m]; 0 draws none.
-        base: Whether the base is drawn; default only for a solid arm, since ghosts stand in the live arm's base.
     """
 
     def __init__(
@@ -86,17 +83,13 @@ class ArmView:
         model: DrawableModel,
         style: ArmStyle = "live",
         *,
-        opacity: float | None = None,
-        color: Color | None = None,
         quality: Literal["fine", "coarse"] | None = None,
         axes_length: float = 0.0,
-        base: bool | None = None,
     ) -> None:
         look = _LOOKS[style]
         self._scene = scene
         self._root = "/" + name.strip("/")
-        self._tint = look.tint if color is None else color
-        self._opacity = look.opacity if opacity is None else opacity
+        self._tint, self._opacity = look.tint, look.opacity
         self._inset = look.inset
         self._meshes: list[tuple[str, ColorRole]] = []
         self._frames: list[str] = []
@@ -107,7 +100,7 @@ class ArmView:
         shape = build_shapes(model.description, quality or ("fine" if self._opacity >= 1.0 else "coarse"))
         with scene.batch():
             scene.add_frame(self._root)
-            if self._opacity >= 1.0 if base is None else base:
+            if self._opacity >= 1.0:
                 self._add_link(self._root + "/base_", shape.base)
             path = self._root
             for number, (joint, link) in enumerate(zip(joints, shape.links, strict=True), start=1):

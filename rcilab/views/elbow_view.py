@@ -63,15 +63,14 @@ class ElbowView:
 
     Args:
         scene: Where to draw.
-        root: Name of its root node.
     """
 
-    def __init__(self, scene: Scene, root: str = "/elbow") -> None:
-        self._scene, self.root = scene, root
+    def __init__(self, scene: Scene) -> None:
+        self._scene, self.root = scene, "/elbow"
         self._shown = False
         self._drawn: set[str] = set()
         self._hidden: set[str] = set()
-        scene.add_frame(root, visible=False)
+        scene.add_frame(self.root, visible=False)
 
     def show(self, circle: ElbowCircle, psi: float, arcs: Iterable[DrawableArc], dexterity: Array) -> None:
         """Draws the ring.

@@ -28,15 +28,10 @@ class _Node:
 
 
 class MeshcatScene:
-    """Draws into a meshcat page that only this machine can open.
+    """Draws into a meshcat page of its own that only this machine can open."""
 
-    Args:
-        server: The server to draw into; default a new one, which `close()` then stops.
-    """
-
-    def __init__(self, server: MeshcatServer | None = None) -> None:
-        self._server = server or MeshcatServer()
-        self._owns_server = server is None
+    def __init__(self) -> None:
+        self._server = MeshcatServer()
         self._nodes: dict[str, _Node] = {}
         self.visualizer = import_meshcat().Visualizer(window=self._server)
         """meshcat's own handle; what it offers beyond `Scene` is there: animations, properties."""
@@ -137,9 +132,8 @@ class MeshcatScene:
         return self._server.get_scene()
 
     def close(self) -> None:
-        """Stops the server if this scene started it."""
-        if self._owns_server:
-            self._server.close()
+        """Stops the server."""
+        self._server.close()
 
     def _at(self, name: str) -> Any:
         return self.visualizer[name.strip("/")]

@@ -10,7 +10,7 @@ import pytest
 
 from rcilab.client import connect
 from rcilab.client.world import World
-from rcilab.command import JointPosition
+from rcilab.command import CartesianPosition, JointPosition
 from rcilab.dynamics.payload import Payload
 from rcilab.errors import (
     CommandRejectedError,
@@ -123,6 +123,27 @@ def test_a_safety_stop_in_mid_motion_ends_it_and_holds_until_it_is_put_right(rob
     robot.recover()
     robot.power_on()
     hold(robot, lambda k: None)
+
+
+def test_what_the_vendors_sdk_allows_breaks_the_manuals_limit_until_the_table_is_changed(robot):
+    start = MODEL.forward(robot.state.q_c)
+
+    def turn(state, t):
+        s = min(t / 0.2, 1.0)
+        angle = 0.11 * s**3 * (10.0 - 15.0 * s + 6.0 * s * s)  # At most 15.9 rad/s^2; the manual's limit is 10.
+        return CartesianPosition((start @ Pose.from_rpy([0, 0, 0], [0, 0, angle])).matrix, finished=t >= 0.25)
+
+    try:
+        with pytest.raises(ControlError, match="rotational acceleration .* passes 10 rad"):
+            robot.control(turn, "cartesian_position")
+        robot.recover()
+        robot.power_on()
+        start = MODEL.forward(robot.state.q_c)
+        robot.world.set_limits("sdk")
+        robot.control(turn, "cartesian_position")
+        assert robot.state.faults == ()
+    finally:
+        robot.world.set_limits("manual")
 
 
 def test_auto_limit_leads_a_command_to_rest_inside_the_soft_limit(robot):

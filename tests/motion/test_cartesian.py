@@ -128,7 +128,7 @@ def test_a_bad_argument_is_named(options, hint):
 def test_an_arm_angle_is_refused_for_six_axes_and_a_start_outside_the_limits_for_all():
     with pytest.raises(InvalidValueError, match="a 6-axis arm has no arm angle"):
         plan_line(SIX, SIX.home, moved(SIX, (0.0, 0.1, 0.0)), psi=0.1)
-    with pytest.raises(PlanningError, match=r"joint 2: start 130\.00 deg is not strictly between"):
+    with pytest.raises(PlanningError, match=r"joint 2: start 130\.00° \(2\.2689 rad\) is not strictly between"):
         plan_line(SIX, [0.0, math.radians(130.0), 0.0, 0.0, 0.0, 0.0], SIX.forward(SIX.home))
 
 
