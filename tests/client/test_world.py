@@ -134,7 +134,7 @@ def test_what_the_vendors_sdk_allows_breaks_the_manuals_limit_until_the_table_is
         return CartesianPosition((start @ Pose.from_rpy([0, 0, 0], [0, 0, angle])).matrix, finished=t >= 0.25)
 
     try:
-        with pytest.raises(ControlError, match="rotational acceleration .* passes 10 rad"):
+        with pytest.raises(ControlError, match=r"rotational acceleration .* passes 10 rad"):
             robot.control(turn, "cartesian_position")
         robot.recover()
         robot.power_on()
