@@ -81,6 +81,11 @@ class Publisher:
         if is_timed and count % _SNAPSHOT_CYCLES == 0:
             self.update(motion_time=self._motion_cycle * CYCLE_TIME)
 
+    def end_motion(self) -> None:
+        """Says how far the motion came; nothing where it was no timed one."""
+        if self.snapshot.motion_duration is not None:
+            self.update(motion_time=self._motion_cycle * CYCLE_TIME)
+
     def begin_motion(self, duration: float | None) -> None:
         """Says how long the motion takes that begins now, [s]; None: as long as somebody holds it."""
         self._motion_cycle = 0
