@@ -72,7 +72,8 @@ class Publisher:
         count = self.recorder.count
         self._words[Word.CYCLES] = count
         self._words[Word.LOST] = log.lost_total
-        self._histogram.add(log.lateness)
+        if log.lateness == log.lateness:  # NaN where nobody waited for the state.
+            self._histogram.add(log.lateness)
         if log.state is not None and log.state.tau_ext_in_base is not self._felt:
             self._felt = log.state.tau_ext_in_base
             _WRENCH.pack_into(self._block.felt, 0, *self._felt.tolist())
