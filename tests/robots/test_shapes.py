@@ -23,7 +23,7 @@ def shell(shape: LinkShape) -> Mesh:
 def winding_number(points: Array, mesh: Mesh) -> Array:
     """How often a mesh wraps around each point: about 1 inside, 0 outside (van Oosterom and Strackee 1983).
 
-    With a, b, c from a point p to the corners of a face, a . (b x c) is linear in p, and 2 a . b = a^2 + b^2 - (a - b)^2.
+    With a, b, c from a point p to the corners of a face, a (b x c) is linear in p, and 2 a b = a^2 + b^2 - (a - b)^2.
     """
     corners = mesh.vertices[mesh.faces]  # (faces, 3, 3)
     v, w, x = corners.transpose(1, 0, 2)
