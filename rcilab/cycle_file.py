@@ -22,7 +22,7 @@ def cycle_dtype(n: int) -> np.dtype[np.void]:
     message_id              number of the controller cycle
     t                       time since the first command of the motion, in controller cycles, [s]; NaN outside
     received_ns, sent_ns    monotonic stamps of the state's arrival and of the answer (0: not answered), [ns]
-    lateness                how late the cycle was handled, against the robot's own 1 ms grid, [s]
+    lateness                how late it was handled, by the robot's own 1 ms grid, [s]; NaN: nobody waited for it
     success_rate            share of commands that arrived in time, as the controller reports it, 0 to 1
     q, q_c, dq              measured and commanded joint angles [rad], measured velocities [rad/s], shape (n,)
     command                 joint angles sent in answer, [rad], shape (n,); NaN when none were sent

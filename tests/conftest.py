@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 from collections.abc import Iterator
@@ -49,6 +50,7 @@ def pytest_collection(session: pytest.Session) -> None:
     To compile a test's assertions takes longer than everything else in collecting it, and in a fresh clone nobody has
     done it yet: one after the other they would do the same work at the same time.
     """
+    gc.disable()  # Until all are collected.
     worker = os.environ.get("PYTEST_XDIST_WORKER", "")
     if not worker.startswith("gw"):
         return
@@ -56,6 +58,12 @@ def pytest_collection(session: pytest.Session) -> None:
     for path in sorted(Path(__file__).parent.rglob("test_*.py"))[int(worker[2:]) % count :: count]:
         with suppress(Exception):  # It is told where the tests are collected.
             pytest.Module.from_parent(session, path=path).obj  # noqa: B018
+
+
+def pytest_collection_finish() -> None:
+    """What collecting makes stays until the end: no garbage is looked for meanwhile, nor later among it."""
+    gc.freeze()
+    gc.enable()
 
 
 @pytest.hookimpl(optionalhook=True)

@@ -128,7 +128,7 @@ class CycleLog:
         self.recorder = recorder
         self._on_row = on_row
         self.lateness = 0.0
-        """Of the newest row, [s]."""
+        """Of the newest row, [s]; NaN when nobody waited for it."""
         self.lost_total = 0
         """Controller cycles whose state never arrived."""
         self.state: RobotState | None = None
@@ -152,6 +152,8 @@ class CycleLog:
         t: float = math.nan,
         sent_ns: int = 0,
         command: Command | None = None,
+        *,
+        is_awaited: bool = True,
     ) -> None:
         """Records one state and, where there was one, the answer to it.
 
@@ -161,6 +163,7 @@ class CycleLog:
             t: Motion time, [s].
             sent_ns: When it was answered, monotonic, [ns]; 0 when it was not.
             command: What was sent in answer.
+            is_awaited: Whether somebody waited for it; of one that was found waiting nothing tells how late it is.
         """
         before, self.state = self.state, state
         number = state.message_id
@@ -171,8 +174,11 @@ class CycleLog:
             lost = number - self._last_id - 1
             self.lost_total += lost
         self._last_id = number
-        self._origins.append(received_ns - number * _CYCLE_NS)
-        self.lateness = ((sent_ns or received_ns) - number * _CYCLE_NS - min(self._origins)) * 1e-9
+        if is_awaited:
+            self._origins.append(received_ns - number * _CYCLE_NS)
+            self.lateness = ((sent_ns or received_ns) - number * _CYCLE_NS - min(self._origins)) * 1e-9
+        else:
+            self.lateness = math.nan
         is_idle = command is None and sent_ns == 0 and math.isnan(t)
         if is_idle and self._idle_count == self.recorder.count and before is not None and _is_alike(state, before):
             self.recorder.repeat(number, received_ns, self.lateness, lost)

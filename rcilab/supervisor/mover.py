@@ -123,6 +123,7 @@ class Mover:
             with awake_cores():
                 reason = loop.run(callback) or self._softly
         finally:
+            self._publisher.end_motion()  # Before it is said to be over: whoever looks then sees where it ended.
             gc.collect()
         say = self._publisher.say
         if reason is None:

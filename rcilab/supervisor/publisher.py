@@ -72,13 +72,19 @@ class Publisher:
         count = self.recorder.count
         self._words[Word.CYCLES] = count
         self._words[Word.LOST] = log.lost_total
-        self._histogram.add(log.lateness)
+        if log.lateness == log.lateness:  # NaN where nobody waited for the state.
+            self._histogram.add(log.lateness)
         if log.state is not None and log.state.tau_ext_in_base is not self._felt:
             self._felt = log.state.tau_ext_in_base
             _WRENCH.pack_into(self._block.felt, 0, *self._felt.tolist())
         self.beat()
         is_timed = self.snapshot.motion_duration is not None and self.snapshot.phase in ("moving", "stopping")
         if is_timed and count % _SNAPSHOT_CYCLES == 0:
+            self.update(motion_time=self._motion_cycle * CYCLE_TIME)
+
+    def end_motion(self) -> None:
+        """Says how far the motion came; nothing where it was no timed one."""
+        if self.snapshot.motion_duration is not None:
             self.update(motion_time=self._motion_cycle * CYCLE_TIME)
 
     def begin_motion(self, duration: float | None) -> None:

@@ -78,8 +78,9 @@ class Incident:
 class Lateness:
     """How late cycles were handled against the robot's own 1 ms grid, since the connection was made, [us].
 
-    Cycles without a motion count, too: the control process wakes for every single state then as well, so they show what
-    the machine is capable of before anything moves. What a motion met is in its rows: `drain()`, where `t` is finite.
+    Cycles without a motion count, too, one in five: for so many the control process waits while the arm rests, and
+    they show what the machine is capable of before anything moves. What a motion met, where it waits for every single
+    one, is in its rows: `drain()`, where `t` is finite.
 
     Percentiles come from a logarithmic histogram and are right to about 4 %; the maximum is exact.
     """

@@ -43,6 +43,7 @@ from rcilab.supervisor.setup_letter import parse_setup
 
 SILENCE = 0.3  # [s] without a state while idle before the connection counts as lost; a choice below half a second.
 _LOOK = 0.02  # [s] Longest wait in the idle loop, and between looks for the supervisor.
+_NAP = 0.004  # [s] between two states that a control process waits for while nothing moves; a choice.
 
 
 class Worker:
@@ -104,6 +105,9 @@ class Worker:
             self._publisher.beat()
             time.sleep(_LOOK)
             return
+        if self._guide is None and self._publisher.snapshot.phase == "idle":
+            time.sleep(_NAP)  # To wake up for every state of a resting arm would take twice its share of a core.
+            self._record(self._link.poll(0.0), is_awaited=False)
         states = self._link.poll(_LOOK)
         self._record(states)
         if states:
@@ -111,12 +115,12 @@ class Worker:
         elif time.monotonic_ns() - self._link.received_ns > SILENCE * 1e9:
             self._publisher.say("lost", "lost.silent", address=self._address)
 
-    def _record(self, states: list[RobotState]) -> None:
+    def _record(self, states: list[RobotState], *, is_awaited: bool = True) -> None:
         if not states:
             self._publisher.beat()  # Otherwise every row is one.
         for state in states:
             assert self._link is not None
-            self._log.write(state, self._link.received_ns)
+            self._log.write(state, self._link.received_ns, is_awaited=is_awaited)
 
     def _show_state(self, state: RobotState) -> None:
         """Keeps the phase in step with what the robot reports while nothing moves."""

@@ -182,17 +182,18 @@ def test_what_a_stranger_wrote_into_a_file_is_shown_and_not_run():
 
 
 @pytest.mark.parametrize(
-    ("kind", "payload", "words"),
+    ("kind", "make", "words"),
     [
-        ("TAIL", b'{"stopped": 7}', "no text"),
-        ("TAIL", b"[1]", "is damaged"),
-        ("TAIL", b"[" * 100_000, "is damaged"),
-        ("CYCL", struct.pack("<I", 4_000_000_000) + zlib.compress(b""), "are the most"),
-        ("CYCL", struct.pack("<I", 1) + zlib.compress(bytes(50_000_000)), "is damaged"),
+        ("TAIL", lambda: b'{"stopped": 7}', "no text"),
+        ("TAIL", lambda: b"[1]", "is damaged"),
+        ("TAIL", lambda: b"[" * 100_000, "is damaged"),
+        ("CYCL", lambda: struct.pack("<I", 4_000_000_000) + zlib.compress(b""), "are the most"),
+        ("CYCL", lambda: struct.pack("<I", 1) + zlib.compress(bytes(50_000_000)), "is damaged"),
     ],
 )
-def test_a_block_that_lies_is_refused_in_words(kind, payload, words):
+def test_a_block_that_lies_is_refused_in_words(kind, make, words):
+    """Payloads are made here: every worker collects them, and one runs them."""
     content = export_run(some_run(), ".rcirun")
     head_ends = block_places(content)[1][0]
     with pytest.raises(InvalidValueError, match=words):
-        decode_run(content[:head_ends] + encode_block(kind, payload))
+        decode_run(content[:head_ends] + encode_block(kind, make()))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import struct
 import subprocess
@@ -259,6 +260,19 @@ def test_lateness_is_against_the_robot_s_grid_and_forgets_a_slip():
     assert late([0, 1, 2.3, 3, 4]) == [0, 0, 0.3, 0, 0]
     assert late([0, 1, 5, 5, 5, 5, 6]) == [0, 0, 3, 2, 1, 0, 0]
     assert late([0, *range(2, 22)])[-1] == 0  # The controller left a cycle out: its grid has moved.
+
+
+def test_a_state_that_nobody_waited_for_is_recorded_and_tells_nothing_of_lateness():
+    log, found = CycleLog(Recorder(7, 100)), []
+    cycles = (0.0, True), (4.0, False), (4.0, False), (4.0, False), (4.1, True)
+    for number, (arrival, is_awaited) in enumerate(cycles):
+        datagram = number.to_bytes(8, "big") + bytes(rci.STATE_SIZE - 8)
+        log.write(rci.decode_state(datagram, 7), round(arrival * 1e6), is_awaited=is_awaited)
+        found.append(round(log.lateness * 1e3, 6))
+    assert np.array_equal(found, [0, math.nan, math.nan, math.nan, 0.1], equal_nan=True)
+    assert log.recorder.rows()["message_id"].tolist() == [0, 1, 2, 3, 4]
+    assert np.isnan(log.recorder.rows()["lateness"]).tolist() == [False, True, True, True, False]
+    assert log.lost_total == 0
 
 
 def test_the_control_process_imports_nothing_that_draws():

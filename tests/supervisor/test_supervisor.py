@@ -83,6 +83,16 @@ def test_status_says_what_runs_and_how_punctual_it_is(supervisor):
     assert status.lateness.histogram.sum() == status.lateness.cycles > 0
 
 
+def test_of_a_resting_arm_every_state_is_recorded_and_one_in_five_is_waited_for(supervisor):
+    supervisor.drain()
+    number = supervisor.status().message_id
+    wait_for(lambda: supervisor.status().message_id > number + 300)
+    rows = supervisor.drain()
+    assert np.isnan(rows["t"]).all()
+    assert (np.diff(rows["message_id"].astype(int)) == 1 + rows["lost"][1:]).all()
+    assert 0.02 < np.isfinite(rows["lateness"]).mean() < 0.5
+
+
 def test_libraries_are_loaded_before_the_first_state_and_not_by_the_first_motion():
     with Supervisor(MODEL) as fresh:
         loaded = Path(f"/proc/{fresh.status().worker_pid}/maps").read_text(encoding="utf-8")

@@ -13,7 +13,7 @@ from rcilab.errors import InvalidValueError, ModelError, UsageError
 from rcilab.model import load_model
 from rcilab.posing.planning import make_plan
 from rcilab.words.units import Units
-from rcilab.workbench import requests
+from rcilab.workbench import conductor, requests
 from rcilab.workbench.app import Workbench, WorkbenchConfig
 from rcilab.workbench.panels.arm_now import arm_html
 from rcilab.workbench.panels.target import planned_html
@@ -223,6 +223,23 @@ def test_execute_runs_the_plan_records_it_and_then_asks_for_a_new_one(bench, ask
     ask(requests.PoseGoal(name="start"))
     assert abs(float(bench.store.state.plan.motion.goal[0]) - start) < 1e-9
     assert obstacle(bench.store.state, bench.session.status()) is None
+
+
+@pytest.mark.parametrize("what", ["execute", "stop"])
+def test_a_motion_that_was_seldom_looked_at_leaves_the_preview_where_it_ended(bench, ask, monkeypatch, what):
+    start = float(bench.session.status().q_c[0])
+    ask(requests.MoveJoint(joint=0, angle=start + (0.1 if start < 1.0 else -0.1)))
+    if what == "stop":
+        ask(requests.SetSpeed(speed=0.05))
+    monkeypatch.setattr(conductor, "_TICK", 1.0)  # [s] A busy machine.
+    ask(requests.Drive(what="execute"))
+    if what == "stop":
+        wait(lambda: (bench.session.status().motion_place or 0.0) > 0.3, "a part of the way")
+        ask(requests.Drive(what="stop"))
+    wait(lambda: told(bench) == ("notice.arrived" if what == "execute" else "notice.stopped"), "its end to be told")
+    left = bench.session.status().motion_place / bench.store.state.plan.motion.duration
+    assert (left == 1.0) is (what == "execute")
+    wait(lambda: bench.store.state.place == left, "the preview to stand there")
 
 
 def test_stop_ends_a_motion_and_says_so(bench, ask):

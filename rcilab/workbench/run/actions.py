@@ -174,8 +174,8 @@ class RobotActions:
         Returns:
             "rested" when the arm has just come to rest, "placed" when it was seen for the first time, else None.
         """
-        status = self._session.status()
         self._collect_tickets()
+        status = self._session.status()  # After them: where a motion has ended, it says so too.
         if status.incident is not None and status.incident.number > self._incident:
             self._incident = status.incident.number
             if status.incident.code == "crashed.controller":
@@ -198,11 +198,13 @@ class RobotActions:
         return "rested" if before in ("moving", "stopping") and not is_moving(status) else None
 
     def _follow(self, status: SupervisorStatus) -> None:
-        """Leaves the preview where the arm has left the plan."""
+        """Leaves the preview where the arm has left the plan, however seldom it was looked at on its way."""
         plan = self._store.state.plan
+        if (is_moving(status) or self._reached is not None) and status.motion_place is not None:
+            self._reached = status.motion_place
         if is_moving(status):
-            self._reached = status.motion_place if status.motion_place is not None else self._reached
-        elif self._reached is not None and plan is not None:
+            return
+        if self._reached is not None and plan is not None:
             place = min(self._reached / max(plan.motion.duration, CYCLE_TIME), 1.0)
             self._reached = None
             self._store.update(place=place)
@@ -253,14 +255,21 @@ class RobotActions:
                 waiting.append((what, ticket))
             elif ticket.error is not None:
                 self._stopped = str(ticket.error) if what == "execute" else self._stopped
+                if what == "execute" and isinstance(ticket.error, ControlError) and self._reached is None:
+                    self._reached = 0.0  # It had begun, and nobody saw it on its way.
                 self._store.say(*self._tell_failure(what, ticket.error))
             elif what == "power_on":
                 self._powered = True
-            elif what == "execute" and self._arrival is not None:
-                self._store.say("warn", message("notice.arrived_short", short=self._arrival))
             elif what == "execute":
-                self._store.say("good", message("notice.arrived"))
+                self._reached = math.inf  # Even if it was too short to be seen on its way.
+                self._tell_arrival()
         self._tickets = waiting
+
+    def _tell_arrival(self) -> None:
+        if self._arrival is not None:
+            self._store.say("warn", message("notice.arrived_short", short=self._arrival))
+        else:
+            self._store.say("good", message("notice.arrived"))
 
     def _tell_failure(self, what: str, error: RcilabError) -> tuple[Tone, Message]:
         if isinstance(error, ConnectionLostError) or (isinstance(error, ControlError) and error.faults):
