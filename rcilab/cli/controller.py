@@ -119,8 +119,11 @@ def run(args: argparse.Namespace) -> int:
     except InvalidValueError as error:
         raise _named(error, args) from error
     server = ControllerServer(config)
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: server.request_stop())
+    signal.signal(signal.SIGTERM, lambda *_: server.request_stop())
+    if args.exit_with_parent is None:
+        signal.signal(signal.SIGINT, lambda *_: server.request_stop())
+    else:  # An interrupt is for who has started us. VS Code sends a kernel's to all that is below it.
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
     if not args.host.startswith("127.") and args.host != "localhost":
         print(
             f"rcilab controller: warning: {args.host} is reachable from outside this machine; anyone there can move "

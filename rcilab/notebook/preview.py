@@ -130,9 +130,10 @@ class Preview(Closing):
         style = f"width: 100%; height: {self._height}px; border: none"
         if self.url is None:
             return f'<iframe srcdoc="{html.escape(self.html())}" style="{style}"></iframe>'
+        url = html.escape(self.url)
         return (
-            f'<iframe src="{self.url}" style="{style}"></iframe>'
-            f'<p><small><a href="{self.url}" target="_blank">{self.url}</a> {told}</small></p>'
+            f'<iframe src="{url}" style="{style}"></iframe>'
+            f'<p><small><a href="{url}" target="_blank">{url}</a> {told}</small></p>'
         )
 
     def _animate(self, motion: Motion | None) -> None:

@@ -71,12 +71,13 @@ class Scene(Part):
         self.build([self._frame, self._note], flex="0 0 auto", min_width="300px")
         if self.is_live:
             self._picture = _LivePicture(self, "viser" if view == "viser" else "meshcat")
-            self._write_frame(f'src="{place.address(self._picture.url)}"')
+            self._write_frame(f'src="{html.escape(place.address(self._picture.url))}"')
             for topic in ("goal", "moment", "robot"):
                 self.hear(topic, self._picture.draw)
             self.hear("plan", self._picture.draw_path)
         else:
-            write(self._note, soft(self.text("scene.asked" if view == "static" else "scene.static")))
+            helps = "scene.static" if place.way == "static" and place.proxy_helps else "scene.static_here"
+            write(self._note, soft(self.text("scene.asked" if view == "static" else helps)))
             self.hear("plan", self._show_film)
 
     @property

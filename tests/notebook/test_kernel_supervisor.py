@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import os
+import signal
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -101,13 +102,13 @@ class Kernel:
         control.send(self.client.session.msg("create_subshell_request", {}))
         return control.get_msg(timeout=20)["content"]["subshell_id"]
 
-    def tell(self, comm: str, subshell: str, **data: Any) -> None:
-        """Says what a widget in the page would, the way JupyterLab sends it."""
+    def tell(self, comm: str, subshell: str | None, **data: Any) -> None:
+        """Says what a widget in the page would, the way JupyterLab sends it; without a subshell that of VS Code."""
         message = self.client.session.msg("comm_msg", {"comm_id": comm, "data": data})
         message["header"]["subshell_id"] = subshell
         self.client.shell_channel.send(message)
 
-    def answer(self, question: str, answer: str, subshell: str, seconds: float) -> None:
+    def answer(self, question: str, answer: str, subshell: str | None, seconds: float) -> None:
         """Is a page that sends every question back, for a while."""
         end = time.monotonic() + seconds
         while time.monotonic() < end:
@@ -187,8 +188,9 @@ def test_an_interrupt_stops_what_a_thread_of_somebodys_own_moves(kernel: Kernel)
     kernel.run("robot.close()")
 
 
-def test_stop_is_heard_while_the_cell_that_moves_the_arm_runs(kernel: Kernel) -> None:
-    subshell = kernel.open_subshell()
+@pytest.mark.parametrize("names_one", [True, False], ids=["JupyterLab", "VS Code"])
+def test_stop_is_heard_while_the_cell_that_moves_the_arm_runs(kernel: Kernel, names_one: bool) -> None:
+    subshell = kernel.open_subshell() if names_one else None
     stop = kernel.run(MAKE + SESSION)
     moving = kernel.client.execute("robot.execute(motion).stopped")
     time.sleep(0.5)  # Soon or late, a press counts from the start of the call on.
@@ -197,11 +199,12 @@ def test_stop_is_heard_while_the_cell_that_moves_the_arm_runs(kernel: Kernel) ->
     kernel.run("beside.close(); robot.close()")
 
 
+@pytest.mark.parametrize("names_one", [True, False], ids=["JupyterLab", "VS Code"])
 def test_a_page_that_falls_silent_stops_what_a_cell_moves_and_one_that_nobody_hears_does_not(
-    another_kernel: Kernel,
+    another_kernel: Kernel, names_one: bool
 ) -> None:
     kernel = another_kernel
-    subshell = kernel.open_subshell()
+    subshell = kernel.open_subshell() if names_one else None
     kernel.run(MAKE + SESSION)
     question, answer, slow = kernel.run(PAGE)
     moving = kernel.client.execute("robot.execute(motion).stopped")
@@ -213,6 +216,17 @@ def test_a_page_that_falls_silent_stops_what_a_cell_moves_and_one_that_nobody_he
     assert kernel.value_of(moving) == "the notebook's page is gone"
     kernel.run("until(lambda: 'page did not answer' in beside._outcome.value)")
     kernel.run("beside.close(); robot.close()")
+
+
+def test_an_interrupt_that_reaches_all_below_the_kernel_ends_none_of_them(kernel: Kernel) -> None:
+    kernel.run(MAKE + CONNECT)
+    kernel.run(MOVE)
+    pids = kernel.run("panel.state.status.worker_pid, panel.state.status.controller_pid")
+    for pid in pids:  # As VS Code interrupts: microsoft/vscode-jupyter, src/kernels/raw/launcher/kernelProcess.node.ts.
+        os.kill(pid, signal.SIGINT)
+    kernel.manager.interrupt_kernel()
+    assert kernel.run(STANDS) == ("idle", True)
+    assert kernel.run("panel.state.status.worker_pid, panel.state.status.controller_pid") == pids
 
 
 def test_a_kernel_that_is_killed_takes_the_control_process_with_it(kernel: Kernel) -> None:

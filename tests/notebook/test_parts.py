@@ -368,6 +368,12 @@ def test_where_nothing_is_live_a_film_is_shown_and_said() -> None:
         assert "set_animation" in scene._make_film().html() or scene._frame.value != before
 
 
+def test_a_film_advises_nothing_that_does_not_help() -> None:
+    with notebook.Scene(XMATE3, place=Place(way="static", proxy_helps=False)) as scene:
+        assert "a film of the plan" in text_of(scene._note)
+        assert "jupyter-server-proxy" not in text_of(scene._note)
+
+
 def test_behind_a_proxy_the_frame_goes_through_it() -> None:
     with notebook.Scene(XMATE3, place=Place(way="proxy", base="/user/ann/")) as scene:
         assert 'src="/user/ann/proxy/' in scene._frame.value

@@ -2,7 +2,8 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -26,12 +27,65 @@ LOCAL = Server(hostname="127.0.0.1", base="/")
         ({"VSCODE_PID": "7"}, LOCAL, False, "loopback"),
         ({"VSCODE_PID": "7", "SSH_CONNECTION": "x"}, None, True, "static"),
         ({"VSCODE_PID": "7", "CODESPACES": "true"}, None, True, "static"),
+        ({"VSCODE_CWD": "/", "VSCODE_IPC_HOOK_CLI": "/tmp/x.sock"}, None, True, "static"),  # A tunnel, say.
+        ({"VSCODE_CWD": "/", "VSCODE_IPC_HOOK_CLI": "/x", "WSL_DISTRO_NAME": "Debian"}, None, True, "loopback"),
     ],
 )
 def test_the_rule_of_where_the_browser_is(
     environment: dict[str, str], server: Server | None, has_proxy: bool, way: Way
 ) -> None:
     assert find_place(environment, server, has_proxy).way == way
+
+
+CODE_CELL = "vscode-notebook-cell:/home/ann/arm.ipynb#W0sZmlsZQ%3D%3D"
+LAB_CELL = "5f9e2d52-4d7e-4b9c-8b8f-6f0b3f1f2f3a"
+CODE_SERVER = {
+    "CODE_SERVER_PARENT_PID": "7",
+    "VSCODE_IPC_HOOK_CLI": "/tmp/x.sock",
+    "VSCODE_PROXY_URI": "https://box.example/code/proxy/{{port}}/",
+}
+
+
+@pytest.mark.parametrize(
+    ("cell", "environment", "server", "way"),
+    [
+        (CODE_CELL, {}, LOCAL, "loopback"),
+        (CODE_CELL, {}, Server(hostname="127.0.0.1", base="/arm/"), "static"),  # Its page has not the server's paths.
+        (CODE_CELL, {"JUPYTERHUB_SERVICE_PREFIX": "/user/ann/"}, None, "static"),
+        (CODE_CELL, {"SSH_CONNECTION": "x"}, LOCAL, "static"),
+        (CODE_CELL, CODE_SERVER, None, "proxy"),
+        (LAB_CELL, CODE_SERVER, LOCAL, "loopback"),
+        (LAB_CELL, {"VSCODE_PID": "7", "SSH_CONNECTION": "x"}, LOCAL, "proxy"),  # Started in VS Code's terminal.
+    ],
+)
+def test_who_asks_is_told_by_the_cell(cell: str, environment: dict[str, str], server: Server | None, way: Way) -> None:
+    assert find_place(environment, server, True, cell).way == way
+
+
+@pytest.mark.parametrize(
+    ("ports", "address"),
+    [
+        ("https://box.example/code/proxy/{{port}}/", "https://box.example/code/proxy/4711/static/?plain"),
+        ("https://{{port}}.box.example", "https://4711.box.example/static/?plain"),
+    ],
+)
+def test_code_server_says_where_a_port_is(ports: str, address: str) -> None:
+    place = find_place({**CODE_SERVER, "VSCODE_PROXY_URI": ports}, None, True, CODE_CELL)
+    assert place.address("http://127.0.0.1:4711/static/?plain") == address
+
+
+def test_where_ports_are_shown_to_a_login_only_nothing_is_framed() -> None:
+    known = {"VSCODE_PROXY_URI": CODE_SERVER["VSCODE_PROXY_URI"], "SSH_CONNECTION": "x", "VSCODE_PID": "7"}
+    assert find_place(known, None, True, CODE_CELL) == Place(way="static", proxy_helps=False)
+
+
+def test_the_cell_that_runs_is_asked(monkeypatch: pytest.MonkeyPatch) -> None:
+    told: dict[str, Any] = {"metadata": {"cellId": CODE_CELL}}
+    monkeypatch.setattr("rcilab.notebook.place.shell", lambda: SimpleNamespace(get_parent=lambda: told))
+    server = Server(hostname="127.0.0.1", base="/arm/")
+    assert find_place({}, server, True).way == "static"
+    told["metadata"] = {}  # A press.
+    assert find_place({}, server, True).way == "proxy"
 
 
 def test_an_address_goes_below_the_notebook_server_behind_a_proxy() -> None:
