@@ -12,6 +12,7 @@
   const keep = (name, value) => { try { sessionStorage.setItem("rcilab." + name, JSON.stringify(value)); } catch { /* Then not. */ } };
 
   const NARROWEST = 240;  // [px] of the scene that a notice is shown over; else it is shown at the window's lower edge.
+  const PAUSE = 50;  // [ms] A choice: between two looks at tabs and plots, whatever changes meanwhile.
   const SHOWN = 7000;  // [ms] A choice: long enough to read a notice twice.
   let live = null, said = {}, bar, chips, stop, home, take, question, toast, me = null, notice = recall("notice"), greeted = false, hideTimer = 0;
 
@@ -82,7 +83,9 @@
     document.body.append(bar, question, toast);
     label();
     connect();
-    requestAnimationFrame(follow);
+    // Asked for only when something has changed: a page that looked by itself kept its browser drawing frames all day.
+    new MutationObserver(followSoon).observe(document.getElementById("root"), { childList: true, subtree: true, attributes: true, attributeFilter: ["aria-selected"] });
+    followSoon();
   };
 
   const label = () => {
@@ -138,8 +141,9 @@
       }
       const look = "rl-chip" + (chip.tone ? " rl-" + chip.tone : "") + (chip.wide ? " rl-wide" : "");
       if (box.className !== look) box.className = look;
-      box.dataset.id = chip.id;
-      box.title = chip.hint || chip.label + ": " + chip.value;
+      const hint = chip.hint || chip.label + ": " + chip.value;
+      if (box.dataset.id !== chip.id) box.dataset.id = chip.id;
+      if (box.title !== hint) box.title = hint;
       if (box.firstChild.textContent !== chip.label) box.firstChild.textContent = chip.label;
       if (box.lastChild.textContent !== chip.value) box.lastChild.textContent = chip.value;
     });
@@ -157,6 +161,7 @@
     }
     if (!greeted && said.stopHint) welcome();
     greeted = true;
+    if ("cursor" in news) followSoon();
     if ("holder" in news || "take" in news || "question" in news) hold();
     if (news.viser) document.documentElement.dataset.rlViser = news.viser;
     if (news.theme) document.documentElement.dataset.rlTheme = news.theme;
@@ -220,8 +225,9 @@
       if (line.style.left !== place) line.style.left = place;
       line.style.display = cursor ? "" : "none";
     });
-    setTimeout(() => requestAnimationFrame(follow), 50);
   };
+  let following = 0;
+  const followSoon = () => { if (!following) following = setTimeout(() => { following = 0; follow(); }, PAUSE); };
 
   // Capture phase: before viser and before any text field. A convenience, not a safety function.
   window.addEventListener("keydown", (event) => {
