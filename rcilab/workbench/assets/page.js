@@ -213,6 +213,7 @@
   const follow = () => {
     const cursor = said.cursor;
     keepTab();
+    if (toast.className) place();  // What is said while a page loads is said before there is a scene.
     document.querySelectorAll(".u-over").forEach((over) => {
       let line = over.querySelector(".rl-cursor");
       if (!line) {
