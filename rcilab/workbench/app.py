@@ -109,6 +109,7 @@ class Workbench:
                 seek=lambda share: ask(requests.Seek(place=self.presenter.place_at(share))),
                 size=lambda height: ask(requests.SetView(name="height", value=height)),
                 peek=lambda page, branch: ask(requests.Peek(page=page, index=branch if branch >= 0 else None)),
+                entered=lambda page: ask(requests.Enter(page=page)),
                 take=lambda page: ask(requests.TakeControls(page=page)),
                 answer=lambda page, yes: ask(requests.AnswerControls(page=page, yes=yes)),
                 home=self._bring_back,
