@@ -109,13 +109,14 @@ class Workbench:
                 seek=lambda share: ask(requests.Seek(place=self.presenter.place_at(share))),
                 size=lambda height: ask(requests.SetView(name="height", value=height)),
                 peek=lambda page, branch: ask(requests.Peek(page=page, index=branch if branch >= 0 else None)),
+                entered=lambda page: ask(requests.Enter(page=page)),
                 take=lambda page: ask(requests.TakeControls(page=page)),
                 answer=lambda page, yes: ask(requests.AnswerControls(page=page, yes=yes)),
                 home=self._bring_back,
             )
         )
         gate = Gate(host=self._config.host, port=self.port, token=self._config.token, title="this workbench")
-        self._door = GuardedServer(self._bound, gate, decorate=decorate, routes={LIVE_PATH: live.serve})
+        self._door = GuardedServer(self._bound, gate, decorate=self._decorate, routes={LIVE_PATH: live.serve})
         self.server = self._door.viser
         self._opened = True
         self._follow_pages()
@@ -160,6 +161,9 @@ class Workbench:
             ask(requests.PageWent(page=client.client_id))
             self.live.forget(client.client_id)
             self._views.pop(client.client_id, None)
+
+    def _decorate(self, index: bytes) -> bytes:
+        return decorate(index, self.store.state.quality)
 
     def _bring_back(self, page: int) -> None:
         """Shows a page what it showed at first; what other pages see is theirs."""

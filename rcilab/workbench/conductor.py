@@ -92,6 +92,7 @@ class Conductor:
             requests.ChooseBranch: self._goal.choose_branch,
             requests.DragElbow: self._scene.drag_elbow,
             requests.Peek: self._scene.peek,
+            requests.Enter: self._view.enter,
             requests.ShowBead: self._scene.show_bead,
             requests.ShowExtra: self._scene.show_extra,
             requests.SetWay: self._goal.set_way,

@@ -33,6 +33,8 @@ class Heard:
     """Height of a page's window, [px], when it opens and when it changes."""
     peek: Callable[[int, int], None] = lambda page, branch: None
     """The branch that is under a page's mouse, from 0; -1 when it is left."""
+    entered: Callable[[int], None] = lambda page: None
+    """What was typed in a page is complete."""
     take: Callable[[int], None]
     """A page wants the controls."""
     answer: Callable[[int, bool], None]
@@ -107,6 +109,8 @@ class LiveChannel:
             self._heard.here(page)
         elif kind == "peek":
             _pass_on(said.get("branch"), -1.0, 99.0, lambda branch: self._heard.peek(page, int(branch)))
+        elif kind == "entered":
+            self._heard.entered(page)
         elif kind == "take":
             self._heard.take(page)
         elif kind == "home":

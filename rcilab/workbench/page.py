@@ -21,11 +21,15 @@ _WAITING = 8  # Messages of a page that may wait for their way while a file is s
 _PAUSE = 0.005  # [s]
 
 
-def decorate(index: bytes) -> bytes:
+def decorate(index: bytes, quality: str = "full") -> bytes:
     """Returns viser's `index.html` with our style sheet and script in its head.
 
     The bar must be there in every tab and with every panel folded away, and the Esc key must work while a text field
     has the focus; viser's own controls and hotkeys can do neither.
+
+    Args:
+        index: As viser has it.
+        quality: How the scene is to be drawn: "light" does without smoothed edges, which a browser cannot change later.
     """
     assets = files("rcilab.workbench") / "assets"
     style = (assets / "page.css").read_bytes()
@@ -33,6 +37,7 @@ def decorate(index: bytes) -> bytes:
     script = b"\n".join((assets / f"{name}.js").read_bytes() for name in scripts)
     head = b"<style>" + style + b"</style><script>" + script + b"</script></head>"
     page = index.replace(b"<title>Viser</title>", b"<title>rcilab workbench</title>", 1)
+    page = page.replace(b"<html ", f'<html data-rl-quality="{quality}" '.encode(), 1)
     return page.replace(b"</head>", head, 1)
 
 

@@ -177,7 +177,7 @@ class Presenter:
             panel.show(seen if panel is self._timeline else state, status)
 
     def _build(self, state: UiState) -> None:
-        """Makes the panels anew: another language, unit or theme has other words, another arm other joints."""
+        """Makes the panels anew: another language or unit has other words, another arm other joints."""
         gui: Any = self._server.gui  # Icons are plain strings here, which viser's types do not allow.
         if not self._tabs:
             self._lay_out(gui)
@@ -232,4 +232,4 @@ def _traits(status: SupervisorStatus) -> tuple[object, ...]:
 
 def _looks(state: UiState) -> tuple[object, ...]:
     """Returns what the panels are built for."""
-    return state.language, state.units, state.theme, state.model.name
+    return state.language, state.units, state.model.name

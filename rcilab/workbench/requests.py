@@ -131,6 +131,11 @@ class DragElbow(Request):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Enter(Request):
+    """Enter was pressed in a field that was typed in, or the field was left: what is typed is complete."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Peek(Request):
     """A branch of the list is under the mouse or has the focus."""
 
@@ -464,7 +469,7 @@ class PageWent(Request):
 
 Harmless: TypeAlias = (
     PageCame | PageWent | TakeControls | AnswerControls | Seek | Play | SetView | ShowPlot | ShowBead | ShowExtra
-    | Peek | Export | CancelExport
+    | Peek | Enter | Export | CancelExport
 )  # fmt: skip
 """What a watching page may ask for as well: nothing of it moves a goal or a robot."""
 

@@ -169,6 +169,8 @@ class UiState:
     """Height of the newest page's window, [px]: the plots fill it."""
     lease: Lease = field(default_factory=Lease)
     notice: Notice | None = None
+    entered: Mapping[int | None, float] = field(default_factory=lambda: MappingProxyType({}))
+    """When a page last said that what is typed in it is complete, by page, [s] of the monotonic clock."""
     problems: Mapping[str, Message] = field(default_factory=lambda: MappingProxyType({}))
     """What is wrong with typed numbers, by field."""
 

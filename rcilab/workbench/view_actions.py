@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import time
 from dataclasses import replace
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from rcilab.words.units import ANGLES, LENGTHS
@@ -53,6 +55,11 @@ class ViewActions:
         if state.loop and place >= 1.0:
             place = 0.0
         self._store.update(place=min(place, 1.0), playing=place < 1.0)
+
+    def enter(self, request: requests.Enter) -> None:
+        """Lets what is typed in a page count at once."""
+        entered = {**self._store.state.entered, request.page: time.monotonic()}
+        self._store.update(entered=MappingProxyType(entered))
 
     def set_view(self, request: requests.SetView) -> None:
         """Changes a setting; values that do not exist are ignored."""

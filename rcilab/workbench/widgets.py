@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import html
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -21,6 +22,8 @@ HAND_AWAY = 0.6  # [s] A choice: a control touched less long ago is not written 
 _TYPING_PAUSE = 0.7  # [s] A choice: a typed number counts when no key came for so long.
 _ANSWER = 0.2  # [s] A choice: what a typed number came to stands in the state after that.
 _STANDS = 3.0  # [s] A choice: so long a number that was taken stands as it was typed; to write is to disturb the hand.
+_ENTERED = 0.5  # [s] A choice: the same of a number that was entered: the hand is done with it.
+_NOBODY: Mapping[int | None, float] = MappingProxyType({})
 
 
 def on_press(button: Any, ask: Ask, make: Callable[[int | None], Request]) -> None:
@@ -64,7 +67,7 @@ class Linked:
 
 
 class NumberField:
-    """A text box for a number: a proposal while it is typed, asked for once the typing has paused.
+    """A text box for a number: a proposal while it is typed, asked for once it is entered or the typing has paused.
 
     Args:
         handle: From `gui.add_text`.
@@ -77,7 +80,7 @@ class NumberField:
         self._handle, self._ask, self.field = handle, ask, field
         self._unit = unit or Unit("", 1.0)
         self._typed: tuple[float, str, int | None, str] | None = None
-        self._committed = float("-inf")
+        self._committed, self._stands_for = float("-inf"), _STANDS
         self._answer: str | None = None  # What the state made of it.
 
         @handle.on_update
@@ -85,18 +88,20 @@ class NumberField:
             if event.client_id is not None:
                 self._typed = (time.monotonic(), event.target.value, event.client_id, self.field)
 
-    def show(self, text: str, problem: Message | None) -> None:
+    def show(self, text: str, problem: Message | None, entered: Mapping[int | None, float] = _NOBODY) -> None:
         """Commits what was typed, or writes the state's number; called at the display's rate.
 
         Args:
             text: The state's number as it is to be shown, in degrees or millimetres where it has a unit of the page.
             problem: What is wrong with the typed number; it is then left as it is.
+            entered: When a page last said that what is typed in it is complete, `UiState.entered`.
         """
         typed = self._typed
         if typed is not None:
-            if time.monotonic() - typed[0] < _TYPING_PAUSE and typed[3] == self.field:
+            is_shown, is_entered = typed[3] == self.field, entered.get(typed[2], float("-inf")) >= typed[0]
+            if is_shown and not is_entered and time.monotonic() - typed[0] < _TYPING_PAUSE:
                 return
-            is_shown = typed[3] == self.field
+            self._stands_for = _ENTERED if is_entered else _STANDS
             self._committed = time.monotonic() if is_shown else float("-inf")
             self._typed, self._answer = None, None
             self._ask(TypeField(page=typed[2], field=typed[3], text=self._unit.complete(typed[1])))
@@ -112,7 +117,7 @@ class NumberField:
             return True
         if self._answer is None:
             self._answer = said
-        return past < _STANDS and said == self._answer
+        return past < self._stands_for and said == self._answer
 
 
 class Html:

@@ -42,6 +42,15 @@ def test_a_typed_negative_fraction_keeps_its_sign(page):
     page.wait(lambda: field.input_value() == "-0.25", "the field to show -0.25")
 
 
+def test_enter_and_leaving_a_field_say_that_the_number_is_complete(page):
+    for joint, key in ((1, "Enter"), (2, "Tab")):
+        before = dict(page.state.entered)
+        page.joint_field(joint).fill("12")
+        page.joint_field(joint).press(key)
+        page.wait(lambda before=before: page.state.entered != before, f"{key} to be heard")
+        page.wait(lambda joint=joint: abs(np.degrees(page.state.goal.q[joint - 1]) - 12.0) < 1e-9, "12 deg")
+
+
 def test_numbers_typed_without_any_pause_between_fields_all_count(page):
     page.open_tab("Target")
     page.pose_field("x").click()

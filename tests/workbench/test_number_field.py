@@ -69,6 +69,23 @@ def test_a_number_counts_once_the_typing_has_paused_and_stands_as_it_was_typed(n
     assert len(asked) == 1
 
 
+def test_a_number_that_is_entered_counts_at_once_and_is_soon_restated(now: SimpleNamespace) -> None:
+    box, field, asked = make()
+    box.type("10")
+    now.time += 0.1
+    field.show("30.00", None, {1: 100.0 - 0.1, 2: now.time})
+    assert asked == [], "another page's, and one of before"
+    field.show("30.00", None, {1: now.time})
+    assert asked == [TypeField(page=1, field="joint.1", text="10")]
+    for _ in range(6):
+        now.time += 0.1
+        field.show("10.00", None, {1: 100.1})
+    assert box.value == "10.00"
+    box.type("12")
+    field.show("10.00", None, {1: 100.1})
+    assert len(asked) == 1, "what is typed after that is a new number"
+
+
 def test_what_becomes_another_number_meanwhile_is_shown_at_once(now: SimpleNamespace) -> None:
     box, field, _ = make()
     box.type("10")

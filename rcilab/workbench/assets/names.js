@@ -37,7 +37,7 @@
       if (control.dataset.rlName === undefined && (hasName(control) || control.getAttribute("aria-label"))) return;
       const name = nameOf(control);
       if (name && control.getAttribute("aria-label") !== name) control.setAttribute("aria-label", name);
-      if (name) control.dataset.rlName = "";
+      if (name && control.dataset.rlName === undefined) control.dataset.rlName = "";  // Written again it would be drawn again.
     });
   };
   // The one button of viser's that has only a picture: scene tree, connection, its own settings.
@@ -45,7 +45,7 @@
     const name = document.documentElement.dataset.rlViser || "";
     document.querySelectorAll("#root button.mantine-ActionIcon-root").forEach((button) => {
       if (name && !button.textContent.trim() && (!button.getAttribute("aria-label") || button.dataset.rlName !== undefined)) {
-        button.dataset.rlName = "";
+        if (button.dataset.rlName === undefined) button.dataset.rlName = "";
         if (button.getAttribute("aria-label") !== name) button.setAttribute("aria-label", name);
       }
     });

@@ -2,9 +2,12 @@
 (() => {
   "use strict";
   // Plots are drawn by the processor: without a graphics card the browser would have it imitate one for every curve.
+  // A light scene has no smoothed edges: to imitate them takes as long as all the rest of a frame.
+  const LOOKS = { "2d": (options) => ({ willReadFrequently: true, ...options }) };
+  if (document.documentElement.dataset.rlQuality === "light") LOOKS.webgl2 = (options) => ({ ...options, antialias: false });
   const getContext = HTMLCanvasElement.prototype.getContext;
   HTMLCanvasElement.prototype.getContext = function (kind, options) {
-    return getContext.call(this, kind, kind === "2d" ? { willReadFrequently: true, ...options } : options);
+    return getContext.call(this, kind, LOOKS[kind] ? LOOKS[kind](options) : options);
   };
 
   // What a window has when it is loaded anew: the open tab, and which notice it has seen last.
@@ -12,6 +15,7 @@
   const keep = (name, value) => { try { sessionStorage.setItem("rcilab." + name, JSON.stringify(value)); } catch { /* Then not. */ } };
 
   const NARROWEST = 240;  // [px] of the scene that a notice is shown over; else it is shown at the window's lower edge.
+  const PAUSE = 50;  // [ms] A choice: between two looks at tabs and plots, whatever changes meanwhile.
   const SHOWN = 7000;  // [ms] A choice: long enough to read a notice twice.
   let live = null, said = {}, bar, chips, stop, home, take, question, toast, me = null, notice = recall("notice"), greeted = false, hideTimer = 0;
 
@@ -82,7 +86,9 @@
     document.body.append(bar, question, toast);
     label();
     connect();
-    requestAnimationFrame(follow);
+    // Asked for only when something has changed: a page that looked by itself kept its browser drawing frames all day.
+    new MutationObserver(followSoon).observe(document.getElementById("root"), { childList: true, subtree: true, attributes: true, attributeFilter: ["aria-selected"] });
+    followSoon();
   };
 
   const label = () => {
@@ -138,8 +144,9 @@
       }
       const look = "rl-chip" + (chip.tone ? " rl-" + chip.tone : "") + (chip.wide ? " rl-wide" : "");
       if (box.className !== look) box.className = look;
-      box.dataset.id = chip.id;
-      box.title = chip.hint || chip.label + ": " + chip.value;
+      const hint = chip.hint || chip.label + ": " + chip.value;
+      if (box.dataset.id !== chip.id) box.dataset.id = chip.id;
+      if (box.title !== hint) box.title = hint;
       if (box.firstChild.textContent !== chip.label) box.firstChild.textContent = chip.label;
       if (box.lastChild.textContent !== chip.value) box.lastChild.textContent = chip.value;
     });
@@ -157,6 +164,7 @@
     }
     if (!greeted && said.stopHint) welcome();
     greeted = true;
+    if ("cursor" in news) followSoon();
     if ("holder" in news || "take" in news || "question" in news) hold();
     if (news.viser) document.documentElement.dataset.rlViser = news.viser;
     if (news.theme) document.documentElement.dataset.rlTheme = news.theme;
@@ -205,6 +213,7 @@
   const follow = () => {
     const cursor = said.cursor;
     keepTab();
+    if (toast.className) place();  // What is said while a page loads is said before there is a scene.
     document.querySelectorAll(".u-over").forEach((over) => {
       let line = over.querySelector(".rl-cursor");
       if (!line) {
@@ -220,8 +229,9 @@
       if (line.style.left !== place) line.style.left = place;
       line.style.display = cursor ? "" : "none";
     });
-    setTimeout(() => requestAnimationFrame(follow), 50);
   };
+  let following = 0;
+  const followSoon = () => { if (!following) following = setTimeout(() => { following = 0; follow(); }, PAUSE); };
 
   // Capture phase: before viser and before any text field. A convenience, not a safety function.
   window.addEventListener("keydown", (event) => {

@@ -1,9 +1,10 @@
 // viser has one throttle for all its controls: within 50 ms, what is told of one replaces what was to be told of another.
-// So a text box that is left right after its last key is told once more when nothing has been typed for a moment.
+// So a text box that is left right after its last key is told once more when nothing has been typed for a moment. After
+// that, whoever has left a box or pressed Enter in it need not wait until the typing has paused: what is there counts.
 (() => {
   "use strict";
   const WINDOW = 80, left = new Map();  // [ms] A little more than viser's.
-  let last = -Infinity, box = null, timer = 0;
+  let last = -Infinity, box = null, timer = 0, saying = 0, isUnsaid = false;
 
   const retell = () => {
     timer = 0;
@@ -20,14 +21,29 @@
   };
   const wait = () => { if (!timer && left.size) timer = setTimeout(retell, WINDOW); };
 
+  const enter = () => {
+    clearTimeout(saying);
+    if (isUnsaid) saying = setTimeout(say, 2 * WINDOW);
+  };
+  const say = () => {
+    if (timer) return enter();  // Something is still to be told.
+    isUnsaid = false;
+    window.dispatchEvent(new CustomEvent("rl-say", { detail: { kind: "entered" } }));
+  };
+
+  document.addEventListener("keydown", (event) => { if (event.key === "Enter" && event.target === box) enter(); }, true);
   document.addEventListener("input", (event) => {
     if (!event.isTrusted) return;
+    clearTimeout(saying);
+    isUnsaid = true;
     last = performance.now();
     box = event.target;
     left.delete(box);
   }, true);
   document.addEventListener("focusout", (event) => {
-    if (event.target !== box || box.type !== "text" || performance.now() - last > WINDOW) return;
+    if (event.target !== box || box.type !== "text") return;
+    enter();
+    if (performance.now() - last > WINDOW) return;
     left.set(box, box.value);
     wait();
   }, true);

@@ -52,7 +52,7 @@ class ElbowPanel:
         if goal.psi is not None:
             is_deg = self._text.units.angle == "deg"
             self._psi.show(float(round(math.degrees(goal.psi))) if is_deg else round(goal.psi, 2))
-            self._field.show(shown(math.degrees(goal.psi)), state.problems.get("psi"))
+            self._field.show(shown(math.degrees(goal.psi)), state.problems.get("psi"), state.entered)
         if elbow is not self._drawn or elbow is None:
             self._drawn = elbow
             self._ring.show(f'<p class="rl-note">{esc(self._text("elbow.none"))}</p>' if elbow is None

@@ -92,7 +92,7 @@ class JogPanel:
         for joint, angle in enumerate(state.goal.q):
             self._sliders[joint].show(round(float(factor * angle), digits))
             field = self._fields[joint]
-            field.show(shown(math.degrees(angle)), state.problems.get(field.field))
+            field.show(shown(math.degrees(angle)), state.problems.get(field.field), state.entered)
             ends = float(limits.lower[joint]), float(limits.upper[joint])
             self._margins[joint].show(margin_html(float(state.goal.q[joint]), *ends, self._text))
         fields = [(field.field, f"J{number}") for number, field in enumerate(self._fields, start=1)]

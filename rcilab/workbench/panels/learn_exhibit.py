@@ -59,7 +59,7 @@ class LearnExhibitPanel:
         """Draws the fault on show."""
         learn, text = state.learn, self._text
         exhibit = None if learn.show is None or learn.provoking is not None else learn.show.exhibit
-        wanted = (exhibit, learn.is_script_shown)
+        wanted = (exhibit, learn.is_script_shown, state.theme)
         if wanted == self._drawn:
             return
         self._drawn = wanted
@@ -87,6 +87,7 @@ class LearnExhibitPanel:
         margin = 0.12 * (high - low or 1.0)
         self._plot.data = data
         self._plot.series = series
+        self._plot.axes = plot_axes(theme, last=True)
         self._plot.scales = {
             "x": {"time": False, "range": (0.0, float(t[-1]) * (1.0 + _AROUND))},
             "y": {"range": (low - margin, high + margin)},

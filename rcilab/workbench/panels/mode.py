@@ -74,7 +74,7 @@ class ModePanel:
             if folder.visible != visible:
                 folder.visible = visible
             for field, number in zip(self._fields[part], getattr(wanted, part), strict=True):
-                field.show(f"{number:g}", state.problems.get(field.field))
+                field.show(f"{number:g}", state.problems.get(field.field), state.entered)
             labels = [(field.field, self._labels[field.field]) for field in self._fields[part]]
             self._problems[part].show(problems_html(state, text, labels))
         self._send.visible = state.target != "virtual"

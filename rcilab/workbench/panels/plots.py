@@ -83,7 +83,7 @@ class Plots:
         self._legend = Html(gui)
 
     def show(self, state: UiState) -> None:
-        """Redraws the plots when plan, recording or choice have changed."""
+        """Redraws the plots when plan, recording, choice or colours have changed."""
         streamed = streamed_rows(state)
         if state.plan is not self._plan or streamed is not self._streamed:
             self._plan, self._streamed, self._planned = state.plan, streamed, {}
@@ -98,7 +98,7 @@ class Plots:
                 self._plots[name].height, is_rearranged = wanted_height, True
         if is_rearranged:
             self._fit(state, visible)
-        wanted = (state.plan, state.recording, state.plot_joint, state.model, visible)
+        wanted = (state.plan, state.recording, state.plot_joint, state.model, state.theme, visible)
         now = time.monotonic()
         if wanted != self._drawn and now >= self._next:
             self._drawn = wanted

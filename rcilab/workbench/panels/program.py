@@ -104,7 +104,7 @@ class ProgramPanel:
         self._plan.disabled = not count or planning or is_moving(status)
         self._upto.disabled = place is None or planning or is_moving(status)
         self._loop.show(state.loop)
-        self._rounds.show(str(program.rounds), state.problems.get(self._rounds.field))
+        self._rounds.show(str(program.rounds), state.problems.get(self._rounds.field), state.entered)
         now = time.monotonic()
         self._began = self._began if planning else now
         self._bar.visible = self._cancel.visible = planning and now - self._began > _MOMENT

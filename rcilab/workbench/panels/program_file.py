@@ -76,7 +76,7 @@ class ProgramFilePanel:
         self._save.disabled = self._clear.disabled = not there
         self._python.disabled = not there
         self._tool.visible = there and not draft.has_tool_of(state.model)
-        self._name.show(draft.name, state.problems.get(self._name.field))
+        self._name.show(draft.name, state.problems.get(self._name.field), state.entered)
         labels = [("program.0.file", text("program.load")), ("program.0.name", text("program.name"))]
         self._problems.show(problems_html(state, text, labels))
         is_shown = there and state.program.is_script_shown

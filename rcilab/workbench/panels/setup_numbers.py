@@ -77,7 +77,7 @@ class SetupNumbersPanel:
             for field, name in zip(fields, FIELD_NAMES[part], strict=True):
                 number = read_field(setup, part, name)
                 said = f"{number + 0.0:.6g}" if part == "load" and name in INERTIA_NAMES else shown(number)
-                field.show(said, state.problems.get(field.field))
+                field.show(said, state.problems.get(field.field), state.entered)
             self._problems[part].show(problems_html(state, self._text, self._named[part]))
 
     def _build_numbers(self, gui: Any, part: str) -> None:

@@ -46,10 +46,10 @@ class TargetPanel:
         labels: list[tuple[str, str]] = []
         for field in self._fields:
             name = field.field.partition(".")[2]
-            field.show(numbers[name], state.problems.get(field.field))
+            field.show(numbers[name], state.problems.get(field.field), state.entered)
             labels.append((field.field, self._text(f"target.{name}")))
         wxyz = self._wxyz
-        wxyz.show(quaternion_text(target.wxyz), state.problems.get(wxyz.field))
+        wxyz.show(quaternion_text(target.wxyz), state.problems.get(wxyz.field), state.entered)
         labels.append((wxyz.field, self._text("target.wxyz")))
         problems = problems_html(state, self._text, labels)
         is_broken = state.plan is not None and not state.plan.report.ok  # Said here, too: below it is out of sight.

@@ -54,7 +54,7 @@ class WayPanel:
         self._via.visible = state.way == "arc"
         self._note.show(_note_html(state, text))
         self._speed.show(round(state.speed * 100.0))
-        self._field.show(shown(state.speed * 100.0), state.problems.get("speed"))
+        self._field.show(shown(state.speed * 100.0), state.problems.get("speed"), state.entered)
         self._problem.show(problems_html(state, text, [("speed", text("target.speed"))]))
         self._law.show(self._laws[state.law])
         self._planned.show(planned_html(state, text))

@@ -86,7 +86,7 @@ class WaypointPanel:
         labels = []
         for name, field in self._fields.items():
             field.field = f"program.{key}.{name}"
-            field.show(values.get(name, ""), state.problems.get(field.field))
+            field.show(values.get(name, ""), state.problems.get(field.field), state.entered)
             labels.append((field.field, self._text(f"program.field.{name}")))
         self._problems.show(problems_html(state, self._text, labels) + self._note(waypoint))
 
