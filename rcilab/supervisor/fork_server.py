@@ -13,6 +13,7 @@ import fcntl
 import gc
 import os
 import selectors
+import signal
 import socket
 import sys
 import traceback
@@ -171,6 +172,9 @@ def main(argv: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(prog="rcilab.supervisor.fork_server", description=__doc__)
     parser.add_argument("--socket", type=int, required=True, metavar="FD", help="through which orders come")
     args = parser.parse_args(argv)
+    # For us and all our copies: an interrupt is for who started us, who brings the arm to rest. A session of our own
+    # keeps Ctrl-C away, but VS Code sends that of a kernel to every process below it.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     preload()
     order = ForkServer(socket.socket(fileno=args.socket)).serve()
     if order is not None:

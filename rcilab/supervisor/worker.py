@@ -7,7 +7,6 @@ imports nothing that draws. The supervisor's fork server calls `main`.
 from __future__ import annotations
 
 import argparse
-import signal
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -303,6 +302,4 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--block", type=int, required=True, metavar="FD", help="open descriptor of the shared block")
     parser.add_argument("--parent", type=int, required=True, metavar="PID", help="end when it is gone")
     args = parser.parse_args(argv)
-    # An interrupt is for who started us, and brings the arm to rest. VS Code sends a kernel's to all that is below it.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
     return Worker(ControlBlock(args.block), args.parent).run()
