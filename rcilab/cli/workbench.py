@@ -47,6 +47,9 @@ def add_page_options(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Serves the page until Ctrl-C or a termination signal."""
+    from rcilab.workbench.security import require_openable
+
+    require_openable(args.host, args.token, args.robot, args.model)  # Before the page and its libraries are loaded.
     return serve(page_config(args, model=args.model, target=args.robot), browser=not args.no_browser)
 
 

@@ -30,7 +30,7 @@ def lab_command(
     require_installed("jupyterlab", "the lab")
     if not directory.is_dir():
         raise UsageError(f"there is no directory {directory}: name one that holds notebooks")
-    command = [sys.executable, "-m", "jupyterlab", str(directory), "--ServerApp.ip=127.0.0.1"]
+    command = [sys.executable, "-m", "rcilab.notebook.quick_lab", str(directory), "--ServerApp.ip=127.0.0.1"]
     command.append("--LabApp.extension_manager=readonly")  # The other kind asks PyPI what there is.
     if port is not None:
         command += [f"--ServerApp.port={port}", "--ServerApp.port_retries=0"]

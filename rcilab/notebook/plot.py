@@ -118,6 +118,7 @@ def _draw(motion: Motion, model: RobotModel, run: Run | None, chosen: Sequence[i
 
 def _new_figure(rows: int) -> Figure:
     """Returns an empty figure that belongs to no window and shows itself in a notebook."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     class NotebookFigure(Figure):
@@ -125,7 +126,7 @@ def _new_figure(rows: int) -> Figure:
 
         def _repr_png_(self) -> bytes:
             picture = io.BytesIO()
-            self.savefig(picture, format="png")
+            FigureCanvasAgg(self).print_png(picture)  # What `savefig` does, but without drawing it all beforehand.
             return picture.getvalue()
 
     figure = NotebookFigure(figsize=(9.0, 0.6 + 1.75 * rows), dpi=_RESOLUTION, layout="constrained")

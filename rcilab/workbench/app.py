@@ -9,7 +9,6 @@ from pathlib import Path
 from types import TracebackType
 from typing import IO, TYPE_CHECKING
 
-from rcilab.model import load_model, require_rci
 from rcilab.views.gate import Gate
 from rcilab.views.guarded_server import GuardedServer
 from rcilab.views.viser_stage import HomeView
@@ -65,13 +64,10 @@ class Workbench:
     """
 
     def __init__(self, config: WorkbenchConfig) -> None:
-        security.check_host(config.host, config.token)
-        if config.target != "virtual":
-            from rcilab.client.address import parse_address
-
-            parse_address(config.target)
+        model = security.require_openable(config.host, config.token, config.target, config.model)
         replay = config.replay
-        model = require_rci(load_model(config.model)) if replay is None else require_replayable(replay)
+        if replay is not None:
+            model = require_replayable(replay)
         self._config = config
         self._bound = security.bind(config.host, config.port)
         self.port: int = self._bound.getsockname()[1]

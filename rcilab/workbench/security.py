@@ -9,8 +9,8 @@ import errno
 import socket
 
 from rcilab.errors import UsageError
+from rcilab.model import RobotModel, load_model, require_rci
 from rcilab.views.gate import is_loopback
-from rcilab.views.guarded_server import listen
 
 DEFAULT_PORT = 8080
 
@@ -24,12 +24,35 @@ def check_host(host: str, token: str | None) -> None:
         )
 
 
+def require_openable(host: str, token: str | None, target: str, model: str) -> RobotModel:
+    """Returns the arm to open with; refuses what can be known to fail before anything is loaded that takes time.
+
+    Args:
+        host: Address to listen on.
+        token: Secret that every page must bring.
+        target: "virtual", or the address of a controller.
+        model: Name of the arm.
+
+    Raises:
+        ModelError: No robot has this name, or it does not speak the RCI.
+        UsageError: The address needs a token, or the controller's is none.
+    """
+    check_host(host, token)
+    if target != "virtual":
+        from rcilab.client.address import parse_address
+
+        parse_address(target)
+    return require_rci(load_model(model))
+
+
 def bind(host: str, port: int) -> socket.socket:
     """Returns a listening socket on exactly this port; port 0 takes any free one.
 
     Raises:
         UsageError: The port is taken or the address is not ours; the message says what to change.
     """
+    from rcilab.views.guarded_server import listen
+
     try:
         return listen(host, port)
     except socket.gaierror as error:

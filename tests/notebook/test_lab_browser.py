@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import shutil
-import subprocess
 import sys
 import time
+import urllib.request
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -18,13 +18,16 @@ import pytest
 
 import rcilab
 from rcilab.notebook.page_watch import LEFT_ALONE
+from tests.notebook.jupyter_servers import serving
 
 FLAGS = (
     "--no-sandbox --no-first-run --use-gl=angle --use-angle=swiftshader --enable-unsafe-swiftshader "
-    "--disable-gpu-rasterization "  # Debian's launcher switches it on, which the processor then has to imitate.
+    # A graphics processor would have to be imitated: it is kept to what cannot do without, the scenes.
+    "--disable-gpu-rasterization --disable-gpu-compositing "
     "--disable-background-networking --disable-component-update --disable-sync --disable-default-apps "
     "--disable-background-timer-throttling --disable-renderer-backgrounding --disable-backgrounding-occluded-windows"
 ).split()
+FLAGS.append("--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1, EXCLUDE localhost")
 CELL = """import rcilab
 from rcilab.notebook import Lab
 model = rcilab.load_model("xMatePro7")
@@ -54,8 +57,8 @@ def find_chromium() -> str | None:
 
 
 @pytest.fixture(scope="module")
-def jupyter(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, Path]]:
-    """Address of a notebook with one cell in a JupyterLab that `rcilab lab` has opened, and its runtime folder."""
+def jupyter(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[dict[str, Any], Path]]:
+    """A JupyterLab that `rcilab lab` has opened on a notebook with one cell, as it tells about itself; its folder."""
     import nbformat
 
     folder = tmp_path_factory.mktemp("lab")
@@ -64,35 +67,16 @@ def jupyter(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, Pat
     note = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(CELL)], metadata=kernel)
     nbformat.write(note, folder / "notes" / "lab.ipynb")
     shutil.copy(Path(__file__).parents[2] / "notebooks" / LESSON, folder / "notes")
-    environment = {**os.environ, "JUPYTER_RUNTIME_DIR": str(folder / "runtime")}
-    environment |= {f"JUPYTER_{name}_DIR": str(folder / name) for name in ("CONFIG", "DATA")}
-    environment["JUPYTERLAB_SETTINGS_DIR"] = str(folder / "settings")
-    command = [sys.executable, "-m", "rcilab.cli", "lab", str(folder / "notes"), "--no-browser"]
-    command += ["--allow-root"] if os.geteuid() == 0 else []
-    with open(folder / "log", "w", encoding="utf-8") as log:
-        process = subprocess.Popen(command, env=environment, stdout=log, stderr=log)
-    try:
-        server = wait_for_server(folder / "runtime", process, folder / "log")
-        yield f"{server['url']}lab/tree/lab.ipynb?token={server['token']}", folder / "runtime"
-    finally:
-        process.terminate()
-        process.wait(15)
+    with serving([sys.executable, "-m", "rcilab.cli", "lab", str(folder / "notes")], folder) as server:
+        yield server, folder
 
 
-def wait_for_server(runtime: Path, process: subprocess.Popen[bytes], log: Path) -> dict[str, Any]:
-    deadline = time.monotonic() + 60.0
-    while time.monotonic() < deadline:
-        assert process.poll() is None, log.read_text(encoding="utf-8")
-        for file in runtime.glob("jpserver-*.json"):
-            text = file.read_text(encoding="utf-8")
-            if text.strip().endswith("}"):
-                return json.loads(text)
-        time.sleep(0.1)
-    raise AssertionError("JupyterLab did not start within 60 s:\n" + log.read_text(encoding="utf-8"))
+def address(server: dict[str, Any], place: str) -> str:
+    return f"{server['url']}{place}?token={server['token']}"
 
 
 @pytest.fixture(scope="module")
-def page(jupyter: tuple[str, Path]) -> Iterator[Any]:
+def page(jupyter: tuple[dict[str, Any], Path]) -> Iterator[Any]:
     path = find_chromium()
     if path is None:
         reason = "no Chromium found: install it (Debian: apt install chromium) to run the browser tests"
@@ -105,16 +89,13 @@ def page(jupyter: tuple[str, Path]) -> Iterator[Any]:
         context.set_default_timeout(40_000)
         outside: list[str] = []
 
-        def guard(route: Any) -> None:
-            if re.match(r"(https?://127\.0\.0\.1|https?://localhost|data:|blob:)", route.request.url):
-                route.continue_()
-            else:
-                outside.append(route.request.url)
-                route.abort()
+        def note(request: Any) -> None:
+            if not re.match(r"(https?://127\.0\.0\.1|https?://localhost|data:|blob:)", request.url):
+                outside.append(request.url)
 
-        context.route("**/*", guard)
+        context.on("request", note)  # To stop each and let it go on would cost the page its cache.
         tab = context.new_page()
-        tab.goto(jupyter[0])
+        tab.goto(address(jupyter[0], "lab/tree/lab.ipynb"))
         yield tab
         context.close()
         browser.close()
@@ -133,14 +114,18 @@ def run_all(page: Any) -> None:
     page.get_by_text("(ipykernel) | Idle").wait_for()
     prompt = page.locator(".jp-CodeCell .jp-InputPrompt").first
 
+    def is_asked() -> bool:
+        return prompt.inner_text().strip() not in ("", "[ ]:")
+
     def begun() -> bool:
         page.keyboard.press("Escape")
         page.get_by_role("menuitem", name="Run", exact=True).click()
         entry = page.get_by_text("Run All Cells", exact=True)
         if entry.is_visible():
             entry.click()
-            page.wait_for_timeout(500)
-        return prompt.inner_text().strip() not in ("", "[ ]:")
+            with suppress(AssertionError):
+                wait_for(page, is_asked, "the cell to run", timeout=3.0)
+        return is_asked()
 
     wait_for(page, begun, "the cell to run")
 
@@ -167,13 +152,20 @@ def button(page: Any, name: str) -> Any:
 
 def turn_joint_1(page: Any, handle: Any) -> np.ndarray:
     """Brings the joint from home to 30 degrees by the keys of its slider, and returns where the arm is seen then."""
-    handle.focus()
-    for _ in range(60):
-        page.keyboard.press("ArrowRight")
+    for key in (*["PageUp"] * 11, *["ArrowRight"] * 5):  # Five steps of half a degree, and one.
+        handle.press(key)  # Wherever a cell that still runs has taken the focus to.
     goal = PRO7.home.copy()
     goal[0] = np.radians(30.0)
     wait_for(page, lambda: shows(page, goal), "the arm where the slider put it")
     return goal
+
+
+def test_jupyterlab_starts_on_loopback_and_serves_the_directory(jupyter: tuple[dict[str, Any], Path]) -> None:
+    server, folder = jupyter
+    assert server["hostname"] == "127.0.0.1"
+    assert Path(server["root_dir"]) == folder / "notes"
+    with urllib.request.urlopen(address(server, "lab"), timeout=20) as page:
+        assert b"JupyterLab" in page.read()
 
 
 @pytest.mark.browser
@@ -207,11 +199,11 @@ def test_a_person_runs_the_lab_moves_a_slider_executes_and_stops(page: Any) -> N
 
 @pytest.mark.browser
 def test_a_tab_that_is_closed_stops_what_panel_and_cell_move_but_not_one_without_timers(
-    page: Any, jupyter: tuple[str, Path]
+    page: Any, jupyter: tuple[dict[str, Any], Path]
 ) -> None:
     from jupyter_client.blocking.client import BlockingKernelClient
 
-    client = BlockingKernelClient(connection_file=str(next(jupyter[1].glob("kernel-*.json"))))
+    client = BlockingKernelClient(connection_file=str(next((jupyter[1] / "runtime").glob("kernel-*.json"))))
     client.load_connection_file()
     client.start_channels()
     client.execute_interactive(SESSION, timeout=60)
@@ -223,7 +215,7 @@ def test_a_tab_that_is_closed_stops_what_panel_and_cell_move_but_not_one_without
     client.execute(MOVE)
     page.evaluate("window.setTimeout = window.setInterval = window.requestAnimationFrame = () => 0")  # As if hidden.
     time.sleep(4.0)  # Longer than a page may be silent.
-    ended = jupyter[1].parent / "notes" / "ended"
+    ended = jupyter[1] / "notes" / "ended"
     assert not ended.exists()
     page.close()
     deadline = time.monotonic() + 20.0
@@ -238,17 +230,18 @@ def test_a_tab_that_is_closed_stops_what_panel_and_cell_move_but_not_one_without
             break
         assert time.monotonic() < deadline, "the arm goes on although nobody is there"
         time.sleep(0.2)
+    client.execute_interactive("lab.close(); robot.close()", timeout=30)  # What runs on would slow down the next test.
     client.stop_channels()
     assert float(left) > 2.0  # It was to go on so long.
 
 
 @pytest.mark.browser
 def test_the_first_lesson_runs_in_its_language_and_its_slider_moves_the_arm(
-    page: Any, jupyter: tuple[str, Path]
+    page: Any, jupyter: tuple[dict[str, Any], Path]
 ) -> None:
     tab = page.context.new_page()
     tab.set_viewport_size({"width": 1280, "height": 2600})  # Cells out of sight are not there.
-    tab.goto(jupyter[0].replace("lab/tree/lab.ipynb", f"lab/workspaces/lesson/tree/{LESSON}"))
+    tab.goto(address(jupyter[0], f"lab/workspaces/lesson/tree/{LESSON}"))
     run_all(tab)
     handle = tab.locator(".widget-hslider .noUi-handle").first
     handle.wait_for()

@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from tests.notebook.forked_kernels import forked_kernels
+
 if TYPE_CHECKING:
     import nbformat
 
@@ -88,7 +90,8 @@ def execute(notebook: nbformat.NotebookNode, path: Path) -> nbformat.NotebookNod
     environment = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")}
     environment["JPY_SESSION_NAME"] = str(path)  # As Jupyter's server does; the language is read from it.
     resources = {"metadata": {"path": str(path.parent)}}
-    return NotebookClient(notebook, timeout=60, resources=resources).execute(env=environment)
+    with forked_kernels():
+        return NotebookClient(notebook, timeout=60, resources=resources).execute(env=environment)
 
 
 def printed(notebook: nbformat.NotebookNode, stream: str = "stdout") -> str:

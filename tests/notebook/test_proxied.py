@@ -4,15 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import json
-import os
 import re
-import subprocess
 import sys
-import time
 import urllib.request
 from collections.abc import Iterator
 from importlib import import_module
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -21,6 +17,7 @@ import rcilab
 from rcilab import notebook
 from rcilab.notebook.place import find_place
 from tests.late import Late
+from tests.notebook.jupyter_servers import serving
 
 if TYPE_CHECKING:
     from tornado.httpclient import HTTPRequest
@@ -28,33 +25,21 @@ if TYPE_CHECKING:
 httpclient, websocket, umsgpack = Late("tornado.httpclient"), Late("tornado.websocket"), Late("umsgpack")
 
 
+QUICK = "import sys; sys.modules['rfc3987_syntax'] = None; from jupyter_server.serverapp import main; main()"
+"""As `rcilab.notebook.quick_lab` starts JupyterLab."""
+UNUSED = ("jupyter_lsp", "jupyter_server_terminals", "jupyterlab", "notebook_shim")
+
+
 @pytest.fixture(scope="module")
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Any]]:
-    """A notebook server below /arm/ with jupyter-server-proxy, as it writes about itself."""
+    """A notebook server below /arm/ with jupyter-server-proxy, and nothing else, as it writes about itself."""
     folder = tmp_path_factory.mktemp("server")
-    environment = {**os.environ, "JUPYTER_CONFIG_DIR": str(folder), "JUPYTER_DATA_DIR": str(folder)}
-    environment["JUPYTER_RUNTIME_DIR"] = str(folder / "runtime")
-    command = [sys.executable, "-m", "jupyter_server", "--ServerApp.ip=127.0.0.1", "--ServerApp.port=0"]
-    command += ["--ServerApp.base_url=/arm/", "--no-browser", "--allow-root", f"--ServerApp.root_dir={folder}"]
-    with open(folder / "log", "w", encoding="utf-8") as log:
-        process = subprocess.Popen(command, env=environment, stdout=log, stderr=log)
-    try:
-        yield wait_for_server(folder / "runtime", process, folder / "log")
-    finally:
-        process.terminate()
-        process.wait(10)
-
-
-def wait_for_server(runtime: Path, process: subprocess.Popen[bytes], log: Path) -> dict[str, Any]:
-    deadline = time.monotonic() + 40.0
-    while time.monotonic() < deadline:
-        assert process.poll() is None, log.read_text(encoding="utf-8")
-        for file in runtime.glob("jpserver-*.json"):
-            text = file.read_text(encoding="utf-8")
-            if text.strip().endswith("}"):
-                return {**json.loads(text), "runtime": str(runtime)}
-        time.sleep(0.05)
-    raise AssertionError("no server within 40 s:\n" + log.read_text(encoding="utf-8"))
+    (folder / "config").mkdir()
+    chosen = {"ServerApp": {"jpserver_extensions": dict.fromkeys(UNUSED, False)}}
+    (folder / "config" / "jupyter_server_config.json").write_text(json.dumps(chosen), encoding="utf-8")
+    command = [sys.executable, "-c", QUICK, "--ServerApp.ip=127.0.0.1", "--ServerApp.port=0"]
+    with serving([*command, "--ServerApp.base_url=/arm/", f"--ServerApp.root_dir={folder}"], folder) as told:
+        yield {**told, "runtime": str(folder / "runtime")}
 
 
 def test_a_scene_is_live_through_the_proxy(server: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
