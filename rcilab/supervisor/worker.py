@@ -191,6 +191,8 @@ class Worker:
         link.on_states = self._record
         self._log.restart()
         self._publisher.restart()
+        if link.latest is not None:
+            self._record([link.latest])  # Before it is said to be ready: the newest row may be a dead predecessor's.
         self._told = None
         self._commands = RciCommands(link, self._settings.limits)
         self._learn_power()
