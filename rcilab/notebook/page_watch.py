@@ -1,7 +1,7 @@
 """Whoever moves an arm from a cell is in the notebook: when its page is gone, the arm is brought to rest.
 
 The page is asked from the first part, or the first sliders, that a notebook makes. Before, or where the kernel hears
-no page while a cell runs (VS Code, JupyterLab before 4.4, ipykernel before 7), nothing is known and nothing is stopped.
+no page while a cell runs (ipykernel before 7; before 7.4 VS Code, too), nothing is known and nothing is stopped.
 Nor is it while a button of somebody's own runs the motion in the very thread that hears the page.
 """
 

@@ -19,11 +19,16 @@ class Oversight:
     def __init__(self, words: memoryview, parent: int) -> None:
         self._words, self._parent = words, parent
         self._stops_seen = words[Word.STOPS_ASKED]
+        self._is_dismissed = False
+
+    def dismiss(self) -> None:
+        """Has everything end as if the supervisor were gone."""
+        self._is_dismissed = True
 
     @property
     def is_orphan(self) -> bool:
-        """Whether the supervisor's process is gone."""
-        return os.getppid() != self._parent
+        """Whether the supervisor's process is gone, or nobody waits for it."""
+        return self._is_dismissed or os.getppid() != self._parent
 
     @property
     def is_operator_gone(self) -> bool:

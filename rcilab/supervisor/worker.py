@@ -7,6 +7,7 @@ imports nothing that draws. The supervisor's fork server calls `main`.
 from __future__ import annotations
 
 import argparse
+import signal
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -90,6 +91,12 @@ class Worker:
         finally:
             self._disconnect()
         return 0
+
+    def leave(self) -> None:
+        """Brings the arm to rest and ends, as when the supervisor is gone; where no arm is connected, at once."""
+        self._oversight.dismiss()
+        if self._link is None:
+            sys.exit()
 
     def _is_orphan(self) -> bool:
         """Returns whether the supervisor is gone; without a connection the loop looks no more often either."""
@@ -304,4 +311,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--block", type=int, required=True, metavar="FD", help="open descriptor of the shared block")
     parser.add_argument("--parent", type=int, required=True, metavar="PID", help="end when it is gone")
     args = parser.parse_args(argv)
-    return Worker(ControlBlock(args.block), args.parent).run()
+    worker = Worker(ControlBlock(args.block), args.parent)
+    # Not in mid-motion: before VS Code ends a kernel it asks every process below it to end.
+    signal.signal(signal.SIGTERM, lambda *_: worker.leave())
+    return worker.run()

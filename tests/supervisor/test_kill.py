@@ -96,6 +96,19 @@ def test_a_killed_control_process_is_noticed_and_started_again_and_the_arm_stops
         assert np.abs(supervisor.status().q - GOAL).max() <= 1e-12
 
 
+def test_a_control_process_that_is_asked_to_end_brings_the_arm_to_rest_first():
+    with running(auto_restart=False) as supervisor:
+        begin_moving(supervisor)
+        os.kill(supervisor.status().worker_pid, signal.SIGTERM)
+        status = measure("control process", lambda: s if (s := supervisor.status()).phase == "crashed" else None)
+        assert "control process has died (exit code 0" in status.message
+        with connect(supervisor.status().address, MODEL) as robot:
+            state = robot.state
+            assert state.faults == ()  # Had it just gone, the controller would have stopped the arm, and said so.
+            assert np.abs(state.q_c - MODEL.home).max() > 0.001
+            assert np.abs(state.q_c - GOAL).max() > 0.001
+
+
 def test_a_killed_workbench_leaves_an_arm_that_its_control_process_has_stopped_and_nothing_else():
     before = shared_memory()
     controller = start_controller(MODEL.name)
