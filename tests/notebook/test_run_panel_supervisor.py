@@ -145,7 +145,9 @@ def test_a_motion_is_held_gone_on_with_and_slowed_down_as_by_the_session(own: bo
         wait_for(lambda: panel.state.status is not None and panel.state.status.pace == 1.0, "all of it")
         panel.stop.click()
         wait_for(lambda: pace.pause.disabled, "the end of the motion")
-        assert not pace._way.value
+        wait_for(
+            lambda: not pace._way.value, "the end of what is said of it"
+        )  # Another thread writes it, a moment later.
         wait_for(lambda: panel.state.run is not None, "the run")
         run = panel.state.run
         assert run is not None
