@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections import deque
 from collections.abc import Callable
@@ -10,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from rcilab.errors import ConnectionLostError
-from rcilab.supervisor.launch import START_TIMEOUT, Child, VirtualController
+from rcilab.supervisor.launch import START_TIMEOUT, Child, VirtualController, parent_pid
 from rcilab.supervisor.layout import ControlBlock, Word
 from rcilab.supervisor.snapshot import read_snapshot
 from rcilab.supervisor.status import MESSAGES
@@ -124,7 +123,8 @@ class ProcessKeeper:
         self._worker_started = time.monotonic()
         words[Word.SUPERVISOR_BEAT] = time.monotonic_ns()
         self._worker = Child(
-            ["-m", "rcilab.supervisor.worker", "--block", str(self._block.descriptor), "--parent", str(os.getpid())],
+            "rcilab.supervisor.worker",
+            ["--block", str(self._block.descriptor), "--parent", str(parent_pid())],
             "the control process",
             [self._block.descriptor],
         )

@@ -6,14 +6,14 @@ import os
 import re
 import select
 import signal
-import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Sequence
 from typing import IO
 
 from rcilab.errors import ConnectionLostError, InvalidValueError
+from rcilab.supervisor.fork_order import Order
+from rcilab.supervisor.forked import Forked, fork_server
 
 START_TIMEOUT = 20.0  # [s] A cold Python with its numerical libraries takes about 1 s; a busy machine several.
 _END_TIMEOUT = 3.0  # [s] Between asking a process to end and ending it.
@@ -38,47 +38,51 @@ class Child:
     """A process of ours with what it says kept for error messages.
 
     Args:
-        arguments: What to run, after the interpreter.
+        module: What to run: its `main` is given the arguments and returns the exit code.
+        arguments: See above.
         name: What to call it in errors.
-        descriptors: Open files it inherits.
+        descriptors: Open files it inherits, under the same numbers.
     """
 
-    def __init__(self, arguments: Sequence[str], name: str, descriptors: Sequence[int] = ()) -> None:
+    def __init__(self, module: str, arguments: Sequence[str], name: str, descriptors: Sequence[int] = ()) -> None:
         self.name = name
         self._stderr: IO[bytes] = tempfile.TemporaryFile()
+        self._stdout, stdout = os.pipe()
+        order = Order(
+            module=module,
+            arguments=tuple(arguments),
+            environment=dict(os.environ),
+            folder=_here(),
+            descriptors=tuple(descriptors),
+        )
         try:
-            # A session of its own: Ctrl-C in the terminal is for the parent, which brings the arm to rest first.
-            self._process = subprocess.Popen(
-                [sys.executable, *arguments],
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.PIPE,
-                stderr=self._stderr,
-                pass_fds=tuple(descriptors),
-                start_new_session=True,
-            )
+            self._process = Forked(order, [stdout, self._stderr.fileno(), *descriptors])
         except OSError as error:
+            os.close(self._stdout)
             self._stderr.close()
             raise ConnectionLostError(f"{name} could not be started: {error}").coded("no_process") from error
+        finally:
+            os.close(stdout)
 
     @property
-    def pid(self) -> int:
-        """Process id."""
+    def pid(self) -> int | None:
+        """Process id; None as long as it is none."""
         return self._process.pid
 
     @property
     def is_alive(self) -> bool:
-        """Whether it still runs."""
-        return self._process.poll() is None
+        """Whether it runs, or is about to."""
+        return not self._process.wait(0.0)
 
     @property
     def how_it_ended(self) -> str:
         """In words, such as "signal 9 (SIGKILL)"."""
-        code = self._process.poll()
-        if code is None:
+        if self.is_alive:
             return "it is running"
-        if code < 0:
-            return f"signal {-code} ({signal.Signals(-code).name})"
-        return f"exit code {code}"
+        code = self._process.exit_code
+        if code is None:
+            return "nobody saw how"
+        return f"signal {-code} ({signal.Signals(-code).name})" if code < 0 else f"exit code {code}"
 
     @property
     def last_words(self) -> str:
@@ -92,36 +96,46 @@ class Child:
 
     def end(self, timeout: float = _END_TIMEOUT) -> None:
         """Asks it to end (SIGTERM), and ends it (SIGKILL) when it has not after `timeout`, [s]. May be called twice."""
-        if self.is_alive:
-            self._process.terminate()
-            try:
-                self._process.wait(timeout)
-            except subprocess.TimeoutExpired:
-                self.kill()
-        if self._process.stdout is not None:
-            self._process.stdout.close()
+        if self._stderr.closed:
+            return
+        if not self._process.terminate(timeout):
+            self.kill()
+        self._process.close()
+        os.close(self._stdout)
         self._stderr.close()
 
     def kill(self) -> None:
         """Ends it at once and waits until it is gone."""
         self._process.kill()
-        self._process.wait()
 
     def wait(self, timeout: float) -> bool:
         """Returns whether it has ended within `timeout`, [s]."""
-        try:
-            self._process.wait(timeout)
-        except subprocess.TimeoutExpired:
-            return False
-        return True
+        return self._process.wait(timeout)
 
     def read_output(self) -> str:
         """Returns what has come on stdout since the last call; does not wait."""
-        stream = self._process.stdout
-        assert stream is not None
-        if not select.select([stream], [], [], 0.0)[0]:
+        if not select.select([self._stdout], [], [], 0.0)[0]:
             return ""
-        return os.read(stream.fileno(), 4096).decode(errors="replace")
+        return os.read(self._stdout, 4096).decode(errors="replace")
+
+
+def _here() -> str | None:
+    try:
+        return os.getcwd()
+    except FileNotFoundError:  # The folder has been removed.
+        return None
+
+
+def parent_pid() -> int:
+    """Returns the process id of what our processes' parent is: it is gone when we are.
+
+    Raises:
+        ConnectionLostError: It could not be started.
+    """
+    try:
+        return fork_server().pid
+    except OSError as error:
+        raise ConnectionLostError(f"Python could not be started once more: {error}").coded("no_process") from error
 
 
 class VirtualController(Child):
@@ -137,11 +151,10 @@ class VirtualController(Child):
     def __init__(
         self, model_name: str, plant: str = "ideal", lockstep: bool = False, options: Sequence[str] = ()
     ) -> None:
-        arguments = ["-m", "rcilab.cli", "controller", "--model", model_name, "--plant", plant, "--port", "0"]
-        super().__init__(
-            [*arguments, *(["--lockstep"] if lockstep else []), *options, "--exit-with-parent", str(os.getpid())],
-            "the virtual controller",
-        )
+        arguments = ["controller", "--model", model_name, "--plant", plant, "--port", "0", *options]
+        if lockstep:
+            arguments.append("--lockstep")
+        super().__init__("rcilab.cli", [*arguments, "--exit-with-parent", str(parent_pid())], "the virtual controller")
         self._said = ""
         self._started = time.monotonic()
         self._address: str | None = None

@@ -13,7 +13,7 @@ class Oversight:
 
     Args:
         words: The counters of the shared block.
-        parent: Process id of the supervisor. Told, since it may be gone before we look.
+        parent: Process id of the fork server, which goes with the supervisor. Told: it may be gone before we look.
     """
 
     def __init__(self, words: memoryview, parent: int) -> None:

@@ -1,7 +1,7 @@
 """The main of the control process: one thread, one connection, one loop.
 
 It reads states, writes every cycle into the shared ring, takes requests from the mailbox and streams motions. It
-imports nothing that draws. Started by the supervisor as `python -m rcilab.supervisor.worker --block FD`.
+imports nothing that draws. The supervisor's fork server calls `main`.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class Worker:
 
     Args:
         block: The shared block.
-        parent: Process id of the supervisor, without which it ends. Told, since it may be gone before we look.
+        parent: Process id of the fork server, which goes with the supervisor, and without which this process ends.
     """
 
     def __init__(self, block: ControlBlock, parent: int) -> None:
@@ -296,10 +296,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Runs the control process on the block it was handed."""
     parser = argparse.ArgumentParser(prog="rcilab.supervisor.worker", description=__doc__)
     parser.add_argument("--block", type=int, required=True, metavar="FD", help="open descriptor of the shared block")
-    parser.add_argument("--parent", type=int, required=True, metavar="PID", help="the supervisor: end when it is gone")
+    parser.add_argument("--parent", type=int, required=True, metavar="PID", help="end when it is gone")
     args = parser.parse_args(argv)
     return Worker(ControlBlock(args.block), args.parent).run()
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -16,6 +16,7 @@ from rcilab.notebook import cells
 from rcilab.notebook.cells import Cells
 from rcilab.notebook.place import Place
 from tests.late import Late
+from tests.processes import processes
 
 widget = Late("ipywidgets.widgets.widget")
 
@@ -126,7 +127,7 @@ def test_fifty_re_runs_leave_no_thread_no_socket_no_widget_and_no_process(
 
     def count() -> tuple[int, ...]:
         gc.collect()
-        return threading.active_count(), len(os.listdir("/proc/self/fd")), len(widget._instances), len(children())
+        return threading.active_count(), len(os.listdir("/proc/self/fd")), len(widget._instances), len(processes())
 
     def run_everything(times: int) -> None:
         with monkeypatch.context() as patch:
@@ -143,13 +144,4 @@ def test_fifty_re_runs_leave_no_thread_no_socket_no_widget_and_no_process(
     run_everything(50)
     assert count() == once
     owner.close()
-    assert ([thread.name for thread in threading.enumerate() if thread not in before], children()) == ([], [])
-
-
-def children() -> list[str]:
-    """Processes of ours, whichever thread started them."""
-    found: list[str] = []
-    for task in os.listdir("/proc/self/task"):
-        with open(f"/proc/self/task/{task}/children", encoding="ascii") as file:
-            found += file.read().split()
-    return found
+    assert ([thread.name for thread in threading.enumerate() if thread not in before], processes()) == ([], set())

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import html
 import math
-import os
 import re
 import threading
-from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,6 +18,7 @@ from rcilab.gallery import Exhibit
 from rcilab.language import LANGUAGES
 from rcilab.notebook.place import Place
 from rcilab.words.text import load_face
+from tests.processes import processes
 from tests.waiting import wait_for
 
 if TYPE_CHECKING:
@@ -30,17 +29,6 @@ PRO7 = rcilab.load_model("xMatePro7")
 
 def text_of(widget: Any) -> str:
     return html.unescape(re.sub(r"<[^>]*>", "", widget.value))
-
-
-def children() -> set[str]:
-    found: set[str] = set()
-    for task in os.listdir("/proc/self/task"):
-        with (
-            suppress(FileNotFoundError),  # A thread has ended meanwhile.
-            open(f"/proc/self/task/{task}/children", encoding="ascii") as file,
-        ):
-            found |= set(file.read().split())
-    return found
 
 
 def require_at_moment(exhibit: Exhibit, scene: Scene, timeline: Timeline, plot: MotionPlot) -> None:
@@ -57,7 +45,7 @@ def require_at_moment(exhibit: Exhibit, scene: Scene, timeline: Timeline, plot: 
 def test_a_fault_is_provoked_on_a_private_controller_looked_at_and_the_session_is_left_alone() -> None:
     with rcilab.simulate(PRO7) as robot:
         before = robot.receive_state()
-        own = children()
+        own = processes()
         with (
             notebook.FaultPanel(robot, language="zh") as panel,
             notebook.Scene(panel, place=Place(way="loopback")) as scene,
@@ -93,15 +81,15 @@ def test_a_fault_is_provoked_on_a_private_controller_looked_at_and_the_session_i
                 assert timeline.moment is None
             assert panel.moment.layout.display == "none"
             assert "<circle" not in panel._told.value
-            assert len(children() - own) == 1
-        assert children() == own
+            assert len(processes() - own) == 1
+        assert processes() == own
         after = robot.receive_state()
         np.testing.assert_array_equal(after.q_c, before.q_c)
         assert after.faults == ()
 
 
 def test_who_cancels_or_closes_sees_nothing_and_leaves_nothing_behind() -> None:
-    own, threads = children(), threading.active_count()
+    own, threads = processes(), threading.active_count()
     with notebook.FaultPanel(PRO7) as panel:
         panel.provoke.click()
         panel.cancel.click()
@@ -109,7 +97,7 @@ def test_who_cancels_or_closes_sees_nothing_and_leaves_nothing_behind() -> None:
         assert panel.exhibit is None
         panel.provoke.click()
     wait_for(lambda: threading.active_count() == threads, 10.0, "the end of the threads")
-    assert children() == own
+    assert processes() == own
 
 
 def test_an_arm_of_six_axes_is_told_which_fault_it_cannot_have() -> None:

@@ -8,7 +8,8 @@ import subprocess
 import sys
 import threading
 import time
-from contextlib import contextmanager
+import uuid
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import numpy as np
@@ -224,8 +225,9 @@ def shared_memory():
 
 
 STILLBORN = """
-import os
+import os, sys, time
 from rcilab.model import load_model
+from rcilab.supervisor.forked import fork_server
 from rcilab.supervisor.keeper import ProcessKeeper
 from rcilab.supervisor.layout import ControlBlock
 from rcilab.supervisor.settings import build_settings
@@ -233,13 +235,25 @@ model = load_model("xMatePro7")
 block = ControlBlock.create(model.n, build_settings(model))
 keeper = ProcessKeeper(block, model.name, "ideal", None, auto_restart=False)
 keeper.launch()
-print(keeper.worker_pid, keeper.controller_pid, flush=True)
+while sys.argv[1] == "born" and None in (keeper.worker_pid, keeper.controller_pid):
+    time.sleep(0.001)
+print(fork_server().pid, flush=True)
 os._exit(0)
 """
 
 
-def test_a_supervisor_that_dies_while_its_processes_load_leaves_none_of_them_behind():
-    done = subprocess.run([sys.executable, "-c", STILLBORN], capture_output=True, text=True, check=True)
-    pids = [int(word) for word in done.stdout.split()]
-    assert len(pids) == 2
-    wait_for(lambda: not any(map(is_alive, pids)), 2.0 * SOON)
+@pytest.mark.parametrize("when", ["not yet born", "born"])
+def test_a_supervisor_that_dies_while_its_processes_load_leaves_none_of_them_behind(when, monkeypatch):
+    monkeypatch.setenv("STILLBORN", uuid.uuid4().hex)  # By which they are found; each inherits it.
+    done = subprocess.run([sys.executable, "-c", STILLBORN, when], capture_output=True, text=True, check=True)
+    assert int(done.stdout)
+    wait_for(lambda: not list(processes_with(f"STILLBORN={os.environ['STILLBORN']}".encode())), 2.0 * SOON)
+
+
+def processes_with(variable: bytes):
+    """The processes that were started with this in their environment."""
+    for folder in Path("/proc").iterdir():
+        with suppress(OSError):
+            if folder.name.isdigit() and folder.name != str(os.getpid()) and is_alive(int(folder.name)):
+                if variable in (folder / "environ").read_bytes().split(b"\0"):
+                    yield int(folder.name)
