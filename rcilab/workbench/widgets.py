@@ -49,7 +49,7 @@ class Linked:
 
     def __init__(self, handle: Any, ask: Ask, make: Callable[[Any, int | None], Request | None]) -> None:
         self.handle = handle
-        self._touched = float("-inf")
+        self._touched, self._seen = float("-inf"), handle.value
 
         @handle.on_update
         async def _(event: Any) -> None:
@@ -62,8 +62,9 @@ class Linked:
 
     def show(self, value: Any) -> None:
         """Writes the state's value, unless a person is moving the control."""
-        if self.handle.value != value and time.monotonic() - self._touched > HAND_AWAY:
-            self.handle.value = value
+        before, self._seen = self._seen, self.handle.value
+        if value != self._seen == before and time.monotonic() - self._touched > HAND_AWAY:
+            self.handle.value = self._seen = value  # What was not there before is a hand's, whose word is on its way.
 
 
 class NumberField:

@@ -63,9 +63,11 @@ def test_in_every_tab_controls_have_names_buttons_are_seen_stop_too_and_axe_find
         assert page.button("Stop").is_visible(), name
     assert hinted > 20
     assert violations(page) == []
+    tab.evaluate("document.querySelector('#root [role=slider]').dataset.kept = ''")
     page.bench.conductor.ask(requests.SetView(name="theme", value="dark"))
     page.wait(lambda: tab.evaluate("document.documentElement.dataset.rlTheme") == "dark", "a dark page")
-    page.wait(lambda: tab.evaluate(_UNNAMED) == [], "names in the new panels")
+    assert tab.evaluate("!!document.querySelector('#root [data-kept]')"), "the panels are not made anew for it"
+    page.wait(lambda: tab.evaluate(_UNNAMED) == [], "names in the dark panels")
     page.open_tab("Jog")
     assert violations(page) == []
     page.bench.conductor.ask(requests.SetView(name="theme", value="light"))

@@ -7,6 +7,21 @@ import numpy as np
 from rcilab.views.elbow_view import OUTWARD
 from rcilab.views.viser_stage import standing_place
 
+_ASKED = """async () => {
+  const ask = window.requestAnimationFrame, began = performance.now();
+  let count = 0;
+  window.requestAnimationFrame = (draw) => { count++; return ask.call(window, draw); };
+  await new Promise((done) => setTimeout(done, 1000));
+  window.requestAnimationFrame = ask;
+  return count / (performance.now() - began) * 1000;
+}"""
+
+
+def test_an_idle_page_asks_for_few_frames_and_smooths_no_edges_of_a_light_scene(page):
+    page.wait(lambda: page.tab.evaluate(_ASKED) < 8.0, "fewer than 8 frames a second")  # viser itself asks for one.
+    looks = "document.querySelector('#root canvas[data-engine]').getContext('webgl2').getContextAttributes().antialias"
+    assert page.tab.evaluate(looks) is False
+
 
 def test_dragging_the_elbow_turns_it_and_leaves_the_tool(page):
     page.wait(lambda: page.state.scene.elbow is not None, "the elbow's circle")

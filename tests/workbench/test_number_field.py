@@ -12,7 +12,7 @@ import pytest
 from rcilab.workbench import widgets
 from rcilab.workbench.requests import Request, TypeField
 from rcilab.workbench.text import message
-from rcilab.workbench.widgets import NumberField
+from rcilab.workbench.widgets import Linked, NumberField
 
 
 class Box:
@@ -114,3 +114,20 @@ def test_a_field_that_becomes_another_ones_shows_that_one_at_once(now: SimpleNam
     assert asked == [TypeField(page=1, field="joint.1", text="10")]
     field.show("55.00", None)
     assert box.value == "55.00"
+
+
+def test_a_control_that_a_hand_has_just_moved_is_not_written_over_before_its_word_has_come(
+    now: SimpleNamespace,
+) -> None:
+    box = Box()
+    box.value = "off"
+    linked = Linked(box, lambda _: None, lambda value, page: None)
+    linked.show("off")
+    box.value = "on"  # viser keeps the value, then calls us.
+    linked.show("off")
+    assert box.value == "on"
+    box.type("on")
+    now.time += 1.0
+    linked.show("on")
+    linked.show("off")
+    assert box.value == "off", "nobody touches it any more"

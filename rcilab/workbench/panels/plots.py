@@ -136,7 +136,7 @@ class Plots:
                 plot.visible = name in visible
             if name not in visible:
                 self._titles[name].show("")
-        self._visible = visible
+        self._visible, self._drawn = visible, ()  # One that goes and comes back before it is redrawn has no title.
 
     def _draw(self, state: UiState, name: str) -> None:
         scale = plot_scale(name, self._text.units)
