@@ -8,6 +8,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -28,19 +29,40 @@ sys.modules.setdefault("rfc3987_syntax", None)  # pyright: ignore[reportArgument
 
 LANES = {"pages": ("browser",), "loops": ("workbench", "supervisor")}
 """In the names of files whose tests draw, or run control processes at 1 kHz: a core has no room for two of a kind."""
-_ORDER = ("pages", "loops", "notebook", "")
+_KINDS = {
+    "notebook": ("notebook",),
+    "sums": ("/conformance/", "/dynamics/", "/kinematics/", "/motion/", "/posing/", "/protocols/", "/robots/"),
+}
+_ORDER = ("pages", "loops", "notebook", "", "sums")
 """Pages take longest, and loops, which wait more than they compute, are what fits beside them. What only computes goes
-on any core that is left at the end, and comes in the smallest pieces."""
+on any core that is left, and comes in the smallest pieces."""
 
 
 def lane_of(file: str) -> str:
     """Returns the lane that a file's tests run in, one after the other; nothing for files that need none."""
-    return next((lane for lane, parts in LANES.items() if any(part in file for part in parts)), "")
+    return _kind(file, LANES)
 
 
 def place_of(scope: str) -> int:
     """Returns when a piece of work comes: places of `_ORDER`."""
-    return _ORDER.index(scope if scope in LANES else "notebook" if "notebook" in scope else "")
+    return _ORDER.index(scope if scope in LANES else _kind(scope, _KINDS))
+
+
+def _kind(name: str, kinds: dict[str, tuple[str, ...]]) -> str:
+    return next((kind for kind, parts in kinds.items() if any(part in name for part in parts)), "")
+
+
+def is_spare(worker: str) -> bool:
+    """Returns whether a worker is one more than there are cores. It computes, in turns that nobody else wants."""
+    return worker.startswith("gw") and int(worker[2:]) >= (os.cpu_count() or 1)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """A spare worker takes no turn from pages and loops as long as it only computes."""
+    if is_spare(os.environ.get("PYTEST_XDIST_WORKER", "")):
+        only_computes = place_of(item.nodeid.partition("::")[0]) == _ORDER.index("sums")
+        os.sched_setscheduler(0, os.SCHED_IDLE if only_computes else os.SCHED_OTHER, os.sched_param(0))
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -76,10 +98,14 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
             file = super()._split_scope(nodeid)
             return lane_of(file) or file
 
-        def _assign_work_unit(self, node: object) -> None:
-            if self._is_idle(node) and self._is_crowded():
+        def _assign_work_unit(self, node: Any) -> None:
+            sums = [scope for scope in self.workqueue if place_of(scope) == _ORDER.index("sums")]
+            if is_spare(node.gateway.id) and sums:
+                first = sums[0]
+            elif self._is_idle(node) and self._is_crowded():
                 return  # Asked again after every test.
-            first = min(self.workqueue, key=place_of)  # The first of those that come first.
+            else:
+                first = min(self.workqueue, key=place_of)  # The first of those that come first.
             self.workqueue.move_to_end(first, last=False)
             super()._assign_work_unit(node)
 
@@ -91,7 +117,8 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
         def _is_crowded(self) -> bool:
             """Returns whether pages are drawn and every core has a worker: a further one would only slow them down."""
             drawn = any(False in work.get("pages", {}).values() for work in self.assigned_work.values())
-            return drawn and sum(not self._is_idle(node) for node in self.nodes) >= (os.cpu_count() or 1)
+            busy = sum(not (self._is_idle(node) or is_spare(node.gateway.id)) for node in self.nodes)
+            return drawn and busy >= (os.cpu_count() or 1)
 
         def _is_idle(self, node: object) -> bool:
             return not self._pending_of(self.assigned_work[node])
