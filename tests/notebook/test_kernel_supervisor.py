@@ -175,14 +175,17 @@ def test_a_cell_that_runs_again_leaves_no_widget_no_thread_and_no_socket(kernel:
     assert once[0] > 50
 
 
-def test_an_interrupt_stops_the_arm_whether_a_cell_runs_or_not(kernel: Kernel) -> None:
+def test_an_interrupt_stops_the_arm_whether_a_cell_runs_or_not(kernel: Kernel, tmp_path: Path) -> None:
     kernel.run(MAKE + CONNECT)
     kernel.run(MOVE)
     kernel.manager.interrupt_kernel()
     assert kernel.run(STANDS) == ("idle", True)
     kernel.run(MOVE)
-    sleeping = kernel.client.execute("time.sleep(60)", stop_on_error=False)  # What comes right after it runs, too.
-    time.sleep(0.3)
+    begun = tmp_path / "begun"
+    sleeping = kernel.client.execute(  # Without `stop_on_error` what comes right after it runs, too.
+        f"open({str(begun)!r}, 'w').close(); time.sleep(60)", stop_on_error=False
+    )
+    wait_for(begun.exists, what="the cell to begin")
     kernel.manager.interrupt_kernel()
     with pytest.raises(AssertionError, match="KeyboardInterrupt"):
         kernel.value_of(sleeping)
