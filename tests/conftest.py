@@ -31,11 +31,14 @@ LANES = {"pages": ("browser",), "loops": ("workbench", "supervisor")}
 """In the names of files whose tests draw, or run control processes at 1 kHz: a core has no room for two of a kind."""
 _KINDS = {
     "notebook": ("notebook",),
+    "waits": ("/gallery/", "test_faults_on_wire", "test_fuzz", "cli/test_run"),
     "sums": ("/conformance/", "/dynamics/", "/kinematics/", "/motion/", "/posing/", "/protocols/", "/robots/"),
 }
-_ORDER = ("pages", "loops", "notebook", "", "sums")
-"""Pages take longest, and loops, which wait more than they compute, are what fits beside them. What only computes goes
-on any core that is left, and comes in the smallest pieces."""
+_ORDER = ("pages", "loops", "notebook", "waits", "", "sums")
+"""Pages take longest, and loops, which wait more than they compute, are what fits beside them. What only computes comes
+in the smallest pieces and fills what is left."""
+_SPARE = ("waits", "sums")
+"""What a worker more than there are cores begins with: it hardly is in anybody's way."""
 
 
 def lane_of(file: str) -> str:
@@ -53,7 +56,7 @@ def _kind(name: str, kinds: dict[str, tuple[str, ...]]) -> str:
 
 
 def is_spare(worker: str) -> bool:
-    """Returns whether a worker is one more than there are cores. It computes, in turns that nobody else wants."""
+    """Returns whether a worker is one more than there are cores."""
     return worker.startswith("gw") and int(worker[2:]) >= (os.cpu_count() or 1)
 
 
@@ -61,7 +64,7 @@ def is_spare(worker: str) -> bool:
 def pytest_runtest_setup(item: pytest.Item) -> None:
     """A spare worker takes no turn from pages and loops as long as it only computes."""
     if os.geteuid() == 0 and is_spare(os.environ.get("PYTEST_XDIST_WORKER", "")):  # Others could not go back.
-        only_computes = place_of(item.nodeid.partition("::")[0]) == _ORDER.index("sums")
+        only_computes = _ORDER[place_of(item.nodeid.partition("::")[0])] == "sums"
         os.sched_setscheduler(0, os.SCHED_IDLE if only_computes else os.SCHED_OTHER, os.sched_param(0))
 
 
@@ -99,9 +102,9 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
             return lane_of(file) or file
 
         def _assign_work_unit(self, node: Any) -> None:
-            sums = [scope for scope in self.workqueue if place_of(scope) == _ORDER.index("sums")]
-            if is_spare(node.gateway.id) and sums:
-                first = sums[0]
+            spare = [scope for scope in self.workqueue if _ORDER[place_of(scope)] in _SPARE]
+            if is_spare(node.gateway.id) and spare:
+                first = min(spare, key=place_of)
             elif self._is_idle(node) and self._is_crowded():
                 return  # Asked again after every test.
             else:

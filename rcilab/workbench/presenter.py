@@ -58,7 +58,7 @@ if TYPE_CHECKING:
     from rcilab.workbench.store import UiState
 
 _PERIOD = 1.0 / 30.0  # [s] A choice: the display's rate is enough, and it leaves the processor to the robot.
-_AT_REST = 0.12  # [s] A choice: so often counters and clocks are shown while nothing else changes.
+_AT_REST = 0.25  # [s] A choice: so often counters and clocks are shown while nothing else changes.
 _READ = 0.25
 """[s] A choice: where the scene is drawn lightly and a hand drags the goal in it, numbers and plots come so long after
 the arm: a page that draws in software shows the arm once it has applied all that came with it."""

@@ -53,8 +53,8 @@ def test_a_row_that_hangs_is_ended_and_the_next_one_measured(monkeypatch, capsys
 
 def test_the_table_tells_failed_from_slow(capsys):
     main(["bench", "check"])
-    row = capsys.readouterr().out.splitlines()[-2]
-    assert row.split()[:2] == ["FAIL", "check"]
+    rows = [line.split()[:2] for line in capsys.readouterr().out.splitlines()]
+    assert ["FAIL", "check"] in rows
 
 
 def test_every_row_has_its_function():
