@@ -32,11 +32,12 @@ LANES = {"pages": ("browser",), "loops": ("workbench", "supervisor")}
 _KINDS = {
     "notebook": ("notebook",),
     "waits": ("/gallery/", "test_faults_on_wire", "test_fuzz", "cli/test_run"),
+    "long": ("/peers/", "test_vendor_programs", "client/test_motions", "test_still", "cli/test_bench", "test_readme"),
     "sums": ("/conformance/", "/dynamics/", "/kinematics/", "/motion/", "/posing/", "/protocols/", "/robots/"),
 }
-_ORDER = ("pages", "loops", "notebook", "waits", "", "sums")
+_ORDER = ("pages", "loops", "notebook", "waits", "long", "", "sums")
 """Pages take longest, and loops, which wait more than they compute, are what fits beside them. What only computes comes
-in the smallest pieces and fills what is left."""
+in the smallest pieces and fills what is left, so what is long for the number of its tests goes before."""
 _SPARE = ("waits", "sums")
 """What a worker more than there are cores begins with: it hardly is in anybody's way."""
 
