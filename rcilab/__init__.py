@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from rcilab.spatial import Pose as Pose
     from rcilab.supervisor.simulate import simulate as simulate
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 _HOMES = {
     "CartesianPosition": "rcilab.command",
