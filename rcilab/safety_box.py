@@ -85,6 +85,59 @@ class SafetyBox:
         return signs * np.array(self.size) @ self.T_base_box.rotation.T + self.T_base_box.position
 
 
+class EntryBox:
+    """A safety box for a tool that starts outside it: the faces that it starts beyond may be passed inwards only.
+
+    Such a face is where the tool is now, until the tool is inside it; the other faces are those of the box. Owned by
+    one monitor, which asks once a cycle.
+
+    Args:
+        box: Where the tool belongs.
+        position: Where the tool starts, in the base frame, three numbers, [m].
+    """
+
+    _ROUNDING = 1e-6  # [m] How far outwards rounding may move a tool that is commanded to stay.
+
+    def __init__(self, box: SafetyBox, position: Sequence[float]) -> None:
+        self._box = box
+        self._half = [0.5 * edge for edge in box.size]
+        self._faces = [
+            (min(-half, x - self._ROUNDING), max(half, x + self._ROUNDING))
+            for x, half in zip(self._local(position), self._half, strict=True)
+        ]
+
+    def excess(self, position: Sequence[float]) -> float:
+        """Returns how far a point lies outside of what is open to the tool, [m]; see `SafetyBox.excess`.
+
+        Args:
+            position: The point in the base frame, three numbers, [m].
+        """
+        local = self._local(position)
+        beyond = [max(low - x, x - high) for x, (low, high) in zip(local, self._faces, strict=True)]
+        self._faces = [
+            (min(-half, max(low, x - self._ROUNDING)), max(half, min(high, x + self._ROUNDING)))
+            for x, half, (low, high) in zip(local, self._half, self._faces, strict=True)
+        ]
+        deepest = max(beyond)
+        return deepest if deepest <= 0.0 else hypot(*(max(0.0, distance) for distance in beyond))
+
+    def _local(self, position: Sequence[float]) -> tuple[float, float, float]:
+        r, (cx, cy, cz) = self._box.T_base_box.parts
+        x, y, z = position[0] - cx, position[1] - cy, position[2] - cz
+        return r[0] * x + r[3] * y + r[6] * z, r[1] * x + r[4] * y + r[7] * z, r[2] * x + r[5] * y + r[8] * z
+
+
+def box_from(box: SafetyBox | None, position: Sequence[float]) -> SafetyBox | EntryBox | None:
+    """Returns what bounds a tool that starts at a position: its box, or the way into it; None when nothing does.
+
+    Args:
+        box: Where the tool belongs; None, or one that is not active, bounds nothing.
+        position: Where the tool starts, in the base frame, three numbers, [m].
+    """
+    box = active_box(box)
+    return box if box is None or box.excess(position) <= 0.0 else EntryBox(box, position)
+
+
 def require_box(box: object) -> SafetyBox:
     """Returns `box` if it is a safety box, active or not.
 

@@ -8,7 +8,7 @@ from rcilab.conformance.breach import Breach
 from rcilab.conformance.condition import Condition
 from rcilab.conformance.tool_conditions import BOX_TOLERANCE, CARTESIAN_POSITION
 from rcilab.faults import Fault
-from rcilab.safety_box import SafetyBox, active_box
+from rcilab.safety_box import EntryBox, SafetyBox, active_box
 
 
 class BoxMonitor:
@@ -20,13 +20,14 @@ class BoxMonitor:
         excess: How far the tool was outside in the last step, [m]; below zero inside.
 
     Args:
-        box: Where the tool shall stay; None, or one that is not active, bounds nothing.
+        box: Where the tool shall stay; None, or one that is not active, bounds nothing; an `EntryBox` for a
+            tool that starts outside.
         row: What to judge by: that of the manual, or another maker's, see `JointMonitor`.
     """
 
-    def __init__(self, box: SafetyBox | None, row: Condition = CARTESIAN_POSITION) -> None:
+    def __init__(self, box: SafetyBox | EntryBox | None, row: Condition = CARTESIAN_POSITION) -> None:
         self._row = row
-        self._box = active_box(box)
+        self._box = box if isinstance(box, EntryBox) else active_box(box)
         self.excess = -1.0
 
     @property

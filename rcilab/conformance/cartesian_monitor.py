@@ -13,7 +13,7 @@ from rcilab.conformance.spans import spans
 from rcilab.conformance.tool_conditions import TOOL_CONDITIONS
 from rcilab.faults import Fault
 from rcilab.limits import Limits
-from rcilab.safety_box import SafetyBox, active_box
+from rcilab.safety_box import EntryBox, SafetyBox, active_box
 from rcilab.spatial import IDENTITY, Pose, turn_between
 
 _TURN = 2.0 * math.pi  # [rad]
@@ -40,15 +40,15 @@ class CartesianMonitor:
 
     Args:
         limits: Bounds of the tool and the arm angle.
-        box: Where the tool shall stay; None, or one that is not active, bounds nothing. The monitor starts at rest at
-            the base; `reset` places it.
+        box: Where the tool shall stay; None, or one that is not active, bounds nothing; an `EntryBox` for a tool
+            that starts outside. The monitor starts at rest at the base; `reset` places it.
         rows: What to judge by: those of the manual, or another maker's on the same signals, see `JointMonitor`.
     """
 
     def __init__(
-        self, limits: Limits, box: SafetyBox | None = None, rows: Sequence[Condition] = TOOL_CONDITIONS
+        self, limits: Limits, box: SafetyBox | EntryBox | None = None, rows: Sequence[Condition] = TOOL_CONDITIONS
     ) -> None:
-        self._box = active_box(box)
+        self._box = box if isinstance(box, EntryBox) else active_box(box)
         self._rows = BoundRows(rows, limits)
         self.reset(IDENTITY)
 
@@ -65,7 +65,7 @@ class CartesianMonitor:
         self.acceleration: Six = _REST
         self.jerk: Six = _REST
         self.arm_angle: Four | None = None if psi is None else (psi, 0.0, 0.0, 0.0)
-        self._values: tuple[float, ...] = self._signals()
+        self._values: tuple[float, ...] = self._signals(_NO_BOX)
 
     def step(self, pose: Pose, psi: float | None = None, cycles: int = 1) -> tuple[Fault, ...]:
         """Takes the commanded pose of this cycle and returns the faults it raises, in wire order.
@@ -89,16 +89,15 @@ class CartesianMonitor:
         self.jerk = _difference(acceleration, self.acceleration, third)
         self._pose, self.twist, self.acceleration = pose, twist, acceleration
         self.arm_angle = _arm_angle_differences(self.arm_angle, psi, times)
-        self._values = self._signals()
+        self._values = self._signals(_NO_BOX if self._box is None else self._box.excess(pose.parts[1]))
         return self._rows.judge(self._values)
 
     def broken(self) -> list[Breach]:
         """Returns what the last step broke."""
         return self._rows.broken(self._values)
 
-    def _signals(self) -> tuple[float, ...]:
-        """Returns the value of every row."""
-        outside = _NO_BOX if self._box is None else self._box.excess(self._pose.parts[1])
+    def _signals(self, outside: float) -> tuple[float, ...]:
+        """Returns the value of every row; `outside` is how far the tool is outside the box, [m]."""
         angle = self.arm_angle or (0.0, 0.0, 0.0, 0.0)
         return (
             outside,

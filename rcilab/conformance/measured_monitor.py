@@ -12,7 +12,7 @@ from rcilab.conformance.measured_conditions import ACCELERATION_CUTOFF, MEASURED
 from rcilab.errors import InvalidValueError
 from rcilab.faults import Fault
 from rcilab.limits import Limits
-from rcilab.safety_box import SafetyBox, active_box
+from rcilab.safety_box import EntryBox, SafetyBox, active_box
 
 _SHARE = CYCLE_TIME / (CYCLE_TIME + 1.0 / (2.0 * math.pi * ACCELERATION_CUTOFF))
 """How much of a new difference the first-order low pass takes in one cycle."""
@@ -31,12 +31,13 @@ class MeasuredMonitor:
 
     Args:
         limits: Bounds of the arm.
-        box: Where the tool shall stay; None, or one that is not active, bounds nothing.
+        box: Where the tool shall stay; None, or one that is not active, bounds nothing; an `EntryBox` for a
+            tool that starts outside.
     """
 
-    def __init__(self, limits: Limits, box: SafetyBox | None = None) -> None:
+    def __init__(self, limits: Limits, box: SafetyBox | EntryBox | None = None) -> None:
         self._n = len(limits.joint.velocity)
-        self._box = active_box(box)
+        self._box = box if isinstance(box, EntryBox) else active_box(box)
         self._rows = BoundRows(MEASURED_CONDITIONS, limits)
         self.reset([0.0] * self._n)
 

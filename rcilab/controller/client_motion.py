@@ -11,6 +11,7 @@ from rcilab.controller.modes.terms import build_terms
 from rcilab.controller.playout import Playout
 from rcilab.controller.settings import Settings
 from rcilab.faults import Fault
+from rcilab.safety_box import box_from
 from rcilab.words.text import Remark
 
 PREFILL = 10  # [cycles] Pauses of client and network that a motion survives unharmed, and its delay. Both ends on one
@@ -70,7 +71,7 @@ class ClientMotion:
         self._generator = build_generator(mode, terms, list(arm.commanded.q))
         watch.begin(
             terms.limits,
-            terms.box,
+            box_from(terms.box, terms.start.parts[1]),
             settings.collision_thresholds,
             judges_tool=mode.is_cartesian,
             yields=mode.law.yields,

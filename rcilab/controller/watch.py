@@ -16,7 +16,7 @@ from rcilab.controller.tool import ToolMotion
 from rcilab.faults import Fault
 from rcilab.limits import Limits
 from rcilab.model import RobotModel
-from rcilab.safety_box import SafetyBox
+from rcilab.safety_box import EntryBox, SafetyBox
 from rcilab.words.text import Remark
 
 YIELDING_ALLOWANCE = 8.0
@@ -62,7 +62,7 @@ class Watch:
     def begin(
         self,
         limits: Limits,
-        box: SafetyBox | None,
+        box: SafetyBox | EntryBox | None,
         thresholds: Sequence[float],
         *,
         judges_tool: bool,

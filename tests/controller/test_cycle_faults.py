@@ -228,6 +228,46 @@ def test_a_cartesian_motion_does_not_start_at_a_singularity(make_hand, name: str
     assert hand.ask(rci.StartMove(0, 1)) is rci.StartStatus.SUCCESS
 
 
+@pytest.mark.parametrize("plant", ["ideal", "mujoco"])
+@pytest.mark.parametrize(
+    ("axis", "sign", "is_allowed"),
+    [(2, -1, True), (2, 1, False), (1, 1, False), (1, -1, False)],
+    ids=["inwards", "outwards", "past another face", "past the face opposite to it"],
+)
+def test_a_tool_that_starts_outside_its_box_may_only_move_in(
+    make_hand, plant: str, axis: int, sign: int, is_allowed: bool
+) -> None:
+    hand = make_hand(plant=plant)
+    x, y, z = hand.state.T_base_tool[:3, 3].tolist()
+    below = (1, 0, 0, x, 0, 1, 0, y, 0, 0, 1, z - 0.06, 0, 0, 0, 1)  # The tool starts 5 cm beyond the +z face.
+    hand.ask(rci.SetCartesianLimit((0.02, 0.02, 0.02), below, True))
+    hand.start(1, 2)
+    T, v = hand.state.T_base_tool_c.copy(), 0.0
+    for k in range(1000):
+        v += 0.05 * 1e-3 * (min(k, 100) / 100.0)
+        T[axis, 3] += sign * v * 1e-3
+        if hand.pose(T).faults:
+            break
+    allowed = [] if is_allowed else [Fault.COMMAND_CARTESIAN_POSITION_LIMITS_VIOLATION]
+    assert list(hand.state.faults) == allowed
+
+
+def test_a_tool_that_came_in_stays_in(make_hand) -> None:
+    hand = make_hand()
+    x, y, z = hand.state.T_base_tool[:3, 3].tolist()
+    below = (1, 0, 0, x, 0, 1, 0, y, 0, 0, 1, z - 0.02, 0, 0, 0, 1)  # The tool starts 1 cm beyond the +z face.
+    hand.ask(rci.SetCartesianLimit((0.02, 0.02, 0.02), below, True))
+    hand.start(1, 2)
+    T = hand.state.T_base_tool_c.copy()
+    start = T[2, 3]
+    for k in range(1, 1201):  # 2 cm down, and back up to where it began.
+        T[2, 3] = start - 0.01 * (1.0 - np.cos(2.0 * np.pi * k / 1200.0))
+        if hand.pose(T).faults:
+            break
+    assert list(hand.state.faults) == [Fault.COMMAND_CARTESIAN_POSITION_LIMITS_VIOLATION]
+    assert hand.state.T_base_tool_c[2, 3] - (start - 0.01) < 1e-3  # At the face, on its way out.
+
+
 def test_an_inactive_box_bounds_nothing(make_hand) -> None:
     hand = make_hand()
     request = hand.box(0.04)

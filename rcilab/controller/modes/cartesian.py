@@ -25,6 +25,7 @@ from rcilab.controller.stream import Stream
 from rcilab.errors import InvalidValueError, KinematicsError
 from rcilab.faults import Fault
 from rcilab.protocols.rci import CommandPacket
+from rcilab.safety_box import box_from
 from rcilab.spatial import Pose, rotation_from_wxyz, wxyz_from_rotation
 from rcilab.words.text import Remark
 
@@ -52,7 +53,7 @@ class CartesianGenerator:
         self._follower = Follower(model)
         self._stream = Stream([*pose.parts[1], *wxyz_from_rotation(pose.parts[0]), self._psi])
         self._filter = PoseLowPass(terms.settings.cartesian_filter, pose, self._psi)
-        self._monitor = CartesianMonitor(terms.limits, terms.box)
+        self._monitor = CartesianMonitor(terms.limits, box_from(terms.box, terms.start.parts[1]))
         self._monitor.reset(pose, self._psi if self._has_psi else None)
         self._gap = Gap()
         self._reference = JointReference(terms, q, judges_box=False)

@@ -17,7 +17,8 @@ from rcilab.faults import Fault
 from rcilab.limits import Limits
 from rcilab.model import RobotModel
 from rcilab.protocols.rci import CommandPacket
-from rcilab.safety_box import SafetyBox
+from rcilab.safety_box import SafetyBox, box_from
+from rcilab.spatial import Pose
 from rcilab.words.text import Remark
 
 NOTHING = Remark("")
@@ -35,7 +36,9 @@ class Terms:
     limits: Limits
     """With the soft limits as position bounds, and the tool's bounds from the table in force."""
     box: SafetyBox | None
-    """Where the commanded tool shall stay; None when nothing is to be judged."""
+    """Where the tool must stay; None when nothing bounds it."""
+    start: Pose
+    """Pose of the tool in base where the motion begins. Outside the box, it may only move in."""
 
 
 class Step(NamedTuple):
@@ -102,7 +105,7 @@ class JointReference:
     def __init__(self, terms: Terms, q: list[float], *, judges_box: bool) -> None:
         joint = terms.limits.joint
         self._model = terms.model
-        self._box = BoxMonitor(terms.box if judges_box else None)
+        self._box = BoxMonitor(box_from(terms.box, terms.start.parts[1]) if judges_box else None)
         self._fence = Fence(joint, q) if terms.settings.auto_limit else None
         self._monitor = JointMonitor(joint)
         self._monitor.reset(q)

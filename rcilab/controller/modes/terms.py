@@ -15,7 +15,7 @@ from rcilab.controller.plant import Measurement
 from rcilab.controller.settings import Settings
 from rcilab.limits import JointLimits
 from rcilab.model import RobotModel
-from rcilab.safety_box import SafetyBox, active_box
+from rcilab.safety_box import active_box
 from rcilab.spatial import Pose
 
 _ROUNDING = 1e-6  # [rad], [m] Where an arm stands beyond a bound, it may be that much farther.
@@ -27,7 +27,8 @@ def build_terms(
     """Returns filters and bounds of a motion.
 
     Stops end beyond a soft limit or the safety box when that was what they were for. A motion that begins out there may
-    lead back, and not farther out: the bound is where the arm stands. Where walls push the tool back into its box, the
+    lead back, and not farther out: the bound of a joint is where the arm stands, that of the tool moves in with it (see
+    `EntryBox`). Where walls push the tool back into its box, the
     box is not judged.
 
     Args:
@@ -42,7 +43,7 @@ def build_terms(
     limits = replace(cartesian_limits(model.limits, table), joint=joint)
     yields_to_walls = mode.law in (Law.JOINT_IMPEDANCE, Law.CARTESIAN_IMPEDANCE) and guiding_box(settings) is not None
     box = None if yields_to_walls else settings.safety_box
-    return Terms(model=model, settings=settings, limits=limits, box=_around(box, T_base_tool))
+    return Terms(model=model, settings=settings, limits=limits, box=active_box(box), start=T_base_tool)
 
 
 def _up_to(joint: JointLimits, measured: Measurement) -> JointLimits:
@@ -51,14 +52,3 @@ def _up_to(joint: JointLimits, measured: Measurement) -> JointLimits:
         return joint
     lower, upper = np.minimum(joint.lower, q - _ROUNDING), np.maximum(joint.upper, q + _ROUNDING)
     return replace(joint, lower=frozen(lower), upper=frozen(upper))
-
-
-def _around(box: SafetyBox | None, T_base_tool: Pose) -> SafetyBox | None:
-    """Returns the box, large enough for the tool as it stands; None when it bounds nothing."""
-    box = active_box(box)
-    if box is None:
-        return None
-    excess = box.excess(T_base_tool.parts[1])
-    if excess <= 0.0:
-        return box
-    return replace(box, size=tuple(edge + 2.0 * (excess + _ROUNDING) for edge in box.size))
