@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 import socket
 from dataclasses import dataclass
+from ipaddress import AddressValueError, IPv4Address
 from urllib.parse import parse_qsl, urlsplit
 
 from rcilab.errors import ConnectionLostError, InvalidValueError
@@ -12,6 +14,7 @@ DEFAULT_PORT = 1337  # By convention of the manual; the teach pendant's RCI page
 SPARE_LOOPBACK = "127.0.0.3"
 """Our address when the robot already owns the one that we would have used; any other in 127/8 would do."""
 
+_NAME = re.compile(r"(?=.{1,253}$)[a-z0-9_]([a-z0-9_-]{0,61}[a-z0-9_])?(\.[a-z0-9_]([a-z0-9_-]{0,61}[a-z0-9_])?)*")
 _KNOWN_OPTIONS = ("udp_port", "client_port", "world_port")
 _EXAMPLE = "rci://192.168.0.160:1337"
 
@@ -69,6 +72,7 @@ def parse_address(text: str) -> RobotAddress:
         raise InvalidValueError("address", text, f"begins with {parts.scheme}://, needs rci://, like {_EXAMPLE}")
     if not parts.hostname or parts.username or parts.path not in ("", "/"):
         raise InvalidValueError("address", text, f"must be a host and a port, like {_EXAMPLE}")
+    _require_host(text, parts.hostname)
     try:
         port = parts.port
     except ValueError:
@@ -135,6 +139,24 @@ def choose_route(address: RobotAddress) -> Route:
         local_tcp=(local, 0),
         local_udp=(local, address.state_port),
     )
+
+
+def _require_host(text: str, host: str) -> None:
+    """Raises where no machine can have this address or name; whether one has it, only the network knows."""
+    if not host.rpartition(".")[2].isdecimal():
+        if not _NAME.fullmatch(host):
+            raise InvalidValueError(
+                "address", text, f"has the host {host!r}, which is not a valid name or IPv4 address"
+            )
+        return
+    try:
+        address = IPv4Address(host)
+    except AddressValueError:
+        raise InvalidValueError(
+            "address", text, f"has the host {host!r}: an IPv4 address has four numbers from 0 to 255, like {_EXAMPLE}"
+        ) from None
+    if address.is_unspecified or address.is_multicast or address.is_reserved:
+        raise InvalidValueError("address", text, f"has the host {host}, which is not the address of one machine")
 
 
 def _port(text: str, name: str, value: str) -> int:

@@ -9,7 +9,7 @@ from rcilab.model import RobotModel
 from rcilab.notebook.look import head, table, verdict
 from rcilab.notebook.robot_side import BusyError, Outcome
 from rcilab.supervisor import SupervisorStatus
-from rcilab.supervisor.telling import phase_code, tell_error, tell_status
+from rcilab.supervisor.telling import phase_code, tell_error, tell_status, tell_success
 from rcilab.words.text import Message, Text, message
 
 
@@ -43,7 +43,7 @@ def health_html(status: SupervisorStatus, text: Text) -> str:
         ("mode", "—" if mode is None else text(f"robot_mode.{mode.name}")),
         ("control", "—" if control is None else text(f"controller_mode.{control.name}")),
         ("power", {None: "—", True: text("run.on"), False: text("run.off")}[status.powered]),
-        ("success", f"{100.0 * status.success_rate:.1f} %"),
+        ("success", text.say(tell_success(status))),
         ("rate", f"{status.rate_hz:.0f} Hz"),
     ]
     late = status.lateness

@@ -65,8 +65,14 @@ def judge_pose(model: RobotModel, target: Pose, near: JointVector, psi: float | 
     """
     found = model.closest(target, near, psi)
     if found.refusal is not None:
-        short = _how_short(target, found.pose)
-        return Reach(tone="bad", reason=why_not(found.refusal), q=found.q, solutions=None, short=short)
+        missed, turned = _miss(target, found.pose)
+        return Reach(
+            tone="bad",
+            reason=why_not(found.refusal, missed),
+            q=found.q,
+            solutions=None,
+            short=_how_short(missed, turned),
+        )
     return _judge_configuration(model, found.q, found.solutions)
 
 
@@ -79,10 +85,15 @@ def judge_joints(model: RobotModel, q: JointVector) -> Reach:
     return _judge_configuration(model, q, solutions)
 
 
-def why_not(refusal: UnreachableError) -> Message:
-    """Returns why a pose is not reachable."""
+def why_not(refusal: UnreachableError, missed: float) -> Message:
+    """Returns why a pose is not reachable.
+
+    Args:
+        refusal: What the inverse says.
+        missed: How far the pose that the arm takes instead is from it, [m]: no other distance is shown beside it.
+    """
     if refusal.distance > 0.0:
-        return message("reach.far", distance=f"{refusal.distance * 1000.0:.0f}")
+        return message("reach.far", distance=f"{missed * 1000.0:.0f}")
     if refusal.joint is not None:
         return message("reach.joint", joint=refusal.joint, excess=f"{math.degrees(refusal.excess):.1f}")
     return message("reach.no")
@@ -100,7 +111,14 @@ def _judge_configuration(model: RobotModel, q: JointVector, solutions: Solutions
     return Reach(tone="good", reason=message("reach.good"), q=q, solutions=solutions)
 
 
-def _how_short(target: Pose, reached: Pose) -> Message:
-    away = float(np.linalg.norm(target.position - reached.position)) * 1000.0
-    turned = math.degrees(2.0 * math.acos(min(1.0, abs(float(np.asarray(target.wxyz) @ np.asarray(reached.wxyz))))))
-    return message("reach.short", mm=f"{away:.0f}", deg=f"{turned:.1f}")
+def _miss(target: Pose, reached: Pose) -> tuple[float, float]:
+    """Returns how far a pose is from its target, [m], and how far it is turned from it, [rad]."""
+    turned = 2.0 * math.acos(min(1.0, abs(float(np.asarray(target.wxyz) @ np.asarray(reached.wxyz)))))
+    return float(np.linalg.norm(target.position - reached.position)), turned
+
+
+def _how_short(missed: float, turned: float) -> Message:
+    mm, deg = f"{missed * 1000.0:.0f}", f"{math.degrees(turned):.1f}"
+    if deg == "0.0":
+        return message("reach.short_mm", mm=mm)
+    return message("reach.short_deg", deg=deg) if mm == "0" else message("reach.short", mm=mm, deg=deg)

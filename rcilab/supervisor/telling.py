@@ -69,6 +69,12 @@ def tell_status(status: SupervisorStatus) -> Message:
     return message(phase_code(status))
 
 
+def tell_success(status: SupervisorStatus) -> Message:
+    """Returns the share of commands in time; the controller keeps that of the last motion until the next one."""
+    code = "health.success_now" if status.phase in ("moving", "stopping") else "health.success_last"
+    return message(code, share=f"{100.0 * status.success_rate:.1f}")
+
+
 def phase_code(status: SupervisorStatus) -> str:
     """Returns the key of the two or three words for what the robot side is doing."""
     return _PHASES.get(status.code, f"phase.{status.phase}")

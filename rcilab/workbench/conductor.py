@@ -81,6 +81,7 @@ class Conductor:
         self._mailbox: Mailbox[requests.Request] = Mailbox()
         self._thread: threading.Thread | None = None
         self._ending = threading.Event()
+        self._refused_for: int | None = None  # Who held the controls when another page was last refused.
         self.errors: list[BaseException] = []
         """Failures of our own code, for tests; each was also printed and said on the page."""
         self._actions: dict[type, Callable[[Any], None]] = {
@@ -175,7 +176,9 @@ class Conductor:
         lease = self._store.state.lease
         if not requests.is_harmless(request) and not lease.allows(request.page) and not _is_stop(request):
             code = "lease.free" if lease.holder is None else "notice.watching"
-            self._store.say("warn", message(code, page=lease.number(lease.holder)))
+            self._refused_for = lease.holder
+            said = message(code, page=lease.number(lease.holder))
+            self._store.say("warn", said, page=request.page, trouble="lease")
             return
         self._guard(lambda: self._actions[type(request)](request))
 
@@ -183,6 +186,8 @@ class Conductor:
         """Does what time asks for: the preview plays on, the robot is looked at, a plan completed."""
         self._view.advance(elapsed)
         self._lease.tick()
+        if self._store.state.lease.holder != self._refused_for:
+            self._store.settle("lease")
         event = self.robot.watch()
         if event == "placed":
             self._goal.plan()

@@ -47,6 +47,10 @@ class Notice:
     serial: int
     tone: Tone
     text: Message
+    page: int | None = None
+    """Client id of the only page it concerns; None: all of them."""
+    trouble: str = ""
+    """Names a trouble that it reports and that can end: then it is withdrawn."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -182,6 +186,7 @@ class Store:
         self._lock = threading.Lock()
         self._state = state
         self._past: list[Goal] = []
+        self._notices = 0
         self.changed = threading.Event()
         """Set when a request has been carried out whole, cleared by who shows it."""
 
@@ -196,11 +201,25 @@ class Store:
             self._state = replace(self._state, **changes)
             return self._state
 
-    def say(self, tone: Tone, text: Message) -> None:
-        """Shows a notice on every page."""
+    def say(self, tone: Tone, text: Message, *, page: int | None = None, trouble: str = "") -> None:
+        """Shows a notice, on one page or on every page.
+
+        Args:
+            tone: How it looks.
+            text: What it says.
+            page: Client id of the only page it concerns; None: all of them.
+            trouble: Names the trouble that it reports, for `settle`.
+        """
         with self._lock:
-            serial = self._state.notice.serial + 1 if self._state.notice else 1
-            self._state = replace(self._state, notice=Notice(serial, tone, text))
+            self._notices += 1
+            self._state = replace(self._state, notice=Notice(self._notices, tone, text, page, trouble))
+
+    def settle(self, trouble: str) -> None:
+        """Withdraws the notice of a trouble that is over, if it is still the last one."""
+        with self._lock:
+            notice = self._state.notice
+            if notice is not None and notice.trouble == trouble:
+                self._state = replace(self._state, notice=None)
 
     def complain(self, field: str, problem: Message) -> None:
         """Says beside a field what is wrong with what was typed."""

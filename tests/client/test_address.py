@@ -35,6 +35,13 @@ def test_options_name_the_ports_that_differ():
         ("rci://[::1]:1337", "IPv6, which is not supported; write the robot's IPv4 address"),
         ("::1", "IPv6"),
         ("foo", "is no address; write it like rci://"),
+        ("999.1.1.1", "'999.1.1.1': an IPv4 address has four numbers from 0 to 255"),
+        ("rci://192.168.0:1337", "four numbers from 0 to 255"),
+        ("rci://1.2.3.4.5", "four numbers from 0 to 255"),
+        ("rci://0.0.0.0", "not the address of one machine"),
+        ("224.0.0.1", "not the address of one machine"),
+        ("rci://a b.c", "'a b.c', which is not a valid name or IPv4 address"),
+        ("rci://robot..lab", "not a valid name or IPv4 address"),
     ],
 )
 def test_a_wrong_address_says_what_is_wrong_with_it(text, hint):

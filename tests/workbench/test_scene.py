@@ -118,6 +118,14 @@ def test_a_forbidden_arm_angle_is_left_for_the_nearest_free_one_and_told_why(ben
     assert (free, why) == (0.4, None)
 
 
+def test_a_stretched_arm_has_no_free_range_from_0_to_0(bench):
+    bench.aim(0.0, 0.2, 0.8)
+    bench.scene.tick()
+    said = ring_html(bench.state.scene.elbow, Text("en"))
+    assert "Free:" not in said
+    assert Text("en")("elbow.stretched") in said
+
+
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_the_ring_laid_out_flat_tells_its_arcs_in_words_and_patterns(bench, language):
     html = ring_html(bench.state.scene.elbow, Text(language))

@@ -83,6 +83,8 @@ def test_a_killed_process_is_noticed_told_and_replaced(bench, who, code):
     for language, cable in (("en", "cable"), ("zh", "网线")):
         assert cable not in Text(language).say(bench.store.state.notice.text)
     assert np.array_equal(bench.store.state.goal.q, goal), "what the operator has set is not lost"
+    wait(lambda: bench.session.status().phase == "idle", "the process to be replaced")
+    wait(lambda: told(bench) == "incident.over", "to be told that the trouble is over")
     move_on(bench)
 
 

@@ -34,10 +34,12 @@
   const show = (message) => {
     toast.textContent = message.text;
     toast.className = "rl-shown rl-" + message.tone;
+    toast.dataset.serial = message.serial || "";
     place();
     clearTimeout(hideTimer);
-    hideTimer = setTimeout(() => { toast.className = ""; }, SHOWN);
+    hideTimer = setTimeout(hide, SHOWN);
   };
+  const hide = () => { toast.className = ""; };
 
   // Over the scene, wherever the panels have left it: that covers no tab, no button and no field.
   const place = () => {
@@ -159,9 +161,11 @@
     if ("stop" in news || "stopHint" in news || "homeHint" in news) label();
     if (news.chips) draw(news.chips);
     if (news.notice && news.notice.serial !== notice) {
-      if (greeted || notice !== null) show(news.notice);  // What was said before this page came is no news to it.
+      const concerns = news.notice.page === null || (me && news.notice.page === me.page);
+      if (concerns && (greeted || notice !== null)) show(news.notice);  // What was said before this page came is no news to it.
       keep("notice", notice = news.notice.serial);
     }
+    if (news.notice === null && toast.dataset.serial) hide();  // The trouble that it reported is over.
     if (!greeted && said.stopHint) welcome();
     greeted = true;
     if ("cursor" in news) followSoon();

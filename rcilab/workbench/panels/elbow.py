@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from rcilab.supervisor import SupervisorStatus
     from rcilab.workbench.store import UiState
 
+_NARROW = math.radians(5.0)  # [rad] A tuning value: in less the elbow hardly moves aside.
 _HEIGHT = {"free": 10, "other": 4}  # Of 14; forbidden arcs are as high as hatched.
 
 
@@ -82,13 +83,21 @@ def ring_html(elbow: Elbow, text: Text) -> str:
     here = math.degrees(elbow.psi) + 180.0
     kinds = list(dict.fromkeys(arc.kind for arc in elbow.arcs))
     legend = "".join(f'<span class="rl-arc-{kind}">{esc(text(f"elbow.kind.{kind}"))}</span>' for kind in kinds)
-    free = ", ".join(_range(arc.start, arc.end, text) for arc in elbow.arcs if arc.kind == "free")
-    words = text("elbow.free", ranges=free) if free else text("elbow.nowhere")
+    words = _words(elbow, text)
     return (
         f'<div class="rl-ring"><svg viewBox="0 0 360 14" preserveAspectRatio="none" role="img" '
         f'aria-label="{esc(words)}">{_PATTERNS}{"".join(parts)}</svg><i style="left:{here / 3.6:.2f}%"></i></div>'
         f'<div class="rl-arcs">{legend}</div><p class="rl-note rl-dim">{esc(words)}</p>'
     )
+
+
+def _words(elbow: Elbow, text: Text) -> str:
+    """Returns the free ranges; those in which the elbow hardly moves are left out."""
+    free = [arc for arc in elbow.arcs if arc.kind == "free"]
+    wide = [arc for arc in free if arc.end - arc.start > _NARROW]
+    if not wide:
+        return text("elbow.stretched" if free else "elbow.nowhere")
+    return text("elbow.free", ranges=", ".join(_range(arc.start, arc.end, text) for arc in wide))
 
 
 def _shaded(start: float, end: float, elbow: Elbow, title: str) -> list[str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from rcilab.protocols.world import DIRECTIONS
+from rcilab.supervisor.telling import tell_success
 from rcilab.words.errors import tell_note
 from rcilab.workbench import requests
 from rcilab.workbench.run.driving import NETWORK_LAB, is_ours
@@ -90,7 +91,7 @@ def noticed_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
     rows = [
         ("client_rate", f"{status.rate_hz:.0f} Hz"),
         ("client_lost", f"{status.lost_cycles}"),
-        ("client_success", f"{100.0 * status.success_rate:.1f} %"),
+        ("client_success", text.say(tell_success(status))),
         ("controller_lost", "—" if world is None else f"{world.lost}"),
         ("controller_ignored", "—" if world is None else f"{world.ignored}"),
         ("controller_faults", faults),

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from rcilab.workbench.lease import PATIENCE, Lease
 from rcilab.workbench.run.played import played_at
-from rcilab.workbench.run.readiness import time_shown
+from rcilab.workbench.run.readiness import is_moving, time_shown
 from rcilab.workbench.telling import phase_code, tell_status
 from rcilab.workbench.text import Text
 
@@ -43,9 +43,13 @@ def status_values(state: UiState, status: SupervisorStatus, text: Text, cursor_e
         "take": text("lease.take" if state.lease.holder is None else "lease.ask"),
         "question": _question(state, text),
     }
-    if state.notice is not None:
-        notice = state.notice
-        values["notice"] = {"serial": notice.serial, "tone": notice.tone, "text": text.say(notice.text)}
+    notice = state.notice
+    values["notice"] = notice and {
+        "serial": notice.serial,
+        "tone": notice.tone,
+        "text": text.say(notice.text),
+        "page": notice.page,
+    }
     return values
 
 
@@ -70,7 +74,7 @@ def _chips(state: UiState, status: SupervisorStatus, text: Text) -> list[dict[st
         ),
         _chip(text, "mode", mode),
         _chip(text, "rate", f"{status.rate_hz:.0f} Hz" if connected else "—"),
-        _chip(text, "success", f"{100.0 * status.success_rate:.0f} %" if connected else "—"),
+        _chip(text, "success", f"{100.0 * status.success_rate:.0f} %" if is_moving(status) else "—"),
         _chip(text, "controls", _holder(lease, text)),
         _chip(text, "faults", faults, "bad" if status.faults else "", wide=True),
     ]

@@ -31,6 +31,7 @@ class WherePanel:
     def __init__(self, text: Text, ask: Ask) -> None:
         self._text, self._ask = text, ask
         self._picked: str | None = None  # "an address", before there is one.
+        self._asked = ""  # The address that the question is about.
 
     def build(self, gui: Any, state: UiState) -> None:
         """Adds the controls."""
@@ -48,9 +49,15 @@ class WherePanel:
             self._address = gui.add_text(text("run.address"), typed, hint=text("run.address_hint"))
             self._connect = gui.add_button(text("run.connect"), icon="plug-connected", color="gray")
             on_press(self._connect, ask, lambda page: _choose(page, "address", self._address.value))
+
+            @self._address.on_update
+            async def _(event: Any) -> None:
+                if self._asked and event.target.value.strip() != self._asked:
+                    ask(_choose(event.client_id, "address", answer="no"))
+
             self._question = Html(gui)
             self._yes = gui.add_button(text("destination.yes"), icon="plug-connected", color="red", visible=False)
-            on_press(self._yes, ask, lambda page: _choose(page, "address", answer="yes"))
+            on_press(self._yes, ask, lambda page: _choose(page, "address", self._address.value, "yes"))
             self._no = gui.add_button(text("destination.no"), color="gray", visible=False)
             on_press(self._no, ask, lambda page: _choose(page, "address", answer="no"))
             self._again = gui.add_button(text("destination.again"), icon="refresh", color="gray", visible=False)
@@ -67,7 +74,7 @@ class WherePanel:
         self._choice.handle.disabled = self._connect.disabled = moving
         is_address = (self._picked or where) == "address"
         self._address.visible = self._connect.visible = is_address
-        asked = state.drive.typed_address
+        asked = self._asked = state.drive.typed_address
         said = "" if not asked else esc(text("destination.ask", address=asked, model=state.model.name))
         self._question.show(said and f'<p class="rl-verdict rl-warn" role="alert">{said}</p>')
         self._yes.visible = self._no.visible = bool(asked)

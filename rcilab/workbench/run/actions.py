@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     from rcilab.supervisor import SupervisorStatus, Ticket
 
 _SECOND_THOUGHT = 10.0  # [s] A choice: a second press that comes later asks anew.
+TROUBLE = "robot"
+"""Names what is said while the robot side cannot move: see `Store.settle`."""
 _POWER_PAUSE = 2.0  # [s] A choice: between two attempts to switch the virtual arm on.
 
 
@@ -49,6 +51,7 @@ class RobotActions:
         self._arrival: Message | None = None  # What to say at the end of the motion under way.
         self._untouched: Goal | None = store.state.goal  # The goal that nobody has posed yet.
         self._incident = 0
+        self._trouble = ""  # The code of the incident that has not ended yet.
         self._phase = ""
         self._reached: float | None = None  # [s] How far along the plan the moving arm is.
         self._guided = False
@@ -136,14 +139,14 @@ class RobotActions:
         self._store.update(plant=plant, playing=False, **_unasked(state))
         self._powered, self._power_asked = False, float("-inf")
         self._end_recording()
-        self._tickets, self._incident, self._phase = [], 0, ""
+        self._tickets, self._incident, self._phase, self._trouble = [], 0, "", ""
         self._session.open(state.model, state.target, plant, _own_setup(state, state.target))
 
     def disconnect(self) -> None:
         """Lets go of the controller, and ends our own; goal and plan stay, for the preview."""
         state = self._store.state
         self._end_recording()
-        self._tickets, self._incident, self._phase = [], 0, ""
+        self._tickets, self._incident, self._phase, self._trouble = [], 0, "", ""
         self._powered, self._power_asked = False, float("-inf")
         self._session.disconnect()
         self._store.update(asked=None, playing=False, **_unasked(state))
@@ -154,7 +157,7 @@ class RobotActions:
         model = state.model if state.model.name == name else load_model(name)
         self._powered, self._power_asked = False, float("-inf")
         self._end_recording()
-        self._tickets, self._incident, self._phase = [], 0, ""
+        self._tickets, self._incident, self._phase, self._trouble = [], 0, "", ""
         changes: dict[str, object] = {"target": target, "recording": None, "asked": None, **_unasked(state)}
         if model is not state.model:
             self._store.forget()
@@ -180,10 +183,14 @@ class RobotActions:
             self._incident = status.incident.number
             if status.incident.code == "crashed.controller":
                 self._powered = False  # The one that is started in its place comes up without motor power.
-            self._store.say("bad", tell_incident(status.incident.code, status.incident.message, status))
+            self._trouble = status.incident.code
+            said = tell_incident(status.incident.code, status.incident.message, status)
+            self._store.say("bad", said, trouble=TROUBLE)
         if self._guided and status.code == "idle.operator":
             self._store.say("warn", message("notice.operator"))
         self._guided = is_guided(status) or (self._guided and status.phase == "stopping")
+        if status.phase == "idle":
+            self._settle()
         before, self._phase = self._phase, status.phase
         self._follow(status)
         self._record(status)
@@ -196,6 +203,13 @@ class RobotActions:
         if may_power and not self._powered:
             self._switch_on(status)
         return "rested" if before in ("moving", "stopping") and not is_moving(status) else None
+
+    def _settle(self) -> None:
+        """Withdraws what was said of a trouble that is over; the end of one that cut the connection is said."""
+        self._store.settle(TROUBLE)
+        if self._trouble.startswith(("crashed", "lost")):
+            self._store.say("good", message("incident.over"))
+        self._trouble = ""
 
     def _follow(self, status: SupervisorStatus) -> None:
         """Leaves the preview where the arm has left the plan, however seldom it was looked at on its way."""
@@ -257,7 +271,8 @@ class RobotActions:
                 self._stopped = str(ticket.error) if what == "execute" else self._stopped
                 if what == "execute" and isinstance(ticket.error, ControlError) and self._reached is None:
                     self._reached = 0.0  # It had begun, and nobody saw it on its way.
-                self._store.say(*self._tell_failure(what, ticket.error))
+                trouble = TROUBLE if _is_trouble(ticket.error) else ""
+                self._store.say(*self._tell_failure(what, ticket.error), trouble=trouble)
             elif what == "power_on":
                 self._powered = True
             elif what == "execute":
@@ -272,7 +287,7 @@ class RobotActions:
             self._store.say("good", message("notice.arrived"))
 
     def _tell_failure(self, what: str, error: RcilabError) -> tuple[Tone, Message]:
-        if isinstance(error, ConnectionLostError) or (isinstance(error, ControlError) and error.faults):
+        if _is_trouble(error):
             return "bad", tell_error(error, self._session.status())
         if isinstance(error, ControlError) and what == "execute":
             self._is_left_alone = self._session.status().code == "idle.operator"
@@ -308,6 +323,11 @@ class RobotActions:
         if self._recording:
             self._stopped = "the workbench was closed"
             self._end_recording()
+
+
+def _is_trouble(error: RcilabError) -> bool:
+    """Returns whether an error lasts until the robot side is well again: a fault or a lost connection."""
+    return isinstance(error, ConnectionLostError) or (isinstance(error, ControlError) and bool(error.faults))
 
 
 def _unasked(state: UiState) -> dict[str, object]:

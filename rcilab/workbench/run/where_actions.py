@@ -43,12 +43,11 @@ class WhereActions:
             self._robot.open(state.model.name, "virtual")
 
     def _choose_address(self, request: requests.ChooseDestination) -> None:
-        asked = self._store.state.drive.typed_address
-        if request.answer == "yes" and asked:
-            self._ask("")
+        asked, address = self._store.state.drive.typed_address, request.address.strip()
+        self._ask("")  # It was about what stood in the field before.
+        if request.answer == "yes" and asked and address == asked:
             self._robot.open(self._store.state.model.name, asked)
             return
-        address = request.address.strip()
         if not address:
             self._store.say("warn", message("run.address_needed"))
             return
