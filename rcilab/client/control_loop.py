@@ -13,7 +13,7 @@ import numpy as np
 from rcilab.client.brake import Brake, CartesianBrake, JointBrake, TorqueBrake
 from rcilab.client.checked_command import check_command, has_arrived, require_first
 from rcilab.client.commands import RciCommands
-from rcilab.client.fault_report import describe_faults
+from rcilab.client.fault_report import describe_faults, describe_late_callback
 from rcilab.client.filters import CommandFilter, is_near
 from rcilab.client.link import Link
 from rcilab.client.recorder import CycleLog
@@ -26,6 +26,7 @@ from rcilab.errors import (
     DeadlineError,
     InvalidValueError,
 )
+from rcilab.faults import Fault
 from rcilab.limits import Limits
 from rcilab.protocols.rci import StartMotionMode, build_command
 from rcilab.state import ControllerMode, RobotState
@@ -105,6 +106,7 @@ class ControlLoop:
         self._first_id = 0
         self._answered_id = -1
         self._t = math.nan
+        self._slowest, self._slowest_t = 0, 0.0  # [ns], [s] The longest call of the callback, and when it was.
         self._command: Command | None = None
         self._pending: deque[RobotState] = deque()
         self._brake: Brake = {
@@ -176,7 +178,12 @@ class ControlLoop:
                 self._pending.appendleft(state)  # Still without an answer: the way to rest begins with it.
                 return reason
             try:
-                wanted = self._checked(callback(state, t), state)
+                begun_ns = time.monotonic_ns()
+                answer = callback(state, t)
+                taken = time.monotonic_ns() - begun_ns
+                if taken > self._slowest:
+                    self._slowest, self._slowest_t = taken, t
+                wanted = self._checked(answer, state)
                 command = self._filtered(wanted, state)
             except BaseException:
                 self._pending.appendleft(state)
@@ -330,7 +337,11 @@ class ControlLoop:
         t = self._time(state) if self._command is not None else math.nan
         self._log.write(state, self._link.received_ns, t)
         record = self._log.recorder.last(RECORD_CYCLES)
-        return ControlError(describe_faults(state.faults, record, t, self._limits), state.faults, record)
+        late = ""
+        if Fault.INSTABILITY_DETECTION in state.faults:
+            late = describe_late_callback(1e-9 * self._slowest, self._slowest_t)
+        message = describe_faults(state.faults, record, t, self._limits, late=late)
+        return ControlError(message, state.faults, record)
 
     def _ended_by_controller(self, state: RobotState) -> ControlError:
         self._log.write(state, self._link.received_ns, self._time(state))

@@ -17,16 +17,36 @@ from rcilab.limits import Limits
 from rcilab.spatial import Pose
 
 _HISTORY = 3  # Commands that a third difference looks back to.
+_LATE_CYCLES = 5  # A delay that the play-out of a controller does not always absorb; shorter ones are not worth words.
 
 
-def describe_faults(faults: Iterable[Fault], record: NDArray[np.void], t: float, limits: Limits) -> str:
-    """Returns what to tell a person.
+def describe_late_callback(duration: float, t: float) -> str:
+    """Returns what a callback that held up the loop did and what helps, in one sentence; "" for one that was in time.
+
+    Args:
+        duration: The longest time that one call took, [s].
+        t: Motion time of that call, [s].
+    """
+    missed = int(duration / CYCLE_TIME)
+    if missed < _LATE_CYCLES:
+        return ""
+    return (
+        f"the callback took {1e3 * duration:.1f} ms at t = {t:.3f} s, so that {missed} cycles had no command in time; "
+        "return within 1 ms: compute beforehand or in another thread, and do not sleep, print or read files in it"
+    )
+
+
+def describe_faults(
+    faults: Iterable[Fault], record: NDArray[np.void], t: float, limits: Limits, *, late: str = ""
+) -> str:
+    """Returns the message of the error that a motion ends with.
 
     Args:
         faults: What the controller reported, in wire order.
         record: The last cycles, see `cycle_dtype`.
         t: Motion time of the state that carried the faults, [s]; NaN before the first command.
         limits: Bounds of the arm.
+        late: What `describe_late_callback` returned, for a motion that a slow callback may have ended.
     """
     faults = tuple(faults)
     when = "before the first command" if math.isnan(t) else f"at t = {t:.3f} s"
@@ -36,7 +56,7 @@ def describe_faults(faults: Iterable[Fault], record: NDArray[np.void], t: float,
     if numbers:
         parts.append(numbers)
     if faults:
-        parts.append(faults[0].remedy)
+        parts.append(late or faults[0].remedy)
     parts.append("recover() clears the fault; .record holds the last cycles")
     return "; ".join(parts)
 
@@ -47,6 +67,8 @@ def _numbers(faults: tuple[Fault, ...], record: NDArray[np.void], limits: Limits
     What the controller measured, and the torques it computed, are not judged again here.
     """
     sent = record[record["sent_ns"] != 0]
+    if len(sent) == 0:
+        return ""
     for field, judge, describe in (
         ("command", _judge_joints, _describe_joints),
         ("command_pose", _judge_poses, _describe_pose),

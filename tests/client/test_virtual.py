@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 import pytest
 
 from rcilab.command import JointPosition
 from rcilab.errors import CommandRejectedError, ControlError, UsageError
+from rcilab.faults import Fault
 from rcilab.model import load_model
+from rcilab.motion import plan_joint
 from rcilab.protocols.rci import RecoveryStatus, SafetyStop, SettingStatus
 from rcilab.spatial import Pose
 from rcilab.state import RobotMode
@@ -98,3 +102,28 @@ def test_a_reboot_closes_the_session():
         robot.reboot()
         with pytest.raises(UsageError, match="closed; connect again"):
             robot.motor_state()
+
+
+@pytest.mark.parametrize("plant", ["ideal", "mujoco"])
+def test_a_fault_before_the_first_command_is_a_control_error_that_names_it(plant):
+    with simulate(MODEL, plant=plant) as robot:
+        robot.power_on()
+        robot.world.push([0.0, 0.0, -150.0, 0.0, 0.0, 0.0], duration=3.0)
+        with pytest.raises(ControlError, match="before the first command: COLLISION") as caught:
+            robot.execute(plan_joint(MODEL, robot.state.q_c, robot.state.q_c + 0.1))
+        assert caught.value.faults == (Fault.COLLISION,)
+        assert len(caught.value.record) > 0
+
+
+@pytest.mark.realtime
+def test_a_slow_callback_is_named_with_its_duration_and_the_cycles_it_missed():
+    def slow(state, t):
+        time.sleep(0.03)
+        return JointPosition(state.q_c)
+
+    with simulate(MODEL, lockstep=False) as robot:
+        robot.power_on()
+        with pytest.raises(ControlError, match=r"the callback took \d+\.\d ms at t = .* (\d+) cycles had no") as caught:
+            robot.control(slow)
+        assert caught.value.faults == (Fault.INSTABILITY_DETECTION,)
+        assert "network" not in str(caught.value)
