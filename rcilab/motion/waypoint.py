@@ -316,5 +316,5 @@ def vector_of(name: str, value: ArrayLike) -> Floats:
             raise InvalidValueError(name, numbers, "has no direction: its length is zero").coded("no_direction")
     elif max(map(abs, numbers)) > FARTHEST:
         error = InvalidValueError(name, numbers, f"is beyond {FARTHEST:g} m; millimetres divided by 1000 are metres")
-        raise error.coded("beyond", most=f"{1e3 * FARTHEST:g}")
+        raise error.coded("beyond", most=f"{FARTHEST:g}")
     return numbers

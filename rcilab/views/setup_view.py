@@ -71,7 +71,7 @@ class SetupView:
         with self._scene.batch():
             self._place(self._box, box.T_base_box)
             faces = f"{self._box}/faces"
-            self._scene.add_mesh(faces, corners, _FACES, color=color, opacity=0.10 if box.active else 0.04)
+            self._scene.add_mesh(faces, corners, _FACES, color=color, opacity=0.10 if box.active else 0.0)
             for number, (a, b) in enumerate(_EDGES):
                 edge = f"{self._box}/edge{number}"
                 self._scene.add_polyline(edge, corners[[a, b]], color=color, thickness=0.006 if box.active else 0.003)

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import sys
 import threading
 import time
-import traceback
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -13,6 +11,7 @@ from typing import Any
 from rcilab.errors import RcilabError
 from rcilab.workbench import requests
 from rcilab.workbench.check.actions import CheckActions
+from rcilab.workbench.failures import Failures
 from rcilab.workbench.goal.actions import GoalActions
 from rcilab.workbench.jog.actions import JogActions
 from rcilab.workbench.jog.pose_actions import PoseActions
@@ -82,8 +81,8 @@ class Conductor:
         self._thread: threading.Thread | None = None
         self._ending = threading.Event()
         self._refused_for: int | None = None  # Who held the controls when another page was last refused.
-        self.errors: list[BaseException] = []
-        """Failures of our own code, for tests; each was also printed and said on the page."""
+        self.errors = Failures()
+        """Failures of our own code; one a second at most is printed and shown on the page."""
         self._actions: dict[type, Callable[[Any], None]] = {
             requests.MoveJoint: self._goal.move_joint,
             requests.PoseGoal: self._goal.pose_goal,
@@ -252,9 +251,8 @@ class Conductor:
         except RcilabError as error:
             self._store.say("bad", tell_error(error))
         except Exception as error:  # A bug of ours must neither end the thread nor stay unseen.
-            self.errors.append(error)
-            traceback.print_exc(file=sys.stderr)
-            self._store.say("bad", message("notice.bug", error=f"{type(error).__name__}: {error}"))
+            if self.errors.report(error):
+                self._store.say("bad", message("notice.bug", error=f"{type(error).__name__}: {error}"))
 
 
 def _coalescing_key(request: requests.Request) -> str | None:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 import threading
 import time
-import traceback
 from typing import TYPE_CHECKING, Any
 
 from rcilab.clock import CYCLE_TIME
 from rcilab.views.lasting_tab import LastingTab
+from rcilab.workbench.failures import Failures
 from rcilab.workbench.learn.state import exhibited
 from rcilab.workbench.live import LiveChannel
 from rcilab.workbench.page import dress
@@ -113,8 +112,8 @@ class Presenter:
         self._told: tuple[object, ...] = ()
         self._ending = threading.Event()
         self._thread: threading.Thread | None = None
-        self.errors: list[BaseException] = []
-        """Failures of our own code, for tests; each was also printed."""
+        self.errors = Failures()
+        """Failures of our own code; one a second at most is printed."""
 
     def start(self) -> None:
         """Draws once, then goes on in a thread of its own."""
@@ -213,8 +212,7 @@ class Presenter:
             try:
                 has_drawn = self.show()
             except Exception as error:  # A panel that fails must not freeze the others for good.
-                self.errors.append(error)
-                traceback.print_exc(file=sys.stderr)
+                self.errors.report(error)
             if has_drawn:  # A slow page must not starve others.
                 self._ending.wait(max(0.3 * _PERIOD, began + _PERIOD - time.monotonic()))
             else:

@@ -95,7 +95,7 @@ class Recording:
     is_left_alone: bool = False
     """Whether it was stopped because no page answered."""
     moment: float | None = None
-    """When what it is about happened, [s]: the fault of an exhibit; None for a motion like any other."""
+    """When a fault was reported, as in `t`, [s]; None for a motion without one."""
 
 
 @dataclass(frozen=True, slots=True)

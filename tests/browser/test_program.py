@@ -7,7 +7,7 @@ import json
 import pytest
 
 from browser.test_settings import choose
-from rcilab.motion import Program
+from rcilab.motion import Program, Waypoint
 from rcilab.workbench import requests
 
 
@@ -66,6 +66,8 @@ def test_a_program_is_written_by_keyboard_planned_saved_and_loaded(writing, tmp_
         choosing.value.set_files(path)
         if path is bad:
             page.wait(lambda: any("bad.json, line" in text for text in page.alerts()), "the line that is wrong")
+            page.wait(lambda: "Not loaded" in page.toast(), "to be told on any tab")
+            assert page.tab.get_by_text("Uploading", exact=False).locator("visible=true").count() == 0
             assert len(steps()) == 2
     page.wait(lambda: page.state.program.selected not in (first, second), "the saved program back")
     page.wait(lambda: page.alerts() == [], "no complaint any more")
@@ -73,3 +75,14 @@ def test_a_program_is_written_by_keyboard_planned_saved_and_loaded(writing, tmp_
     page.wait(
         lambda: "rcilab.plan_program(model, program)" in page.tab.locator(".rl-code pre").inner_text(), "a script"
     )
+
+
+def test_a_waypoint_of_a_file_has_its_own_type_in_the_editor(writing):
+    page, home = writing, writing.state.model.home
+    program = Program(model=page.state.model.name, start=home, waypoints=(Waypoint.nullspace(0.3),))
+    page.bench.conductor.ask(requests.LoadProgram(name="elbow.json", content=program.to_json().encode()))
+    page.wait(lambda: len(page.state.program.draft.steps) == 1, "the program")
+    page.wait(lambda: field(page, "Type").input_value() == "Elbow", "the type that the list shows")
+    assert field(page, "Type").is_disabled()
+    page.bench.conductor.ask(requests.EditProgram(what="add", source="here"))
+    page.wait(lambda: field(page, "Type").input_value() == "MoveJ", "the type of the new waypoint")

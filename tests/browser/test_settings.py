@@ -49,6 +49,11 @@ def test_the_second_page_watches_asks_for_the_controls_and_is_given_them(page, c
     other.type_joint(1, "33")
     other.wait(lambda: "holds the controls" in other.toast(), "to be told that it only watches")
     assert np.array_equal(page.state.goal.q, before)
+    assert page.toast() != other.toast(), "the page that holds the controls need not be told"
+    assert (page.chip("controls"), other.chip("controls")) == ("this page, 1 of 2", "page 1; this is page 2")
+    looks = "(box) => getComputedStyle(box).opacity"
+    assert float(other.slider(1).locator("xpath=ancestor::*[contains(@class,'Slider-root')]").evaluate(looks)) < 0.6
+    assert float(page.slider(1).locator("xpath=ancestor::*[contains(@class,'Slider-root')]").evaluate(looks)) == 1.0
     assert page.tab.locator("#rl-take").is_hidden()
     other.button("Ask for the controls").first.click()
     question = page.tab.get_by_role("alertdialog", name="Page 2 asks for the controls")
@@ -58,7 +63,7 @@ def test_the_second_page_watches_asks_for_the_controls_and_is_given_them(page, c
     other.wait(lambda: "was told no" in other.toast(), "the answer")
     other.button("Ask for the controls").first.click()
     question.get_by_role("button", name="Hand over").click()
-    other.wait(lambda: page.chip("controls") == "page 2 of 2", "the first page to see who has the controls")
+    other.wait(lambda: page.chip("controls") == "page 2; this is page 1", "the first page to see who has the controls")
     page.tab.locator("#rl-take").wait_for()
     context.close()
     page.wait(lambda: page.state.lease.pages == (page.state.lease.holder,), "the controls back with the first page")

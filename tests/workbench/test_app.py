@@ -120,7 +120,7 @@ def test_a_target_out_of_reach_has_no_ways_and_its_plan_says_how_far_short_it_en
     state = bench.store.state
     assert state.goal.reach.tone == "bad"
     assert state.goal.reach.solutions is None
-    assert state.plan.short.code == "reach.short"
+    assert state.plan.short.code == "reach.short_mm"
     reached = state.model.forward(state.goal.q).position
     assert float(state.plan.short.values["mm"]) == pytest.approx(
         1000.0 * np.linalg.norm(np.array((2.0, 0.3, 0.6)) - reached), abs=1.0
@@ -136,6 +136,18 @@ def test_a_target_out_of_reach_has_no_ways_and_its_plan_says_how_far_short_it_en
     ask(requests.SetSpeed(speed=1.0))
     ask(requests.Drive(what="execute"))
     wait(lambda: told(bench) == "notice.arrived_short", "the arrival short of the target")
+
+
+def test_labels_in_the_scene_follow_the_language_at_once(bench, ask):
+    ask(requests.SetWay(kind="arc", via=True))
+    label = bench.presenter._stage._goal._via_label
+    try:
+        for language in ("en", "zh", "en"):
+            ask(requests.SetView(name="language", value=language))
+            said = Text(language)("target.via_label")
+            wait(lambda said=said: label.text == said, f"the label in {language}")
+    finally:
+        ask(requests.SetWay(kind="joint"))
 
 
 def test_connecting_without_an_address_asks_for_one_and_does_nothing(bench, ask):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import subprocess
 import sys
 import threading
@@ -19,12 +20,13 @@ from rcilab.workbench.check.freshness import outdated
 from rcilab.workbench.check.state import CheckState, Slowed
 from rcilab.workbench.goal.actions import GoalActions, initial_goal
 from rcilab.workbench.panels.program import read_row
-from rcilab.workbench.panels.program_list import list_html
+from rcilab.workbench.panels.program_list import list_html, notes_html
 from rcilab.workbench.panels.target import planned_html
 from rcilab.workbench.program import actions as program_actions
 from rcilab.workbench.program import planning as program_planning
 from rcilab.workbench.program.actions import ProgramActions
 from rcilab.workbench.program.draft import draft_of, number_at, tell_place, time_at
+from rcilab.workbench.program.marks import label_of, neighbours
 from rcilab.workbench.run.readiness import may_go_back, may_plan_again, obstacle
 from rcilab.workbench.store import Store, UiState
 from rcilab.workbench.text import Text
@@ -223,6 +225,33 @@ def test_an_arm_that_is_elsewhere_is_led_to_the_start_first_and_told_so(square):
     assert np.allclose(plan.motion.goal, alone.goal)
 
 
+def test_many_shortened_blends_are_one_line_that_opens_and_marks_on_their_rows(bench):
+    count = 60
+    turns = np.linspace(0.0, math.tau, count, endpoint=False)
+    circle = tuple(
+        Waypoint.line(beside(0.03 * math.cos(turn) - 0.03, 0.03 * math.sin(turn), 0.0), blend=0.002) for turn in turns
+    )
+    bench.load(Program(model=MODEL.name, start=MODEL.home, waypoints=circle))
+    bench.type("rounds", "2")
+    bench.plan()
+    notes, text = bench.program.notes, Text("en")
+    assert len({note.key for note in notes}) == len(notes) > 40, "each once, however many rounds there are"
+    assert bench.program.answer is None
+    assert f"{len(notes)} blends shortened</summary>" in notes_html(notes, text)
+    assert notes_html(notes[:1], text).startswith('<p class="rl-note">* waypoint')
+    assert list_html(bench.state, bench.program.draft, None, text).count("<i title=") == len(notes)
+    bench.edit("clear")
+    assert notes_html(bench.program.notes, text) == ""
+
+
+def test_close_waypoints_share_one_label_in_the_scene():
+    points = [np.array((0.5, 0.001 * step, 0.3)) for step in range(5)] + [np.array((0.2, 0.0, 0.3))]
+    assert neighbours(points) == [[0, 1, 2, 3, 4], [5]]
+    assert label_of([(1, ""), (2, "[2]"), (3, ""), (7, "7 !")]) == "1–3, 7 · [2] · 7 !"
+    assert (label_of([(4, "")]), label_of([(4, "[4]")])) == ("4", "[4]")
+    assert neighbours([]) == []
+
+
 def test_an_error_names_the_waypoint_and_marks_it(square):
     key = square.program.draft.steps[1].key
     square.type("x", "2900", key)
@@ -271,6 +300,13 @@ def test_a_bad_file_is_answered_by_line_and_another_arms_by_name_and_nothing_is_
     problem = Text("en").say(square.state.problems["program.0.file"])
     assert "bad.json, line 9" in problem
     assert "waypoint 2" in problem
+    assert square.told == "program.not_loaded"
+    assert problem in Text("en").say(square.state.notice.text)
+    far = SQUARE.to_json().replace(str(list(SQUARE.waypoints[1].position)), "[55.0, 10.0, 4.0]")
+    square.actions.load(requests.LoadProgram(name="far.json", content=far.encode()))
+    problem = Text("en").say(square.state.problems["program.0.file"])
+    assert "(55.0, 10.0, 4.0) is farther than 10 m" in problem, "one message, one unit"
+    assert "mm" not in problem
     for content in (b"", b"\xff\xfe", b"[" * 1000):
         square.actions.load(requests.LoadProgram(name="bad.json", content=content))
         assert square.state.problems["program.0.file"].code == "program.file_bad"

@@ -20,7 +20,7 @@ from rcilab.recording.setup import Setup
 from rcilab.workbench import requests
 from rcilab.workbench.app import Workbench, WorkbenchConfig
 from rcilab.workbench.goal.actions import initial_goal
-from rcilab.workbench.panels.outcome import outcome_html
+from rcilab.workbench.panels.outcome import outcome_html, replay_html
 from rcilab.workbench.panels.recording import progress_html, summary_html
 from rcilab.workbench.run.export_actions import ENDINGS
 from rcilab.workbench.run.keeper import whole_recording
@@ -179,6 +179,10 @@ def test_a_run_is_replayed_with_nothing_connected_until_it_is_asked_for(monkeypa
         assert bench.store.state.setup.touched == {"tool", "load"}
         status = bench.session.status()
         assert (status.phase, status.worker_pid) == ("closed", None)
+        banner = replay_html(bench.store.state, status, Text("en"))
+        assert "Recorded run:</b> xMatePro7" in banner
+        assert "Ran to its end." in banner
+        assert replay_html(bench.store.state, SimpleNamespace(phase="idle"), Text("en")) == ""
         assert obstacle(bench.store.state, status).code == "ready.closed"
         opened = []
         monkeypatch.setattr(bench.session, "open", lambda *what: opened.append(what[:2]))

@@ -21,6 +21,7 @@ from rcilab.workbench.live import Heard, LiveChannel
 from rcilab.workbench.panels.branches import BranchesPanel
 from rcilab.workbench.panels.elbow import ring_html
 from rcilab.workbench.panels.target import planned_html
+from rcilab.workbench.panels.timeline import TimelinePanel
 from rcilab.workbench.scene.actions import SceneActions
 from rcilab.workbench.scene.ribbon_stage import bead_words
 from rcilab.workbench.store import Store, UiState
@@ -155,7 +156,11 @@ def test_the_ways_to_reach_a_target_are_listed_nearest_first_and_lead_where_they
     panel._rows = SimpleNamespace(show=shown.append)
     here = np.radians((-100.0, 20.0, 0.0, 40.0, -90.0, 60.0, 0.0))
     panel.show(bench.state, SimpleNamespace(q_c=here))
-    rows = re.findall(r'data-branch="(\d+)".*?<span>(\d+)</span>.*?<span>(\d+)°</span></div>', shown[0])
+    rows = re.findall(
+        r'data-branch="(\d+)".*?<span>(\d+)</span>[^/]*?(?:</span>.*?)?<span>(\d+)°</span><small>', shown[0]
+    )
+    told = re.findall("<small>(.*?)</small>", shown[0])
+    assert len(set(told)) == len(solutions), "no two rows read alike"
     numbers, away = [int(number) for _, number, _ in rows], [float(angle) for _, _, angle in rows]
     assert len(rows) == len(solutions) > 2
     assert numbers == list(range(1, len(rows) + 1))
@@ -247,6 +252,8 @@ def test_an_arc_needs_a_place_to_lead_over_and_then_does(bench):
     bench.aim(-0.03, 0.08, 0.0)
     bench.goal.plan(requests.Plan())
     assert bench.state.no_plan.code == "plan.no_via"
+    said = TimelinePanel(Text("en"), lambda request: None)._read(bench.state, SimpleNamespace(q_c=HOME))
+    assert Text("en")("plan.no_via") in said, "not how to begin, but what is missing"
     bench.goal.set_way(requests.SetWay(via=True))
     via = bench.state.via.position
     bench.aim(0.0, 0.08, 0.05)

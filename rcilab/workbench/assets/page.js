@@ -114,6 +114,8 @@
     if (!take) return;
     take.hidden = !me || !said.take || said.holder === me.page;
     take.textContent = said.take || "";
+    document.documentElement.toggleAttribute("data-rl-watching", Boolean(me) && said.holder !== me.page);
+    if (said.chips) draw(said.chips);  // It says which page this one is.
     const asked = said.question && me && said.question.page === me.page ? said.question : null;
     question.hidden = !asked;
     if (!asked) return;
@@ -146,11 +148,11 @@
       }
       const look = "rl-chip" + (chip.tone ? " rl-" + chip.tone : "") + (chip.wide ? " rl-wide" : "");
       if (box.className !== look) box.className = look;
-      const hint = chip.hint || chip.label + ": " + chip.value;
+      const value = (me && chip.of && chip.of[me.page]) || chip.value, hint = chip.hint || chip.label + ": " + value;
       if (box.dataset.id !== chip.id) box.dataset.id = chip.id;
       if (box.title !== hint) box.title = hint;
       if (box.firstChild.textContent !== chip.label) box.firstChild.textContent = chip.label;
-      if (box.lastChild.textContent !== chip.value) box.lastChild.textContent = chip.value;
+      if (box.lastChild.textContent !== value) box.lastChild.textContent = value;
     });
   };
 
@@ -202,12 +204,13 @@
     if (found.length < 4 || (shown === null && found.length <= before)) return;  // They come one by one.
     if (shown === null) document.documentElement.dataset.rlReady = "";
     const open = Math.max(0, found.findIndex((tab) => tab.getAttribute("aria-selected") === "true"));
+    const panel = list.closest(".mantine-ScrollArea-root");
+    if (panel) panel.toggleAttribute("data-rl-acts", open < found.length - 1);  // Language and theme are for watchers, too.
     if (shown === null && open !== before) {
       // viser's tabs hear keys and fingers, not click().
       found[before].dispatchEvent(new KeyboardEvent("keydown", { key: "Enter", bubbles: true }));
       shown = before;
     } else if (open !== shown) {
-      const panel = list.closest(".mantine-ScrollArea-root");
       if (shown !== null && panel) panel.firstElementChild.scrollTop = 0;  // What another tab was scrolled by is not its own.
       keep("tab", shown = open);
     }

@@ -52,7 +52,10 @@ class BranchesPanel:
             return f'<p class="rl-note">{esc(text(code))}</p>'
         here = state.goal.q if arm is None else arm
         order = nearest_first(np.asarray(list(solutions)), here)
-        rows = "".join(self._row(number, at, solutions[at], here, state) for number, at in enumerate(order, start=1))
+        joints = telling_joints(np.asarray(list(solutions)))
+        rows = "".join(
+            self._row(number, at, solutions[at], here, joints, state) for number, at in enumerate(order, start=1)
+        )
         heads = "".join(
             f"<span>{esc(text(f'target.head.{name}'))}</span>" for name in ("number", "margin", "worst", "away")
         )
@@ -64,19 +67,38 @@ class BranchesPanel:
             f'<p class="rl-note rl-dim">{esc(text("target.branch_point"))}</p>{rest}'
         )
 
-    def _row(self, number: int, at: int, q: np.ndarray, here: np.ndarray, state: UiState) -> str:
+    def _row(
+        self, number: int, at: int, q: np.ndarray, here: np.ndarray, joints: tuple[int, ...], state: UiState
+    ) -> str:
         least = margin(state.model, q)
         chosen = float(np.abs(np.angle(np.exp(1j * (q - state.goal.q)))).max()) < 1e-6
         left, away = (self._text.units.angle_of(a, 0) for a in (least.angle, float(np.abs(q - here).max())))
         sign = "▲ " if least.angle < NEAR_LIMIT else ""
         cells = (f"{number}", f"{sign}{left}", f"J{least.joint}", away)
+        angles = " · ".join(f"J{j + 1} {self._text.units.angle_of(float(q[j]), 0)}" for j in joints).replace("-", "−")
         said = self._text("target.branch_said", number=cells[0], margin=cells[1], joint=cells[2], away=cells[3])
+        said += f": {angles}" if angles else ""
         return (
             f'<div class="rl-branch" role="option" tabindex="{0 if chosen or number == 1 else -1}" '
             f'data-branch="{at}" aria-selected="{str(chosen).lower()}" aria-label="{esc(said)}">'
             + "".join(f"<span>{esc(cell)}</span>" for cell in cells)
-            + "</div>"
+            + (f"<small>{esc(angles)}</small></div>" if angles else "</div>")
         )
+
+
+def telling_joints(solutions: np.ndarray) -> tuple[int, ...]:
+    """Returns the joints, from 0, whose angles in whole degrees tell the solutions apart; none where there is one.
+
+    Args:
+        solutions: Joint angles, shape (N, n), [rad].
+    """
+    angles = np.degrees(solutions).round()
+    told: list[int] = []
+    for joint in np.argsort(-np.ptp(angles, axis=0), kind="stable").tolist():
+        if len(np.unique(angles[:, told], axis=0)) == len(np.unique(angles, axis=0)):
+            break
+        told.append(joint)
+    return tuple(sorted(told))
 
 
 def nearest_first(solutions: np.ndarray, here: np.ndarray) -> list[int]:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import time
 from typing import TYPE_CHECKING
 
+from rcilab.words.text import Finished
 from rcilab.workbench.run.driving import destination
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import esc
@@ -47,6 +49,21 @@ def outcome_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
     return f'<p class="rl-verdict rl-{tone}">{last}<b>{esc(ended)}</b> {esc(facts)}</p>'
 
 
+def replay_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
+    """Returns which recorded run is looked at while nothing is connected: whose, when, and how it ended; else ""."""
+    recording = state.recording
+    if status.phase != "closed" or recording is None or recording.run is None:
+        return ""
+    run = recording.run
+    made = run.setup
+    where = text(f"where.{made.plant}") if made.target == "virtual" and made.plant else made.target
+    when = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(made.started_ns * 1e-9)) if made.started_ns else ""
+    facts = ", ".join(filter(None, ("" if run.model is None else run.model.name, when, where)))
+    tone, ended, _ = _outcome(recording, text)
+    why = "" if run.stopped is None or run.faults else f"<br><small>{esc(text.tell(Finished(run.stopped)))}</small>"
+    return f'<p class="rl-verdict rl-{tone}"><b>{esc(text("record.replay"))}</b> {esc(facts)}. {esc(ended)}{why}</p>'
+
+
 def _elsewhere(run: Run, state: UiState, status: SupervisorStatus, text: Text) -> str:
     """Returns where a run was made, and with which arm, if that is not where motions go now; else ""."""
     made, arm = run.setup, state.model.name if run.model is None else run.model.name
@@ -64,7 +81,8 @@ def _outcome(recording: Recording, text: Text) -> tuple[str, str, str]:
     facts = text("record.facts", duration=f"{run.duration:.3f}", cycles=len(run.t), lost=run.timing.lost)
     if run.faults:
         faults = ", ".join(fault.manual_name for fault in run.faults)
-        return "bad", text("record.faulted", faults=faults), facts
+        moment = "" if recording.moment is None else f"{recording.moment:.3f}"
+        return "bad", text("record.faulted", faults=faults, moment=moment), facts
     if not run.is_complete:
         return "warn", text("record.cut"), facts
     if run.stopped:

@@ -55,6 +55,7 @@ class Plots:
         self._planned: dict[str, Curves] = {}
         self._plan: object = None
         self._streamed: JointPath | None = None  # What became of the plan at another pace.
+        self._above = 0
         self.end = 1.0
         """Where the time axis ends, [s]."""
 
@@ -72,7 +73,7 @@ class Plots:
                 data,
                 series,
                 bands=bands,
-                height=_height(state, len(self._visible)),
+                height=self._height(state, len(self._visible)),
                 legend={"show": False},
                 scales={"x": {"time": False, "range": (0.0, 1.0)}, "y": {"range": self._reaches[name][:2]}},
                 cursor={"drag": {"x": False, "y": False}, "sync": {"key": "rcilab"}},
@@ -82,8 +83,14 @@ class Plots:
             )
         self._legend = Html(gui)
 
-    def show(self, state: UiState) -> None:
-        """Redraws the plots when plan, recording, choice or colours have changed."""
+    def show(self, state: UiState, above: int = 0) -> None:
+        """Redraws the plots when plan, recording, choice or colours have changed.
+
+        Args:
+            state: Of the page.
+            above: What stands above them beside the controls, [px].
+        """
+        self._above = above
         streamed = streamed_rows(state)
         if state.plan is not self._plan or streamed is not self._streamed:
             self._plan, self._streamed, self._planned = state.plan, streamed, {}
@@ -91,7 +98,7 @@ class Plots:
         is_rearranged = visible != self._visible
         if is_rearranged:
             self._arrange(visible)
-        height = _height(state, len(visible))
+        height = self._height(state, len(visible))
         for name in visible:
             wanted_height = height + (_TIMES if name == visible[-1] else 0)
             if self._plots[name].height != wanted_height:
@@ -127,7 +134,7 @@ class Plots:
 
     def _axes(self, name: str, state: UiState, visible: tuple[str, ...]) -> tuple[Any, ...]:
         low, high, limits = self._reaches[name]
-        ticks = axis_ticks(low, high, _height(state, len(visible)) - 2 * _MARGIN, limits)
+        ticks = axis_ticks(low, high, self._height(state, len(visible)) - 2 * _MARGIN, limits)
         return plot_axes(state.theme, last=name == (visible or PLOTS)[-1], ticks=ticks)
 
     def _arrange(self, visible: tuple[str, ...]) -> None:
@@ -152,7 +159,7 @@ class Plots:
         if name not in ERRORS:
             self.end = frame.end
         if state.recording is not None and state.recording.moment is not None:
-            frame = mark_moment(frame, state.recording.moment)
+            frame = mark_moment(frame, state.recording.moment - state.recording.delay * CYCLE_TIME)
         title = self._text(f"plot.{name}") + (f" · J{joint}" if joint else "") + f" [{unit}]"
         self._titles[name].show(f'<div class="rl-plot-title">{esc(title)}</div>')
         low = 0.0 if name in ("speed", "acceleration", "tool") else -frame.bound
@@ -204,6 +211,12 @@ class Plots:
         errors = tracking.position[:, None] if name == "tool" else errors
         return build_error_frame(t, scale.factor * errors, last, scale.least)
 
+    def _height(self, state: UiState, rows: int) -> int:
+        """Returns how high each of the plots may be, [px]."""
+        hint = 0 if state.plan is not None else _HINT
+        spare = state.height - _OTHER_HEIGHT - self._above - hint - _TIMES - _TITLE * rows
+        return max(72, min(int(spare / max(rows, 1)), 260)) // 4 * 4
+
 
 def _wanted(state: UiState) -> tuple[str, ...]:
     finished = state.recording is not None and state.recording.tracking is not None
@@ -216,9 +229,3 @@ def _wanted(state: UiState) -> tuple[str, ...]:
 
 def _times(recording: Recording) -> Any:
     return recording.t - recording.delay * CYCLE_TIME  # So that plan and actual lie on each other.
-
-
-def _height(state: UiState, rows: int) -> int:
-    hint = 0 if state.plan is not None else _HINT
-    spare = state.height - _OTHER_HEIGHT - hint - _TIMES - _TITLE * rows
-    return max(72, min(int(spare / max(rows, 1)), 260)) // 4 * 4

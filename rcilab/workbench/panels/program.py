@@ -10,9 +10,9 @@ import numpy as np
 
 from rcilab.workbench import requests
 from rcilab.workbench.panels.jog import problems_html
-from rcilab.workbench.panels.program_list import list_html
+from rcilab.workbench.panels.program_list import list_html, notes_html
 from rcilab.workbench.panels.target import planned_html
-from rcilab.workbench.program.draft import Draft, number_at, tell_place
+from rcilab.workbench.program.draft import FILE_FIELD, Draft, number_at, tell_place
 from rcilab.workbench.run.readiness import is_moving, time_shown
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, Html, Linked, NumberField, esc, on_press
@@ -47,6 +47,7 @@ class ProgramPanel:
                     text(f"program.add_{source}"), icon=icon, hint=text(f"program.add_{source}_hint")
                 )
                 on_press(button, ask, _edit("add", source=source))
+        self._refused = Html(gui)
         self._list = Html(gui)
         gui.add_html('<i class="rl-bridge"></i>')
         bridge = gui.add_text(text("program.list"), "")  # Not shown: rows.js writes into it what is done in the list.
@@ -80,6 +81,7 @@ class ProgramPanel:
             self._cancel = gui.add_button(text("program.cancel"), icon="x", color="gray", visible=False)
             on_press(self._cancel, ask, lambda page: requests.CancelProgram(page=page))
             self._answer = Html(gui)
+            self._notes = Html(gui)
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows the program and its plan."""
@@ -88,10 +90,11 @@ class ProgramPanel:
         plan = state.plan if state.plan is not None and program.planned is draft and state.plan.program else None
         t = time_shown(state, status)
         running = None if plan is None else number_at(plan, t)
-        drawn = (draft, program.selected, program.failed, running, state.model)
+        drawn = (draft, program.selected, program.failed, program.notes, running, state.model)
         if drawn != self._drawn:  # Where each waypoint is takes a while to compute.
             self._drawn = drawn
             self._list.show(list_html(state, draft, running, text))
+        self._refused.show(problems_html(state, text, [(FILE_FIELD, text("program.load"))]))
         place, count = draft.place(program.selected), len(draft.steps)
         able = {
             "up": place is not None and place > 0, "down": place is not None and place < count - 1,
@@ -111,7 +114,9 @@ class ProgramPanel:
         if program.progress is not None:
             self._bar.value = round(100.0 * program.progress, 1)
         said = problems_html(state, text, [("program.0.rounds", text("program.rounds"))])
-        if plan is not None:
+        if FILE_FIELD in state.problems:  # What stands here is about the program that the file did not replace.
+            said += f'<p class="rl-note">{esc(text("program.stays"))}</p>'
+        elif plan is not None:
             where = tell_place(plan, t)
             said += planned_html(state, text)
             said += "" if where is None else f'<p class="rl-note rl-now">▸ {esc(text.say(where))}</p>'
@@ -120,6 +125,8 @@ class ProgramPanel:
         if program.answer is not None:
             said += f'<p class="rl-verdict rl-{program.tone}">{esc(text.say(program.answer))}</p>'
         self._answer.show(f'<div class="rl-room">{said}</div>' if count else said)
+
+        self._notes.show(notes_html(program.notes, text))
 
     def _elsewhere(self, draft: Draft, status: SupervisorStatus) -> str:
         """Returns whether the program starts where the arm is, in words."""

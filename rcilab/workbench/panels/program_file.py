@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from rcilab.motion.program import Program
 from rcilab.workbench import requests
 from rcilab.workbench.panels.jog import problems_html
+from rcilab.workbench.program.draft import FILE_FIELD
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, Html, NumberField, esc, on_press
 
@@ -77,7 +78,7 @@ class ProgramFilePanel:
         self._python.disabled = not there
         self._tool.visible = there and not draft.has_tool_of(state.model)
         self._name.show(draft.name, state.problems.get(self._name.field), state.entered)
-        labels = [("program.0.file", text("program.load")), ("program.0.name", text("program.name"))]
+        labels = [(FILE_FIELD, text("program.load")), ("program.0.name", text("program.name"))]
         self._problems.show(problems_html(state, text, labels))
         is_shown = there and state.program.is_script_shown
         self._python.label = text("program.script_hide" if is_shown else "program.script")

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 from rcilab.errors import RcilabError
 from rcilab.motion.waypoint import Waypoint
-from rcilab.workbench.program.draft import Draft, target_of
+from rcilab.words.errors import tell_note
+from rcilab.workbench.program.draft import Draft, Note, target_of
 from rcilab.workbench.program.fields import arm_angle_of
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import esc
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from rcilab.model import RobotModel
     from rcilab.workbench.store import UiState
 
+_NOTED = "*"
 _HEADS = ("number", "type", "place", "speed", "blend", "psi", "dwell")
 
 
@@ -35,11 +37,14 @@ def list_html(state: UiState, draft: Draft, running: int | None, text: Text) -> 
         f'<span title="{esc(text(f"program.head.{name}_long"))}">{esc(text(f"program.head.{name}"))}</span>'
         for name in _HEADS
     )
+    noted = {note.key: note.remark for note in state.program.notes}
     rows = [_start_row(draft, arm, running == 0, text)]
     for number, step in enumerate(draft.steps, start=1):
         chosen, failed = step.key == state.program.selected, step.key == state.program.failed
         look = (" rl-failed" if failed else "") + (" rl-running" if number == running else "")
         sign = f'<em title="{esc(text("program.failed"))}">!</em>' if failed else ""
+        if step.key in noted:
+            sign += f'<i title="{esc(text.tell(tell_note(noted[step.key])))}">{_NOTED}</i>'
         cells = (f"{number}{sign}", *_cells(step.waypoint, arm, text))
         rows.append(
             f'<div class="rl-step{look}" role="option" id="rl-step-{step.key}" data-key="{step.key}" '
@@ -52,6 +57,21 @@ def list_html(state: UiState, draft: Draft, running: int | None, text: Text) -> 
         f'aria-label="{esc(text("program.list"))}" aria-activedescendant="rl-step-{state.program.selected}">'
         + "".join(rows)
         + f'</div><p class="rl-note rl-keys">{esc(text("program.keys"))}</p>'
+    )
+
+
+def notes_html(notes: tuple[Note, ...], text: Text) -> str:
+    """Returns the planner's remarks as one line that opens; "" without any."""
+    if not notes:
+        return ""
+    if len(notes) == 1:
+        return f'<p class="rl-note">{_NOTED} {esc(text.tell(tell_note(notes[0].remark)))}</p>'
+    codes = {note.code for note in notes}
+    code = "program.shortened" if codes == {"blend"} else "program.noted"
+    listed = "".join(f"<li>{esc(text.tell(tell_note(note.remark)))}</li>" for note in notes)
+    return (
+        f'<details class="rl-noted"><summary>{_NOTED} {esc(text(code, count=len(notes)))}</summary>'
+        f"<ul>{listed}</ul></details>"
     )
 
 

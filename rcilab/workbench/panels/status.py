@@ -75,7 +75,7 @@ def _chips(state: UiState, status: SupervisorStatus, text: Text) -> list[dict[st
         _chip(text, "mode", mode),
         _chip(text, "rate", f"{status.rate_hz:.0f} Hz" if connected else "—"),
         _chip(text, "success", f"{100.0 * status.success_rate:.0f} %" if is_moving(status) else "—"),
-        _chip(text, "controls", _holder(lease, text)),
+        {**_chip(text, "controls", _holder(lease, text)), "of": _seen_by_pages(lease, text)},
         _chip(text, "faults", faults, "bad" if status.faults else "", wide=True),
     ]
 
@@ -84,6 +84,21 @@ def _holder(lease: Lease, text: Text) -> str:
     if lease.holder is None:
         return text("bar.free", pages=len(lease.pages))
     return text("bar.holder", holder=lease.number(lease.holder), pages=len(lease.pages))
+
+
+def _seen_by_pages(lease: Lease, text: Text) -> dict[int, str]:
+    """Returns who holds the controls as each page has to read it, by client id."""
+    if lease.holder is None:
+        return {}
+    holder, count = lease.number(lease.holder), len(lease.pages)
+    if count == 1:
+        return {lease.holder: text("bar.alone")}
+    return {
+        page: text("bar.mine", mine=lease.number(page), pages=count)
+        if page == lease.holder
+        else text("bar.theirs", holder=holder, mine=lease.number(page))
+        for page in lease.pages
+    }
 
 
 def _question(state: UiState, text: Text) -> dict[str, Any] | None:

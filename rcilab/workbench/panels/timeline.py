@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from rcilab.clock import CYCLE_TIME
 from rcilab.workbench import requests
 from rcilab.workbench.check.freshness import outdated
+from rcilab.workbench.panels.outcome import replay_html
 from rcilab.workbench.panels.plots import Plots
 from rcilab.workbench.program.draft import tell_place
 from rcilab.workbench.run.readiness import time_shown
@@ -17,6 +18,8 @@ from rcilab.workbench.widgets import Ask, Html, Linked, esc, on_press
 if TYPE_CHECKING:
     from rcilab.supervisor import SupervisorStatus
     from rcilab.workbench.store import UiState
+
+_BANNER = 72  # [px] What the line about a recorded run takes.
 
 
 class TimelinePanel:
@@ -51,12 +54,14 @@ class TimelinePanel:
         )
         with gui.add_folder(text("timeline.show"), expand_by_default=False):
             self._build_choices(gui, state)
+        self._banner = Html(gui)
         self._readout = Html(gui)
         self._plots.build(gui, state)
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Moves the scrubber; redraws plots when plan, recording or choice have changed."""
-        text = self._text
+        text, banner = self._text, replay_html(state, status, self._text)
+        self._banner.show(banner)
         self._play.label = text("timeline.hold" if state.playing else "timeline.play")
         self._play.disabled = state.plan is None
         duration = 0.0 if state.plan is None else state.plan.motion.duration
@@ -68,7 +73,7 @@ class TimelinePanel:
         for name, box in self._choices.items():
             box.show(name in state.plots)
         self._readout.show(self._read(state, status))
-        self._plots.show(state)
+        self._plots.show(state, _BANNER if banner else 0)
 
     def _build_choices(self, gui: Any, state: UiState) -> None:
         text, ask = self._text, self._ask
@@ -85,7 +90,8 @@ class TimelinePanel:
         """Returns where the preview stands, and what is drawn how."""
         text = self._text
         if state.plan is None:
-            return f'<p class="rl-note rl-welcome">{esc(text("timeline.nothing"))}</p>'
+            said = text("timeline.nothing") if state.no_plan is None else text.say(state.no_plan)
+            return f'<p class="rl-note rl-welcome">{esc(said)}</p>'
         duration = state.plan.motion.duration
         t, kinds = min(time_shown(state, status), duration), text("timeline.plan_only")
         if state.recording is not None:

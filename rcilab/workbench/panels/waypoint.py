@@ -80,15 +80,23 @@ class WaypointPanel:
         self._folder.visible = self._teach.visible = True
         self._folder.label = self._text("program.selected", number=place + 1)
         self._pose.visible, self._via.visible = "x" in values, waypoint.type == "arc"
-        self._kind.handle.disabled = waypoint.type not in TYPES
-        if waypoint.type in TYPES:
-            self._kind.show(self._kinds[waypoint.type])
+        self._show_kind(waypoint)
         labels = []
         for name, field in self._fields.items():
             field.field = f"program.{key}.{name}"
             field.show(values.get(name, ""), state.problems.get(field.field), state.entered)
             labels.append((field.field, self._text(f"program.field.{name}")))
         self._problems.show(problems_html(state, self._text, labels) + self._note(waypoint))
+
+    def _show_kind(self, waypoint: Waypoint) -> None:
+        """Shows the type; one that only files have is there alone, and cannot be changed."""
+        label = self._text(f"program.type.{waypoint.type}")
+        is_free, box = waypoint.type in TYPES, self._kind.handle
+        options = tuple(self._kinds.values()) if is_free else (label,)
+        if box.options != options:
+            box.options = options
+        box.disabled = not is_free
+        self._kind.show(label)
 
     def _field(self, gui: Any, name: str) -> None:
         box = gui.add_text(self._text(f"program.field.{name}"), "", hint=self._text(f"program.hint.{_hint_of(name)}"))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import partial
+from functools import partial, reduce
 
 import numpy as np
 
@@ -12,10 +12,10 @@ from rcilab.errors import InvalidValueError, PlanningError, RcilabError, Version
 from rcilab.motion.program import Program
 from rcilab.motion.program_file import read_program
 from rcilab.posing.planning import Plan
-from rcilab.words.errors import tell, tell_note
+from rcilab.words.errors import tell
 from rcilab.workbench import requests
 from rcilab.workbench.goal.actions import GoalActions
-from rcilab.workbench.program.draft import Draft, draft_of, is_led_in, number_at
+from rcilab.workbench.program.draft import FILE_FIELD, Draft, draft_of, is_led_in, notes_of, number_at
 from rcilab.workbench.program.edit_actions import LONGEST_NAME, EditActions
 from rcilab.workbench.program.planning import Job, plan_job
 from rcilab.workbench.program.shelves import Shelves
@@ -63,7 +63,8 @@ class ProgramActions:
         )
         self._planner.start(job, partial(plan_job, job))
         self._store.update(busy=message("program.planning"))
-        self._shelves.set(progress=0.0, answer=None, failed=None)
+        self._store.clear_problems(FILE_FIELD)
+        self._shelves.set(progress=0.0, answer=None, failed=None, notes=())
 
     def cancel(self, request: requests.CancelProgram) -> None:
         """Drops the planning that is under way; the plan there was before stays."""
@@ -77,16 +78,14 @@ class ProgramActions:
         try:
             program = read_program(request.content, request.name[:LONGEST_NAME] or "program")
         except (InvalidValueError, VersionMismatchError) as error:
-            self._shelves.answer("program.0.file", message("program.file_bad", error=tell(error)))
+            self._refuse_file(message("program.file_bad", error=tell(error)))
             return
         model = self._store.state.model.name
         if program.model != model:
-            self._shelves.answer(
-                "program.0.file",
-                message("program.file_other", file=request.name[:LONGEST_NAME], theirs=program.model, ours=model),
-            )
+            name = request.name[:LONGEST_NAME]
+            self._refuse_file(message("program.file_other", file=name, theirs=program.model, ours=model))
             return
-        self._shelves.answer("program.0.file", None)
+        self._store.clear_problems(FILE_FIELD)
         draft = draft_of(program, self._store.state.model)
         self._shelves.change(draft, draft.steps[0].key)
         self._store.say("good", message("program.loaded", count=len(draft.steps), name=request.name[:LONGEST_NAME]))
@@ -106,7 +105,7 @@ class ProgramActions:
     def keep_plan(self, plan: Plan) -> None:
         """Takes the plan of the program as it is."""
         self._store.update(plan=plan, no_plan=None, recording=None, place=0.0, playing=False, asked=None)
-        self._shelves.set(planned=self._shelves.draft, answer=None)
+        self._shelves.set(planned=self._shelves.draft, answer=None, notes=notes_of(plan, self._shelves.draft.steps))
 
     def tick(self) -> None:
         """Shows how far the planning is, and what came of it; follows the choice of another arm."""
@@ -127,6 +126,11 @@ class ProgramActions:
     def close(self) -> None:
         """Ends what is being planned."""
         self._planner.cancel()
+
+    def _refuse_file(self, why: Message) -> None:
+        """Says on every tab why a file was not loaded; on this one it stands until the next file, edit or plan."""
+        self._store.complain(FILE_FIELD, why)
+        self._store.say("bad", message("program.not_loaded", why=why))
 
     def _drop_planning(self) -> bool:
         if self._planner.progress is None:
@@ -160,16 +164,15 @@ class ProgramActions:
         if is_led_in(result):
             tone = "warn"
             answer.append(_tell_approach(job, result))
-        if result.motion.notes:
-            tone = "warn"
-            answer += [message("program.notes", text=tell_note(note)) for note in result.motion.notes]
         if result.report.violations:
             number = number_at(result, result.report.violations[0].time) or 0
             failed = steps[number - 1].key if number else None
             where = message("program.at_start") if number == 0 else message("program.waypoint", number=number)
             answer.append(message("program.worst", where=where))
             tone = "bad"
-        self._shelves.set(planned=job.draft, failed=failed, tone=tone, answer=_together(answer))
+        self._shelves.set(
+            planned=job.draft, failed=failed, tone=tone, answer=_together(answer), notes=notes_of(result, steps)
+        )
 
 
 def _tell_approach(job: Job, plan: Plan) -> Message:
@@ -181,6 +184,5 @@ def _tell_approach(job: Job, plan: Plan) -> Message:
 
 
 def _together(said: list[Message]) -> Message | None:
-    if len(said) < 2:
-        return said[0] if said else None
-    return message("program.both", first=said[0], second=_together(said[1:]))
+    """Returns the few sentences about a plan as one message."""
+    return reduce(lambda first, second: message("program.both", first=first, second=second), said) if said else None

@@ -13,10 +13,13 @@ from rcilab.motion.waypoint import Floats, Waypoint, WaypointType
 from rcilab.posing.planning import Plan
 from rcilab.posing.reach import Tone
 from rcilab.spatial import Pose
+from rcilab.words.text import Remark
 from rcilab.workbench.text import Message, message
 
 TYPES: tuple[WaypointType, ...] = ("joint", "line", "arc")
 """What the page makes; circles and elbow moves come from files."""
+FILE_FIELD = "program.0.file"
+"""Names what is wrong with a file among `UiState.problems`."""
 MOST_ROUNDS = 100
 """A choice: nobody watches more, and the motion stays one that can be looked at."""
 
@@ -97,6 +100,21 @@ class Draft:
         return model if self.tool is None else model.with_tool(Pose(self.tool[:3], self.tool[3:]))
 
 
+@dataclass(frozen=True, slots=True)
+class Note:
+    """What the planner remarks, about one step or about all."""
+
+    remark: str
+    """A `Remark` where it has words of its own in the catalogues."""
+    key: int | None
+    """Of the step; None: about the whole program."""
+
+    @property
+    def code(self) -> str:
+        """Names what it says; "" where it is a plain sentence."""
+        return self.remark.code if isinstance(self.remark, Remark) else ""
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ProgramState:
     """The Program tab."""
@@ -115,9 +133,26 @@ class ProgramState:
     """What was planned last."""
     tone: Tone = "good"
     answer: Message | None = None
-    """What came of it beside the plan: the way to the start, what was shortened, why there is none."""
+    """What came of it beside the plan: the way to the start, why there is none."""
+    notes: tuple[Note, ...] = ()
+    """What the planner remarks about the plan."""
     failed: int | None = None
     """Key of the step that could not be planned, or that breaks a condition."""
+
+
+def notes_of(plan: Plan, steps: tuple[Step, ...]) -> tuple[Note, ...]:
+    """Returns what the planner remarks about a plan, each once, however many rounds it makes.
+
+    Args:
+        plan: Of a program.
+        steps: What the program was made of.
+    """
+    notes: dict[tuple[str, int | None], Note] = {}
+    for remark in plan.motion.notes:
+        number = remark.facts.get("number") if isinstance(remark, Remark) else None
+        key = steps[number - 1].key if isinstance(number, int) and 0 < number <= len(steps) else None
+        notes.setdefault((remark, key), Note(remark, key))
+    return tuple(notes.values())
 
 
 def draft_of(program: Program, model: RobotModel) -> Draft:

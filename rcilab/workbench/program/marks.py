@@ -1,4 +1,4 @@
-"""The waypoints of the program in the scene: a numbered point each. Owned by the presenter."""
+"""The waypoints of the program in the scene: a point each, a label for those close together. Owned by the presenter."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rcilab.arrays import Array
 from rcilab.errors import RcilabError
 from rcilab.workbench.program.draft import target_of
 
@@ -14,7 +15,9 @@ if TYPE_CHECKING:
 
     from rcilab.workbench.store import UiState
 
-_MOST = 60  # A choice: more numbers than that hide the arm, and cost the browser more than it has.
+_MOST = 60  # A choice: more labels than that hide the arm, and cost the browser more than it has.
+_NEAR = 0.06  # [m] A tuning value: at the home view, labels closer than that overlap.
+_RANGES = 4  # A choice: a label that lists more is wider than what it labels.
 _PLAIN, _CHOSEN, _FAILED = (70, 110, 160), (11, 111, 194), (209, 57, 43)
 _SIZE = 0.016  # [m]
 _ABOVE = 0.022  # [m]
@@ -44,9 +47,10 @@ class ProgramMarks:
         self._handles = []
         if program.draft.model != state.model.name:
             return
-        points, colors = [], []
+        points: list[Array] = []
+        colors, numbers = [], []
         arm = program.draft.arm(state.model)
-        for number, step in enumerate(program.draft.steps[:_MOST], start=1):
+        for number, step in enumerate(program.draft.steps, start=1):
             try:
                 target = target_of(step.waypoint, arm)
             except RcilabError:
@@ -56,8 +60,10 @@ class ProgramMarks:
             failed, chosen = step.key == program.failed, step.key == program.selected
             points.append(target.position)
             colors.append(_FAILED if failed else _CHOSEN if chosen else _PLAIN)
-            said = f"{number} !" if failed else f"[{number}]" if chosen else f"{number}"
-            self._handles.append(self._label(number, said, target.position))
+            numbers.append((number, f"{number} !" if failed else f"[{number}]" if chosen else ""))
+        for place, group in enumerate(neighbours(points)[:_MOST]):
+            said = label_of([numbers[at] for at in group])
+            self._handles.append(self._label(place, said, points[group[0]]))
         if points:
             self._handles.append(
                 self._scene.add_point_cloud(
@@ -76,3 +82,37 @@ class ProgramMarks:
             f"/program/{number}", said, position=(x, y, z + _ABOVE), anchor="bottom-center", depth_test=False,
             font_screen_scale=0.8,
         )  # fmt: skip
+
+
+def neighbours(points: list[Array]) -> list[list[int]]:
+    """Returns which points are so near each other that their numbers would lie on one another, by their places."""
+    anchors = np.empty((len(points), 3))
+    groups: list[list[int]] = []
+    for at, point in enumerate(points):
+        away = np.linalg.norm(anchors[: len(groups)] - point, axis=1)
+        nearest = int(away.argmin()) if len(groups) else 0
+        if len(groups) and away[nearest] < _NEAR:
+            groups[nearest].append(at)
+        else:
+            anchors[len(groups)] = point
+            groups.append([at])
+    return groups
+
+
+def label_of(numbers: list[tuple[int, str]]) -> str:
+    """Returns one label for waypoints that are near each other: their numbers as ranges, and what stands out.
+
+    Args:
+        numbers: The number of each, rising, and its own words where it stands out, else "".
+    """
+    if len(numbers) == 1:
+        return numbers[0][1] or str(numbers[0][0])
+    ranges: list[list[int]] = []
+    for number, _ in numbers:
+        if ranges and number == ranges[-1][1] + 1:
+            ranges[-1][1] = number
+        else:
+            ranges.append([number, number])
+    said = [f"{low}" if low == high else f"{low}\N{EN DASH}{high}" for low, high in ranges]
+    listed = ", ".join(said if len(said) <= _RANGES else [*said[:_RANGES], "\N{HORIZONTAL ELLIPSIS}"])
+    return " · ".join([listed, *filter(None, (own for _, own in numbers))])

@@ -107,6 +107,6 @@ class Shelves:
             selected = draft.steps[-1].key if draft.steps else None
         self.set(
             draft=draft, selected=selected, can_undo=bool(shelf.past), can_redo=bool(shelf.future), failed=None,
-            tone="warn", answer=message("program.changed") if is_dropped else None,
+            notes=(), tone="warn", answer=message("program.changed") if is_dropped else None,
         )  # fmt: skip
         self._store.clear_problems("program.")

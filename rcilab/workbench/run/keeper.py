@@ -121,6 +121,7 @@ def as_recording(cycles: NDArray[np.void], delay: int, paced: PacedMotion | None
 
 def whole_recording(run: Run, file: str = "", paced: PacedMotion | None = None) -> Recording:
     """Returns a finished run for plots, table and export."""
+    faulty = np.flatnonzero(run.cycles["faults"])
     return Recording(
         t=run.t,
         q=run.q,
@@ -132,4 +133,5 @@ def whole_recording(run: Run, file: str = "", paced: PacedMotion | None = None) 
         paced=paced,
         tracking=run.tracking,
         file=file,
+        moment=float(run.t[faulty[0]]) if len(faulty) else None,
     )

@@ -104,14 +104,15 @@ class GoalStage:
             handle.remove()
 
     def _show_via(self, state: UiState, text: Text) -> None:
-        via = state.via if state.way == "arc" else None
+        via, said = state.via if state.way == "arc" else None, text("target.via_label")
+        if said != self._via_label.text:
+            self._via_label.text = said
         if via is self._via:
             return
         self._via = via
         self._via_mark.visible = self._via_label.visible = via is not None
         if via is not None:
             self._via_mark.position = self._via_label.position = via.position
-            self._via_label.text = text("target.via_label")
 
 
 def _below(position: np.ndarray) -> tuple[float, float, float]:

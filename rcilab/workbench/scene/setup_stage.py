@@ -61,7 +61,9 @@ class SetupStage:
         """Draws what is chosen to be seen, puts handles on what is edited."""
         setup = state.setup
         wanted, seen = setup.wanted, setup.seen
-        box = wanted.box if "box" in seen else None
+        box = wanted.box
+        if box is not None and not ("box" in seen and (box.active or setup.edited == "box")):
+            box = None  # One that is off bounds nothing: it is there while it is edited.
         self._view.show_box(box)
         self._view.show_tool(wanted.tool if "tool" in seen else None)
         self._view.show_load(wanted.load if "load" in seen else None)
@@ -149,6 +151,9 @@ class SetupStage:
 
     def _show_outside(self, state: UiState, text: Text) -> None:
         """Draws the part of the planned path outside the box in red, with words beside it."""
+        said = text("setup.outside")
+        if said != self._crossing.text:
+            self._crossing.text = said
         path = None if state.plan is None else state.plan.path
         wanted = (path, state.setup.wanted.box)
         if wanted[0] is self._outside[0] and wanted[1] is self._outside[1]:
@@ -159,7 +164,6 @@ class SetupStage:
         self._crossing.visible = bool(runs)
         if runs:
             self._crossing.position = runs[0][len(runs[0]) // 2]
-            self._crossing.text = text("setup.outside")
 
     def _draw_outside(self, runs: list[Array]) -> None:
         for number in range(len(runs), self._lines):

@@ -1,0 +1,35 @@
+"""Failures of our own code: all are counted, and one a second at most is printed, however often a loop repeats it."""
+
+from __future__ import annotations
+
+import sys
+import time
+import traceback
+from collections.abc import Callable
+
+_PAUSE = 1.0  # [s] A tuning value: a loop that fails at the display's rate fills no disk.
+_MOST = 100  # A tuning value: the first ones tell the most.
+
+
+class Failures(list[BaseException]):
+    """The first failures, for tests. One thread adds them.
+
+    Args:
+        clock: Returns the time, [s].
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        super().__init__()
+        self._clock = clock
+        self._printed = float("-inf")
+
+    def report(self, error: Exception) -> bool:
+        """Keeps a failure; returns whether it was printed, too: not if another one was within the last second."""
+        if len(self) < _MOST:
+            self.append(error)
+        now = self._clock()
+        if now - self._printed < _PAUSE:
+            return False
+        self._printed = now
+        traceback.print_exception(error, file=sys.stderr)
+        return True
