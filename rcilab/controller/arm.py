@@ -26,6 +26,7 @@ class Arm:
         commanded: The commanded joint angles.
         tool_c: The tool on them.
         watch: The sensors.
+        yielded_as: The law under which the arm yielded last, until commands have moved it on its servos; None: none.
 
     Args:
         model: The arm.
@@ -44,6 +45,7 @@ class Arm:
         self.actuator = Actuator(model, settings)
         self._tool_version = self.commanded.version
         self._law = Law.BRAKED
+        self.yielded_as: Law | None = None
         self._dq_before = measured.dq
         self._standing = 0
         self._setpoint: Setpoint | None = None
@@ -97,6 +99,8 @@ class Arm:
         if self._law.yields and not law.yields:
             ddq: list[float] = ((last.dq - self._dq_before) / CYCLE_TIME).tolist()
             commanded.join(last.q.tolist(), last.dq.tolist(), ddq)
+        if has_moved and not law.yields:
+            self.yielded_as = None
         if not (law.leads or commanded.is_at_rest or has_moved):
             commanded.come_to_rest()
         if not law.leads:
@@ -132,6 +136,8 @@ class Arm:
             commanded.place(measured.q.tolist())
             self._move_tool()
         self._law, self._dq_before = law, last.dq
+        if law.yields:
+            self.yielded_as = law
         self._standing = self._standing + 1 if commanded.is_at_rest else 0
         self.watch.observe(measured, commanded, self.tool_c)
 

@@ -7,6 +7,7 @@ from rcilab.controller.actuator import Law
 from rcilab.controller.arm import Arm
 from rcilab.controller.modes import Mode, build_generator
 from rcilab.controller.modes.generator import MotionGenerator, Step
+from rcilab.controller.modes.start import start_tolerance
 from rcilab.controller.modes.terms import build_terms
 from rcilab.controller.playout import Playout
 from rcilab.controller.settings import Settings
@@ -67,7 +68,10 @@ class ClientMotion:
         """
         arm, mode = self._arm, self._mode
         watch = arm.watch
-        terms = build_terms(mode, arm.model, settings, table, watch.measured, watch.tool.pose)
+        tolerance = start_tolerance(mode.law, settings)
+        if arm.yielded_as is not None:
+            tolerance = tolerance.widened(start_tolerance(arm.yielded_as, settings))
+        terms = build_terms(mode, arm.model, settings, table, watch.measured, watch.tool.pose, tolerance)
         self._generator = build_generator(mode, terms, list(arm.commanded.q))
         watch.begin(
             terms.limits,

@@ -71,8 +71,9 @@ def jump(hand, joint: int, size: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize("joint", range(1, 8))
-def test_a_first_command_elsewhere_than_the_arm_is_a_discontinuity(hand, joint: int) -> None:
+def test_a_command_that_jumps_is_a_discontinuity(hand, joint: int) -> None:
     hand.start()
+    hand.command(hand.state.q_c)
     q_before = hand.state.q_c
     state = hand.command(jump(hand, joint, 8e-6))  # 8000 rad/s^3 with 8 rad/s^2.
     expected = {F.COMMAND_JOINT_ACCELERATION_DISCONTINUITY}

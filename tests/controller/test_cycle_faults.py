@@ -90,12 +90,14 @@ def joint_acceleration(hand: Hand) -> RobotState:
 
 def tool_acceleration(hand: Hand) -> RobotState:
     hand.start(1, 2)
+    hand.pose(hand.state.T_base_tool_c)
     return moved(hand, (0.0, 1.1e-5, 0.0))  # 11 m/s^2, 11000 m/s^3.
 
 
 def jerk(hand: Hand) -> RobotState:
     hand.start()
     q = hand.state.q_c.copy()
+    hand.command(q)
     q[0] += 6e-6
     return hand.command(q)
 

@@ -58,7 +58,7 @@ def test_recovery_is_refused_beyond_a_limit_and_while_something_presses(make_han
 def test_a_recovery_that_is_overtaken_by_an_emergency_stop_says_so(make_hand) -> None:
     hand = make_hand()
     hand.start()
-    hand.command(hand.state.q_c + 6e-6)
+    hand.command(hand.state.q_c + 6e-3)
     assert hand.cycle.phase is Phase.REFLEX
     reply = hand.cycle.handle(rci.AutomaticErrorRecovery())
     hand.step(5)

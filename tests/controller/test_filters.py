@@ -60,6 +60,7 @@ def test_a_step_that_a_filter_makes_bearable_is_no_fault(make_hand) -> None:
         hand.ask(rci.SetFilters(frequency, frequency, frequency))
         hand.start()
         q = hand.state.q_c.copy()
+        hand.command(q)
         q[0] += 1e-5
         for _ in range(50):
             hand.command(q)

@@ -10,7 +10,7 @@ as "not valid"); so on its way through zero an arm angle that is not valid is ze
 
 from __future__ import annotations
 
-from math import pi, remainder, tau
+from math import dist, hypot, pi, remainder, tau
 
 from rcilab.clock import CYCLE_TIME
 from rcilab.conformance.breach import describe_breaches
@@ -20,13 +20,14 @@ from rcilab.conformance.tool_conditions import ARM_ANGLE_TOLERANCE
 from rcilab.controller.filters import PoseLowPass
 from rcilab.controller.modes.generator import Gap, JointReference, Step, Terms, lost_motion
 from rcilab.controller.modes.inverse import Follower
+from rcilab.controller.modes.start import StartMonitor, find_tool_jump
 from rcilab.controller.playout import Playback
 from rcilab.controller.stream import Stream
 from rcilab.errors import InvalidValueError, KinematicsError
 from rcilab.faults import Fault
 from rcilab.protocols.rci import CommandPacket
 from rcilab.safety_box import box_from
-from rcilab.spatial import Pose, rotation_from_wxyz, wxyz_from_rotation
+from rcilab.spatial import Pose, rotation_from_wxyz, turn_between, wxyz_from_rotation
 from rcilab.words.text import Remark
 
 _INVALID = (Fault.CARTESIAN_POSITION_MOTION_GENERATOR_INVALID_FRAME,)
@@ -43,6 +44,9 @@ class CartesianGenerator:
 
     def __init__(self, terms: Terms, q: list[float]) -> None:
         model = terms.model
+        self._terms = terms
+        self._has_begun = False
+        self._jump: Remark | None = None
         self._has_psi = model.n == 7
         self._q = q
         self._psi = model.arm_angle(q) if self._has_psi else 0.0
@@ -53,10 +57,12 @@ class CartesianGenerator:
         self._follower = Follower(model)
         self._stream = Stream([*pose.parts[1], *wxyz_from_rotation(pose.parts[0]), self._psi])
         self._filter = PoseLowPass(terms.settings.cartesian_filter, pose, self._psi)
-        self._monitor = CartesianMonitor(terms.limits, box_from(terms.box, terms.start.parts[1]))
-        self._monitor.reset(pose, self._psi if self._has_psi else None)
+        self._pose = pose
+        self._monitor = self._monitor_from(pose, self._psi)
+        self._start: StartMonitor[CartesianMonitor] | None = None
         self._gap = Gap()
         self._reference = JointReference(terms, q, judges_box=False)
+        self._reference_has_begun = False
 
     def is_next(self, packet: CommandPacket, steps: int) -> bool:
         """Returns whether a command continues the motion by one cycle rather than by `steps`."""
@@ -80,6 +86,8 @@ class CartesianGenerator:
             values = self._read(packet)
             if is_lost:
                 values = self._stream.predict(1, values, playback.steps)
+        if not self._has_begun:
+            self._begin(values)
         self._stream.take(values)
         self._psi = remainder(values[7], tau) if packet is None or is_lost else self._arm_angle(packet)
         self._is_told |= packet is not None and packet.psi_valid
@@ -92,19 +100,66 @@ class CartesianGenerator:
 
     def _judge(self, pose: Pose, psi: float, cycles: int) -> Step:
         if cycles > 0:
-            faults = self._monitor.step(pose, psi if self._has_psi else None, cycles)
+            faults = self._step_monitor(pose, psi if self._has_psi else None, cycles)
             if faults:
-                return Step(faults=faults, reason=describe_breaches(self._monitor.broken()))
+                reason = describe_breaches(self._monitor.broken())
+                return Step(faults=faults, reason=Remark.all((self._jump, reason)) if self._jump else reason)
+            self._jump = None
         try:
             q = self._follower.solve(pose, psi, self._q)
         except KinematicsError as error:
             if cycles == 0:
                 return lost_motion(Remark(f"no joint angles for a pose on its way: {error}", "no_angles"))
             return Step(faults=_INVALID, reason=Remark(f"commanded pose: {error}", "no_angles"))
+        if not self._reference_has_begun:
+            self._reference_has_begun = True
+            self._reference.begin(q, None)  # Of the tool's, the tolerance has been looked at.
         step = self._reference.step(q, cycles)
         if step.q is not None:
-            self._q = step.q
+            self._q = q
         return step
+
+    def _begin(self, values: list[float]) -> None:
+        """Takes the first command: where the motion begins at rest, or its first step from the reference."""
+        self._has_begun = True
+        x, y, z, *wxyz, psi = values
+        try:
+            pose = Pose.from_parts(rotation_from_wxyz(wxyz), (x, y, z))
+        except InvalidValueError:
+            return  # It is refused like any other command that is no pose.
+        rotation, position = self._pose.parts
+        translation = dist(position, (x, y, z))
+        turn = hypot(*turn_between(rotation, pose.parts[0]))
+        lag = remainder(psi - self._psi, tau)
+        if not (translation or turn or lag):
+            return
+        cartesian, arm_angle = self._terms.limits.cartesian, self._terms.limits.arm_angle
+        h3 = CYCLE_TIME**3
+        is_a_step = translation <= cartesian.translation_jerk * h3 and turn <= cartesian.rotation_jerk * h3
+        if is_a_step and (arm_angle is None or abs(lag) <= arm_angle.jerk * h3):
+            self._start = StartMonitor(self._monitor, self._monitor_from(pose, psi))
+            return
+        self._jump = find_tool_jump(translation, turn, lag, self._terms.tolerance)
+        if self._jump is None:
+            self._stream = Stream(values)
+            self._filter = PoseLowPass(self._terms.settings.cartesian_filter, pose, psi)
+            self._monitor = self._monitor_from(pose, psi)
+
+    def _monitor_from(self, pose: Pose, psi: float) -> CartesianMonitor:
+        terms = self._terms
+        monitor = CartesianMonitor(terms.limits, box_from(terms.box, terms.start.parts[1]))
+        monitor.reset(pose, psi if self._has_psi else None)
+        return monitor
+
+    def _step_monitor(self, pose: Pose, psi: float | None, cycles: int) -> tuple[Fault, ...]:
+        start = self._start
+        if start is None:
+            return self._monitor.step(pose, psi, cycles)
+        faults = start.step(pose, psi, cycles)
+        self._monitor = start.monitor
+        if start.is_decided:
+            self._start = None
+        return faults
 
     def _read(self, packet: CommandPacket) -> list[float]:
         """Returns position, quaternion and arm angle of a command, with sign and turn that continue the last one."""

@@ -11,6 +11,7 @@ from rcilab.conformance.breach import describe_breaches
 from rcilab.conformance.monitor import JointMonitor
 from rcilab.controller.commanded import JOIN_SHARE
 from rcilab.controller.fence import Fence
+from rcilab.controller.modes.start import StartMonitor, StartOffset, StartTolerance, find_joint_jump
 from rcilab.controller.playout import Playback
 from rcilab.controller.settings import Settings
 from rcilab.faults import Fault
@@ -37,6 +38,8 @@ class Terms:
     """With the soft limits as position bounds, and the tool's bounds from the table in force."""
     box: SafetyBox | None
     """Where the tool must stay; None when nothing bounds it."""
+    tolerance: StartTolerance
+    """How far the first command may be off the reference."""
     start: Pose
     """Pose of the tool in base where the motion begins. Outside the box, it may only move in."""
 
@@ -105,14 +108,42 @@ class JointReference:
     def __init__(self, terms: Terms, q: list[float], *, judges_box: bool) -> None:
         joint = terms.limits.joint
         self._model = terms.model
+        self._limits = joint
         self._box = BoxMonitor(box_from(terms.box, terms.start.parts[1]) if judges_box else None)
         self._fence = Fence(joint, q) if terms.settings.auto_limit else None
-        self._monitor = JointMonitor(joint)
-        self._monitor.reset(q)
+        self._monitor = self._monitor_from(q)
+        self._start: StartMonitor[JointMonitor] | None = None
+        self._offset: StartOffset | None = None
+        self._jump: Remark | None = None
         self._range = list(zip(joint.lower.tolist(), joint.upper.tolist(), strict=True))
         self._hardest: list[float] = (JOIN_SHARE * joint.acceleration).tolist()
         self._last = self._before = q
         self._shaken = 0
+
+    def begin(self, q: list[float], tolerance: StartTolerance | None) -> bool:
+        """Takes the first commanded angles, before `step` does; returns whether the motion begins there, at rest.
+
+        Otherwise they are the first step of a motion from the reference: near it, or too far off to begin there.
+
+        Args:
+            q: n plain floats, [rad].
+            tolerance: How far they may be off the reference; None where that has been looked at already.
+        """
+        h3 = CYCLE_TIME**3
+        offset = [here - angle for here, angle in zip(self._last, q, strict=True)]
+        if not any(offset):
+            return False
+        if all(abs(d) <= jerk * h3 for d, jerk in zip(offset, self._limits.jerk.tolist(), strict=True)):
+            self._start = StartMonitor(self._monitor, self._monitor_from(q))
+            return False
+        self._jump = None if tolerance is None else find_joint_jump(q, self._last, tolerance)
+        if self._jump is not None:
+            return False
+        self._monitor = self._monitor_from(q)
+        self._offset = StartOffset(self._limits, offset)
+        if self._fence is not None:
+            self._fence = Fence(self._limits, q)
+        return True
 
     def step(self, q: list[float], cycles: int) -> Step:
         """Takes the joint angles of this cycle.
@@ -123,11 +154,24 @@ class JointReference:
         """
         if self._fence is not None:
             q = self._fence.step(q)
-        reason = NOTHING if cycles == 1 and self._shaken == 0 else self._find_throw(q, cycles)
-        self._last, self._before = q, self._last
+        reference = q
+        if self._offset is not None:
+            reference = self._offset.step(q)
+            if self._offset.is_absorbed:
+                self._offset, self._shaken = None, 0
+        reason = NOTHING if cycles == 1 and self._shaken == 0 else self._find_throw(reference, cycles)
+        self._last, self._before = reference, self._last
         if reason:
             return lost_motion(reason)
-        return Step(q) if cycles == 0 else self._judge(q, cycles)
+        if cycles == 0:
+            return Step(reference)
+        step = self._judge(q, cycles)
+        return step if reference is q or step.faults else Step(reference)
+
+    def _monitor_from(self, q: list[float]) -> JointMonitor:
+        monitor = JointMonitor(self._limits)
+        monitor.reset(q)
+        return monitor
 
     def _find_throw(self, q: list[float], cycles: int) -> Remark:
         """Returns what the arm cannot be asked to do, or nothing; for as long as a difference reaches to a gap."""
@@ -147,12 +191,24 @@ class JointReference:
         return NOTHING
 
     def _judge(self, q: list[float], cycles: int) -> Step:
-        faults = self._monitor.step(q, cycles)
+        faults = self._step_monitor(q, cycles)
         breaches = self._monitor.broken() if faults else []
         if self._box.is_active:
             faults += self._box.step(self._model.forward(q).parts[1])
             breaches += self._box.broken()
         if faults:
-            return Step(faults=tuple(sorted(faults)), reason=describe_breaches(breaches))
+            reason = describe_breaches(breaches)
+            return Step(faults=tuple(sorted(faults)), reason=Remark.all((self._jump, reason)) if self._jump else reason)
+        self._jump = None
         monitor = self._monitor
-        return Step(q, differences=(monitor.dq, monitor.ddq) if monitor.is_even else None)
+        return Step(q, differences=(monitor.dq, monitor.ddq) if monitor.is_even and self._start is None else None)
+
+    def _step_monitor(self, q: list[float], cycles: int) -> tuple[Fault, ...]:
+        start = self._start
+        if start is None:
+            return self._monitor.step(q, cycles)
+        faults = start.step(q, cycles)
+        self._monitor = start.monitor
+        if start.is_decided:
+            self._start = None
+        return faults

@@ -28,6 +28,8 @@ class JointGenerator:
 
     def __init__(self, terms: Terms, q: list[float]) -> None:
         self._n = terms.model.n
+        self._terms = terms
+        self._has_begun = False
         self._stream = Stream(q)
         self._filter = LowPass(terms.settings.joint_filter, q)
         self._gap = Gap()
@@ -50,5 +52,14 @@ class JointGenerator:
         if not isfinite(sum(q)):  # Not a number is in no range; the derivatives say nothing then.
             reason = Remark(f"commanded positions {q} rad are not all finite numbers", "no_numbers")
             return Step(faults=(Fault.COMMAND_JOINT_POSITION_LIMITS_VIOLATION,), reason=reason)
+        if not self._has_begun:
+            self._begin(q)
         self._stream.take(q)
         return self._reference.step(self._filter.step(q), cycles)
+
+    def _begin(self, q: list[float]) -> None:
+        """Takes the first command, which filter and prediction start from when the motion begins there."""
+        self._has_begun = True
+        if self._reference.begin(q, self._terms.tolerance):
+            self._stream = Stream(q)
+            self._filter = LowPass(self._terms.settings.joint_filter, q)

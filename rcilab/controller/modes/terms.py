@@ -11,6 +11,7 @@ from rcilab.conformance import LimitTable, cartesian_limits
 from rcilab.controller.actuator import Law, guiding_box
 from rcilab.controller.modes.generator import Terms
 from rcilab.controller.modes.mode import Mode
+from rcilab.controller.modes.start import StartTolerance
 from rcilab.controller.plant import Measurement
 from rcilab.controller.settings import Settings
 from rcilab.limits import JointLimits
@@ -22,7 +23,13 @@ _ROUNDING = 1e-6  # [rad], [m] Where an arm stands beyond a bound, it may be tha
 
 
 def build_terms(
-    mode: Mode, model: RobotModel, settings: Settings, table: LimitTable, measured: Measurement, T_base_tool: Pose
+    mode: Mode,
+    model: RobotModel,
+    settings: Settings,
+    table: LimitTable,
+    measured: Measurement,
+    T_base_tool: Pose,
+    tolerance: StartTolerance,
 ) -> Terms:
     """Returns filters and bounds of a motion.
 
@@ -38,12 +45,15 @@ def build_terms(
         table: Whose bounds of the tool's motion count.
         measured: Where the arm rests.
         T_base_tool: Where its tool is, in base.
+        tolerance: How far the first command may be off the reference.
     """
     joint = _up_to(settings.soft_limits(model.limits.joint), measured)
     limits = replace(cartesian_limits(model.limits, table), joint=joint)
     yields_to_walls = mode.law in (Law.JOINT_IMPEDANCE, Law.CARTESIAN_IMPEDANCE) and guiding_box(settings) is not None
     box = None if yields_to_walls else settings.safety_box
-    return Terms(model=model, settings=settings, limits=limits, box=active_box(box), start=T_base_tool)
+    return Terms(
+        model=model, settings=settings, limits=limits, box=active_box(box), tolerance=tolerance, start=T_base_tool
+    )
 
 
 def _up_to(joint: JointLimits, measured: Measurement) -> JointLimits:
