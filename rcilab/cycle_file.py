@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from io import TextIOWrapper
 from os import PathLike, fspath
 from pathlib import Path
 from typing import IO, Any
@@ -13,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rcilab.errors import InvalidValueError
+from rcilab.whole_file import replacing
 
 
 def cycle_dtype(n: int) -> np.dtype[np.void]:
@@ -160,7 +162,8 @@ def save_cycles(cycles: NDArray[np.void], file: str | PathLike[str]) -> None:
     if path.suffix not in _WRITERS:
         raise InvalidValueError("file", fspath(file), f"must end in {' or '.join(_WRITERS)}, which chooses the format")
     try:
-        _WRITERS[path.suffix](cycles, path)
+        with replacing(path) as stream:
+            _WRITERS[path.suffix](cycles, stream)
     except OSError as error:
         raise InvalidValueError("file", fspath(file), f"cannot be written: {error.strerror}").coded(
             "file_unwritable", file=fspath(file)
@@ -173,18 +176,14 @@ def write_npz(cycles: NDArray[np.void], stream: IO[bytes]) -> None:
     np.savez_compressed(stream, **arrays)
 
 
-def _save_csv(cycles: NDArray[np.void], path: Path) -> None:
-    with path.open("w", newline="", encoding="utf-8") as stream:
-        write_csv(cycle_columns(cycles), stream)
-
-
-def _save_npz(cycles: NDArray[np.void], path: Path) -> None:
-    with path.open("wb") as stream:
-        write_npz(cycles, stream)
+def _write_csv(cycles: NDArray[np.void], stream: IO[bytes]) -> None:
+    lines = TextIOWrapper(stream, encoding="utf-8", newline="")
+    write_csv(cycle_columns(cycles), lines)
+    lines.detach()
 
 
 def _fields(cycles: NDArray[np.void]) -> list[str]:
     return [name for name in cycles.dtype.names or () if name not in _HIDDEN]
 
 
-_WRITERS = {".csv": _save_csv, ".npz": _save_npz}
+_WRITERS = {".csv": _write_csv, ".npz": write_npz}

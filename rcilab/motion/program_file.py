@@ -14,7 +14,7 @@ from rcilab.motion.lined_json import LONGEST, Node, read_json
 from rcilab.motion.program import Program
 from rcilab.motion.waypoint import ALLOWED, ALWAYS, WORDS, Waypoint, require_fit
 from rcilab.robots import RobotDescription, describe_robot
-from rcilab.whole_file import read_whole
+from rcilab.whole_file import read_whole, replacing
 
 FORMAT = "rcilab program"
 VERSION = 1
@@ -46,7 +46,8 @@ def save_program(program: Program, file: str | PathLike[str]) -> None:
         InvalidValueError: The file cannot be written.
     """
     try:
-        Path(file).write_text(program_text(program), encoding="utf-8")
+        with replacing(file) as stream:
+            stream.write(program_text(program).encode())
     except OSError as error:
         raise InvalidValueError("program file", fspath(file), f"cannot be written: {error.strerror}").coded(
             "file_unwritable", file=fspath(file)

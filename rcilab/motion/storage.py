@@ -13,7 +13,7 @@ from rcilab.errors import InvalidValueError, VersionMismatchError
 from rcilab.motion.archive import read_arrays
 from rcilab.motion.motion import Motion
 from rcilab.motion.piecewise import PiecewisePolynomial
-from rcilab.whole_file import read_whole
+from rcilab.whole_file import read_whole, replacing
 
 KIND = "rcilab motion"
 VERSION = 1
@@ -44,7 +44,7 @@ def save_motion(motion: Motion, file: str | PathLike[str] | BinaryIO) -> None:
         np.savez(file, **content)
         return
     try:
-        with open(file, "wb") as stream:
+        with replacing(file) as stream:
             np.savez(stream, **content)
     except OSError as error:
         raise InvalidValueError("motion file", fspath(file), f"cannot be written: {error.strerror}") from error

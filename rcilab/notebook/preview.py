@@ -6,7 +6,6 @@ import html
 import math
 import os
 import warnings
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -14,13 +13,14 @@ from numpy.typing import ArrayLike
 
 from rcilab.arrays import Array, as_vector
 from rcilab.closing import Closing
-from rcilab.errors import UsageError
+from rcilab.errors import InvalidValueError, UsageError
 from rcilab.model import RobotModel, require_model
 from rcilab.notebook.installed import require_installed
 from rcilab.notebook.place import find_place
 from rcilab.robots.upright import upright_joints
 from rcilab.spoken import chosen_language
 from rcilab.views.arm_view import ArmView
+from rcilab.whole_file import replacing
 from rcilab.words.text import Text
 
 if TYPE_CHECKING:
@@ -112,8 +112,19 @@ class Preview(Closing):
         return self._scene.as_html() if self._live else self._markup
 
     def save(self, file: str | os.PathLike[str]) -> None:
-        """Writes `html()` to a file."""
-        Path(file).write_text(self.html(), encoding="utf-8")
+        """Writes `html()` to a file.
+
+        Raises:
+            InvalidValueError: The file cannot be written.
+        """
+        page = self.html().encode()
+        try:
+            with replacing(file) as stream:
+                stream.write(page)
+        except OSError as error:
+            raise InvalidValueError("file", os.fspath(file), f"cannot be written: {error.strerror}").coded(
+                "file_unwritable", file=os.fspath(file)
+            ) from error
 
     def close(self) -> None:
         """Stops serving and keeps what was shown as a static scene; calling it again does nothing."""

@@ -10,6 +10,7 @@ from typing import IO, TYPE_CHECKING, TypeAlias
 
 from rcilab.cycle_file import write_csv, write_npz
 from rcilab.errors import InvalidValueError
+from rcilab.whole_file import replacing
 from rcilab.words.text import Text
 from rcilab.words.units import USUAL, Units
 
@@ -34,7 +35,7 @@ def save_run(
     path = Path(fspath(file))
     require_ending(path.suffix)
     try:
-        with path.open("wb") as stream:
+        with replacing(path) as stream:
             write_export(run, path.suffix, stream, progress=progress, language=language, units=units)
     except OSError as error:
         raise InvalidValueError("file", fspath(file), f"cannot be written: {error.strerror}").coded(

@@ -7,6 +7,7 @@ from pathlib import Path
 from rcilab.errors import ModelError
 from rcilab.robots.description import RobotDescription
 from rcilab.robots.urdf import build_meshes
+from rcilab.whole_file import replacing
 
 
 def write_model(directory: Path, file_name: str, text: str, description: RobotDescription) -> Path:
@@ -19,9 +20,11 @@ def write_model(directory: Path, file_name: str, text: str, description: RobotDe
         meshes = directory / "meshes" / description.name
         meshes.mkdir(parents=True, exist_ok=True)
         for name, content in build_meshes(description).items():
-            (meshes / name).write_bytes(content)
+            with replacing(meshes / name) as stream:
+                stream.write(content)
         path = directory / file_name
-        path.write_text(text, encoding="utf-8", newline="\n")
+        with replacing(path) as stream:
+            stream.write(text.encode())
     except OSError as error:
         raise ModelError(
             f"cannot write {file_name} into {directory}: {error.strerror}; name another --output"
