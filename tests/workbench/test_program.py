@@ -26,7 +26,7 @@ from rcilab.workbench.program import actions as program_actions
 from rcilab.workbench.program import planning as program_planning
 from rcilab.workbench.program.actions import ProgramActions
 from rcilab.workbench.program.draft import draft_of, number_at, tell_place, time_at
-from rcilab.workbench.program.marks import label_of, neighbours
+from rcilab.workbench.program.marks import label_of, labels_of
 from rcilab.workbench.run.readiness import may_go_back, may_plan_again, obstacle
 from rcilab.workbench.store import Store, UiState
 from rcilab.workbench.text import Text
@@ -246,10 +246,16 @@ def test_many_shortened_blends_are_one_line_that_opens_and_marks_on_their_rows(b
 
 def test_close_waypoints_share_one_label_in_the_scene():
     points = [np.array((0.5, 0.001 * step, 0.3)) for step in range(5)] + [np.array((0.2, 0.0, 0.3))]
-    assert neighbours(points) == [[0, 1, 2, 3, 4], [5]]
+    numbers = [(number, "") for number in range(1, 7)]
+    assert labels_of(points, numbers) == [([0, 1, 2, 3, 4], "1–5"), ([5], "6")]
+    turns = np.linspace(0.0, 6.0 * math.pi, 400)
+    circle = [np.array((0.6 + 0.08 * math.cos(turn), 0.08 * math.sin(turn), 0.5)) for turn in turns]
+    assert len(labels_of(circle, [(number, "") for number in range(1, 401)])) < 4
+    far = [np.array((0.1 * step, 0.0, 0.3)) for step in range(6)]
+    assert [said for _, said in labels_of(far, numbers)] == ["1", "2", "3", "4", "5", "6"]
     assert label_of([(1, ""), (2, "[2]"), (3, ""), (7, "7 !")]) == "1–3, 7 · [2] · 7 !"
     assert (label_of([(4, "")]), label_of([(4, "[4]")])) == ("4", "[4]")
-    assert neighbours([]) == []
+    assert labels_of([], []) == []
 
 
 def test_an_error_names_the_waypoint_and_marks_it(square):

@@ -84,7 +84,8 @@ def test_a_killed_process_is_noticed_told_and_replaced(bench, who, code):
         assert cable not in Text(language).say(bench.store.state.notice.text)
     assert np.array_equal(bench.store.state.goal.q, goal), "what the operator has set is not lost"
     wait(lambda: bench.session.status().phase == "idle", "the process to be replaced")
-    wait(lambda: told(bench) == "incident.over", "to be told that the trouble is over")
+    over = code.replace("incident.", "incident.over.")
+    wait(lambda: told(bench) == over, "to be told that the trouble is over, and what it was")
     move_on(bench)
 
 

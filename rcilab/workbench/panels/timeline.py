@@ -90,7 +90,8 @@ class TimelinePanel:
         """Returns where the preview stands, and what is drawn how."""
         text = self._text
         if state.plan is None:
-            said = text("timeline.nothing") if state.no_plan is None else text.say(state.no_plan)
+            why = state.no_plan
+            said = text("timeline.nothing") if why is None or why.code == "plan.here" else text.say(why)
             return f'<p class="rl-note rl-welcome">{esc(said)}</p>'
         duration = state.plan.motion.duration
         t, kinds = min(time_shown(state, status), duration), text("timeline.plan_only")

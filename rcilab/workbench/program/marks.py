@@ -16,8 +16,9 @@ if TYPE_CHECKING:
     from rcilab.workbench.store import UiState
 
 _MOST = 60  # A choice: more labels than that hide the arm, and cost the browser more than it has.
-_NEAR = 0.06  # [m] A tuning value: at the home view, labels closer than that overlap.
-_RANGES = 4  # A choice: a label that lists more is wider than what it labels.
+_NEAR = 0.03  # [m] A tuning value: at the home view, two numbers closer than that overlap.
+_CHARACTER, _LINE = 0.018, 0.05  # [m] Width and height of a character at the home view, as measured.
+_RANGES = 2  # A choice: a label that lists more is wider than what it labels.
 _PLAIN, _CHOSEN, _FAILED = (70, 110, 160), (11, 111, 194), (209, 57, 43)
 _SIZE = 0.016  # [m]
 _ABOVE = 0.022  # [m]
@@ -61,8 +62,7 @@ class ProgramMarks:
             points.append(target.position)
             colors.append(_FAILED if failed else _CHOSEN if chosen else _PLAIN)
             numbers.append((number, f"{number} !" if failed else f"[{number}]" if chosen else ""))
-        for place, group in enumerate(neighbours(points)[:_MOST]):
-            said = label_of([numbers[at] for at in group])
+        for place, (group, said) in enumerate(labels_of(points, numbers)):
             self._handles.append(self._label(place, said, points[group[0]]))
         if points:
             self._handles.append(
@@ -84,14 +84,39 @@ class ProgramMarks:
         )  # fmt: skip
 
 
-def neighbours(points: list[Array]) -> list[list[int]]:
-    """Returns which points are so near each other that their numbers would lie on one another, by their places."""
+def labels_of(points: list[Array], numbers: list[tuple[int, str]]) -> list[tuple[list[int], str]]:
+    """Returns the labels of waypoints, none on another at the home view: which points each is for, and its words.
+
+    Args:
+        points: Where they are, [m].
+        numbers: The number of each, rising, and its own words where it stands out, else "".
+    """
+    near = _NEAR
+    while True:
+        groups = neighbours(points, near)
+        labels = [(group, label_of([numbers[at] for at in group])) for group in groups[:_MOST]]
+        if not _overlap([points[group[0]] for group, _ in labels], [said for _, said in labels]) or len(groups) == 1:
+            return labels
+        near *= 2.0
+
+
+def _overlap(places: list[Array], said: list[str]) -> bool:
+    if len(places) < 2:
+        return False
+    half = 0.5 * _CHARACTER * np.array([len(words) for words in said])
+    apart = np.array(places)[:, None] - np.array(places)[None]
+    beside = np.linalg.norm(apart[..., :2], axis=-1) < half[:, None] + half[None]
+    return bool((np.triu(beside, 1) & (np.abs(apart[..., 2]) < _LINE)).any())
+
+
+def neighbours(points: list[Array], near: float) -> list[list[int]]:
+    """Returns which points are nearer than `near`, [m], to the first of a group, as their places, group by group."""
     anchors = np.empty((len(points), 3))
     groups: list[list[int]] = []
     for at, point in enumerate(points):
         away = np.linalg.norm(anchors[: len(groups)] - point, axis=1)
         nearest = int(away.argmin()) if len(groups) else 0
-        if len(groups) and away[nearest] < _NEAR:
+        if len(groups) and away[nearest] < near:
             groups[nearest].append(at)
         else:
             anchors[len(groups)] = point

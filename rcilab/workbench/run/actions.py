@@ -208,7 +208,8 @@ class RobotActions:
         """Withdraws what was said of a trouble that is over; the end of one that cut the connection is said."""
         self._store.settle(TROUBLE)
         if self._trouble.startswith(("crashed", "lost")):
-            self._store.say("good", message("incident.over"))
+            code = "lost" if self._trouble.startswith("lost") else self._trouble
+            self._store.say("good", message(f"incident.over.{code}"))
         self._trouble = ""
 
     def _follow(self, status: SupervisorStatus) -> None:
