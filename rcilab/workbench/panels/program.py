@@ -12,7 +12,7 @@ from rcilab.workbench import requests
 from rcilab.workbench.panels.jog import problems_html
 from rcilab.workbench.panels.program_list import list_html, notes_html
 from rcilab.workbench.panels.target import planned_html
-from rcilab.workbench.program.draft import FILE_FIELD, Draft, number_at, tell_place
+from rcilab.workbench.program.draft import FILE_FIELD, Draft, Note, number_at, tell_place
 from rcilab.workbench.run.readiness import is_moving, time_shown
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, Html, Linked, NumberField, esc, on_press
@@ -35,6 +35,7 @@ class ProgramPanel:
     def __init__(self, text: Text, ask: Ask) -> None:
         self._text, self._ask = text, ask
         self._drawn: tuple[object, ...] = ()
+        self._noted: tuple[Note, ...] = ()
         self._began = 0.0
 
     def build(self, gui: Any, state: UiState) -> None:
@@ -126,7 +127,9 @@ class ProgramPanel:
             said += f'<p class="rl-verdict rl-{program.tone}">{esc(text.say(program.answer))}</p>'
         self._answer.show(f'<div class="rl-room">{said}</div>' if count else said)
 
-        self._notes.show(notes_html(program.notes, text))
+        if program.notes is not self._noted:
+            self._noted = program.notes
+            self._notes.show(notes_html(program.notes, text))
 
     def _elsewhere(self, draft: Draft, status: SupervisorStatus) -> str:
         """Returns whether the program starts where the arm is, in words."""

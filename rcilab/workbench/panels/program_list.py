@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from rcilab.errors import RcilabError
@@ -37,14 +38,15 @@ def list_html(state: UiState, draft: Draft, running: int | None, text: Text) -> 
         f'<span title="{esc(text(f"program.head.{name}_long"))}">{esc(text(f"program.head.{name}"))}</span>'
         for name in _HEADS
     )
-    noted = {note.key: note.remark for note in state.program.notes}
+    notes = state.program.notes
+    noted = {note.key: said for note, said in zip(notes, _told(notes, text), strict=True)}
     rows = [_start_row(draft, arm, running == 0, text)]
     for number, step in enumerate(draft.steps, start=1):
         chosen, failed = step.key == state.program.selected, step.key == state.program.failed
         look = (" rl-failed" if failed else "") + (" rl-running" if number == running else "")
         sign = f'<em title="{esc(text("program.failed"))}">!</em>' if failed else ""
         if step.key in noted:
-            sign += f'<i title="{esc(text.tell(tell_note(noted[step.key])))}">{_NOTED}</i>'
+            sign += f'<i title="{noted[step.key]}">{_NOTED}</i>'
         cells = (f"{number}{sign}", *_cells(step.waypoint, arm, text))
         rows.append(
             f'<div class="rl-step{look}" role="option" id="rl-step-{step.key}" data-key="{step.key}" '
@@ -65,14 +67,20 @@ def notes_html(notes: tuple[Note, ...], text: Text) -> str:
     if not notes:
         return ""
     if len(notes) == 1:
-        return f'<p class="rl-note">{_NOTED} {esc(text.tell(tell_note(notes[0].remark)))}</p>'
+        return f'<p class="rl-note">{_NOTED} {_told(notes, text)[0]}</p>'
     codes = {note.code for note in notes}
     code = "program.shortened" if codes == {"blend"} else "program.noted"
-    listed = "".join(f"<li>{esc(text.tell(tell_note(note.remark)))}</li>" for note in notes)
+    listed = "".join(f"<li>{said}</li>" for said in _told(notes, text))
     return (
         f'<details class="rl-noted"><summary>{_NOTED} {esc(text(code, count=len(notes)))}</summary>'
         f"<ul>{listed}</ul></details>"
     )
+
+
+@lru_cache(maxsize=4)
+def _told(notes: tuple[Note, ...], text: Text) -> tuple[str, ...]:
+    """Returns remarks as HTML, once: a program may have a thousand, and its rows are drawn anew at every step."""
+    return tuple(esc(text.tell(tell_note(note.remark))) for note in notes)
 
 
 def _start_row(draft: Draft, arm: RobotModel, running: bool, text: Text) -> str:
