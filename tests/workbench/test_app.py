@@ -200,6 +200,15 @@ def test_a_watching_page_may_look_but_not_touch(bench, ask):
     ask(requests.MoveJoint(page=2, joint=0, angle=0.1))
     assert bench.store.state.goal is before
     assert told(bench) == "notice.watching"
+    assert bench.store.state.notice.page == 2, "the page that holds the controls need not be told"
+    ask(requests.PageWent(page=1))
+    wait(lambda: told(bench) is None, "what is no longer so to be withdrawn")
+    ask(requests.MoveJoint(page=2, joint=0, angle=0.2))
+    assert told(bench) == "lease.free"
+    ask(requests.PageWent(page=2))
+    ask(requests.PageCame(page=1))
+    wait(lambda: told(bench) is None, "that to be withdrawn, too: now a page has the controls")
+    ask(requests.PageCame(page=2))
     ask(requests.MoveJoint(page=1, joint=0, angle=0.1))
     assert bench.store.state.goal.q[0] == pytest.approx(0.1)
     ask(requests.TakeControls(page=2))

@@ -163,6 +163,15 @@ def test_the_bar_and_the_reason_on_run_speak_of_the_same_death():
     assert Text("en").say(reason).startswith("The virtual controller has died")
 
 
+def test_the_share_of_commands_in_time_is_that_of_a_motion_and_marked_as_past_after_it():
+    state, facts = initial_state(), {"success_rate": 0.62, "rate_hz": 1000.0}
+    for phase, bar, table in (("moving", "62 %", "62.0 %<"), ("idle", "—", "62.0 % in the last motion<")):
+        now = status(phase=phase, code=phase, **facts)
+        chips = {chip["id"]: chip["value"] for chip in status_values(state, now, Text("en"), 1.0)["chips"]}
+        assert chips["success"] == bar
+        assert f"<td>{table}" in health_html(state, now, Text("en"))
+
+
 def initial_state():
     from rcilab.model import load_model
     from rcilab.workbench.goal.actions import initial_goal
