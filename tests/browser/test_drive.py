@@ -56,3 +56,25 @@ def test_a_soft_motion_is_held_gone_on_with_and_a_spoiled_network_is_noticed(hea
     page.wait(lambda: page.status.phase == "idle", "states again")
     page.tab.get_by_text("Network lab").first.click()
     page.bench.conductor.ask(requests.SetDrive(mode="joint_position"))
+
+
+def test_the_question_about_an_address_goes_when_another_one_is_typed(page):
+    page.open_tab("Run")
+    choose(page, "Connect to", "a controller at an address")
+    field = page.tab.locator("label:visible", has_text="Address").locator(
+        "xpath=ancestor::div[contains(@class,'Flex-root')][1]"
+    )
+    box = field.locator("input").first
+    box.fill("127.0.0.1:9")
+    page.button("Connect").click()
+    page.button("Yes, connect").wait_for()
+    box.fill("127.0.0.1:99")
+    page.wait(lambda: page.button("Yes, connect").count() == 0, "the question to go")
+    assert page.state.drive.typed_address == ""
+    box.fill("999.1.1.1")
+    page.button("Connect").click()
+    page.wait(lambda: "999.1.1.1" in page.toast(), "the refusal")
+    assert page.button("Yes, connect").count() == 0
+    assert page.state.target == "virtual"
+    choose(page, "Connect to", "virtual controller, ideal arm")
+    page.wait(lambda: page.status.phase == "idle" and bool(page.status.powered), "the virtual controller", 30.0)
