@@ -16,7 +16,7 @@ from rcilab.notebook.look import block, head, soft, verdict, write
 from rcilab.notebook.number_field import NumberField
 from rcilab.notebook.part import Part
 from rcilab.notebook.slider_echo import SliderEcho
-from rcilab.posing.reach import margin
+from rcilab.posing.reach import margin, telling_joints
 from rcilab.spatial import Pose
 
 _NAMES = ("x", "y", "z", "roll", "pitch", "yaw")
@@ -159,13 +159,13 @@ class TargetPanel(Part):
             write(self._table, soft(text(code)))
             return
         here, rows, chosen = state.here, [], None
+        joints = telling_joints(np.asarray(list(solutions)))
         for number, q in enumerate(solutions):
             least = margin(self.model, q)
             away = math.degrees(float(np.abs(q - here).max()))
-            rows.append(
-                text("target.way", number=number + 1, margin=f"{math.degrees(least.angle):.1f}", joint=least.joint,
-                     away=f"{away:.1f}")
-            )  # fmt: skip
+            way = text("target.way", number=number + 1, margin=f"{math.degrees(least.angle):.1f}", joint=least.joint,
+                       away=f"{away:.1f}")  # fmt: skip
+            rows.append(" · ".join([way, *(f"J{j + 1} {math.degrees(q[j]):.0f}°" for j in joints)]))
             if float(np.abs(np.angle(np.exp(1j * (q - state.goal)))).max()) < 1e-6:
                 chosen = number
         options = [(row, number) for number, row in enumerate(rows)]

@@ -54,6 +54,21 @@ def margin(model: RobotModel, q: JointVector) -> Margin:
     return Margin(float(distances[worst]), worst + 1)
 
 
+def telling_joints(solutions: np.ndarray) -> tuple[int, ...]:
+    """Returns the joints, from 0, whose angles in whole degrees tell the solutions apart; none where there is one.
+
+    Args:
+        solutions: Joint angles, shape (N, n), [rad].
+    """
+    angles = np.degrees(solutions).round()
+    told: list[int] = []
+    for joint in np.argsort(-np.ptp(angles, axis=0), kind="stable").tolist():
+        if len(np.unique(angles[:, told], axis=0)) == len(np.unique(angles, axis=0)):
+            break
+        told.append(joint)
+    return tuple(sorted(told))
+
+
 def judge_pose(model: RobotModel, target: Pose, near: JointVector, psi: float | None = None) -> Reach:
     """Returns the branch nearest to `near` at a target, or at the reachable pose nearest to it.
 

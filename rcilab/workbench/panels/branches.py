@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rcilab.posing.reach import NEAR_LIMIT, margin
+from rcilab.posing.reach import NEAR_LIMIT, margin, telling_joints
 from rcilab.workbench import requests
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, Html, esc
@@ -84,21 +84,6 @@ class BranchesPanel:
             + "".join(f"<span>{esc(cell)}</span>" for cell in cells)
             + (f"<small>{esc(angles)}</small></div>" if angles else "</div>")
         )
-
-
-def telling_joints(solutions: np.ndarray) -> tuple[int, ...]:
-    """Returns the joints, from 0, whose angles in whole degrees tell the solutions apart; none where there is one.
-
-    Args:
-        solutions: Joint angles, shape (N, n), [rad].
-    """
-    angles = np.degrees(solutions).round()
-    told: list[int] = []
-    for joint in np.argsort(-np.ptp(angles, axis=0), kind="stable").tolist():
-        if len(np.unique(angles[:, told], axis=0)) == len(np.unique(angles, axis=0)):
-            break
-        told.append(joint)
-    return tuple(sorted(told))
 
 
 def nearest_first(solutions: np.ndarray, here: np.ndarray) -> list[int]:
