@@ -88,7 +88,7 @@ def test_an_unreachable_target_says_why_and_the_arm_comes_as_near_as_it_can(page
     page.pose_field("x").fill("1800")
     page.wait(lambda: page.state.goal.reach.tone == "bad", "the target to be out of reach")
     shown = page.tab.locator(".rl-verdict.rl-bad:visible").first
-    page.wait(lambda: "out of reach by" in shown.inner_text() and "mm" in shown.inner_text(), "the reason in words")
+    page.wait(lambda: "out of reach" in shown.inner_text() and "mm" in shown.inner_text(), "the reason in words")
     assert "Not reachable" in shown.inner_text()
     near = page.state.model.forward(page.state.goal.q).position
     assert near[0] > 0.7
