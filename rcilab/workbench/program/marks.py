@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 _MOST = 60  # A choice: more labels than that hide the arm, and cost the browser more than it has.
 _NEAR = 0.03  # [m] A tuning value: at the home view, two numbers closer than that overlap.
-_CHARACTER, _LINE = 0.018, 0.05  # [m] Width and height of a character at the home view, as measured.
+_CHARACTER, _LINE = 0.018, 0.05  # [m] A character at the home view, wide and high, about.
 _RANGES = 2  # A choice: a label that lists more is wider than what it labels.
 _PLAIN, _CHOSEN, _FAILED = (70, 110, 160), (11, 111, 194), (209, 57, 43)
 _SIZE = 0.016  # [m]

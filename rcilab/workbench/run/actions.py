@@ -327,7 +327,7 @@ class RobotActions:
 
 
 def _is_trouble(error: RcilabError) -> bool:
-    """Returns whether an error lasts until the robot side is well again: a fault or a lost connection."""
+    """Returns whether an error is a fault or a lost connection: it lasts until the robot side is ready again."""
     return isinstance(error, ConnectionLostError) or (isinstance(error, ControlError) and bool(error.faults))
 
 
