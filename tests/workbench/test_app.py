@@ -150,6 +150,16 @@ def test_labels_in_the_scene_follow_the_language_at_once(bench, ask):
         ask(requests.SetWay(kind="joint"))
 
 
+def test_a_safety_box_that_is_off_is_drawn_only_while_it_is_edited(bench, ask):
+    label = bench.presenter._stage._setup._label
+    assert not bench.store.state.setup.wanted.box.active
+    ask(requests.SetSetup(name="edited", value="box"))
+    wait(lambda: label.visible, "the box that is edited")
+    ask(requests.SetSetup(name="edited", value=""))
+    wait(lambda: not label.visible, "it to go")
+    ask(requests.SetSetup(name="box", value=False))
+
+
 def test_connecting_without_an_address_asks_for_one_and_does_nothing(bench, ask):
     before = bench.session.status().address
     ask(requests.ChooseRobot(target="  "))

@@ -13,6 +13,7 @@ import pytest
 
 import rcilab
 from rcilab.errors import UsageError
+from rcilab.faults import Fault
 from rcilab.model import load_model
 from rcilab.recording.export import export_run
 from rcilab.recording.run_file import decode_run
@@ -190,6 +191,19 @@ def test_a_run_is_replayed_with_nothing_connected_until_it_is_asked_for(monkeypa
         wait(lambda: opened == [(run.model, "virtual")], "a virtual controller, once it is asked for")
         assert bench.conductor.errors == []
         assert bench.presenter.errors == []
+
+
+def test_a_fault_is_marked_and_told_at_the_moment_it_was_reported():
+    run = some_run()
+    cycles = run.cycles.copy()
+    cycles["faults"][40:] = 1 << Fault.COLLISION
+    recording = whole_recording(replace(run, cycles=cycles))
+    assert recording.moment == run.t[40]
+    assert whole_recording(run).moment is None
+    goal = initial_goal(run.model, np.array(run.model.home))
+    state = UiState(model=run.model, goal=goal, recording=recording)
+    banner = replay_html(state, SimpleNamespace(phase="closed"), Text("en"))
+    assert f"Ended by a fault at {run.t[40]:.3f} s: {Fault.COLLISION.manual_name}." in banner
 
 
 def test_a_run_that_cannot_be_replayed_says_why():
