@@ -88,13 +88,30 @@ def require_first(command: Command, state: RobotState, limits: Limits) -> None:
             )
 
 
-def has_arrived(state: RobotState, command: Command) -> bool:
-    """Returns whether the controller reports a command as its commanded state."""
+def distance_to(state: RobotState, command: Command) -> float:
+    """Returns how far the controller's commanded state is from a command; torques are always there.
+
+    Returns:
+        The largest difference of a joint angle, [rad], or of an element of the pose, [m]; 0 where none counts.
+    """
     if isinstance(command, JointPosition):
-        return bool(np.abs(state.q_c - command.q).max() <= _ARRIVED)
+        off = float(np.abs(state.q_c - command.q).max())
+        return 0.0 if off <= _ARRIVED else off
     if isinstance(command, CartesianPosition):
-        return bool(np.abs(state.T_base_tool_c - command.T_base_tool).max() <= _POSE_ARRIVED)
-    return True
+        off = float(np.abs(state.T_base_tool_c - command.T_base_tool).max())
+        return 0.0 if off <= _POSE_ARRIVED else off
+    return 0.0
+
+
+def describe_distance(state: RobotState, command: Command) -> str:
+    """Returns what is how far from a command, in words: "joint 2 is 11.46 deg"."""
+    if isinstance(command, JointPosition):
+        off = np.abs(state.q_c - command.q)
+        joint = int(off.argmax())
+        return f"joint {joint + 1} is {math.degrees(off[joint]):.4g} deg"
+    assert isinstance(command, CartesianPosition)  # Torques are always there.
+    length = float(np.linalg.norm(state.T_base_tool_c[:3, 3] - command.T_base_tool[:3, 3]))
+    return f"the tool is {1e3 * length:.4g} mm"
 
 
 def _numbers(name: str, values: Any, shape: tuple[int, ...], unit: str) -> Array:

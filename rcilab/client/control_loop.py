@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from rcilab.client.brake import Brake, CartesianBrake, JointBrake, TorqueBrake
-from rcilab.client.checked_command import check_command, has_arrived, require_first
+from rcilab.client.checked_command import check_command, describe_distance, distance_to, require_first
 from rcilab.client.commands import RciCommands
 from rcilab.client.fault_report import describe_faults, describe_late_callback
 from rcilab.client.filters import CommandFilter, is_near
@@ -39,7 +39,9 @@ CATCH_UP = 20  # Cycles: as many lost commands as a controller bridges at most (
 MODE_TIMEOUT = 3.0  # [s] for the controller to show the requested modes; virtual ones take 0.2 to 1.05 s.
 STOP_TIMEOUT = 1.0  # [s] for the answer to StopMove when something has gone wrong already.
 FILTER_CYCLES = 5000  # Cycles that filters get at most to arrive at the last command.
-SETTLE_CYCLES = 200  # Cycles that the last command is repeated at most until the controller has played it.
+SETTLE_CYCLES = 200  # Cycles that the last command is repeated for at most while the controller comes no nearer to it.
+ARRIVAL_TOLERANCE = 1e-6  # [rad], [m] What a motion may end off its last command: far below what an arm resolves.
+_NEARER = 0.95  # What is left of a distance after SETTLE_CYCLES where a low pass approaches, at 0.1 Hz 0.88.
 REST_TIMEOUT = 1.0  # [s] for the controller's own stop after a fault; the slowest joint needs 0.3 s from full speed.
 _NEAR_CYCLES = 2  # Cycles in a row that a filter is at its command until it counts as standing there.
 RECORD_CYCLES = 50  # Cycles that a ControlError carries, as many as the vendor's client writes.
@@ -104,6 +106,7 @@ class ControlLoop:
         self._silence = silence
         self._filters = tuple(filters)
         self._first_id = 0
+        self._first_q_c = np.zeros(0)
         self._answered_id = -1
         self._t = math.nan
         self._slowest, self._slowest_t = 0, 0.0  # [ns], [s] The longest call of the callback, and when it was.
@@ -158,7 +161,7 @@ class ControlLoop:
             if state.faults:
                 raise self._fault(state)
             if state.controller_mode == self._mode and state.motion_generator_mode == shown:
-                self._first_id = state.message_id
+                self._first_id, self._first_q_c = state.message_id, state.q_c
                 self._brake.begin(state)
                 return state
             self._log.write(state, self._link.received_ns)
@@ -207,7 +210,10 @@ class ControlLoop:
                 return reason
             sent = self._filtered(wanted, state)
             self._answer(state, sent)
-        self._hold(wanted if near else sent)
+        last = wanted if near else sent
+        state = self._hold(last)
+        if distance_to(state, last) > ARRIVAL_TOLERANCE:
+            raise self._not_arrived(state, last)
         return None
 
     def _next(self) -> RobotState:
@@ -247,13 +253,25 @@ class ControlLoop:
         self._brake.remember(command, state.message_id - self._first_id, state)
         self._log.write(state, self._link.received_ns, self._t, sent_ns, command)
 
-    def _hold(self, command: Command) -> None:
-        """Repeats the last command until the controller has played it: StopMove may overtake a queued one."""
-        for _ in range(SETTLE_CYCLES):
+    def _hold(self, command: Command) -> RobotState:
+        """Repeats the last command until the controller has played it: StopMove may overtake a queued one.
+
+        A low pass of the controller's delays it: as long as the commanded state comes nearer, it is waited for.
+
+        Returns:
+            The last state, there or as near as it came.
+        """
+        before, cycle = math.inf, 0
+        while True:
             state = self._next()
             self._answer(state, command)
-            if has_arrived(state, command):
-                return
+            off, cycle = distance_to(state, command), cycle + 1
+            if off == 0.0:
+                return state
+            if cycle % SETTLE_CYCLES == 0:
+                if off <= ARRIVAL_TOLERANCE or off > _NEARER * before or self._watch(self._time(state)) is not None:
+                    return state
+                before = off
 
     def _end(self, error: BaseException | None, *, brake: bool = True) -> None:
         """The one stop path: every end of a motion comes through here, the planned one too.
@@ -342,6 +360,19 @@ class ControlLoop:
             late = describe_late_callback(1e-9 * self._slowest, self._slowest_t)
         message = describe_faults(state.faults, record, t, self._limits, late=late)
         return ControlError(message, state.faults, record)
+
+    def _not_arrived(self, state: RobotState, command: Command) -> ControlError:
+        if np.array_equal(state.q_c, self._first_q_c):
+            cause = "the controller has played none of the commands: they are lost on their way, look at the network"
+        elif state.success_rate < 1.0:
+            cause = (
+                f"{100.0 * state.success_rate:.1f} % of the last second's commands arrived in time: look at the network"
+            )
+        else:
+            cause = "something in the controller holds it back: look at the filters (set_filters) and soft limits"
+        record = self._log.recorder.last(RECORD_CYCLES)
+        off = describe_distance(state, command)
+        return ControlError(f"the motion was executed and did not arrive: {off} from its end; {cause}", (), record)
 
     def _ended_by_controller(self, state: RobotState) -> ControlError:
         self._log.write(state, self._link.received_ns, self._time(state))

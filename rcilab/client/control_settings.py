@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias
 
-from rcilab.client.settings import HIGHEST_FREQUENCY
 from rcilab.errors import InvalidValueError
+from rcilab.protocols.rci.bounds import FILTER_OFF, LOWEST_FREQUENCY
 
 if TYPE_CHECKING:
     from rcilab.client.settings import RciSettings
@@ -62,7 +62,7 @@ class Range(NamedTuple):
 def control_ranges(limits: Limits) -> dict[ControlPart, tuple[Range, ...]]:
     """Returns the range of every number, from the arm's one table of limits."""
     joint, tool = limits.joint, limits.cartesian
-    frequency = Range(0.0, HIGHEST_FREQUENCY, "Hz")
+    frequency = Range(LOWEST_FREQUENCY, FILTER_OFF, "Hz")
     return {
         "joint_stiffness": tuple(Range(0.0, k, "N·m/rad") for k in joint.stiffness.tolist()),
         "cartesian_stiffness": (Range(0.0, tool.translation_stiffness, "N/m"),) * 3

@@ -19,8 +19,7 @@ from rcilab.errors import InvalidValueError
 from rcilab.limits import Limits
 from rcilab.motion import LIMIT_MARGIN
 from rcilab.motion.path import slerp
-
-FILTER_OFF = 1000.0  # [Hz]
+from rcilab.protocols.rci.bounds import FILTER_OFF
 
 _CATCH_UP = 300.0  # [1/s] What is behind is caught up with at most so much of itself a second; a choice.
 _BRAKING = (

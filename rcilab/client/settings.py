@@ -18,11 +18,9 @@ from rcilab.client.link import Link
 from rcilab.errors import CommandRejectedError, InvalidValueError
 from rcilab.limits import Limits
 from rcilab.protocols import rci
+from rcilab.protocols.rci.bounds import FARTHEST_BOX, FILTER_OFF, LARGEST_BOX, LONGEST_TOOL, LOWEST_FREQUENCY
 from rcilab.safety_box import SafetyBox, require_box
 from rcilab.spatial import Pose
-
-HIGHEST_FREQUENCY = 1000.0  # [Hz] RCI manual 3.1.9: cut-off frequencies end there; it switches the filter off.
-LONGEST_TOOL = 2.0  # [m] from the flange; a choice: more than any xMate reaches, so what is longer is a slip of units.
 
 _AXES = ("x", "y", "z", "about x", "about y", "about z")
 _ADVICE: dict[tuple[type[rci.Request], IntEnum], str] = {
@@ -76,6 +74,8 @@ class RciSettings:
     def set_cartesian_limit(self, box: SafetyBox) -> None:
         """Sets the safety box that the origin of the tool must stay in, and whether it is watched."""
         require_box(box)
+        _vector("safety box size", box.size, _AXES[:3], "m", 0.0, LARGEST_BOX)
+        _vector("safety box centre", box.T_base_box.position, _AXES[:3], "m", -FARTHEST_BOX, FARTHEST_BOX)
         self._ask(rci.SetCartesianLimit(box.size, box.T_base_box.as_row_major(), box.active))
 
     def set_joint_limit(self, lower: ArrayLike, upper: ArrayLike) -> None:
@@ -118,13 +118,7 @@ class RciSettings:
 
     def set_coor(self, T_flange_tool: Pose) -> None:
         """Sets the tool by its pose in the flange frame, at most 2 m long."""
-        pose = _pose("T_flange_tool", T_flange_tool)
-        length = math.hypot(*pose.parts[1])
-        if not length <= LONGEST_TOOL:
-            raise InvalidValueError(
-                "T_flange_tool", round(length, 6), f"m from the flange is farther than {LONGEST_TOOL:g} m; give metres"
-            )
-        self._ask(rci.SetCoor(pose.as_row_major()))
+        self._ask(rci.SetCoor(_pose_at_flange("T_flange_tool", T_flange_tool).as_row_major()))
 
     def set_load(self, mass: float, center_of_mass: ArrayLike, inertia: ArrayLike) -> None:
         """Sets the load at the flange.
@@ -136,6 +130,7 @@ class RciSettings:
         """
         kilograms = float(_vector("mass", [mass], ("",), "kg", 0.0)[0])
         center = _vector("center_of_mass", center_of_mass, _AXES[:3], "m")
+        _require_near("center_of_mass", center.tolist())
         try:
             flat = np.asarray(inertia, dtype=np.float64).ravel()
         except (TypeError, ValueError) as error:
@@ -144,18 +139,18 @@ class RciSettings:
         self._ask(rci.SetLoad(kilograms, _floats(center), _floats(_vector("inertia", flat, names, "kg m^2"))))
 
     def set_filters(self, joint: float, cartesian: float, torque: float) -> None:
-        """Sets the cut-off frequencies of the controller's own filters of commands, [Hz]; 1000 switches one off."""
+        """Sets the cut-off frequencies of the controller's filters of commands, 0.1 to 1000 [Hz]; 1000 is off."""
         names = ("joint", "cartesian", "torque")
-        values = _vector("cut-off frequency", [joint, cartesian, torque], names, "Hz", 0.0, HIGHEST_FREQUENCY)
+        values = _vector("cut-off frequency", [joint, cartesian, torque], names, "Hz", LOWEST_FREQUENCY, FILTER_OFF)
         self._ask(rci.SetFilters(*_floats(values)))
 
     def set_torque_filter_cut_off_frequency(self, frequency: float) -> None:
-        """Sets the cut-off frequency of the reported torques' filter, [Hz]; 1000 switches it off."""
-        values = _vector("frequency", [frequency], ("",), "Hz", 0.0, HIGHEST_FREQUENCY)
+        """Sets the cut-off frequency of the reported torques' filter, 0.1 to 1000 [Hz]; 1000 switches it off."""
+        values = _vector("frequency", [frequency], ("",), "Hz", LOWEST_FREQUENCY, FILTER_OFF)
         self._ask(rci.SetTorqueFilterCutOffFrequency(float(values[0])))
 
     def set_fc_coor(
-        self, T_flange_force: Pose, type: rci.ForceFrame | Literal["world", "tool", "path"] = rci.ForceFrame.TOOL
+        self, T_flange_force: Pose, type: rci.ForceFrame | Literal["world", "tool", "path"] = rci.ForceFrame.WORLD
     ) -> None:
         """Sets the force-control frame, in which `state.tau_ext_in_stiff` is reported.
 
@@ -164,7 +159,7 @@ class RciSettings:
             type: What its axes follow: the base ("world"), the tool, or the path.
         """
         kind = member(rci.ForceFrame, "type", type)
-        self._ask(rci.SetFcCoor(_pose("T_flange_force", T_flange_force).as_row_major(), kind))
+        self._ask(rci.SetFcCoor(_pose_at_flange("T_flange_force", T_flange_force).as_row_major(), kind))
 
     def enable_virtual_guide(self, enable: bool) -> None:
         """Switches the virtual guide: walls at the faces of the safety box while a person or a force moves the arm."""
@@ -243,6 +238,19 @@ def _pose(name: str, value: object) -> Pose:
     if not math.isfinite(sum(rotation) + sum(position)):
         raise InvalidValueError(name, repr(value), "must be finite in every element")
     return value
+
+
+def _pose_at_flange(name: str, value: object) -> Pose:
+    pose = _pose(name, value)
+    _require_near(name, pose.parts[1])
+    return pose
+
+
+def _require_near(name: str, position: Sequence[float]) -> None:
+    length = math.hypot(*position)
+    if not length <= LONGEST_TOOL:
+        problem = f"m from the flange is farther than {LONGEST_TOOL:g} m; give metres"
+        raise InvalidValueError(name, round(length, 6), problem)
 
 
 def _floats(values: Array) -> tuple[float, ...]:

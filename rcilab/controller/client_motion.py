@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from rcilab.clock import CYCLE_TIME
 from rcilab.conformance import LimitTable
 from rcilab.controller.actuator import Law
 from rcilab.controller.arm import Arm
@@ -9,7 +10,7 @@ from rcilab.controller.modes import Mode, build_generator
 from rcilab.controller.modes.generator import MotionGenerator, Step
 from rcilab.controller.modes.start import start_tolerance
 from rcilab.controller.modes.terms import build_terms
-from rcilab.controller.playout import Playout
+from rcilab.controller.playout import FIRST_COMMAND_TIMEOUT, Playout
 from rcilab.controller.settings import Settings
 from rcilab.faults import Fault
 from rcilab.safety_box import box_from
@@ -109,6 +110,9 @@ class ClientMotion:
         if playback.is_lost and self._lost_limit is not None and playout.lost_in_row >= self._lost_limit:
             lost = playout.lost_in_row
             reason = Remark(f"{lost} commands in a row were lost", "lost_in_row", count=lost)
+            if not playout.is_playing:
+                seconds = f"{FIRST_COMMAND_TIMEOUT * CYCLE_TIME:g}"
+                reason = Remark(f"no command came within {seconds} s of the start", "no_command", seconds=seconds)
             return Step(faults=(Fault.INSTABILITY_DETECTION,), reason=reason)
         if not step.faults:
             self.tau = step.tau

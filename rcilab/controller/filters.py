@@ -3,7 +3,7 @@
     x += k (u - x),   k = dt / (dt + 1 / (2 pi f))
 
 The same filter that the vendor's client applies before it sends. At 1000 Hz, the largest frequency that can be set, a
-filter is off; at 0 Hz nothing passes.
+filter is off.
 """
 
 from __future__ import annotations
@@ -13,20 +13,19 @@ from math import pi, remainder, tau
 
 from rcilab.clock import CYCLE_TIME
 from rcilab.kinematics.reach import interpolate
+from rcilab.protocols.rci.bounds import FILTER_OFF
 from rcilab.spatial import Pose
-
-MAX_FREQUENCY = 1000.0  # [Hz] Largest cut-off frequency; there it means "no filter" (wire notes, section 4).
 
 
 def low_pass_gain(frequency: float) -> float:
     """Returns the share of the difference that a low pass takes up in one cycle, 0 to 1.
 
     Args:
-        frequency: Cut-off frequency, 0 to 1000 Hz.
+        frequency: Cut-off frequency, 0.1 to 1000 Hz.
     """
-    if frequency >= MAX_FREQUENCY:
+    if frequency >= FILTER_OFF:
         return 1.0
-    return CYCLE_TIME / (CYCLE_TIME + 1.0 / (2.0 * pi * frequency)) if frequency > 0.0 else 0.0
+    return CYCLE_TIME / (CYCLE_TIME + 1.0 / (2.0 * pi * frequency))
 
 
 class LowPass:

@@ -7,6 +7,7 @@
   queue; its old message ids do not matter.
 * Where ids advance one by one, they are cycle numbers. An empty queue is a lost cycle, and the command for it, when
   it comes after all, is dropped as it comes: the arm has passed that place already.
+* Without a first command within `FIRST_COMMAND_TIMEOUT`, the cycles from then on are lost: the commands go elsewhere.
 * A repeated id is the next command: the vendor's client answers the last state again when none came in time. A
   datagram that is the same in every number is the network's copy and dropped; it only shows that the client lives.
 * A command that was overtaken on its way is put back in its place.
@@ -30,6 +31,7 @@ CAPACITY = 256  # Commands in the queue; then the oldest gives way. 2.5 of the v
 WINDOW = 1000  # Cycles that the success rate looks back over, 1 s; a choice.
 STOCK_WINDOW = 100  # Cycles in which the lowest stock is looked for; longer than any jitter, a choice.
 SLACK = 5  # Cycles of delay more than wanted that are left alone: a client may be late with its first answer; a choice.
+FIRST_COMMAND_TIMEOUT = 5000  # Cycles. A vendor client begins 1 s after StartMove; a first callback loads libraries.
 LONGEST_GAP = 20  # Ids. The largest loss that the controller bridges at all (manual 4.6: 10 to 20).
 
 
@@ -88,6 +90,7 @@ class Playout:
         self._last_id = 0
         self._was_lost = False  # The cycle `_last_id` had no command.
         self._surplus = 0
+        self._waited = 0
         self.is_playing = False
         self.is_finished = False
         self.lost = self.lost_in_row = self.most_in_row = self.late = self.dropped = self.copies = 0
@@ -150,7 +153,8 @@ class Playout:
             return _WAITING
         if not self.is_playing:
             if not self._queue:
-                return _WAITING
+                self._waited += 1
+                return _WAITING if self._waited <= FIRST_COMMAND_TIMEOUT else self._lose(_EMPTY)
             if self._countdown > 0:
                 self._countdown -= 1
                 return _WAITING

@@ -10,23 +10,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, repeat
-from math import isfinite
+from math import hypot, isfinite
 
 import numpy as np
 
 from rcilab.arrays import frozen
-from rcilab.controller.filters import MAX_FREQUENCY
 from rcilab.dynamics.payload import NO_LOAD, Payload
 from rcilab.errors import InvalidValueError
 from rcilab.limits import JointLimits
 from rcilab.protocols import rci
+from rcilab.protocols.rci.bounds import FARTHEST_BOX, FILTER_OFF, LARGEST_BOX, LONGEST_TOOL, LOWEST_FREQUENCY
 from rcilab.robots import RobotDescription
 from rcilab.safety_box import SafetyBox
 from rcilab.spatial import IDENTITY, Pose
 
 SIGNAL_COUNT = 6  # Digital inputs, and outputs: DI0_0 to DI0_3, DI1_0, DI1_1 (manual 3.1.13 and 3.1.14).
-FARTHEST = 10.0  # [m] from flange or base that a tool, a load or a box may be; a choice: more is a slip of units.
-LARGEST_BOX = 100.0  # [m] A choice, as above.
 _LIMIT_TOLERANCE = 1e-9  # [rad] For soft limits that were converted from degrees elsewhere.
 
 Floats = tuple[float, ...]
@@ -50,12 +48,12 @@ class Settings:
     """What Cartesian impedance presses with, [N, N m]."""
     T_flange_tool: Pose = IDENTITY
     load: Payload = NO_LOAD
-    joint_filter: float = MAX_FREQUENCY
+    joint_filter: float = FILTER_OFF
     """Cut-off frequency of the low pass on commanded joint angles, [Hz]. It wakes up switched off, a choice: the
     vendor's client filters before it sends, and whoever does not is followed exactly."""
-    cartesian_filter: float = MAX_FREQUENCY
+    cartesian_filter: float = FILTER_OFF
     """The same for commanded poses, [Hz]."""
-    torque_filter: float = MAX_FREQUENCY
+    torque_filter: float = FILTER_OFF
     """The same for commanded torques, [Hz]."""
     torque_report_filter: float = 100.0
     """Cut-off frequency of the filtered torques in the state, [Hz]."""
@@ -136,24 +134,26 @@ def _judge(request: rci.Request, arm: RobotDescription, settings: Settings) -> d
             largest = [cartesian.force] * 3 + [cartesian.moment] * 3
             return _ranged("desired_wrench", values, largest, symmetric=True)
         case rci.SetTorqueFilterCutOffFrequency(frequency=value):
-            return {"torque_report_filter": value} if 0.0 <= value <= MAX_FREQUENCY else None
+            return {"torque_report_filter": value} if LOWEST_FREQUENCY <= value <= FILTER_OFF else None
         case rci.SetFilters():
             frequencies = (request.joint_frequency, request.cartesian_frequency, request.torque_frequency)
-            if not all(0.0 <= value <= MAX_FREQUENCY for value in frequencies):
+            if not all(LOWEST_FREQUENCY <= value <= FILTER_OFF for value in frequencies):
                 return None
             return dict(zip(("joint_filter", "cartesian_filter", "torque_filter"), frequencies, strict=True))
         case rci.SetJointLimit():
             return _soft_limits(request, arm)
         case rci.SetCartesianLimit():
             pose = _pose(request.frame)
-            if pose is None or not all(0.0 < edge <= LARGEST_BOX for edge in request.size):
+            if pose is None or not all(abs(x) <= FARTHEST_BOX for x in pose.parts[1]):
+                return None
+            if not all(0.0 < edge <= LARGEST_BOX for edge in request.size):
                 return None
             return {"safety_box": SafetyBox(size=request.size, T_base_box=pose, active=request.active)}
         case rci.SetCoor(T_flange_tool=numbers):
-            pose = _pose(numbers)
+            pose = _pose_at_flange(numbers)
             return None if pose is None else {"T_flange_tool": pose}
         case rci.SetFcCoor(frame=numbers, type=kind):
-            pose = _pose(numbers)
+            pose = _pose_at_flange(numbers)
             if pose is None or kind not in tuple(rci.ForceFrame):
                 return None
             return {"T_flange_force": pose, "force_frame": rci.ForceFrame(kind)}
@@ -192,7 +192,7 @@ def _load(request: rci.SetLoad, arm: RobotDescription) -> dict[str, object] | No
     numbers = chain(request.center_of_mass, request.inertia)
     if not 0.0 <= request.mass <= arm.rated_payload or not all(map(isfinite, numbers)):
         return None
-    if not all(abs(x) <= FARTHEST for x in request.center_of_mass):
+    if not hypot(*request.center_of_mass) <= LONGEST_TOOL:
         return None
     try:
         load = Payload(
@@ -207,7 +207,11 @@ def _load(request: rci.SetLoad, arm: RobotDescription) -> dict[str, object] | No
 
 def _pose(numbers: Floats) -> Pose | None:
     try:
-        pose = Pose.from_row_major(numbers)
+        return Pose.from_row_major(numbers)
     except InvalidValueError:
         return None
-    return pose if all(abs(x) <= FARTHEST for x in pose.position.tolist()) else None
+
+
+def _pose_at_flange(numbers: Floats) -> Pose | None:
+    pose = _pose(numbers)
+    return pose if pose is not None and hypot(*pose.parts[1]) <= LONGEST_TOOL else None

@@ -32,6 +32,8 @@ class Payload:
         mass = float(as_vector([self.mass], 1, "load mass", "kg")[0])
         if mass < 0.0:
             raise InvalidValueError("load mass", mass, "must not be negative, [kg]")
+        if mass == 0.0 and np.any(np.asarray(self.inertia)):
+            raise InvalidValueError("load inertia", self.inertia, "must be zero: a load without mass has none")
         inertia = as_vector(np.ravel(self.inertia), 9, "load inertia", "kg m^2").reshape(3, 3)
         if np.abs(inertia - inertia.T).max() > 1e-9 * max(1.0, float(np.abs(inertia).max())):
             raise InvalidValueError("load inertia", inertia.tolist(), "must be symmetric")

@@ -146,6 +146,26 @@ def test_what_the_vendors_sdk_allows_breaks_the_manuals_limit_until_the_table_is
         robot.world.set_limits("manual")
 
 
+@pytest.mark.parametrize("is_free", [False, True], ids=["lock-step", "free"])
+def test_a_motion_whose_commands_are_all_lost_says_that_it_did_not_arrive(is_free):
+    with simulate(MODEL, lockstep=not is_free) as robot:
+        robot.power_on()
+        robot.world.set_network(NetworkFaults(loss=1.0), direction="commands")
+        with pytest.raises(ControlError, match=r"joint 2 is 5\.73 deg from its end; .* played none of the commands"):
+            robot.move_j(MODEL.home + np.eye(MODEL.n)[1] * 0.1, speed=1.0)
+
+
+@pytest.mark.parametrize("frequency", [1.0, 10.0])
+def test_a_motion_that_a_filter_delays_is_waited_for(frequency):
+    with simulate(MODEL) as robot:
+        robot.power_on()
+        robot.set_filters(frequency, frequency, frequency)
+        motion = plan_joint(MODEL, MODEL.home, MODEL.home + 0.1)
+        run = robot.execute(motion)
+        assert np.abs(robot.state.q_c - motion.goal).max() <= 1e-6
+        assert run.stopped is None
+
+
 def test_auto_limit_leads_a_command_to_rest_inside_the_soft_limit(robot):
     start = np.array(robot.state.q_c)
     upper = np.array(MODEL.limits.joint.upper)
@@ -160,7 +180,8 @@ def test_auto_limit_leads_a_command_to_rest_inside_the_soft_limit(robot):
     robot.set_joint_limit(MODEL.limits.joint.lower, upper)
     robot.world.set_auto_limit()
     try:
-        robot.control(follow)
+        with pytest.raises(ControlError, match=r"did not arrive: joint 1 is \d\.\d+ deg from its end; .* soft limits"):
+            robot.control(follow)
         reached = np.array(robot.state.q_c)
         assert start[0] + 0.03 < reached[0] < upper[0]
     finally:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from rcilab.controller.playout import FIRST_COMMAND_TIMEOUT
 from rcilab.faults import Fault
 from rcilab.motion.joint import plan_joint
 from rcilab.protocols import rci
@@ -33,6 +34,17 @@ def test_n_lost_cycles_in_a_row_are_an_instability_and_one_stop(make_hand, limit
     assert hand.state.success_rate == pytest.approx(400 / (400 + limit))
     hand.rest()
     hand.assert_smooth()
+
+
+def test_commands_that_never_begin_are_lost_commands(make_hand) -> None:
+    hand = make_hand()
+    hand.start()
+    for _ in range(FIRST_COMMAND_TIMEOUT + 100):
+        if hand.step().faults:
+            break
+    assert hand.state.faults == (F.INSTABILITY_DETECTION,)
+    assert str(hand.cycle.reason) == "no command came within 5 s of the start"
+    assert hand.state.success_rate == 0.0
 
 
 def test_lost_cycles_are_bridged_with_the_acceleration_of_the_last_ones(hand) -> None:

@@ -37,7 +37,7 @@ GOOD = [
     rci.SetCartesianImpedance(CARTESIAN),
     rci.SetCartesianImpedance((0.0,) * 6),
     rci.SetCartImpDesiredTau(WRENCH),
-    rci.SetFilters(0.0, 1000.0, 55.5),
+    rci.SetFilters(0.1, 1000.0, 55.5),
     rci.SetTorqueFilterCutOffFrequency(1000.0),
     rci.SetJointLimit(UPPER, LOWER),
     rci.SetCartesianLimit((0.1, 2.0, 1e-3), POSE),
@@ -59,9 +59,11 @@ BAD = [
     *(rci.SetCartImpDesiredTau(more((0.0,) * 6, axis, 60.1)) for axis in range(6)),
     rci.SetCartImpDesiredTau(more((0.0,) * 6, 5, -30.1)),
     rci.SetCartImpDesiredTau((NAN,) * 6),
-    rci.SetFilters(1000.1, 0.0, 0.0),
-    rci.SetFilters(0.0, -0.1, 0.0),
-    rci.SetFilters(0.0, 0.0, NAN),
+    rci.SetFilters(1000.1, 1.0, 1.0),
+    rci.SetFilters(1.0, 0.0, 1.0),
+    rci.SetFilters(1.0, -0.1, 1.0),
+    rci.SetFilters(1.0, 1.0, NAN),
+    rci.SetTorqueFilterCutOffFrequency(0.0),
     rci.SetTorqueFilterCutOffFrequency(NAN),
     rci.SetTorqueFilterCutOffFrequency(math.inf),
     *(rci.SetJointLimit(more(UPPER, joint), LOWER) for joint in range(7)),
@@ -111,7 +113,7 @@ def test_taken_values_are_in_the_settings(settings, arm) -> None:
         settings = apply_request(settings, request_, arm) or settings
     assert settings.collision_thresholds == (0.0,) * 7
     assert settings.desired_wrench == WRENCH
-    assert (settings.joint_filter, settings.cartesian_filter, settings.torque_filter) == (0.0, 1000.0, 55.5)
+    assert (settings.joint_filter, settings.cartesian_filter, settings.torque_filter) == (0.1, 1000.0, 55.5)
     assert settings.T_flange_tool.position.tolist() == [0.25, 0.5, 0.75]
     assert settings.force_frame is rci.ForceFrame.PATH
     assert settings.safety_box is not None

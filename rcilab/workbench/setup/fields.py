@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rcilab.client.settings import LONGEST_TOOL
 from rcilab.client.setup import RobotSetup
 from rcilab.dynamics.payload import Payload
 from rcilab.errors import InvalidValueError
+from rcilab.protocols.rci.bounds import LONGEST_TOOL
 from rcilab.safety_box import SafetyBox
 from rcilab.spatial import Pose
 from rcilab.workbench.setup.wanted import SetupState
