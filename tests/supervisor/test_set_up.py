@@ -88,9 +88,9 @@ def test_what_the_controller_refuses_stands_in_the_way_of_a_motion(supervisor):
     home = plan_joint(MODEL, supervisor.status().q_c, MODEL.home, speed=0.5)
     far = RobotSetup(force=ForceControlFrame(T_flange_force=Pose((50.0, 0.0, 0.0))))
     ticket = supervisor.set_up(far)
-    with pytest.raises(rcilab.RcilabError, match="T_flange_force: 50.0 m from the flange"):
+    with pytest.raises(rcilab.RcilabError, match=r"T_flange_force: .* m from the flange"):
         ticket.wait(SOON)
-    with pytest.raises(UsageError, match="T_flange_force: 50.0 m from the flange"):
+    with pytest.raises(UsageError, match=r"T_flange_force: .* m from the flange"):
         supervisor.execute(home, check(home, supervisor.model).certificate)
     supervisor.set_up(RobotSetup(force=FORCE)).wait(SOON)
     supervisor.execute(home, check(home, supervisor.model).certificate).wait(SOON)
