@@ -177,10 +177,10 @@ class CommandRejectedError(RcilabError):
         status: The status that came back.
     """
 
-    def __init__(self, command: str, status: object, advice: str = "") -> None:
+    def __init__(self, command: str, status: object, advice: str = "", *, reason: str = "") -> None:
         name = getattr(status, "name", str(status)).lower().replace("_", " ")
         super().__init__(f"{command} was refused: {name}" + (f"; {advice}" if advice else ""))
-        self.coded("rejected", command=command, status=name)
+        self.coded("rejected", command=command, status=reason or name)
         self.command = command
         self.status = status
 

@@ -79,14 +79,16 @@ def faults_from_bits(bits: Iterable[int]) -> tuple[Fault, ...]:
 _CAUSES = {
     Fault.ACTUAL_JOINT_POSITION_LIMITS_VIOLATION: "a measured joint angle left its range",
     Fault.ACTUAL_CARTESIAN_POSITION_LIMITS_VIOLATION: "the measured tool pose left the safety box",
-    Fault.ACTUAL_CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION: "the measured arm angle left its range",
+    Fault.ACTUAL_CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION: "the measured arm angle turned too fast",
     Fault.ACTUAL_JOINT_VELOCITY_LIMITS_VIOLATION: "a measured joint velocity was too high",
     Fault.ACTUAL_CARTESIAN_VELOCITY_LIMITS_VIOLATION: "the measured tool velocity was too high",
     Fault.ACTUAL_JOINT_ACCELERATION_LIMITS_VIOLATION: "a measured joint acceleration was too high",
     Fault.ACTUAL_CARTESIAN_ACCELERATION_LIMITS_VIOLATION: "the measured tool acceleration was too high",
     Fault.COMMAND_JOINT_POSITION_LIMITS_VIOLATION: "a commanded joint angle is outside its range",
     Fault.COMMAND_CARTESIAN_POSITION_LIMITS_VIOLATION: "the commanded tool pose is outside the safety box",
-    Fault.COMMAND_CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION: "the commanded arm angle is out of range",
+    Fault.COMMAND_CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION: (
+        "the commanded arm angle broke one of its bounds (angle, velocity, acceleration or jerk)"
+    ),
     Fault.COMMAND_JOINT_VELOCITY_LIMITS_VIOLATION: "a commanded joint velocity is too high",
     Fault.COMMAND_CARTESIAN_VELOCITY_LIMITS_VIOLATION: "the commanded tool velocity is too high",
     Fault.COMMAND_JOINT_ACCELERATION_LIMITS_VIOLATION: "a commanded joint acceleration is too high",

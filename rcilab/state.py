@@ -99,11 +99,12 @@ class RobotState:
     tau_ext_in_stiff: Array
     """External force and moment in the force-control frame, (6,), [N, N m]."""
     theta: JointVector
-    """Motor positions, [rad]."""
+    """Motor positions, motor side of the gear, [rad] (manual: theta_m). The virtual controller takes 101 motor turns
+    for one of the joint, a figure of ours: the manual gives none."""
     dtheta: JointVector
-    """Motor velocities, [rad/s]."""
+    """Motor velocities, motor side of the gear, [rad/s] (manual: theta_vel_m)."""
     motor_tau: JointVector
-    """Motor torques, [N m]."""
+    """Motor torques, motor side of the gear, [N m]."""
     motor_tau_filtered: JointVector
     """Filtered motor torques, [N m]."""
     faults: tuple[Fault, ...]

@@ -17,6 +17,7 @@ from rcilab.client.fault_report import describe_faults, describe_late_callback
 from rcilab.client.filters import CommandFilter, is_near
 from rcilab.client.link import Link
 from rcilab.client.recorder import CycleLog
+from rcilab.client.refusal import Refusal
 from rcilab.clock import CYCLE_TIME
 from rcilab.command import CartesianPosition, Command, JointPosition, JointTorque
 from rcilab.errors import (
@@ -25,11 +26,12 @@ from rcilab.errors import (
     ControlError,
     DeadlineError,
     InvalidValueError,
+    RcilabError,
 )
 from rcilab.faults import Fault
 from rcilab.limits import Limits
-from rcilab.protocols.rci import StartMotionMode, build_command
-from rcilab.state import ControllerMode, RobotState
+from rcilab.protocols.rci import SafetyStop, StartMotionMode, build_command
+from rcilab.state import ControllerMode, RobotMode, RobotState
 
 if TYPE_CHECKING:
     from rcilab.model import RobotModel
@@ -358,8 +360,22 @@ class ControlLoop:
         late = ""
         if Fault.INSTABILITY_DETECTION in state.faults:
             late = describe_late_callback(1e-9 * self._slowest, self._slowest_t)
-        message = describe_faults(state.faults, record, t, self._limits, late=late)
-        return ControlError(message, state.faults, record)
+        pressed = self._find_safety_stop(state)
+        message = describe_faults(
+            state.faults, record, t, self._limits, late=late, pressed="" if pressed is None else pressed.sentence
+        )
+        error = ControlError(message, state.faults, record)
+        return error if pressed is None else error.coded("safety_stop", status=pressed.word)
+
+    def _find_safety_stop(self, state: RobotState) -> Refusal | None:
+        """Returns which safety stop ended the motion; None: a fault of the motion did."""
+        if state.robot_mode is not RobotMode.USER_STOPPED:
+            return None
+        try:
+            is_gate = self._commands.safety_stop() is SafetyStop.GSTOP
+        except RcilabError:  # The state says that there is one.
+            is_gate = False
+        return Refusal.GSTOP if is_gate else Refusal.ESTOP
 
     def _not_arrived(self, state: RobotState, command: Command) -> ControlError:
         if np.array_equal(state.q_c, self._first_q_c):

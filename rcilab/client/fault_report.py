@@ -37,7 +37,7 @@ def describe_late_callback(duration: float, t: float) -> str:
 
 
 def describe_faults(
-    faults: Iterable[Fault], record: NDArray[np.void], t: float, limits: Limits, *, late: str = ""
+    faults: Iterable[Fault], record: NDArray[np.void], t: float, limits: Limits, *, late: str = "", pressed: str = ""
 ) -> str:
     """Returns the message of the error that a motion ends with.
 
@@ -47,9 +47,16 @@ def describe_faults(
         t: Motion time of the state that carried the faults, [s]; NaN before the first command.
         limits: Bounds of the arm.
         late: What `describe_late_callback` returned, for a motion that a slow callback may have ended.
+        pressed: Which safety stop ended the motion, in a sentence with what to do; "" for none. The RCI has no error
+            bit for it, so that the bits which a controller sets meanwhile say something else.
     """
     faults = tuple(faults)
     when = "before the first command" if math.isnan(t) else f"at t = {t:.3f} s"
+    if pressed:
+        bits = ", ".join(fault.name for fault in faults)
+        return (
+            f"the controller stopped the motion {when}: {pressed} (reported as {bits}); .record holds the last cycles"
+        )
     names = ", ".join(f"{fault.name} ({fault.cause})" for fault in faults)
     parts = [f"the controller stopped the motion {when}: {names}"]
     numbers = _numbers(faults, record, limits)

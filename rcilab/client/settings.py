@@ -1,6 +1,6 @@
 """Every setter of the RCI as a method: arguments checked before they are sent, in the words of the axis they are for.
 
-Settable while nothing moves; the controller answers "not possible" otherwise.
+Most are settable while nothing moves; a refusal says what the controller is doing instead.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from rcilab.arrays import Array, as_number, described
 from rcilab.client.link import Link
+from rcilab.client.refusal import Refusal, find_refusal
 from rcilab.errors import CommandRejectedError, InvalidValueError
 from rcilab.limits import Limits
 from rcilab.protocols import rci
@@ -24,26 +25,28 @@ from rcilab.spatial import Pose
 
 _AXES = ("x", "y", "z", "about x", "about y", "about z")
 _ADVICE: dict[tuple[type[rci.Request], IntEnum], str] = {
-    (rci.StartMove, rci.StartStatus.NOT_POSSIBLE): "is the motor power on (power_on()), and does nothing move yet?",
-    (rci.StartMove, rci.StartStatus.SINGULAR_START_POSE): "move away from the singularity in joint space first",
-    (rci.StartMove, rci.StartStatus.REFLEX): "faults are set: recover() clears them",
-    (rci.StartMove, rci.StartStatus.USER_STOP): "an emergency stop is pressed: release it, then recover()",
     (
-        rci.AutomaticErrorRecovery,
-        rci.RecoveryStatus.NOT_POSSIBLE,
-    ): "the arm still moves: try again at rest",
+        rci.StartMove,
+        rci.StartStatus.NOT_POSSIBLE,
+    ): "the controller has no such pair of modes, or still moves",
+    (rci.StartMove, rci.StartStatus.SINGULAR_START_POSE): "move away from the singularity in joint space first",
+    (rci.StartMove, rci.StartStatus.REFLEX): Refusal.FAULT.sentence,
+    (rci.StartMove, rci.StartStatus.USER_STOP): Refusal.ESTOP.sentence,
+    (rci.AutomaticErrorRecovery, rci.RecoveryStatus.NOT_POSSIBLE): "the arm still moves: try again at standstill",
     (rci.AutomaticErrorRecovery, rci.RecoveryStatus.MANUAL_RECOVERY_NEEDED): (
-        "a person has to bring the arm out of it: see the teach pendant"
+        "the arm is too far outside its soft limits or its safety box: power_off() clears the fault; "
+        "then power_on() and guide it back by hand (start_drag()), or widen them and move it back"
     ),
     (rci.AutomaticErrorRecovery, rci.RecoveryStatus.REFLEX): (
-        "the cause is still there: look what touches or loads the arm, remove it, and try again"
+        "the cause is still there: look what touches or loads the arm and remove it, set the load (set_load()) or "
+        "higher thresholds (set_collision_behavior()), and try again"
     ),
-    (rci.AutomaticErrorRecovery, rci.RecoveryStatus.USER_STOP): (
-        "an emergency stop or the safety gate is open: release it first (safety_stop() tells which)"
-    ),
+    (rci.AutomaticErrorRecovery, rci.RecoveryStatus.USER_STOP): Refusal.ESTOP.sentence,
     (rci.AutomaticErrorRecovery, rci.RecoveryStatus.ABORTED): "something ended it half-way: try again",
 }
-_WHILE_IDLE = "it is settable while nothing moves and nobody guides the arm"
+"""What to do where the controller's state does not tell the reason either."""
+_TEMPORARY = frozenset({"NOT_POSSIBLE", "USER_STOP", "FAILED"})
+"""Names of statuses that refuse a request because of what the controller is doing, whatever its values."""
 
 _Member = TypeVar("_Member", bound=IntEnum)
 
@@ -170,11 +173,14 @@ class RciSettings:
 
     def _ask(self, request: rci.Request, also_good: IntEnum | None = None, timeout: float | None = None) -> None:
         status = self._request(request, timeout).status
-        if status != 0 and status != also_good:
-            advice = _ADVICE.get((type(request), status), "")
-            if not advice and status == rci.SettingStatus.NOT_POSSIBLE and isinstance(status, rci.SettingStatus):
-                advice = _WHILE_IDLE
-            raise CommandRejectedError(type(request).__name__, status, advice)
+        if status == 0 or status == also_good:
+            return
+        reason = None
+        if getattr(status, "name", "") in _TEMPORARY or status is rci.StartStatus.REFLEX:
+            reason = find_refusal(self._request, lambda: self._link.latest)
+        advice = _ADVICE.get((type(request), status), "") if reason is None else reason.sentence
+        word = "" if reason is None else reason.word
+        raise CommandRejectedError(type(request).__name__, status, advice, reason=word)
 
     def _request(self, request: rci.Request, timeout: float | None = None) -> Any:
         """Sends a request and returns the answer; every command comes through here."""

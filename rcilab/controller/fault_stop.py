@@ -2,6 +2,10 @@
 
     print(fault_stop.as_text())
 
+Where one command or one measurement breaks several conditions, all their bits are set in that cycle. A state, a report
+and an error list them in the order of the error bytes on the wire, that of this table, which says nothing about what
+came first. Commands are judged before the measurement: after a broken command no measurement is judged in that cycle.
+
 What is the same for all: the bit is set in the state of the cycle in which the condition is violated and stays set
 until the error recovery; queued commands are forgotten; the arm comes to rest inside its acceleration and jerk limits
 under the position servo, then the brakes close; StopMove is answered with success. What differs is whose value broke

@@ -126,6 +126,10 @@ GROUNDED: Final = (
 )
 """Setters for an arm at rest and in good health. The manual gives no list: a choice, on the safe side."""
 
+REMEDIES: Final = (C.SET_COLLISION_BEHAVIOR, C.SET_LOAD)
+"""Those of them that also a stopped arm takes: the manual's way out of a collision without contact is to raise the
+thresholds (4.6), and an error recovery waits until nothing is above them."""
+
 _BUSY = (P.STARTING, P.MOVING, P.STOPPING, P.GUIDING, P.RECOVERING)
 _START_REFUSED = dict.fromkeys((P.OFF, *_BUSY), StartStatus.NOT_POSSIBLE) | {
     P.REFLEX: StartStatus.REFLEX,
@@ -146,7 +150,7 @@ def _setters(phase: Phase) -> dict[Trigger, Transition]:
     for command in ANYTIME:
         rows[command] = Transition(phase, (A.APPLY,), _success(command))
     for command in GROUNDED:
-        if phase in (P.OFF, P.IDLE):
+        if phase in (P.OFF, P.IDLE) or (phase is P.REFLEX and command in REMEDIES):
             rows[command] = Transition(phase, (A.APPLY,), _success(command))
         else:
             rows[command] = Transition(phase, (), _refusal(command))

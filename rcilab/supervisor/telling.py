@@ -39,7 +39,7 @@ def tell_error(error: RcilabError, status: SupervisorStatus | None = None) -> Me
         error: What went wrong.
         status: How the robot side stands, where the error came from there.
     """
-    if isinstance(error, ControlError) and error.faults:
+    if isinstance(error, ControlError) and error.faults and not error.code:
         return message("notice.fault", faults=name_faults(error.faults))
     if isinstance(error, InvalidValueError) and error.name == "address":
         return message("address.bad", typed=str(error.value))

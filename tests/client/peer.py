@@ -32,6 +32,7 @@ class Script:
 
     q: np.ndarray = field(default_factory=lambda: np.array([0.1, 0.2, 0.3, 0.9, -0.1, 0.5, 0.0]))
     statuses: dict[type[rci.Request], int] = field(default_factory=dict)
+    safety_stop: rci.SafetyStop = rci.SafetyStop.NONE
     silent_requests: tuple[type[rci.Request], ...] = ()
     split_responses: bool = False
     stale_responses: bool = False
@@ -174,7 +175,7 @@ class Peer:
             self.script.fault_at = None
         response = {
             rci.GetMotorState: rci.MotorStateResponse(1),
-            rci.GetSafetyStopState: rci.SafetyStopResponse(rci.SafetyStop.GSTOP),
+            rci.GetSafetyStopState: rci.SafetyStopResponse(self.script.safety_stop),
             rci.GetDIState: rci.DigitalInputResponse(rci.SettingStatus.SUCCESS, True),
             rci.LoadRobotModel: rci.ModelResponse(_DH_PRO7, (0.0,) * 66, (0.0,) * 45),
         }.get(type(request)) or rci.StatusResponse(rci.STATUS_TYPES[request.code](status))

@@ -25,7 +25,7 @@ REST = plan_joint(MODEL, MODEL.home, MODEL.home)
 
 
 def test_every_command_reaches_the_controller_as_the_protocol_spells_it(make_robot):
-    peer, robot = make_robot()
+    peer, robot = make_robot(Script(safety_stop=rci.SafetyStop.GSTOP))
     robot.power_on()
     assert robot.motor_state() is True
     robot.connect()
@@ -110,7 +110,7 @@ def test_a_bad_argument_is_named_and_not_sent(make_robot, call, hint):
 
 def test_a_refusal_says_what_to_do(make_robot):
     _, robot = make_robot(Script(statuses={rci.StartMove: rci.StartStatus.NOT_POSSIBLE}))
-    with pytest.raises(CommandRejectedError, match="power_on") as caught:
+    with pytest.raises(CommandRejectedError, match="no such pair of modes, or still moves") as caught:
         robot.control(wave(10))
     assert caught.value.status is rci.StartStatus.NOT_POSSIBLE
 
@@ -152,10 +152,13 @@ def test_a_refused_tool_leaves_the_model_as_it_is(make_robot):
 @pytest.mark.parametrize(
     ("status", "words"),
     [
-        (rci.RecoveryStatus.NOT_POSSIBLE, "not possible; the arm still moves: try again at rest"),
-        (rci.RecoveryStatus.MANUAL_RECOVERY_NEEDED, "manual recovery needed; a person has to bring the arm out of it"),
+        (rci.RecoveryStatus.NOT_POSSIBLE, "not possible; the arm still moves: try again at standstill"),
+        (
+            rci.RecoveryStatus.MANUAL_RECOVERY_NEEDED,
+            "manual recovery needed; the arm is too far outside its soft limits or its safety box",
+        ),
         (rci.RecoveryStatus.REFLEX, "reflex; the cause is still there"),
-        (rci.RecoveryStatus.USER_STOP, "user stop; an emergency stop or the safety gate is open: release it first"),
+        (rci.RecoveryStatus.USER_STOP, "user stop; an emergency stop is pressed: release it first"),
         (rci.RecoveryStatus.ABORTED, "aborted; something ended it half-way"),
     ],
 )
@@ -166,9 +169,25 @@ def test_every_refusal_of_a_recovery_has_its_words(make_robot, status, words):
     assert caught.value.status is status
 
 
-def test_a_setter_that_comes_too_late_says_when_it_may(make_robot):
-    _, robot = make_robot(Script(statuses={rci.SetFilters: rci.SettingStatus.NOT_POSSIBLE}))
-    with pytest.raises(CommandRejectedError, match="not possible; it is settable while nothing moves"):
+@pytest.mark.parametrize(
+    ("stop", "words"),
+    [
+        (rci.SafetyStop.ESTOP, "an emergency stop is pressed: release it first"),
+        (rci.SafetyStop.GSTOP, "the safety gate is open: close it first"),
+    ],
+)
+def test_a_refusal_as_not_possible_asks_the_controller_for_its_reason(make_robot, stop, words):
+    statuses = {rci.SetFilters: rci.SettingStatus.NOT_POSSIBLE}
+    _, robot = make_robot(Script(statuses=statuses, safety_stop=stop))
+    with pytest.raises(CommandRejectedError, match=f"SetFilters was refused: not possible; {words}") as caught:
+        robot.set_filters(100, 100, 100)
+    assert caught.value.facts["status"] == stop.name.lower()
+
+
+def test_a_reason_that_cannot_be_asked_for_does_not_replace_the_refusal(make_robot):
+    statuses = {rci.SetFilters: rci.SettingStatus.NOT_POSSIBLE}
+    _, robot = make_robot(Script(statuses=statuses, silent_requests=(rci.GetSafetyStopState,)))
+    with pytest.raises(CommandRejectedError, match="SetFilters was refused: not possible"):
         robot.set_filters(100, 100, 100)
 
 

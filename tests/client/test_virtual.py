@@ -60,7 +60,7 @@ def test_outputs_come_back_as_inputs_when_looped(robot):
 def test_a_drag_shows_in_the_mode_and_refuses_settings_until_it_ends(robot):
     robot.start_drag("cartesian", "free")
     assert robot.state.robot_mode is RobotMode.GUIDING
-    with pytest.raises(CommandRejectedError, match="settable while nothing moves and nobody guides") as caught:
+    with pytest.raises(CommandRejectedError, match="not possible; the arm is guided by hand") as caught:
         robot.set_joint_impedance(MODEL.limits.joint.stiffness)
     assert caught.value.status is SettingStatus.NOT_POSSIBLE
     robot.stop_drag()
@@ -73,13 +73,45 @@ def test_a_safety_stop_is_shown_and_recovery_waits_for_its_release(robot, button
     assert robot.safety_stop() is SafetyStop.NONE
     robot.world.press(button)
     assert robot.safety_stop() is shown
-    with pytest.raises(CommandRejectedError, match="release it first") as caught:
+    with pytest.raises(CommandRejectedError, match=r"(release|close) it first") as caught:
         robot.recover()
     assert caught.value.status is RecoveryStatus.USER_STOP
+    words = {"estop": "an emergency stop is pressed", "gstop": "the safety gate is open"}[button]
+    for refused in (robot.power_on, robot.start_drag, lambda: robot.set_filters(100.0, 100.0, 100.0)):
+        with pytest.raises(CommandRejectedError, match=words):
+            refused()
     robot.world.press("none")
     robot.recover()
     robot.power_on()
     assert robot.control(hold).stopped is None
+
+
+def test_without_power_a_drag_and_a_motion_are_refused_for_that(robot):
+    robot.power_off()
+    with pytest.raises(CommandRejectedError, match="StartDrag was refused: not possible; the motors are off"):
+        robot.start_drag()
+    with pytest.raises(CommandRejectedError, match="StartMove was refused: not possible; the motors are off"):
+        robot.control(hold)
+    robot.power_on()
+
+
+@pytest.mark.parametrize("plant", ["ideal", "mujoco"])
+def test_a_collision_that_presses_on_is_left_by_higher_thresholds(plant):
+    with simulate(MODEL, plant=plant) as robot:
+        robot.power_on()
+        robot.set_collision_behavior([5.0] * MODEL.n)
+        robot.world.push([0.0, 0.0, -40.0, 0.0, 0.0, 0.0], duration=60.0)
+        with pytest.raises(ControlError, match="COLLISION"):
+            robot.control(lambda state, t: JointPosition(state.q_c))
+        with pytest.raises(
+            CommandRejectedError, match="StartDrag was refused: not possible; a fault has stopped the arm"
+        ):
+            robot.start_drag()
+        with pytest.raises(CommandRejectedError, match=r"the cause is still there: .*set_collision_behavior"):
+            robot.recover()
+        robot.set_collision_behavior(MODEL.limits.joint.collision_threshold)
+        robot.recover()
+        assert robot.control(hold).stopped is None
 
 
 def test_a_safety_stop_in_mid_motion_ends_it_with_a_record_and_the_session_goes_on(robot):
@@ -88,8 +120,10 @@ def test_a_safety_stop_in_mid_motion_ends_it_with_a_record_and_the_session_goes_
             robot.world.press("estop")
         return JointPosition(state.q_c)
 
-    with pytest.raises(ControlError, match="emergency stop") as caught:
+    with pytest.raises(ControlError, match=r"stopped the motion at t = .*: an emergency stop is pressed") as caught:
         robot.control(callback)
+    assert "network" not in str(caught.value)
+    assert "commands in a row" not in str(caught.value)
     assert len(caught.value.record) > 20
     robot.world.press("none")
     robot.recover()

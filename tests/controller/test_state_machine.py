@@ -9,6 +9,7 @@ from rcilab.controller.state_machine import (
     GROUNDED,
     POWER_OFF,
     QUERIES,
+    REMEDIES,
     TABLE,
     Action,
     Event,
@@ -31,6 +32,7 @@ SET_MOTOR_POWER IDLE,0 =,0 =,0 =,0 =,0 =,0 =,0 =,1 =,0
 AUTOMATIC_ERROR_RECOVERY =,0 =,0 =,1 =,1 =,1 =,1 RECOVERING,0 =,4 =,1
 REBOOT_ROBOT =,0 OFF,0 =,1 =,1 =,1 =,1 OFF,0 =,0 =,1
 GROUNDED     =,0 =,0 =,1 =,1 =,1 =,1 =,1 =,1 =,1
+REMEDIES     =,0 =,0 =,1 =,1 =,1 =,1 =,0 =,1 =,1
 ANYTIME      =,0 =,0 =,0 =,0 =,0 =,0 =,0 =,0 =,0
 QUERIES      =,- =,- =,- =,- =,- =,- =,- =,- =,-
 MODES_SHOWN  = = MOVING = = = = = =
@@ -41,7 +43,7 @@ CLIENT_LOST  = = IDLE STOPPING STOPPING IDLE = = =
 SAFETY_STOP  USER_STOPPED USER_STOPPED USER_STOPPED USER_STOPPED USER_STOPPED USER_STOPPED USER_STOPPED = USER_STOPPED
 SAFETY_RELEASE = = = = = = = OFF =
 """
-GROUPS = {"GROUNDED": GROUNDED, "ANYTIME": ANYTIME, "QUERIES": QUERIES}
+GROUPS = {"GROUNDED": GROUNDED, "REMEDIES": REMEDIES, "ANYTIME": ANYTIME, "QUERIES": QUERIES}
 
 
 def expected() -> dict[tuple[Phase, CommandCode | Event], tuple[Phase, str]]:
