@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from rcilab.model import RobotModel
     from rcilab.motion import Motion, Program
 
-HELP = "motion (.npz, from Motion.save) or program (.json, from Program.save)"
+HELP = "motion (.npz or .csv, from Motion.save) or program (.json, from Program.save)"
 
 
 def read_file(file: Path) -> Motion | Program:

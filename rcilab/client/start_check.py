@@ -21,7 +21,7 @@ def require_motion(motion: object, certificate: object) -> None:
     from rcilab.motion import Motion
 
     if not isinstance(motion, Motion):
-        raise InvalidValueError("motion", motion, "is no motion; make one with plan_joint or Motion.from_samples")
+        raise InvalidValueError("motion", motion, "is no motion; make one with plan_joint or Motion.from_cycles")
     if isinstance(certificate, Report):
         raise InvalidValueError("certificate", "report", "is not the proof: pass report.certificate, not the report")
     if certificate is not None and not isinstance(certificate, Certificate):

@@ -79,7 +79,7 @@ def _breaches(candidate: PacedMotion, model: RobotModel, mode: Mode) -> list[Vio
         rows, start = candidate.q, None
     else:
         start = _state(candidate.q[first - _PAST : first + 1])
-    report = check(Motion.from_samples(rows), model, start=start, distance=None, mode=mode)
+    report = check(Motion.from_cycles(rows), model, start=start, distance=None, mode=mode)
     return list(report.violations)
 
 

@@ -280,7 +280,7 @@ class Report:
 
         The curve stays the same and runs slower as a whole. The factor is found to 0.1 % and checked: the motion comes
         with its own report. A way that leaves its range or the box does not mend, nor does a start that is elsewhere.
-        Rows from elsewhere (`Motion.from_samples`) jump a little in acceleration from row to row, and that shows at one
+        Rows from elsewhere (`Motion.from_cycles`) jump a little in acceleration from row to row, and that shows at one
         factor and not at the next: with them a smaller factor may pass by chance.
 
         Args:

@@ -116,7 +116,7 @@ class Exhibit:
             q[:] = q[0]
         elif np.isfinite(sent).all():
             q[1 : len(self.cycles)] = sent
-        return Motion.from_samples(q)
+        return Motion.from_cycles(q)
 
     @property
     def moved(self) -> Motion:
@@ -125,7 +125,7 @@ class Exhibit:
 
         if FAULT_STOP[self.fault].offender is Offender.COMMAND and self.recipe.mode != "torque":
             return self.commanded
-        return Motion.from_samples(self._every_cycle("q"))
+        return Motion.from_cycles(self._every_cycle("q"))
 
     def _every_cycle(self, name: str) -> Array:
         """Returns joint angles of every cycle, shape (N, n), [rad]; between states that were dropped, interpolated."""

@@ -39,7 +39,7 @@ def exhibition_of(exhibit: Exhibit) -> Exhibition:
     from rcilab.recording.run import Run
 
     def draw(motion: Motion) -> Plan:
-        judged = Motion.from_samples(motion.q[: exhibit.sample + 1])  # From there on the way is the controller's.
+        judged = Motion.from_cycles(motion.q[: exhibit.sample + 1])  # From there on the way is the controller's.
         return picture(exhibit.model, motion, check(judged, exhibit.model, distance=None))
 
     commanded = exhibit.commanded

@@ -88,8 +88,36 @@ class Motion:
         object.__setattr__(self, "notes", tuple(note if isinstance(note, Remark) else str(note) for note in self.notes))
 
     @classmethod
-    def from_samples(cls, q: ArrayLike) -> Motion:
-        """Returns a motion through given rows, one a cycle: a recording, or a path from elsewhere, to be judged.
+    def from_samples(cls, q: ArrayLike, *, dt: float | None = None, times: ArrayLike | None = None) -> Motion:
+        """Returns the motion through joint samples at any rate, even or not: a cubic spline through every sample.
+
+        It starts and ends at rest. Nothing is slowed down or smoothed; `check` says whether it keeps the limits. Rows
+        that are one a controller cycle, such as those of a recording, go into `from_cycles`.
+
+        Args:
+            q: Joint angles, shape (N, n), N >= 1, [rad].
+            dt: Time between two samples, [s]: 0.01 for 100 samples a second.
+            times: Time of each sample, shape (N,), increasing, [s]; instead of `dt`.
+
+        Raises:
+            InvalidValueError: Not finite, no times or too many, or the times do not increase.
+        """
+        from rcilab.motion.spline import motion_through
+
+        if (dt is None) == (times is None):
+            problem = "needs either dt= (seconds between samples) or times=; rows of 1 ms go into Motion.from_cycles"
+            raise InvalidValueError("dt and times", (dt, times), problem)
+        rows = as_path(q, None, "q", "rad")
+        if dt is not None:
+            if not 0.0 < (dt := as_number(dt, "dt", "s")) < math.inf:
+                raise InvalidValueError("dt", dt, "must be above 0: seconds between two samples")
+            times = np.arange(len(rows)) * dt
+        assert times is not None
+        return motion_through(times, rows)
+
+    @classmethod
+    def from_cycles(cls, q: ArrayLike) -> Motion:
+        """Returns the motion through given rows, one a controller cycle of 1 ms: those of a recording or a motion.
 
         Between the rows it runs as cubic pieces with the slopes of central differences, at the ends of one-sided ones.
 
@@ -214,10 +242,13 @@ class Motion:
         return replace(self, polynomial=self.polynomial.slowed(factor), segment_starts=starts)
 
     def save(self, file: str | PathLike[str] | BinaryIO) -> None:
-        """Writes the motion to a file (.npz) that `Motion.load` reads back to the last bit.
+        """Writes the motion to a file that `Motion.load` reads; the ending of its name chooses the format.
+
+        .npz holds everything, to the last bit. .csv holds the rows of the 1 ms grid, `t [s]`, `q1 [rad]`, ...: the
+        motion that comes back has the same `.times` and `.q`, to the last bit, and the law "samples".
 
         Raises:
-            InvalidValueError: The file cannot be written.
+            InvalidValueError: The ending is unknown, or the file cannot be written.
         """
         from rcilab.motion.storage import save_motion
 
@@ -225,7 +256,9 @@ class Motion:
 
     @classmethod
     def load(cls, file: str | PathLike[str] | BinaryIO) -> Motion:
-        """Returns the motion in a file.
+        """Returns the motion in a file (.npz or .csv, see `save`).
+
+        A CSV whose times are not the 1 ms grid is read as `load_samples` reads it.
 
         Raises:
             InvalidValueError: There is no such file, or it holds no sound motion.

@@ -10,7 +10,8 @@ from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 
-from rcilab.arrays import Array, as_number, as_path, as_vector
+from rcilab.arrays import Array, JointPath, as_number, as_path, as_vector
+from rcilab.clock import CYCLE_TIME
 from rcilab.errors import InvalidValueError
 from rcilab.motion.archive import read_arrays
 from rcilab.motion.motion import Motion
@@ -24,6 +25,9 @@ AngleUnit: TypeAlias = Literal["rad", "deg"]
 MOST = 4.0 * math.pi
 """Angle that no joint of an arm reaches, [rad]: whoever reads more, reads degrees."""
 
+_ON_GRID = 1e-6
+"""How far times may be off whole cycles and still be them, [s]: what six decimals leave."""
+
 _TIME = re.compile(r"(?:t|time|times|timestamp)[ _]*[\[(]?(s|ms|us|ns)?[\])]?")
 _JOINT = re.compile(r"(?:(?:\w*[_./])?joint|q|j|axis)[ _]*(?:\[(\d+)\]|(\d+))[ _]*[\[(]?(rad|deg|°)?[\])]?")
 _SECONDS = {None: 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
@@ -35,6 +39,22 @@ def load_samples(file: str | PathLike[str], *, rate_hz: float | None = None, uni
     Raises:
         InvalidValueError: There is no such file, or it holds no sound samples; one sentence with the line.
     """
+    return motion_through(*_read(file, rate_hz, unit))
+
+
+def load_rows(file: str | PathLike[str]) -> Motion:
+    """Returns the motion in a CSV file: rows of the 1 ms grid as they are, others as `load_samples` reads them.
+
+    Raises:
+        InvalidValueError: As for `load_samples`.
+    """
+    times, q = _read(file, None, "rad")
+    grid = times[0] + CYCLE_TIME * np.arange(len(times))
+    return Motion.from_cycles(q) if np.abs(times - grid).max() < _ON_GRID else motion_through(times, q)
+
+
+def _read(file: str | PathLike[str], rate_hz: float | None, unit: AngleUnit) -> tuple[Array, JointPath]:
+    """Returns times [s] and joint angles [rad]."""
     if unit not in get_args(AngleUnit):
         raise InvalidValueError("unit", unit, f"is unknown; known: {', '.join(get_args(AngleUnit))}")
     if rate_hz is not None and not 0.0 < (rate_hz := as_number(rate_hz, "rate_hz", "Hz")) < math.inf:
@@ -56,7 +76,7 @@ def load_samples(file: str | PathLike[str], *, rate_hz: float | None = None, uni
         raise InvalidValueError("rate_hz", rate_hz, f"is not needed: {path.name} has times of its own; leave it out")
     _require_later(times, place)
     _require_angles(q, place)
-    return motion_through(times, q)
+    return times, q
 
 
 def _from_csv(content: bytes, name: str, has_rate: bool, unit: AngleUnit) -> tuple[Array | None, Array, list[str]]:

@@ -1,14 +1,16 @@
-"""Motions in files: a versioned .npz that comes back to the last bit, and kind words for every other file."""
+"""Motions in files: a versioned .npz that comes back to the last bit, the rows as CSV, and words for other files."""
 
 from __future__ import annotations
 
+from io import TextIOWrapper
 from os import PathLike, fspath
 from pathlib import Path
-from typing import BinaryIO
+from typing import IO, BinaryIO
 
 import numpy as np
 
 from rcilab.arrays import as_number
+from rcilab.cycle_file import Column, write_csv
 from rcilab.errors import InvalidValueError, VersionMismatchError
 from rcilab.motion.archive import read_arrays
 from rcilab.motion.motion import Motion
@@ -23,11 +25,24 @@ _SIGNATURES = (b"PK", b"\x93NUMPY")
 
 
 def save_motion(motion: Motion, file: str | PathLike[str] | BinaryIO) -> None:
-    """Writes a motion; the name is kept as given, no ending is added.
+    """Writes a motion: by the ending of a name .npz or .csv, to a stream .npz.
 
     Raises:
-        InvalidValueError: The file cannot be written.
+        InvalidValueError: The ending is unknown, or the file cannot be written.
     """
+    if not isinstance(file, str | PathLike):
+        _require_stream(file, "write")
+        _write_npz(motion, file)
+        return
+    write = _WRITERS[_require_suffix(file)]
+    try:
+        with replacing(file) as stream:
+            write(motion, stream)
+    except OSError as error:
+        raise InvalidValueError("motion file", fspath(file), f"cannot be written: {error.strerror}") from error
+
+
+def _write_npz(motion: Motion, stream: IO[bytes]) -> None:
     content = {
         "kind": np.array(KIND),
         "version": np.array(VERSION),
@@ -39,15 +54,24 @@ def save_motion(motion: Motion, file: str | PathLike[str] | BinaryIO) -> None:
         "segment_starts": motion.segment_starts,
         "notes": np.array(motion.notes, dtype=np.str_),
     }
-    if not isinstance(file, str | PathLike):
-        _require_stream(file, "write")
-        np.savez(file, **content)
-        return
-    try:
-        with replacing(file) as stream:
-            np.savez(stream, **content)
-    except OSError as error:
-        raise InvalidValueError("motion file", fspath(file), f"cannot be written: {error.strerror}") from error
+    np.savez(stream, **content)
+
+
+def _write_csv(motion: Motion, stream: IO[bytes]) -> None:
+    lines = TextIOWrapper(stream, encoding="utf-8", newline="")
+    joints = [Column(f"q{i + 1}", "rad", motion.q[:, i]) for i in range(motion.n)]
+    write_csv([Column("t", "s", motion.times), *joints], lines)
+    lines.detach()
+
+
+_WRITERS = {".npz": _write_npz, ".csv": _write_csv}
+
+
+def _require_suffix(file: str | PathLike[str]) -> str:
+    suffix = Path(file).suffix.lower()
+    if suffix not in _WRITERS:
+        raise InvalidValueError("motion file", fspath(file), f"must end in {' or '.join(_WRITERS)}")
+    return suffix
 
 
 def load_motion(file: str | PathLike[str] | BinaryIO) -> Motion:
@@ -59,6 +83,10 @@ def load_motion(file: str | PathLike[str] | BinaryIO) -> Motion:
     """
     if not isinstance(file, str | PathLike):
         _require_stream(file, "read")
+    elif Path(file).suffix.lower() == ".csv":
+        from rcilab.motion.samples import load_rows
+
+        return load_rows(file)
     name = fspath(file) if isinstance(file, str | PathLike) else "stream"
     content = _read(file, name)
     if str(content.get("kind", "")) != KIND:

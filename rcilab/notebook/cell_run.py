@@ -45,4 +45,4 @@ def _commanded(run: Run) -> Motion:
     """Returns what a callback commanded, each row at the time of its command; of torques, where they led."""
     from rcilab.motion import Motion
 
-    return Motion.from_samples(run.q if run.setup.mode == "torque" else run.q_c[run.delay :])
+    return Motion.from_cycles(run.q if run.setup.mode == "torque" else run.q_c[run.delay :])

@@ -115,7 +115,7 @@ def test_a_motion_that_breaks_a_condition_is_shown_and_not_sent(address, tmp_pat
     file = tmp_path / "jump.npz"
     with connect(address) as robot:
         q = robot.state.q_c
-    Motion.from_samples(np.vstack([q, q + 0.5])).save(file)
+    Motion.from_cycles(np.vstack([q, q + 0.5])).save(file)
     assert main(["run", str(file), "--robot", address, "--yes", "--model", "xMatePro7"]) == 1
     assert "does not conform" in capsys.readouterr().err
 

@@ -99,7 +99,7 @@ def test_where_nobody_looked_for_collisions_no_hand_off_takes_the_certificate(di
 
 
 def test_a_report_that_is_not_ok_has_no_certificate():
-    report = check(Motion.from_samples(MOTION.q[:500]), MODEL)
+    report = check(Motion.from_cycles(MOTION.q[:500]), MODEL)
     assert not report.ok
     assert report.certificate is None
 

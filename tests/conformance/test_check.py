@@ -40,7 +40,7 @@ def test_exactly_the_spoiled_sample_is_flagged(data):
     shift = data.draw(st.sampled_from([1.0, -1.0])) * data.draw(st.floats(2e-4, 1e-3))
     q = MOTION.q.copy()
     q[row, joint] += shift
-    report = check(Motion.from_samples(q), MODEL, distance=None)
+    report = check(Motion.from_cycles(q), MODEL, distance=None)
     assert not report.ok
     assert {violation.joint for violation in report.violations} == {joint + 1}
     jerk, acceleration = (
@@ -67,14 +67,14 @@ def test_the_bound_itself_breaks_a_condition_and_a_hair_more_room_does_not(name)
 def test_a_sample_on_the_position_limit_is_outside():
     q = np.repeat(MODEL.home[np.newaxis], 5, axis=0)
     q[:, 1] = LIMITS.upper[1]
-    report = check(Motion.from_samples(q), MODEL, distance=None)
+    report = check(Motion.from_cycles(q), MODEL, distance=None)
     assert [(v.joint, v.fault) for v in report.violations] == [(2, Fault.COMMAND_JOINT_POSITION_LIMITS_VIOLATION)]
     q[:, 1] = np.nextafter(LIMITS.upper[1], 0.0)
-    assert check(Motion.from_samples(q), MODEL, distance=None).ok
+    assert check(Motion.from_cycles(q), MODEL, distance=None).ok
 
 
 def test_a_motion_that_ends_moving_is_flagged_in_the_cycle_after_its_last_row():
-    cut = Motion.from_samples(MOTION.q[: len(MOTION) // 2])
+    cut = Motion.from_cycles(MOTION.q[: len(MOTION) // 2])
     report = check(cut, MODEL)
     assert {round(v.time / CYCLE_TIME) for v in report.violations} == {len(cut)}
     assert "let it end at rest" in str(report.violations[0])
@@ -123,7 +123,7 @@ def test_a_faster_motion_than_the_limits_is_flagged_with_the_speed_that_would_do
 def test_require_returns_the_report_or_raises_with_all_violations():
     good = check(MOTION, MODEL)
     assert good.require() is good
-    bad = check(Motion.from_samples(MOTION.q[:400]), MODEL)
+    bad = check(Motion.from_cycles(MOTION.q[:400]), MODEL)
     with pytest.raises(ConformanceError, match=r"joint \d: commanded jerk .* \(and \d+ more\)") as caught:
         bad.require()
     assert caught.value.violations == bad.violations
@@ -139,7 +139,7 @@ def test_a_motion_or_start_for_another_arm_is_refused():
 
 
 def test_rows_that_end_at_rest_to_within_a_cycle_are_not_blamed_for_their_grid():
-    report = check(Motion.from_samples(MOTION.q), MODEL)
+    report = check(Motion.from_cycles(MOTION.q), MODEL)
     assert not [v for v in report.warnings if v.condition.stage != "throughout"]
 
 

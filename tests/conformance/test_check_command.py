@@ -28,7 +28,7 @@ def test_a_good_motion_prints_its_report_and_gives_0(tmp_path, capsys):
 def test_a_bad_motion_prints_what_is_wrong_and_gives_1(tmp_path, capsys):
     q = MOTION.q.copy()
     q[300, 2] += 0.1
-    Motion.from_samples(q).save(tmp_path / "a.npz")
+    Motion.from_cycles(q).save(tmp_path / "a.npz")
     assert run(tmp_path / "a.npz", "--model", "xMate3") == 1
     assert "- joint 3: commanded jerk" in capsys.readouterr().out
 
@@ -59,7 +59,7 @@ def test_a_motion_that_is_too_fast_is_written_slowed_down_and_the_new_one_passes
 
 
 def test_a_motion_that_no_slow_down_mends_is_not_written(tmp_path, capsys):
-    Motion.from_samples(np.repeat([MODEL.limits.joint.upper], 3, axis=0)).save(tmp_path / "a.npz")
+    Motion.from_cycles(np.repeat([MODEL.limits.joint.upper], 3, axis=0)).save(tmp_path / "a.npz")
     assert run(tmp_path / "a.npz", "--model", "xMate3", "--slow-down", tmp_path / "b.npz") == 1
     assert "slow-down: No slow-down mends it" in capsys.readouterr().out
     assert not (tmp_path / "b.npz").exists()

@@ -140,7 +140,7 @@ def test_check_and_monitors_give_the_same_verdict_in_every_cycle(model, seed, sp
     joints, monitor = JointMonitor(model.limits.joint), ClearanceMonitor(model, ASKED)
     joints.reset(q[0].tolist())
     monitor.reset(q[0].tolist())
-    report = check(Motion.from_samples(q), model, distance=ASKED)
+    report = check(Motion.from_cycles(q), model, distance=ASKED)
     played: dict[str, list[bool]] = {row.id: [] for row in clearance_conditions(ASKED)}
     kept = True
     for row in [*q, *[q[-1]] * HOLD_SAMPLES]:
@@ -161,7 +161,7 @@ def test_check_and_monitors_give_the_same_verdict_in_every_cycle(model, seed, sp
 def test_exactly_the_spoiled_sample_is_flagged(row, turn):
     q = np.repeat(MODEL.home[np.newaxis], 160, axis=0)
     q[row] = ON_THE_FLOOR + [turn, 0, 0, 0, 0, 0, 0]
-    report = check(Motion.from_samples(q), MODEL)
+    report = check(Motion.from_cycles(q), MODEL)
     found = [violation for violation in report.violations if violation.condition.is_clearance]
     assert [(v.condition.id, v.count, v.links) for v in found] == [("clearance.floor", 1, LinkPair(7, FLOOR))]
     assert found[0].time == pytest.approx(row * CYCLE_TIME)
@@ -195,7 +195,7 @@ def test_a_hand_in_the_base_is_refused_and_the_report_says_who_meets_whom():
     table = np.random.default_rng(0).uniform(limits.lower, limits.upper, (4000, 6))
     found = folded.clearance(table, SafetyDistance(floor_height=None))
     worst = int(found.distance.argmin())
-    motion = Motion.from_samples(np.repeat(table[worst : worst + 1], 5, axis=0))
+    motion = Motion.from_cycles(np.repeat(table[worst : worst + 1], 5, axis=0))
     report = check(motion, folded, distance=SafetyDistance(floor_height=None))
     [violation] = report.violations
     assert violation.condition.id == "clearance.links"

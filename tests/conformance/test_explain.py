@@ -200,7 +200,7 @@ def test_a_tool_close_to_a_wall_is_told_with_its_distance():
 def test_a_refused_motion_is_told_worst_first_and_ends_with_what_a_slow_down_does():
     q = MOTION.q.copy()
     q[400, 3] += 1e-5
-    report = check(Motion.from_samples(q), MODEL)
+    report = check(Motion.from_cycles(q), MODEL)
     lines = report.explain().splitlines()
     assert lines[0].startswith(
         f"The robot would not accept this motion. Violations of necessary conditions: {len(report.violations)}."
@@ -213,7 +213,7 @@ def test_a_refused_motion_is_told_worst_first_and_ends_with_what_a_slow_down_doe
 
 def test_a_thousand_violations_do_not_make_a_thousand_lines():
     rows = MODEL.home + 0.01 * np.random.default_rng(0).normal(size=(100, 7))
-    report = check(Motion.from_samples(rows), MODEL)
+    report = check(Motion.from_cycles(rows), MODEL)
     lines = report.explain().splitlines()
     assert len(lines) < 12
     assert lines[-2] == f"- ... and {len(report.violations) + len(report.warnings) - 8} more."
@@ -239,7 +239,7 @@ def test_every_source_is_told_in_both_languages():
 
 
 def test_the_table_of_a_notebook_speaks_both_languages():
-    broken = check(Motion.from_samples(MOTION.q[::2]), MODEL)
+    broken = check(Motion.from_cycles(MOTION.q[::2]), MODEL)
     for report in (check(MOTION, MODEL), broken):
         english, chinese = report_html(report), report_html(report, "zh")
         assert english == report._repr_html_()

@@ -107,7 +107,7 @@ def test_exactly_the_spoiled_sample_is_flagged_with_the_makers_names(data):
     shift = data.draw(st.sampled_from([1.0, -1.0])) * data.draw(st.floats(2e-4, 1e-3))
     q = MOTION.q.copy()
     q[row, joint] += shift
-    report = check(Motion.from_samples(q), PANDA, distance=None)
+    report = check(Motion.from_cycles(q), PANDA, distance=None)
     assert {violation.joint for violation in report.violations} == {joint + 1}
     jerk, acceleration = (
         [(v.time, v.count, v.fault) for v in report.violations if v.condition.id == name]
@@ -124,7 +124,7 @@ def test_one_motion_is_judged_by_two_makers_side_by_side():
     pro = load_model("xMatePro7")
     names = {
         model.name: {
-            v.fault.manual_name for v in check(Motion.from_samples(q - PANDA.home + model.home), model).violations
+            v.fault.manual_name for v in check(Motion.from_cycles(q - PANDA.home + model.home), model).violations
         }
         for model in (PANDA, pro)
     }
@@ -142,7 +142,7 @@ def test_a_start_elsewhere_aborts_a_panda_and_no_slow_down_mends_it():
 def test_joint_4_has_to_stay_below_its_upper_limit_and_the_words_say_so():
     q = np.repeat(PANDA.home[np.newaxis], 5, axis=0)
     q[:, 3] = PANDA.limits.joint.upper[3]
-    report = check(Motion.from_samples(q), PANDA)
+    report = check(Motion.from_cycles(q), PANDA)
     assert [(v.joint, v.fault) for v in report.violations] == [
         (4, FrankaError.JOINT_MOTION_GENERATOR_POSITION_LIMITS_VIOLATION)
     ]

@@ -52,7 +52,7 @@ def commands(model: RobotModel, rows: Array, mode: Mode, start: StartState, last
     path = [*rows, *[rows[-1]] * HOLD_SAMPLES]
     last = len(rows) - 1 if last is None else last
     if mode == "torque":
-        signals = MotionSignals(Motion.from_samples(rows), model, start, None, None, mode)
+        signals = MotionSignals(Motion.from_cycles(rows), model, start, None, None, mode)
         tau, _ = signals.table(condition_table(model.description).find("torque.range"))
         return [JointTorque(row, i == last) for i, row in enumerate(tau)]
     if mode.startswith("joint"):
@@ -84,7 +84,7 @@ def played(
 
 def expected(model: RobotModel, rows: Array, mode: Mode, start: StartState | Array, box: SafetyBox | None = None):
     """What `check` finds broken, by condition, and the cycles in which a value is too near its bound to compare."""
-    signals = MotionSignals(Motion.from_samples(rows), model, as_state(start), box, None, mode)
+    signals = MotionSignals(Motion.from_cycles(rows), model, as_state(start), box, None, mode)
     table = condition_table(model.description)
     broken: dict[str, set[tuple[int, int]]] = {}
     near: dict[str, set[tuple[int, int]]] = {}
@@ -148,7 +148,7 @@ def test_monitor_and_check_give_the_same_verdict_row_by_row_in_every_mode(name, 
     box = SafetyBox(size=(0.02, 0.02, 0.05), T_base_box=model.forward(model.home)) if boxed else None
     require_same(model, mode, rows, rows[0], box)
     broken, _ = expected(model, rows, mode, rows[0], box)
-    report = check(Motion.from_samples(rows), model, box=box, distance=None, mode=mode)
+    report = check(Motion.from_cycles(rows), model, box=box, distance=None, mode=mode)
     necessary = {row.id for row in condition_table(model.description).conditions if row.necessity == "necessary"}
     assert from_violations(report) == {name: places for name, places in broken.items() if places and name in necessary}
 
@@ -225,7 +225,7 @@ def test_a_spoiled_pose_is_flagged_in_exactly_its_differences(name, what, seed, 
     rows[place] = model.inverse(spoiled_pose, psi, model.home).nearest(model.home)
     if what == "elbow" and name == "Panda":
         row = "elbow.{}"
-    report = check(Motion.from_samples(rows), model, distance=None, mode="cartesian_position")
+    report = check(Motion.from_cycles(rows), model, distance=None, mode="cartesian_position")
     found = from_violations(report)
     assert found[row.format("jerk")] == {(place + i, 0) for i in range(4)}
     assert found[row.format("acceleration")] == {(place + i, 0) for i in range(3)}
@@ -253,7 +253,7 @@ def test_a_joint_spoiled_in_position_velocity_acceleration_or_jerk_is_flagged_wh
         end = 3 if order == 3 else 1
         rows[place : place + end, joint] += 1.1 * bound[order][joint] * CYCLE_TIME**order * binomial[:end]
         rows[place + end :, joint] = rows[place + end - 1, joint]
-    found = from_violations(check(Motion.from_samples(rows), model, distance=None, mode="cartesian_position"))
+    found = from_violations(check(Motion.from_cycles(rows), model, distance=None, mode="cartesian_position"))
     places = found[f"{prefix}joint.{kind}"]
     assert {axis for _, axis in places} == {joint + 1}
     assert min(cycle for cycle, _ in places) == place
@@ -430,5 +430,5 @@ def test_rest_is_asked_for_at_both_ends_and_nowhere_else(name, mode):
         monitor.reset(rows[0])
         found = [b for c in commands(model, rows, mode, as_state(rows[0])) for b in monitor.step(c)]
         assert {b.condition.stage for b in found} - {"throughout"} == wanted
-        report = check(Motion.from_samples(rows), model, distance=None, mode=mode)
+        report = check(Motion.from_cycles(rows), model, distance=None, mode=mode)
         assert {v.condition.stage for v in report.warnings} - {"throughout"} == wanted

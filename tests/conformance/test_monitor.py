@@ -43,7 +43,7 @@ def spoiled_motions(draw):
             q[row, joint] += size
         else:
             q[row:, joint] += size if kind == "step" else size * np.arange(len(q) - row) / 10.0
-    return model, Motion.from_samples(q)
+    return model, Motion.from_cycles(q)
 
 
 @settings(max_examples=150)

@@ -17,7 +17,7 @@ GOOD = plan_joint(MODEL, MODEL.home, -MODEL.home, speed=0.4, law="s_profile")
 def spoiled() -> Motion:
     q = GOOD.q.copy()
     q[412, 3] += 0.01
-    return Motion.from_samples(q)
+    return Motion.from_cycles(q)
 
 
 def test_a_violation_reads_as_one_sentence_with_everything_in_it():
@@ -32,7 +32,7 @@ def test_a_violation_reads_as_one_sentence_with_everything_in_it():
 def test_an_angle_is_told_in_both_units():
     q = np.repeat(MODEL.home[np.newaxis], 10, axis=0)
     q[:, 1] = 2.2
-    sentence = str(check(Motion.from_samples(q), MODEL, distance=None).violations[0])
+    sentence = str(check(Motion.from_cycles(q), MODEL, distance=None).violations[0])
     assert sentence.startswith("joint 2: commanded position 2.2 rad (126.05°) passes 2.094 rad (120.00°) at t = 0.000")
 
 
@@ -66,7 +66,7 @@ def test_the_text_says_the_verdict_and_lists_every_condition():
 
 def test_a_thousand_violations_do_not_make_a_thousand_lines():
     rows = MODEL.home + 0.01 * np.random.default_rng(0).normal(size=(300, 7))
-    report = check(Motion.from_samples(rows), MODEL)
+    report = check(Motion.from_cycles(rows), MODEL)
     assert len(report.violations) > 100
     assert len(str(report).splitlines()) < 30
     assert len(report._repr_html_()) < 20000

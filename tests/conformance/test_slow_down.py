@@ -44,7 +44,7 @@ def test_the_slowed_motion_passes_and_one_that_is_a_little_faster_does_not(seed,
     planned = plan_joint(MODEL, start, goal, speed=1.0, law="jerk_limited" if law == "samples" else law)
     motion = hurried(planned, factor)
     if law == "samples":  # Rows tell rest from motion only so far: hurried further, their curve starts with a step.
-        motion = Motion.from_samples(hurried(planned, 1.0 + factor / 8.0).q)
+        motion = Motion.from_cycles(hurried(planned, 1.0 + factor / 8.0).q)
     # A planner sees no table: what is judged here is how fast.
     report = check(motion, MODEL, distance=None)
     result = report.slow_down()
@@ -97,7 +97,7 @@ def test_recommended_conditions_count_only_when_asked_and_those_that_none_meets_
 def test_a_joint_out_of_its_range_is_not_mended():
     q = FULL.q.copy()
     q[:, 1] += MODEL.limits.joint.upper[1]
-    report = check(Motion.from_samples(q), MODEL, distance=None)
+    report = check(Motion.from_cycles(q), MODEL, distance=None)
     assert refused(report) == ("position", "joint.position")
     assert "the way stays the same: joint 2, commanded position" in str(report.slow_down())
 
@@ -144,7 +144,7 @@ def test_an_arm_that_moves_at_the_start_must_go_on_as_it_moves():
     assert report.slow_down().factor == 1.0
     spoiled = onward.q.copy()
     spoiled[200:, 0] += np.linspace(0.0, 4e-3, len(spoiled) - 200)
-    obstacle, _ = refused(check(Motion.from_samples(spoiled), MODEL, start=moving))
+    obstacle, _ = refused(check(Motion.from_cycles(spoiled), MODEL, start=moving))
     assert obstacle == "moving_start"
     # A recommendation is no reason to break a necessary condition.
     result = report.slow_down(recommended=True)
@@ -153,7 +153,7 @@ def test_an_arm_that_moves_at_the_start_must_go_on_as_it_moves():
 
 
 def test_a_step_in_velocity_is_not_mended_but_told_as_a_jump():
-    report = check(Motion.from_samples(FULL.q[:300]), MODEL)
+    report = check(Motion.from_cycles(FULL.q[:300]), MODEL)
     assert refused(report) == ("jump", "joint.jerk")
     assert "jumps at t = 0.299 s" in str(report.slow_down())
     # It only becomes smaller, and with patience small enough.

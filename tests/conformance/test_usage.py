@@ -26,7 +26,7 @@ def test_a_motion_at_half_speed_uses_half_of_its_velocity_limit_at_most():
 def test_it_passes_one_exactly_where_a_necessary_condition_is_broken():
     q = np.array(plan_joint(MODEL, HOME, HOME + 0.3, speed=0.5).q)
     q[len(q) // 2 :] += 0.01
-    report = check(Motion.from_samples(q), MODEL, distance=None)
+    report = check(Motion.from_cycles(q), MODEL, distance=None)
     assert not report.ok
     usage = report.usage()
     assert usage.ratio.max() == pytest.approx(report.worst.ratio)

@@ -53,7 +53,7 @@ def test_the_box_is_judged_alike_by_check_and_monitor(seed, spoils):
     rows = [*q, *[q[-1]] * HOLD_SAMPLES]
     played = [bool(monitor.step(MODEL.forward(row).parts[1])) for row in rows]
     expected = np.zeros(len(rows), dtype=bool)
-    for violation in check(Motion.from_samples(q), MODEL, box=box, distance=None).violations:
+    for violation in check(Motion.from_cycles(q), MODEL, box=box, distance=None).violations:
         if violation.condition is CARTESIAN_POSITION:
             first = round(violation.time / CYCLE_TIME)
             expected[first : first + violation.count] = True

@@ -84,16 +84,16 @@ def test_rows_are_computed_once_and_cannot_be_changed():
 
 def test_samples_of_a_curve_come_back_as_its_rows():
     q = np.random.default_rng(0).normal(size=(40, 6))
-    motion = Motion.from_samples(q)
+    motion = Motion.from_cycles(q)
     assert np.array_equal(motion.q, q)
     assert motion.n == 6
     assert motion.duration == 39 * CYCLE_TIME
-    assert len(Motion.from_samples(q[:1])) == 1
+    assert len(Motion.from_cycles(q[:1])) == 1
 
 
 def test_samples_of_a_smooth_curve_give_nearly_its_velocity():
     planned = plan_joint(MODEL, MODEL.home, GOAL)
-    again = Motion.from_samples(planned.q)
+    again = Motion.from_cycles(planned.q)
     # A cubic through rows 1 ms apart is off by less than the jerk's effect over one cycle.
     assert np.abs(again.dq - planned.dq).max() < MODEL.limits.joint.jerk.max() * CYCLE_TIME**2
 
@@ -101,7 +101,7 @@ def test_samples_of_a_smooth_curve_give_nearly_its_velocity():
 @pytest.mark.parametrize("rows", [np.zeros((0, 7)), np.full((3, 7), np.nan), np.zeros((2, 2, 2))])
 def test_rows_that_are_no_path_are_refused(rows):
     with pytest.raises(InvalidValueError, match="q"):
-        Motion.from_samples(rows)
+        Motion.from_cycles(rows)
 
 
 def test_the_fingerprint_changes_with_anything_that_defines_the_motion():
@@ -147,20 +147,20 @@ def test_its_texts_are_short_and_name_duration_and_law():
 @pytest.mark.parametrize("q", ["abc", None, [], [[1.0, 2.0], [1.0]], np.zeros((2, 2, 2))])
 def test_samples_that_are_no_table_are_refused_in_words(q):
     with pytest.raises(InvalidValueError, match=r"^q: "):
-        Motion.from_samples(q)
+        Motion.from_cycles(q)
 
 
 def test_a_sample_that_is_not_finite_is_named_by_row_and_joint():
     q = np.zeros((5, 6))
     q[3, 1] = np.nan
     with pytest.raises(InvalidValueError, match=r"q at row 3 \(from 0\), joint 2: nan must be finite"):
-        Motion.from_samples(q)
+        Motion.from_cycles(q)
 
 
 @pytest.mark.parametrize("t", ["a", None])
 def test_a_time_that_is_no_number_is_refused_in_words(t):
     with pytest.raises(InvalidValueError, match=r"t: .* is not a number"):
-        Motion.from_samples(np.zeros((3, 6))).at(t)
+        Motion.from_cycles(np.zeros((3, 6))).at(t)
 
 
 @settings(max_examples=40)
@@ -169,7 +169,7 @@ def test_a_slowed_motion_runs_the_same_way_with_smaller_derivatives(seed, factor
     rng = np.random.default_rng(seed)
     goal = MODEL.home + rng.uniform(-0.5, 0.5, 7)
     if law == "samples":
-        motion = Motion.from_samples(plan_joint(MODEL, MODEL.home, goal).q)
+        motion = Motion.from_cycles(plan_joint(MODEL, MODEL.home, goal).q)
     else:
         motion = plan_joint(MODEL, MODEL.home, goal, law=law, speed=rng.uniform(0.1, 1.0))
     slowed = motion.slowed(factor)

@@ -366,7 +366,7 @@ def test_what_was_jogged_from_rest_to_rest_conforms(model):
         rows += [jog.step() for _ in range(150)]
     jog.stop()
     rows += until_rest(jog)
-    assert check(Motion.from_samples(rows), model).ok
+    assert check(Motion.from_cycles(rows), model).ok
 
 
 def test_far_inside_the_ranges_looking_at_all_joints_at_once_changes_nothing(monkeypatch):

@@ -29,8 +29,8 @@ def fields(**changes: object) -> dict[str, object]:
 @pytest.mark.parametrize("law", ["jerk_limited", "s_profile"])
 def test_load_after_save_is_the_same_motion_to_the_last_bit(tmp_path, law):
     motion = plan_joint(MODEL, MODEL.home, MODEL.home + 0.3, law=law)
-    motion.save(tmp_path / "a.motion")  # No ending is added to the name.
-    again = Motion.load(str(tmp_path / "a.motion"))
+    motion.save(tmp_path / "a.npz")
+    again = Motion.load(str(tmp_path / "a.npz"))
     assert again.fingerprint == motion.fingerprint
     assert np.array_equal(again.q, motion.q)
     assert again.law == law
@@ -175,3 +175,30 @@ def test_what_is_no_file_is_refused_in_words(file):
         MOTION.save(file)
     with pytest.raises(InvalidValueError, match="is no file name"):
         Motion.load(file)
+
+
+def test_a_motion_saved_as_csv_comes_back_with_the_same_rows(tmp_path):
+    MOTION.save(tmp_path / "m.csv")
+    again = Motion.load(tmp_path / "m.csv")
+    assert np.array_equal(again.q, MOTION.q)
+    assert np.array_equal(again.times, MOTION.times)
+    assert (tmp_path / "m.csv").read_text().startswith("t [s],q1 [rad],q2 [rad]")
+
+
+def test_an_unknown_ending_of_a_motion_is_refused_with_the_known_ones(tmp_path):
+    with pytest.raises(InvalidValueError, match=r"must end in \.npz or \.csv"):
+        MOTION.save(tmp_path / "m.txt")
+    assert not list(tmp_path.iterdir())
+
+
+def test_samples_say_their_rate():
+    rows = MOTION.q[::10]
+    assert Motion.from_samples(rows, dt=0.01).duration == pytest.approx(0.01 * (len(rows) - 1))
+    assert Motion.from_samples(rows, times=0.02 * np.arange(len(rows))).duration == pytest.approx(
+        0.02 * (len(rows) - 1)
+    )
+    for wrong in ({}, {"dt": 0.01, "times": [0.0]}):
+        with pytest.raises(InvalidValueError, match="from_cycles"):
+            Motion.from_samples(rows, **wrong)
+    with pytest.raises(InvalidValueError, match="above 0"):
+        Motion.from_samples(rows, dt=0.0)

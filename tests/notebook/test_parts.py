@@ -258,7 +258,7 @@ def test_a_goal_that_was_moved_is_told_beside_the_plan(fresh: Lab) -> None:
 
 
 def test_what_breaks_a_limit_is_shaded_explained_and_slowed_down_to_fit(fresh: Lab) -> None:
-    fast = rcilab.Motion.from_samples(rcilab.plan_joint(PRO7, PRO7.home, GOAL, speed=1.0).q[::2])
+    fast = rcilab.Motion.from_cycles(rcilab.plan_joint(PRO7, PRO7.home, GOAL, speed=1.0).q[::2])
     fresh.state.take_motion(fast)
     assert 'class="rl-violation"' in fresh.plot.html
     assert "Not safe" in text_of(fresh.report._verdict)
@@ -306,7 +306,7 @@ def test_what_only_goes_against_advice_can_be_slowed_down_too(fresh: Lab) -> Non
 
 
 def test_a_motion_that_no_slow_down_mends_says_so(fresh: Lab) -> None:
-    fresh.state.take_motion(rcilab.Motion.from_samples(rcilab.plan_joint(PRO7, PRO7.home, GOAL, speed=1.0).q[::9]))
+    fresh.state.take_motion(rcilab.Motion.from_cycles(rcilab.plan_joint(PRO7, PRO7.home, GOAL, speed=1.0).q[::9]))
     broken = fresh.state.plan
     assert broken is not None
     fresh.plan.slow_down.click()

@@ -22,7 +22,7 @@ colors, widgets = Late("matplotlib.colors"), Late("rcilab.notebook.widgets")
 
 PRO7 = rcilab.load_model("xMatePro7")
 MOTION = rcilab.plan_joint(PRO7, PRO7.home, PRO7.home + np.array([0.5, -0.4, 0.3, -0.6, 0.7, -0.8, 1.0]))
-TOO_FAST = rcilab.Motion.from_samples(MOTION.q[::2])
+TOO_FAST = rcilab.Motion.from_cycles(MOTION.q[::2])
 
 
 def hatched(ax: Axes) -> list[tuple[float, float]]:
@@ -141,8 +141,8 @@ assert "matplotlib.pyplot" not in sys.modules
 def test_one_jump_of_all_joints_is_one_place_in_the_title() -> None:
     q = MOTION.q.copy()
     q[len(q) // 2 :] += 0.05
-    assert len(rcilab.check(rcilab.Motion.from_samples(q), PRO7).violations) == 21
-    assert "beyond a limit at 1 place," in plot(rcilab.Motion.from_samples(q), PRO7).get_suptitle()
+    assert len(rcilab.check(rcilab.Motion.from_cycles(q), PRO7).violations) == 21
+    assert "beyond a limit at 1 place," in plot(rcilab.Motion.from_cycles(q), PRO7).get_suptitle()
 
 
 @pytest.mark.parametrize(

@@ -71,7 +71,7 @@ def test_two_simulated_runs_arrive_and_are_equal_to_the_last_bit():
 
 
 def test_a_motion_without_a_certificate_is_checked_and_refused_with_its_reason(robot):
-    jump = Motion.from_samples(np.vstack([robot.state.q_c, robot.state.q_c + 0.1]))
+    jump = Motion.from_cycles(np.vstack([robot.state.q_c, robot.state.q_c + 0.1]))
     with pytest.raises(ConformanceError, match=r"joint \d: commanded jerk"):
         robot.execute(jump)
     assert np.array_equal(robot.state.q_c, MODEL.home)
