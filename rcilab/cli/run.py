@@ -131,11 +131,15 @@ def _run(args: Namespace, stopper: _Stopper) -> int:
 
 
 def _what_will_move(motion: Motion, robot: RobotSession) -> str:
-    travel = abs(motion.goal - motion.q[0])
-    joint = int(travel.argmax())
+    from rcilab.motion.extent import measure_extent
+
+    extent = measure_extent(motion, robot.model)
     return (
-        f"{robot.model.name} at {robot.address} will move for {motion.duration:.2f} s; "
-        f"joint {joint + 1} the farthest, by {math.degrees(travel[joint]):.1f} deg."
+        f"{robot.model.name} at {robot.address} will move for {extent.duration:.2f} s. "
+        f"Joints {extent.describe_joints() or 'stay'}. "
+        f"The tool goes up to {1e3 * extent.tool_distance:.0f} mm from where it is. "
+        f"Top speeds: joint {extent.fastest_joint} with {math.degrees(extent.joint_speed):.1f}°/s, "
+        f"the tool with {extent.tool_speed:.2f} m/s."
     )
 
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from rcilab.arrays import JointVector
+from rcilab.motion.extent import measure_extent
 from rcilab.posing.planning import Plan
-from rcilab.words.text import Message, message
+from rcilab.words.text import Finished, Message, message
 
 _SAME_PLACE = 1e-9  # [rad] What the checker allows between the arm and the start of a motion.
 _NOT_IDLE = {
@@ -46,16 +47,17 @@ def is_done(plan: Plan, q_c: JointVector) -> bool:
 
 def ask_to_move(plan: Plan, address: str) -> Message:
     """Returns what the robot at an address is about to do, as the question before it does."""
-    travel = np.degrees(np.abs(plan.motion.goal - plan.motion.start))
-    joint = int(travel.argmax())
+    extent = measure_extent(plan.motion, plan.model)
     return message(
         "run.ask",
         model=plan.model.name,
         address=address,
-        duration=f"{plan.motion.duration:.2f}",
-        joint=joint + 1,
-        angle=f"{travel[joint]:.1f}",
-        mm=f"{1000.0 * float(np.linalg.norm(plan.path[-1] - plan.path[0])):.0f}",
+        duration=f"{extent.duration:.2f}",
+        ranges=Finished(extent.describe_joints().replace(" to ", " … ")),
+        mm=f"{1e3 * extent.tool_distance:.0f}",
+        joint=extent.fastest_joint,
+        angle=f"{np.degrees(extent.joint_speed):.1f}",
+        speed=f"{1e3 * extent.tool_speed:.0f}",
     )
 
 
