@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from rcilab.arrays import Array, as_number, described
 from rcilab.client.link import Link
 from rcilab.client.refusal import Refusal, find_refusal
+from rcilab.dynamics.payload import Payload
 from rcilab.errors import CommandRejectedError, InvalidValueError
 from rcilab.limits import Limits
 from rcilab.protocols import rci
@@ -139,7 +140,10 @@ class RciSettings:
         except (TypeError, ValueError) as error:
             raise InvalidValueError("inertia", described(inertia), "is not 3 x 3 numbers [kg m^2]") from error
         names = [f"row {row}, column {column}" for row in (1, 2, 3) for column in (1, 2, 3)]
-        self._ask(rci.SetLoad(kilograms, _floats(center), _floats(_vector("inertia", flat, names, "kg m^2"))))
+        values = _vector("inertia", flat, names, "kg m^2")
+        # A body that cannot exist is refused here.
+        Payload(mass=kilograms, center_of_mass=center, inertia=values.reshape(3, 3))
+        self._ask(rci.SetLoad(kilograms, _floats(center), _floats(values)))
 
     def set_filters(self, joint: float, cartesian: float, torque: float) -> None:
         """Sets the cut-off frequencies of the controller's filters of commands, 0.1 to 1000 [Hz]; 1000 is off."""
@@ -155,7 +159,7 @@ class RciSettings:
     def set_fc_coor(
         self, T_flange_force: Pose, type: rci.ForceFrame | Literal["world", "tool", "path"] = rci.ForceFrame.WORLD
     ) -> None:
-        """Sets the force-control frame, in which `state.tau_ext_in_stiff` is reported.
+        """Sets the force-control frame: the axes of desired force, stiffness and `state.tau_ext_in_stiff`.
 
         Args:
             T_flange_force: Its pose in the flange frame.

@@ -2,7 +2,8 @@
 
     POSITION              the servo follows the commanded angles; also how an arm comes to rest and stands still
     JOINT_IMPEDANCE       springs at the joints pull towards the commanded angles
-    CARTESIAN_IMPEDANCE   springs at the tool pull towards the commanded pose, and press with the desired wrench
+    CARTESIAN_IMPEDANCE   springs at the tool pull towards the commanded pose, and press with the desired wrench;
+                          both along the axes of setFcCoor, at the tool's origin
     TORQUE                the commanded torques act, gravity and friction are compensated
     GUIDE                 the arm is weightless and follows a hand
     BRAKED                the brakes hold
@@ -16,9 +17,12 @@ from __future__ import annotations
 from enum import Enum
 from typing import Final
 
+import numpy as np
+
 from rcilab.arrays import JointVector
 from rcilab.controller.commanded import CommandedMotion
 from rcilab.controller.compliance import Damper
+from rcilab.controller.force_frame import ForceAxes
 from rcilab.controller.guiding import guide_torque, wall_torque
 from rcilab.controller.plant import Drive, Measurement, Setpoint
 from rcilab.controller.servo import cartesian_impedance, joint_impedance
@@ -59,6 +63,7 @@ class Actuator:
     """
 
     def __init__(self, model: RobotModel, settings: Settings) -> None:
+        self._axes = ForceAxes(model, settings)
         self.configure(model, settings)
         self._space, self._kind = rci.DragSpace.JOINT, rci.DragType.FREE
 
@@ -66,6 +71,7 @@ class Actuator:
         """Takes new settings, and the model with the tool and load that they say."""
         self._law = Law.BRAKED
         self._damper = Damper()
+        self._axes.configure(model, settings)
         self._model = model
         self._settings = settings
         self._soft_limits = settings.soft_limits(model.limits.joint)
@@ -112,6 +118,8 @@ class Actuator:
         if law is Law.JOINT_IMPEDANCE:
             return joint_impedance(model, *commanded.arrays, measured, settings.joint_stiffness, self._damper)
         if law is Law.CARTESIAN_IMPEDANCE:
+            self._axes.follow(tool_c.twist[:3])
+            tool = model.rigid_body.tool_terms(measured.q, measured.dq)
             return cartesian_impedance(
                 model,
                 tool_c.pose,
@@ -121,6 +129,7 @@ class Actuator:
                 measured,
                 settings.cartesian_stiffness,
                 settings.desired_wrench,
+                axes=None if self._axes.is_world else np.array(self._axes.rotation(tool.pose)).reshape(3, 3),
                 damper=self._damper,
             )
         return guide_torque(model, measured, self._space, self._kind, self._T_held, self._soft_limits)

@@ -20,7 +20,6 @@ What this virtual arm knows and how (each documented here because a state must n
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -30,18 +29,16 @@ from rcilab.arrays import Array, JointVector, frozen, scalar, sealed
 from rcilab.clock import CYCLE_TIME
 from rcilab.controller.commanded import CommandedMotion
 from rcilab.controller.drive_report import DriveReport
+from rcilab.controller.force_frame import ForceAxes
 from rcilab.controller.plant import Measurement
 from rcilab.controller.settings import Settings
 from rcilab.controller.tool import ToolMotion
 from rcilab.faults import Fault
 from rcilab.model import RobotModel
-from rcilab.protocols.rci import ForceFrame
 from rcilab.spatial import Rotation9
 from rcilab.state import ControllerMode, MotionGeneratorMode, RobotMode, RobotState, build_state
 
 _CYCLE = scalar(CYCLE_TIME)  # [s]
-_STANDING = 1e-6  # [m/s] Below this the tool has no direction of its path.
-_ALONG = 0.999  # Cosine of an angle above which two directions count as parallel.
 
 
 class Readings(NamedTuple):
@@ -74,16 +71,14 @@ class StateReporter:
 
     def __init__(self, model: RobotModel, settings: Settings) -> None:
         self._zeros = frozen(np.zeros(model.n))
-        self._path = (0.0, 0.0, 0.0)
+        self._axes = ForceAxes(model, settings)
         self.configure(model, settings)
 
     def configure(self, model: RobotModel, settings: Settings) -> None:
         """Takes a new tool, load, force frame or filter; only while the arm is at rest."""
         self._model = model
-        self._T_tool_force = model.T_flange_tool.inverse() @ settings.T_flange_force
-        self._force_frame = settings.force_frame
-        at_tool = not any(self._T_tool_force.parts[1])
-        self._is_wrench_at_tool = at_tool and self._force_frame is ForceFrame.WORLD
+        self._axes.configure(model, settings)
+        self._is_wrench_at_tool = self._axes.is_world and not any(self._axes.T_tool_force.parts[1])
         self._drives = DriveReport(model, settings.torque_report_filter)
         self._body: tuple[Any, ...] | None = None
         self._tau_c = self._zeros
@@ -175,47 +170,21 @@ class StateReporter:
 
     def _in_force_frame(self, wrench: Array, tool: ToolMotion, velocity: Sequence[float]) -> Array:
         """Returns a wrench on the tool (base axes, tool's origin) at the force frame's origin, in its type's axes."""
-        speed = math.hypot(*velocity)
-        if speed > _STANDING:
-            x, y, z = velocity
-            self._path = (x / speed, y / speed, z / speed)
+        self._axes.follow(velocity)
         fx, fy, fz, mx, my, mz = wrench.tolist()
         if self._is_wrench_at_tool or not (fx or fy or fz or mx or my or mz):
             return wrench
         T_base_tool = tool.pose
-        r, (x, y, z) = (T_base_tool @ self._T_tool_force).parts
+        x, y, z = (T_base_tool @ self._axes.T_tool_force).parts[1]
         tx, ty, tz = T_base_tool.parts[1]
         ax, ay, az = tx - x, ty - y, tz - z
         mx, my, mz = mx + ay * fz - az * fy, my + az * fx - ax * fz, mz + ax * fy - ay * fx
-        if self._force_frame is ForceFrame.WORLD:
+        if self._axes.is_world:
             return frozen((fx, fy, fz, mx, my, mz))
-        if self._force_frame is ForceFrame.PATH:
-            r = _path_axes(self._path, r)
+        r = self._axes.rotation(T_base_tool)
         return frozen((*_inwards(r, fx, fy, fz), *_inwards(r, mx, my, mz)))
 
 
 def _inwards(r: Rotation9, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Returns a vector of the base in axes that are the columns of a rotation."""
     return r[0] * x + r[3] * y + r[6] * z, r[1] * x + r[4] * y + r[7] * z, r[2] * x + r[5] * y + r[8] * z
-
-
-def _path_axes(x: tuple[float, float, float], r: Rotation9) -> Rotation9:
-    """Returns axes with x along a path and z as near as possible to the force frame's z, or its y if that is along x.
-
-    Before the first motion there is no path, and the axes are those of the force frame.
-    """
-    ax, ay, az = x
-    if not any(x):
-        return r
-    near = (r[2], r[5], r[8])
-    if abs(near[0] * ax + near[1] * ay + near[2] * az) > _ALONG:
-        near = (r[1], r[4], r[7])
-    along = near[0] * ax + near[1] * ay + near[2] * az
-    cx, cy, cz = near[0] - along * ax, near[1] - along * ay, near[2] - along * az
-    length = math.hypot(cx, cy, cz)
-    cx, cy, cz = cx / length, cy / length, cz / length
-    return (
-        ax, cy * az - cz * ay, cx,
-        ay, cz * ax - cx * az, cy,
-        az, cx * ay - cy * ax, cz,
-    )  # fmt: skip

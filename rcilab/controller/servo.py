@@ -73,8 +73,8 @@ def cartesian_impedance(
     """Returns the torque of springs between the commanded and the measured tool, without gravity, shape (n,), [N m].
 
     The orientation spring acts on the rotation vector from the measured to the commanded orientation. A 7-axis arm
-    keeps its elbow near `q_null`, softly and without a force on the tool. The manual names no axes for stiffness and
-    desired force; here they are the base's, unless `axes` says otherwise.
+    keeps its elbow near `q_null`, softly and without a force on the tool. Stiffness, damping and desired force act
+    at the tool's origin, along the axes of setFcCoor.
 
     Args:
         model: The arm as the controller knows it, with its tool.
@@ -85,7 +85,7 @@ def cartesian_impedance(
         measured: Where the arm is.
         stiffness6: Three translations [N/m], three rotations [N m/rad].
         desired_wrench6: Force and moment that the arm exerts on its surroundings in addition, [N, N m].
-        axes: Rotation whose columns, in base, are the directions that both refer to, shape (3, 3).
+        axes: Rotation whose columns, in base, are the directions that both refer to, shape (3, 3); None: the base's.
         damper: The one of the cycles before; None designs another.
     """
     body, q, dq = model.rigid_body, measured.q, measured.dq

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from rcilab.client.settings import RciSettings
 from rcilab.conformance import check
 from rcilab.errors import (
     CertificateError,
@@ -73,6 +74,7 @@ def test_every_command_reaches_the_controller_as_the_protocol_spells_it(make_rob
         (lambda r: r.set_filters(1001, 1, 1), "0.1 to 1000"),
         (lambda r: r.set_do(6, True), "0 to 5"),
         (lambda r: r.set_load(-1, [0, 0, 0], np.eye(3)), "negative"),
+        (lambda r: RciSettings.set_load(r, 0, [0, 0, 0], np.eye(3)), "a load without mass has none"),
         (lambda r: r.set_load(100, [0, 0, 0], np.eye(3)), "load mass: 100.* kg is above 7 kg for xMatePro7"),
         (lambda r: r.set_coor(None), "Pose"),
         (lambda r: r.set_coor(Pose((0.0, 0.0, 99.0))), r"99\.0 m from the flange is farther than 2 m; give metres"),

@@ -1,0 +1,69 @@
+"""setFcCoor over real sockets: desired force, stiffness and damping act along its axes."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from rcilab.command import CartesianPosition
+from rcilab.model import load_model
+from rcilab.spatial import Pose
+from rcilab.supervisor.simulate import simulate
+
+MODEL = load_model("xMatePro7")
+TURNED = Pose.from_rpy([0.0, 0.0, 0.0], [0.0, math.pi / 2.0, 0.0])
+"""The force-control frame in the flange: its x is the flange's -z, its z the flange's x."""
+SOFT = [400.0] * 3 + [200.0] * 3
+
+
+def hold(robot, seconds: float = 2.0) -> tuple[np.ndarray, np.ndarray]:
+    """Holds a pose under Cartesian impedance; returns how far the tool went in base, and the turn of base to flange."""
+    start = robot.state
+    T = np.array(start.T_base_tool_c)
+
+    def callback(state, t):
+        return CartesianPosition(T, start.psi_c, finished=t >= seconds)
+
+    last = {}
+
+    def watched(state, t):
+        last["p"] = np.array(state.T_base_tool)[:3, 3]
+        return callback(state, t)
+
+    robot.control(watched, mode="cartesian_impedance")
+    return last["p"] - T[:3, 3], T[:3, :3]
+
+
+@pytest.fixture(params=["ideal", "mujoco"])
+def robot(request):
+    with simulate(MODEL, plant=request.param) as robot:
+        robot.power_on()
+        robot.set_cartesian_impedance(SOFT)
+        yield robot
+
+
+def test_a_desired_force_presses_along_the_turned_frame_of_the_tool(robot):
+    robot.set_fc_coor(TURNED, "tool")
+    robot.set_cart_imp_desired_tau([10.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    moved, R = hold(robot)
+    wanted = R @ TURNED.rotation @ [10.0 / SOFT[0], 0.0, 0.0]
+    assert moved == pytest.approx(wanted, abs=2e-3)
+
+
+def test_the_soft_direction_is_that_of_the_turned_frame(robot):
+    robot.set_fc_coor(TURNED, "tool")
+    robot.set_cartesian_impedance([200.0, 3000.0, 3000.0, 300.0, 300.0, 300.0])
+    R = np.array(robot.state.T_base_tool_c)[:3, :3]
+    soft = R @ TURNED.rotation @ [1.0, 0.0, 0.0]
+    robot.world.push([*(6.0 * soft), 0.0, 0.0, 0.0], duration=10.0)
+    moved, _ = hold(robot)
+    assert moved @ soft == pytest.approx(6.0 / 200.0, rel=0.1)
+
+
+def test_in_the_frame_of_the_world_both_act_in_base_axes(robot):
+    robot.set_fc_coor(TURNED, "world")
+    robot.set_cart_imp_desired_tau([0.0, 10.0, 0.0, 0.0, 0.0, 0.0])
+    moved, _ = hold(robot)
+    assert moved == pytest.approx([0.0, 10.0 / SOFT[1], 0.0], abs=2e-3)
