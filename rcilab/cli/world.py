@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 EPILOG = """examples, for a controller that has printed "world 127.0.0.2:40123":
   rcilab world 127.0.0.2:40123 push wrench=[0,0,-20,0,0,0] link=4 duration=1
-  rcilab world 127.0.0.2:40123 place_box box=wall size=[0.1,1,1] position=[0.6,0,0.5]
+  rcilab world 127.0.0.2:40123 place_box box=wall size=[0.1,1,1] position=[0.9,0,0.5]
   rcilab world 127.0.0.2:40123 press button=estop
   rcilab world 127.0.0.2:40123 status
 Contact (place_box, floor, walls) needs a controller with --plant mujoco."""

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.arrays import as_vector
+from rcilab.arrays import Array, as_vector
 from rcilab.errors import InvalidValueError
 from rcilab.safety_box import SafetyBox
 from rcilab.spatial import Pose
@@ -21,6 +21,12 @@ MOST_BOXES = 16
 _FLOOR = "floor"
 _WALLS = tuple(f"wall{number}" for number in range(6))
 _BOXES = tuple(f"box{number}" for number in range(MOST_BOXES))
+_NEAR = 0.1  # [m] Beyond this distance from a link a box is free.
+_GAP = 1e-3  # [m] Left between a box that was moved out of the way and the arm.
+_FARTHEST_WAY = 5.0  # [m] No arm of ours is that large.
+_DIRECTIONS = {
+    "+x": (1, 0, 0), "-x": (-1, 0, 0), "+y": (0, 1, 0), "-y": (0, -1, 0), "+z": (0, 0, 1), "-z": (0, 0, -1),
+}  # fmt: skip
 _ARM, _SOLID = 1, 1  # Bits: an arm's geom takes part as `conaffinity`, a solid one as `contype`.
 
 
@@ -55,16 +61,71 @@ class Obstacles:
             model.geom_sameframe[model.geom(name).id] = 0
         self._apply()
 
-    def place_box(self, name: str, size: ArrayLike, pose: Pose) -> None:
-        """Puts a box somewhere, or moves it; see `Plant.place_box`."""
+    def place_box(self, name: str, size: ArrayLike, pose: Pose, data: Any) -> None:
+        """Puts a box somewhere, or moves it; see `Plant.place_box`.
+
+        Args:
+            name: See there, as the next two.
+            size: [m].
+            pose: In base.
+            data: MuJoCo's data of the arm as it is now, which must not stand in the box.
+        """
         x, y, z = as_vector(size, 3, "box size", "m").tolist()
         if min(x, y, z) <= 0.0:
             raise InvalidValueError("box size", [x, y, z], "must be three lengths above 0 [m]").coded("box_size")
         if name not in self._boxes and len(self._boxes) == MOST_BOXES:
             problem = f"would be one too many; {MOST_BOXES} can be there, remove another"
             raise InvalidValueError("box", name, problem).coded("box_many", name=name, most=MOST_BOXES)
+        before = dict(self._boxes)
         self._boxes[name] = (x, y, z, pose)
         self._apply()
+        try:
+            self._require_free(name, data)
+        except InvalidValueError:
+            self._boxes = before
+            self._apply()
+            raise
+
+    def _require_free(self, name: str, data: Any) -> None:
+        """Refuses a box that the arm stands in: MuJoCo would throw the arm out of it."""
+        index = int(self._model.geom(_BOXES[list(self._boxes).index(name)]).id)
+        depth, link = self._deepest(index, data)
+        if depth <= 0.0:
+            return
+        position = self._model.geom_pos[index].copy()
+        ways = {axis: self._way_out(index, data, np.array(direction)) for axis, direction in _DIRECTIONS.items()}
+        self._model.geom_pos[index] = position
+        axis = min(ways, key=lambda axis: ways[axis])
+        millimetres = {"depth": f"{1e3 * depth:.0f}", "way": f"{math.ceil(1e3 * ways[axis])}"}
+        problem = (
+            f"would overlap {link} of the arm by {millimetres['depth']} mm; place it {millimetres['way']} mm farther "
+            f"along {axis}, or move the arm first"
+        )
+        raise InvalidValueError("box", name, problem).coded(
+            "box_overlap", name=name, link=link, axis=axis, **millimetres
+        )
+
+    def _deepest(self, box: int, data: Any) -> tuple[float, str]:
+        """Returns how deep a link of the arm is in a box, [m], and its name; 0 or less where none is."""
+        model, mj = self._model, self._mj
+        mj.mj_kinematics(model, data)
+        moves = model.body_weldid[model.geom_bodyid] != 0  # The base may stand in a table: neither of them moves.
+        links = np.flatnonzero((model.geom_conaffinity & _ARM != 0) & moves)
+        distances = [mj.mj_geomDistance(model, data, int(link), box, _NEAR, None) for link in links]
+        nearest = int(np.argmin(distances))
+        return -distances[nearest], str(model.body(int(model.geom_bodyid[links[nearest]])).name)
+
+    def _way_out(self, box: int, data: Any, direction: Array) -> float:
+        """Returns how far a box has to move along a direction to be free of the arm, [m]."""
+        position, way = self._model.geom_pos[box].copy(), 0.0
+        while way < _FARTHEST_WAY:
+            depth, _ = self._deepest(box, data)
+            if depth <= 0.0:
+                break
+            way += depth + _GAP
+            self._model.geom_pos[box] = position + way * direction
+        self._model.geom_pos[box] = position
+        return way
 
     def remove_box(self, name: str) -> None:
         """Takes a box away; see `Plant.remove_box`."""

@@ -97,7 +97,7 @@ class MuJoCoPlant:
 
     def place_box(self, name: str, size: ArrayLike, pose: Pose) -> None:
         """Puts a solid box into the arm's way, or moves it; see `Plant.place_box`."""
-        self._obstacles.place_box(name, size, pose)
+        self._obstacles.place_box(name, size, pose, self._data)
         self._rests = False
 
     def remove_box(self, name: str) -> None:

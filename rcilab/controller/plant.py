@@ -122,7 +122,7 @@ class Plant(Protocol):
             pose: Its centre and directions in the base frame.
 
         Raises:
-            InvalidValueError: The size is not three positive finite numbers.
+            InvalidValueError: The size is not three positive finite numbers, or the arm stands in the box.
             UsageError: This plant knows no contact.
         """
         ...

@@ -164,6 +164,7 @@ def test_a_box_can_be_moved_and_taken_away_and_stays_through_a_change_of_load() 
     plant.place_box("table", [2.0, 2.0, 0.1], far)
     unhindered = descend(plant, start, goal)
     assert unhindered.q == pytest.approx(goal, abs=0.01)
+    plant.reset(start)
     plant.place_box("table", [2.0, 2.0, 0.1], near)
     assert np.abs(descend(plant, start, goal).q - goal).max() > 0.05
     plant.reset(start)
@@ -209,3 +210,28 @@ def test_what_mujoco_warns_of_is_logged_and_no_file_is_written(tmp_path, monkeyp
         plant.step(Setpoint(Drive.TORQUE, model.home.tolist(), [0.0] * 7, [0.0] * 7, tau=[0.0] * 7))
     assert any("MuJoCo" in record.message for record in caplog.records)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_box_that_the_arm_stands_in_is_refused_with_the_depth_and_the_way_out() -> None:
+    plant = MuJoCoPlant(load_model("xMatePro7"))
+    size, inside = [0.1, 1.0, 1.0], [0.6, 0.0, 0.5]
+    with pytest.raises(
+        InvalidValueError, match=r"would overlap link5 of the arm by 87 mm; place it (\d+) mm farther"
+    ) as caught:
+        plant.place_box("wall", size, Pose(inside))
+    facts = caught.value.facts
+    assert facts["axis"] == "+x"
+    home = load_model("xMatePro7").home
+    plant.place_box("wall", size, Pose(inside + np.array([1e-3 * float(facts["way"]), 0.0, 0.0])))
+    after = run(plant, hold(Drive.POSITION, home), 100)
+    assert np.abs(after.q - home).max() < 1e-6  # It is not thrown.
+
+
+def test_a_box_that_was_refused_leaves_the_one_of_its_name_where_it_was() -> None:
+    plant = MuJoCoPlant(load_model("xMatePro7"))
+    plant.place_box("wall", [0.1, 1.0, 1.0], Pose([2.0, 0.0, 0.5]))
+    with pytest.raises(InvalidValueError, match="would overlap"):
+        plant.place_box("wall", [0.1, 1.0, 1.0], Pose([0.6, 0.0, 0.5]))
+    plant.remove_box("wall")
+    with pytest.raises(InvalidValueError, match="is not there"):
+        plant.remove_box("wall")
