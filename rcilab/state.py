@@ -117,7 +117,7 @@ class RobotState:
 
     def __repr__(self) -> str:
         angles = " ".join(f"{degrees(angle):.2f}" for angle in self.q)
-        faults = ", ".join(fault.name for fault in self.faults) or "none"
+        faults = ", ".join(fault.manual_name for fault in self.faults) or "none"
         modes = f"{self.robot_mode.name}, {self.controller_mode.name}"
         return f"<RobotState {self.message_id}: q = {angles} deg; {modes}; faults: {faults}>"
 

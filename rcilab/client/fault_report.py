@@ -53,11 +53,11 @@ def describe_faults(
     faults = tuple(faults)
     when = "before the first command" if math.isnan(t) else f"at t = {t:.3f} s"
     if pressed:
-        bits = ", ".join(fault.name for fault in faults)
+        bits = ", ".join(fault.manual_name for fault in faults)
         return (
             f"the controller stopped the motion {when}: {pressed} (reported as {bits}); .record holds the last cycles"
         )
-    names = ", ".join(f"{fault.name} ({fault.cause})" for fault in faults)
+    names = ", ".join(f"{fault.manual_name} ({fault.cause})" for fault in faults)
     parts = [f"the controller stopped the motion {when}: {names}"]
     numbers = _numbers(faults, record, limits)
     if numbers:

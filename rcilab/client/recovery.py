@@ -24,7 +24,7 @@ def recover(commands: RciCommands, link: Link) -> None:
             faults = states[-1].faults
             if not faults:
                 return
-    names = ", ".join(fault.name for fault in faults)
+    names = ", ".join(fault.manual_name for fault in faults)
     raise DeadlineError(
         f"{link.name}: {names or 'the faults'} did not clear within {RECOVERY_TIMEOUT:g} s; remove the cause first"
         + (f": {faults[0].remedy}" if faults else "")

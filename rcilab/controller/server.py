@@ -331,7 +331,9 @@ class ControllerServer:
         state = self.cycle.step(is_seen=is_seen)
         self._surroundings.step()
         if state.faults and state.faults != faults:
-            self._log(f"{', '.join(fault.name for fault in state.faults)}: {self.cycle.reason}; the arm comes to rest")
+            self._log(
+                f"{', '.join(fault.manual_name for fault in state.faults)}: {self.cycle.reason}; the arm comes to rest"
+            )
             if Fault.INSTABILITY_DETECTION in state.faults and self.cycle.playout.lost_in_row:
                 self._log(
                     "a client that pauses needs a deeper play-out (--prefill 50), SCHED_FIFO for itself, or --lockstep"

@@ -54,7 +54,7 @@ class _Panel:
 
 
 def plot(
-    motion: Motion,
+    motion: Motion | Run,
     model: RobotModel,
     run: Run | None = None,
     *,
@@ -71,7 +71,7 @@ def plot(
     out. Needs no display: the figure shows itself in a notebook and takes `savefig` anywhere.
 
     Args:
-        motion: What to draw.
+        motion: What to draw: a motion, or a run, which brings its plan; of a callback, what it commanded is drawn.
         model: The arm it is for; its limits are drawn.
         run: What came of it on a robot, as `execute` returned it.
         joints: Numbers of the joints to draw, from 1; None draws all.
@@ -83,10 +83,8 @@ def plot(
     """
     chosen = chosen_language(language)
     require_installed("matplotlib", "plot")
-    require_motion(motion)
+    motion, run = _motion_and_run(motion, run)
     require_model(model)
-    if run is not None:
-        _require_run(run)
     indices = _joint_indices(joints, model.n)
     with writing(chosen) as written:
         return _draw(motion, model, run, indices, Text(written, "rcilab.notebook"))
@@ -225,11 +223,19 @@ def _plan_times(run: Run) -> Array:
     return run.t - run.delay * CYCLE_TIME
 
 
-def _require_run(run: object) -> None:
+def _motion_and_run(motion: object, run: object) -> tuple[Motion, Run | None]:
+    """Returns what is drawn, and what came of it.
+
+    Raises:
+        InvalidValueError: One of them is something else.
+    """
     from rcilab.recording.run import Run
 
-    if not isinstance(run, Run):
+    if isinstance(motion, Run):
+        return motion.plan or motion.commanded(), motion
+    if run is not None and not isinstance(run, Run):
         raise InvalidValueError("run", run, "is no run; execute returns one")
+    return require_motion(motion), run
 
 
 def _draw_error(ax: Axes, run: Run, joints: Sequence[int], text: Text) -> None:

@@ -34,7 +34,7 @@ def _ended(run: Run, text: Text) -> str:
     if not run.is_complete:
         return text("facts.cut")
     if not run.stopped:
-        return text("facts.goal")
+        return text("facts.goal" if run.plan is not None else "facts.last")
     why = f"stop.{run.stopped}"
     return text("facts.stopped", why=text(why) if text.has(why) else run.stopped)
 

@@ -18,6 +18,7 @@ from typing import IO, TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rcilab.clock import CYCLE_TIME
 from rcilab.language import load_words
 from rcilab.recording.html_facts import fact_rows
 from rcilab.recording.tracking_words import error_rows, tracking_notes
@@ -41,9 +42,9 @@ def write_html(run: Run, stream: IO[bytes], text: Text) -> None:
     tracking = run.tracking
     packed, scales = _Packed(), {name: plot_scale(name, text.units) for name in _PLOTS}
     content = {
-        "words": dict(load_words("rcilab.recording", text.language)),
+        "words": _words(run, text),
         "run": _pack_run(run, tracking, scales, packed),
-        "charts": [_chart(name, scale, text) for name, scale in scales.items()],
+        "charts": [_chart(name, scale, text, run) for name, scale in scales.items()],
         "arm": None if run.model is None else _pack_arm(run.model, packed),
         "path": None if run.model is None else _pack_path(run, run.model, tracking, scales["tool"], packed),
         "facts": {
@@ -93,8 +94,17 @@ class _Packed:
         return base64.b64encode(gzip.compress(b"".join(self._parts), 6, mtime=0)).decode("ascii")
 
 
-def _chart(name: str, scale: PlotScale, text: Text) -> dict[str, Any]:
-    return {"name": name, "title": text(f"plot.{name}"), **asdict(scale), "digits": scale.digits}
+def _words(run: Run, text: Text) -> dict[str, str]:
+    """Returns the words of the page; a run without a plan is compared with its commands, and they say so."""
+    words = dict(load_words("rcilab.recording", text.language))
+    if run.plan is None:
+        words |= {name: words[f"{name}_commanded"] for name in ("path", "table.title")}
+    return words
+
+
+def _chart(name: str, scale: PlotScale, text: Text, run: Run) -> dict[str, Any]:
+    key = f"plot.{name}_commanded" if run.plan is None and name in ERRORS else f"plot.{name}"
+    return {"name": name, "title": text(key), **asdict(scale), "digits": scale.digits}
 
 
 def _pack_run(run: Run, tracking: Tracking, scales: dict[str, PlotScale], packed: _Packed) -> dict[str, Any]:
@@ -110,9 +120,11 @@ def _pack_run(run: Run, tracking: Tracking, scales: dict[str, PlotScale], packed
         "fault": packed.add(run.cycles["faults"] != 0, "u1"),
     }
     if run.plan is not None:
-        rows = np.clip(np.rint(run.t * 1e3).astype(np.intp) - run.delay, 0, len(run.plan.dq) - 1)
+        # As the controller computes it: by backward differences.
+        velocity = np.diff(run.plan.q, axis=0, prepend=run.plan.q[:1]) / CYCLE_TIME
+        rows = np.clip(np.rint(run.t / CYCLE_TIME).astype(np.intp) - run.delay, 0, len(velocity) - 1)
         packs["q_plan"] = packed.add(factor["q"] * run.planned.T)
-        packs["dq_plan"] = packed.add(factor["dq"] * run.plan.dq[rows].T)
+        packs["dq_plan"] = packed.add(factor["dq"] * velocity[rows].T)
     limits = None
     if run.model is not None:
         joint = run.model.limits.joint

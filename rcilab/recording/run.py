@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from rcilab.arrays import Array, JointPath
 from rcilab.clock import CYCLE_TIME
+from rcilab.errors import UsageError
 from rcilab.faults import FAULT_COUNT, Fault
 from rcilab.recording.setup import Setup
 from rcilab.recording.tracking import Tracking, compute_tracking, find_stop, last_compared
@@ -190,6 +191,23 @@ class Run:
 
         return check(self.plan, self.model)
 
+    def commanded(self) -> Motion:
+        """Returns the motion that the controller reports as commanded, on its 1 ms grid, the play-out delay taken out.
+
+        It stands in for the plan where a callback moved the arm: to be drawn and checked. Cycles of which no state came
+        lie on straight lines.
+
+        Raises:
+            UsageError: No cycle was recorded.
+        """
+        from rcilab.motion.motion import Motion
+
+        if not len(self.t):
+            raise UsageError("this run has no cycle: nothing was commanded")
+        times = self.t - self.delay * CYCLE_TIME
+        grid = CYCLE_TIME * np.arange(max(round(float(times[-1]) / CYCLE_TIME), 0) + 1)
+        return Motion.from_cycles(np.stack([np.interp(grid, times, column) for column in self.q_c.T], axis=1))
+
     def _planned(self, delay: int) -> JointPath:
         """The plan at every row, `delay` cycles late, shape (N, n), [rad]."""
         assert self.plan is not None
@@ -300,7 +318,7 @@ class Run:
         if not self.is_complete:
             facts.append("cut off: the end of its file is missing")
         if self.faults:
-            facts.append("faults: " + ", ".join(fault.name for fault in self.faults))
+            facts.append("faults: " + ", ".join(fault.manual_name for fault in self.faults))
         return f"<Run {', '.join(facts)}>"
 
     def _repr_html_(self) -> str:

@@ -32,7 +32,7 @@ def run_html(run: Run, language: str = "en") -> str:
     rows = [
         ("duration", words["card.cycles"].format(duration=run.duration, cycles=len(run.cycles))),
         ("ended", ended),
-        ("faults", ", ".join(fault.name for fault in run.faults) or words["card.none"]),
+        ("faults", ", ".join(fault.manual_name for fault in run.faults) or words["card.none"]),
         ("error", _error(run, words)),
         ("success", f"{float(run.success_rate[-1]):.3f}" if len(run.cycles) else "-"),
         ("lost", f"{timing.lost}"),

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 Quantity = Literal["q", "dq", "ddq", "jerk", "tau"]
 QUANTITIES: tuple[Quantity, ...] = ("q", "dq", "ddq", "jerk")
+ORDERS: dict[Quantity, int] = {quantity: order for order, quantity in enumerate(QUANTITIES)}
+"""How many times the angles are differentiated for a signal."""
 """What a motion has of every joint; a torque takes an arm and its load as well."""
 
 _WIDENED = 3  # Points that a marked violation reaches to both sides: one bad cycle is still some pixels wide.
@@ -112,11 +114,16 @@ def _first(values: Array, wanted: Array, places: NDArray[np.intp], counts: NDArr
 
 
 def plan_curves(motion: Motion, quantity: Quantity, model: RobotModel | None = None) -> Curves:
-    """Returns a planned signal, one column a joint; the torque that it takes `model` with its load."""
+    """Returns a planned signal, one column a joint; the torque that it takes `model` with its load.
+
+    Velocity, acceleration and jerk are the backward differences that the controller computes and `check` compares.
+    """
     if quantity == "tau":
         assert model is not None
         return Curves(t=motion.times, values=model.torque(motion.q, motion.dq, motion.ddq).full)
-    return Curves(t=motion.times, values=getattr(motion, quantity))
+    order = ORDERS[quantity]
+    path = np.concatenate((np.repeat(motion.q[:1], order, axis=0), motion.q))  # The arm stands still before the start.
+    return Curves(t=motion.times, values=np.diff(path, n=order, axis=0) / CYCLE_TIME**order)
 
 
 def streamed_curves(q: JointPath, quantity: Quantity, model: RobotModel | None = None) -> Curves:
@@ -136,7 +143,7 @@ def streamed_curves(q: JointPath, quantity: Quantity, model: RobotModel | None =
         assert model is not None
         rates = (backward_differences(t, q, order) for order in (1, 2))
         return Curves(t=t, values=model.torque(q, *rates).full)
-    return Curves(t=t, values=backward_differences(t, q, {"dq": 1, "ddq": 2, "jerk": 3}[quantity]))
+    return Curves(t=t, values=backward_differences(t, q, ORDERS[quantity]))
 
 
 def recorded_curves(t: Array, q: Array, q_c: Array, dq: Array, quantity: Quantity) -> Curves:

@@ -135,7 +135,7 @@ def test_stop_brings_the_arm_to_rest_and_returns_the_run(make_robot):
 
 def test_a_fault_ends_the_motion_with_faults_and_record_and_recovery_leads_on(make_robot):
     peer, robot = make_robot(Script(fault_at=40))
-    with pytest.raises(ControlError, match=r"COMMAND_JOINT_VELOCITY_LIMITS_VIOLATION.*rad/s") as caught:
+    with pytest.raises(ControlError, match=r"kCommandJointVelocityLimitsViolation.*rad/s") as caught:
         robot.control(wave(400))
     assert caught.value.faults == (Fault.COMMAND_JOINT_VELOCITY_LIMITS_VIOLATION,)
     assert len(caught.value.record) > 30

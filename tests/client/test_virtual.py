@@ -101,7 +101,7 @@ def test_a_collision_that_presses_on_is_left_by_higher_thresholds(plant):
         robot.power_on()
         robot.set_collision_behavior([5.0] * MODEL.n)
         robot.world.push([0.0, 0.0, -40.0, 0.0, 0.0, 0.0], duration=60.0)
-        with pytest.raises(ControlError, match="COLLISION"):
+        with pytest.raises(ControlError, match="kCollision"):
             robot.control(lambda state, t: JointPosition(state.q_c))
         with pytest.raises(
             CommandRejectedError, match="StartDrag was refused: not possible; a fault has stopped the arm"
@@ -143,7 +143,7 @@ def test_a_fault_before_the_first_command_is_a_control_error_that_names_it(plant
     with simulate(MODEL, plant=plant) as robot:
         robot.power_on()
         robot.world.push([0.0, 0.0, -150.0, 0.0, 0.0, 0.0], duration=3.0)
-        with pytest.raises(ControlError, match="before the first command: COLLISION") as caught:
+        with pytest.raises(ControlError, match="before the first command: kCollision") as caught:
             robot.execute(plan_joint(MODEL, robot.state.q_c, robot.state.q_c + 0.1))
         assert caught.value.faults == (Fault.COLLISION,)
         assert len(caught.value.record) > 0

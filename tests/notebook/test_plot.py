@@ -3,6 +3,7 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from rcilab.errors import InvalidValueError
 from rcilab.notebook.plot import JOINT_COLORS, VIOLATION_COLOR, plot
 from rcilab.notebook.preview import preview
 from tests.late import Late
+from tests.recording.runs import PLAN, some_run
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -168,3 +170,12 @@ def test_a_name_where_a_model_belongs_is_refused_by_previews_and_sliders_too() -
     for make in (lambda name: preview(MOTION, name), widgets.JointSliders):
         with pytest.raises(InvalidValueError, match=r"use load_model\('xMatePro7'\)"):
             make("xMatePro7")
+
+
+def test_a_run_is_drawn_with_its_plan_or_what_a_callback_commanded():
+    run = some_run()
+    for given in (run, replace(run, plan=None)):
+        figure = plot(given, run.model)
+        assert len(figure.axes) == 5
+        drawn = next(line.get_ydata() for line in figure.axes[0].lines if line.get_label() == "joint 1")
+        assert np.allclose(drawn[: len(PLAN.q) - 1], PLAN.q[:-1, 0], rtol=0, atol=1e-9)

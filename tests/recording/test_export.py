@@ -119,3 +119,15 @@ def test_the_page_asks_for_nothing_from_elsewhere_and_speaks_both_languages():
         assert "default-src 'none'" in page
         assert word in page
         assert "@@" not in page
+
+
+def test_the_page_of_a_callback_speaks_of_commands_and_of_no_plan(tmp_path):
+    from dataclasses import replace
+
+    run = replace(some_run(), plan=None)
+    for ending in (".html", ".csv", ".npz", ".rcirun"):
+        run.save(tmp_path / f"a{ending}")
+    page = (tmp_path / "a.html").read_text(encoding="utf-8")
+    assert "measured minus commanded" in page
+    assert "at its last command" in page
+    assert "q_plan" not in (tmp_path / "a.csv").read_text().splitlines()[0]

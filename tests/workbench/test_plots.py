@@ -7,6 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rcilab.conformance import check
+from rcilab.conformance.conditions import CYCLE_CONDITIONS
 from rcilab.model import load_model
 from rcilab.motion import Motion, plan_joint
 from rcilab.views.plots import QUANTITIES, Curves, bounds_of, build_frame, decimate, plan_curves, recorded_curves
@@ -97,3 +99,10 @@ def test_the_number_of_series_never_changes(joint):
     full = plot_contents(build_frame(plan_curves(motion, "q"), plan_curves(motion, "q"), LIMITS, "q", joint), joint, 7)
     assert len(empty[0]) == len(empty[1]) == len(full[0]) == len(full[1]) == 20
     assert len({len(column) for column in full[0]}) == 1
+
+
+def test_a_plan_is_drawn_as_it_is_checked():
+    motion = plan_joint(MODEL, MODEL.home, MODEL.home + 0.3)
+    used = {row.condition.order: row.ratio for row in check(motion, MODEL).rows if row.condition in CYCLE_CONDITIONS}
+    drawn = np.abs(plan_curves(motion, "jerk").values / LIMITS.jerk).max()
+    assert drawn == pytest.approx(used[3], rel=1e-6)

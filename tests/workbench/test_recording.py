@@ -29,7 +29,7 @@ from rcilab.workbench.run.readiness import obstacle
 from rcilab.workbench.run.replay import replayed_pose, require_replayable
 from rcilab.workbench.store import UiState
 from rcilab.workbench.text import Text
-from tests.recording.runs import some_run
+from tests.recording.runs import PLAN, some_run
 from tests.workbench.opened import told, wait
 
 
@@ -211,7 +211,6 @@ def test_a_run_that_cannot_be_replayed_says_why():
 
     for facts, words in (
         ({"model": None}, "which arm"),
-        ({"plan": None}, "callback"),
         ({"cycles": some_run().cycles[:0]}, "cycle"),
     ):
         with pytest.raises(UsageError, match=words):
@@ -226,3 +225,12 @@ def test_every_export_of_the_page_is_named_in_both_languages():
             assert text.has(f"export.{ending[1:]}_hint")
         assert "40 %" in progress_html(".csv", 0.4, text)
     assert len(export_run(some_run(), ".npz")) > 1000
+
+
+def test_a_run_of_a_callback_is_replayed_by_what_it_commanded():
+    run = replace(some_run(), plan=None)
+    with Workbench(WorkbenchConfig(port=0, quality="light", replay=run)) as bench:
+        state = bench.store.state
+        assert state.plan is not None
+        assert np.allclose(state.plan.motion.q, PLAN.q[: len(state.plan.motion)], rtol=0, atol=1e-9)
+        assert state.recording.run.plan is None

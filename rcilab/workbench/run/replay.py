@@ -9,6 +9,7 @@ import numpy as np
 
 from rcilab.client.setup import RobotSetup
 from rcilab.clock import CYCLE_TIME
+from rcilab.conformance import check
 from rcilab.errors import UsageError
 from rcilab.posing.planning import picture
 from rcilab.workbench.goal.actions import initial_goal
@@ -25,24 +26,20 @@ def require_replayable(run: Run) -> RobotModel:
     """Returns the arm of a run that can be shown.
 
     Raises:
-        UsageError: It has no cycle, no plan, or nobody knows which arm it was.
+        UsageError: It has no cycle, or nobody knows which arm it was.
     """
     if run.model is None:
         raise UsageError("this run cannot be replayed: its file does not say which arm made it").coded("run_no_arm")
     if not len(run.cycles):
         raise UsageError("this run cannot be replayed: not one cycle was recorded").coded("run_no_cycle")
-    if run.plan is None:
-        raise UsageError(
-            "this run has no plan to compare with (a callback made it); save it as .html to look at it"
-        ).coded("run_no_plan")
     return run.model
 
 
 def replayed(state: UiState, run: Run) -> UiState:
     """Returns a state that shows a run."""
-    model, motion, report = require_replayable(run), run.plan, run.report
-    assert motion is not None  # Both are required above.
-    assert report is not None
+    model = require_replayable(run)
+    motion = run.plan or run.commanded()  # A callback has no plan: what it commanded is drawn and checked.
+    report = run.report or check(motion, model)
     plan = replace(picture(model, motion, report), complete=True)
     goal = initial_goal(model, motion.goal)
     wanted = state.setup.wanted.updated(RobotSetup(tool=model.T_flange_tool, load=model.load))
