@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.arrays import JointVector, as_path, as_rows, described
+from rcilab.arrays import JointVector, as_path, as_rows, as_vector, described
 from rcilab.dynamics.payload import NO_LOAD, Payload
 from rcilab.errors import InvalidValueError, KinematicsError, ModelError
 from rcilab.kinematics.frames import Frame
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
     from rcilab.dynamics.friction import JointFriction
     from rcilab.dynamics.rigid_body import RigidBody, TorqueTerms
     from rcilab.kinematics.collision import Clearance, CollisionGeometry
+
+_SOFT_LIMIT = "soft limit that was set (SetJointLimit, RCI manual 3.1.15)"
 
 __all__ = ["RobotModel", "load_model", "require_model", "require_rci"]
 
@@ -131,6 +134,30 @@ class RobotModel(ReachingArm):
             InvalidValueError: It is no `Payload`, or heavier than the arm is rated for.
         """
         return RobotModel(self.description, self.T_flange_tool, load, self.T_tool_stiffness)
+
+    def with_joint_limits(self, lower: ArrayLike, upper: ArrayLike) -> RobotModel:
+        """Returns this arm with other bounds of its joint angles, such as soft limits (SetJointLimit).
+
+        Planners, solvers and `check` keep inside them, and a certificate is for them.
+
+        Args:
+            lower: Shape (n,), [rad].
+            upper: Above `lower`, shape (n,), [rad].
+
+        Raises:
+            InvalidValueError: Not n finite numbers, or a bound is not below its upper one.
+        """
+        low, high = as_vector(lower, self.n, "lower", "rad"), as_vector(upper, self.n, "upper", "rad")
+        for joint in np.flatnonzero(low >= high).tolist():
+            raise InvalidValueError(
+                f"lower, joint {joint + 1}", float(low[joint]), f"rad must be below {high[joint]:g}"
+            )
+        limits = self.limits
+        sources = {**limits.sources, "joint.lower": _SOFT_LIMIT, "joint.upper": _SOFT_LIMIT}
+        joint = replace(limits.joint, lower=low, upper=high)
+        limits = replace(limits, joint=joint, sources=MappingProxyType(sources))
+        description = replace(self.description, limits=limits)
+        return RobotModel(description, self.T_flange_tool, self.load, self.T_tool_stiffness)
 
     def with_stiffness_frame(self, T_tool_stiffness: Pose) -> RobotModel:
         """Returns this arm with another stiffness frame, given by its pose in the tool frame (SetCoor).

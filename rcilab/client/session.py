@@ -128,7 +128,7 @@ class RobotSession(Motions, Closing):
 
     @property
     def model(self) -> RobotModel:
-        """The arm, with the tool and the load that the controller was told of last by this session."""
+        """The arm, with the tool, the load and the soft limits that this session has set."""
         return self._model
 
     @property
@@ -234,6 +234,17 @@ class RobotSession(Motions, Closing):
         with self._turns.take("SetCartesianLimit"):
             super().set_cartesian_limit(box)
             self._safety_box = box
+
+    def set_joint_limit(self, lower: ArrayLike, upper: ArrayLike) -> None:
+        """Sets soft limits of the joint angles; `model` has them from then on, so that motions are checked with them.
+
+        Args:
+            lower: Shape (n,), [rad], inside the arm's own range.
+            upper: Shape (n,), [rad].
+        """
+        with self._turns.take("SetJointLimit"):
+            super().set_joint_limit(lower, upper)
+            self._model = self._model.with_joint_limits(lower, upper)
 
     def set_load(self, mass: float, center_of_mass: ArrayLike, inertia: ArrayLike) -> None:
         """Sets the load at the flange; `model` has it from then on.

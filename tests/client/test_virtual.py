@@ -8,7 +8,15 @@ import numpy as np
 import pytest
 
 from rcilab.command import JointPosition
-from rcilab.errors import CommandRejectedError, ControlError, UsageError
+from rcilab.conformance import check
+from rcilab.errors import (
+    CertificateError,
+    CommandRejectedError,
+    ConformanceError,
+    ControlError,
+    PlanningError,
+    UsageError,
+)
 from rcilab.faults import Fault
 from rcilab.model import load_model
 from rcilab.motion import plan_joint
@@ -161,3 +169,26 @@ def test_a_slow_callback_is_named_with_its_duration_and_the_cycles_it_missed():
             robot.control(slow)
         assert caught.value.faults == (Fault.INSTABILITY_DETECTION,)
         assert "network" not in str(caught.value)
+
+
+def test_soft_limits_of_the_session_count_in_plan_check_and_certificate():
+    with simulate(MODEL) as robot:
+        robot.power_on()
+        start = robot.state.q_c
+        goal = start + np.eye(MODEL.n)[0] * 0.3
+        motion = plan_joint(robot.model, start, goal)
+        certificate = check(motion, robot.model).certificate
+        joint = MODEL.limits.joint
+        upper = np.array(joint.upper)
+        upper[0] = start[0] + 0.2
+        robot.set_joint_limit(joint.lower, upper)
+        with pytest.raises(PlanningError, match="joint 1"):
+            plan_joint(robot.model, start, goal)
+        assert not check(motion, robot.model).ok
+        with pytest.raises(ConformanceError, match="joint 1"):
+            robot.execute(motion)
+        with pytest.raises(CertificateError, match="limits"):
+            robot.execute(motion, certificate)
+        assert "SetJointLimit" in robot.model.limits.source("joint.upper")
+        robot.set_joint_limit(joint.lower, joint.upper)
+        robot.execute(motion)
