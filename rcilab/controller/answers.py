@@ -38,7 +38,7 @@ def answer_query(
     """Returns the content that a query asks for, or None when the request is no query."""
     match request:
         case rci.GetMotorState():
-            return rci.MotorStateResponse(int(phase not in (Phase.OFF, Phase.USER_STOPPED)))
+            return rci.MotorStateResponse(int(phase not in (Phase.OFF, Phase.CUT_OFF, Phase.USER_STOPPED)))
         case rci.GetSafetyStopState():
             return rci.SafetyStopResponse(safety_stop)
         case rci.GetDIState(signal=signal):
@@ -65,7 +65,7 @@ def judge_request(request: rci.Request, phase: Phase, settings: Settings, arm: A
         case rci.StartDrag(space=space, type=kind):
             is_known = space in tuple(rci.DragSpace) and kind in tuple(rci.DragType)
             refusal = None if is_known else rci.SettingStatus.INVALID_ARGUMENT
-        case rci.AutomaticErrorRecovery() if phase is Phase.REFLEX:
+        case rci.AutomaticErrorRecovery() if phase in (Phase.REFLEX, Phase.CUT_OFF):
             refusal = judge_recovery(settings, arm.watch)
         case _ if request.code in GROUNDED and Action.APPLY in cell.actions and not arm.commanded.is_at_rest:
             refusal = rci.SettingStatus.NOT_POSSIBLE
@@ -117,6 +117,7 @@ def conclude(reply: Reply, phase: Phase) -> rci.Response:
 
 _OVERTAKEN = {
     Phase.IDLE: rci.RecoveryStatus.SUCCESS,
+    Phase.OFF: rci.RecoveryStatus.SUCCESS,
     Phase.USER_STOPPED: rci.RecoveryStatus.USER_STOP,
     Phase.REFLEX: rci.RecoveryStatus.REFLEX,
 }

@@ -37,10 +37,11 @@ _PRESSED = {
     rci.SafetyStop.ESTOP: Remark("an emergency stop was pressed", "estop"),
     rci.SafetyStop.GSTOP: Remark("the safety gate was opened", "gstop"),
 }
+_JOINT_RANGE = frozenset((Fault.ACTUAL_JOINT_POSITION_LIMITS_VIOLATION, Fault.COMMAND_JOINT_POSITION_LIMITS_VIOLATION))
 _WAITING = (Phase.STARTING, Phase.RECOVERING)
 _MOVING = (Phase.MOVING, Phase.STOPPING)
-_STILL = (Phase.OFF, Phase.IDLE, Phase.REFLEX, Phase.USER_STOPPED)
-_BRAKED = (Phase.OFF, Phase.REFLEX, Phase.USER_STOPPED, Phase.RECOVERING)
+_STILL = (Phase.OFF, Phase.IDLE, Phase.REFLEX, Phase.CUT_OFF, Phase.USER_STOPPED)
+_BRAKED = (Phase.OFF, Phase.REFLEX, Phase.CUT_OFF, Phase.USER_STOPPED, Phase.RECOVERING)
 _IDLE_MODES = (ControllerMode.OTHER, MotionGeneratorMode.IDLE)
 _REPORTED = (
     rci.CommandCode.SET_COOR,
@@ -273,7 +274,8 @@ class ControlCycle:
 
     def _raise(self, faults: tuple[Fault, ...], reason: Remark) -> None:
         self.reason = reason
-        self.happen(Event.FAULT, *faults)
+        is_limit = not self.settings.auto_limit and not _JOINT_RANGE.isdisjoint(faults)
+        self.happen(Event.JOINT_LIMIT if is_limit else Event.FAULT, *faults)
 
     def _current_law(self) -> Law:
         if self._motion.is_followed:

@@ -9,7 +9,7 @@ came first. Commands are judged before the measurement: after a broken command n
 What is the same for all: the bit is set in the state of the cycle in which the condition is violated and stays set
 until the error recovery; queued commands are forgotten; the arm comes to rest inside its acceleration and jerk limits
 under the position servo, then the brakes close; StopMove is answered with success. What differs is whose value broke
-the condition, and where the stop begins.
+the condition, and where the stop begins. A joint limit without auto_limit also switches the motors off (manual 3.1.15).
 """
 
 from __future__ import annotations
@@ -39,7 +39,10 @@ class FaultStop(NamedTuple):
 
 
 _ANYTIME = "none: recover, then start the next motion"
-_BACK = "up to 1 deg outside: as below. Farther: refused (manual recovery needed), power off and on, then lead back"
+_BACK = (
+    "up to 1 deg outside: recover, then power on, which the limit has taken unless auto_limit is on. "
+    "Farther: refused (manual recovery needed), power off and on, then lead back"
+)
 _BACK_BOX = "up to 1 cm outside: as below. Farther: refused (manual recovery needed), power off and on, then lead back"
 _CLEAR = "refused (reflex) while something still presses harder than the thresholds"
 

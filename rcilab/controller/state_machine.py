@@ -2,6 +2,7 @@
 
     OFF <-> IDLE -> STARTING -> MOVING -> STOPPING -> IDLE
     IDLE <-> GUIDING            any of them -> REFLEX -> RECOVERING -> IDLE
+                                MOVING, STOPPING -> CUT_OFF -> OFF
                                 any of them <-> USER_STOPPED
 
 In every phase but MOVING and GUIDING the arm is brought to rest if it still moves, and then stays; that is the one
@@ -43,6 +44,8 @@ class Phase(Enum):
     """A person moves the arm by hand."""
     REFLEX = (RobotMode.REFLEX, 0)
     """A fault stopped the arm; brakes closed once it rests."""
+    CUT_OFF = (RobotMode.REFLEX, 1)
+    """As REFLEX, and without motor power: a joint passed its range without `auto_limit` (manual 3.1.15)."""
     USER_STOPPED = (RobotMode.USER_STOPPED, 0)
     """An emergency stop is pressed or the safety gate is open."""
     RECOVERING = (RobotMode.AUTOMATIC_ERROR_RECOVERY, 0)
@@ -58,6 +61,7 @@ class Event(Enum):
 
     MODES_SHOWN = "the delay after StartMove is over"
     FAULT = "a condition was broken"
+    JOINT_LIMIT = "a joint passed its range, and auto_limit is off"
     AT_REST = "the arm has come to rest"
     RECOVERED = "the recovery has taken its time and the arm rests"
     CLIENT_LOST = "the client's connection ended"
@@ -133,6 +137,7 @@ thresholds (4.6), and an error recovery waits until nothing is above them."""
 _BUSY = (P.STARTING, P.MOVING, P.STOPPING, P.GUIDING, P.RECOVERING)
 _START_REFUSED = dict.fromkeys((P.OFF, *_BUSY), StartStatus.NOT_POSSIBLE) | {
     P.REFLEX: StartStatus.REFLEX,
+    P.CUT_OFF: StartStatus.REFLEX,
     P.USER_STOPPED: StartStatus.USER_STOP,
 }
 
@@ -150,7 +155,7 @@ def _setters(phase: Phase) -> dict[Trigger, Transition]:
     for command in ANYTIME:
         rows[command] = Transition(phase, (A.APPLY,), _success(command))
     for command in GROUNDED:
-        if phase in (P.OFF, P.IDLE) or (phase is P.REFLEX and command in REMEDIES):
+        if phase in (P.OFF, P.IDLE) or (phase in (P.REFLEX, P.CUT_OFF) and command in REMEDIES):
             rows[command] = Transition(phase, (A.APPLY,), _success(command))
         else:
             rows[command] = Transition(phase, (), _refusal(command))
@@ -186,11 +191,11 @@ def _power(phase: Phase) -> dict[Trigger, Transition]:
     rows: dict[Trigger, Transition] = {}
     if phase is P.OFF:
         rows[C.SET_MOTOR_POWER] = Transition(P.IDLE, (), SettingStatus.SUCCESS)
-    elif phase is P.USER_STOPPED:
+    elif phase in (P.USER_STOPPED, P.CUT_OFF):
         rows[C.SET_MOTOR_POWER] = Transition(phase, (), SettingStatus.NOT_POSSIBLE)
     else:
         rows[C.SET_MOTOR_POWER] = Transition(phase, (), SettingStatus.SUCCESS)
-    if phase in (P.OFF, P.IDLE, P.REFLEX, P.USER_STOPPED):
+    if phase in (P.OFF, P.IDLE, P.REFLEX, P.CUT_OFF, P.USER_STOPPED):
         after = phase if phase is P.USER_STOPPED else P.OFF
         actions = (A.HIDE_MODES, A.DISCARD, A.CLEAR_FAULTS, A.REBOOT)
         rows[C.REBOOT_ROBOT] = Transition(after, actions, SettingStatus.SUCCESS, When.AT_REST)
@@ -203,6 +208,8 @@ def _recovery(phase: Phase) -> dict[Trigger, Transition]:
     command = C.AUTOMATIC_ERROR_RECOVERY
     if phase is P.REFLEX:
         return {command: Transition(P.RECOVERING, (), RecoveryStatus.SUCCESS, When.AT_REST)}
+    if phase is P.CUT_OFF:
+        return {command: Transition(P.OFF, (A.CLEAR_FAULTS,), RecoveryStatus.SUCCESS, When.AT_REST)}
     if phase in (P.OFF, P.IDLE):  # Nothing to recover from.
         return {command: Transition(phase, (), RecoveryStatus.SUCCESS)}
     status = RecoveryStatus.USER_STOP if phase is P.USER_STOPPED else RecoveryStatus.NOT_POSSIBLE
@@ -219,9 +226,11 @@ def _events(phase: Phase) -> dict[Trigger, Transition]:
         rows[E.RECOVERED] = Transition(P.IDLE, (A.CLEAR_FAULTS,))
     if phase is P.USER_STOPPED:
         rows[E.SAFETY_RELEASE] = Transition(P.OFF, (A.CLEAR_FAULTS,))
-        rows[E.FAULT] = Transition(phase, (A.SET_FAULTS,))
+        rows[E.FAULT] = rows[E.JOINT_LIMIT] = Transition(phase, (A.SET_FAULTS,))
     elif phase is not P.OFF:
-        rows[E.FAULT] = Transition(P.REFLEX, (A.SET_FAULTS, A.HIDE_MODES, A.DISCARD))
+        actions = (A.SET_FAULTS, A.HIDE_MODES, A.DISCARD)
+        rows[E.FAULT] = Transition(phase if phase is P.CUT_OFF else P.REFLEX, actions)
+        rows[E.JOINT_LIMIT] = Transition(P.CUT_OFF, actions)
     tells = (A.SET_FAULTS,) if phase in (P.MOVING, P.STOPPING) else ()  # A bit is the only thing that stops a client.
     rows[E.SAFETY_STOP] = Transition(P.USER_STOPPED, (*tells, A.HIDE_MODES, A.DISCARD))
     if phase in (P.STARTING, P.GUIDING):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from contextlib import suppress
 
 import numpy as np
 from numpy.typing import NDArray
@@ -177,9 +176,10 @@ class Booth(Closing):
             self._widen(robot)
             robot.power_on()
             return ["refused", "power_off", "widen", "power_on"]
-        with suppress(CommandRejectedError):  # It is on already.
-            robot.power_on()
-        return ["recover"]
+        if robot.motor_state():
+            return ["recover"]
+        robot.power_on()  # A joint limit and an emergency stop take the motor power.
+        return ["recover", "power_on"]
 
 
 def _is_far_outside(error: CommandRejectedError) -> bool:

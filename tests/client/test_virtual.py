@@ -94,6 +94,39 @@ def test_a_safety_stop_is_shown_and_recovery_waits_for_its_release(robot, button
     assert robot.control(hold).stopped is None
 
 
+def test_a_joint_limit_takes_the_motor_power_and_recovery_does_not_give_it_back(robot):
+    limits, q = MODEL.limits.joint, robot.state.q_c
+    robot.set_joint_limit(q - 0.05, q + 0.05)
+
+    def swing(state, t):
+        away = 0.03 * (1.0 - np.cos(2.0 * t)) * np.eye(MODEL.n)[0]
+        return JointPosition(q + away, finished=t >= 3.0)
+
+    with pytest.raises(ControlError, match="COMMAND_JOINT_POSITION_LIMITS_VIOLATION"):
+        robot.control(swing)
+    assert robot.motor_state() is False
+    with pytest.raises(CommandRejectedError, match="a fault has stopped the arm: recover"):
+        robot.power_on()
+    robot.recover()
+    assert robot.motor_state() is False
+    with pytest.raises(CommandRejectedError, match="the motors are off"):
+        robot.control(hold)
+    robot.power_on()
+    robot.set_joint_limit(limits.lower, limits.upper)
+    assert robot.control(hold).stopped is None
+
+
+def test_with_auto_limit_the_motors_stay_on(robot):
+    limits, q = MODEL.limits.joint, robot.state.q_c
+    robot.set_joint_limit(q - 0.05, q + 0.05)
+    robot.world.set_auto_limit(True)
+    away = np.eye(MODEL.n)[0]
+    robot.control(lambda state, t: JointPosition(q + 0.03 * (1.0 - np.cos(2.0 * t)) * away, finished=t >= np.pi))
+    assert robot.motor_state() is True
+    robot.world.set_auto_limit(False)
+    robot.set_joint_limit(limits.lower, limits.upper)
+
+
 def test_without_power_a_drag_and_a_motion_are_refused_for_that(robot):
     robot.power_off()
     with pytest.raises(CommandRejectedError, match="StartDrag was refused: not possible; the motors are off"):

@@ -196,7 +196,8 @@ def test_a_broken_condition_is_its_bit_in_that_cycle_one_stop_and_a_recovery(mak
     provoke(hand)
     first = next(state for state in hand.states if state.faults)
     assert fault in first.faults, (first.faults, hand.cycle.reason)
-    assert hand.cycle.phase is Phase.REFLEX
+    is_limit = F.COMMAND_JOINT_POSITION_LIMITS_VIOLATION in first.faults
+    assert hand.cycle.phase is (Phase.CUT_OFF if is_limit else Phase.REFLEX)
     assert hand.cycle.reason
     assert first.robot_mode is RobotMode.REFLEX
     if fault_stop.FAULT_STOP[fault].offender is fault_stop.Offender.COMMAND and provoke not in (torque_range,):

@@ -22,27 +22,28 @@ from rcilab.protocols.rci import CommandCode, StopStatus
 from rcilab.state import RobotMode
 
 # Rows: what happens. Columns: where. A cell: the phase afterwards ("=" is the same), and the status that is answered.
-PHASES = "OFF IDLE STARTING MOVING STOPPING GUIDING REFLEX USER_STOPPED RECOVERING".split()
+PHASES = "OFF IDLE STARTING MOVING STOPPING GUIDING REFLEX CUT_OFF USER_STOPPED RECOVERING".split()
 MATRIX = """
-START_MOVE   =,3 STARTING,0 =,3 =,3 =,3 =,3 =,6 =,7 =,3
-STOP_MOVE    =,0 =,0 IDLE,0 STOPPING,0 =,0 =,0 =,0 =,0 =,0
-START_DRAG   =,1 GUIDING,0 =,1 =,1 =,1 =,1 =,1 =,1 =,1
-STOP_DRAG    =,0 =,0 =,0 =,0 =,0 IDLE,0 =,0 =,0 =,0
-SET_MOTOR_POWER IDLE,0 =,0 =,0 =,0 =,0 =,0 =,0 =,1 =,0
-AUTOMATIC_ERROR_RECOVERY =,0 =,0 =,1 =,1 =,1 =,1 RECOVERING,0 =,4 =,1
-REBOOT_ROBOT =,0 OFF,0 =,1 =,1 =,1 =,1 OFF,0 =,0 =,1
-GROUNDED     =,0 =,0 =,1 =,1 =,1 =,1 =,1 =,1 =,1
-REMEDIES     =,0 =,0 =,1 =,1 =,1 =,1 =,0 =,1 =,1
-ANYTIME      =,0 =,0 =,0 =,0 =,0 =,0 =,0 =,0 =,0
-QUERIES      =,- =,- =,- =,- =,- =,- =,- =,- =,-
-MODES_SHOWN  = = MOVING = = = = = =
-FAULT        = REFLEX REFLEX REFLEX REFLEX REFLEX REFLEX = REFLEX
-AT_REST      = = = = IDLE = = = =
-RECOVERED    = = = = = = = = IDLE
-CLIENT_LOST  = = IDLE STOPPING STOPPING IDLE = = =
-SAFETY_STOP  USER_STOPPED USER_STOPPED USER_STOPPED USER_STOPPED USER_STOPPED USER_STOPPED USER_STOPPED = USER_STOPPED
-SAFETY_RELEASE = = = = = = = OFF =
-"""
+START_MOVE   =,3 STARTING,0 =,3 =,3 =,3 =,3 =,6 =,6 =,7 =,3
+STOP_MOVE    =,0 =,0 IDLE,0 STOPPING,0 =,0 =,0 =,0 =,0 =,0 =,0
+START_DRAG   =,1 GUIDING,0 =,1 =,1 =,1 =,1 =,1 =,1 =,1 =,1
+STOP_DRAG    =,0 =,0 =,0 =,0 =,0 IDLE,0 =,0 =,0 =,0 =,0
+SET_MOTOR_POWER IDLE,0 =,0 =,0 =,0 =,0 =,0 =,0 =,1 =,1 =,0
+AUTOMATIC_ERROR_RECOVERY =,0 =,0 =,1 =,1 =,1 =,1 RECOVERING,0 OFF,0 =,4 =,1
+REBOOT_ROBOT =,0 OFF,0 =,1 =,1 =,1 =,1 OFF,0 OFF,0 =,0 =,1
+GROUNDED     =,0 =,0 =,1 =,1 =,1 =,1 =,1 =,1 =,1 =,1
+REMEDIES     =,0 =,0 =,1 =,1 =,1 =,1 =,0 =,0 =,1 =,1
+ANYTIME      =,0 =,0 =,0 =,0 =,0 =,0 =,0 =,0 =,0 =,0
+QUERIES      =,- =,- =,- =,- =,- =,- =,- =,- =,- =,-
+MODES_SHOWN  = = MOVING = = = = = = =
+FAULT        = REFLEX REFLEX REFLEX REFLEX REFLEX REFLEX = = REFLEX
+JOINT_LIMIT  = CUT_OFF CUT_OFF CUT_OFF CUT_OFF CUT_OFF CUT_OFF CUT_OFF = CUT_OFF
+AT_REST      = = = = IDLE = = = = =
+RECOVERED    = = = = = = = = = IDLE
+CLIENT_LOST  = = IDLE STOPPING STOPPING IDLE = = = =
+SAFETY_STOP  USER_STOPPED USER_STOPPED USER_STOPPED USER_STOPPED USER_STOPPED USER_STOPPED USER_STOPPED USER_STOPPED = USER_STOPPED
+SAFETY_RELEASE = = = = = = = = OFF =
+"""  # noqa: E501
 GROUPS = {"GROUNDED": GROUNDED, "REMEDIES": REMEDIES, "ANYTIME": ANYTIME, "QUERIES": QUERIES}
 
 
@@ -65,7 +66,7 @@ EXPECTED = expected()
 def test_the_table_holds_every_pair() -> None:
     assert set(TABLE) == {(phase, trigger) for phase in Phase for trigger in (*CommandCode, *Event)} == set(EXPECTED)
     assert [phase.name for phase in Phase] == PHASES
-    assert len(as_text().splitlines()) == 9 * (25 + 7)
+    assert len(as_text().splitlines()) == 10 * (25 + 8)
 
 
 @pytest.mark.parametrize("pair", list(EXPECTED), ids=lambda pair: f"{pair[0].name}-{pair[1].name}")
@@ -110,7 +111,12 @@ def test_only_the_delay_after_start_move_leads_into_a_motion() -> None:
 
 def test_faults_are_cleared_only_by_recovery_release_power_off_and_reboot() -> None:
     clearing = {trigger for (_, trigger), cell in TABLE.items() if Action.CLEAR_FAULTS in cell.actions}
-    assert clearing == {Event.RECOVERED, Event.SAFETY_RELEASE, CommandCode.REBOOT_ROBOT}
+    assert clearing == {
+        Event.RECOVERED,
+        Event.SAFETY_RELEASE,
+        CommandCode.REBOOT_ROBOT,
+        CommandCode.AUTOMATIC_ERROR_RECOVERY,
+    }
 
 
 def test_each_phase_reports_a_robot_mode() -> None:
