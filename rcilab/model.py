@@ -110,6 +110,11 @@ class RobotModel(ReachingArm):
         return self.description.name
 
     @property
+    def tool(self) -> Pose:
+        """Pose of the tool in the flange frame (SetCoor), as given to `load_model`; also `T_flange_tool`."""
+        return self.T_flange_tool
+
+    @property
     def limits(self) -> Limits:
         """Every bound, each with its source."""
         return self.description.limits

@@ -89,11 +89,11 @@ class ConditionResult:
 
     @property
     def has_share(self) -> bool:
-        """Whether `ratio` can be told as a part of the bound: not of 0, nor how far a distance has passed its bound."""
+        """Whether `ratio` is a part of the bound: not of 0, nor of a distance, which is to stay above its bound."""
         condition = self.condition
-        if condition.signal == "position" or condition.is_clearance:
-            return self.ok
-        return condition.stage == "throughout"
+        if condition.is_clearance:
+            return False
+        return self.ok if condition.signal == "position" else condition.stage == "throughout"
 
     @property
     def texts(self) -> tuple[str, str, str]:
@@ -325,7 +325,8 @@ class Report:
         for row in self.rows:
             value, bound, used = row.texts
             place = f"{row.place}, t = {row.time:.3f} s"
-            size = f"{value:>9} of {bound:>10} {row.unit:7} {used:>7}"
+            relation = " >" if row.condition.is_clearance else "of"
+            size = f"{value:>9} {relation} {bound:>10} {row.unit:7} {used:>7}"
             lines.append(f"  {row.verdict:8}  {row.id:{width}}  {size}  {place}  [{row.source}]")
         found = (*self.violations, *self.warnings)
         lines += [f"- {violation}" for violation in found[:LISTED]]

@@ -293,6 +293,9 @@ def _require_word(name: str, value: object) -> None:
 def _target(target: Pose | ArrayLike) -> dict[str, Any]:
     if isinstance(target, Pose):
         return {"position": tuple(target.position.tolist()), "wxyz": tuple(target.wxyz.tolist())}
+    if np.size(target) not in (6, 7):
+        problem = "is not a target: give a Pose (position and wxyz), or joint angles, 6 or 7 numbers [rad]"
+        raise InvalidValueError("target", described(target), problem).coded("target_shape")
     return {"q": angles_of(target, "q")}
 
 

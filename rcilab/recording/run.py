@@ -236,7 +236,7 @@ class Run:
     def _told_error(self) -> str:
         """In words, and until when where it was stopped."""
         stop = self.stop_time if self.plan is not None else None
-        told = f"{math.degrees(self.largest_error):.3g} deg"
+        told = f"{self.largest_error:.3g} rad ({math.degrees(self.largest_error):.3g} deg)"
         return told if stop is None else f"{told} until the stop at {stop:.3f} s"
 
     @property

@@ -74,7 +74,7 @@ def test_a_stopped_run_is_not_compared_with_the_plan_it_left(make_robot):
     motion = plan_joint(MODEL, peer.script.q, MODEL.home, speed=0.5)
     run = robot.execute(motion, progress=lambda t, duration: robot.stop() if t > 0.1 else None)
     assert run.stopped == "on request"
-    assert "largest error 0 deg" in repr(run)
+    assert "largest error 0 rad (0 deg)" in repr(run)
     assert "<td>0 deg" in run._repr_html_()
 
 

@@ -323,3 +323,8 @@ def test_values_from_python_are_checked_as_well():
     assert Waypoint(type="nullspace", psi=0.1) == Waypoint.nullspace(0.1)
     assert Waypoint.line(HOME).pose.is_close(HOME, 1e-12)
     assert Waypoint.nullspace(0.1).pose is None
+
+
+def test_a_position_alone_is_no_target_and_the_error_says_what_is() -> None:
+    with pytest.raises(InvalidValueError, match=r"target: \[0\.5, 0, 0\.3\] is not a target: give a Pose"):
+        Waypoint.line([0.5, 0, 0.3])

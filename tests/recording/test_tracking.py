@@ -37,7 +37,7 @@ def test_the_way_to_rest_after_a_stop_is_no_error_of_tracking():
     assert compared(run).tolist() == list(range(301))  # What was sent last is seen one cycle later.
     assert run.tracking.joint_max == pytest.approx(OFFSET * np.eye(7)[1], abs=1e-12)
     assert np.abs(run.q - run.planned)[301:].max() > 5.0 * OFFSET  # The braking, as it would have counted.
-    assert f"largest error {np.degrees(OFFSET):.3g} deg until the stop at 0.300 s" in repr(run)
+    assert f"largest error {OFFSET:.3g} rad ({np.degrees(OFFSET):.3g} deg) until the stop at 0.300 s" in repr(run)
     assert np.isfinite(run.q).all()  # The motion itself is there to its rest.
 
 
