@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from rcilab.arrays import JointVector, Matrix
+from rcilab.spatial import Pose
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -23,11 +24,16 @@ class CartesianPosition:
     """Commanded pose of the tool in the base frame."""
 
     T_base_tool: Matrix
-    """Homogeneous transform, shape (4, 4), [m]."""
+    """Homogeneous transform, shape (4, 4), [m]; a `Pose` becomes one."""
     psi: float | None = None
     """Arm angle, [rad]; None leaves it to the controller."""
     finished: bool = False
     """True on the last command of a motion."""
+
+    def __post_init__(self) -> None:
+        """Takes a pose for its matrix."""
+        if isinstance(self.T_base_tool, Pose):
+            object.__setattr__(self, "T_base_tool", self.T_base_tool.matrix)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

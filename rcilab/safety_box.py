@@ -11,7 +11,7 @@ import numpy as np
 
 from rcilab.arrays import Array, described
 from rcilab.errors import InvalidValueError
-from rcilab.spatial import Pose
+from rcilab.spatial import Pose, as_pose
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,8 +34,7 @@ class SafetyBox:
         size = tuple(float(edge) for edge in self.size)
         if len(size) != 3 or not all(isfinite(edge) and edge > 0.0 for edge in size):
             raise InvalidValueError("safety box size", size, "must be three lengths above 0 [m]")
-        if not isinstance(self.T_base_box, Pose):  # pyright: ignore[reportUnnecessaryIsInstance]
-            raise InvalidValueError("safety box pose", self.T_base_box, "is no Pose; give its centre in the base")
+        object.__setattr__(self, "T_base_box", as_pose(self.T_base_box, "safety box pose"))
         object.__setattr__(self, "size", size)
 
     def excess(self, position: Sequence[float]) -> float:

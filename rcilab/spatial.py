@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TypeAlias
+from typing import Any, TypeAlias, overload
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, DTypeLike
 
 from rcilab.arrays import Array, Matrix, Vector3, as_vector, described
 from rcilab.errors import InvalidValueError
@@ -44,6 +44,7 @@ class Pose:
     """
 
     __slots__ = ("_p", "_r")
+    __array_ufunc__ = None  # So that `matrix @ pose` comes to us.
 
     _r: Rotation9
     _p: tuple[float, float, float]
@@ -159,17 +160,28 @@ class Pose:
             ),
         )
 
-    def __matmul__(self, other: Pose) -> Pose:
-        """Returns `T_a_c` from `T_a_b @ T_b_c`.
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> Matrix:
+        return np.array(self.as_row_major(), dtype=dtype).reshape(4, 4)
+
+    @overload
+    def __matmul__(self, other: Pose) -> Pose: ...
+
+    @overload
+    def __matmul__(self, other: ArrayLike) -> Any: ...
+
+    def __matmul__(self, other: Pose | ArrayLike) -> Any:
+        """Returns `T_a_c` from `T_a_b @ T_b_c`, also where that is a matrix (4, 4), or points of b as seen in a.
+
+        Args:
+            other: A pose, or points of shape (3,) or (N, 3), [m]; the points come back in their shape.
 
         Raises:
-            InvalidValueError: The other factor is no pose.
+            InvalidValueError: The other factor is neither a pose nor points.
         """
+        if not isinstance(other, Pose):
+            return self._times_array(other)
         a, (px, py, pz) = self._r, self._p
-        try:
-            b, (qx, qy, qz) = other._r, other._p
-        except AttributeError:
-            raise _no_pose(other) from None
+        b, (qx, qy, qz) = other._r, other._p
         return Pose.from_parts(
             (
                 a[0] * b[0] + a[1] * b[3] + a[2] * b[6],
@@ -189,12 +201,24 @@ class Pose:
             ),
         )
 
-    def is_close(self, other: Pose, tolerance: float = 1e-9) -> bool:
-        """Returns whether no element of the two transforms differs by more than `tolerance`."""
+    def __rmatmul__(self, other: ArrayLike) -> Pose:
+        return as_pose(other) @ self
+
+    def _times_array(self, other: object) -> Pose | Array:
+        if is_transform(other):
+            return self @ as_pose(other)
         try:
-            numbers = other._r + other._p
-        except AttributeError:
-            raise _no_pose(other) from None
+            points = np.asarray(other, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise _no_pose("pose", other) from None
+        if points.ndim not in (1, 2) or points.shape[-1] != 3:
+            raise InvalidValueError("factor", described(other), "is no Pose, and no points of shape (3,) or (N, 3)")
+        return points @ self.rotation.T + self.position
+
+    def is_close(self, other: Pose | ArrayLike, tolerance: float = 1e-9) -> bool:
+        """Returns whether no element of the two transforms differs by more than `tolerance`."""
+        other = as_pose(other)
+        numbers = other._r + other._p
         return all(abs(x - y) <= tolerance for x, y in zip(self._r + self._p, numbers, strict=True))
 
     def __repr__(self) -> str:
@@ -203,8 +227,40 @@ class Pose:
         return f"Pose(x={x:.4f}, y={y:.4f}, z={z:.4f} m; roll={roll:.2f}, pitch={pitch:.2f}, yaw={yaw:.2f} deg)"
 
 
-def _no_pose(value: object) -> InvalidValueError:
-    return InvalidValueError("pose", described(value), "is no Pose; Pose.from_matrix makes one of a 4 x 4 matrix")
+def is_transform(value: object) -> bool:
+    """Returns whether a value has the shape of a homogeneous transform, (4, 4)."""
+    try:
+        return np.shape(value) == (4, 4)  # type: ignore[arg-type]
+    except ValueError:  # Rows of different lengths.
+        return False
+
+
+def as_pose(value: object, name: str = "pose", advice: str = "") -> Pose:
+    """Returns a pose that was given as a `Pose` or as a homogeneous transform, shape (4, 4): for borders.
+
+    Args:
+        value: What was given.
+        name: What to call it in an error.
+        advice: What else to write, for the error.
+
+    Raises:
+        InvalidValueError: It is neither, or not finite, or not a proper rigid transform.
+    """
+    if isinstance(value, Pose):
+        rotation, position = value.parts
+        if not math.isfinite(sum(rotation) + sum(position)):
+            raise InvalidValueError(name, repr(value), "must be finite in every element")
+        return value
+    try:
+        return Pose.from_matrix(value)  # type: ignore[arg-type]
+    except InvalidValueError as error:
+        if is_transform(value):
+            raise InvalidValueError(name, described(value), error.requirement) from error
+        raise _no_pose(name, value, advice) from None
+
+
+def _no_pose(name: str, value: object, advice: str = "") -> InvalidValueError:
+    return InvalidValueError(name, described(value), f"is no Pose, and no matrix of shape (4, 4){advice}")
 
 
 IDENTITY = Pose.from_parts((1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0))

@@ -72,7 +72,7 @@ def test_a_size_that_is_none_is_refused(size):
 
 def test_a_pose_that_is_none_is_refused():
     with pytest.raises(InvalidValueError, match="is no Pose"):
-        SafetyBox(size=(1.0, 1.0, 1.0), T_base_box=np.eye(4))
+        SafetyBox(size=(1.0, 1.0, 1.0), T_base_box=np.eye(3))
 
 
 def test_only_an_active_box_bounds_anything_and_what_is_no_box_is_refused_in_words():

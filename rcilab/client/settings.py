@@ -22,7 +22,7 @@ from rcilab.limits import Limits
 from rcilab.protocols import rci
 from rcilab.protocols.rci.bounds import FARTHEST_BOX, FILTER_OFF, LARGEST_BOX, LONGEST_TOOL, LOWEST_FREQUENCY
 from rcilab.safety_box import SafetyBox, require_box
-from rcilab.spatial import Pose
+from rcilab.spatial import Pose, as_pose
 
 _AXES = ("x", "y", "z", "about x", "about y", "about z")
 _ADVICE: dict[tuple[type[rci.Request], IntEnum], str] = {
@@ -241,17 +241,8 @@ def _vector(
     return array
 
 
-def _pose(name: str, value: object) -> Pose:
-    if not isinstance(value, Pose):
-        raise InvalidValueError(name, described(value), "must be a Pose; Pose.from_matrix makes one")
-    rotation, position = value.parts
-    if not math.isfinite(sum(rotation) + sum(position)):
-        raise InvalidValueError(name, repr(value), "must be finite in every element")
-    return value
-
-
 def _pose_at_flange(name: str, value: object) -> Pose:
-    pose = _pose(name, value)
+    pose = as_pose(value, name)
     _require_near(name, pose.parts[1])
     return pose
 

@@ -48,7 +48,7 @@ from rcilab.protocols.world import (
     decode_world_answer,
     encode_world_request,
 )
-from rcilab.spatial import Pose
+from rcilab.spatial import Pose, as_pose
 
 TIMEOUT = LONGEST_STALL + 5.0  # [s] A controller that stalls on request answers afterwards; on a busy machine later.
 
@@ -139,6 +139,7 @@ class World(Closing):
             size: Edges along its own axes, shape (3,), [m].
             pose: Its centre and orientation in base.
         """
+        pose = as_pose(pose)
         position, wxyz = tuple(pose.position.tolist()), tuple(pose.wxyz.tolist())
         self.ask(PlaceBox(name, _numbers(size, 3, "size", "m"), position, wxyz))
 

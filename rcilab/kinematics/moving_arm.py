@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.arrays import Array, JointVector, as_path, as_rows, as_vector, described
+from rcilab.arrays import Array, JointVector, as_path, as_rows, as_vector
 from rcilab.errors import InvalidValueError
 from rcilab.kinematics import forward as forward_kinematics
 from rcilab.kinematics.differential import MovingFrame, drift_path, jacobian_path, moving_frame
@@ -16,7 +16,7 @@ from rcilab.kinematics.frames import Frame, locate
 from rcilab.kinematics.jacobian import jacobian
 from rcilab.kinematics.least_norm import JointRates, least_norm
 from rcilab.robots.description import DhRow
-from rcilab.spatial import IDENTITY, Pose
+from rcilab.spatial import IDENTITY, Pose, as_pose
 
 
 class MovingArm:
@@ -34,17 +34,11 @@ class MovingArm:
     """
 
     def __init__(self, dh: Sequence[DhRow], T_flange_tool: Pose, T_tool_stiffness: Pose) -> None:
-        for name, pose, more in (
-            ("tool", T_flange_tool, ", Pose() is no tool"),
-            ("stiffness frame", T_tool_stiffness, ""),
-        ):
-            if not isinstance(pose, Pose):  # pyright: ignore[reportUnnecessaryIsInstance]
-                raise InvalidValueError(name, described(pose), f"is no Pose; Pose.from_matrix makes one{more}")
-        self.T_flange_tool = T_flange_tool
-        self.T_tool_stiffness = T_tool_stiffness
+        self.T_flange_tool = as_pose(T_flange_tool, "tool", "; Pose() is no tool")
+        self.T_tool_stiffness = as_pose(T_tool_stiffness, "stiffness frame")
         self.n = len(dh)
         self._chain = forward_kinematics.build_chain(dh)
-        self._has_tool = not T_flange_tool.is_close(IDENTITY, 0.0)
+        self._has_tool = not self.T_flange_tool.is_close(IDENTITY, 0.0)
 
     def forward(self, q: ArrayLike) -> Pose:
         """Returns the pose of the tool in base.

@@ -37,7 +37,7 @@ class ReachingArm(MovingArm):
     def __init__(self, description: RobotDescription, T_flange_tool: Pose, T_tool_stiffness: Pose) -> None:
         super().__init__(description.dh, T_flange_tool, T_tool_stiffness)
         self.description = description
-        self._T_tool_flange = T_flange_tool.inverse()
+        self._T_tool_flange = self.T_flange_tool.inverse()
 
     def inverse(self, T: Pose | ArrayLike, psi: float | None = None, near: ArrayLike | None = None) -> Solutions:
         """Returns every analytic solution inside the joint limits (GetJointPos); `.nearest(q)` is the vendor's answer.

@@ -17,7 +17,7 @@ from rcilab.arrays import Array, as_number, as_vector, described
 from rcilab.errors import InvalidValueError, PlanningError
 from rcilab.motion.s_curve import STANDSTILL_DISTANCE
 from rcilab.motion.turning import SteadyTurn, Turning, turn_through, turn_to
-from rcilab.spatial import Pose, Rotation9, rotation_from_wxyz, wxyz_from_rotation
+from rcilab.spatial import Pose, Rotation9, as_pose, rotation_from_wxyz, wxyz_from_rotation
 
 _COLLINEAR = 1e-4
 """Sine of the angle between two chords below which three points make no circle: its radius would be 5 000 chords."""
@@ -145,7 +145,7 @@ def build_line(start: Pose, goal: Pose, psi_start: float | None = None, psi_goal
     Raises:
         InvalidValueError: A pose is none, or not finite.
     """
-    _require_poses(start=start, goal=goal)
+    start, goal = as_pose(start, "start"), as_pose(goal, "goal")
     turn = _angle_between(start, goal)
     return _path(start, goal, psi_start, psi_goal, None, math.dist(start.parts[1], goal.parts[1]), turn)
 
@@ -175,7 +175,7 @@ def build_arc(
         PlanningError: The three positions lie on a line, or two of them are the same.
         InvalidValueError: A pose is none, or not finite, or the orientation is unknown.
     """
-    _require_poses(start=start, via=via, goal=goal)
+    start, via, goal = as_pose(start, "start"), as_pose(via, "via"), as_pose(goal, "goal")
     _require_word("orientation", orientation, get_args(ArcOrientation))
     circle = _circle(start.position, via.position, goal.position)
     distance = circle.angle * math.hypot(*circle.first)
@@ -214,7 +214,7 @@ def build_circle(
         PlanningError: Start is the centre, or not in the plane through the centre at right angles to the axis.
         InvalidValueError: `start` is no pose, a number is not finite or out of range, or the orientation is unknown.
     """
-    _require_poses(start=start)
+    start = as_pose(start, "start")
     _require_word("orientation", orientation, get_args(CircleOrientation))
     middle, normal = as_vector(center, 3, "center", "m"), as_vector(axis, 3, "axis")
     angle = as_number(angle, "angle", "rad")
@@ -256,7 +256,7 @@ def circle_through(start: Pose, second: Pose, third: Pose) -> tuple[Array, Array
         PlanningError: The three positions lie on a line, or two of them are the same.
         InvalidValueError: A pose is none, or not finite.
     """
-    _require_poses(start=start, second=second, third=third)
+    start, second, third = as_pose(start, "start"), as_pose(second, "second"), as_pose(third, "third")
     circle = _circle(start.position, second.position, third.position)
     return np.array(circle.center), np.cross(circle.first, circle.second)
 
@@ -327,15 +327,6 @@ def _angle_between(a: Pose, b: Pose) -> float:
     """Returns the angle of the rotation from a to b, 0 to pi, [rad]."""
     w, x, y, z = wxyz_from_rotation((a.inverse() @ b).parts[0])
     return 2.0 * math.atan2(math.hypot(x, y, z), w)
-
-
-def _require_poses(**poses: object) -> None:
-    for name, pose in poses.items():
-        if not isinstance(pose, Pose):
-            raise InvalidValueError(name, described(pose), "is no Pose; Pose.from_matrix makes one of a 4 x 4 matrix")
-        rotation, position = pose.parts
-        if not math.isfinite(sum(rotation) + sum(position)):
-            raise InvalidValueError(name, repr(pose), "must be finite in every element")
 
 
 def _require_word(name: str, value: object, known: tuple[str, ...]) -> None:

@@ -14,7 +14,7 @@ from rcilab.errors import InvalidValueError
 from rcilab.motion.joint import MIN_SPEED
 from rcilab.motion.path import CircleOrientation, Way
 from rcilab.motion.samples import MOST
-from rcilab.spatial import Pose
+from rcilab.spatial import Pose, as_pose, is_transform
 
 WaypointType: TypeAlias = Literal["joint", "line", "arc", "circle", "nullspace"]
 
@@ -158,7 +158,8 @@ class Waypoint:
     ) -> Waypoint:  # fmt: skip
         """Returns an arc of the tool over `via`: through that pose, or only that position, shape (3,), [m]."""
         places: dict[str, Any] = {"via": via}
-        if isinstance(via, Pose):
+        if isinstance(via, Pose) or is_transform(via):
+            via = as_pose(via, "via")
             places = {"via": via.position, "via_wxyz": via.wxyz}
         return cls(type="arc", **places, **_target(target), psi=psi, speed=speed, blend=blend, dwell=dwell)
 
@@ -291,7 +292,8 @@ def _require_word(name: str, value: object) -> None:
 
 
 def _target(target: Pose | ArrayLike) -> dict[str, Any]:
-    if isinstance(target, Pose):
+    if isinstance(target, Pose) or is_transform(target):
+        target = as_pose(target, "target")
         return {"position": tuple(target.position.tolist()), "wxyz": tuple(target.wxyz.tolist())}
     if np.size(target) not in (6, 7):
         problem = "is not a target: give a Pose (position and wxyz), or joint angles, 6 or 7 numbers [rad]"

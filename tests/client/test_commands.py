@@ -90,7 +90,7 @@ def test_every_command_reaches_the_controller_as_the_protocol_spells_it(make_rob
         ),
         (lambda r: r.set_torque_filter_cut_off_frequency(math.nan), r"frequency: nan must be finite \[Hz\]"),
         (lambda r: r.set_fc_coor(Pose(), "flange"), "type: 'flange' is unknown; known: 'world', 'tool', 'path'"),
-        (lambda r: r.set_fc_coor(None), "must be a Pose"),
+        (lambda r: r.set_fc_coor(None), "is no Pose"),
         (lambda r: r.start_drag("elbow"), "space: 'elbow' is unknown; known: 'joint', 'cartesian'"),
         (lambda r: r.enable_virtual_guide("off"), "True or False"),
         (lambda r: r.receive_state(max_age=-1), "max_age: -1 must not be below 0"),

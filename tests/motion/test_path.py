@@ -132,7 +132,7 @@ def test_points_that_make_no_circle_are_named(via, goal, hint):
 
 def test_what_is_no_pose_is_named():
     with pytest.raises(InvalidValueError, match=r"goal: .* is no Pose"):
-        build_line(IDENTITY, np.eye(4))
+        build_line(IDENTITY, np.eye(3))
 
 
 @given(st.floats(0.0, 1.0), st.floats(0.01, 3.1))
