@@ -102,7 +102,7 @@ def test_a_joint_limit_takes_the_motor_power_and_recovery_does_not_give_it_back(
         away = 0.03 * (1.0 - np.cos(2.0 * t)) * np.eye(MODEL.n)[0]
         return JointPosition(q + away, finished=t >= 3.0)
 
-    with pytest.raises(ControlError, match="COMMAND_JOINT_POSITION_LIMITS_VIOLATION"):
+    with pytest.raises(ControlError, match="kCommandJointPositionLimitsViolation"):
         robot.control(swing)
     assert robot.motor_state() is False
     with pytest.raises(CommandRejectedError, match="a fault has stopped the arm: recover"):
