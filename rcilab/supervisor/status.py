@@ -52,6 +52,7 @@ MESSAGES: dict[str, str] = {
     "stopping": "The arm is being brought to rest.",
     "stopping.operator": "Nobody is at the controls: the arm is being brought to rest.",
     "fault": "The controller stopped the arm: {faults}. Recover leads out.",
+    "fault.pressed": "An emergency stop or the safety gate has stopped the arm. Recover leads out once it is released.",
     "lost.unreachable": "{error}",
     "lost.other_arm": "{error}",
     "lost.silent": "{address} has stopped sending states; reconnect tries again.",

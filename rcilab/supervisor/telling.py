@@ -53,6 +53,8 @@ def tell_error(error: RcilabError, status: SupervisorStatus | None = None) -> Me
 
 def tell_incident(code: str, sentence: str, status: SupervisorStatus) -> Message:
     """Returns the sentence for an incident of the supervisor."""
+    if code == "fault.pressed":
+        return message("ready.pressed")
     if code == "fault":
         return message("notice.fault", faults=name_faults(status.faults))
     if code in _CRASHES or code in _LOST:
@@ -62,6 +64,8 @@ def tell_incident(code: str, sentence: str, status: SupervisorStatus) -> Message
 
 def tell_status(status: SupervisorStatus) -> Message:
     """Returns what the robot side is doing, in one sentence."""
+    if status.code == "fault.pressed":
+        return message("ready.pressed")
     if status.code == "fault":
         return message("ready.fault_of", faults=name_faults(status.faults))
     if status.code in _CRASHES or status.code in _LOST:

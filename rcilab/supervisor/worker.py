@@ -141,7 +141,7 @@ class Worker:
             self._say_ready()
         elif state.faults:
             if phase != "fault":
-                self._publisher.say("fault", "fault", faults=_names(state.faults))
+                self._say_fault(state.faults)
         elif phase in ("fault", "lost"):
             self._say_ready()
 
@@ -176,7 +176,7 @@ class Worker:
             code = "lost.other_arm" if isinstance(error, ModelError) else "lost.unreachable"
             self._publisher.say("lost", code, error=str(error))
         elif isinstance(error, ControlError) and error.faults:
-            self._publisher.say("fault", "fault", faults=_names(error.faults))
+            self._say_fault(error.faults)
         elif self._link is not None and self._guide is None:
             self._publisher.say("idle", "idle.failed", error=str(error))
         self._letters.answer(request, error)
@@ -276,13 +276,21 @@ class Worker:
 
     def _say_ready(self) -> None:
         if self._link is not None and self._link.latest is not None and self._link.latest.faults:
-            self._publisher.say("fault", "fault", faults=_names(self._link.latest.faults))
+            self._say_fault(self._link.latest.faults)
         elif self._guide is not None:
             self._publisher.say("moving", "moving.guided")
         elif self._publisher.snapshot.powered:
             self._publisher.say("idle", "idle")
         else:
             self._publisher.say("idle", "idle.unpowered")
+
+    def _say_fault(self, faults: Sequence[object]) -> None:
+        """Says what has stopped the arm; a safety stop shows as an error bit that means something else."""
+        state = None if self._link is None else self._link.latest
+        if state is not None and state.robot_mode is RobotMode.USER_STOPPED:
+            self._publisher.say("fault", "fault.pressed")
+        else:
+            self._publisher.say("fault", "fault", faults=_names(faults))
 
     def _require_link(self) -> Link:
         if self._link is None:

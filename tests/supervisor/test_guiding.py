@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from rcilab.client.world import World
-from rcilab.errors import InvalidValueError, UsageError
+from rcilab.conformance import check
+from rcilab.errors import CommandRejectedError, ControlError, InvalidValueError, UsageError
 from rcilab.model import load_model
+from rcilab.motion import plan_joint
 from rcilab.supervisor import Supervisor
 from tests.waiting import SOON, wait_for
 
@@ -74,6 +76,24 @@ def test_an_emergency_stop_ends_guiding_and_the_phase_follows(supervisor, world)
     world.press("estop")
     wait_for(lambda: supervisor.status().phase != "moving")
     world.press("none")
+    supervisor.power_on().wait(SOON)
+    wait_for(lambda: supervisor.status().phase == "idle")
+
+
+def test_an_emergency_stop_in_mid_motion_is_what_status_and_error_name(supervisor, world):
+    q = supervisor.status().q_c
+    motion = plan_joint(MODEL, q, q + 0.3, speed=0.2)
+    ticket = supervisor.execute(motion, check(motion, MODEL).certificate)
+    wait_for(lambda: supervisor.status().phase == "moving" and np.abs(supervisor.status().q_c - q).max() > 0.01)
+    world.press("estop")
+    with pytest.raises(ControlError, match="an emergency stop is pressed") as caught:
+        ticket.wait(SOON)
+    assert (caught.value.code, caught.value.facts["status"]) == ("safety_stop", "estop")
+    assert supervisor.status().code == "fault.pressed"
+    with pytest.raises(CommandRejectedError, match="an emergency stop is pressed: release it first"):
+        supervisor.power_on().wait(SOON)
+    world.press("none")
+    supervisor.recover().wait(SOON)
     supervisor.power_on().wait(SOON)
     wait_for(lambda: supervisor.status().phase == "idle")
 

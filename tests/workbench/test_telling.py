@@ -43,6 +43,7 @@ def address_error() -> RcilabError:
     "error",
     [
         ControlError("recover() clears the fault; .record holds the last cycles", [Fault.COLLISION]),
+        ControlError("power_on()", [Fault.INSTABILITY_DETECTION]).coded("safety_stop", status="estop"),
         CertificateError("plan again from robot.state.q_c with plan_joint()"),
         ConnectionLostError("rci://127.0.0.1:9 went silent; look whether the cable is in"),
         StartingError("the control process is still starting"),
@@ -56,6 +57,13 @@ def test_errors_say_what_to_press_and_name_no_call(error):
         assert not any(call in english for call in CALLS)
         assert str(error) not in chinese
         assert ("cable" in english) == (target != "virtual" and isinstance(error, ConnectionLostError))
+
+
+def test_an_emergency_stop_in_mid_motion_is_named_and_no_error_bit():
+    error = ControlError("power_on()", [Fault.INSTABILITY_DETECTION]).coded("safety_stop", status="estop")
+    said = Text("en").say(tell_error(error, status()))
+    assert "an emergency stop is pressed: release it first" in said
+    assert "Instability" not in said
 
 
 @pytest.mark.parametrize("code", [code for code in MESSAGES if code.startswith(("crashed", "lost", "fault"))])
