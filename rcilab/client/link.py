@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
@@ -24,7 +25,7 @@ _LOOK = 0.05  # [s] Longest wait before the deadline of a request is looked at a
 
 
 class Link:
-    """One connection. Owned by one thread.
+    """One connection. Owned by one thread; others may use `request_alongside`.
 
     Args:
         transport: The wire.
@@ -48,6 +49,7 @@ class Link:
         self._transport = transport
         self._decoder = StateDecoder()
         self._command_id = 0
+        self._one_request = threading.Lock()  # Of the TCP connection: a motion's thread and others may ask.
 
     @property
     def local_address(self) -> tuple[str, int]:
@@ -85,24 +87,35 @@ class Link:
             ConnectionLostError: The connection broke.
             DecodeError: The answer is none.
         """
-        self._command_id = self._command_id % 0xFFFFFFFF + 1
+        return self._request(request, timeout, self._wait_and_take_states)
+
+    def request_alongside(self, request: Request, timeout: float | None = None) -> Any:
+        """Sends a request while a motion's thread receives the states, from any thread; see `request`."""
+        return self._request(request, timeout, self._transport.wait_for_frame)
+
+    def _request(self, request: Request, timeout: float | None, wait: Callable[[float], object]) -> Any:
         limit = self.timeout if timeout is None else timeout
         deadline = time.monotonic() + limit
-        self._transport.send_request(encode_request(request, self._command_id))
-        while True:
-            frame = self._transport.receive_frame()
-            if frame is not None:
-                if decode_header(frame).command_id == self._command_id:
-                    return decode_response(request.code, frame)[1]
-                continue
-            remaining = deadline - time.monotonic()
-            if remaining <= 0.0:
-                raise DeadlineError(
-                    f"{self.name} did not answer {type(request).__name__} within {limit:g} s; "
-                    "look whether the controller is busy or hangs, and connect again if it goes on"
-                ).coded("no_answer", command=type(request).__name__, seconds=f"{limit:g}")
-            is_ready = self._transport.wait(min(remaining, _LOOK), frames=True)
-            self.on_states(self._take_states() if is_ready else [])
+        with self._one_request:
+            self._command_id = self._command_id % 0xFFFFFFFF + 1
+            self._transport.send_request(encode_request(request, self._command_id))
+            while True:
+                frame = self._transport.receive_frame()
+                if frame is not None:
+                    if decode_header(frame).command_id == self._command_id:
+                        return decode_response(request.code, frame)[1]
+                    continue
+                remaining = deadline - time.monotonic()
+                if remaining <= 0.0:
+                    raise DeadlineError(
+                        f"{self.name} did not answer {type(request).__name__} within {limit:g} s; "
+                        "look whether the controller is busy or hangs, and connect again if it goes on"
+                    ).coded("no_answer", command=type(request).__name__, seconds=f"{limit:g}")
+                wait(min(remaining, _LOOK))
+
+    def _wait_and_take_states(self, timeout: float) -> None:
+        is_ready = self._transport.wait(timeout, frames=True)
+        self.on_states(self._take_states() if is_ready else [])
 
     def close(self) -> None:
         """Ends the connection. May be called twice."""

@@ -45,6 +45,10 @@ class Transport(Protocol):
         """Returns once a state (or with `frames` a piece of a TCP frame) is there, or False after `timeout`, [s]."""
         ...
 
+    def wait_for_frame(self, timeout: float) -> bool:
+        """Returns once a piece of a TCP frame is there, or False after `timeout`, [s]; leaves states alone."""
+        ...
+
     def close(self) -> None:
         """Ends both channels. May be called twice."""
         ...
@@ -83,6 +87,8 @@ class SocketTransport:
         self._states_ready = select.poll()
         self._states_ready.register(self._udp, select.POLLIN)
         self._states_ready.register(self._tcp, select.POLLRDHUP)
+        self._frames_ready = select.poll()
+        self._frames_ready.register(self._tcp, select.POLLIN)
         self._anything_ready = select.poll()
         self._anything_ready.register(self._udp, select.POLLIN)
         self._anything_ready.register(self._tcp, select.POLLIN)
@@ -160,6 +166,10 @@ class SocketTransport:
         if len(events) == 1 and events[0][0] != self._udp_number:
             raise self._lost(None)
         return bool(events)
+
+    def wait_for_frame(self, timeout: float) -> bool:
+        """Returns once a piece of a TCP frame is there, or False after `timeout`, [s]; leaves states alone."""
+        return bool(self._frames) or bool(self._frames_ready.poll(max(0.0, timeout) * _MS))
 
     def close(self) -> None:
         """Ends both channels. May be called twice."""

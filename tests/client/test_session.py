@@ -25,7 +25,7 @@ def test_whoever_calls_in_mid_motion_is_refused_and_the_motion_goes_on(make_robo
 
     def disturb():
         for call in (robot.receive_state, robot.recover, robot.power_off, lambda: robot.set_coor(Pose()),
-                     robot.motor_state, lambda: robot.control(wave(10))):  # fmt: skip
+                     lambda: robot.set_filters(100, 100, 100), lambda: robot.control(wave(10))):  # fmt: skip
             with pytest.raises(UsageError, match="a motion is running already") as caught:
                 call()
             refused.append(caught.value)

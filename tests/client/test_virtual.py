@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import threading
 import time
 
 import numpy as np
 import pytest
 
-from rcilab.command import JointPosition
+from rcilab.command import CartesianPosition, JointPosition
 from rcilab.conformance import check
+from rcilab.controller.state_machine import QUERIES, Phase, transition
 from rcilab.errors import (
     CertificateError,
     CommandRejectedError,
@@ -20,7 +22,8 @@ from rcilab.errors import (
 from rcilab.faults import Fault
 from rcilab.model import load_model
 from rcilab.motion import plan_joint
-from rcilab.protocols.rci import RecoveryStatus, SafetyStop, SettingStatus
+from rcilab.protocols.rci import CommandCode, RecoveryStatus, SafetyStop, SettingStatus
+from rcilab.protocols.rci.statuses import WHILE_MOVING
 from rcilab.spatial import Pose
 from rcilab.state import RobotMode
 from rcilab.supervisor.simulate import simulate
@@ -225,3 +228,50 @@ def test_soft_limits_of_the_session_count_in_plan_check_and_certificate():
         assert "SetJointLimit" in robot.model.limits.source("joint.upper")
         robot.set_joint_limit(joint.lower, joint.upper)
         robot.execute(motion)
+
+
+@pytest.mark.parametrize("is_free", [False, True], ids=["lock-step", "free"])
+def test_a_callback_and_another_thread_switch_outputs_and_ramp_a_force_while_the_arm_moves(is_free):
+    with simulate(MODEL, plant="mujoco", lockstep=not is_free) as robot:
+        robot.power_on()
+        robot.world.set_loop_back(True)
+        start, seen, others = robot.state.T_base_tool_c, [], []
+        moving, done = threading.Event(), threading.Event()
+
+        def callback(state, t):
+            cycle = round(t * 1000)
+            moving.set()
+            if cycle % 50 == 10:
+                robot.set_cart_imp_desired_tau([0, 0, -cycle / 100, 0, 0, 0])
+                robot.set_do(1, cycle % 100 == 10)
+                seen.append((robot.get_di(1), robot.safety_stop(), robot.motor_state()))
+            return CartesianPosition(start, finished=cycle >= 500)
+
+        def ask():
+            moving.wait(10.0)
+            while not done.is_set():
+                robot.set_do(2, len(others) % 2 == 0)
+                others.append(robot.get_di(2))
+
+        thread = threading.Thread(target=ask)
+        thread.start()
+        try:
+            run = robot.control(callback, "cartesian_impedance")
+        finally:
+            done.set()
+            thread.join(10.0)
+        assert run.stopped is None
+        assert seen[:2] == [(True, SafetyStop.NONE, True), (False, SafetyStop.NONE, True)]
+        assert others[:4] == [True, False, True, False]
+        with pytest.raises(UsageError, match="a motion is running"):
+            robot.control(lambda state, t: robot.set_filters(100, 100, 100), "cartesian_impedance")
+
+
+def test_what_the_session_allows_while_moving_is_what_the_controller_grants():
+    granted = {
+        code
+        for code in CommandCode
+        if (cell := transition(Phase.MOVING, code)).phase is Phase.MOVING
+        and (code in QUERIES or (cell.status == 0 and cell.actions))
+    }
+    assert granted - {CommandCode.CONNECT} == set(WHILE_MOVING)

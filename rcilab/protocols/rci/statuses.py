@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from enum import IntEnum
-from typing import TypeAlias
+from typing import Final, TypeAlias
 
 from rcilab.state import MotionGeneratorMode
 
@@ -36,6 +36,19 @@ class CommandCode(IntEnum):
     STOP_DRAG = 22
     GET_SAFETY_STOP_STATE = 23
     REBOOT_ROBOT = 24
+
+
+WHILE_MOVING: Final = frozenset(
+    {
+        CommandCode.GET_MOTOR_STATE,
+        CommandCode.LOAD_ROBOT_MODEL,
+        CommandCode.GET_DI_STATE,
+        CommandCode.GET_SAFETY_STOP_STATE,
+        CommandCode.SET_DO,
+        CommandCode.SET_CART_IMP_DESIRED_TAU,
+    }
+)
+"""Commands that change nothing under a moving arm: a controller grants them in every phase."""
 
 
 class SettingStatus(IntEnum):
