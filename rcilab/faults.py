@@ -51,6 +51,11 @@ class Fault(IntEnum):
         """What to do about it, in one sentence (manual 4.6, third column)."""
         return _REMEDIES.get(self, _SMOOTHNESS)
 
+    @property
+    def torque_remedy(self) -> str:
+        """The same for a motion that commands torques, where no planner's advice helps."""
+        return _REMEDIES.get(self, _GAINS)
+
 
 FAULT_COUNT = len(Fault)
 
@@ -106,10 +111,18 @@ _SMOOTHNESS = (
     "lower the speed or filter it where it is not"
 )
 
+_GAINS = (
+    "let torques grow gradually and keep them inside the limits of section 4.4; where a control law of yours rings, "
+    "lower its damping first: above a joint's inertia divided by the delay of the loop it is unstable, and the wrist "
+    "is light"
+)
+
 _REMEDIES = {
     Fault.COLLISION: "look for contact; if it fires without contact, raise the collision thresholds "
     "(an emergency stop can also raise this bit)",
     Fault.CARTESIAN_POSITION_MOTION_GENERATOR_INVALID_FRAME: "keep Cartesian motions away from singular poses",
+    Fault.COMMAND_TORQUE_DISCONTINUITY: _GAINS,
+    Fault.COMMAND_TORQUE_RANGE_VIOLATION: _GAINS,
     Fault.INSTABILITY_DETECTION: "look at the network and the real-time set-up, or raise the packet-loss "
     "threshold (usually 10 to 20); an emergency stop can also raise this bit",
 }

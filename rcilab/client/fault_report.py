@@ -63,7 +63,8 @@ def describe_faults(
     if numbers:
         parts.append(numbers)
     if faults:
-        parts.append(late or faults[0].remedy)
+        is_torque = bool(np.isfinite(record["command_tau"]).any())
+        parts.append(late or (faults[0].torque_remedy if is_torque else faults[0].remedy))
     parts.append("recover() clears the fault; .record holds the last cycles")
     return "; ".join(parts)
 

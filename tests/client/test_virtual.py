@@ -8,7 +8,7 @@ import time
 import numpy as np
 import pytest
 
-from rcilab.command import CartesianPosition, JointPosition
+from rcilab.command import CartesianPosition, JointPosition, JointTorque
 from rcilab.conformance import check
 from rcilab.controller.state_machine import QUERIES, Phase, transition
 from rcilab.errors import (
@@ -275,3 +275,29 @@ def test_what_the_session_allows_while_moving_is_what_the_controller_grants():
         and (code in QUERIES or (cell.status == 0 and cell.actions))
     }
     assert granted - {CommandCode.CONNECT} == set(WHILE_MOVING)
+
+
+@pytest.mark.parametrize("plant", ["ideal", "mujoco"])
+@pytest.mark.parametrize(("wrist", "is_stable"), [((5.0, 5.0, 0.5), True), ((30.0, 25.0, 15.0), False)])
+def test_the_joint_gains_of_the_readme_are_stable_and_others_get_advice_on_gains(plant, wrist, is_stable):
+    model = load_model("xMatePro7")
+    stiffness = np.array([600.0, 600.0, 600.0, 600.0, 250.0, 150.0, 50.0])
+    damping = np.array([50.0] * 4 + list(wrist))
+    with simulate(model, plant=plant) as robot:
+        robot.power_on()
+        start, errors = robot.state.q_c, []
+
+        def follow(state, t):
+            q, dq = start + 0.05 * (1.0 - np.cos(2.0 * t)), 0.1 * np.sin(2.0 * t)
+            errors.append(np.abs(q - state.q).max())
+            return JointTorque(stiffness * (q - state.q) + damping * (dq - state.dq), finished=t >= 1.0)
+
+        if is_stable:
+            robot.control(follow, "torque")
+            assert max(errors) < 5e-3
+        else:
+            with pytest.raises(
+                ControlError, match=r"joint 7: commanded torque rate .* lower its damping first"
+            ) as caught:
+                robot.control(follow, "torque")
+            assert "planned motion" not in str(caught.value)
