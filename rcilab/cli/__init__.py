@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
 
+from rcilab.cli.output import drop_output
 from rcilab.errors import RcilabError
 
 COMMANDS = ("workbench", "controller", "world", "run", "replay", "check", "urdf", "mjcf", "lab", "doctor", "bench")
@@ -14,6 +16,7 @@ COMMANDS = ("workbench", "controller", "world", "run", "replay", "check", "urdf"
 
 _USAGE = 2  # Exit status of a request that cannot be served, as argparse uses it.
 _INTERRUPTED = 130  # Exit status after Ctrl-C, as shells use it.
+_CLOSED_PIPE = 141  # Exit status of a command that ended early because its output was no longer read, as shells use it.
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -21,15 +24,32 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = list(sys.argv[1:] if argv is None else argv)
     if not arguments or (arguments[0].startswith("-") and arguments[0] not in ("-h", "--help", "--version")):
         arguments.insert(0, "workbench")
+    if "_ARGCOMPLETE" in os.environ:  # The shell asks how to go on: this prints the answers and ends the process.
+        import argcomplete
+
+        argcomplete.autocomplete(_build_parser())
     try:
         # Whoever names a command waits for that one only; what is wrong is answered with all of them.
         args = _build_parser(arguments[:1] if arguments[0] in COMMANDS else COMMANDS).parse_args(arguments)
-        return int(args.run(args) or 0)
+        code = int(args.run(args) or 0)
+        _flush()
+        return code
+    except BrokenPipeError:
+        drop_output()
+        return _CLOSED_PIPE
     except RcilabError as error:
         print(f"rcilab: {error}", file=sys.stderr)
         return _USAGE
     except KeyboardInterrupt:
         return _INTERRUPTED
+
+
+def _flush() -> None:
+    """Writes what stdout has kept; what a reader that has gone does not take changes nothing about the exit status."""
+    try:
+        sys.stdout.flush()
+    except BrokenPipeError:
+        drop_output()
 
 
 def _build_parser(commands: Sequence[str] = COMMANDS) -> argparse.ArgumentParser:

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rcilab.cli.motion_file import HELP, as_motion, read_file
+from rcilab.cli.output import show
 from rcilab.errors import UsageError
 from rcilab.language import LANGUAGES
+
+if TYPE_CHECKING:
+    from rcilab.conformance.slow_down import SlowDown
 
 
 def add_parser(subparsers: Any) -> None:
@@ -16,9 +20,9 @@ def add_parser(subparsers: Any) -> None:
     parser: ArgumentParser = subparsers.add_parser(
         "check",
         help="judge a saved motion or program by the robot's conditions",
-        description="Prints the report on a motion saved with Motion.save, or on that of a program saved with "
-        "Program.save. Exit code: 0 it conforms, or what was written does; 1 it does not; 2 the file or the model name "
-        "is no good, or the program cannot be planned.",
+        description="Prints the report on a motion (.npz from Motion.save, .csv with times and joint angles) or on "
+        "that of a program saved with Program.save. Exit code: 0 it conforms, or what was written does; 1 it does not; "
+        "2 the file or the model name is not valid, or the program cannot be planned.",
     )
     parser.add_argument("file", type=Path, metavar="FILE", help=HELP)
     parser.add_argument(
@@ -36,7 +40,9 @@ def add_parser(subparsers: Any) -> None:
         default="joint_position",
         help="how it will be sent, which decides what is judged: %(default)s, cartesian_position, torque ...",
     )
-    parser.add_argument("--explain", choices=tuple(LANGUAGES), help="say it in whole sentences, in English or Chinese")
+    form = parser.add_mutually_exclusive_group()
+    form.add_argument("--explain", choices=tuple(LANGUAGES), help="say it in whole sentences, in English or Chinese")
+    form.add_argument("--json", action="store_true", help="print one JSON object instead; SI units")
     parser.set_defaults(run=run)
 
 
@@ -46,6 +52,7 @@ def run(args: Namespace) -> int:
     Raises:
         RcilabError: Bad input; the caller prints it and exits with 2.
     """
+    from rcilab.cli.report_json import as_json_text, report_as_json
     from rcilab.conformance import check
     from rcilab.model import load_model
     from rcilab.motion import Program
@@ -55,14 +62,26 @@ def run(args: Namespace) -> int:
     if name is None:
         raise UsageError("a motion does not say for which arm it is: add --model NAME, such as --model xMatePro7")
     model = load_model(name, tool=found.T_flange_tool if isinstance(found, Program) else None)
-    report = check(as_motion(found, model), model, mode=args.mode)
-    print(report if args.explain is None else report.explain(args.explain))
-    if args.slow_down is None:
-        return 0 if report.ok else 1
-    slowed = report.slow_down()
-    print(f"slow-down: {slowed}" if args.explain is None else slowed.explain(args.explain))
-    if slowed.motion is None:
-        return 1
-    slowed.motion.save(args.slow_down)
-    print(f"written: {args.slow_down}")
-    return 0
+    motion = as_motion(found, model, show=(lambda line: None) if args.json else show)
+    report = check(motion, model, mode=args.mode)
+    out: Path | None = args.slow_down
+    slowed = None if out is None else report.slow_down()
+    if out is not None and slowed is not None and slowed.motion is not None:
+        slowed.motion.save(out)
+    if args.json:
+        show(as_json_text({"model": model.name, **report_as_json(report), **_slow_down_as_json(slowed, out)}))
+    else:
+        show(report if args.explain is None else report.explain(args.explain))
+        if slowed is not None:
+            show(f"slow-down: {slowed}" if args.explain is None else slowed.explain(args.explain))
+            if slowed.motion is not None:
+                show(f"written: {args.slow_down}")
+    conforms = report.ok if slowed is None else slowed.motion is not None
+    return 0 if conforms else 1
+
+
+def _slow_down_as_json(slowed: SlowDown | None, file: Path | None) -> dict[str, Any]:
+    if slowed is None:
+        return {}
+    written = None if slowed.motion is None else str(file)
+    return {"slow_down": {"factor": slowed.factor, "written": written, "text": str(slowed)}}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,8 +25,13 @@ def read_file(file: Path) -> Motion | Program:
     return Program.load(file) if file.suffix.lower() == ".json" else Motion.load(file)
 
 
-def as_motion(found: Motion | Program, model: RobotModel) -> Motion:
-    """Returns the motion; a program is planned, and what its planner has to say is printed.
+def as_motion(found: Motion | Program, model: RobotModel, show: Callable[[str], None] = print) -> Motion:
+    """Returns the motion; a program is planned, and the notes of its planner are shown.
+
+    Args:
+        found: What `read_file` has returned.
+        model: The arm.
+        show: Called with every line of text.
 
     Raises:
         PlanningError: The program cannot be planned.
@@ -37,5 +43,5 @@ def as_motion(found: Motion | Program, model: RobotModel) -> Motion:
         return found
     motion = plan_program(model, found)
     for note in motion.notes:
-        print(f"note: {note}")
+        show(f"note: {note}")
     return motion

@@ -9,18 +9,24 @@ import threading
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, TextIO
 
 from rcilab.cli.motion_file import HELP, as_motion, read_file
+from rcilab.cli.output import drop_output, show
 from rcilab.errors import UsageError
 
 if TYPE_CHECKING:
+    from rcilab.arrays import JointVector
     from rcilab.client import RobotSession, Run
-    from rcilab.conformance import Certificate
+    from rcilab.conformance import Certificate, Report
     from rcilab.motion import Motion
+    from rcilab.state import RobotState
 
 _DONE, _NOT_DONE = 0, 1
+_TO_START_SPEED = 0.2  # Part of the limits; slow, because the way is not the program's.
 _STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)  # Ctrl-C, kill, a terminal that was closed.
 
 
@@ -29,15 +35,23 @@ def add_parser(subparsers: Any) -> None:
     parser: ArgumentParser = subparsers.add_parser(
         "run",
         help="run a saved motion or program on a robot",
-        description="Judges a motion saved with Motion.save, or that of a program saved with Program.save, shows the "
-        "report, asks for a yes, runs it. Exit code: "
-        "0 it ran to its end, 1 it does not conform, nobody said yes or it was stopped, 2 bad input, no robot or a "
-        "fault of the robot.",
+        description="Checks a motion (.npz from Motion.save, .csv with times and joint angles) or that of a program "
+        "saved with Program.save, shows the report, asks for a yes, runs it. Exit code: 0 it ran to its end; 1 it does "
+        "not conform, the answer was not yes, or it was stopped; 2 bad input, no robot or a fault of the robot.",
     )
     parser.add_argument("file", type=Path, metavar="FILE", help=HELP)
     parser.add_argument("--robot", required=True, metavar="ADDRESS", help="rci://HOST:PORT")
     parser.add_argument("--model", metavar="NAME", help="arm, such as xMatePro7; asked of the robot when left out")
+    parser.add_argument(
+        "--to-start",
+        action="store_true",
+        help="first clear a fault and move the arm from where it is to the start of the motion, after a report and a "
+        "yes of its own",
+    )
     parser.add_argument("--yes", action="store_true", help="do not ask; for scripts that have asked already")
+    parser.add_argument(
+        "--json", action="store_true", help="print one JSON object, SI units; reports and questions go to stderr"
+    )
     parser.add_argument("--timeout", type=float, default=3.0, metavar="S", help="for every answer of the robot [s]")
     parser.set_defaults(run=run)
 
@@ -53,6 +67,10 @@ def run(args: Namespace) -> int:
             return _run(args, stopper)
         except KeyboardInterrupt:
             print("\nNothing was sent.", file=sys.stderr)
+            return _NOT_DONE
+        except BrokenPipeError:  # Before the motion: a report or a question that was not read is not agreed to.
+            drop_output()
+            print("The output is closed, so the report cannot be read: nothing was sent.", file=sys.stderr)
             return _NOT_DONE
 
 
@@ -96,38 +114,97 @@ def _stopping_on_signals() -> Iterator[_Stopper]:
 
 
 def _run(args: Namespace, stopper: _Stopper) -> int:
+    from rcilab.cli.report_json import as_json_text
     from rcilab.client import connect
     from rcilab.client.start_check import describe_start_mismatch
-    from rcilab.conformance import check
     from rcilab.model import load_model
 
     found = read_file(args.file)
     model = load_model(args.model) if args.model else None
+    moves: list[_Move] = []
     with connect(args.robot, model, args.timeout) as robot:
-        motion = as_motion(found, robot.model)
-        start = robot.state.q_c
-        mismatch = describe_start_mismatch(motion.q[0], start)
-        if mismatch is not None:  # Before the report: every one of its violations would only say this again.
-            raise UsageError(mismatch)
-        report = check(motion, robot.model, start=start)
-        print(report)
-        if not report.ok:
-            print("The motion does not conform; nothing was sent.", file=sys.stderr)
-            return _NOT_DONE
-        print(_what_will_move(motion, robot))
-        if not args.yes and not _agreed():
-            return _NOT_DONE
-        if not robot.motor_state():
-            robot.power_on()
-        result = stopper.execute(robot, motion, report.certificate)
-    print(result, flush=True)
+        motion = as_motion(found, robot.model, show=partial(print, file=_reader(args)))
+        state = robot.state
+        mismatch = describe_start_mismatch(motion.q[0], state.q_c)
+        if mismatch is None or not args.to_start:
+            if mismatch is not None:  # Before the report: every one of its violations would only say this again.
+                raise UsageError(f"{mismatch}; in the shell, rcilab run --to-start does that after a yes of its own")
+            motions = [motion]
+        else:
+            motions = [*_plan_to_start(motion, robot, state.q_c), motion]
+        if args.to_start and state.faults:
+            _recover(robot, state, args)
+        for planned in motions:
+            moves.append(_move(planned, robot, stopper, args))
+            if moves[-1].outcome != "done":
+                break
+        name = robot.model.name
+    if args.json:
+        show(as_json_text({"model": name, "outcome": moves[-1].outcome, "moves": [move.as_json() for move in moves]}))
+    return _DONE if moves[-1].outcome == "done" else _NOT_DONE
+
+
+def _reader(args: Namespace) -> TextIO:
+    """Returns where text for people goes: stdout belongs to the JSON where that was asked for."""
+    return sys.stderr if args.json else sys.stdout
+
+
+def _plan_to_start(motion: Motion, robot: RobotSession, q: JointVector) -> list[Motion]:
+    """Returns what leads from `q` to the start of a motion; the first part leads back inside the joint ranges."""
+    from rcilab.motion import plan_joint
+
+    if len(motion.q[0]) != len(q):
+        raise UsageError(f"the motion is for {len(motion.q[0])} joints and the arm has {len(q)}: it is for another arm")
+    return [plan_joint(robot.model, q, motion.q[0], speed=_TO_START_SPEED)]
+
+
+def _recover(robot: RobotSession, state: RobotState, args: Namespace) -> None:
+    names = ", ".join(fault.manual_name for fault in state.faults)
+    print(f"The robot is stopped by {names}; clearing it. Nothing moves yet.", file=_reader(args))
+    robot.recover()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Move:
+    """One motion of the command, and what became of it."""
+
+    outcome: Literal["done", "stopped", "not_conforming", "not_agreed"]
+    report: Report
+    run: Run | None = None
+
+    def as_json(self) -> dict[str, Any]:
+        """Returns the entry that `rcilab run --json` prints."""
+        from rcilab.cli.report_json import report_as_json, run_as_json
+
+        run = None if self.run is None else run_as_json(self.run)
+        return {"outcome": self.outcome, "report": report_as_json(self.report), "run": run}
+
+
+def _move(motion: Motion, robot: RobotSession, stopper: _Stopper, args: Namespace) -> _Move:
+    """Checks a motion, shows the report, asks, and runs the motion."""
+    from rcilab.conformance import check
+
+    out = _reader(args)
+    report = check(motion, robot.model, start=robot.state.q_c)
+    print(report, file=out)
+    if not report.ok:
+        print("The motion does not conform; nothing was sent.", file=sys.stderr)
+        return _Move(outcome="not_conforming", report=report)
+    print(_what_will_move(motion, robot), file=out, flush=True)
+    if not args.yes and not _agreed(out):
+        return _Move(outcome="not_agreed", report=report)
+    if not robot.motor_state():
+        robot.power_on()
+    result = stopper.execute(robot, motion, report.certificate)
+    if not args.json:
+        show(result)
     if result.stopped:
         print(
             f"stopped {result.stopped} at t = {result.duration:.2f} s; the arm is at rest; plan the next motion from "
-            "where it is (robot.state.q_c)",
+            "where it is (robot.state.q_c), or bring it to the start of a file: rcilab run FILE --to-start",
             file=sys.stderr,
         )
-    return _NOT_DONE if result.stopped else _DONE
+    return _Move(outcome="stopped" if result.stopped else "done", report=report, run=result)
 
 
 def _what_will_move(motion: Motion, robot: RobotSession) -> str:
@@ -143,9 +220,10 @@ def _what_will_move(motion: Motion, robot: RobotSession) -> str:
     )
 
 
-def _agreed() -> bool:
+def _agreed(out: TextIO) -> bool:
+    print("Keep clear of the arm and the emergency stop at hand. Move it? Type yes: ", end="", file=out, flush=True)
     try:
-        answer = input("Keep clear of the arm and the emergency stop at hand. Move it? Type yes: ").strip()
+        answer = input().strip()
     except EOFError:
         print("\nNothing was sent.", file=sys.stderr)
         return False

@@ -68,9 +68,9 @@ def _read(file: str | PathLike[str], rate_hz: float | None, unit: AngleUnit) -> 
     times, q, place = _READERS[path.suffix.lower()](content, path.name, rate_hz is not None, unit)
     if times is None:
         if rate_hz is None:
-            raise InvalidValueError("samples", path.name, "has no times; pass rate_hz, the samples a second").coded(
-                "table_no_times", file=path.name
-            )
+            raise InvalidValueError(
+                "samples", path.name, "has no times; pass rate_hz, the samples a second, or add a column t [s]"
+            ).coded("table_no_times", file=path.name)
         times = np.arange(len(q)) / rate_hz
     elif rate_hz is not None:
         raise InvalidValueError("rate_hz", rate_hz, f"is not needed: {path.name} has times of its own; leave it out")

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import subprocess
 import sys
 
@@ -72,3 +73,12 @@ except SystemExit:
 """
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert result.stdout.splitlines()[-1] == "LOADED"
+
+
+@pytest.mark.parametrize(("line", "among"), [("rcilab mj", "mjcf"), ("rcilab run --to", "--to-start")])
+def test_the_shell_completes_commands_and_options(line: str, among: str) -> None:
+    asked = {"_ARGCOMPLETE": "1", "_ARGCOMPLETE_STDOUT_FILENAME": "/dev/stdout", "_ARGCOMPLETE_SUPPRESS_SPACE": "1"}
+    asked |= {"COMP_LINE": line, "COMP_POINT": str(len(line)), "_ARGCOMPLETE_IFS": "\n"}
+    command = [sys.executable, "-m", "rcilab.cli"]
+    result = subprocess.run(command, env={**os.environ, **asked}, capture_output=True, text=True, check=False)
+    assert result.stdout.split() == [among], result.stderr

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import json
+import subprocess
+import sys
+
 import pytest
 
 from rcilab.cli import main
@@ -59,3 +63,29 @@ def test_check_judges_as_it_will_be_sent_and_refuses_a_mode_that_is_none(file, c
     assert "cartesian.velocity.translation" in capsys.readouterr().out
     assert main(["check", str(file), "--mode", "sideways"]) == 2
     assert "known: joint_position" in capsys.readouterr().err
+
+
+def test_json_has_the_verdict_every_condition_and_the_slow_down(file, tmp_path, capsys):
+    fast = Motion.from_cycles(plan_program(MODEL, PROGRAM).q[::2])
+    fast.save(tmp_path / "fast.csv")
+    argv = ["check", str(tmp_path / "fast.csv"), "--model", "xmatepro7", "--json"]
+    assert main(argv) == 1
+    found = json.loads(capsys.readouterr().out)
+    assert (found["model"], found["ok"]) == ("xMatePro7", False)
+    assert found["violations"][0]["fault"].startswith("k")
+    assert len(found["conditions"]) == len({row["id"] for row in found["conditions"]}) > 10
+    assert main([*argv, "--slow-down", str(tmp_path / "out.csv")]) in (0, 1)
+    slowed = json.loads(capsys.readouterr().out)["slow_down"]
+    assert (slowed["factor"] is None) == (slowed["written"] is None)
+
+
+def test_a_reader_that_goes_away_leaves_the_exit_code_and_no_traceback(file):
+    command = [sys.executable, "-m", "rcilab.cli"]
+    for arguments, code in ((["check", str(file)], 0), (["check", "no.npz"], 2), (["urdf", "xMatePro7"], 141)):
+        process = subprocess.Popen([*command, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        process.stdout.close()
+        err = process.stderr.read()
+        process.stderr.close()
+        assert process.wait(30) == code, err
+        assert "Traceback" not in err
+        assert "BrokenPipe" not in err

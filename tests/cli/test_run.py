@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import io
+import json
 import re
 import signal
 import subprocess
@@ -12,6 +13,8 @@ import pytest
 
 from rcilab.cli import main
 from rcilab.client import connect
+from rcilab.command import JointPosition
+from rcilab.errors import ControlError
 from rcilab.model import load_model
 from rcilab.motion import Motion, Program, Waypoint, plan_joint
 from rcilab.supervisor.launch import start_controller
@@ -50,6 +53,71 @@ def test_without_a_yes_nothing_is_sent_and_with_one_the_arm_arrives(address, mot
     (line,) = captured.err.splitlines()
     assert line.startswith("rcilab: the motion starts elsewhere than the arm is: joint ")
     assert "plan_joint(robot.model, robot.state.q_c, motion.q[0])" in line
+    assert "rcilab run --to-start" in line
+
+
+def test_the_way_to_the_start_has_a_report_and_a_question_of_its_own(address, tmp_path, monkeypatch, capsys):
+    with connect(address) as robot:
+        q = robot.state.q_c
+    file = tmp_path / "elsewhere.csv"
+    plan_joint(MODEL, q + 0.1, q + 0.15, speed=1.0).save(file)
+    monkeypatch.setattr("sys.stdin", io.StringIO("no\n"))
+    assert main(["run", str(file), "--robot", address, "--to-start"]) == 1
+    assert capsys.readouterr().out.count("will move for") == 1
+    monkeypatch.setattr("sys.stdin", io.StringIO("yes\nyes\n"))
+    assert main(["run", str(file), "--robot", address, "--to-start"]) == 0
+    captured = capsys.readouterr()
+    assert captured.out.count("conforms") == captured.out.count("<Run") == captured.out.count("Type yes: ") == 2
+    with connect(address) as robot:
+        assert np.allclose(robot.state.q_c, q + 0.15, atol=1e-6)
+
+
+def test_to_start_clears_a_fault_first(address, tmp_path, capsys):
+    with connect(address) as robot:
+        robot.power_on()
+        q = robot.state.q_c
+        with pytest.raises(ControlError):
+            robot.control(lambda state, t: JointPosition(q=q + (0.2 if t > 0.01 else 0.0)), mode="joint_position")
+    file = tmp_path / "motion.npz"
+    plan_joint(MODEL, q + 0.05, q + 0.1, speed=1.0).save(file)
+    assert main(["run", str(file), "--robot", address, "--yes"]) == 2
+    capsys.readouterr()
+    assert main(["run", str(file), "--robot", address, "--yes", "--to-start"]) == 0
+    assert "The robot is stopped by kCommandJoint" in capsys.readouterr().out
+
+
+def test_json_is_one_object_on_stdout_and_all_text_is_on_stderr(address, tmp_path, capsys):
+    with connect(address) as robot:
+        q = robot.state.q_c
+    file = tmp_path / "motion.npz"
+    plan_joint(MODEL, q, q - 0.05, speed=1.0).save(file)
+    assert main(["run", str(file), "--robot", address, "--yes", "--json"]) == 0
+    captured = capsys.readouterr()
+    found = json.loads(captured.out)
+    assert found["outcome"] == "done"
+    (move,) = found["moves"]
+    assert move["report"]["ok"] is True
+    assert move["run"]["stopped"] is None
+    assert "will move for" in captured.err
+
+
+def test_a_question_that_cannot_be_read_is_not_agreed_to(address, tmp_path):
+    with connect(address) as robot:
+        q = robot.state.q_c
+    file = tmp_path / "motion.npz"
+    plan_joint(MODEL, q, q + 0.01).save(file)
+    command = [sys.executable, "-u", "-m", "rcilab.cli", "run", str(file), "--robot", address]
+    process = subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    process.stdout.close()
+    process.stdin.write("yes\n")
+    process.stdin.close()
+    err = process.stderr.read()
+    process.stderr.close()
+    assert process.wait(20) == 1, err
+    assert err.strip().endswith("nothing was sent.")
+    assert "Traceback" not in err
 
 
 def test_a_program_is_planned_for_the_robot_s_arm_and_runs(address, tmp_path, capsys):

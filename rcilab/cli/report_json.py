@@ -1,0 +1,72 @@
+"""Reports and runs as JSON, for `rcilab check --json` and `rcilab run --json`. SI units; what is not finite is null."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rcilab.conformance import ConditionResult, Report, Violation
+    from rcilab.motion import Motion
+    from rcilab.recording.run import Run
+
+
+def motion_as_json(motion: Motion) -> dict[str, Any]:
+    """Returns the duration of a motion, [s], and the notes of its planner."""
+    return {"duration": motion.duration, "notes": [str(note) for note in motion.notes]}
+
+
+def report_as_json(report: Report) -> dict[str, Any]:
+    """Returns the verdict, every condition with its worst value, and the violations and warnings in sentences."""
+    return {
+        "ok": report.ok,
+        "title": str(report.title),
+        "motion": motion_as_json(report.motion),
+        "conditions": [_condition(row) for row in report.rows],
+        "violations": [_violation(violation) for violation in report.violations],
+        "warnings": [_violation(violation) for violation in report.warnings],
+    }
+
+
+def run_as_json(run: Run) -> dict[str, Any]:
+    """Returns how long a run lasted, [s], why it was stopped or null, and its largest joint error, [rad]."""
+    return {"duration": _finite(run.duration), "stopped": run.stopped, "largest_error": _finite(run.largest_error)}
+
+
+def as_json_text(content: dict[str, Any]) -> str:
+    """Returns one JSON object."""
+    return json.dumps(content, indent=1, allow_nan=False, ensure_ascii=False)
+
+
+def _condition(row: ConditionResult) -> dict[str, Any]:
+    return {
+        "id": row.id,
+        "necessity": row.necessity,
+        "ok": row.ok,
+        "value": _finite(row.value),
+        "bound": _finite(row.bound),
+        "unit": row.unit,
+        "ratio": _finite(row.ratio),
+        "place": row.place,
+        "time": _finite(row.time),
+        "source": row.source,
+        "fault": None if row.fault is None else row.fault.manual_name,
+    }
+
+
+def _violation(violation: Violation) -> dict[str, Any]:
+    return {
+        "id": violation.condition.id,
+        "place": violation.place,
+        "time": _finite(violation.time),
+        "value": _finite(violation.value),
+        "bound": _finite(violation.bound),
+        "unit": violation.condition.unit,
+        "fault": None if violation.fault is None else violation.fault.manual_name,
+        "text": str(violation),
+    }
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
