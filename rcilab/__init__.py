@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from rcilab.motion.motion import Motion as Motion
     from rcilab.motion.plan_program import plan_program as plan_program
     from rcilab.motion.program import Program as Program
+    from rcilab.motion.recovery import plan_recovery as plan_recovery
     from rcilab.motion.waypoint import Waypoint as Waypoint
     from rcilab.notebook.plot import plot as plot
     from rcilab.notebook.preview import preview as preview
@@ -70,6 +71,7 @@ _HOMES = {
     "plan_line": "rcilab.motion.cartesian",
     "plan_nullspace": "rcilab.motion.cartesian",
     "plan_program": "rcilab.motion.plan_program",
+    "plan_recovery": "rcilab.motion.recovery",
     "plot": "rcilab.notebook.plot",
     "preview": "rcilab.notebook.preview",
     "simulate": "rcilab.supervisor.simulate",

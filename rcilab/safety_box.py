@@ -92,17 +92,17 @@ class EntryBox:
 
     Args:
         box: Where the tool belongs.
-        position: Where the tool starts, in the base frame, three numbers, [m].
+        positions: Where the tool starts, in the base frame, three numbers each, [m]: the farthest one opens a face.
     """
 
     _ROUNDING = 1e-6  # [m] How far outwards rounding may move a tool that is commanded to stay.
 
-    def __init__(self, box: SafetyBox, position: Sequence[float]) -> None:
+    def __init__(self, box: SafetyBox, *positions: Sequence[float]) -> None:
         self._box = box
         self._half = [0.5 * edge for edge in box.size]
         self._faces = [
-            (min(-half, x - self._ROUNDING), max(half, x + self._ROUNDING))
-            for x, half in zip(self._local(position), self._half, strict=True)
+            (min(-half, min(x) - self._ROUNDING), max(half, max(x) + self._ROUNDING))
+            for half, *x in zip(self._half, *map(self._local, positions), strict=True)
         ]
 
     def excess(self, position: Sequence[float]) -> float:
@@ -126,15 +126,15 @@ class EntryBox:
         return r[0] * x + r[3] * y + r[6] * z, r[1] * x + r[4] * y + r[7] * z, r[2] * x + r[5] * y + r[8] * z
 
 
-def box_from(box: SafetyBox | None, position: Sequence[float]) -> SafetyBox | EntryBox | None:
+def box_from(box: SafetyBox | None, *positions: Sequence[float]) -> SafetyBox | EntryBox | None:
     """Returns what bounds a tool that starts at a position: its box, or the way into it; None when nothing does.
 
     Args:
         box: Where the tool belongs; None, or one that is not active, bounds nothing.
-        position: Where the tool starts, in the base frame, three numbers, [m].
+        positions: Where the tool starts, as measured and as commanded, in the base frame, three numbers each, [m].
     """
     box = active_box(box)
-    return box if box is None or box.excess(position) <= 0.0 else EntryBox(box, position)
+    return box if box is None or max(map(box.excess, positions)) <= 0.0 else EntryBox(box, *positions)
 
 
 def require_box(box: object) -> SafetyBox:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -21,8 +22,10 @@ from rcilab.conformance.start import StartState, as_start
 from rcilab.conformance.usage import Usage, near_bound, worst_of
 from rcilab.conformance.wording import advise
 from rcilab.errors import InvalidValueError
+from rcilab.limits import Limits
 from rcilab.model import RobotModel, require_model
 from rcilab.motion.motion import Motion, require_motion
+from rcilab.motion.range import RECOVERY_RANGE, range_from
 from rcilab.safety_box import SafetyBox, active_box
 from rcilab.safety_distance import STANDARD_DISTANCE, SafetyDistance
 from rcilab.state import Mode, require_mode
@@ -51,6 +54,9 @@ def check(
     By default the angles themselves are commanded. In Cartesian modes it is the tool's poses and arm angles that they
     lead to: tool and arm angle are judged, whether a pose is singular, and the joints that follow from the poses. In
     torque mode it is the torques that make the arm follow: they have to keep their bounds, and the arm its range.
+
+    A motion that ends inside the joint ranges may start outside, by `RECOVERY_RANGE` at most, and lead back, not
+    farther out, as `plan_recovery` plans it. A tool that starts outside the box may move inwards only.
 
     Args:
         motion: The motion.
@@ -123,7 +129,7 @@ class _Judge:
         mode: Mode,
     ) -> None:
         self._motion = motion
-        self._limits = model.limits
+        self._limits = _limits_of(motion, model.limits, start)
         self._signals = MotionSignals(motion, model, start, box, distance, mode)
         self._depth = min(box.size) / 2.0 if box is not None else 1.0
 
@@ -196,6 +202,15 @@ class _Judge:
             advice=advice,
             links=self._signals.links(condition, row),
         )
+
+
+def _limits_of(motion: Motion, limits: Limits, start: StartState) -> Limits:
+    """Returns the limits of a motion: one that leads back inside may start outside; a moving one may pause there."""
+    joint = limits.joint
+    ends_inside = bool(((joint.lower < motion.goal) & (motion.goal < joint.upper)).all())
+    if not ends_inside and not start.moving:
+        return limits
+    return replace(limits, joint=range_from(joint, start.q, RECOVERY_RANGE))
 
 
 def _passed(value: float, lower: Array, upper: Array, column: int) -> float:

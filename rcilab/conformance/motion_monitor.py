@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.arrays import Array, as_vector, described
+from rcilab.arrays import Array, JointVector, as_vector, described
 from rcilab.command import CartesianPosition, Command, JointPosition, JointTorque
 from rcilab.conformance.box_monitor import BoxMonitor
 from rcilab.conformance.breach import Breach
@@ -26,7 +27,8 @@ from rcilab.conformance.torque_monitor import TorqueMonitor
 from rcilab.errors import InvalidValueError
 from rcilab.kinematics.closed_form import build_closed_form
 from rcilab.model import RobotModel, require_model
-from rcilab.safety_box import SafetyBox, active_box
+from rcilab.motion.range import RECOVERY_RANGE, range_from
+from rcilab.safety_box import SafetyBox, active_box, box_from
 from rcilab.safety_distance import SafetyDistance
 from rcilab.spatial import IDENTITY, Pose
 from rcilab.state import Mode, require_mode
@@ -57,25 +59,23 @@ class Monitor:
         distance: SafetyDistance | None = None,
     ) -> None:
         self._model, self.mode = require_model(model), require_mode(mode)
-        table, box = condition_table(model.description), active_box(box)
+        table, self._safety_box = condition_table(model.description), active_box(box)
         limits = model.limits
         self._own_rows = {row.id: row for row in table.conditions}
         rows = table.rows(self.mode, has_elbow=model.n == 7)
         self._start_rows = [row for row in rows if row.stage == "start" and row.order == 0]
         self._clearance = None if distance is None else ClearanceMonitor(model, distance)
-        self._measured = MeasuredMonitor(limits, box)
-        self._torques = self._tool = self._joints = None
+        self._torques = None
         torques = TorqueMonitor(limits.joint, sorted(_throughout(rows, "torque"), key=lambda row: -row.order))
         if self.mode == "torque":
             self._torques = torques
         else:
-            self._joints, self._needed = JointMonitor(limits.joint, _throughout(rows, "joint")), torques
+            self._joint_rows, self._needed = _throughout(rows, "joint"), torques
             self._rest = RestMonitor(limits, [row for row in rows if row.stage != "throughout" and row.order > 0])
         self._is_cartesian = self.mode.startswith("cartesian")
         if self._is_cartesian:
-            tool_rows = _throughout(table.cartesian, "arm_angle", "translation", "rotation")
-            self._tool = CartesianMonitor(limits, box, (table.box, *tool_rows))
-        self._box = BoxMonitor(None if self._is_cartesian or self.mode == "torque" else box, table.box)
+            self._tool_rows = (table.box, *_throughout(table.cartesian, "arm_angle", "translation", "rotation"))
+        self._box_row = table.box
         self._pose_rows = {row.signal: row for row in rows if row.signal in ("frame", "elbow_sign")}
         self._inverse = build_closed_form(model.description)
         self._T_tool_flange = model.T_flange_tool.inverse()
@@ -96,6 +96,7 @@ class Monitor:
         state = as_start(start, model.n)
         self._start, self._is_first = state, not state.moving
         self._q = state.q.tolist()
+        self._open_from(state.q)
         self._measured.reset(state.q.tolist())
         tau = model.rigid_body.motion_torque(state.q, state.dq, state.ddq).tolist() if state.moving else [0.0] * model.n
         if self._joints is not None:
@@ -115,6 +116,17 @@ class Monitor:
             self._start_psi = self._psi
         if "elbow_sign" in self._pose_rows:
             self._start_side = model.elbow(state.q)[1]
+
+    def _open_from(self, q: JointVector) -> None:
+        """Makes the monitors of what bounds a motion from here: outside its range or box, the way in is open."""
+        joint = range_from(self._model.limits.joint, q, RECOVERY_RANGE)
+        limits = replace(self._model.limits, joint=joint)
+        position = self._model.forward(q).parts[1]
+        self._measured = MeasuredMonitor(limits, box_from(self._safety_box, position))
+        box = box_from(self._safety_box, position)
+        self._joints = None if self.mode == "torque" else JointMonitor(joint, self._joint_rows)
+        self._tool = CartesianMonitor(limits, box, self._tool_rows) if self._is_cartesian else None
+        self._box = BoxMonitor(None if self._is_cartesian or self.mode == "torque" else box, self._box_row)
 
     def step(self, command: Command, cycles: int = 1, side: int | None = None) -> tuple[Breach, ...]:
         """Takes the command of this cycle and returns what it breaks, recommendations too; nothing when all is well.

@@ -18,7 +18,7 @@ from rcilab.conformance.start import StartState
 from rcilab.conformance.tool_signals import ToolSignals
 from rcilab.model import RobotModel
 from rcilab.motion.motion import Motion
-from rcilab.safety_box import SafetyBox
+from rcilab.safety_box import EntryBox, SafetyBox, box_from
 from rcilab.safety_distance import SafetyDistance
 from rcilab.state import Mode
 
@@ -99,8 +99,15 @@ class MotionSignals:
             return self._tool.elbow_side
         if condition.signal == "position":
             assert self._box is not None
-            return self._box.excess_path(self._model.position_path(self._differences[0]))[:, np.newaxis]
+            return self._excess(self._box)[:, np.newaxis]
         return self._differences[condition.order]
+
+    def _excess(self, box: SafetyBox) -> Array:
+        way = self._model.position_path(self._differences[0])
+        entry = box_from(box, self._model.forward(self._start.q).parts[1])
+        if isinstance(entry, EntryBox):
+            return np.array([entry.excess(position) for position in way.tolist()])
+        return box.excess_path(way)
 
     def _at_start(self, condition: Condition) -> Array:
         """Returns how far the first command is from what the arm has, shape (n,) or (1,)."""

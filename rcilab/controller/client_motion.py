@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from rcilab.clock import CYCLE_TIME
 from rcilab.conformance import LimitTable
 from rcilab.controller.actuator import Law
@@ -13,7 +15,6 @@ from rcilab.controller.modes.terms import build_terms
 from rcilab.controller.playout import FIRST_COMMAND_TIMEOUT, Playout
 from rcilab.controller.settings import Settings
 from rcilab.faults import Fault
-from rcilab.safety_box import box_from
 from rcilab.words.text import Remark
 
 PREFILL = 10  # [cycles] Pauses of client and network that a motion survives unharmed, and its delay. Both ends on one
@@ -72,11 +73,13 @@ class ClientMotion:
         tolerance = start_tolerance(mode.law, settings)
         if arm.yielded_as is not None:
             tolerance = tolerance.widened(start_tolerance(arm.yielded_as, settings))
-        terms = build_terms(mode, arm.model, settings, table, watch.measured, watch.tool.pose, tolerance)
+        stands = (watch.measured.q, np.array(arm.commanded.q))
+        tools = (watch.tool.pose, arm.tool_c.pose)
+        terms = build_terms(mode, arm.model, settings, table, stands, tools, tolerance)
         self._generator = build_generator(mode, terms, list(arm.commanded.q))
         watch.begin(
             terms.limits,
-            box_from(terms.box, terms.start.parts[1]),
+            terms.entry_box(),
             settings.collision_thresholds,
             judges_tool=mode.is_cartesian,
             yields=mode.law.yields,

@@ -11,6 +11,7 @@ from rcilab.motion.online import Jog
 from rcilab.motion.piecewise import PiecewisePolynomial
 from rcilab.motion.plan_program import plan_program
 from rcilab.motion.program import Program
+from rcilab.motion.recovery import plan_recovery
 from rcilab.motion.spline import motion_through
 from rcilab.motion.stop import plan_stop
 from rcilab.motion.waypoint import Waypoint
@@ -33,6 +34,7 @@ __all__ = [
     "plan_line",
     "plan_nullspace",
     "plan_program",
+    "plan_recovery",
     "plan_stop",
     "require_motion",
 ]

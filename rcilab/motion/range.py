@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
-from math import degrees
+from dataclasses import replace
+from math import degrees, inf, radians
 
 import numpy as np
 
-from rcilab.arrays import JointVector
+from rcilab.arrays import JointVector, frozen
 from rcilab.errors import PlanningError
 from rcilab.limits import JointLimits
+
+RECOVERY_RANGE = radians(20.0)
+"""How far outside its range a joint may start to be led back, [rad]. A tuning value: from their highest speed the arms
+stop within 18 degrees. Where a joint is farther out, more is wrong than a stop that came late."""
+_ROUNDING = 1e-6  # [rad] How far outwards rounding may move a joint that starts outside.
 
 
 def require_inside(what: str, q: JointVector, limits: JointLimits) -> None:
     """Makes sure that joint angles are strictly inside their limits.
 
     Args:
-        what: What they are, such as "start".
+        what: What they are: "start", from which `plan_recovery` leads back, or another word.
         q: Joint angles, shape (n,), [rad].
         limits: Of each joint.
 
@@ -26,10 +32,33 @@ def require_inside(what: str, q: JointVector, limits: JointLimits) -> None:
     if outside.size:
         i = int(outside[0])
         angle, low, high = float(q[i]), float(limits.lower[i]), float(limits.upper[i])
+        remedy = "choose an angle between them"
+        if what == "start":
+            remedy = "where the arm is there, plan_recovery(model, q) leads back inside"
         raise PlanningError(
             f"joint {i + 1}: {what} {angle_text(angle)} is not strictly between {angle_text(low)} and "
-            f"{angle_text(high)}; choose an angle between them"
-        ).coded("range", joint=i + 1, **_in_degrees(angle=angle, low=low, high=high))
+            f"{angle_text(high)}; {remedy}"
+        ).coded(
+            "range_start" if what == "start" else "range",
+            joint=i + 1, **_in_degrees(angle=angle, low=low, high=high),
+        )  # fmt: skip
+
+
+def range_from(limits: JointLimits, q: JointVector, most: float = inf) -> JointLimits:
+    """Returns the limits of a motion that starts at `q`: a joint that starts outside may lead back, not farther out.
+
+    Args:
+        limits: Of each joint.
+        q: Where the arm is, shape (n,), [rad].
+        most: How far outside a joint may be for this, [rad]; the range of one that is farther out stays.
+    """
+    beyond = np.maximum(limits.lower - q, q - limits.upper)
+    if (beyond < 0.0).all():
+        return limits
+    is_near = beyond <= most
+    lower = np.where(is_near, np.minimum(limits.lower, q - _ROUNDING), limits.lower)
+    upper = np.where(is_near, np.maximum(limits.upper, q + _ROUNDING), limits.upper)
+    return replace(limits, lower=frozen(lower), upper=frozen(upper))
 
 
 def angle_text(value: float) -> str:

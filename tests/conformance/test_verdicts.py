@@ -16,7 +16,7 @@ from rcilab.conformance.check import HOLD_SAMPLES
 from rcilab.conformance.tool_conditions import CARTESIAN_POSITION, TOOL_CONDITIONS, TORQUE_CONDITIONS
 from rcilab.model import load_model
 from rcilab.motion import Motion, plan_joint
-from rcilab.safety_box import SafetyBox
+from rcilab.safety_box import SafetyBox, box_from
 from rcilab.spatial import Pose
 
 MODEL = load_model("xMatePro7")
@@ -49,7 +49,7 @@ def test_the_box_is_judged_alike_by_check_and_monitor(seed, spoils):
         q[rng.integers(len(q)), rng.integers(7)] += rng.choice((-1.0, 1.0)) * 10.0 ** rng.uniform(-4.0, 0.0)
     T_base_box = MODEL.forward(q[0]) @ Pose.from_rpy(rng.uniform(-0.1, 0.1, 3), rng.uniform(-3.0, 3.0, 3))
     box = SafetyBox(size=tuple(rng.uniform(0.05, 0.6, 3)), T_base_box=T_base_box)
-    monitor = BoxMonitor(box)
+    monitor = BoxMonitor(box_from(box, MODEL.forward(q[0]).parts[1]))
     rows = [*q, *[q[-1]] * HOLD_SAMPLES]
     played = [bool(monitor.step(MODEL.forward(row).parts[1])) for row in rows]
     expected = np.zeros(len(rows), dtype=bool)

@@ -26,7 +26,6 @@ from rcilab.controller.stream import Stream
 from rcilab.errors import InvalidValueError, KinematicsError
 from rcilab.faults import Fault
 from rcilab.protocols.rci import CommandPacket
-from rcilab.safety_box import box_from
 from rcilab.spatial import Pose, rotation_from_wxyz, turn_between, wxyz_from_rotation
 from rcilab.words.text import Remark
 
@@ -147,7 +146,7 @@ class CartesianGenerator:
 
     def _monitor_from(self, pose: Pose, psi: float) -> CartesianMonitor:
         terms = self._terms
-        monitor = CartesianMonitor(terms.limits, box_from(terms.box, terms.start.parts[1]))
+        monitor = CartesianMonitor(terms.limits, terms.entry_box())
         monitor.reset(pose, psi if self._has_psi else None)
         return monitor
 

@@ -18,7 +18,7 @@ from rcilab.faults import Fault
 from rcilab.limits import Limits
 from rcilab.model import RobotModel
 from rcilab.protocols.rci import CommandPacket
-from rcilab.safety_box import SafetyBox, box_from
+from rcilab.safety_box import EntryBox, SafetyBox, box_from
 from rcilab.spatial import Pose
 from rcilab.words.text import Remark
 
@@ -40,8 +40,12 @@ class Terms:
     """Where the tool must stay; None when nothing bounds it."""
     tolerance: StartTolerance
     """How far the first command may be off the reference."""
-    start: Pose
-    """Pose of the tool in base where the motion begins. Outside the box, it may only move in."""
+    starts: tuple[Pose, ...]
+    """Poses of the tool in base where the motion begins: measured and commanded."""
+
+    def entry_box(self) -> SafetyBox | EntryBox | None:
+        """Returns what bounds the tool; where it starts outside the box, it may only move in."""
+        return box_from(self.box, *(pose.parts[1] for pose in self.starts))
 
 
 class Step(NamedTuple):
@@ -109,7 +113,7 @@ class JointReference:
         joint = terms.limits.joint
         self._model = terms.model
         self._limits = joint
-        self._box = BoxMonitor(box_from(terms.box, terms.start.parts[1]) if judges_box else None)
+        self._box = BoxMonitor(terms.entry_box() if judges_box else None)
         self._fence = Fence(joint, q) if terms.settings.auto_limit else None
         self._monitor = self._monitor_from(q)
         self._start: StartMonitor[JointMonitor] | None = None

@@ -4,22 +4,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
-from rcilab.arrays import frozen
+from rcilab.arrays import JointVector
 from rcilab.conformance import LimitTable, cartesian_limits
 from rcilab.controller.actuator import Law, guiding_box
 from rcilab.controller.modes.generator import Terms
 from rcilab.controller.modes.mode import Mode
 from rcilab.controller.modes.start import StartTolerance
-from rcilab.controller.plant import Measurement
 from rcilab.controller.settings import Settings
-from rcilab.limits import JointLimits
 from rcilab.model import RobotModel
+from rcilab.motion.range import range_from
 from rcilab.safety_box import active_box
 from rcilab.spatial import Pose
-
-_ROUNDING = 1e-6  # [rad], [m] Where an arm stands beyond a bound, it may be that much farther.
 
 
 def build_terms(
@@ -27,8 +22,8 @@ def build_terms(
     model: RobotModel,
     settings: Settings,
     table: LimitTable,
-    measured: Measurement,
-    T_base_tool: Pose,
+    stands: tuple[JointVector, ...],
+    tools: tuple[Pose, ...],
     tolerance: StartTolerance,
 ) -> Terms:
     """Returns filters and bounds of a motion.
@@ -43,22 +38,14 @@ def build_terms(
         model: The arm with its tool and load.
         settings: What the client has set.
         table: Whose bounds of the tool's motion count.
-        measured: Where the arm rests.
-        T_base_tool: Where its tool is, in base.
+        stands: Where the arm is, as measured and as commanded: the farther one opens a range.
+        tools: Where its tool is, in base, likewise.
         tolerance: How far the first command may be off the reference.
     """
-    joint = _up_to(settings.soft_limits(model.limits.joint), measured)
+    joint = settings.soft_limits(model.limits.joint)
+    for q in stands:
+        joint = range_from(joint, q)
     limits = replace(cartesian_limits(model.limits, table), joint=joint)
     yields_to_walls = mode.law in (Law.JOINT_IMPEDANCE, Law.CARTESIAN_IMPEDANCE) and guiding_box(settings) is not None
     box = None if yields_to_walls else settings.safety_box
-    return Terms(
-        model=model, settings=settings, limits=limits, box=active_box(box), tolerance=tolerance, start=T_base_tool
-    )
-
-
-def _up_to(joint: JointLimits, measured: Measurement) -> JointLimits:
-    q = measured.q
-    if (joint.lower < q).all() and (q < joint.upper).all():
-        return joint
-    lower, upper = np.minimum(joint.lower, q - _ROUNDING), np.maximum(joint.upper, q + _ROUNDING)
-    return replace(joint, lower=frozen(lower), upper=frozen(upper))
+    return Terms(model=model, settings=settings, limits=limits, box=active_box(box), tolerance=tolerance, starts=tools)

@@ -1,0 +1,60 @@
+"""The way back inside the joint ranges, for an arm that was stopped beyond them."""
+
+from __future__ import annotations
+
+from math import degrees, radians
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rcilab.arrays import as_vector
+from rcilab.errors import PlanningError
+from rcilab.model import RobotModel, require_model
+from rcilab.motion.joint import plan_joint
+from rcilab.motion.motion import Motion
+from rcilab.motion.range import RECOVERY_RANGE, angle_text, range_from
+
+RECOVERY_MARGIN = radians(1.0)
+"""How far inside its range a joint is led, [rad]. A tuning value: far enough that the next motion starts inside where
+a compliant arm yields a little."""
+RECOVERY_SPEED = 0.05
+"""Part of the velocity and acceleration limits. A tuning value: slow, for an arm that has just been stopped."""
+
+
+def plan_recovery(model: RobotModel, q: ArrayLike, *, speed: float = RECOVERY_SPEED) -> Motion:
+    """Returns the motion that leads joints that are outside their range back inside, 1 degree deep, and stops there.
+
+    Each of these joints moves straight inwards; all others stay. `check` accepts the motion, and `execute` runs it. Of
+    joints that are all inside, it returns a motion without length. A controller that has stopped for a joint limit
+    also switches motor power off: `recover()`, `power_on()`, then this motion.
+
+    Args:
+        model: The arm; with soft limits, their range counts.
+        q: Where the arm is, shape (n,), [rad]: `state.q_c`. A joint may be outside by at most `RECOVERY_RANGE`, 20
+            degrees.
+        speed: Part of the velocity and acceleration limits to use, 0.001 to 1.
+
+    Raises:
+        PlanningError: A joint is farther outside; lead the arm by hand (`start_drag`) or by the maker's panel.
+        InvalidValueError: Wrong shape, not finite, or a speed out of range.
+    """
+    limits = require_model(model).limits.joint
+    start = as_vector(q, model.n, "q", "rad")
+    beyond = np.maximum(limits.lower - start, start - limits.upper)
+    farthest = int(beyond.argmax())
+    if beyond[farthest] > RECOVERY_RANGE:
+        raise PlanningError(
+            f"joint {farthest + 1}: {angle_text(float(start[farthest]))} is {degrees(beyond[farthest]):.2f}° outside "
+            f"its range, and plan_recovery leads back from {degrees(RECOVERY_RANGE):g}° at most; guide the arm back by "
+            "hand (start_drag), or widen a soft limit (set_joint_limit)"
+        ).coded(
+            "recovery_range",
+            joint=farthest + 1,
+            angle=f"{degrees(start[farthest]):.2f}",
+            beyond=f"{degrees(beyond[farthest]):.2f}",
+            most=f"{degrees(RECOVERY_RANGE):g}",
+        )
+    margin = np.minimum(RECOVERY_MARGIN, (limits.upper - limits.lower) / 2.0)
+    goal = np.where(beyond >= 0.0, np.clip(start, limits.lower + margin, limits.upper - margin), start)
+    opened = range_from(limits, start)
+    return plan_joint(model.with_joint_limits(opened.lower, opened.upper), start, goal, speed=speed)
