@@ -5,16 +5,21 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from rcilab.notebook.lessons import FOLDER
+
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Adds `rcilab lab`."""
     parser = subparsers.add_parser(
         "lab",
         help="open JupyterLab on the lessons",
-        description="Opens JupyterLab on the lessons, or on a directory of yours, in the browser. It listens on this "
-        "machine only and asks for the token in the address it prints. Ctrl-C twice ends it.",
+        description=f"Opens JupyterLab on your own copies of the lessons, in {FOLDER} in your home directory, or on a "
+        "directory of yours. A copy that you have edited is never overwritten: a newer lesson goes beside it. It "
+        "listens on this machine only and asks for the token in the address it prints. Ctrl-C twice ends it.",
     )
-    parser.add_argument("directory", nargs="?", type=Path, help="where your notebooks are (default: the lessons)")
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument("directory", nargs="?", type=Path, help=f"your notebooks (default: ~/{FOLDER})")
+    where.add_argument("--in-place", action="store_true", help="the lessons themselves, to write on them as an author")
     parser.add_argument("--port", type=int, help="TCP port (default: 8888 or the next free one)")
     parser.add_argument("--no-browser", action="store_true", help="only print the address")
     parser.add_argument("--allow-root", action="store_true", help="run as root, as in a container")
@@ -23,7 +28,17 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Becomes JupyterLab."""
-    from rcilab.notebook.lab import find_notebooks, lab_command, open_lab
+    from rcilab.notebook.lab import lab_command, open_lab, require_lab
+    from rcilab.notebook.lessons import copy_lessons, find_lessons
 
-    directory = args.directory or find_notebooks()
+    require_lab(allow_root=args.allow_root)  # Before anything is copied.
+    if args.directory is not None:
+        directory = args.directory
+    elif args.in_place:
+        directory = find_lessons()
+        print(f"lessons: {directory}, in place")
+    else:
+        copied = copy_lessons(Path.home() / FOLDER)
+        directory = copied.folder
+        print(copied)
     return open_lab(lab_command(directory, port=args.port, browser=not args.no_browser, allow_root=args.allow_root))

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from rcilab.errors import UsageError
 from rcilab.notebook.installed import require_installed
+from rcilab.notebook.lessons import INDEX
 
 _CONFIG_PATH = "JUPYTER_CONFIG_PATH"
 
@@ -24,14 +25,18 @@ def lab_command(
         browser: Whether to open a browser too.
         allow_root: Whether root may run it, as in a container; Jupyter refuses otherwise.
 
+    A directory with a page `index.md` is opened on that page.
+
     Raises:
-        UsageError: JupyterLab is not installed, or there is no such directory.
+        UsageError: JupyterLab is not installed, there is no such directory, or root has not asked to be allowed.
     """
-    require_installed("jupyterlab", "the lab")
+    require_lab(allow_root=allow_root)
     if not directory.is_dir():
         raise UsageError(f"there is no directory {directory}: name one that holds notebooks")
     command = [sys.executable, "-m", "rcilab.notebook.quick_lab", str(directory), "--ServerApp.ip=127.0.0.1"]
     command.append("--LabApp.extension_manager=readonly")  # The other kind asks PyPI what there is.
+    if (directory / INDEX).is_file():
+        command.append(f"--LabApp.default_url=/lab/tree/{INDEX}")  # Our settings show it as a page, not as its source.
     if port is not None:
         command += [f"--ServerApp.port={port}", "--ServerApp.port_retries=0"]
     if not browser:
@@ -39,6 +44,20 @@ def lab_command(
     if allow_root:
         command.append("--allow-root")
     return command
+
+
+def require_lab(*, allow_root: bool = False) -> None:
+    """Makes sure that JupyterLab can be started.
+
+    Args:
+        allow_root: See `lab_command`.
+
+    Raises:
+        UsageError: It is not installed, or root has not asked to be allowed.
+    """
+    require_installed("jupyterlab", "the lab")
+    if os.geteuid() == 0 and not allow_root:
+        raise UsageError("you are root, and JupyterLab refuses root unless it is told: add --allow-root")
 
 
 def lab_environment(environment: Mapping[str, str]) -> dict[str, str]:
@@ -52,12 +71,6 @@ def lab_environment(environment: Mapping[str, str]) -> dict[str, str]:
     ours = str(Path(__file__).parent / "assets" / "jupyter")
     others = environment.get(_CONFIG_PATH)
     return {**environment, _CONFIG_PATH: ours if not others else f"{others}{os.pathsep}{ours}"}
-
-
-def find_notebooks() -> Path:
-    """Returns the lessons of this checkout, or the current directory where rcilab was installed without them."""
-    lessons = Path(__file__).resolve().parents[2] / "notebooks"
-    return lessons if lessons.is_dir() else Path.cwd()
 
 
 def open_lab(command: list[str]) -> int:

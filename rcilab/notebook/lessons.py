@@ -1,0 +1,120 @@
+"""The lessons that come with rcilab, and a student's copies of them, which are the student's: never overwritten."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+
+from rcilab.errors import UsageError
+from rcilab.whole_file import write_whole
+
+INDEX = "index.md"
+"""The page of the course: every lesson by its title, English and Chinese apart."""
+FOLDER = "rcilab-notebooks"
+"""Name of the folder of the copies, in the home directory."""
+
+_RECORD = ".rcilab-lessons.json"  # SHA-256 of each file as it was given out: a file that differs was edited.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CopiedLessons:
+    """What `copy_lessons` has done; `str` makes a sentence of it."""
+
+    folder: Path
+    """Where the copies are."""
+    written: tuple[str, ...]
+    """Files that are new, or newer versions of copies that nobody had edited."""
+    beside: tuple[str, ...]
+    """Newer versions of copies that had been edited, under names of their own."""
+
+    def __str__(self) -> str:
+        text = f"lessons: your copies are in {self.folder}"
+        if self.beside:
+            text += f"; newer versions beside those that you have edited: {', '.join(self.beside)}"
+        return text
+
+
+def find_lessons() -> Path:
+    """Returns the folder of the lessons: those of the installed package, or of the checkout that it runs from.
+
+    Raises:
+        UsageError: rcilab was installed without them.
+    """
+    package = Path(__file__).resolve().parents[1]
+    for folder in (package / "lessons", package.parent / "notebooks"):
+        if (folder / INDEX).is_file():
+            return folder
+    raise UsageError(
+        f"there are no lessons beside {package}: install rcilab again, or name a folder of notebooks, rcilab lab FOLDER"
+    )
+
+
+def copy_lessons(folder: Path, source: Path | None = None) -> CopiedLessons:
+    """Copies the lessons into a folder; a copy that was edited stays as it is, and a newer lesson goes beside it.
+
+    Args:
+        folder: Where to; it is made.
+        source: Where the lessons are; None finds them.
+
+    Raises:
+        UsageError: The folder cannot be written, or there are no lessons.
+    """
+    source = find_lessons() if source is None else source
+    try:
+        given = _read_record(folder)
+        written: list[str] = []
+        beside: list[str] = []
+        for lesson in sorted([*source.glob("*.ipynb"), source / INDEX]):
+            text = lesson.read_text(encoding="utf-8")
+            name = _place(folder, lesson.name, text, given)
+            if name is not None:
+                write_whole(folder / name, text)
+                given[name] = _digest(text)
+                (written if name == lesson.name else beside).append(name)
+        write_whole(folder / _RECORD, json.dumps(given, indent=1, sort_keys=True))
+    except OSError as error:
+        raise UsageError(
+            f"the lessons cannot be copied into {folder}: {error.strerror}; name a folder that you may write to"
+        ) from error
+    return CopiedLessons(folder=folder, written=tuple(written), beside=tuple(beside))
+
+
+def _place(folder: Path, name: str, text: str, given: dict[str, str]) -> str | None:
+    """Returns the name that a lesson is written to, or None where it has been given out already."""
+    digest = _digest(text)
+    for candidate in _names(name):
+        file = folder / candidate
+        if not file.exists():
+            was_declined = candidate != name and given.get(candidate) == digest  # Offered beside, and deleted.
+            return None if was_declined else candidate
+        found = _digest(file.read_text(encoding="utf-8", errors="replace"))
+        if digest in (found, given.get(candidate)):
+            return None
+        if found == given.get(candidate):
+            return candidate
+    raise AssertionError("the names have no end")
+
+
+def _names(name: str) -> Iterator[str]:
+    """Yields 01_x.zh.ipynb, 01_x.new.zh.ipynb, 01_x.new2.zh.ipynb, ...: the ending tells the language."""
+    yield name
+    stem, _, ending = name.partition(".")
+    number = 1
+    while True:
+        yield f"{stem}.new{'' if number == 1 else number}.{ending}"
+        number += 1
+
+
+def _read_record(folder: Path) -> dict[str, str]:
+    try:
+        found = json.loads((folder / _RECORD).read_text(encoding="utf-8"))
+    except (FileNotFoundError, ValueError):
+        return {}  # Then every copy that differs counts as edited.
+    return {str(name): str(digest) for name, digest in found.items()} if isinstance(found, dict) else {}
+
+
+def _digest(text: str) -> str:
+    return sha256(text.encode()).hexdigest()
