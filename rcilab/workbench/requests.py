@@ -99,7 +99,7 @@ class TypeField(Request):
     """A number field holds this text now."""
 
     field: str
-    """joint.0 ..., pose.x ..., psi, speed, program.KEY.speed ..., setup.PART.NAME (see `rcilab.workbench.setup.fields`)."""
+    """joint.0 ..., pose.x ..., psi, speed, program.KEY.speed ..., setup.PART.NAME (see `setup.fields`)."""
     text: str
 
 
