@@ -6,12 +6,16 @@ JupyterLab and VS Code name the cell with every run; where nobody does (nbclient
 
 from __future__ import annotations
 
+import asyncio
 import atexit
 import hashlib
+import os
 import signal
+import socket
 import sys
 import threading
 import weakref
+from collections.abc import Callable
 from contextlib import suppress
 from typing import Any, Protocol
 
@@ -43,7 +47,7 @@ class Cells:
         if shell is not None:
             shell.events.register("pre_run_cell", self.begin)
             shell.events.register("post_run_cell", self.end)
-            _hear_idle_interrupts(shell, self.halt)
+            _stop_on_interrupts(shell, self.halt)
             if self._current() is not None:  # It has begun before anybody listened.
                 self._running.set()
 
@@ -83,15 +87,24 @@ class Cells:
                 thing.close()
 
     def end(self, result: Any) -> None:
-        """A cell has ended; if somebody interrupted it, everything that moves comes to rest."""
+        """A cell has ended; if it was interrupted, everything that moves stops.
+
+        A cell that awaits is cancelled by an interrupt, and may then have no result at all.
+        """
         self._running.clear()
-        if isinstance(result.error_in_exec, KeyboardInterrupt):
+        if result is None or isinstance(result.error_in_exec, KeyboardInterrupt | asyncio.CancelledError):
             self.halt()
 
     def halt(self) -> None:
-        """Brings to rest whatever any cell moves."""
+        """Stops whatever any cell moves; what cannot be stopped does not keep the others moving."""
+        failures: list[Exception] = []
         for thing in list(self._keep.values()):
-            thing.halt()
+            try:
+                thing.halt()
+            except Exception as error:
+                failures.append(error)
+        if failures:
+            raise ExceptionGroup("not everything could be stopped", failures)
 
     def close(self) -> None:
         """Ends everything."""
@@ -133,14 +146,43 @@ def _name(cell_id: str | None, code: str | None) -> str:
     return cell_id or hashlib.sha256((code or "").encode()).hexdigest()
 
 
-def _hear_idle_interrupts(shell: Any, act: Any) -> None:
-    """An interrupt while no cell runs is dropped by ipykernel; here it stops what moves in the background.
+def _stop_on_interrupts(shell: Any, act: Callable[[], None]) -> None:
+    """Has every interrupt of the kernel stop what moves, whatever its main thread does at that moment.
 
-    ipykernel puts its own handler in place while it handles a message, and the saved one back afterwards.
+    ipykernel ignores an interrupt while it is idle, swallows one that comes while it handles a widget's message, and
+    does not wake its event loop for one that is to cancel a cell which awaits. A thread of ours is told of each by the
+    interpreter itself (`signal.set_wakeup_fd`), also while the main thread is in a library.
     """
     kernel = getattr(shell, "kernel", None)
-    if kernel is None or not hasattr(kernel, "saved_sigint_handler"):
+    if kernel is None or not hasattr(kernel, "io_loop"):
         return
-    kernel.saved_sigint_handler = lambda number, frame: act()
-    if threading.current_thread() is threading.main_thread() and signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
-        signal.signal(signal.SIGINT, kernel.saved_sigint_handler)
+    reader, writer = socket.socketpair()
+    writer.setblocking(False)
+
+    def watch() -> None:
+        with reader, writer:
+            while numbers := reader.recv(64):
+                if former >= 0:
+                    with suppress(OSError):
+                        os.write(former, numbers)
+                if signal.SIGINT in numbers:
+                    act()
+                    kernel.io_loop.add_callback(_do_nothing)  # Wakes the loop, which then cancels the cell.
+
+    def install() -> None:
+        nonlocal former
+        former = signal.set_wakeup_fd(writer.fileno(), warn_on_full_buffer=False)
+        kernel.saved_sigint_handler = _do_nothing  # What is ignored wakes nobody.
+        if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+            signal.signal(signal.SIGINT, _do_nothing)
+        threading.Thread(target=watch, name="interrupts", daemon=True).start()
+
+    former = -1
+    if threading.current_thread() is threading.main_thread():
+        install()
+    else:
+        kernel.io_loop.add_callback(install)
+
+
+def _do_nothing(*_: object) -> None:
+    pass

@@ -29,7 +29,7 @@ class Shell:
 
     def __init__(self) -> None:
         self.events = self
-        self.kernel = SimpleNamespace(saved_sigint_handler=None)
+        self.kernel = SimpleNamespace()
         self._hooks: dict[str, Any] = {}
         self._parent: dict[str, Any] = {}
 
@@ -98,12 +98,6 @@ def test_an_interrupted_cell_stops_everything_that_moves_and_closes_nothing(shel
     shell.run(lambda: None, "b", error=KeyboardInterrupt())
     assert (thing.halted, thing.closed) == (1, 0)
     shell.run(lambda: None, "b", error=ValueError())
-    assert thing.halted == 1
-
-
-def test_an_interrupt_while_no_cell_runs_stops_it_too(shell: Shell, owner: Cells) -> None:
-    thing = shell.run(lambda: Thing(owner), "a")
-    shell.kernel.saved_sigint_handler(2, None)
     assert thing.halted == 1
 
 

@@ -47,7 +47,7 @@ until(lambda: panel.state.status.powered)
 MOVE = """
 panel.state.error = None
 sign = 1.0 if panel.state.here[0] < 0.0 else -1.0
-panel.state.speed = 0.05
+panel.state.speed = 0.005  # Minutes: an arrival is no stop.
 panel.state.pose(model.home + 0.5 * sign)
 panel.state.make_plan()
 panel._show()
@@ -189,6 +189,30 @@ def test_an_interrupt_stops_the_arm_whether_a_cell_runs_or_not(kernel: Kernel, t
     kernel.manager.interrupt_kernel()
     with pytest.raises(AssertionError, match="KeyboardInterrupt"):
         kernel.value_of(sleeping)
+    assert kernel.run(STANDS) == ("idle", True)
+
+
+def test_an_interrupt_stops_the_arm_while_a_cell_awaits_or_a_widget_is_served(kernel: Kernel, tmp_path: Path) -> None:
+    begun = tmp_path / "begun"
+    kernel.run(MAKE + CONNECT)
+    kernel.run(MOVE)
+    awaiting = kernel.client.execute(
+        f"import asyncio; open({str(begun)!r}, 'w').close(); await asyncio.sleep(60)", stop_on_error=False
+    )
+    wait_for(begun.exists, what="the cell to begin")
+    kernel.manager.interrupt_kernel()
+    with pytest.raises(AssertionError):
+        kernel.value_of(awaiting)
+    assert kernel.run(STANDS) == ("idle", True)
+    begun.unlink()
+    kernel.run(MOVE)
+    slow = kernel.run(
+        f"from ipywidgets import Button; slow = Button(); "
+        f"slow.on_click(lambda _: (open({str(begun)!r}, 'w').close(), time.sleep(60))); slow.comm.comm_id"
+    )
+    kernel.tell(slow, None, **CLICK)
+    wait_for(begun.exists, what="the button to be served")
+    kernel.manager.interrupt_kernel()
     assert kernel.run(STANDS) == ("idle", True)
 
 
