@@ -57,7 +57,8 @@ class LiveChannel:
         self._pages: dict[Any, int | None] = {}  # Connection -> client id. Owned by the event loop.
         self._keys: dict[int, str] = {}
         self._loop: asyncio.AbstractEventLoop | None = None
-        self._latest: dict[str, Any] = {}
+        self._latest: dict[str, Any] = {"server": secrets.token_hex(8)}
+        """What pages show; `server` tells them that another workbench answers at this address since."""
 
     def introduce(self, page: int) -> str:
         """Returns the key of a client that has just connected; the page brings it along on its live connection."""

@@ -159,6 +159,8 @@
   const hear = (event) => {
     const news = JSON.parse(event.data);
     if (news.beat) { send({ kind: "here" }); return; }
+    // Another workbench answers at this address: viser's panels are those of the one that is gone.
+    if (news.server && said.server && news.server !== said.server) { location.reload(); return; }
     Object.assign(said, news);
     if ("stop" in news || "stopHint" in news || "homeHint" in news) label();
     if (news.chips) draw(news.chips);
