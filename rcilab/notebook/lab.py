@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Mapping
+from hashlib import sha256
 from pathlib import Path
 
 from rcilab.errors import UsageError
@@ -37,6 +38,7 @@ def lab_command(
     command.append("--LabApp.extension_manager=readonly")  # The other kind asks PyPI what there is.
     if (directory / INDEX).is_file():
         command.append(f"--LabApp.default_url=/lab/tree/{INDEX}")  # Our settings show it as a page, not as its source.
+    command.append(f"--LabApp.workspaces_dir={_workspaces(directory)}")
     if port is not None:
         command += [f"--ServerApp.port={port}", "--ServerApp.port_retries=0"]
     if not browser:
@@ -44,6 +46,14 @@ def lab_command(
     if allow_root:
         command.append("--allow-root")
     return command
+
+
+def _workspaces(directory: Path) -> Path:
+    """Returns where JupyterLab keeps the open tabs of a directory; shared, it looks for them in every other one."""
+    from jupyter_core.paths import jupyter_config_dir
+
+    digest = sha256(str(directory.resolve()).encode()).hexdigest()[:8]
+    return Path(jupyter_config_dir()) / "lab" / "workspaces" / f"rcilab-{digest}"
 
 
 def require_lab(*, allow_root: bool = False) -> None:
