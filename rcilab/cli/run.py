@@ -151,11 +151,13 @@ def _reader(args: Namespace) -> TextIO:
 
 def _plan_to_start(motion: Motion, robot: RobotSession, q: JointVector) -> list[Motion]:
     """Returns what leads from `q` to the start of a motion; the first part leads back inside the joint ranges."""
-    from rcilab.motion import plan_joint
+    from rcilab.motion import plan_joint, plan_recovery
 
     if len(motion.q[0]) != len(q):
         raise UsageError(f"the motion is for {len(motion.q[0])} joints and the arm has {len(q)}: it is for another arm")
-    return [plan_joint(robot.model, q, motion.q[0], speed=_TO_START_SPEED)]
+    back = plan_recovery(robot.model, q)
+    way = plan_joint(robot.model, back.q[-1], motion.q[0], speed=_TO_START_SPEED)
+    return [back, way] if back.duration > 0.0 else [way]
 
 
 def _recover(robot: RobotSession, state: RobotState, args: Namespace) -> None:
