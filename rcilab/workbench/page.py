@@ -33,7 +33,7 @@ def decorate(index: bytes, quality: str = "full") -> bytes:
     """
     assets = files("rcilab.workbench") / "assets"
     style = (assets / "page.css").read_bytes()
-    scripts = ("page", "marks", "names", "rows", "pick", "branches", "folds", "retell", "labels")
+    scripts = ("heartbeat", "page", "marks", "names", "rows", "pick", "branches", "folds", "retell", "labels")
     script = b"\n".join((assets / f"{name}.js").read_bytes() for name in scripts)
     head = b"<style>" + style + b"</style><script>" + script + b"</script></head>"
     page = index.replace(b"<title>Viser</title>", b"<title>rcilab workbench</title>", 1)

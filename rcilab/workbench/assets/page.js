@@ -106,7 +106,11 @@
   };
 
   // Which of the server's clients this page is; the key proves it. Python calls this as soon as viser is connected.
-  window.rcilabPage = (page, key) => { me = { page, key }; greet(); };
+  window.rcilabPage = (page, key) => {
+    me = { page, key };
+    greet();
+    window.dispatchEvent(new CustomEvent("rl-me", { detail: me }));
+  };
   const greet = () => { if (me) { send({ kind: "hello", ...me }); hold(); } };
 
   // Who holds the controls: the others can ask for them, and the holder is asked.

@@ -1,0 +1,33 @@
+// Signs of life from a thread of their own: drawing a scene without a graphics card can hold the page up for seconds,
+// and a slow page is not a gone page. A page that is held up for longer than `SLOWEST` is as good as gone.
+(() => {
+  "use strict";
+  const SLOWEST = 10000;  // [ms] The longest frame that software rendering was seen to take is about a third of it.
+  const work = (slowest) => {
+    let me = null, live = null, heard = 0;
+    const hello = () => { if (live && live.readyState === WebSocket.OPEN && me) live.send(JSON.stringify({ kind: "hello", ...me })); };
+    const connect = (address) => {
+      live = new WebSocket(address);
+      live.onopen = hello;
+      live.onmessage = (event) => {
+        if (!event.data.startsWith('{"beat"')) return;
+        self.postMessage(0);  // The page's own thread answers when it can.
+        if (Date.now() - heard < slowest) live.send('{"kind":"here"}');
+      };
+      live.onclose = () => setTimeout(() => connect(address), 1000);
+    };
+    self.onmessage = ({ data }) => {
+      heard = Date.now();
+      if (!data) return;
+      me = data.me;
+      if (live) hello(); else connect(data.address);
+    };
+  };
+  let worker;
+  try {
+    worker = new Worker(URL.createObjectURL(new Blob([`(${work})(${SLOWEST})`], { type: "text/javascript" })));
+  } catch { return; }  // A browser without workers: the page's own thread answers alone.
+  worker.onmessage = () => worker.postMessage(null);
+  const address = (location.protocol === "https:" ? "wss://" : "ws://") + location.host + "/rcilab/live";
+  window.addEventListener("rl-me", (event) => worker.postMessage({ me: event.detail, address }));
+})();
