@@ -287,6 +287,7 @@ def follow_path(model: RobotModel, q: JointVector, path: Path, speed: float) -> 
         PlanningError: A pose on the way is out of reach, a joint limit or a singularity is in the way.
         InvalidValueError: The speed is out of range.
     """
+    require_inside("start", q, model.limits.joint)
     law = _s_law(path, speed)
     shares = law.s
     if len(shares) == 1:

@@ -32,16 +32,15 @@ def require_inside(what: str, q: JointVector, limits: JointLimits) -> None:
     if outside.size:
         i = int(outside[0])
         angle, low, high = float(q[i]), float(limits.lower[i]), float(limits.upper[i])
-        remedy = "choose an angle between them"
+        facts = {"joint": i + 1, **_in_degrees(angle=angle, low=low, high=high)}
+        said = (
+            f"joint {i + 1}: {what} {angle_text(angle)} is not strictly between {angle_text(low)} and "
+            f"{angle_text(high)}; "
+        )
         if what == "start":
             remedy = "where the arm is there, plan_recovery(model, q) leads back inside"
-        raise PlanningError(
-            f"joint {i + 1}: {what} {angle_text(angle)} is not strictly between {angle_text(low)} and "
-            f"{angle_text(high)}; {remedy}"
-        ).coded(
-            "range_start" if what == "start" else "range",
-            joint=i + 1, **_in_degrees(angle=angle, low=low, high=high),
-        )  # fmt: skip
+            raise PlanningError(said + remedy).coded("range_start", **facts)
+        raise PlanningError(f"{said}choose an angle between them").coded("range", **facts)
 
 
 def range_from(limits: JointLimits, q: JointVector, most: float = inf) -> JointLimits:

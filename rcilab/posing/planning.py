@@ -111,9 +111,9 @@ def make_plan(
     from rcilab.conformance import check
 
     for name, q in (("plan.start_limit", start), ("plan.at_limit", goal)):
-        outside = np.flatnonzero(~((model.limits.joint.lower < q) & (q < model.limits.joint.upper)))
-        if outside.size:
-            return message(name, joint=int(outside[0]) + 1)
+        joint = find_outside(model, q)
+        if joint is not None:
+            return message(name, joint=joint)
     if float(np.abs(goal - start).max()) < SMALLEST_MOTION:
         return message("plan.here")
     if kind == "arc" and via is None:
@@ -128,6 +128,25 @@ def make_plan(
     if abs(float(motion.goal[away] - goal[away])) > SAME_WAY:
         note = message("plan.other_way", joint=away + 1)
     return replace(picture(model, motion, report, box), kind=kind, note=note)
+
+
+def make_recovery(model: RobotModel, start: JointVector, box: SafetyBox | None = None) -> Plan | Message:
+    """Returns the motion that leads joints back inside their range, checked but for collisions, or why none does."""
+    from rcilab.conformance import check
+    from rcilab.motion import plan_recovery
+
+    try:
+        motion = plan_recovery(model, start)
+        report = check(motion, model, start=start, box=box, distance=None)
+    except RcilabError as error:
+        return message("plan.failed", error=tell(error))
+    return picture(model, motion, report, box)
+
+
+def find_outside(model: RobotModel, q: JointVector) -> int | None:
+    """Returns the first joint, counted from 1, that is not strictly inside its range; None when all are."""
+    outside = np.flatnonzero(~((model.limits.joint.lower < q) & (q < model.limits.joint.upper)))
+    return int(outside[0]) + 1 if outside.size else None
 
 
 def _go(

@@ -97,6 +97,7 @@ class Conductor:
             requests.ShowExtra: self._scene.show_extra,
             requests.SetWay: self._goal.set_way,
             requests.Plan: self._goal.plan,
+            requests.PlanRecovery: self._goal.plan_recovery,
             requests.SetSpeed: self._goal.set_speed,
             requests.SetLaw: self._goal.set_law,
             requests.Drive: self._drive,

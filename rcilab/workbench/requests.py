@@ -159,6 +159,11 @@ class Plan(Request):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class PlanRecovery(Request):
+    """Plan from where the arm is, outside a joint's range, back inside."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SetSpeed(Request):
     """Share of the velocity and acceleration limits to plan with."""
 

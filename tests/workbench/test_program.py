@@ -456,7 +456,7 @@ def test_a_program_that_has_run_is_planned_again_or_one_goes_back_to_its_start(s
     reason = obstacle(square.state, status)
     assert reason.code == "ready.done_program"
     assert may_plan_again(reason)
-    assert may_go_back(reason)
+    assert may_go_back(square.state, reason)
     square.goal.pose_goal(requests.PoseGoal(name="start"))
     plan = square.state.plan
     assert plan.program is None

@@ -10,7 +10,7 @@ import numpy as np
 
 from rcilab.arrays import JointVector, frozen
 from rcilab.errors import KinematicsError
-from rcilab.posing.planning import LAWS, PATH_KINDS, Plan, make_plan
+from rcilab.posing.planning import LAWS, PATH_KINDS, Plan, make_plan, make_recovery
 from rcilab.posing.reach import judge_joints, judge_pose
 from rcilab.posing.readiness import is_done
 from rcilab.spatial import Pose
@@ -199,8 +199,19 @@ class GoalActions:
         is_program = state.plan is not None and state.plan.program is not None
         if is_program and not is_asked and state.plan is not None and not is_done(state.plan, start):
             self._store.say("warn", message("plan.replaced"))
+        self._show(replace(made, short=state.goal.reach.short) if isinstance(made, Plan) else made)
+
+    def plan_recovery(self, request: requests.PlanRecovery) -> None:
+        """Plans from where the arm stands, outside a joint's range, back inside; the goal stays for the next plan."""
+        state, status = self._store.state, self._session.status()
+        if status.q_c is None or is_moving(status):
+            return
+        self._stale, self._due = False, None
+        self._planned = time.monotonic()
+        self._show(make_recovery(state.model, frozen(status.q_c), state.setup.wanted.box))
+
+    def _show(self, made: Plan | Message) -> None:
         if isinstance(made, Plan):
-            made = replace(made, short=state.goal.reach.short)
             self._store.update(plan=made, no_plan=None, recording=None, place=0.0, playing=False)
         else:
             self._store.update(plan=None, no_plan=made, recording=None, place=0.0, playing=False)

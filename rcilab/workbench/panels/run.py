@@ -9,7 +9,14 @@ from rcilab.workbench import requests
 from rcilab.workbench.check.freshness import outdated
 from rcilab.workbench.panels.outcome import outcome_html, way_html
 from rcilab.workbench.panels.target import planned_html
-from rcilab.workbench.run.readiness import describe_move, is_moving, may_go_back, may_plan_again, obstacle
+from rcilab.workbench.run.readiness import (
+    describe_move,
+    is_moving,
+    may_go_back,
+    may_lead_inside,
+    may_plan_again,
+    obstacle,
+)
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, Html, Linked, esc, on_press
 
@@ -60,6 +67,10 @@ class RunPanel:
             text("run.back"), icon="arrow-back-up", color="gray", visible=False, hint=text("run.back_hint")
         )
         on_press(self._back, ask, lambda page: requests.PoseGoal(page=page, name="start"))
+        self._inside = gui.add_button(
+            text("run.inside"), icon="arrow-bar-to-right", color="orange", visible=False, hint=text("run.inside_hint")
+        )
+        on_press(self._inside, ask, lambda page: requests.PlanRecovery(page=page))
         self._buttons: dict[str, Any] = {}
         with gui.add_folder(text("run.robot")):
             gui.add_html('<i class="rl-buttons"></i>')
@@ -93,7 +104,8 @@ class RunPanel:
         self._reason.show("" if unsaid is None else f'<p class="rl-note rl-why">{esc(text.say(unsaid))}</p>')
         is_program = state.plan is not None and state.plan.program is not None
         self._again.visible = is_program and (may_plan_again(reason) or outdated(state) is not None)
-        self._back.visible = may_go_back(reason)
+        self._back.visible = may_go_back(state, reason)
+        self._inside.visible = may_lead_inside(state, status)
         is_held = status.code == "moving.held"
         self._pause.visible, self._resume.visible = not is_held, is_held  # There before they are needed: nothing moves.
         self._pause.disabled = status.code != "moving" or status.motion_place is None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from rcilab.posing.planning import find_outside
 from rcilab.posing.readiness import arm_obstacle, ask_to_move, plan_obstacle
 from rcilab.workbench.check.freshness import outdated
 from rcilab.workbench.run.driving import parameter_obstacle
@@ -56,9 +57,15 @@ def may_plan_again(reason: Message | None) -> bool:
     return reason is not None and reason.code in ("ready.program", "ready.program_fails", *_OF_PROGRAMS.values())
 
 
-def may_go_back(reason: Message | None) -> bool:
-    """Returns whether the plan has been carried out, so that a person may want to see it once more."""
-    return reason is not None and reason.code in ("ready.done", _OF_PROGRAMS["ready.done"])
+def may_go_back(state: UiState, reason: Message | None) -> bool:
+    """Returns whether the plan has been carried out, and its start is a place to go to again."""
+    is_done = reason is not None and reason.code in ("ready.done", _OF_PROGRAMS["ready.done"])
+    return is_done and state.plan is not None and find_outside(state.model, state.plan.starts_at) is None
+
+
+def may_lead_inside(state: UiState, status: SupervisorStatus) -> bool:
+    """Returns whether the arm stands outside a joint's range, so that no plan but the way back inside starts there."""
+    return status.q_c is not None and not is_moving(status) and find_outside(state.model, status.q_c) is not None
 
 
 def describe_move(state: UiState) -> Message | None:

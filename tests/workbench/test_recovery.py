@@ -1,0 +1,51 @@
+"""The button that leads an arm back inside its joint ranges, at a controller that another client left outside."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+from rcilab import connect
+from rcilab.supervisor.launch import start_controller
+from rcilab.workbench import requests
+from rcilab.workbench.app import Workbench, WorkbenchConfig
+from rcilab.workbench.run.readiness import may_lead_inside
+from tests.outside import JOINT, drive_outside
+from tests.workbench.opened import wait
+
+
+@pytest.fixture
+def bench() -> Iterator[Workbench]:
+    controller = start_controller("xMatePro7")
+    assert controller.address is not None
+    try:
+        with connect(controller.address) as robot:
+            robot.power_on()
+            drive_outside(robot)
+            robot.recover()
+            robot.power_on()
+        with Workbench(WorkbenchConfig(target=controller.address, port=0, quality="light")) as bench:
+            yield bench
+            assert bench.conductor.errors == []
+            assert bench.presenter.errors == []
+    finally:
+        controller.end()
+
+
+def test_the_arm_is_led_back_inside_and_plans_start_there_again(bench):
+    ask, store, session = bench.conductor.ask, bench.store, bench.session
+    upper = store.state.model.limits.joint.upper[JOINT]
+    wait(lambda: session.status().phase == "idle" and bool(session.status().powered), "an idle arm")
+    assert may_lead_inside(store.state, session.status())
+    wait(lambda: store.state.no_plan is not None and store.state.no_plan.code == "plan.start_limit", "a refusal")
+    ask(requests.PlanRecovery())
+    wait(lambda: store.state.plan is not None and store.state.plan.complete, "a plan")
+    ask(requests.Drive(what="execute"))
+    wait(lambda: store.state.asked is not None, "the question")
+    ask(requests.Drive(what="confirm"))
+    wait(lambda: session.status().q_c[JOINT] < upper - 0.017, "the arm inside")
+    wait(lambda: session.status().phase == "idle", "the arm to stop")
+    ask(requests.PoseGoal(name="home"))
+    wait(lambda: store.state.plan is not None and store.state.plan.motion.start[JOINT] < upper, "a plan from inside")
+    assert not may_lead_inside(store.state, session.status())
