@@ -30,3 +30,19 @@ def test_a_page_loads_itself_again_when_another_workbench_answers_at_its_address
             assert tab.evaluate("document.querySelector('.rl-lost') === null")
     finally:
         context.close()
+
+
+def test_without_a_connection_the_arm_is_translucent_and_nothing_is_called_passed(page) -> None:
+    bench, tab = page.bench, page.tab
+    opacity = """(() => { const arm = __viserMutable.nodeRefFromName["/live"]; let found = null;
+      if (arm) arm.traverse((node) => { if (node.material && found === null) found = node.material.opacity; });
+      return found; })()"""
+    wait_for(lambda: tab.evaluate(opacity) == 1.0, "a solid arm", 20.0, tab)
+    target = bench.store.state.target
+    bench.session.disconnect()
+    try:
+        wait_for(lambda: (tab.evaluate(opacity) or 1.0) < 0.5, "a translucent arm", 20.0, tab)
+    finally:
+        bench.session.open(bench.store.state.model, target, bench.store.state.plant)
+        wait_for(lambda: bench.session.is_ready, "the connection", 30.0)
+    wait_for(lambda: tab.evaluate(opacity) == 1.0, "a solid arm again", 20.0, tab)

@@ -11,6 +11,7 @@ from rcilab.workbench.panels.outcome import outcome_html, way_html
 from rcilab.workbench.panels.target import planned_html
 from rcilab.workbench.run.readiness import (
     describe_move,
+    is_connected,
     is_moving,
     may_go_back,
     may_lead_inside,
@@ -93,7 +94,7 @@ class RunPanel:
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows the robot."""
         text, reason, moving = self._text, obstacle(state, status), is_moving(status)
-        self._planned.show(planned_html(state, text))
+        self._planned.show("" if not is_connected(status) else planned_html(state, text))  # Nothing is ready to run it.
         self._execute.disabled = reason is not None
         question = None if reason is not None else describe_move(state)
         said = "" if question is None else esc(text.say(question))
@@ -113,7 +114,7 @@ class RunPanel:
         self._way.show(way_html(state, status, text))
         self._outcome.show("" if moving else outcome_html(state, status, text))
         self._plan.visible, self._to_target.visible = not is_program, is_program
-        self._plan.disabled = self._to_target.disabled = moving
+        self._plan.disabled = self._to_target.disabled = moving or not is_connected(status)
         self._buttons["recover"].disabled = status.phase not in ("fault", "crashed", "lost")
         self._buttons["power_on"].disabled = moving or status.powered is not False
         self._buttons["power_off"].disabled = moving or status.powered is not True

@@ -83,6 +83,11 @@ def time_shown(state: UiState, status: SupervisorStatus) -> float:
     return 0.0 if state.plan is None else state.place * state.plan.motion.duration
 
 
+def is_connected(status: SupervisorStatus) -> bool:
+    """Returns whether a robot tells where it is."""
+    return status.q is not None and status.phase not in ("closed", "lost", "crashed")
+
+
 def is_moving(status: SupervisorStatus) -> bool:
     """Returns whether the arm is being moved by us."""
     return status.phase in ("moving", "stopping")

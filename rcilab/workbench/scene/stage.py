@@ -10,7 +10,7 @@ from rcilab.arrays import JointVector
 from rcilab.views.arm_view import ArmView
 from rcilab.views.viser_scene import ViserScene
 from rcilab.views.viser_stage import furnish, place_camera
-from rcilab.workbench.run.readiness import is_moving
+from rcilab.workbench.run.readiness import is_connected, is_moving
 from rcilab.workbench.run.replay import replayed_pose
 from rcilab.workbench.scene.elbow_stage import ElbowStage
 from rcilab.workbench.scene.extras_stage import ExtrasStage
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 _Ghost = Literal["commanded", "candidate", "plan"]
 _CANDIDATE_COLORS = {"good": (46, 180, 124), "warn": (240, 165, 40), "bad": (225, 62, 52), "peek": (130, 86, 225)}
 _SAME_POSE = 2e-3  # [rad] A choice: ghosts closer than this to the arm would only flicker on its surface.
+_ABSENT = 0.25  # Opacity of an arm that no robot stands for.
 _STRAYED, _BACK = 0.01, 0.006
 """[rad] A choice: the commanded arm is drawn from where a joint is more than 0.6 degrees away from it, some 10 mm at
 the tool, and until it is back within the second."""
@@ -70,8 +71,9 @@ class Stage:
             for arm in (self._live, *self._ghosts.values()):
                 arm.show_tool(self._tool)
         self._model, live = state.model, status.q
-        if live is None:  # Nothing is connected: what stands there is the run that is looked at.
-            replayed = replayed_pose(state)
+        replayed = replayed_pose(state) if live is None else None
+        self._show_presence(is_connected(status) or replayed is not None)
+        if live is None:  # Nothing is connected: what stands there is the run that is looked at, or the target.
             live = state.goal.q if replayed is None else replayed
         self._live.show(live)
         self._show_commanded(status, live)
@@ -96,7 +98,7 @@ class Stage:
         drawing = self._drawing = ViserScene(server, shadows=full)
         self._model = model = state.model
         self._live = ArmView(drawing, "live", model, "live", quality="fine" if full else "coarse")
-        self._ghosts, self._look = {}, ""
+        self._ghosts, self._look, self._is_there = {}, "", True
         self._visible.clear()
         self._grip = Grip(server, drawing, self._live, self._ask)
         self._setup = SetupStage(server, drawing, self._live, self._ask)
@@ -105,6 +107,12 @@ class Stage:
         self._ribbon = RibbonStage(server, drawing, self._ask)
         self._extras = ExtrasStage(server, drawing, self._live)
         self._tool = model.T_flange_tool
+
+    def _show_presence(self, is_there: bool) -> None:
+        """Draws the arm translucent while no robot tells where it is."""
+        if is_there != self._is_there:
+            self._is_there = is_there
+            self._live.set_look(opacity=1.0 if is_there else _ABSENT)
 
     def _show_commanded(self, status: SupervisorStatus, live: np.ndarray) -> None:
         """Draws where the arm is told to be, once that is somewhere else."""
