@@ -70,11 +70,11 @@ class RciCommands(RciSettings):
 
     def set_do(self, signal: int, level: bool) -> None:
         """Sets a digital output, 0 to 5."""
-        self._ask(rci.SetDO(_signal(signal), flag("level", level)))
+        self._ask(rci.SetDO(require_signal(signal), flag("level", level)))
 
     def get_di(self, signal: int) -> bool:
         """Returns the level of a digital input, 0 to 5."""
-        return bool(self._request(rci.GetDIState(_signal(signal))).level)
+        return bool(self._request(rci.GetDIState(require_signal(signal))).level)
 
     def start_drag(
         self,
@@ -102,7 +102,12 @@ class RciCommands(RciSettings):
         self._ask(rci.RebootRobot())
 
 
-def _signal(signal: object) -> int:
+def require_signal(signal: object) -> int:
+    """Returns the number of a digital signal, 0 to 5.
+
+    Raises:
+        InvalidValueError: There is no such signal.
+    """
     if isinstance(signal, bool) or not isinstance(signal, int) or signal not in SIGNALS:
         raise InvalidValueError("signal", described(signal), "does not exist; there are 0 to 5")
     return signal

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
 
+from rcilab.client.commands import require_signal
 from rcilab.client.setup import RobotSetup, require_setup
 from rcilab.errors import UsageError
 from rcilab.motion.pacing import PacedMotion, require_pace
@@ -292,6 +293,25 @@ class ArmRequests:
             self._setup.follow(ticket, setup)
             self.model = model
             return ticket
+
+    def set_output(self, signal: int, level: bool) -> Ticket:
+        """Sets a digital output, 0 to 5, and reads the inputs again; the status shows both."""
+        return self._ask("set output", kind="output", signal=require_signal(signal), level=bool(level))
+
+    def read_inputs(self) -> Ticket:
+        """Reads the digital inputs; the status shows them."""
+        return self._ask("read inputs", kind="inputs")
+
+    def reboot(self) -> Ticket:
+        """Restarts the controller, which ends the connection; `reconnect` makes the next one, and sets all up again.
+
+        Raises:
+            UsageError: The arm is moving, or no controller is connected.
+        """
+        with self._lock:
+            self._require_block()
+            require_ready(self.status(), is_operator_overdue=False)
+            return self._ask("reboot", kind="reboot")
 
     def recover(self) -> Ticket:
         """Asks the controller to clear its faults (automatic error recovery)."""

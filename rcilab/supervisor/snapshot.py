@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from rcilab.supervisor.layout import Word
 from rcilab.supervisor.status import PHASES, Phase
 
-_RECORD = struct.Struct("<BbBBxxxxddd96s1024s")
+_RECORD = struct.Struct("<BbBBbBBxddd96s1024s")
 _ATTEMPTS = 1000  # The writer needs about 3 us; whoever fails this often meets a writer that died in mid-sentence.
 
 
@@ -22,6 +22,12 @@ class Snapshot:
     powered: bool | None = None
     is_fifo: bool = False
     memory_locked: bool = False
+    inputs: int = -1
+    """Levels of the digital inputs when they were read last, a bit each; -1: not read on this connection."""
+    outputs_known: int = 0
+    """Digital outputs that were set on this connection, a bit each: a controller cannot be asked for them."""
+    outputs: int = 0
+    """Levels of those, a bit each."""
     rate_hz: float = 0.0
     motion_time: float | None = None
     motion_duration: float | None = None
@@ -38,6 +44,9 @@ def write_snapshot(memory: memoryview, words: memoryview, snapshot: Snapshot) ->
         -1 if snapshot.powered is None else snapshot.powered,
         snapshot.is_fifo,
         snapshot.memory_locked,
+        snapshot.inputs,
+        snapshot.outputs_known,
+        snapshot.outputs,
         snapshot.rate_hz,
         -1.0 if snapshot.motion_time is None else snapshot.motion_time,
         -1.0 if snapshot.motion_duration is None else snapshot.motion_duration,
@@ -55,7 +64,8 @@ def read_snapshot(memory: memoryview, words: memoryview) -> Snapshot:
         data = bytes(memory[: _RECORD.size])
         if before % 2 == 0 and words[Word.SNAPSHOT] == before:
             break
-    phase, powered, is_fifo, locked, rate_hz, time, duration, code, message = _RECORD.unpack(data)
+    facts = _RECORD.unpack(data)
+    phase, powered, is_fifo, locked, inputs, outputs_known, outputs, rate_hz, time, duration, code, message = facts
     return Snapshot(
         phase=PHASES[phase] if phase < len(PHASES) else "starting",
         code=_text(code),
@@ -63,6 +73,9 @@ def read_snapshot(memory: memoryview, words: memoryview) -> Snapshot:
         powered=None if powered < 0 else bool(powered),
         is_fifo=bool(is_fifo),
         memory_locked=bool(locked),
+        inputs=inputs,
+        outputs_known=outputs_known,
+        outputs=outputs,
         rate_hz=rate_hz,
         motion_time=None if time < 0.0 else time,
         motion_duration=None if duration < 0.0 else duration,

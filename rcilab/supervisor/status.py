@@ -54,6 +54,7 @@ MESSAGES: dict[str, str] = {
     "fault": "The controller stopped the arm: {faults}. Recover leads out.",
     "fault.pressed": "An emergency stop or the safety gate has stopped the arm. Recover leads out once it is released.",
     "lost.unreachable": "{error}",
+    "lost.rebooted": "{address} restarts; reconnect once it is up.",
     "lost.other_arm": "{error}",
     "lost.silent": "{address} has stopped sending states; reconnect tries again.",
     "crashed.controller": "The virtual controller has died ({how}); {next}.",
@@ -136,6 +137,10 @@ class SupervisorStatus:
     """Error bits that are set."""
     powered: bool | None = None
     """Motor power; None while unknown."""
+    inputs: tuple[bool, ...] | None = None
+    """Levels of the digital inputs 0 to 5 when they were read last; None: not read on this connection."""
+    outputs: tuple[bool | None, ...] = (None,) * 6
+    """Levels of the digital outputs 0 to 5 as set on this connection; None: not set (a controller cannot be asked)."""
     success_rate: float = 0.0
     """Share of commands that arrived in time, as the controller reports it, 0 to 1."""
     rate_hz: float = 0.0

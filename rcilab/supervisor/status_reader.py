@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from rcilab.client.commands import SIGNALS
 from rcilab.clock import CYCLE_TIME
 from rcilab.errors import InvalidValueError
 from rcilab.faults import faults_from_bits
@@ -42,6 +43,10 @@ class StatusReader:
         """
         return {
             "powered": shown.powered,
+            "inputs": None if shown.inputs < 0 else tuple(bool(shown.inputs >> bit & 1) for bit in SIGNALS),
+            "outputs": tuple(
+                bool(shown.outputs >> bit & 1) if shown.outputs_known >> bit & 1 else None for bit in SIGNALS
+            ),
             "rate_hz": shown.rate_hz,
             "scheduling": "SCHED_FIFO" if shown.is_fifo else "normal",
             "memory_locked": shown.memory_locked,

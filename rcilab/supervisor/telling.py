@@ -29,7 +29,7 @@ _PHASES = {
     **{code: f"phase.{code}" for code in _CRASHES}, "moving.held": "phase.held", "moving.guided": "phase.guided",
 }  # fmt: skip
 """States that are worth a word of their own beside that of their phase."""
-_LOST = ("lost.silent", "lost.unreachable", "lost.other_arm")
+_LOST = ("lost.silent", "lost.unreachable", "lost.other_arm", "lost.rebooted")
 
 
 def tell_error(error: RcilabError, status: SupervisorStatus | None = None) -> Message:

@@ -18,7 +18,7 @@ import numpy as np
 
 from rcilab.arrays import Array, JointVector, Matrix
 from rcilab.client.address import parse_address
-from rcilab.client.commands import RciCommands
+from rcilab.client.commands import SIGNALS, RciCommands
 from rcilab.client.link import Link
 from rcilab.client.opening import await_first_state, require_arm_there
 from rcilab.client.punctual import PRIORITY
@@ -218,6 +218,28 @@ class Worker:
         self._learn_power()
         self._say_ready()
 
+    def _do_output(self, request: Letter) -> None:
+        self._require_link()
+        bit = 1 << request["signal"]
+        self._commands.set_do(request["signal"], request["level"])
+        shown = self._publisher.snapshot
+        outputs = shown.outputs | bit if request["level"] else shown.outputs & ~bit
+        self._publisher.update(outputs_known=shown.outputs_known | bit, outputs=outputs)
+        self._read_inputs()  # What an output is wired to may have changed.
+
+    def _do_inputs(self, request: Letter) -> None:
+        self._require_link()
+        self._read_inputs()
+
+    def _read_inputs(self) -> None:
+        self._publisher.update(inputs=sum(self._commands.get_di(signal) << signal for signal in SIGNALS))
+
+    def _do_reboot(self, request: Letter) -> None:
+        self._require_link()
+        self._commands.reboot()
+        self._disconnect()
+        self._publisher.say("lost", "lost.rebooted", address=self._address)
+
     def _do_recover(self, request: Letter) -> None:
         recover(self._commands, self._require_link())
         self._learn_power()
@@ -302,7 +324,7 @@ class Worker:
             self._guide = None  # The controller ends it with the connection.
             self._link.close()
             self._link = None
-            self._publisher.update(powered=None)
+            self._publisher.update(powered=None, inputs=-1, outputs_known=0, outputs=0)
 
 
 def _is_same(numbers: Array, others: Array) -> bool:

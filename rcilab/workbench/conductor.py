@@ -26,6 +26,7 @@ from rcilab.workbench.run.export_actions import Deliver, ExportActions
 from rcilab.workbench.run.folder_actions import FolderActions
 from rcilab.workbench.run.mode_actions import ModeActions
 from rcilab.workbench.run.push_actions import PushActions
+from rcilab.workbench.run.signal_actions import SignalActions
 from rcilab.workbench.run.where_actions import WhereActions
 from rcilab.workbench.run.world_actions import WorldActions
 from rcilab.workbench.scene.actions import SceneActions
@@ -65,6 +66,7 @@ class Conductor:
         self._mode = ModeActions(store, session)
         self._where = WhereActions(store, session, self.robot)
         self._world = WorldActions(store, session)
+        self._signals = SignalActions(store, session)
         self._push = PushActions(store, session)
         self._setup = SetupActions(store, session)
         self._jog = JogActions(store, session, self._goal)
@@ -105,6 +107,9 @@ class Conductor:
             requests.PressControl: self._mode.press,
             requests.SetNetwork: self._world.set_network,
             requests.PressSafety: self._world.press_safety,
+            requests.SetWiring: self._world.set_wiring,
+            requests.SetOutput: self._signals.set_output,
+            requests.PressSignals: self._signals.press,
             requests.ChooseDestination: self._where.choose,
             requests.ChooseRobot: self.robot.choose_robot,
             requests.SetJog: self._jog.set_jog,
@@ -198,6 +203,7 @@ class Conductor:
         self._push.tick(status)
         self._mode.tick(status)
         self._world.tick(status)
+        self._signals.tick(status)
         self._setup.tick(status)
         self._jog.tick(elapsed)
         self._poses.tick()

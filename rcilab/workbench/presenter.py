@@ -35,6 +35,7 @@ from rcilab.workbench.panels.runs_folder import RunsFolderPanel
 from rcilab.workbench.panels.settings import SettingsPanel
 from rcilab.workbench.panels.setup import SetupPanel
 from rcilab.workbench.panels.setup_numbers import SetupNumbersPanel
+from rcilab.workbench.panels.signals import SignalsPanel
 from rcilab.workbench.panels.status import status_values
 from rcilab.workbench.panels.target import TargetPanel
 from rcilab.workbench.panels.timeline import TimelinePanel
@@ -77,6 +78,7 @@ _TABS = (
         WherePanel,
         ModePanel,
         PushPanel,
+        SignalsPanel,
         LabPanel,
         HealthPanel,
     ),

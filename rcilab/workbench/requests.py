@@ -227,6 +227,29 @@ class PressSafety(Request):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class SetOutput(Request):
+    """A digital output, 0 to 5, on or off."""
+
+    signal: int
+    level: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PressSignals(Request):
+    """Reads the digital inputs; or restarts the controller, once that is confirmed."""
+
+    what: Literal["read", "reboot", "confirm", "cancel"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetWiring(Request):
+    """Has our own controller's outputs wired to its inputs, or commands led to rest inside the soft limits."""
+
+    name: Literal["loop_back", "auto_limit"]
+    on: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ChooseDestination(Request):
     """Where motions go; an address is asked for once more."""
 

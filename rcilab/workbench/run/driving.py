@@ -48,6 +48,12 @@ class DriveState:
     direction: Direction = "both"
     world: WorldStatus | None = None
     """What our own controller says of itself; None: it is not ours, or does not answer."""
+    loop_back: bool = False
+    """Whether the outputs of the virtual controller are wired to its inputs."""
+    auto_limit: bool = False
+    """Whether the virtual controller leads commands to rest inside the soft joint limits."""
+    reboot_asked: bool = False
+    """Whether the question about a restart of the controller waits for its answer."""
     typed_address: str = ""
     """The address that waits for a second yes."""
 

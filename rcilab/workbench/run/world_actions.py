@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from rcilab.client.world import World
 from rcilab.client.world_watch import WorldWatch
-from rcilab.protocols.world import DIRECTIONS, Direction, Network, NetworkFaults, Press
+from rcilab.protocols.world import DIRECTIONS, AutoLimit, Direction, LoopBack, Network, NetworkFaults, Press
 from rcilab.workbench import requests
 from rcilab.workbench.run.driving import CABLE_PULLED, NETWORK_LAB
 from rcilab.workbench.run.pushing import no_push
@@ -19,6 +19,9 @@ from rcilab.workbench.text import message
 
 if TYPE_CHECKING:
     from rcilab.supervisor import SupervisorStatus
+
+
+_WIRING = {"loop_back": LoopBack, "auto_limit": AutoLimit}
 
 
 class WorldActions:
@@ -55,6 +58,14 @@ class WorldActions:
             watch.ask(Press(request.button))
             self._store.say("warn" if request.button != "none" else "good", message(f"safety.{request.button}_done"))
 
+    def set_wiring(self, request: requests.SetWiring) -> None:
+        """Wires outputs to inputs, or has commands led to rest at the soft limits; or takes that back."""
+        watch = self._require_watch()
+        if watch is None or request.name not in _WIRING:
+            return
+        watch.ask(_WIRING[request.name](request.on))
+        self._store.update(drive=replace(self._store.state.drive, **{request.name: request.on}))
+
     def tick(self, status: SupervisorStatus) -> None:
         """Follows the controller of now and what it says of itself; another one has a good network."""
         address = status.world_address
@@ -65,7 +76,13 @@ class WorldActions:
                 host, _, port = address.partition(":")
                 self._watch = WorldWatch(World(host, int(port)))
             drive = replace(
-                self._store.state.drive, pulled=False, network=NetworkFaults(), direction="both", world=None
+                self._store.state.drive,
+                pulled=False,
+                network=NetworkFaults(),
+                direction="both",
+                world=None,
+                loop_back=False,
+                auto_limit=False,
             )
             self._store.update(drive=drive)
         if self._watch is None:

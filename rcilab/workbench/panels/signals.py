@@ -1,0 +1,93 @@
+"""Digital outputs and inputs, and the restart of the controller."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from rcilab.client.commands import SIGNALS
+from rcilab.workbench import requests
+from rcilab.workbench.run.driving import is_ours
+from rcilab.workbench.text import Text
+from rcilab.workbench.widgets import Ask, Html, Linked, esc, on_press
+
+if TYPE_CHECKING:
+    from rcilab.supervisor import SupervisorStatus
+    from rcilab.workbench.store import UiState
+
+_NAMES = ("0_0", "0_1", "0_2", "0_3", "1_0", "1_1")  # Of the manual, 3.1.13 and 3.1.14, after DO or DI.
+
+
+class SignalsPanel:
+    """Two groups of the Run tab."""
+
+    def __init__(self, text: Text, ask: Ask) -> None:
+        self._text, self._ask = text, ask
+
+    def build(self, gui: Any, state: UiState) -> None:
+        """Adds the controls."""
+        text, ask = self._text, self._ask
+        with gui.add_folder(text("signals.title"), expand_by_default=False):
+            names = [f"DO{name}" for name in _NAMES]
+            output = gui.add_dropdown(text("signals.output"), tuple(names), hint=text("signals.output_hint"))
+            gui.add_html('<i class="rl-buttons"></i>')
+            self._buttons: list[Any] = []
+            for word, icon, level in (("on", "toggle-right", True), ("off", "toggle-left", False)):
+                button = gui.add_button(text(f"signals.{word}"), icon=icon, color="blue" if level else "gray")
+                on_press(
+                    button,
+                    ask,
+                    lambda page, level=level: requests.SetOutput(
+                        page=page, signal=names.index(output.value), level=level
+                    ),
+                )
+                self._buttons.append(button)
+            read = gui.add_button(text("signals.read"), icon="refresh", color="gray", hint=text("signals.read_hint"))
+            on_press(read, ask, lambda page: requests.PressSignals(page=page, what="read"))
+            self._buttons.append(read)
+            self._levels = Html(gui)
+            wired = gui.add_checkbox(text("signals.loop_back"), False, hint=text("signals.loop_back_hint"))
+            self._wired = Linked(wired, ask, lambda v, p: requests.SetWiring(page=p, name="loop_back", on=bool(v)))
+        with gui.add_folder(text("reboot.title"), expand_by_default=False):
+            gui.add_html('<i class="rl-buttons"></i>')
+            self._reboot = gui.add_button(
+                text("reboot.press"), icon="rotate-clockwise", color="orange", hint=text("reboot.hint")
+            )
+            on_press(self._reboot, ask, _press("reboot"))
+            self._question = Html(gui)
+            self._agree = gui.add_button(text("reboot.confirm"), icon="rotate-clockwise", color="red", visible=False)
+            on_press(self._agree, ask, _press("confirm"))
+            self._cancel = gui.add_button(text("run.cancel"), color="gray", visible=False)
+            on_press(self._cancel, ask, _press("cancel"))
+
+    def show(self, state: UiState, status: SupervisorStatus) -> None:
+        """Follows the controller."""
+        text, drive, is_ready = self._text, state.drive, status.phase in ("idle", "fault")
+        for button in self._buttons:
+            button.disabled = not is_ready
+        self._levels.show(levels_html(status, text))
+        self._wired.show(drive.loop_back)
+        self._wired.handle.disabled = not is_ours(status)
+        self._reboot.disabled = not is_ready
+        self._reboot.visible = not drive.reboot_asked
+        self._agree.visible = self._cancel.visible = drive.reboot_asked
+        said = esc(text("reboot.ask", address=status.address or status.target)) if drive.reboot_asked else ""
+        self._question.show(said and f'<p class="rl-verdict rl-warn" role="alert">{said}</p>')
+
+
+def levels_html(status: SupervisorStatus, text: Text) -> str:
+    """Returns the outputs as set and the inputs as read last."""
+    inputs = status.inputs or (None,) * len(SIGNALS)
+    rows = "".join(
+        f"<tr><th>DO{name}</th><td>{esc(_level(out, text, 'unset'))}</td>"
+        f"<th>DI{name}</th><td>{esc(_level(level, text, 'unread'))}</td></tr>"
+        for name, out, level in zip(_NAMES, status.outputs, inputs, strict=True)
+    )
+    return f'<table class="rl-table rl-facts-table">{rows}</table>'
+
+
+def _level(level: bool | None, text: Text, unknown: str) -> str:
+    return text(f"signals.{unknown}" if level is None else "signals.on" if level else "signals.off")
+
+
+def _press(what: Any):  # type: ignore[no-untyped-def]
+    return lambda page: requests.PressSignals(page=page, what=what)
