@@ -95,7 +95,7 @@ class Workbench:
 
     def start(self) -> None:
         """Serves the page, then connects to the robot in the background."""
-        from rcilab.workbench.presenter import Presenter
+        from rcilab.workbench.presenter import Presenter, tab_name
 
         ask = self.conductor.ask
         self.live = live = LiveChannel(
@@ -106,6 +106,7 @@ class Workbench:
                 size=lambda height: ask(requests.SetView(name="height", value=height)),
                 peek=lambda page, branch: ask(requests.Peek(page=page, index=branch if branch >= 0 else None)),
                 entered=lambda page: ask(requests.Enter(page=page)),
+                tab=lambda page, index: ask(requests.OpenTab(page=page, name=tab_name(index))),
                 take=lambda page: ask(requests.TakeControls(page=page)),
                 answer=lambda page, yes: ask(requests.AnswerControls(page=page, yes=yes)),
                 home=self._bring_back,

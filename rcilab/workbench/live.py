@@ -35,6 +35,8 @@ class Heard:
     """The branch that is under a page's mouse, from 0; -1 when it is left."""
     entered: Callable[[int], None] = lambda page: None
     """What was typed in a page is complete."""
+    tab: Callable[[int, int], None] = lambda page, index: None
+    """Another tab was opened in a page, counted from 0."""
     take: Callable[[int], None]
     """A page wants the controls."""
     answer: Callable[[int, bool], None]
@@ -112,6 +114,8 @@ class LiveChannel:
             _pass_on(said.get("branch"), -1.0, 99.0, lambda branch: self._heard.peek(page, int(branch)))
         elif kind == "entered":
             self._heard.entered(page)
+        elif kind == "tab":
+            _pass_on(said.get("index"), 0.0, 99.0, lambda index: self._heard.tab(page, int(index)))
         elif kind == "take":
             self._heard.take(page)
         elif kind == "home":

@@ -87,6 +87,11 @@ _TABS = (
 )
 
 
+def tab_name(index: int) -> str:
+    """Returns the key of a tab's label, counted from 0; "" where there is none."""
+    return _TABS[index][0] if index < len(_TABS) else ""
+
+
 class Presenter:
     """Owns every handle of the page. It reads snapshots and knows no sockets.
 

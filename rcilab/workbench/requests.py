@@ -136,6 +136,14 @@ class Enter(Request):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class OpenTab(Request):
+    """Another tab was opened."""
+
+    name: str
+    """Key of its label, such as "tab.setup"; "" for one that does not exist."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Peek(Request):
     """A branch of the list is under the mouse or has the focus."""
 

@@ -24,6 +24,7 @@ from rcilab.workbench.panels.setup import SetupPanel
 from rcilab.workbench.panels.target import TargetPanel, planned_html
 from rcilab.workbench.program.draft import target_of
 from rcilab.workbench.run.readiness import obstacle
+from rcilab.workbench.scene.setup_stage import hides_target
 from rcilab.workbench.setup.fields import FACE_NAMES, FIELD_NAMES, faces, read_field, with_field
 from rcilab.workbench.setup.wanted import SetupState, describe_held, describe_part, pending_parts, setup_obstacle
 from rcilab.workbench.text import Message, Text
@@ -165,6 +166,7 @@ def test_another_tool_says_once_what_it_makes_of_a_program_and_that_is_what_it_d
     ask(requests.TypeField(field=f"program.{typed}.z", text="500"))
     before = bench.store.state
     taught, posed = before.program.draft.steps
+    ask(requests.SetSetup(name="edited", value="tool"))
     ask(requests.MoveSetup(part="tool", position=(0.0, 0.0, 0.05), wxyz=NO_TURN))
     said = bench.store.state.notice
     assert said.text.code == "setup.program_moves"
@@ -186,6 +188,7 @@ def test_another_tool_says_once_what_it_makes_of_a_program_and_that_is_what_it_d
 
 def test_a_drag_is_one_step_to_undo_and_is_sent_when_it_has_ended(bench, ask):
     before = wanted(bench).tool
+    ask(requests.SetSetup(name="edited", value="tool"))
     for step in range(1, 4):
         ask(requests.MoveSetup(part="tool", position=(0.0, 0.0, 0.03 * step), wxyz=NO_TURN))
     assert pending_parts(bench.store.state, bench.session.status()) == ("tool",)
@@ -195,6 +198,18 @@ def test_a_drag_is_one_step_to_undo_and_is_sent_when_it_has_ended(bench, ask):
     ask(requests.PressSetup(what="undo"))
     assert wanted(bench).tool is before
     assert bench.store.state.model.T_flange_tool is before
+
+
+def test_handles_belong_to_the_tab_that_is_open(bench, ask):
+    ask(requests.SetSetup(name="edited", value="load"))
+    before = wanted(bench).load
+    ask(requests.OpenTab(name="tab.setup"))
+    assert bench.store.state.setup.edited == "load"
+    ask(requests.OpenTab(name="tab.target"))
+    assert bench.store.state.setup.edited == ""
+    assert not hides_target(bench.store.state)
+    ask(requests.MoveSetup(part="load", position=(0.0, 0.0, 0.05), wxyz=NO_TURN, ended=True))
+    assert wanted(bench).load is before
 
 
 def test_a_face_of_the_box_follows_its_handle_and_cannot_pass_the_other(bench, ask):
@@ -241,6 +256,7 @@ def test_an_inertia_is_taken_once_some_body_has_it(bench, ask):
 
 
 def test_what_is_no_number_or_no_part_is_ignored(bench, ask):
+    ask(requests.SetSetup(name="edited", value="tool"))
     before = bench.store.state.setup
     ask(requests.MoveSetup(part="tool", position=(math.nan, 0.0, 0.0), wxyz=NO_TURN))
     ask(requests.MoveSetup(part="tool", position=(0.0, 0.0, 0.1), wxyz=(0.0,) * 4))

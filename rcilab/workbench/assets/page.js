@@ -219,6 +219,7 @@
     } else if (open !== shown) {
       if (shown !== null && panel) panel.firstElementChild.scrollTop = 0;  // What another tab was scrolled by is not its own.
       keep("tab", shown = open);
+      send({ kind: "tab", index: open });
     }
   };
 

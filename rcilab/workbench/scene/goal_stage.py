@@ -93,6 +93,7 @@ class GoalStage:
             self._mark.color = TONE_COLORS[self._tone]
         tone, reason = goal.reach.tone, text.say(goal.reach.reason)
         said = text("reach.label") if tone == "good" else f"{text('reach.tone.' + tone)} {reason}"
+        said = text("target.handles", verdict=said)
         if said != self._said:
             self._said = said
             self._label.text = said

@@ -52,6 +52,7 @@ class SetupStage:
         self._label: Any = server.scene.add_label(
             "/safety_box_label", "", anchor="bottom-center", depth_test=False, font_screen_scale=1.0, visible=False
         )
+        self._name: Any = None  # Whose handles these are.
         self._crossing: Any = server.scene.add_label(
             "/outside_label", "", anchor="top-left", depth_test=False, font_screen_scale=1.0, visible=False
         )
@@ -73,6 +74,7 @@ class SetupStage:
         if edited != self._edited:
             self._exchange_handles(edited, state)
         self._follow(state)
+        self._name_handles(state, text)
         self._name_box(box, text)
         self._show_outside(state, text)
 
@@ -80,6 +82,7 @@ class SetupStage:
         """Takes box, labels and handles away; what is on the flange goes with the arm."""
         if self._gizmo is not None:
             self._gizmo.remove()
+            self._name.remove()
         self._label.remove()
         self._crossing.remove()
         self._draw_outside([])
@@ -88,7 +91,8 @@ class SetupStage:
     def _exchange_handles(self, part: str, state: UiState) -> None:
         if self._gizmo is not None:
             self._gizmo.remove()
-            self._gizmo = None
+            self._name.remove()
+            self._gizmo = self._name = None
         if self._edited == "box":
             for face in range(6):
                 self._drawing.remove(f"/safety_box/handle{face}")
@@ -101,6 +105,10 @@ class SetupStage:
             name, scale=_SCALES[part], line_width=3.0, depth_test=False, disable_rotations=part == "load",
             wxyz=pose.wxyz, position=pose.position,
         )  # fmt: skip
+
+        self._name = self._server.scene.add_label(
+            f"{name}_name", "", anchor="top-center", depth_test=False, font_screen_scale=1.0
+        )
 
         @self._gizmo.on_update
         async def _(event: Any) -> None:
@@ -137,6 +145,18 @@ class SetupStage:
             self._gizmo.position = pose.position
         if 1.0 - abs(float(np.asarray(self._gizmo.wxyz) @ pose.wxyz)) > 1e-12:
             self._gizmo.wxyz = pose.wxyz
+
+    def _name_handles(self, state: UiState, text: Text) -> None:
+        """Says beside the handles what they move."""
+        if self._name is None:
+            return
+        said = text("setup.handles", part=text(f"setup.part.{self._edited}"))
+        if said != self._name.text:
+            self._name.text = said
+        away = 1.2 * _SCALES[self._edited] * (-1.0 if self._edited == "box" else 1.0)  # Down, as the flange looks.
+        place = _pose_of(state, self._edited).position + (0.0, 0.0, away)
+        if np.abs(np.asarray(self._name.position) - place).max() > 1e-6:
+            self._name.position = place
 
     def _name_box(self, box: SafetyBox | None, text: Text) -> None:
         if self._label.visible != (box is not None):

@@ -87,8 +87,8 @@ class SetupActions:
     def move(self, request: requests.MoveSetup) -> None:
         """Follows the handles of a part."""
         numbers = (*request.position, *request.wxyz)
-        if request.part not in SETUP_PARTS or len(numbers) != 7 or not all(map(math.isfinite, numbers)):
-            return
+        if request.part != self._store.state.setup.edited or len(numbers) != 7 or not all(map(math.isfinite, numbers)):
+            return  # A drag that ends after its edit, or nothing of ours.
         if math.hypot(*request.wxyz) < 1e-6:
             return
         changed = with_pose(self._store.state.setup, request.part, Pose(request.position, request.wxyz))
@@ -136,6 +136,12 @@ class SetupActions:
         elif request.name == "axes" and value in FORCE_AXES:
             turned = replace(force, type=FORCE_AXES[str(value)])
             self._edit(replace(setup, wanted=setup.wanted.updated(RobotSetup(force=turned))), "force")
+
+    def open_tab(self, request: requests.OpenTab) -> None:
+        """Ends the edit when its tab is left: handles in the scene are those of the tab that is open."""
+        setup = self._store.state.setup
+        if request.name != "tab.setup" and setup.edited:
+            self._store.update(setup=replace(setup, edited=""))
 
     def press(self, request: requests.PressSetup) -> None:
         """Does what one of the buttons says."""
