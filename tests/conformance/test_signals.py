@@ -13,7 +13,7 @@ from rcilab.errors import InvalidValueError
 from rcilab.faults import Fault
 from rcilab.model import load_model
 from rcilab.motion import Motion, plan_joint
-from rcilab.safety_box import SafetyBox
+from rcilab.safety_box import SafetyBox, box_from
 from rcilab.spatial import Pose
 
 MODELS = [load_model("xMatePro7"), load_model("xMate3").with_tool(Pose((0.05, 0.0, 0.12)))]
@@ -87,7 +87,7 @@ def test_monitor_and_check_give_one_verdict_on_the_safety_box(model, seed, edge)
     rng = np.random.default_rng(seed)
     centre = model.forward(motion.q[int(rng.integers(0, len(motion)))]).position
     box = SafetyBox(size=tuple(edge * rng.uniform(0.5, 1.5, 3)), T_base_box=Pose.from_rpy(centre, rng.normal(size=3)))
-    monitor = BoxMonitor(box)
+    monitor = BoxMonitor(box_from(box, model.forward(motion.q[0]).position.tolist()))
     played = [bool(monitor.step(model.forward(q).position.tolist())) for q in motion.q]
     played += played[-1:] * HOLD_SAMPLES
     report = check(motion, model, box=box, distance=None)
