@@ -1,7 +1,7 @@
 """What is fixed to the arm, where its tool may be, and how it follows: the settings of the RCI that stay for a while.
 
-Tool (`setCoor`), load (`setLoad`), safety box (`setCartesianLimit`), force-control frame (`setFcCoor`), and the
-parameters of the modes (`ControlSettings`).
+Tool (`setCoor`), load (`setLoad`), safety box (`setCartesianLimit`), force-control frame (`setFcCoor`), soft joint
+limits (`setJointLimit`), and the parameters of the modes (`ControlSettings`).
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ if TYPE_CHECKING:
     from rcilab.client.settings import RciSettings
     from rcilab.model import RobotModel
 
-SetupPart: TypeAlias = Literal["box", "tool", "load", "force", "control"]
+SetupPart: TypeAlias = Literal["box", "tool", "load", "force", "joints", "control"]
 
 SETUP_PARTS: tuple[SetupPart, ...] = ("box", "tool", "load", "force")
 """The parts that have a place in space."""
-_ALL_PARTS: tuple[SetupPart, ...] = (*SETUP_PARTS, "control")
+_ALL_PARTS: tuple[SetupPart, ...] = (*SETUP_PARTS, "joints", "control")
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -37,6 +37,14 @@ class ForceControlFrame:
     """What its axes follow."""
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SoftJointLimits:
+    """Bounds of the joint angles inside the arm's own, n numbers each, [rad]."""
+
+    lower: tuple[float, ...]
+    upper: tuple[float, ...]
+
+
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class RobotSetup:
     """A set-up, or a part of one: what is None is left as the controller has it."""
@@ -46,6 +54,7 @@ class RobotSetup:
     """Pose of the tool in the flange frame."""
     load: Payload | None = None
     force: ForceControlFrame | None = None
+    joints: SoftJointLimits | None = None
     control: ControlSettings | None = None
     """Parameters of the modes."""
 
@@ -67,13 +76,14 @@ class RobotSetup:
         return replace(self, **{part: getattr(newer, part) for part in newer.parts})
 
     def applied_to(self, model: RobotModel) -> RobotModel:
-        """Returns the arm with this tool and this load.
+        """Returns the arm with this tool, this load and these soft limits.
 
         Raises:
             InvalidValueError: The load is heavier than the arm is rated for.
         """
         changed = model if self.tool is None else model.with_tool(self.tool)
-        return changed if self.load is None else changed.with_load(self.load)
+        changed = changed if self.load is None else changed.with_load(self.load)
+        return changed if self.joints is None else changed.with_joint_limits(self.joints.lower, self.joints.upper)
 
 
 def require_setup(setup: object) -> RobotSetup:
@@ -105,5 +115,7 @@ def give_setup(settings: RciSettings, setup: RobotSetup) -> None:
         settings.set_cartesian_limit(setup.box)
     if setup.force is not None:
         settings.set_fc_coor(setup.force.T_flange_force, setup.force.type)
+    if setup.joints is not None:
+        settings.set_joint_limit(setup.joints.lower, setup.joints.upper)
     if setup.control is not None:
         give_control(settings, setup.control)

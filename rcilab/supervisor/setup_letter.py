@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from rcilab.client.control_settings import ControlSettings
-from rcilab.client.setup import ForceControlFrame, RobotSetup
+from rcilab.client.setup import ForceControlFrame, RobotSetup, SoftJointLimits
 from rcilab.dynamics.payload import Payload
 from rcilab.protocols.rci import ForceFrame
 from rcilab.safety_box import SafetyBox
@@ -26,6 +26,8 @@ def pack_setup(setup: RobotSetup) -> dict[str, Any]:
         letter["box"] = [setup.box.size, setup.box.T_base_box.as_row_major(), setup.box.active]
     if setup.force is not None:
         letter["force"] = [setup.force.T_flange_force.as_row_major(), int(setup.force.type)]
+    if setup.joints is not None:
+        letter["joints"] = [setup.joints.lower, setup.joints.upper]
     if setup.control is not None:
         letter["control"] = setup.control.as_letter()
     return letter
@@ -33,7 +35,7 @@ def pack_setup(setup: RobotSetup) -> dict[str, Any]:
 
 def parse_setup(letter: dict[str, Any]) -> RobotSetup:
     """Returns what `pack_setup` wrote."""
-    tool = load = box = force = control = None
+    tool = load = box = force = joints = control = None
     if "tool" in letter:
         tool = Pose.from_row_major(letter["tool"])
     if "load" in letter:
@@ -45,6 +47,9 @@ def parse_setup(letter: dict[str, Any]) -> RobotSetup:
     if "force" in letter:
         pose, kind = letter["force"]
         force = ForceControlFrame(T_flange_force=Pose.from_row_major(pose), type=ForceFrame(kind))
+    if "joints" in letter:
+        lower, upper = map(tuple, letter["joints"])
+        joints = SoftJointLimits(lower=lower, upper=upper)
     if "control" in letter:
         control = ControlSettings.from_letter(letter["control"])
-    return RobotSetup(box=box, tool=tool, load=load, force=force, control=control)
+    return RobotSetup(box=box, tool=tool, load=load, force=force, joints=joints, control=control)

@@ -36,6 +36,7 @@ from rcilab.workbench.panels.settings import SettingsPanel
 from rcilab.workbench.panels.setup import SetupPanel
 from rcilab.workbench.panels.setup_numbers import SetupNumbersPanel
 from rcilab.workbench.panels.signals import SignalsPanel
+from rcilab.workbench.panels.soft_limits import SoftLimitsPanel
 from rcilab.workbench.panels.status import status_values
 from rcilab.workbench.panels.target import TargetPanel
 from rcilab.workbench.panels.timeline import TimelinePanel
@@ -67,7 +68,7 @@ _TABS = (
     ("tab.jog", "adjustments-horizontal", JogPanel, ToolJogPanel, ArmNowPanel, PosesPanel),
     ("tab.target", "current-location", TargetPanel, ElbowPanel, BranchesPanel, WayPanel),
     ("tab.program", "list-numbers", ProgramPanel, WaypointPanel, ProgramFilePanel),
-    ("tab.setup", "tool", SetupPanel, SetupNumbersPanel),
+    ("tab.setup", "tool", SetupPanel, SetupNumbersPanel, SoftLimitsPanel),
     ("tab.check", "clipboard-check", CheckPanel),
     (
         "tab.run",

@@ -343,7 +343,7 @@ class SetSetup(Request):
 class PressSetup(Request):
     """A button of the set-up."""
 
-    what: Literal["undo", "send", "confirm", "cancel"]
+    what: Literal["whole", "undo", "send", "confirm", "cancel"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

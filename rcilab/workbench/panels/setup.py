@@ -9,6 +9,7 @@ from rcilab.workbench import requests
 from rcilab.workbench.check.freshness import outdated
 from rcilab.workbench.panels.target import planned_html
 from rcilab.workbench.setup.wanted import (
+    LISTED,
     describe_held,
     describe_part,
     differing_tool,
@@ -104,7 +105,7 @@ class SetupPanel:
     def _table_html(self, state: UiState, status: SupervisorStatus) -> str:
         text, pending = self._text, pending_parts(state, status)
         rows = []
-        for part in SETUP_PARTS:
+        for part in LISTED:
             here, held = self._said(state.setup.wanted, part), text.say(describe_held(status, part))
             mark = ' class="rl-differs"' if part in pending else ""
             rows.append(

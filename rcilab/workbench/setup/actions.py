@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from rcilab.client.setup import SETUP_PARTS, RobotSetup, SetupPart
+from rcilab.client.setup import SETUP_PARTS, RobotSetup, SetupPart, SoftJointLimits
 from rcilab.posing.planning import Plan, tool_path
 from rcilab.posing.reach import judge_joints, judge_pose
+from rcilab.robots import describe_robot
 from rcilab.safety_box import SafetyBox
 from rcilab.spatial import Pose
 from rcilab.words.number import parse_number
@@ -21,6 +22,7 @@ from rcilab.workbench.setup.fields import (
     FARTHEST_FACE,
     FIELD_NAMES,
     INERTIA_NAMES,
+    JOINT_ENDS,
     THINNEST,
     box_between,
     faces,
@@ -30,7 +32,15 @@ from rcilab.workbench.setup.fields import (
     with_pose,
 )
 from rcilab.workbench.setup.post import SetupPost
-from rcilab.workbench.setup.wanted import FORCE_AXES, SetupState, name_parts, pending_parts
+from rcilab.workbench.setup.wanted import (
+    FORCE_AXES,
+    LISTED,
+    SetupState,
+    name_parts,
+    own_limits,
+    pending_parts,
+    soft_limits,
+)
 from rcilab.workbench.store import Goal, Store, UiState
 from rcilab.workbench.text import Message, message
 
@@ -38,6 +48,7 @@ if TYPE_CHECKING:
     from rcilab.supervisor import SupervisorStatus
 
 _UNDO_DEPTH = 100
+_ROUNDED = 1e-5  # [rad] Closer than what the page shows of an angle: the arm's own bound is meant.
 _HAND_GONE = 1.0  # [s] A choice: a drag that was not heard of for so long has ended, whatever became of its page.
 
 
@@ -58,6 +69,9 @@ class SetupActions:
         """Takes a typed number, or says beside the field what is wrong with it."""
         _, _, place = request.field.partition(".")
         part, _, name = place.partition(".")
+        if part == "joints":
+            self._type_joint_limit(request, name)
+            return
         if name not in FIELD_NAMES.get(part, ()):
             return
         state = self._store.state
@@ -83,6 +97,37 @@ class SetupActions:
         self._edit(changed, cast("SetupPart", part))
         if untaken is not None:
             self._store.complain("setup.load.ixx", untaken)
+
+    def _type_joint_limit(self, request: requests.TypeField, name: str) -> None:
+        end, _, number = name.partition(".")
+        model = self._store.state.model
+        if end not in JOINT_ENDS or number not in map(str, range(model.n)):
+            return
+        joint, own = int(number), describe_robot(model.name).limits.joint
+        least, largest = np.degrees((own.lower[joint], own.upper[joint])).tolist()
+        parsed = parse_number(request.text, least, largest, "deg")
+        if parsed.value is None:
+            assert parsed.problem is not None
+            self._store.complain(request.field, parsed.problem)
+            return
+        now = soft_limits(self._store.state)
+        bounds = {"lower": list(now.lower), "upper": list(now.upper)}
+        exact = {"lower": own.lower, "upper": own.upper}[end][joint]  # What is typed is rounded.
+        typed = math.radians(parsed.value)
+        bounds[end][joint] = float(exact) if abs(typed - exact) < _ROUNDED else typed
+        low, high = (math.degrees(bounds[name][joint]) for name in JOINT_ENDS)
+        if not low < high:
+            self._store.complain(request.field, message("setup.joint_ends", low=f"{low:.1f}", high=f"{high:.1f}"))
+            return
+        self._store.clear_problems(*(f"setup.joints.{name}.{joint}" for name in JOINT_ENDS))
+        self._limit_joints(SoftJointLimits(lower=tuple(bounds["lower"]), upper=tuple(bounds["upper"])))
+
+    def _limit_joints(self, joints: SoftJointLimits) -> None:
+        setup = self._store.state.setup
+        if setup.wanted.joints is None:  # What an undo leads back to has to be said, too.
+            setup = replace(setup, wanted=setup.wanted.updated(RobotSetup(joints=own_limits(self._store.state))))
+            self._store.update(setup=setup)
+        self._edit(replace(setup, wanted=setup.wanted.updated(RobotSetup(joints=joints))), "joints")
 
     def move(self, request: requests.MoveSetup) -> None:
         """Follows the handles of a part."""
@@ -149,6 +194,9 @@ class SetupActions:
         setup = state.setup
         if request.what == "undo":
             self._undo()
+        elif request.what == "whole":
+            self._store.clear_problems("setup.joints.")
+            self._limit_joints(own_limits(self._store.state))
         elif request.what == "cancel":
             self._store.update(setup=replace(setup, asked=None))
         elif request.what == "send" and state.target != "virtual":
@@ -213,7 +261,7 @@ class SetupActions:
         touched |= frozenset(self._session.status().setup.parts)  # What it was told it must be told to forget.
         if self._post.is_underway:
             touched |= setup.touched
-        parts: set[SetupPart] = {p for p in SETUP_PARTS if getattr(before, p) is not getattr(setup.wanted, p)}
+        parts: set[SetupPart] = {p for p in LISTED if getattr(before, p) is not getattr(setup.wanted, p)}
         self._store.clear_problems(*(f"setup.{part}." for part in parts))
         self._take(replace(setup, wanted=before, touched=touched, inertia=None), parts)
 
@@ -229,7 +277,7 @@ class SetupActions:
         """Exchanges the set-up and what depends on it: the arm's tool and load, goal, path. The plan may go stale."""
         state = self._store.state
         changes: dict[str, object] = {}
-        if parts & {"tool", "load"}:
+        if parts & {"tool", "load", "joints"}:
             changes["model"] = model = setup.wanted.only(parts).applied_to(state.model)
             if "tool" in parts:
                 self._tell_program(state)

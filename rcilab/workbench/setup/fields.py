@@ -25,6 +25,8 @@ FIELD_NAMES = {
     "load": ("mass", *POSE_NAMES[:3], *INERTIA_NAMES),
     "force": POSE_NAMES,
 }
+JOINT_ENDS = ("lower", "upper")
+"""Beside FIELD_NAMES: setup.joints.lower.0 and so on."""
 THINNEST = 0.02  # [m] A choice: a box that the mouse cannot make thinner.
 FARTHEST_FACE = 5.0  # [m] A choice: no arm of ours reaches a third of it, so what is farther is a slip of units.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from rcilab.client.setup import ForceControlFrame, RobotSetup
+from rcilab.client.setup import ForceControlFrame, RobotSetup, SoftJointLimits
 from rcilab.dynamics.payload import Payload
 from rcilab.protocols.rci import ForceFrame
 from rcilab.safety_box import SafetyBox
@@ -24,6 +24,8 @@ def setup_facts(setup: RobotSetup) -> dict[str, Any]:
         facts["load"] = [load.mass, load.center_of_mass.tolist(), load.inertia.tolist()]
     if setup.force is not None:
         facts["force"] = {"pose": _seven(setup.force.T_flange_force), "axes": setup.force.type.name}
+    if setup.joints is not None:
+        facts["joints"] = [list(setup.joints.lower), list(setup.joints.upper)]
     return facts
 
 
@@ -33,7 +35,7 @@ def build_setup(facts: dict[str, Any]) -> RobotSetup:
     Raises:
         LookupError, TypeError, ValueError: They are no such facts; numbers out of range raise an InvalidValueError.
     """
-    box, load, force = facts.get("box"), facts.get("load"), facts.get("force")
+    box, load, force, joints = (facts.get(part) for part in ("box", "load", "force", "joints"))
     return RobotSetup(
         box=None
         if box is None
@@ -43,6 +45,7 @@ def build_setup(facts: dict[str, Any]) -> RobotSetup:
         force=None
         if force is None
         else ForceControlFrame(T_flange_force=_pose(force["pose"]), type=ForceFrame[force["axes"]]),
+        joints=None if joints is None else SoftJointLimits(lower=tuple(joints[0]), upper=tuple(joints[1])),
     )
 
 

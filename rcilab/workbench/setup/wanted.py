@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rcilab.client.setup import SETUP_PARTS, ForceControlFrame, RobotSetup, SetupPart
+from rcilab.client.setup import SETUP_PARTS, ForceControlFrame, RobotSetup, SetupPart, SoftJointLimits
 from rcilab.dynamics.payload import NO_LOAD, Payload
 from rcilab.protocols.rci import ForceFrame
+from rcilab.robots import describe_robot
 from rcilab.safety_box import SafetyBox, active_box
 from rcilab.spatial import IDENTITY, Pose
 from rcilab.workbench.text import Message, message
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
     from rcilab.supervisor import SupervisorStatus
     from rcilab.workbench.store import UiState
 
+LISTED: tuple[SetupPart, ...] = (*SETUP_PARTS, "joints")
+"""The parts of the Setup tab."""
 ON_FLANGE: tuple[SetupPart, ...] = ("tool", "load", "force")
 FORCE_AXES = {"world": ForceFrame.WORLD, "tool": ForceFrame.TOOL, "path": ForceFrame.PATH}
 
@@ -58,9 +61,20 @@ def pending_parts(state: UiState, status: SupervisorStatus) -> tuple[SetupPart, 
     setup = state.setup
     return tuple(
         part
-        for part in SETUP_PARTS
+        for part in LISTED
         if part in setup.touched and getattr(status.setup, part) is not getattr(setup.wanted, part)
     )
+
+
+def own_limits(state: UiState) -> SoftJointLimits:
+    """Returns the whole range of the arm's joints."""
+    own = describe_robot(state.model.name).limits.joint
+    return SoftJointLimits(lower=tuple(own.lower.tolist()), upper=tuple(own.upper.tolist()))
+
+
+def soft_limits(state: UiState) -> SoftJointLimits:
+    """Returns the soft limits that are wanted: the whole range as long as none were set."""
+    return state.setup.wanted.joints or own_limits(state)
 
 
 def setup_obstacle(state: UiState, status: SupervisorStatus) -> Message | None:
@@ -108,6 +122,9 @@ def describe_part(setup: RobotSetup, part: str) -> Message:
     if isinstance(value, Payload):
         center = _millimetres(value.center_of_mass)
         return message("setup.load_is" if value.mass else "setup.load_none", mass=f"{value.mass:.2f}", center=center)
+    if isinstance(value, SoftJointLimits):
+        ends = zip(np.degrees(value.lower), np.degrees(value.upper), strict=True)
+        return message("setup.joints_are", ranges=", ".join(f"{low:.0f}…{high:.0f}" for low, high in ends))
     if isinstance(value, ForceControlFrame):
         axes = next(name for name, kind in FORCE_AXES.items() if kind == value.type)
         place = _describe_pose(value.T_flange_force)

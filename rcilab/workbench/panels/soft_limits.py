@@ -1,0 +1,56 @@
+"""Soft joint limits, and whether the virtual controller leads commands to rest at them."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from rcilab.workbench import requests
+from rcilab.workbench.panels.jog import problems_html
+from rcilab.workbench.run.driving import is_ours
+from rcilab.workbench.setup.fields import JOINT_ENDS
+from rcilab.workbench.setup.wanted import own_limits, soft_limits
+from rcilab.workbench.text import Text
+from rcilab.workbench.widgets import Ask, Html, Linked, NumberField, esc, on_press, shown
+
+if TYPE_CHECKING:
+    from rcilab.supervisor import SupervisorStatus
+    from rcilab.workbench.store import UiState
+
+
+class SoftLimitsPanel:
+    """A group of the Setup tab: two numbers a joint."""
+
+    def __init__(self, text: Text, ask: Ask) -> None:
+        self._text, self._ask = text, ask
+
+    def build(self, gui: Any, state: UiState) -> None:
+        """Adds the controls."""
+        text, ask = self._text, self._ask
+        self._fields: list[tuple[str, int, NumberField]] = []
+        self._named: list[tuple[str, str]] = []
+        with gui.add_folder(text("softlimits.title"), expand_by_default=False):
+            gui.add_html('<i class="rl-pairs"></i>')
+            for joint in range(state.model.n):
+                for end in JOINT_ENDS:
+                    label, field = text(f"softlimits.{end}", joint=joint + 1), f"setup.joints.{end}.{joint}"
+                    box = gui.add_text(label, "", hint=text("softlimits.hint"))
+                    self._fields.append((end, joint, NumberField(box, ask, field, text.unit("deg"))))
+                    self._named.append((field, label))
+            self._problems = Html(gui)
+            self._whole = gui.add_button(text("softlimits.whole"), icon="restore", color="gray")
+            on_press(self._whole, ask, lambda page: requests.PressSetup(page=page, what="whole"))
+            auto = gui.add_checkbox(text("softlimits.auto"), False, hint=text("softlimits.auto_hint"))
+            self._auto = Linked(auto, ask, lambda v, p: requests.SetWiring(page=p, name="auto_limit", on=bool(v)))
+            gui.add_html(f'<p class="rl-note">{esc(text("softlimits.note"))}</p>')
+
+    def show(self, state: UiState, status: SupervisorStatus) -> None:
+        """Follows the set-up."""
+        limits = soft_limits(state)
+        for end, joint, field in self._fields:
+            number = shown(math.degrees(getattr(limits, end)[joint]))
+            field.show(number, state.problems.get(field.field), state.entered)
+        self._problems.show(problems_html(state, self._text, self._named))
+        self._whole.disabled = limits == own_limits(state)
+        self._auto.show(state.drive.auto_limit)
+        self._auto.handle.disabled = not is_ours(status)
