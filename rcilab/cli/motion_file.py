@@ -41,7 +41,7 @@ def as_motion(found: Motion | Program, model: RobotModel, show: Callable[[str], 
 
     if not isinstance(found, Program):
         return found
-    motion = plan_program(model, found)
+    motion = plan_program(model, found, law="torque_rate_limited")
     for note in motion.notes:
         show(f"note: {note}")
     return motion

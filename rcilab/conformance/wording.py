@@ -6,7 +6,7 @@ from math import ceil, degrees, floor, isfinite
 
 from rcilab.conformance.catalogue import Phrase
 from rcilab.conformance.condition import Condition, Signal
-from rcilab.motion.motion import Motion
+from rcilab.motion.motion import Law, Motion
 
 
 def amount(value: float, bound: float) -> tuple[str, str]:
@@ -62,7 +62,7 @@ def advise(condition: Condition, motion: Motion, *, row: int, count: int, ratio:
     # One displaced sample shows in two first differences, three second and four third ones.
     if not isfinite(ratio) or (count <= condition.order + 1 and motion.law == "samples"):
         return Phrase("advice.jump")
-    if motion.law in ("jerk_limited", "s_profile"):
+    if motion.law in _PLANNED:
         lower = floor(100.0 * motion.speed / ratio) / 100.0
         if 0.0 < lower < motion.speed:
             return Phrase("advice.speed_to", speed=f"{lower:.2f}")
@@ -85,10 +85,14 @@ _WAYS: dict[Signal, str] = {
 """What to do about signals that are themselves out of bounds, not their derivatives; of joints it is the range."""
 
 
+_PLANNED: tuple[Law, ...] = ("jerk_limited", "torque_rate_limited", "s_profile")
+"""Laws whose planners take a speed."""
+
+
 def _softer(condition: Condition, motion: Motion) -> Phrase:
     """Returns what to do about torques: those of a motion matter only to an arm that gives them exactly as asked."""
     if condition.necessity == "necessary":
         return Phrase("advice.torque.rate" if condition.order == 1 else "advice.torque.range")
     if condition.order == 1 and motion.law == "jerk_limited":
         return Phrase("advice.gentler")
-    return Phrase("advice.speed" if motion.law in ("jerk_limited", "s_profile") else "advice.softer")
+    return Phrase("advice.speed" if motion.law in _PLANNED else "advice.softer")

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Literal, get_args
+from dataclasses import replace
+from typing import TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,7 +14,7 @@ from rcilab.clock import CYCLE_TIME
 from rcilab.errors import InvalidValueError, PlanningError, SingularError
 from rcilab.model import RobotModel, require_model
 from rcilab.motion.along import curve_through, plan_along, require_path
-from rcilab.motion.joint import MIN_SPEED
+from rcilab.motion.joint import JOINT_LAWS, MIN_SPEED, JointLaw
 from rcilab.motion.motion import Motion, standing
 from rcilab.motion.obstacle import examine, refusal
 from rcilab.motion.path import (
@@ -30,12 +31,12 @@ from rcilab.motion.piecewise import join_pieces
 from rcilab.motion.range import require_inside
 from rcilab.motion.s_curve import plan_s_curve
 from rcilab.motion.time_law import TimeLaw
+from rcilab.motion.torque_rate import plan_within_torque_rate
 from rcilab.spatial import Pose
 
-PathLaw = Literal["jerk_limited", "s_profile"]
-"""How a path is followed: as fast as all limits allow, or by the manual's S profile (3.5)."""
+PathLaw: TypeAlias = JointLaw
+"""How a path is followed: by the same laws as a joint motion, the S profile being that of MOVEL (manual 3.5)."""
 
-_LAWS: tuple[PathLaw, ...] = ("jerk_limited", "s_profile")
 
 _WAYS: tuple[Way, ...] = get_args(Way)
 
@@ -72,11 +73,12 @@ def plan_line(
             0.001 to 1.
         psi: Arm angle of a 7-axis arm at the end, from -pi to pi, [rad]; it goes there the shorter way round, across
             +-pi too. None holds the one of the start.
-        law: "jerk_limited": as fast as the limits on joints, tool and arm angle allow, with `LIMIT_MARGIN` to spare,
-            as the controller judges them; the jerk limits are used in full. "s_profile": the vendor's MOVEL, with at
-            most `speed` times 1 m/s and 2.5 m/s^2. So a turn on a short way is fast, and that profile knows neither the
-            joints' limits nor the tool's: `rcilab.check` judges them. Unlike the vendor's, a line from a pose to itself
-            is a motion of no length, and a mere turn takes its angle for the way about every axis.
+        law: "jerk_limited": as fast as the limits on joints, tool and arm angle allow, with `LIMIT_MARGIN` to spare, as
+            the controller judges them; the jerk limits are used in full. "torque_rate_limited": the same with lowered
+            jerk limits, see `plan_joint`. "s_profile": the vendor's MOVEL, with at most `speed` times 1 m/s and 2.5
+            m/s^2. So a turn on a short way is fast, and that profile knows neither the joints' limits nor the tool's:
+            `rcilab.check` judges them. Unlike the vendor's, a line from a pose to itself is a motion of no length, and
+            a mere turn takes its angle for the way about every axis.
 
     Raises:
         PlanningError: A pose on the way is out of reach, or a joint limit or a singularity is in the way; the message
@@ -84,7 +86,7 @@ def plan_line(
         InvalidValueError: An argument is of the wrong shape or kind, not finite, or out of range.
     """
     q = _require_start(model, start, law)
-    return _follow(model, q, build_line(model.forward(q), goal, *arm_angles(model, q, psi, "shorter")), speed, law)
+    return plan_path(model, q, build_line(model.forward(q), goal, *arm_angles(model, q, psi, "shorter")), speed, law)
 
 
 def plan_arc(
@@ -111,7 +113,7 @@ def plan_arc(
             0.001 to 1.
         psi: Arm angle of a 7-axis arm at the end, from -pi to pi, [rad]; it goes there the shorter way round, across
             +-pi too. None holds the one of the start.
-        law: "jerk_limited" or "s_profile", see `plan_line`.
+        law: "jerk_limited", "torque_rate_limited" or "s_profile", see `plan_line`.
         orientation: "through_via": the tool passes exactly the orientation of `via` where it passes its position, and
             turns there and back the shorter way each, with continuous angular velocity and acceleration.
             "start_to_goal": it turns by slerp from start to goal, and the orientation of `via` is ignored, as on the
@@ -124,7 +126,7 @@ def plan_arc(
     """
     q = _require_start(model, start, law)
     angles = arm_angles(model, q, psi, "shorter")
-    return _follow(model, q, build_arc(model.forward(q), via, goal, *angles, orientation=orientation), speed, law)
+    return plan_path(model, q, build_arc(model.forward(q), via, goal, *angles, orientation=orientation), speed, law)
 
 
 def plan_circle(
@@ -156,7 +158,7 @@ def plan_circle(
             0.001 to 1.
         psi: Arm angle of a 7-axis arm at the end, from -pi to pi, [rad]; it goes there the shorter way round, across
             +-pi too. None holds the one of the start.
-        law: "jerk_limited" or "s_profile", see `plan_line`.
+        law: "jerk_limited", "torque_rate_limited" or "s_profile", see `plan_line`.
         orientation: "held": that of the start all the way. "turning": the tool turns with the circle, about its axis
             and by the same angle, so that it shows the centre always the same side.
 
@@ -176,7 +178,7 @@ def plan_circle(
     elif center is None or axis is None:
         raise InvalidValueError("center", described(center), "and axis are both needed, or two poses as through")
     angles = arm_angles(model, q, psi, "shorter")
-    return _follow(model, q, build_circle(T, center, axis, angle, *angles, orientation=orientation), speed, law)
+    return plan_path(model, q, build_circle(T, center, axis, angle, *angles, orientation=orientation), speed, law)
 
 
 def plan_nullspace(
@@ -196,7 +198,7 @@ def plan_nullspace(
         psi: Arm angle at the end, from -pi to pi, [rad].
         speed: Part of the velocity and acceleration limits to use, or of the vendor's generator's, from `MIN_SPEED` =
             0.001 to 1.
-        law: "jerk_limited" or "s_profile", see `plan_line`.
+        law: "jerk_limited", "torque_rate_limited" or "s_profile", see `plan_line`.
         way: Which way round the elbow goes, "shorter" or "longer"; both may lead across +-pi, where the arm angle
             begins anew and the elbow just goes on. The longer way to the arm angle of the start is a full turn.
 
@@ -211,7 +213,7 @@ def plan_nullspace(
         raise InvalidValueError("way", described(way), f"is unknown; known: {', '.join(_WAYS)}")
     T, psi = model.forward(q), as_number(psi, "psi", "rad")
     try:
-        return _follow(model, q, build_line(T, T, *arm_angles(model, q, psi, way)), speed, law)
+        return plan_path(model, q, build_line(T, T, *arm_angles(model, q, psi, way)), speed, law)
     except PlanningError as error:
         if error.share is None:
             raise
@@ -316,14 +318,33 @@ def _s_law(path: Path, speed: float) -> TimeLaw:
     return TimeLaw(np.clip(shares, 0.0, 1.0), du, ddu)
 
 
-def _follow(model: RobotModel, q: JointVector, path: Path, speed: float, law: PathLaw) -> Motion:
-    return plan_along(model, q, path, speed) if law == "jerk_limited" else follow_path(model, q, path, speed)
+def plan_path(model: RobotModel, q: JointVector, path: Path, speed: float, law: PathLaw) -> Motion:
+    """Returns the motion along a path by a law.
+
+    Args:
+        model: The arm, with its tool.
+        q: Joint angles at the start of the path, shape (n,), [rad]: they choose the branch.
+        path: The path.
+        speed: Part of the limits to use, or of the vendor's generator's, from `MIN_SPEED` to 1.
+        law: See `plan_line`.
+
+    Raises:
+        PlanningError: A pose on the way is out of reach, or a joint limit or a singularity is in the way.
+    """
+    if law == "s_profile":
+        return follow_path(model, q, path, speed)
+    if law == "jerk_limited":
+        return plan_along(model, q, path, speed)
+    motion = plan_within_torque_rate(
+        model, lambda arm: plan_along(arm, q, path, speed), lambda planned: planned.polynomial
+    )
+    return replace(motion, law=law)
 
 
 def _require_start(model: RobotModel, start: ArrayLike, law: str) -> JointVector:
     require_model(model)
-    if law not in _LAWS:
-        raise InvalidValueError("law", described(law), f"is unknown for a path; known: {', '.join(_LAWS)}")
+    if law not in JOINT_LAWS:
+        raise InvalidValueError("law", described(law), f"is unknown for a path; known: {', '.join(JOINT_LAWS)}")
     q = as_vector(start, model.n, "start", "rad")
     require_inside("start", q, model.limits.joint)
     return q

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Literal, Protocol
+from dataclasses import replace
+from typing import Literal, Protocol, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,8 +18,10 @@ from rcilab.motion.motion import Motion, standing
 from rcilab.motion.piecewise import PiecewisePolynomial, join_pieces
 from rcilab.motion.range import angle_text, require_inside
 from rcilab.motion.s_curve import STANDSTILL_DISTANCE, plan_s_curve, synchronize
+from rcilab.motion.torque_rate import plan_within_torque_rate
 
-JointLaw = Literal["jerk_limited", "s_profile"]
+JointLaw = Literal["jerk_limited", "torque_rate_limited", "s_profile"]
+JOINT_LAWS: tuple[JointLaw, ...] = get_args(JointLaw)
 
 MIN_SPEED = 0.001
 """Slowest speed to plan with. A choice: a full turn then takes most of an hour and its rows 200 MB; a motion of more
@@ -66,7 +68,9 @@ def plan_joint(
         law: "jerk_limited": the fastest motion inside the limits, with `LIMIT_MARGIN` to spare. From rest, or moving
             straight towards or away from `goal`, it is the fastest one on the straight line in joint space; with
             another start velocity or acceleration there is no such line, and each joint goes its own way in the same
-            time. "s_profile": exactly the motion of the vendor's joint generator (manual 3.5). That one
+            time. "torque_rate_limited": the same with the jerk limits lowered until the torques change no faster than
+            the manual recommends (4.4), which takes some hundredths of a second; it needs a RobotModel. "s_profile":
+            exactly the motion of the vendor's joint generator (manual 3.5). That one
             has speeds of its own and does not know the robot's limits: `rcilab.check` judges it. A joint that is to
             move less than 1e-6 rad stays, so the motion may end that far from `goal`.
         start_velocity: Joint velocities at the start, shape (n,), [rad/s]; None is rest. Derivatives of the running
@@ -88,11 +92,20 @@ def plan_joint(
         raise InvalidValueError(
             "speed", speed, f"must be from {MIN_SPEED:g} to 1: the part of the limits to use"
         ).coded("span", low=f"{MIN_SPEED:g}", high="1")
-    if not isinstance(law, str) or law not in _PLANNERS:
-        raise InvalidValueError("law", law, f"is unknown; known: {', '.join(_PLANNERS)}")
+    if not isinstance(law, str) or law not in JOINT_LAWS:
+        raise InvalidValueError("law", law, f"is unknown; known: {', '.join(JOINT_LAWS)}")
     require_inside("start", start, limits)
     require_inside("goal", goal, limits)
-    return _PLANNERS[law](limits, start, goal, speed, dq, ddq)
+    if law == "s_profile":
+        return _plan_s_profile(limits, start, goal, speed, dq, ddq)
+    if law == "jerk_limited":
+        return _plan_jerk_limited(limits, start, goal, speed, dq, ddq)
+    motion = plan_within_torque_rate(
+        require_model(model),
+        lambda arm: _plan_jerk_limited(arm.limits.joint, start, goal, speed, dq, ddq),
+        lambda planned: planned.polynomial,
+    )
+    return replace(motion, law=law)
 
 
 def _plan_jerk_limited(
@@ -140,11 +153,6 @@ def _plan_s_profile(
     coefficients[:, :, 0] += start[:, np.newaxis]
     curve = join_pieces(np.array([starts for starts, _ in pieces]), coefficients, duration)
     return Motion(polynomial=curve, goal=end, law="s_profile", speed=speed)
-
-
-_Planner = Callable[[JointLimits, JointVector, JointVector, float, JointVector, JointVector], Motion]
-
-_PLANNERS: dict[str, _Planner] = {"jerk_limited": _plan_jerk_limited, "s_profile": _plan_s_profile}
 
 
 def _require_possible(limits: JointLimits, dq: JointVector, ddq: JointVector) -> None:

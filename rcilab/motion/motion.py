@@ -19,11 +19,11 @@ from rcilab.motion.piecewise import DERIVATIVES, PiecewisePolynomial
 from rcilab.spoken import language
 from rcilab.words.text import Remark
 
-Law: TypeAlias = Literal["jerk_limited", "s_profile", "stop", "samples"]
-"""How a motion runs along its path: as fast as all limits allow, by the manual's S profile (3.5), as the fastest stop,
-or through rows that somebody else made."""
+Law: TypeAlias = Literal["jerk_limited", "torque_rate_limited", "s_profile", "stop", "samples"]
+"""How a motion runs along its path: as fast as all limits allow, the same with the recommended torque rate kept too, by
+the manual's S profile (3.5), as the fastest stop, or through rows that somebody else made."""
 
-LAWS: tuple[Law, ...] = ("jerk_limited", "s_profile", "stop", "samples")
+LAWS: tuple[Law, ...] = ("jerk_limited", "torque_rate_limited", "s_profile", "stop", "samples")
 
 _CARD: dict[Language, tuple[str, str, str]] = {
     "en": ("Motion, {law}: {duration:.3f} s at speed {speed:g} (angles in °)", "start", "goal"),

@@ -12,18 +12,19 @@ from numpy.typing import ArrayLike
 
 from rcilab.arrays import Array, JointVector, as_number, as_vector, described, sealed
 from rcilab.clock import CYCLE_TIME
-from rcilab.errors import InvalidValueError
+from rcilab.errors import InvalidValueError, PlanningError
 from rcilab.model import RobotModel, require_model
-from rcilab.motion.along import plan_along
 from rcilab.motion.blend import build_blend
+from rcilab.motion.cartesian import plan_path
 from rcilab.motion.chain import build_chain
 from rcilab.motion.chain_motion import plan_chain
-from rcilab.motion.joint import MIN_SPEED, plan_joint
+from rcilab.motion.joint import JOINT_LAWS, MIN_SPEED, JointLaw, plan_joint
 from rcilab.motion.motion import Motion
 from rcilab.motion.piecewise import PiecewisePolynomial
 from rcilab.motion.program import MOST_WAYPOINTS, Program
 from rcilab.motion.s_curve import STANDSTILL_DISTANCE
 from rcilab.motion.segment import Segment, build_segments, naming
+from rcilab.motion.torque_rate import plan_within_torque_rate
 from rcilab.motion.waypoint import label
 from rcilab.words.text import Remark
 
@@ -40,6 +41,7 @@ def plan_program(
     speed: float = 1.0,
     start: ArrayLike | None = None,
     rounds: int = 1,
+    law: JointLaw = "jerk_limited",
     progress: Callable[[float], None] | None = None,
 ) -> Motion:
     """Returns the motion through the waypoints of a program, from rest to rest.
@@ -62,6 +64,8 @@ def plan_program(
             program's start.
         rounds: How often to go through the waypoints. Between two rounds a joint move, a segment of its own, leads
             back to the program's start.
+        law: How every segment runs, see `plan_joint`. By the S profile the tool stops at every waypoint, so that there
+            can be no blends.
         progress: Called now and then with the part of the work that is done, 0 to 1; what it raises ends the planning.
 
     Raises:
@@ -92,6 +96,10 @@ def plan_program(
         raise InvalidValueError(
             "rounds", rounds, f"must be whole, 1 to {MOST_WAYPOINTS // count} for {count} waypoints"
         ).coded("rounds", most=MOST_WAYPOINTS // count)
+    if law not in JOINT_LAWS:
+        raise InvalidValueError("law", described(law), f"is unknown; known: {', '.join(JOINT_LAWS)}")
+    if law == "s_profile":
+        _require_stops(program)
     if program.T_flange_tool is not None:
         model = model.with_tool(program.T_flange_tool)
     tell = progress or (lambda part: None)
@@ -102,16 +110,16 @@ def plan_program(
     there, slow = np.array(program.start), speed * program.waypoints[0].speed
     track = _Track()
     if approach is not None:
-        track.add(_plan_move(model, approach, there, slow, "the way to the start"))
+        track.add(_plan_move(model, approach, there, slow, "the way to the start", law))
     curves: list[_Curve] = []
     for run in _runs(segments):
-        curves.append(_plan_run(model, run, speed, track.notes))
+        curves.append(_plan_run(model, run, speed, track.notes, law))
         tell(_GEOMETRY + (1.0 - _GEOMETRY) * run[-1].number / count)
-    back = None if rounds == 1 else _plan_move(model, curves[-1].goal, there, slow, "the way back to the start")
+    back = None if rounds == 1 else _plan_move(model, curves[-1].goal, there, slow, "the way back to the start", law)
     for number in range(int(rounds)):
         for curve in (back, *curves) if back is not None and number else curves:
             track.add(curve)
-    return track.motion(speed * max(waypoint.speed for waypoint in program.waypoints))
+    return track.motion(speed * max(waypoint.speed for waypoint in program.waypoints), law)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -130,6 +138,15 @@ class _Curve:
     """When one segment passes to the next, since the start, [s]."""
 
 
+def _require_stops(program: Program) -> None:
+    for number, waypoint in enumerate(program.waypoints, 1):
+        if waypoint.blend > 0.0:
+            raise PlanningError(
+                f"{label(number, waypoint)}: blend {1e3 * waypoint.blend:g} mm, but by the S profile the tool stops at "
+                "every waypoint; set blend to 0, or choose another law: law='torque_rate_limited'"
+            ).coded("s_profile_blend", waypoint=number, blend=f"{1e3 * waypoint.blend:g}")
+
+
 def _runs(segments: list[Segment]) -> list[list[Segment]]:
     """Returns the segments between full stops."""
     runs: list[list[Segment]] = []
@@ -144,12 +161,14 @@ def _runs(segments: list[Segment]) -> list[list[Segment]]:
     return runs
 
 
-def _plan_move(model: RobotModel, start: JointVector, goal: JointVector, speed: float, what: str) -> _Curve:
+def _plan_move(
+    model: RobotModel, start: JointVector, goal: JointVector, speed: float, what: str, law: JointLaw
+) -> _Curve:
     """Returns a joint move that is no waypoint's."""
     if np.abs(goal - start).max() <= STANDSTILL_DISTANCE:
         return _stand(goal)
     with naming(what):
-        curve = plan_joint(model, start, goal, speed=speed).polynomial
+        curve = plan_joint(model, start, goal, speed=speed, law=law).polynomial
     return _Curve(curve.breaks, curve.coefficients, goal)
 
 
@@ -157,7 +176,7 @@ def _stand(goal: JointVector, dwell: float = 0.0) -> _Curve:
     return _Curve(np.zeros(1), np.zeros((0, len(goal), 1)), goal, dwell)
 
 
-def _plan_run(model: RobotModel, run: list[Segment], scale: float, notes: list[str]) -> _Curve:
+def _plan_run(model: RobotModel, run: list[Segment], scale: float, notes: list[str], law: JointLaw) -> _Curve:
     segment = run[0]
     speed = scale * segment.waypoint.speed
     if len(run) > 1:
@@ -171,16 +190,25 @@ def _plan_run(model: RobotModel, run: list[Segment], scale: float, notes: list[s
                 )
                 radii = {"asked": f"{1e3 * asked:.1f}", "radius": f"{1e3 * blend.radius:.1f}"}
                 notes.append(Remark(said, "blend", number=before.number, **radii))
-        coefficients, corners = plan_chain(build_chain(model, run, blends, scale), model.limits)
-        breaks = np.arange(len(coefficients) + 1, dtype=np.float64) * CYCLE_TIME
-        return _Curve(breaks, coefficients, run[-1].goal, run[-1].waypoint.dwell, tuple(corners))
+        chain, last = build_chain(model, run, blends, scale), run[-1]
+
+        def blended(arm: RobotModel) -> _Curve:
+            coefficients, corners = plan_chain(chain, arm.limits)
+            breaks = np.arange(len(coefficients) + 1, dtype=np.float64) * CYCLE_TIME
+            return _Curve(breaks, coefficients, last.goal, last.waypoint.dwell, tuple(corners))
+
+        if law == "jerk_limited":
+            return blended(model)
+        return plan_within_torque_rate(
+            model, blended, lambda curve: PiecewisePolynomial(curve.breaks, curve.coefficients)
+        )
     if segment.stands:
         return _stand(segment.goal, segment.waypoint.dwell)
     with naming(segment.label, segment.number, segment.waypoint.type):
         if segment.path is None:
-            motion = plan_joint(model, segment.start, segment.goal, speed=speed)
+            motion = plan_joint(model, segment.start, segment.goal, speed=speed, law=law)
         else:
-            motion = plan_along(model, segment.start, segment.path, speed)
+            motion = plan_path(model, segment.start, segment.path, speed, law)
     curve = motion.polynomial
     return _Curve(curve.breaks, curve.coefficients, motion.goal, segment.waypoint.dwell)
 
@@ -207,7 +235,7 @@ class _Track:
         if curve.dwell > 0.0:
             self._stand((_cycles(self._end) + round(curve.dwell / CYCLE_TIME)) * CYCLE_TIME)
 
-    def motion(self, speed: float) -> Motion:
+    def motion(self, speed: float, law: JointLaw) -> Motion:
         """Returns the whole motion."""
         if not any(map(len, self._pieces)):
             self._breaks, self._pieces = [np.zeros(1)], [self._goal.reshape(1, -1, 1)]
@@ -219,7 +247,7 @@ class _Track:
             first += len(piece)
         curve = PiecewisePolynomial(np.concatenate((*self._breaks, [self._end])), sealed(coefficients))
         return Motion(
-            polynomial=curve, goal=self._goal, law="jerk_limited", speed=speed,
+            polynomial=curve, goal=self._goal, law=law, speed=speed,
             segment_starts=np.array(self._starts), notes=tuple(self.notes),
         )  # fmt: skip
 

@@ -21,7 +21,7 @@ program = Program(
 
 _TAIL = """
 model = rcilab.load_model(program.model)
-motion = rcilab.plan_program(model, program)
+motion = rcilab.plan_program(model, program, law="torque_rate_limited")
 
 if __name__ == "__main__":
     report = rcilab.check(motion, model)

@@ -76,7 +76,7 @@ class LabState:
         self.speed = 0.5
         self.pace = 1.0
         """Part of its planned speed that a motion runs at."""
-        self.law: PlannableLaw = "jerk_limited"
+        self.law: PlannableLaw = "torque_rate_limited"
         self.way: Way = "joint"
         self.mode: Mode = "joint_position"
         """How a motion is commanded; its conditions judge the plan."""

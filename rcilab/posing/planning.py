@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
 PathKind = Literal["joint", "line", "arc"]
 PATH_KINDS: tuple[PathKind, ...] = ("joint", "line", "arc")
-PlannableLaw = Literal["jerk_limited", "s_profile"]
-LAWS: tuple[PlannableLaw, ...] = ("jerk_limited", "s_profile")
+PlannableLaw = Literal["torque_rate_limited", "jerk_limited", "s_profile"]
+LAWS: tuple[PlannableLaw, ...] = ("torque_rate_limited", "jerk_limited", "s_profile")
 
 SMALLEST_MOTION = 1e-4  # [rad] A choice: a goal closer than this to the arm is where the arm is.
 SAME_WAY = 1e-3  # [rad] A choice: beyond it a line ends in another way of standing than the one that was wanted.

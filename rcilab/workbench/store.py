@@ -147,7 +147,7 @@ class UiState:
     export: Export | None = None
     """What is being written for a page."""
     speed: float = 0.5
-    law: PlannableLaw = "jerk_limited"
+    law: PlannableLaw = "torque_rate_limited"
     way: PathKind = "joint"
     """How the tool goes to the goal."""
     via: Pose | None = None

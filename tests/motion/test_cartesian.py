@@ -111,7 +111,7 @@ def test_a_stretched_arm_has_no_arm_angle_to_hold():
     [
         ({"speed": 0.0}, "speed: 0.0 must be from 0.001 to 1"),
         ({"speed": 1.5}, "speed: 1.5 must be from 0.001 to 1"),
-        ({"law": "trapezoid"}, "is unknown for a path; known: jerk_limited, s_profile"),
+        ({"law": "trapezoid"}, "is unknown for a path; known: jerk_limited, torque_rate_limited, s_profile"),
         ({"psi": 4.0}, "psi: 4.0 must be from -pi to pi"),
         ({"psi": math.nan}, "psi: nan must be from -pi to pi"),
         ({"start": [0.0] * 6}, r"needs \(7,\)"),

@@ -189,7 +189,7 @@ def test_shapes_numbers_and_laws_are_checked():
         plan_joint(MODEL, np.full(7, np.nan), np.zeros(7))
     with pytest.raises(InvalidValueError, match="start_velocity"):
         plan_joint(MODEL, np.zeros(7), np.zeros(7), start_velocity=[1.0])
-    with pytest.raises(InvalidValueError, match="known: jerk_limited, s_profile"):
+    with pytest.raises(InvalidValueError, match="known: jerk_limited, torque_rate_limited, s_profile"):
         plan_joint(MODEL, np.zeros(7), np.zeros(7), law="cubic")  # type: ignore[arg-type]
 
 

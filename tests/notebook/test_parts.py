@@ -243,11 +243,14 @@ def test_plan_check_and_plot_show_the_same_motion_as_the_library(fresh: Lab) -> 
     fresh.plan.plan.click()
     plan = fresh.state.plan
     assert plan is not None
-    np.testing.assert_array_equal(plan.motion.q, rcilab.plan_joint(PRO7, PRO7.home, GOAL, speed=0.4).q)
+    np.testing.assert_array_equal(
+        plan.motion.q, rcilab.plan_joint(PRO7, PRO7.home, GOAL, speed=0.4, law="torque_rate_limited").q
+    )
     assert plan.report.ok
     assert fresh.report.report is plan.report
     assert fresh.plot.html.count("<svg") == 4
     assert "Passed" in text_of(fresh.plan._said)
+    assert not plan.report.warnings
 
 
 def test_a_goal_that_was_moved_is_told_beside_the_plan(fresh: Lab) -> None:
@@ -292,6 +295,7 @@ def test_what_takes_longer_shows_how_far_it_is_and_can_be_given_up(fresh: Lab, m
 
 def test_what_only_goes_against_advice_can_be_slowed_down_too(fresh: Lab) -> None:
     fresh.jog.q = GOAL
+    fresh.state.law = "jerk_limited"
     fresh.plan.plan.click()
     plan = fresh.state.plan
     assert plan is not None

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from rcilab.background import Tell
 from rcilab.posing.planning import Plan, make_plan, picture
 from rcilab.workbench.program.draft import Draft
+from rcilab.workbench.program.planning import PROGRAM_LAW
 
 if TYPE_CHECKING:
     from rcilab.conformance import SlowDown
@@ -57,7 +58,7 @@ def slow_program(plan: Plan, draft: Draft, rounds: int, tell: Tell) -> Slower:
         drafts[scale] = slower = scaled(draft, scale)
         program = slower.program(plan.model)
         assert program is not None
-        motion = plan_program(plan.model, program, start=plan.motion.start, rounds=rounds)
+        motion = plan_program(plan.model, program, start=plan.motion.start, rounds=rounds, law=PROGRAM_LAW)
         report = check(motion, plan.model, start=plan.motion.start, box=plan.box, distance=None)
         return replace(picture(plan.model, motion, report, plan.box), program=program).completed()
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from rcilab.arrays import JointVector
 from rcilab.background import Tell
 from rcilab.model import RobotModel
+from rcilab.motion.joint import JointLaw
 from rcilab.motion.program import Program
 from rcilab.posing.planning import Plan, picture
 from rcilab.safety_box import SafetyBox
@@ -14,6 +15,8 @@ from rcilab.supervisor.layout import MOTION_TIME
 from rcilab.workbench.program.draft import Draft
 from rcilab.workbench.text import Message, message
 
+PROGRAM_LAW: JointLaw = "torque_rate_limited"
+"""How programs run: they may take a hundredth of their time longer to keep what the manual recommends."""
 _MOTION, _JUDGED = 0.75, 0.8
 """Parts of the work when the motion is made, and when all but collisions has been looked at; about what was seen."""
 
@@ -39,7 +42,12 @@ def plan_job(job: Job, tell: Tell) -> Plan | Message:
     from rcilab.motion import plan_program
 
     motion = plan_program(
-        job.model, job.program, start=job.here, rounds=job.rounds, progress=lambda part: tell(_MOTION * part)
+        job.model,
+        job.program,
+        start=job.here,
+        rounds=job.rounds,
+        law=PROGRAM_LAW,
+        progress=lambda part: tell(_MOTION * part),
     )
     tell(_MOTION)
     if motion.duration > MOTION_TIME:
