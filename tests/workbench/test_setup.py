@@ -361,3 +361,20 @@ def test_a_robot_that_is_not_ours_is_changed_only_after_a_second_yes(bench, ask)
         controller.end()
     wait(lambda: bench.session.status().phase == "idle" and bench.session.is_ready, "our own controller")
     wait(lambda: settled(bench), "our own controller to have the set-up")
+
+
+def test_what_belongs_to_an_arm_comes_back_with_it(bench, ask):
+    type_in(ask, tool_z="80", load_mass="1.5")
+    ask(requests.SetSetup(name="active", value=True))
+    wait(lambda: settled(bench), "the controller to have it")
+    before = wanted(bench)
+    name = bench.store.state.model.name
+    ask(requests.ChooseRobot(model="xMate3"))
+    wait(lambda: bench.store.state.model.name == "xMate3", "the other arm")
+    assert wanted(bench).tool.is_close(Pose(), 1e-12)
+    ask(requests.ChooseRobot(model=name))
+    wait(lambda: bench.store.state.model.name == name, "the first arm again")
+    assert bench.store.state.model.T_flange_tool.is_close(before.tool, 1e-12)
+    assert (wanted(bench).tool, wanted(bench).load, wanted(bench).box) == (before.tool, before.load, before.box)
+    assert told(bench) == "setup.back"
+    wait(lambda: settled(bench), "the controller to have it again")

@@ -19,7 +19,7 @@ from rcilab.workbench.run.keeper import RunKeeper
 from rcilab.workbench.run.pushing import PLANTS, TOOL, is_guided
 from rcilab.workbench.run.readiness import is_moving, obstacle
 from rcilab.workbench.session import Session
-from rcilab.workbench.setup.wanted import SetupState, setup_obstacle
+from rcilab.workbench.setup.wanted import SetupState, name_parts, setup_obstacle
 from rcilab.workbench.store import Goal, Store, UiState
 from rcilab.workbench.telling import StartingError, tell_error, tell_incident
 from rcilab.workbench.text import Message, message
@@ -50,6 +50,7 @@ class RobotActions:
         self._power_asked = float("-inf")
         self._arrival: Message | None = None  # What to say at the end of the motion under way.
         self._untouched: Goal | None = store.state.goal  # The goal that nobody has posed yet.
+        self._setups: dict[str, SetupState] = {}  # Of the arms that were chosen before, by name.
         self._incident = 0
         self._trouble = ""  # The code of the incident that has not ended yet.
         self._phase = ""
@@ -161,15 +162,27 @@ class RobotActions:
         changes: dict[str, object] = {"target": target, "recording": None, "asked": None, **_unasked(state)}
         if model is not state.model:
             self._store.forget()
-            self._placed, self._untouched = False, initial_goal(model, model.home)
-            changes |= {"model": model, "goal": self._untouched, "plan": None, "no_plan": None}
+            self._placed = False
+            changes |= {"plan": None, "no_plan": None}
             changes |= {"plot_joint": 0, "problems": {}}
             changes |= {"push": replace(state.push, link=TOOL)}  # The other arm may have no such link.
-            changes |= {"setup": SetupState()}  # Nor may it bear the same load.
+            setup = self._exchange_setups(state, name)
+            model = setup.wanted.only(setup.touched).applied_to(model)
+            self._untouched = initial_goal(model, model.home)
+            changes |= {"model": model, "goal": self._untouched, "setup": setup}
             changes |= {"drive": replace(state.drive, control=None, refusal=None, typed_address="", world=None)}
+        is_same = model.name == state.model.name
         # First: from here on no state of the old arm is shown on the new one.
-        self._session.open(model, target, state.plant, _own_setup(state, target) if model is state.model else None)
+        self._session.open(model, target, state.plant, _own_setup(state, target) if is_same else None)
         self._store.update(place=0.0, playing=False, **changes)
+
+    def _exchange_setups(self, state: UiState, name: str) -> SetupState:
+        """Returns the set-up of an arm that is chosen now, and keeps that of the one before."""
+        self._setups[state.model.name] = replace(state.setup, edited="", asked=None, refusal=None, can_undo=False)
+        setup = self._setups.get(name, SetupState())
+        if setup.touched:
+            self._store.say("good", message("setup.back", what=name_parts(tuple(sorted(setup.touched))), model=name))
+        return setup
 
     def watch(self) -> str | None:
         """Looks at the supervisor: finished tickets, new incidents, recorded cycles, the arm's first pose.
