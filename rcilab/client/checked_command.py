@@ -75,6 +75,16 @@ def require_first(command: Command, state: RobotState, limits: Limits) -> None:
                 f"must be the pose the arm is at: an element differs by {off:.3g} (tolerance {START_TOLERANCE:g}); "
                 "begin with state.T_base_tool_c",
             )
+        if command.psi is not None and len(state.q_c) == 7:
+            off = abs(math.remainder(command.psi - state.psi_c, math.tau))
+            if off > START_TOLERANCE:
+                raise InvalidValueError(
+                    "psi of the first command",
+                    round(math.degrees(command.psi), 4),
+                    f"deg must be where the arm is: its arm angle is {math.degrees(state.psi_c):.4f} deg, "
+                    f"{math.degrees(off):.4f} deg apart (tolerance {math.degrees(START_TOLERANCE):.1g} deg); begin "
+                    "with state.psi_c, or with None to keep it",
+                )
     else:
         off = np.abs(command.tau) - limits.joint.torque_rate * CYCLE_TIME
         joint = int(off.argmax())

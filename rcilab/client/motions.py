@@ -157,6 +157,9 @@ class Motions(RciCommands):
         cycles since the first call, in seconds, so a lost packet does not stretch time. With a filter or a limiter the
         motion ends when what is sent has arrived at the last command.
 
+        A tool that starts outside its safety box may only be led into it, as with `execute`: the controller stops a
+        motion that goes farther out, or past a face that it did not start beyond.
+
         Args:
             callback: `(state, t) -> JointPosition | CartesianPosition | JointTorque`, as the mode asks for.
             mode: How the controller shall follow.

@@ -67,6 +67,23 @@ def test_a_first_command_elsewhere_names_the_joint_and_both_angles(make_robot):
     assert isinstance(peer.requests[-1], rci.StopMove)
 
 
+@pytest.mark.parametrize("psi", [0.1, -0.1])
+def test_a_first_arm_angle_elsewhere_names_both_angles_and_nothing_is_sent(make_robot, psi):
+    peer, robot = make_robot()
+    with pytest.raises(InvalidValueError, match=r"psi of the first command: .* is 0\.0000 deg, 5\.7296 deg apart"):
+        robot.control(lambda state, t: CartesianPosition(state.T_base_tool_c, psi), mode="cartesian_position")
+    assert peer.commands == []
+
+
+@pytest.mark.parametrize("psi", [0.0, None])
+def test_a_first_arm_angle_that_is_the_arms_or_absent_is_sent(make_robot, psi):
+    peer, robot = make_robot()
+    robot.control(
+        lambda state, t: CartesianPosition(state.T_base_tool_c, psi, finished=t >= 0.005), mode="cartesian_position"
+    )
+    assert peer.commands
+
+
 @pytest.mark.parametrize(
     ("bad", "hint"),
     [
@@ -231,9 +248,9 @@ def test_a_fault_of_a_cartesian_motion_is_told_with_its_numbers(make_robot):
 
 def test_commands_of_every_kind_are_on_record(make_robot, tmp_path):
     _, robot = make_robot()
-    run = robot.control(lambda state, t: CartesianPosition(np.eye(4), 0.25, t >= 0.02), "cartesian_impedance")
+    run = robot.control(lambda state, t: CartesianPosition(np.eye(4), 0.25 * t, t >= 0.02), "cartesian_impedance")
     assert np.array_equal(run.command_pose, np.broadcast_to(np.eye(4), (len(run.t), 4, 4)))
-    assert (run.command_psi == 0.25).all()
+    assert np.array_equal(run.command_psi, 0.25 * np.minimum(run.t, 0.02))
     assert np.isnan(run.command).all()
     run.save(tmp_path / "run.csv")
     assert len((tmp_path / "run.csv").read_text().splitlines()) == len(run.t) + 1
