@@ -45,6 +45,7 @@ class SignalsPanel:
             on_press(read, ask, lambda page: requests.PressSignals(page=page, what="read"))
             self._buttons.append(read)
             self._levels = Html(gui)
+            gui.add_html(f'<p class="rl-note">{esc(text("signals.note"))}</p>')
             wired = gui.add_checkbox(text("signals.loop_back"), False, hint=text("signals.loop_back_hint"))
             self._wired = Linked(wired, ask, lambda v, p: requests.SetWiring(page=p, name="loop_back", on=bool(v)))
         with gui.add_folder(text("reboot.title"), expand_by_default=False):
@@ -78,15 +79,15 @@ def levels_html(status: SupervisorStatus, text: Text) -> str:
     """Returns the outputs as set and the inputs as read last."""
     inputs = status.inputs or (None,) * len(SIGNALS)
     rows = "".join(
-        f"<tr><th>DO{name}</th><td>{esc(_level(out, text, 'unset'))}</td>"
-        f"<th>DI{name}</th><td>{esc(_level(level, text, 'unread'))}</td></tr>"
+        f"<tr><th>DO{name}</th><td>{esc(_level(out, text))}</td>"
+        f"<th>DI{name}</th><td>{esc(_level(level, text))}</td></tr>"
         for name, out, level in zip(_NAMES, status.outputs, inputs, strict=True)
     )
     return f'<table class="rl-table rl-facts-table">{rows}</table>'
 
 
-def _level(level: bool | None, text: Text, unknown: str) -> str:
-    return text(f"signals.{unknown}" if level is None else "signals.on" if level else "signals.off")
+def _level(level: bool | None, text: Text) -> str:
+    return "—" if level is None else text("signals.on" if level else "signals.off")
 
 
 def _press(what: Any):  # type: ignore[no-untyped-def]

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class SoftLimitsPanel:
-    """A group of the Setup tab: two numbers a joint."""
+    """Two groups of the Setup tab: two numbers a joint, and what happens at them."""
 
     def __init__(self, text: Text, ask: Ask) -> None:
         self._text, self._ask = text, ask
@@ -40,6 +40,7 @@ class SoftLimitsPanel:
             self._problems = Html(gui)
             self._whole = gui.add_button(text("softlimits.whole"), icon="restore", color="gray")
             on_press(self._whole, ask, lambda page: requests.PressSetup(page=page, what="whole"))
+        with gui.add_folder(text("softlimits.beyond"), expand_by_default=False):
             auto = gui.add_checkbox(text("softlimits.auto"), False, hint=text("softlimits.auto_hint"))
             self._auto = Linked(auto, ask, lambda v, p: requests.SetWiring(page=p, name="auto_limit", on=bool(v)))
             gui.add_html(f'<p class="rl-note">{esc(text("softlimits.note"))}</p>')
