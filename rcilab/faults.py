@@ -117,7 +117,11 @@ _GAINS = (
     "is light"
 )
 
+_BOX = "keep the tool inside the safety box; a motion that starts outside it may only lead into it"
+
 _REMEDIES = {
+    Fault.ACTUAL_CARTESIAN_POSITION_LIMITS_VIOLATION: _BOX,
+    Fault.COMMAND_CARTESIAN_POSITION_LIMITS_VIOLATION: _BOX,
     Fault.COLLISION: "look for contact; if it fires without contact, raise the collision thresholds "
     "(an emergency stop can also raise this bit)",
     Fault.CARTESIAN_POSITION_MOTION_GENERATOR_INVALID_FRAME: "keep Cartesian motions away from singular poses",

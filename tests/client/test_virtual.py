@@ -24,6 +24,7 @@ from rcilab.model import load_model
 from rcilab.motion import plan_joint
 from rcilab.protocols.rci import CommandCode, RecoveryStatus, SafetyStop, SettingStatus
 from rcilab.protocols.rci.statuses import WHILE_MOVING
+from rcilab.safety_box import SafetyBox
 from rcilab.spatial import Pose
 from rcilab.state import RobotMode
 from rcilab.supervisor.simulate import simulate
@@ -301,3 +302,30 @@ def test_the_joint_gains_of_the_readme_are_stable_and_others_get_advice_on_gains
             ) as caught:
                 robot.control(follow, "torque")
             assert "planned motion" not in str(caught.value)
+
+
+@pytest.mark.parametrize("way", ["execute", "control"])
+def test_from_outside_its_box_the_tool_may_only_be_led_in(way):
+    model = load_model("xMatePro7")
+    with simulate(model) as robot:
+        robot.power_on()
+        q = robot.state.q_c
+        below = model.forward(q).position - [0.0, 0.0, 0.06]
+        robot.set_cartesian_limit(SafetyBox(size=(0.04, 0.04, 0.04), T_base_box=Pose(below)))
+        lead_in, lead_out = (plan_joint(model, q, q + turn * np.eye(7)[3]) for turn in (0.02, -0.02))
+        if way == "execute":
+            with pytest.raises(ConformanceError, match="outside the safety box"):
+                robot.execute(lead_out)
+            robot.execute(lead_in)
+            return
+
+        def play(motion):
+            rows = [*motion.q, motion.q[-1]]
+            last = len(rows) - 1
+            return robot.control(
+                lambda state, t: JointPosition(rows[min(round(t * 1e3), last)], round(t * 1e3) >= last)
+            )
+
+        play(lead_in)
+        with pytest.raises(ControlError, match="a motion that starts outside it may only lead into it"):
+            play(plan_joint(model, robot.state.q_c, q))
