@@ -134,6 +134,22 @@ def bench_program() -> Measurement:
     return summarise("program", times, "ms", 200.0, note)
 
 
+def bench_program_close() -> Measurement:
+    """A program of 1000 waypoints a few mm apart, every blend shortened, planned as one motion; growth in the note."""
+    model = load_model(_ROBOT)
+    plan_program(model, close_program_of(model, 20))  # The first one loads the planner.
+    medians: dict[int, list[float]] = {
+        count: time_calls(lambda steps: plan_program(model, steps), [close_program_of(model, count)] * 3, warm_up=0)
+        for count in (250, 500, 1000)
+    }
+    program = close_program_of(model, 1000)
+    gentle = time_calls(lambda steps: plan_program(model, steps, law="torque_rate_limited"), [program], warm_up=0)
+    growth = ", ".join(f"{count} waypoints {np.median(times):.2f} s" for count, times in medians.items())
+    note = f"{_ROBOT}, lines of 4 mm at speed 0.5, blends of 10 mm asked for; {growth}; torque_rate_limited, which the "
+    note += f"page plans programs with: 1000 waypoints {gentle[0]:.2f} s"
+    return summarise("program_close", medians[1000], "s", 3.0, note)
+
+
 def bench_check() -> Measurement:
     """The judgement of a 7-joint motion of 10 s while somebody drags: all but collisions."""
     model = load_model(_ROBOT)
@@ -234,6 +250,22 @@ def program_of(model: RobotModel, count: int) -> Program:
         else:
             waypoints.append(Waypoint.line(place(x, y, height, turn), speed=0.5, blend=0.02))
     return Program(model=model.name, start=tuple(model.home.tolist()), waypoints=tuple(waypoints))
+
+
+def close_program_of(model: RobotModel, count: int) -> Program:
+    """Returns a program of lines to waypoints a few millimetres apart, on a zigzag around a rising circle.
+
+    Args:
+        model: The arm.
+        count: Number of waypoints; 100 go once round.
+    """
+    T = model.forward(model.home)
+    places = (
+        T.position + (0.05 * (np.cos(turn) - 1.0), 0.05 * np.sin(turn), -5e-5 * i + 2e-3 * (i % 2))
+        for i, turn in enumerate(np.arange(1, count + 1) * 2.0 * np.pi / 100.0)
+    )
+    waypoints = tuple(Waypoint.line(Pose(place, T.wxyz), speed=0.5, blend=0.01) for place in places)
+    return Program(model=model.name, start=tuple(model.home.tolist()), waypoints=waypoints)
 
 
 def motion_of(model: RobotModel, duration: float, start: Array | None = None) -> Motion:

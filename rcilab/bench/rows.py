@@ -27,6 +27,7 @@ ROWS = MappingProxyType(
         "feasible_arcs": "compute",
         "plan_joint": "compute",
         "program": "compute",
+        "program_close": "compute",
         "check": "compute",
         "check_full": "compute",
         "check_joint_rows": "compute",
