@@ -42,6 +42,8 @@ def test_an_offset_at_the_start_is_absorbed_within_the_limits(make_hand, plant, 
         assert hand.state.q_c[1] - start[1] == pytest.approx(offset, abs=1e-12)
     q_c = np.array([state.q_c for state in hand.states[first - 1 :]])
     limits = hand.model.limits.joint
+    measured = np.array([state.q for state in hand.states[first - 1 :]])
+    assert (np.abs(np.diff(measured, 2, axis=0)) <= limits.acceleration * 1e-6).all()
     if offset > 1e-5:
         assert (np.abs(np.diff(q_c, 2, axis=0)) <= 0.2 * limits.acceleration * 1e-6).all()
         assert (np.abs(np.diff(q_c, 3, axis=0)) <= 0.2 * limits.jerk * 1e-9).all()
