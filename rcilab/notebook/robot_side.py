@@ -34,7 +34,8 @@ class Outcome:
     """What came of something that was asked for."""
 
     what: str
-    """"execute", "cell", "pace", "control", "power_on", "power_off", "recover" or "connect"; cell: a motion of one."""
+    """"execute", "cell", "pace", "control", "power_on", "power_off", "recover", "output", "inputs", "reboot" or
+    "connect"; cell: a motion of one."""
     run: Run | None = None
     error: RcilabError | None = None
 
@@ -91,6 +92,18 @@ class RobotSide(Protocol):
         Raises:
             UsageError: The arm moves, or something else is under way.
         """
+        ...
+
+    def set_output(self, signal: int, level: bool) -> None:
+        """Sets a digital output, 0 to 5, and reads the inputs; the status shows both."""
+        ...
+
+    def read_inputs(self) -> None:
+        """Reads the digital inputs; the status shows them."""
+        ...
+
+    def reboot(self) -> None:
+        """Restarts the controller; the connection ends with it."""
         ...
 
     def set_pace(self, pace: float) -> None:
@@ -184,6 +197,18 @@ class SupervisedRobot:
     def set_control(self, control: ControlSettings) -> None:
         """Tells the controller parameters of the modes."""
         self._tickets.append(("control", self._supervisor.set_up(RobotSetup(control=control))))
+
+    def set_output(self, signal: int, level: bool) -> None:
+        """Sets a digital output."""
+        self._tickets.append(("output", self._supervisor.set_output(signal, level)))
+
+    def read_inputs(self) -> None:
+        """Reads the digital inputs."""
+        self._tickets.append(("inputs", self._supervisor.read_inputs()))
+
+    def reboot(self) -> None:
+        """Restarts the controller; Recover makes another connection once it is up."""
+        self._tickets.append(("reboot", self._supervisor.reboot()))
 
     def set_pace(self, pace: float) -> None:
         """Runs the motion under way at part of its planned speed; 0 holds it."""

@@ -22,6 +22,7 @@ from rcilab.notebook.ready import obstacle
 from rcilab.notebook.robot_side import Outcome, RobotSide, SupervisedRobot
 from rcilab.notebook.robot_words import health_html, name_phase, outcome_html, tell_refusal, tell_trouble
 from rcilab.notebook.session_robot import SessionRobot
+from rcilab.notebook.signal_fields import SignalFields
 from rcilab.posing.readiness import ask_to_move
 from rcilab.supervisor import SupervisorStatus
 from rcilab.supervisor.supervisor import VIRTUAL
@@ -81,6 +82,7 @@ class RunPanel(Part):
         self.pace = PaceFields(self.state, text, self._pacing)
         self._desk = ParameterDesk(self.state)
         self.modes = ModeFields(self.state, text, self._desk)
+        self.signals = SignalFields(text, lambda: self._robot, self._button)
         self._answers = lean(ipywidgets.HBox, [self.yes, self.no], layout=ipywidgets.Layout(display="none"))
         self._choice = lean(ipywidgets.VBox, [self.target, self.address], layout=ipywidgets.Layout())
         self.build([
@@ -98,6 +100,7 @@ class RunPanel(Part):
             self.progress,
             self._outcome,
             self.modes.parameters,
+            self.signals.folder,
             self._health,
         ], min_width="360px")  # fmt: skip
         self.target.observe(lambda _: self._show(), names="value")
@@ -256,6 +259,7 @@ class RunPanel(Part):
         self._show_progress(status, is_moving)
         self.pace.show(status)
         self.modes.show(status)
+        self.signals.show(status)
         write(self._health, "" if status is None else health_html(status, text))
 
     def _name_robot(self, robot: RobotSide) -> str:

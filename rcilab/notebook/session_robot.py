@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+from rcilab.client.commands import SIGNALS
 from rcilab.client.control_settings import ControlSettings, give_control
 from rcilab.client.setup import RobotSetup
 from rcilab.errors import ConnectionLostError, RcilabError, UsageError
@@ -46,6 +47,8 @@ class SessionRobot:
         self._deafen = session.hear_runs(self._hear_run)
         self._powered: bool | None = None
         self._held = RobotSetup()  # What it was told from here.
+        self._inputs: tuple[bool, ...] | None = None
+        self._outputs: tuple[bool | None, ...] = (None,) * len(SIGNALS)  # What was set from here.
         self._power_seen = float("-inf")
         self._last = SupervisorStatus(phase="connecting", code="connecting", target=self.name)
         self._looked = float("-inf")
@@ -104,6 +107,8 @@ class SessionRobot:
             rate_hz=1000.0,
             message_id=state.message_id,
             setup=self._held,
+            inputs=self._inputs,
+            outputs=self._outputs,
             **_tell_way(way),
         )
 
@@ -129,6 +134,27 @@ class SessionRobot:
             self._held = self._held.updated(RobotSetup(control=control))
 
         self._do("control", tell)
+
+    def set_output(self, signal: int, level: bool) -> None:
+        """Sets a digital output."""
+
+        def tell() -> None:
+            self._session.set_do(signal, level)
+            self._outputs = (*self._outputs[:signal], level, *self._outputs[signal + 1 :])
+            self._read()
+
+        self._do("output", tell)
+
+    def read_inputs(self) -> None:
+        """Reads the digital inputs."""
+        self._do("inputs", self._read)
+
+    def reboot(self) -> None:
+        """Restarts the controller, which closes the session."""
+        self._do("reboot", self._session.reboot)
+
+    def _read(self) -> None:
+        self._inputs = tuple(self._session.get_di(signal) for signal in SIGNALS)
 
     def set_pace(self, pace: float) -> None:
         """Runs the motion under way at part of its planned speed; 0 holds it."""

@@ -245,3 +245,21 @@ def test_an_address_that_is_none_is_refused_beside_the_button() -> None:
         panel.connect.click()
         assert "rl-problem" in panel._outcome.value
         assert panel.state.robot is None
+
+
+@pytest.mark.parametrize("is_own", [True, False])
+def test_outputs_and_inputs_are_shown_and_a_restart_is_asked_about(is_own: bool) -> None:
+    with ExitStack() as stack:
+        subject = PRO7 if is_own else stack.enter_context(rcilab.simulate(PRO7))
+        panel = stack.enter_context(notebook.RunPanel(subject))
+        if is_own:
+            panel.connect.click()
+        wait_for(lambda: phase(panel) == "idle", "a robot")
+        signals = panel.signals
+        signals.output.value = 4
+        signals.on.click()
+        wait_for(lambda: panel.state.status.outputs[4] is True and panel.state.status.inputs == (False,) * 6, "levels")
+        signals.reboot.click()
+        assert phase(panel) == "idle"
+        signals.yes.click()
+        wait_for(lambda: phase(panel) in ("lost", "closed"), "the end of the connection")
