@@ -141,3 +141,33 @@ def test_an_endless_loop_of_impedance_motions_from_the_same_first_pose(make_hand
             assert hand.pose(T).faults == (), str(hand.cycle.reason)
         assert hand.ask(rci.StopMove()) == 0
         hand.step(1000)
+
+
+@pytest.mark.parametrize("plant", ["ideal", "mujoco"])
+@pytest.mark.parametrize("then", POSITION_MODES)
+def test_after_a_push_of_a_few_newtons_the_first_pose_again_moves_the_arm_gently(make_hand, plant, then) -> None:
+    """Under Cartesian impedance 4 N move the tool by 4 mm; then a motion begins where the last one was commanded to."""
+    hand = make_hand(plant=plant)
+    hand.ask(rci.SetMotorPower(1))
+    hand.ask(rci.SetCartesianImpedance((1000.0, 1000.0, 1000.0, 100.0, 100.0, 100.0)))
+    hand.start(3, 2)
+    T, q = hand.state.T_base_tool_c.copy(), hand.state.q_c.copy()
+    for k in range(600):
+        hand.cycle.plant.push((0.0, 4.0 * min(1.0, k / 300.0), 0.0, 0.0, 0.0, 0.0))
+        assert hand.pose(T).faults == ()
+    assert hand.ask(rci.StopMove()) == 0
+    hand.step(200)
+    hand.start(*then)
+    off = abs(hand.state.T_base_tool_c[1, 3] - T[1, 3])
+    first = len(hand.states)
+    for _ in range(600):
+        state = hand.pose(T) if then[1] == 2 else hand.command(q)
+        assert state.faults == (), str(hand.cycle.reason)
+    measured = np.array([state.q for state in hand.states[first - 1 :]])
+    assert 3e-3 < off < 5e-3
+    assert (np.abs(np.diff(measured, 2, axis=0)) <= hand.model.limits.joint.acceleration * 1e-6).all()
+    assert (
+        np.allclose(hand.state.q_c, q, atol=1e-6)
+        if then[1] == 1
+        else np.allclose(hand.state.T_base_tool_c, T, atol=1e-9)
+    )
