@@ -57,4 +57,5 @@ def plan_recovery(model: RobotModel, q: ArrayLike, *, speed: float = RECOVERY_SP
     margin = np.minimum(RECOVERY_MARGIN, (limits.upper - limits.lower) / 2.0)
     goal = np.where(beyond >= 0.0, np.clip(start, limits.lower + margin, limits.upper - margin), start)
     opened = range_from(limits, start)
-    return plan_joint(model.with_joint_limits(opened.lower, opened.upper), start, goal, speed=speed)
+    arm = model.with_joint_limits(opened.lower, opened.upper)
+    return plan_joint(arm, start, goal, speed=speed, law="torque_rate_limited")

@@ -76,7 +76,7 @@ def test_a_torque_too_high_is_advice_with_joint_value_and_way_out_and_the_motion
     assert advice.fault is None
     assert abs(advice.value) > abs(advice.bound)
     assert "torque rate of the motion" in str(advice)
-    assert 'law="s_profile"' in str(advice)
+    assert 'law="torque_rate_limited"' in str(advice)
     assert "(recommended condition)" in str(advice)
 
 

@@ -116,6 +116,7 @@ def test_a_typed_parameter_is_told_acknowledged_and_read_back(idle):
 
 
 def test_the_plan_is_judged_by_the_conditions_of_the_mode(idle):
+    idle.conductor.ask(requests.SetLaw(law="jerk_limited"))
     plan(idle, speed=0.5)
     assert idle.store.state.plan.report.ok
     idle.conductor.ask(requests.SetDrive(mode="torque"))
@@ -128,6 +129,7 @@ def test_the_plan_is_judged_by_the_conditions_of_the_mode(idle):
     idle.conductor.ask(requests.SetDrive(mode="sideways"))
     idle.conductor.ask(requests.SetDrive(mode="joint_position"))
     wait(lambda: idle.store.state.plan.report.ok, "the first judgement again")
+    idle.conductor.ask(requests.SetLaw(law="torque_rate_limited"))
 
 
 def test_paused_gone_on_with_slower_and_recorded_as_it_was(idle):
