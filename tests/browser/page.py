@@ -80,6 +80,7 @@ class BenchPage:
         self.wait(lambda: self.status.phase == "idle" and bool(self.status.powered), "a powered, idle arm", 30.0)
         ask(requests.SetView(name="language", value="en"))
         ask(requests.SetSpeed(speed=0.5))
+        ask(requests.SetLaw(law="torque_rate_limited"))
 
         while True:  # Again when a slider of the last test has only now told what it had to.
             before = self.state.goal

@@ -38,6 +38,7 @@ def test_a_fault_is_provoked_beside_the_robot_and_shown_at_its_moment(page):
 
 
 def test_a_row_leads_to_its_moment_and_a_slow_down_can_be_taken_back(page):
+    page.bench.conductor.ask(requests.SetLaw(law="jerk_limited"))  # The law that leaves torque rates out.
     page.plan_to(1, 40)
     page.open_tab("Check")
     page.wait(lambda: page.state.plan is not None and page.state.plan.complete, "a complete check")

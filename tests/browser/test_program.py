@@ -73,7 +73,7 @@ def test_a_program_is_written_by_keyboard_planned_saved_and_loaded(writing, tmp_
     page.wait(lambda: page.alerts() == [], "no complaint any more")
     page.button("Show as Python").click()
     page.wait(
-        lambda: "rcilab.plan_program(model, program)" in page.tab.locator(".rl-code pre").inner_text(), "a script"
+        lambda: "rcilab.plan_program(model, program, law=" in page.tab.locator(".rl-code pre").inner_text(), "a script"
     )
 
 
