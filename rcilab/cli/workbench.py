@@ -42,7 +42,11 @@ def add_page_options(parser: argparse.ArgumentParser) -> None:
         help="folder that every motion is recorded in, cycle by cycle (default: %(default)s)",
     )
     parser.add_argument("--language", choices=("en", "zh"), default="en", help="language of the page")
-    parser.add_argument("--quality", choices=("full", "light"), default="full", help="light: for software rendering")
+    parser.add_argument(
+        "--quality",
+        choices=("full", "light"),
+        help="light: for software rendering; full, or light where the browser has no graphics card, when left out",
+    )
 
 
 def run(args: argparse.Namespace) -> int:

@@ -77,7 +77,7 @@ def furnish(server: viser.ViserServer, *, full: bool, dark: bool = False) -> Non
     scene.configure_default_lights(True, cast_shadow=full)
     scene.configure_environment_map("studio" if full else None, environment_intensity=0.55)
     scene.set_background_image(_backdrop(dark), format="jpeg", jpeg_quality=92)
-    scene.add_light_ambient("/light", intensity=(0.22 if dark else 0.3) if full else 1.1)
+    scene.add_light_ambient("/light", intensity=(0.22 if dark else 0.3) if full else 1.6)
     scene.add_grid(
         "/ground",
         width=4.0,

@@ -45,7 +45,8 @@ class WorkbenchConfig:
     """0 takes any free port."""
     token: str | None = None
     language: str = "en"
-    quality: str = "full"
+    quality: str | None = None
+    """"full" or "light"; None is full, or light where the browser draws without a graphics card."""
     runs: Path | None = None
     """Folder that every motion is recorded in, cycle by cycle; None keeps the last one in memory only."""
     replay: Run | None = None
@@ -73,7 +74,14 @@ class Workbench:
         self.port: int = self._bound.getsockname()[1]
         """Port the page is served on."""
         goal = initial_goal(model, model.home)
-        state = UiState(model=model, target=config.target, goal=goal, language=config.language, quality=config.quality)
+        state = UiState(
+            model=model,
+            target=config.target,
+            goal=goal,
+            language=config.language,
+            quality=config.quality or "full",
+            is_quality_chosen=config.quality is not None,
+        )
         if replay is not None:
             state = replayed(state, replay)
         self.store = Store(replace(state, runs=config.runs))
@@ -110,6 +118,7 @@ class Workbench:
                 take=lambda page: ask(requests.TakeControls(page=page)),
                 answer=lambda page, yes: ask(requests.AnswerControls(page=page, yes=yes)),
                 home=self._bring_back,
+                software=lambda page: ask(requests.DrawInSoftware(page=page)),
             )
         )
         gate = Gate(host=self._config.host, port=self.port, token=self._config.token, title="this workbench")

@@ -95,6 +95,7 @@ class Conductor:
             requests.DragElbow: self._scene.drag_elbow,
             requests.Peek: self._scene.peek,
             requests.Enter: self._view.enter,
+            requests.DrawInSoftware: self._view.draw_in_software,
             requests.OpenTab: self._setup.open_tab,
             requests.ShowBead: self._scene.show_bead,
             requests.ShowExtra: self._scene.show_extra,

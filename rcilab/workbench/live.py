@@ -41,6 +41,8 @@ class Heard:
     """A page wants the controls."""
     answer: Callable[[int, bool], None]
     """A page was asked for the controls."""
+    software: Callable[[int], None] = lambda page: None
+    """A page's browser draws without a graphics card."""
     home: Callable[[int], None] = lambda page: None
     """A page wants its camera back where it was at first."""
 
@@ -118,6 +120,8 @@ class LiveChannel:
             _pass_on(said.get("index"), 0.0, 99.0, lambda index: self._heard.tab(page, int(index)))
         elif kind == "take":
             self._heard.take(page)
+        elif kind == "software":
+            self._heard.software(page)
         elif kind == "home":
             self._heard.home(page)
         elif kind == "answer" and isinstance(said.get("yes"), bool):

@@ -136,6 +136,11 @@ class Enter(Request):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class DrawInSoftware(Request):
+    """The browser has no graphics card to draw with."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class OpenTab(Request):
     """Another tab was opened."""
 

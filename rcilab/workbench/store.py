@@ -168,6 +168,8 @@ class UiState:
     units: Units = USUAL
     """What angles and lengths are shown and typed in; nothing is kept in them."""
     quality: str = "full"
+    is_quality_chosen: bool = False
+    """Whether the operator chose it; otherwise a browser without a graphics card makes it "light"."""
     theme: Theme = "light"
     height: float = 800.0
     """Height of the newest page's window, [px]: the plots fill it."""

@@ -79,6 +79,13 @@ class ViewActions:
             self._store.update(units=replace(self._store.state.units, length=value))
         elif known.get(request.name, False):
             self._store.update(**{request.name: value})
+            if request.name == "quality":
+                self._store.update(is_quality_chosen=True)
+
+    def draw_in_software(self, request: requests.DrawInSoftware) -> None:
+        """Draws lightly for a browser without a graphics card, unless the operator chose otherwise."""
+        if not self._store.state.is_quality_chosen:
+            self._store.update(quality="light")
 
     def show_plot(self, request: requests.ShowPlot) -> None:
         """Shows or hides a plot."""

@@ -46,3 +46,23 @@ def test_without_a_connection_the_arm_is_translucent_and_nothing_is_called_passe
         bench.session.open(bench.store.state.model, target, bench.store.state.plant)
         wait_for(lambda: bench.session.is_ready, "the connection", 30.0)
     wait_for(lambda: tab.evaluate(opacity) == 1.0, "a solid arm again", 20.0, tab)
+
+
+def test_a_browser_without_a_graphics_card_draws_lightly_and_a_change_of_graphics_loads_the_page_again(
+    chromium, tmp_path
+) -> None:
+    from rcilab.workbench import requests
+    from rcilab.workbench.app import Workbench, WorkbenchConfig
+
+    drawn = "document.documentElement.dataset.rlReady !== undefined && document.documentElement.dataset.rlQuality"
+    context = chromium.new_context(viewport={"width": 640, "height": 480})
+    try:
+        with Workbench(WorkbenchConfig(port=0, runs=tmp_path)) as bench:
+            tab = context.new_page()
+            tab.goto(f"{bench.url}?fixedDpr=0.2")
+            wait_for(lambda: tab.evaluate(drawn) == "light", "light graphics", 40.0, tab)
+            for quality in ("full", "light"):
+                bench.conductor.ask(requests.SetView(name="quality", value=quality))
+                wait_for(lambda wanted=quality: tab.evaluate(drawn) == wanted, f"{quality} graphics", 40.0, tab)
+    finally:
+        context.close()

@@ -51,6 +51,7 @@
   };
 
   const build = () => {
+    if (recall("quality") === document.documentElement.dataset.rlQuality) keep("quality", null);  // It worked.
     bar = document.createElement("div");
     bar.id = "rl-bar";
     bar.innerHTML = '<div id="rl-brand"><svg viewBox="0 0 24 24" fill="none" stroke="#5ab0ff" stroke-width="2.6" ' +
@@ -111,7 +112,14 @@
     greet();
     window.dispatchEvent(new CustomEvent("rl-me", { detail: me }));
   };
-  const greet = () => { if (me) { send({ kind: "hello", ...me }); hold(); } };
+  let software = null;  // Whether the browser draws without a graphics card.
+  const greet = () => {
+    if (!me) return;
+    send({ kind: "hello", ...me });
+    if (software === null) software = drawsInSoftware();
+    if (software) send({ kind: "software" });
+    hold();
+  };
 
   // Who holds the controls: the others can ask for them, and the holder is asked.
   const hold = () => {
@@ -166,6 +174,8 @@
     // Another workbench answers at this address: viser's panels are those of the one that is gone.
     if (news.server && said.server && news.server !== said.server) { location.reload(); return; }
     Object.assign(said, news);
+    // Smoothed edges and shadows are decided when a page is loaded: viser's arm is not drawn without them afterwards.
+    if (news.quality && news.quality !== document.documentElement.dataset.rlQuality) { reloadFor(news.quality); return; }
     if ("stop" in news || "stopHint" in news || "homeHint" in news) label();
     if (news.chips) draw(news.chips);
     if (news.notice && news.notice.serial !== notice) {
@@ -181,6 +191,19 @@
     if (news.viser) document.documentElement.dataset.rlViser = news.viser;
     if (news.theme) document.documentElement.dataset.rlTheme = news.theme;
     if (news.language) document.documentElement.lang = news.language;
+  };
+
+  // Once for a quality: a page that comes back as it was, from a cache, say, does not go round and round.
+  const reloadFor = (quality) => {
+    if (recall("quality") === quality) return;  // Tried before.
+    keep("quality", quality);
+    location.reload();
+  };
+  const drawsInSoftware = () => {
+    const gl = document.createElement("canvas").getContext("webgl2"), info = gl && gl.getExtension("WEBGL_debug_renderer_info");
+    const name = info ? gl.getParameter(info.UNMASKED_RENDERER_WEBGL) : "";
+    if (gl) gl.getExtension("WEBGL_lose_context")?.loseContext();
+    return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(name);
   };
 
   const connect = () => {

@@ -34,6 +34,7 @@ def status_values(state: UiState, status: SupervisorStatus, text: Text, cursor_e
         "home": text("bar.home"),
         "homeHint": text("bar.home_hint"),
         "lost": text("bar.lost"),
+        "quality": state.quality,
         "software": text("bar.software") if state.quality == "full" else "",
         "chips": _chips(state, status, text),
         "cursor": _cursor(state, status, cursor_end),
