@@ -26,6 +26,7 @@ from rcilab.workbench.run.export_actions import Deliver, ExportActions
 from rcilab.workbench.run.folder_actions import FolderActions
 from rcilab.workbench.run.mode_actions import ModeActions
 from rcilab.workbench.run.push_actions import PushActions
+from rcilab.workbench.run.readiness import is_moving
 from rcilab.workbench.run.signal_actions import SignalActions
 from rcilab.workbench.run.where_actions import WhereActions
 from rcilab.workbench.run.world_actions import WorldActions
@@ -182,10 +183,15 @@ class Conductor:
         """Carries out one request; what goes wrong becomes a sentence on the page."""
         lease = self._store.state.lease
         if not requests.is_harmless(request) and not lease.allows(request.page) and not _is_stop(request):
+            if isinstance(request, requests.OpenTab | requests.DrawInSoftware):
+                return  # Nothing was pressed.
             code = "lease.free" if lease.holder is None else "notice.watching"
             self._refused_for = lease.holder
             said = message(code, page=lease.number(lease.holder))
             self._store.say("warn", said, page=request.page, trouble="lease")
+            return
+        if _reloads_pages(request) and is_moving(self._session.status()):
+            self._store.say("warn", message("ready.moving"), page=request.page)
             return
         self._guard(lambda: self._actions[type(request)](request))
 
@@ -290,3 +296,9 @@ def _coalescing_key(request: requests.Request) -> str | None:
 
 def _is_stop(request: requests.Request) -> bool:
     return isinstance(request, requests.Drive) and request.what == "stop"
+
+
+def _reloads_pages(request: requests.Request) -> bool:
+    """Returns whether pages load themselves again for a request; a motion would stop for want of a page."""
+    is_graphics = isinstance(request, requests.SetView) and request.name == "quality"
+    return is_graphics or isinstance(request, requests.DrawInSoftware)

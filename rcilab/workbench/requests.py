@@ -520,5 +520,7 @@ def is_harmless(request: Request) -> bool:
 
     To look at the moment of a row, or of a fault on show, is like seeking: timeline and scene are one for all pages.
     """
+    if isinstance(request, SetView) and request.name == "quality":
+        return False  # Every page loads itself again for it.
     looks = {Check: ("row",), Learn: ("moment",)}.get(type(request), ())
     return isinstance(request, Harmless) or getattr(request, "what", None) in looks

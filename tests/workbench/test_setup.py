@@ -213,6 +213,7 @@ def test_handles_belong_to_the_tab_that_is_open(bench, ask):
 
 
 def test_a_face_of_the_box_follows_its_handle_and_cannot_pass_the_other(bench, ask):
+    ask(requests.SetSetup(name="edited", value="box"))
     low = faces(wanted(bench).box)
     ask(requests.ResizeBox(face=3, hand=(0.5, 9.0, 9.0), ended=True))
     assert faces(wanted(bench).box) == pytest.approx([*low[:3], 0.5, *low[4:]])

@@ -148,7 +148,7 @@ class SetupActions:
         """Follows a handle on a face of the safety box; the other faces stay."""
         setup = self._store.state.setup
         box = setup.wanted.box
-        if box is None or request.face not in range(6) or not np.isfinite(request.hand).all():
+        if box is None or setup.edited != "box" or request.face not in range(6) or not np.isfinite(request.hand).all():
             return
         bounds = faces(box)
         axis, opposite = request.face % 3, (request.face + 3) % 6
