@@ -19,21 +19,22 @@ class JointPosition:
     """True on the last command of a motion."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, init=False)
 class CartesianPosition:
-    """Commanded pose of the tool in the base frame."""
+    """Commanded pose of the tool in the base frame; made from a `Pose` or a homogeneous transform."""
 
     T_base_tool: Matrix
-    """Homogeneous transform, shape (4, 4), [m]; a `Pose` becomes one."""
+    """Homogeneous transform, shape (4, 4), [m]."""
     psi: float | None = None
     """Arm angle, [rad]; None leaves it to the controller."""
     finished: bool = False
     """True on the last command of a motion."""
 
-    def __post_init__(self) -> None:
-        """Takes a pose for its matrix."""
-        if isinstance(self.T_base_tool, Pose):
-            object.__setattr__(self, "T_base_tool", self.T_base_tool.matrix)
+    def __init__(self, T_base_tool: Pose | Matrix, psi: float | None = None, finished: bool = False) -> None:
+        T = T_base_tool.matrix if isinstance(T_base_tool, Pose) else T_base_tool
+        object.__setattr__(self, "T_base_tool", T)
+        object.__setattr__(self, "psi", psi)
+        object.__setattr__(self, "finished", finished)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from struct import Struct
 from typing import Any, TypeAlias, overload
 
 import numpy as np
@@ -27,6 +28,7 @@ PERPENDICULAR_TOLERANCE = 1e-4
 """How large the cosine of the angle between two rows may be. The vendor's client does not look at it; a choice: a
 rotation that was written down with five decimals passes."""
 
+_NUMBERS = Struct("<16d")
 _SHORTEST, _LONGEST = (1.0 - UNIT_TOLERANCE) ** 2, (1.0 + UNIT_TOLERANCE) ** 2  # Of lengths squared.
 _EXACT = 1e-12
 """A rotation that is off by no more is taken as it is; one that is off by more is made one."""
@@ -147,6 +149,10 @@ class Pose:
             r[6], r[7], r[8], p[2],
             0.0, 0.0, 0.0, 1.0,
         )  # fmt: skip
+
+    def tobytes(self) -> bytes:
+        """Returns those numbers as they travel and are recorded: 16 little-endian doubles."""
+        return _NUMBERS.pack(*self.as_row_major())
 
     def inverse(self) -> Pose:
         """Returns the pose of a in b."""

@@ -12,9 +12,10 @@ from enum import IntEnum
 from math import degrees
 from typing import Any, Literal, TypeAlias, get_args
 
-from rcilab.arrays import Array, JointVector, Matrix, described
+from rcilab.arrays import Array, JointVector, described
 from rcilab.errors import InvalidValueError
 from rcilab.faults import Fault
+from rcilab.spatial import Pose
 
 Mode: TypeAlias = Literal["joint_position", "joint_impedance", "cartesian_position", "cartesian_impedance", "torque"]
 """How a motion is commanded: the members of `ControllerMode` that move the arm, in small letters."""
@@ -70,10 +71,10 @@ class RobotState:
     """Commanded joint velocities, [rad/s]."""
     ddq_c: JointVector
     """Commanded joint accelerations, [rad/s^2]."""
-    T_base_tool: Matrix
-    """Pose of the tool in base, (4, 4), [m] (manual: toolTobase_pos_m)."""
-    T_base_tool_c: Matrix
-    """Commanded pose of the tool in base, (4, 4), [m]."""
+    T_base_tool: Pose
+    """Pose of the tool in base, [m] (manual: toolTobase_pos_m)."""
+    T_base_tool_c: Pose
+    """Commanded pose of the tool in base, [m]."""
     tool_velocity_c: Array
     """Commanded twist of the tool in base axes, linear first, (6,), [m/s, rad/s]."""
     tool_acceleration_c: Array

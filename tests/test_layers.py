@@ -25,6 +25,7 @@ LAYERS = [  # From the bottom. A part imports from lines below its own, and from
         "command",
         "state",
         "spatial",
+        "reported_pose",
         "realtime",
         "awake",
         "one_core",

@@ -67,7 +67,7 @@ def require_first(command: Command, state: RobotState, limits: Limits) -> None:
                 "begin with state.q_c",
             )
     elif isinstance(command, CartesianPosition):
-        off = float(np.abs(command.T_base_tool - state.T_base_tool_c).max())
+        off = float(np.abs(command.T_base_tool - state.T_base_tool_c.matrix).max())
         if off > START_TOLERANCE:
             raise InvalidValueError(
                 "first command",
@@ -108,7 +108,7 @@ def distance_to(state: RobotState, command: Command) -> float:
         off = float(np.abs(state.q_c - command.q).max())
         return 0.0 if off <= _ARRIVED else off
     if isinstance(command, CartesianPosition):
-        off = float(np.abs(state.T_base_tool_c - command.T_base_tool).max())
+        off = float(np.abs(state.T_base_tool_c.matrix - command.T_base_tool).max())
         return 0.0 if off <= _POSE_ARRIVED else off
     return 0.0
 
@@ -120,7 +120,7 @@ def describe_distance(state: RobotState, command: Command) -> str:
         joint = int(off.argmax())
         return f"joint {joint + 1} is {math.degrees(off[joint]):.4g} deg"
     assert isinstance(command, CartesianPosition)  # Torques are always there.
-    length = float(np.linalg.norm(state.T_base_tool_c[:3, 3] - command.T_base_tool[:3, 3]))
+    length = float(np.linalg.norm(state.T_base_tool_c.position - command.T_base_tool[:3, 3]))
     return f"the tool is {1e3 * length:.4g} mm"
 
 

@@ -35,6 +35,7 @@ from rcilab.controller.settings import Settings
 from rcilab.controller.tool import ToolMotion
 from rcilab.faults import Fault
 from rcilab.model import RobotModel
+from rcilab.reported_pose import ReportedPose
 from rcilab.spatial import Rotation9
 from rcilab.state import ControllerMode, MotionGeneratorMode, RobotMode, RobotState, build_state
 
@@ -148,8 +149,8 @@ class StateReporter:
             measured.dq,
             dq_c,
             ddq_c,
-            tool.matrix,
-            tool_c.matrix,
+            ReportedPose(tool.matrix),
+            ReportedPose(tool_c.matrix),
             tool_rates_c[:6],
             tool_rates_c[6:],
             tool.psi,

@@ -101,7 +101,7 @@ def _swing(scene: Scene) -> Callback:
 
 
 def _turn(scene: Scene) -> Callback:
-    axis = scene.start.T_base_tool[:3, 2]
+    axis = scene.start.T_base_tool.rotation[:, 2]
     return pushed(scene, _ramp((0.0, 0.0, 0.0, *axis.tolist()), 5.0, 0.12), tool=True)
 
 
@@ -111,7 +111,7 @@ def _throw(scene: Scene) -> Callback:
 
 
 def _twist(scene: Scene) -> Callback:
-    axis = scene.start.T_base_tool[:3, 2]
+    axis = scene.start.T_base_tool.rotation[:, 2]
     return pushed(scene, lambda since: (0.0, 0.0, 0.0, *(1.8 * axis).tolist()), tool=True)
 
 

@@ -55,14 +55,14 @@ def joint_stream(start: Array, joint: int, way: Array) -> Callback:
     return callback
 
 
-def tool_stream(start: Array, offset: Callable[[float], tuple[Array, Array]], way: Array, psi: float) -> Callback:
+def tool_stream(start: Pose, offset: Callable[[float], tuple[Array, Array]], way: Array, psi: float) -> Callback:
     """Returns a callback that moves and turns the tool along a way: `offset` gives translation and rotation vector."""
     held = None if np.isnan(psi) else psi
 
     def callback(state: RobotState, t: float) -> CartesianPosition:
         cycle = round(t / CYCLE_TIME)
         shift, turn = offset(float(way[min(cycle, len(way) - 1)]))
-        T = np.array(start)
+        T = start.matrix
         T[:3, 3] += shift
         T[:3, :3] = T[:3, :3] @ _rotation(turn)
         return CartesianPosition(frozen(T), psi=held, finished=cycle >= len(way))
@@ -93,7 +93,7 @@ def soften_joint_1(scene: Scene) -> Scene:
 def box_around_tool(scene: Scene) -> Scene:
     """Sets a small safety box around the tool."""
     edge = 2.0 * _HALF_BOX
-    box = SafetyBox(size=(edge, edge, edge), T_base_box=Pose(scene.start.T_base_tool_c[:3, 3]), active=True)
+    box = SafetyBox(size=(edge, edge, edge), T_base_box=Pose(scene.start.T_base_tool_c.position), active=True)
     scene.robot.set_cartesian_limit(box)
     return replace(scene, box=box)
 
@@ -146,8 +146,8 @@ def _singular(scene: Scene) -> Callback:
     Cartesian motions cannot go through a stretched arm, whatever their speed.
     """
     T, arm = scene.start.T_base_tool_c, scene.robot.model.description.dh
-    flange = T @ scene.robot.model.T_flange_tool.inverse().matrix
-    wrist = flange[:3, 3] - arm[-1].d * flange[:3, 2]
+    flange = T @ scene.robot.model.T_flange_tool.inverse()
+    wrist = flange.position - arm[-1].d * flange.rotation[:, 2]
     outwards = wrist - np.array([0.0, 0.0, arm[0].d])
     outwards /= np.linalg.norm(outwards)
     way = np.cumsum(np.minimum(np.maximum(np.arange(3000) - _PAUSE, 0) * 1e-8, 1.5e-6))

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from rcilab.arrays import Array, JointVector, Matrix
+from rcilab.arrays import JointVector
 from rcilab.client.address import parse_address
 from rcilab.client.commands import SIGNALS, RciCommands
 from rcilab.client.link import Link
@@ -31,7 +31,7 @@ from rcilab.model import load_model
 from rcilab.motion import plan_stop
 from rcilab.protocols.rci import STATE_SIZE
 from rcilab.realtime import enter_realtime
-from rcilab.spatial import Pose
+from rcilab.spatial import Pose, as_pose
 from rcilab.state import RobotMode, RobotState
 from rcilab.supervisor.guiding import HandGuide
 from rcilab.supervisor.layout import OPERATOR_TIMEOUT, ControlBlock
@@ -68,7 +68,7 @@ class Worker:
         self._next_look = 0.0
         self._model = load_model(self._settings.name, tool=self._settings.T_flange_tool)
         self._guide: HandGuide | None = None
-        self._told: tuple[JointVector, Matrix] | None = None  # Joint angles and pose that the tool was last found from.
+        self._told: tuple[JointVector, Pose] | None = None  # Joint angles and pose that the tool was last found from.
 
     def run(self) -> int:
         """Lives until asked to end or until the supervisor is gone; returns the exit code."""
@@ -148,12 +148,12 @@ class Worker:
     def _show_tool(self, state: RobotState) -> None:
         """Shows the tool that follows from joint angles and pose; at rest both stay, and there is nothing to do."""
         told = (state.q_c, state.T_base_tool_c)
-        if self._told is not None and all(map(_is_same, told, self._told)):
+        if self._told is not None and _is_same(told, self._told):
             return
         self._told = told
         with suppress(InvalidValueError):  # A controller may report no pose before it is ready.
             flange = self._model.pose(state.q_c, "flange")
-            self._publisher.show_tool(flange.inverse() @ Pose.from_matrix(state.T_base_tool_c))
+            self._publisher.show_tool(flange.inverse() @ as_pose(state.T_base_tool_c.matrix))
 
     def _serve(self) -> None:
         while (request := self._letters.take()) is not None:
@@ -327,8 +327,11 @@ class Worker:
             self._publisher.update(powered=None, inputs=-1, outputs_known=0, outputs=0)
 
 
-def _is_same(numbers: Array, others: Array) -> bool:
-    return numbers is others or numbers.tobytes() == others.tobytes()
+def _is_same(told: tuple[JointVector, Pose], before: tuple[JointVector, Pose]) -> bool:
+    (q, T), (q_before, T_before) = told, before
+    return (q is q_before or q.tobytes() == q_before.tobytes()) and (
+        T is T_before or T.as_row_major() == T_before.as_row_major()
+    )
 
 
 def _names(faults: Sequence[object]) -> str:

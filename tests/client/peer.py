@@ -19,6 +19,7 @@ from rcilab.command import JointPosition
 from rcilab.faults import Fault
 from rcilab.model import load_model
 from rcilab.protocols import rci
+from rcilab.spatial import IDENTITY
 from rcilab.state import ControllerMode, MotionGeneratorMode, RobotMode, RobotState
 
 MODEL = load_model("xMatePro7")
@@ -197,7 +198,7 @@ class Peer:
         mode = self._mode or (ControllerMode.OTHER, MotionGeneratorMode.IDLE)
         return RobotState(
             message_id=self._id, q=self._q, q_c=self._q, dq=zeros, dq_c=zeros, ddq_c=zeros,
-            T_base_tool=np.eye(4), T_base_tool_c=np.eye(4), tool_velocity_c=six, tool_acceleration_c=six,
+            T_base_tool=IDENTITY, T_base_tool_c=IDENTITY, tool_velocity_c=six, tool_acceleration_c=six,
             psi=0.0, psi_c=0.0, dpsi_c=0.0, ddpsi_c=0.0, tau=zeros, tau_filtered=zeros, tau_c=zeros, dtau_c=zeros,
             tau_ext_in_base=six, tau_ext_in_stiff=six, theta=zeros, dtheta=zeros, motor_tau=zeros,
             motor_tau_filtered=zeros, faults=self._faults, success_rate=1.0, motion_generator_mode=mode[1],

@@ -50,7 +50,7 @@ def swing(mode: str, duration: float, jump_at: float = np.inf, jump: float = 0.0
 
     def callback(state, t):
         start.setdefault("q", state.q_c)
-        start.setdefault("T", state.T_base_tool_c)
+        start.setdefault("T", state.T_base_tool_c.matrix)
         share, extra, finished = smooth(t / duration), jump * (t >= jump_at), t >= duration
         if mode == "torque":
             tau = np.zeros(7)
@@ -77,7 +77,7 @@ def test_a_callback_runs_to_its_end_in_every_mode(robot, mode):
         assert state.q[0] - HOME[0] == pytest.approx(0.05, abs=2e-3)
         assert np.isfinite(run.command).all()
     elif mode != "torque":
-        assert state.T_base_tool[1, 3] - T_HOME.position[1] == pytest.approx(0.04, abs=2e-3)
+        assert state.T_base_tool.matrix[1, 3] - T_HOME.position[1] == pytest.approx(0.04, abs=2e-3)
         assert np.isfinite(run.command_pose).all()
         assert np.isnan(run.command).all()
     else:
@@ -159,19 +159,19 @@ def test_the_blocking_moves_go_there_by_the_s_profile(robot):
     wanted = np.array([path.at(share)[0].matrix for share in schedule(path, 0.3)])
     assert np.abs(run.command_pose[: len(wanted)] - wanted).max() < 1e-9
     assert np.isnan(run.command_psi).all()
-    assert np.abs(robot.state.T_base_tool_c - goal.matrix).max() < 1e-9
+    assert robot.state.T_base_tool_c.is_close(goal)
     assert np.degrees(np.abs(run.error).max()) < 0.1
     via = Pose(T_HOME.position + [0.05, 0.05, 0.0], T_HOME.wxyz)
     told = []
     run = robot.move_c(via, T_HOME, speed=0.3, psi=0.0, progress=lambda t, duration: told.append(t / duration))
-    assert np.abs(robot.state.T_base_tool_c - T_HOME.matrix).max() < 1e-9
+    assert robot.state.T_base_tool_c.is_close(T_HOME)
     assert run.command_psi[-1] == 0.0
     assert robot.state.psi_c == pytest.approx(0.0, abs=1e-9)
     assert told[-1] == 1.0
 
 
 def test_a_move_to_where_the_arm_is_ends_at_once(robot):
-    here = Pose.from_matrix(robot.state.T_base_tool_c)
+    here = robot.state.T_base_tool_c
     for run in (robot.move_j(robot.state.q_c), robot.move_l(here), robot.move_l(here, psi=MODEL.arm_angle(HOME))):
         assert run.stopped is None
         assert run.duration < 0.05
@@ -180,7 +180,7 @@ def test_a_move_to_where_the_arm_is_ends_at_once(robot):
 def test_a_mere_turn_and_a_mere_arm_angle_arrive(robot):
     turned = T_HOME @ Pose.from_rpy((0, 0, 0), (0.1, 0.2, -0.1))
     robot.move_l(turned, speed=0.4)
-    assert np.abs(robot.state.T_base_tool_c - turned.matrix).max() < 1e-9
+    assert robot.state.T_base_tool_c.is_close(turned)
     robot.move_l(turned, speed=0.4, psi=0.3)
     assert robot.state.psi_c == pytest.approx(0.3, abs=1e-9)
 

@@ -239,7 +239,7 @@ def test_a_mujoco_world_has_boxes_and_a_floor():
 def test_the_walls_of_a_safety_box_hold_an_arm_that_is_led_against_them():
     with simulate(MODEL, plant="mujoco") as robot:
         robot.power_on()
-        tool = robot.state.T_base_tool[:3, 3]
+        tool = robot.state.T_base_tool.position
         robot.set_cartesian_limit(SafetyBox(size=(0.3, 0.3, 0.3), T_base_box=Pose(tool)))
 
         def pull(newtons):
@@ -249,7 +249,7 @@ def test_the_walls_of_a_safety_box_hold_an_arm_that_is_led_against_them():
                 robot.receive_state()
             robot.world.release()
             robot.stop_drag()
-            return abs(robot.state.T_base_tool[1, 3] - tool[1])
+            return abs(robot.state.T_base_tool.matrix[1, 3] - tool[1])
 
         robot.world.set_walls()
         assert pull(20.0) < 0.16

@@ -72,7 +72,7 @@ class Hand:
 
     def shift(self, offset: Sequence[float], duration: float, psi: float = 0.0) -> RobotState:
         """Moves the commanded tool smoothly by an offset in base, [m], and its arm angle; from rest to rest."""
-        start, psi_start = self.state.T_base_tool_c.copy(), self.state.psi_c
+        start, psi_start = self.state.T_base_tool_c.matrix, self.state.psi_c
         for k in range(1, round(duration * 1000) + 1):
             share = smooth(k / (duration * 1000))
             T = start.copy()
@@ -97,7 +97,7 @@ class Hand:
 
     def box(self, edge: float) -> rci.SetCartesianLimit:
         """An active safety box around where the tool is, [m]."""
-        x, y, z = self.state.T_base_tool[:3, 3].tolist()
+        x, y, z = self.state.T_base_tool.position.tolist()
         return rci.SetCartesianLimit((edge,) * 3, (1, 0, 0, x, 0, 1, 0, y, 0, 0, 1, z, 0, 0, 0, 1), True)
 
     def swing(self, joint: int, peak: float, duration: float) -> np.ndarray:

@@ -21,14 +21,14 @@ Provocation = Callable[[Hand], RobotState]
 
 
 def moved(hand: Hand, offset: tuple[float, float, float], **fields: object) -> RobotState:
-    T = hand.state.T_base_tool_c.copy()
+    T = hand.state.T_base_tool_c.matrix
     T[:3, 3] += offset
     return hand.pose(T, **fields)
 
 
 def accelerate(hand: Hand, axis: int, acceleration: float, jerk: float) -> RobotState:
     """Moves the commanded tool along one axis with an acceleration that grows at a steady jerk."""
-    T = hand.state.T_base_tool_c.copy()
+    T = hand.state.T_base_tool_c.matrix
     a = v = 0.0
     for _ in range(2000):
         a = min(a + jerk * 1e-3, acceleration)
@@ -74,7 +74,7 @@ def joint_velocity(hand: Hand) -> RobotState:
 
 def tool_velocity(hand: Hand) -> RobotState:
     hand.start(1, 2)
-    start, angle, v = hand.state.T_base_tool_c.copy(), 0.0, 0.0
+    start, angle, v = hand.state.T_base_tool_c.matrix, 0.0, 0.0
     for k in range(1, 1000):  # About its own axis, which joint 7 alone can do.
         v += 1e-3 * min(6.0, 0.1 * k)
         angle += 1e-3 * v
@@ -109,7 +109,7 @@ def singular(hand: Hand) -> RobotState:
 
 def no_frame(hand: Hand) -> RobotState:
     hand.start(1, 2)
-    T = hand.state.T_base_tool_c.copy()
+    T = hand.state.T_base_tool_c.matrix
     T[0, 0] += 1e-3
     return hand.pose(T)
 
@@ -241,11 +241,11 @@ def test_a_tool_that_starts_outside_its_box_may_only_move_in(
     make_hand, plant: str, axis: int, sign: int, is_allowed: bool
 ) -> None:
     hand = make_hand(plant=plant)
-    x, y, z = hand.state.T_base_tool[:3, 3].tolist()
+    x, y, z = hand.state.T_base_tool.position.tolist()
     below = (1, 0, 0, x, 0, 1, 0, y, 0, 0, 1, z - 0.06, 0, 0, 0, 1)  # The tool starts 5 cm beyond the +z face.
     hand.ask(rci.SetCartesianLimit((0.02, 0.02, 0.02), below, True))
     hand.start(1, 2)
-    T, v = hand.state.T_base_tool_c.copy(), 0.0
+    T, v = hand.state.T_base_tool_c.matrix, 0.0
     for k in range(1000):
         v += 0.05 * 1e-3 * (min(k, 100) / 100.0)
         T[axis, 3] += sign * v * 1e-3
@@ -257,18 +257,18 @@ def test_a_tool_that_starts_outside_its_box_may_only_move_in(
 
 def test_a_tool_that_came_in_stays_in(make_hand) -> None:
     hand = make_hand()
-    x, y, z = hand.state.T_base_tool[:3, 3].tolist()
+    x, y, z = hand.state.T_base_tool.position.tolist()
     below = (1, 0, 0, x, 0, 1, 0, y, 0, 0, 1, z - 0.02, 0, 0, 0, 1)  # The tool starts 1 cm beyond the +z face.
     hand.ask(rci.SetCartesianLimit((0.02, 0.02, 0.02), below, True))
     hand.start(1, 2)
-    T = hand.state.T_base_tool_c.copy()
+    T = hand.state.T_base_tool_c.matrix
     start = T[2, 3]
     for k in range(1, 1201):  # 2 cm down, and back up to where it began.
         T[2, 3] = start - 0.01 * (1.0 - np.cos(2.0 * np.pi * k / 1200.0))
         if hand.pose(T).faults:
             break
     assert list(hand.state.faults) == [Fault.COMMAND_CARTESIAN_POSITION_LIMITS_VIOLATION]
-    assert hand.state.T_base_tool_c[2, 3] - (start - 0.01) < 1e-3  # At the face, on its way out.
+    assert hand.state.T_base_tool_c.matrix[2, 3] - (start - 0.01) < 1e-3  # At the face, on its way out.
 
 
 def test_an_inactive_box_bounds_nothing(make_hand) -> None:

@@ -27,11 +27,11 @@ def drag(hand, space: int, kind: int, wrench: tuple[float, ...], cycles: int = 5
     """Tool poses before and after something has dragged for a while."""
     assert hand.ask(rci.SetMotorPower(1)) == 0
     assert hand.ask(rci.StartDrag(space, kind)) is rci.SettingStatus.SUCCESS
-    before = hand.state.T_base_tool.copy()
+    before = hand.state.T_base_tool.matrix
     hand.cycle.plant.push(wrench)
     hand.step(cycles)
     assert hand.state.robot_mode is RobotMode.GUIDING
-    return before, hand.state.T_base_tool
+    return before, hand.state.T_base_tool.matrix
 
 
 def test_dragging_is_a_mode_of_its_own(hand) -> None:
@@ -129,7 +129,7 @@ def test_in_impedance_walls_push_back_instead_of_a_fault_when_the_guide_is_on(ma
     assert hand.ask(rci.EnableVirtualGuide(guide)) == 0
     assert hand.ask(rci.SetCartesianImpedance((3000.0, 300.0, 3000.0, 100.0, 100.0, 100.0))) == 0
     hand.start(3, 2)
-    T = hand.state.T_base_tool_c.copy()
+    T = hand.state.T_base_tool_c.matrix
     y = T[1, 3]
     for k in range(1, 3001):
         u = min(1.0, k / 1500.0)
@@ -138,7 +138,8 @@ def test_in_impedance_walls_push_back_instead_of_a_fault_when_the_guide_is_on(ma
             break
     if guide:
         assert hand.state.faults == ()
-        assert 0.045 < hand.state.T_base_tool[1, 3] - y < 0.055  # Two springs of 300 N/m, one from 0.08, one from 0.02.
+        off = hand.state.T_base_tool.matrix[1, 3] - y
+        assert 0.045 < off < 0.055  # Two springs of 300 N/m, one from 0.08, one from 0.02.
     else:
         assert hand.state.faults == (Fault.COMMAND_CARTESIAN_POSITION_LIMITS_VIOLATION,)
 

@@ -130,14 +130,14 @@ def test_a_bad_network_does_not_stop_a_good_motion(make_hand, lost, copied, over
 def test_a_bad_network_does_not_stop_a_good_line(make_hand, plant) -> None:
     hand = make_hand(plant=plant, prefill=10)
     hand.start(1, 2)
-    T = hand.state.T_base_tool_c.copy()
+    T = hand.state.T_base_tool_c.matrix
     commands = []
     for k in range(1, 816):
         pose = T.copy()
         pose[:3, 3] += smooth(min(k / 800.0, 1.0)) * np.array([0.05, 0.15, -0.1])
         commands.append({"T_base_tool_c": tuple(pose.ravel().tolist())})
     play_badly(hand, commands, 0.05, 0.05, 0.05)
-    assert np.abs(hand.state.T_base_tool_c - np.reshape(commands[-1]["T_base_tool_c"], (4, 4))).max() < 1e-6
+    assert np.abs(hand.state.T_base_tool_c.matrix - np.reshape(commands[-1]["T_base_tool_c"], (4, 4))).max() < 1e-6
 
 
 def test_a_cycle_that_nobody_sees_is_no_gap_for_the_client(make_hand) -> None:

@@ -70,7 +70,7 @@ def test_filtered_poses_and_torques_arrive_too(make_hand) -> None:
     hand = make_hand()
     assert hand.ask(rci.SetFilters(1000.0, 30.0, 30.0)) == 0
     hand.start(1, 2)
-    T = hand.state.T_base_tool_c.copy()
+    T = hand.state.T_base_tool_c.matrix
     hand.shift((0.0, 0.0, 0.05), 0.6)
     T[2, 3] += 0.05
     for _ in range(200):

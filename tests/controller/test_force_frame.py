@@ -21,7 +21,7 @@ SOFT = [400.0] * 3 + [200.0] * 3
 def hold(robot, seconds: float = 2.0) -> tuple[np.ndarray, np.ndarray]:
     """Holds a pose under Cartesian impedance; returns how far the tool went in base, and the turn of base to flange."""
     start = robot.state
-    T = np.array(start.T_base_tool_c)
+    T = start.T_base_tool_c.matrix
 
     def callback(state, t):
         return CartesianPosition(T, start.psi_c, finished=t >= seconds)
@@ -29,7 +29,7 @@ def hold(robot, seconds: float = 2.0) -> tuple[np.ndarray, np.ndarray]:
     last = {}
 
     def watched(state, t):
-        last["p"] = np.array(state.T_base_tool)[:3, 3]
+        last["p"] = state.T_base_tool.position
         return callback(state, t)
 
     robot.control(watched, mode="cartesian_impedance")
@@ -55,7 +55,7 @@ def test_a_desired_force_presses_along_the_turned_frame_of_the_tool(robot):
 def test_the_soft_direction_is_that_of_the_turned_frame(robot):
     robot.set_fc_coor(TURNED, "tool")
     robot.set_cartesian_impedance([200.0, 3000.0, 3000.0, 300.0, 300.0, 300.0])
-    R = np.array(robot.state.T_base_tool_c)[:3, :3]
+    R = robot.state.T_base_tool_c.rotation
     soft = R @ TURNED.rotation @ [1.0, 0.0, 0.0]
     robot.world.push([*(6.0 * soft), 0.0, 0.0, 0.0], duration=10.0)
     moved, _ = hold(robot)

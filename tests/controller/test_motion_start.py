@@ -18,7 +18,7 @@ POSITION_MODES = [(0, 1), (1, 2), (2, 1), (3, 2)]
 
 def hold(hand, mode: tuple[int, int], offset: float, cycles: int = 300) -> None:
     """Commands one constant place near the reference: an offset of joint 2 in [rad], or of the tool along y in [m]."""
-    q, T = hand.state.q_c.copy(), hand.state.T_base_tool_c.copy()
+    q, T = hand.state.q_c.copy(), hand.state.T_base_tool_c.matrix
     q[1] += offset
     T[1, 3] += offset
     for _ in range(cycles):
@@ -32,12 +32,12 @@ def hold(hand, mode: tuple[int, int], offset: float, cycles: int = 300) -> None:
 def test_an_offset_at_the_start_is_absorbed_within_the_limits(make_hand, plant, mode, offset) -> None:
     hand = make_hand(plant=plant)
     hand.start(*mode)
-    start, T_start = hand.state.q_c, hand.state.T_base_tool_c
+    start, T_start = hand.state.q_c, hand.state.T_base_tool_c.matrix
     first = len(hand.states)
     hold(hand, mode, offset)
     assert hand.state.faults == ()
     if mode[1] == 2:
-        assert hand.state.T_base_tool_c[1, 3] - T_start[1, 3] == pytest.approx(offset, abs=1e-12)
+        assert hand.state.T_base_tool_c.matrix[1, 3] - T_start[1, 3] == pytest.approx(offset, abs=1e-12)
     else:
         assert hand.state.q_c[1] - start[1] == pytest.approx(offset, abs=1e-12)
     q_c = np.array([state.q_c for state in hand.states[first - 1 :]])
@@ -77,7 +77,7 @@ def test_a_motion_that_begins_at_full_jerk_is_no_new_start(make_hand, mode) -> N
     """The first command may be as far off as one cycle's jerk: then it is the first step of the motion."""
     hand = make_hand()
     hand.start(*mode)
-    q, T = hand.state.q_c.copy(), hand.state.T_base_tool_c.copy()
+    q, T = hand.state.q_c.copy(), hand.state.T_base_tool_c.matrix
     jerk = 0.2 * hand.model.limits.cartesian.translation_jerk if mode[1] == 2 else 0.9 * hand.model.limits.joint.jerk[0]
     steps = np.cumsum(np.cumsum(np.cumsum(np.repeat([jerk, 0.0, -jerk], [1, 0, 1])))) * 1e-9
     for step in steps:  # Up and down again: a blip of two cycles.
@@ -134,7 +134,7 @@ def test_an_endless_loop_of_impedance_motions_from_the_same_first_pose(make_hand
     first = None
     for _ in range(3):
         hand.start(3, 2)
-        T = hand.state.T_base_tool_c.copy() if first is None else first.copy()
+        T = hand.state.T_base_tool_c.matrix if first is None else first.copy()
         first = T.copy() if first is None else first
         for k in range(1, 4001):
             T[2, 3] = first[2, 3] - 0.1 * (1.0 - np.cos(np.pi / 4.0 * k * 1e-3 * 2.0)) / 2.0
@@ -151,14 +151,14 @@ def test_after_a_push_of_a_few_newtons_the_first_pose_again_moves_the_arm_gently
     hand.ask(rci.SetMotorPower(1))
     hand.ask(rci.SetCartesianImpedance((1000.0, 1000.0, 1000.0, 100.0, 100.0, 100.0)))
     hand.start(3, 2)
-    T, q = hand.state.T_base_tool_c.copy(), hand.state.q_c.copy()
+    T, q = hand.state.T_base_tool_c.matrix, hand.state.q_c.copy()
     for k in range(600):
         hand.cycle.plant.push((0.0, 4.0 * min(1.0, k / 300.0), 0.0, 0.0, 0.0, 0.0))
         assert hand.pose(T).faults == ()
     assert hand.ask(rci.StopMove()) == 0
     hand.step(200)
     hand.start(*then)
-    off = abs(hand.state.T_base_tool_c[1, 3] - T[1, 3])
+    off = abs(hand.state.T_base_tool_c.matrix[1, 3] - T[1, 3])
     first = len(hand.states)
     for _ in range(600):
         state = hand.pose(T) if then[1] == 2 else hand.command(q)

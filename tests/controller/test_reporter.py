@@ -30,7 +30,7 @@ def test_the_state_tells_the_truth_about_a_moving_arm(make_hand, name: str) -> N
     assert np.allclose(
         state.tool_acceleration_c, (state.tool_velocity_c - before.tool_velocity_c) / h, rtol=0, atol=1e-9
     )
-    moved = (state.T_base_tool_c[:3, 3] - before.T_base_tool_c[:3, 3]) / h
+    moved = (state.T_base_tool_c.position - before.T_base_tool_c.position) / h
     assert np.allclose(state.tool_velocity_c[:3], moved, rtol=0, atol=5e-3)
     assert np.array_equal(state.tau, model.torque(state.q_c, state.dq_c, state.ddq_c).full)
     assert np.allclose(state.dtau_c, (state.tau_c - before.tau_c) / h, rtol=0, atol=1e-9)
@@ -99,7 +99,7 @@ def wrench_frames(hand, frame: tuple[float, ...], kind: int, wrench: tuple[float
     hand.cycle.plant.push(wrench)
     state = hand.step(300)
     T_flange_force = np.array(frame).reshape(4, 4)
-    T_base_force = state.T_base_tool @ np.linalg.inv(hand.model.T_flange_tool.matrix) @ T_flange_force
+    T_base_force = state.T_base_tool.matrix @ np.linalg.inv(hand.model.T_flange_tool.matrix) @ T_flange_force
     return state.tau_ext_in_base, state.tau_ext_in_stiff, T_base_force
 
 
@@ -115,7 +115,7 @@ def test_an_outside_wrench_is_reported_in_the_frame_that_was_set(make_hand, plan
     hand.ask(rci.SetMotorPower(1))
     base, stiff, T_base_force = wrench_frames(hand, FRAME, kind, WRENCH)
     assert np.allclose(base, WRENCH, rtol=0, atol=0.05)
-    arm = hand.state.T_base_tool[:3, 3] - T_base_force[:3, 3]
+    arm = hand.state.T_base_tool.position - T_base_force[:3, 3]
     force, moment = base[:3], base[3:] + np.cross(arm, base[:3])
     R = np.eye(3) if kind == 0 else T_base_force[:3, :3]  # No path yet: the axes of the force frame.
     assert np.allclose(stiff, np.concatenate((R.T @ force, R.T @ moment)), rtol=0, atol=1e-9)
@@ -149,7 +149,7 @@ def test_a_load_that_was_not_set_shows_as_an_outside_wrench(make_hand) -> None:
 def test_commanded_values_are_backward_differences_in_every_mode(make_hand, plant: str, mode) -> None:
     hand = make_hand(plant=plant)
     hand.start(*mode)
-    T = hand.state.T_base_tool_c.copy()
+    T = hand.state.T_base_tool_c.matrix
     rows = plan_joint(hand.model, hand.model.home, hand.model.home + 0.2, speed=0.5).q
     for k, row in enumerate(rows[:150]):
         T[2, 3] += 1e-8 * k

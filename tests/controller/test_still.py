@@ -93,7 +93,7 @@ def lead(cycle: ControlCycle, count: int, random: Random) -> None:
     if cycle.phase is not Phase.MOVING or random.random() < 0.025:
         return
     state = cycle.state
-    q, T = state.q_c.copy(), state.T_base_tool_c.copy()
+    q, T = state.q_c.copy(), state.T_base_tool_c.matrix
     if count > 20:  # The play-out is filled by a standing arm.
         q[random.randrange(2)] += 2e-5 * math.sin(0.01 * count)
         T[2, 3] += 1e-6 * math.sin(0.01 * count)
@@ -137,6 +137,6 @@ def test_a_request_a_push_and_a_stop_end_the_stillness(hand):
     assert hand.step().tau is not still.tau
     hand.cycle.plant.push(np.zeros(6))
     hand.step(800)
-    assert hand.state.T_base_tool.tobytes() == still.T_base_tool.tobytes()
+    assert hand.state.T_base_tool.matrix.tobytes() == still.T_base_tool.matrix.tobytes()
     assert hand.ask(rci.SetMotorPower(1)) == 0
     assert hand.step().robot_mode is not still.robot_mode

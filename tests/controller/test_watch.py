@@ -44,7 +44,7 @@ def creep(joint: int, speed: float) -> Callable[[Hand, SlippingPlant], None]:
     def act(hand: Hand, plant: SlippingPlant) -> None:
         for k in range(400):
             slip(joint, speed * k / 400.0)(hand, plant)
-            if hand.command(hand.state.q_c, T_base_tool_c=tuple(hand.state.T_base_tool_c.ravel())).faults:
+            if hand.command(hand.state.q_c, T_base_tool_c=hand.state.T_base_tool_c.as_row_major()).faults:
                 return
 
     return act
@@ -79,7 +79,7 @@ def test_what_the_sensors_say_is_judged_in_that_cycle(model: RobotModel, mode, a
     hand.ask(rci.SetJointLimit(tuple(model.home + 0.1), tuple(model.home - 0.1)))
     hand.ask(hand.box(0.04))
     hand.start(*mode)
-    q, T = hand.state.q_c, tuple(hand.state.T_base_tool_c.ravel())
+    q, T = hand.state.q_c, hand.state.T_base_tool_c.as_row_major()
     for _ in range(5):
         hand.command(q, T_base_tool_c=T)
     before = len(hand.states)

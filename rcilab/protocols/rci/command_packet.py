@@ -60,7 +60,7 @@ def build_command(message_id: int, command: Command, state: RobotState) -> Comma
         state: The state that is answered; its measured joints and pose fill the unused fields.
     """
     if isinstance(command, JointPosition):
-        pose = tuple(state.T_base_tool.ravel().tolist())
+        pose = state.T_base_tool.as_row_major()
         return CommandPacket(message_id, _seven(command.q), pose, finished=command.finished)
     if isinstance(command, CartesianPosition):
         pose = tuple(command.T_base_tool.ravel().tolist())

@@ -14,6 +14,7 @@ import numpy as np
 from rcilab.errors import DecodeError, InvalidValueError
 from rcilab.faults import FAULT_COUNT, Fault
 from rcilab.protocols.rci.layout import Field, Layout
+from rcilab.reported_pose import ReportedPose
 from rcilab.state import ControllerMode, MotionGeneratorMode, RobotMode, RobotState, build_state
 
 STATE = Layout(
@@ -189,8 +190,8 @@ def _decode_values(data: bytes, n: int) -> tuple[Any, ...]:
         x[_DQ : _DQ + n],
         x[_DQ_C : _DQ_C + n],
         x[_DDQ_C : _DDQ_C + n],
-        x[_POSE : _POSE + 16].reshape(4, 4),
-        x[_POSE_C : _POSE_C + 16].reshape(4, 4),
+        ReportedPose(x[_POSE : _POSE + 16]),
+        ReportedPose(x[_POSE_C : _POSE_C + 16]),
         x[_VELOCITY : _VELOCITY + 6],
         x[_ACCELERATION : _ACCELERATION + 6],
         psi,

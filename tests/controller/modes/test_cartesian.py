@@ -47,7 +47,7 @@ def test_absurd_numbers_are_faults_and_never_followed(make_hand, frequency: floa
     hand = make_hand()
     assert hand.ask(rci.SetFilters(frequency, frequency, frequency)) == 0
     hand.start(1, 2)
-    T = hand.state.T_base_tool_c
+    T = hand.state.T_base_tool_c.matrix
     for _ in range(3):
         hand.pose(T)
     absurd = (*T.ravel()[:3].tolist(), value, *T.ravel()[4:].tolist())

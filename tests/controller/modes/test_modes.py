@@ -23,11 +23,11 @@ def test_a_line_of_the_tool_is_followed_with_its_arm_angle_held(make_hand, name:
     hand = make_hand(name, plant)
     hand.start(1, 2)
     assert hand.state.motion_generator_mode is MotionGeneratorMode.CARTESIAN_POSITION
-    psi, start = hand.state.psi_c, hand.state.T_base_tool_c.copy()
+    psi, start = hand.state.psi_c, hand.state.T_base_tool_c.matrix
     hand.shift((-0.05, -0.15, 0.1), 1.5)
     assert hand.state.faults == ()
-    assert np.allclose(hand.state.T_base_tool_c[:3, 3] - start[:3, 3], (-0.05, -0.15, 0.1), rtol=0, atol=1e-12)
-    assert np.allclose(hand.state.T_base_tool_c[:3, :3], start[:3, :3], rtol=0, atol=1e-12)
+    assert np.allclose(hand.state.T_base_tool_c.position - start[:3, 3], (-0.05, -0.15, 0.1), rtol=0, atol=1e-12)
+    assert np.allclose(hand.state.T_base_tool_c.rotation, start[:3, :3], rtol=0, atol=1e-12)
     assert np.allclose(hand.state.T_base_tool, hand.state.T_base_tool_c, rtol=0, atol=2e-4)
     assert hand.state.psi_c == pytest.approx(psi, abs=1e-9)
     assert hand.ask(rci.StopMove()) == 0
@@ -38,7 +38,7 @@ def test_a_line_of_the_tool_is_followed_with_its_arm_angle_held(make_hand, name:
 def test_a_null_space_motion_turns_the_elbow_and_leaves_the_tool(make_hand, plant: str) -> None:
     hand = make_hand(plant=plant)
     hand.start(1, 2)
-    start = hand.state.T_base_tool_c.copy()
+    start = hand.state.T_base_tool_c.matrix
     hand.shift((0, 0, 0), 1.5, psi=0.6)
     assert hand.state.faults == ()
     assert hand.state.psi_c == pytest.approx(0.6, abs=1e-9)
@@ -49,7 +49,7 @@ def test_an_arm_angle_passes_zero_although_the_vendors_client_cannot_say_zero(ma
     hand = make_hand()
     hand.start(1, 2)
     hand.shift((0, 0, 0), 1.0, psi=0.2)
-    T = hand.state.T_base_tool_c.copy()
+    T = hand.state.T_base_tool_c.matrix
     for k in range(1, 1201):  # From 0.2 to -0.2; on its way a command of exactly zero, which goes out as "not valid".
         u = k / 1200.0
         psi = 0.2 - 0.4 * (u**4 * (35.0 - 84.0 * u + 70.0 * u * u - 20.0 * u**3))
@@ -65,7 +65,7 @@ def test_poses_without_an_arm_angle_hold_one_that_is_nearly_zero(make_hand) -> N
     hand.ask(rci.StopMove())
     hand.rest()
     hand.start(1, 2)
-    T, psi = hand.state.T_base_tool_c.copy(), hand.state.psi_c
+    T, psi = hand.state.T_base_tool_c.matrix, hand.state.psi_c
     for _ in range(5):
         assert hand.pose(T).faults == ()
     assert hand.state.psi_c == pytest.approx(psi, abs=1e-12)
@@ -78,7 +78,7 @@ def test_a_turn_of_the_tool_is_followed_through_the_tool_that_was_set(make_hand,
     tool = (1.0, 0, 0, 0.1, 0, 1, 0, 0.0, 0, 0, 1, 0.15, 0, 0, 0, 1)
     assert hand.ask(rci.SetCoor(tool)) == 0
     hand.start(1, 2)
-    start = hand.state.T_base_tool_c.copy()
+    start = hand.state.T_base_tool_c.matrix
     for k in range(1, 1001):
         u = k / 1000.0
         angle = 0.4 * u**4 * (35.0 - 84.0 * u + 70.0 * u * u - 20.0 * u**3)
@@ -86,15 +86,15 @@ def test_a_turn_of_the_tool_is_followed_through_the_tool_that_was_set(make_hand,
         T[:3, :3] = T[:3, :3] @ Pose.from_rpy((0, 0, 0), (angle, 0, 0)).rotation
         hand.pose(T)
     assert hand.state.faults == ()
-    turn = turn_between(tuple(start[:3, :3].ravel()), tuple(hand.state.T_base_tool_c[:3, :3].ravel()))
+    turn = turn_between(tuple(start[:3, :3].ravel()), tuple(hand.state.T_base_tool_c.rotation.ravel()))
     assert math.hypot(*turn) == pytest.approx(0.4, abs=1e-9)
-    assert np.allclose(hand.state.T_base_tool_c[:3, 3], start[:3, 3], rtol=0, atol=1e-12)
+    assert np.allclose(hand.state.T_base_tool_c.position, start[:3, 3], rtol=0, atol=1e-12)
 
 
 def test_lost_poses_are_bridged_on_their_curve(make_hand) -> None:
     hand = make_hand(prefill=4)
     hand.start(1, 2)
-    start = hand.state.T_base_tool_c.copy()
+    start = hand.state.T_base_tool_c.matrix
     for k in range(1, 1001):
         u = k / 1000.0
         T = start.copy()
@@ -141,12 +141,12 @@ def test_a_cartesian_spring_yields_by_force_over_stiffness(make_hand, name: str,
     hand = make_hand(name, plant)
     assert hand.ask(rci.SetCartesianImpedance((800.0, 800.0, 400.0, 100.0, 100.0, 100.0))) == 0
     hand.start(3, 2)
-    T = hand.state.T_base_tool_c.copy()
+    T = hand.state.T_base_tool_c.matrix
     hand.cycle.plant.push((0.0, 0.0, -8.0, 0.0, 0.0, 0.0))
     for _ in range(1500):
         hand.pose(T)
     assert hand.state.faults == ()
-    assert np.allclose(hand.state.T_base_tool[:3, 3] - T[:3, 3], (0.0, 0.0, -0.02), rtol=0.05, atol=1e-3)
+    assert np.allclose(hand.state.T_base_tool.position - T[:3, 3], (0.0, 0.0, -0.02), rtol=0.05, atol=1e-3)
     assert np.allclose(hand.state.tau_ext_in_base[:3], (0, 0, -8.0), rtol=0, atol=0.4)
 
 
@@ -155,11 +155,11 @@ def test_the_desired_wrench_may_change_while_the_spring_acts(make_hand, plant: s
     hand = make_hand(plant=plant)
     assert hand.ask(rci.SetCartesianImpedance((1000.0,) * 3 + (100.0,) * 3)) == 0
     hand.start(3, 2)
-    T = hand.state.T_base_tool_c.copy()
+    T = hand.state.T_base_tool_c.matrix
     assert hand.ask(rci.SetCartImpDesiredTau((10.0, 0.0, 0.0, 0.0, 0.0, 0.0))) == 0
     for _ in range(1500):
         hand.pose(T)
-    assert np.allclose(hand.state.T_base_tool[:3, 3] - T[:3, 3], (0.01, 0.0, 0.0), rtol=0.05, atol=1e-3)
+    assert np.allclose(hand.state.T_base_tool.position - T[:3, 3], (0.01, 0.0, 0.0), rtol=0.05, atol=1e-3)
 
 
 @PLANTS
@@ -184,16 +184,16 @@ def test_torques_act_on_top_of_gravity(make_hand, plant: str, motion: int) -> No
 def test_a_torque_loop_of_springs_holds_the_tool_where_it_is_told(make_hand, plant: str) -> None:
     hand = make_hand(plant=plant)
     hand.start(4, 0)
-    goal = hand.state.T_base_tool[:3, 3].copy() + (0.0, 0.0, 0.03)
+    goal = hand.state.T_base_tool.position + (0.0, 0.0, 0.03)
     tau = np.zeros(7)
     for _ in range(2500):
         state = hand.state
         J = hand.model.jacobian(state.q)
-        wanted = J[:3].T @ (200.0 * (goal - state.T_base_tool[:3, 3])) - 4.0 * state.dq
+        wanted = J[:3].T @ (200.0 * (goal - state.T_base_tool.position)) - 4.0 * state.dq
         tau += np.clip(wanted - tau, -0.5, 0.5)
         hand.torque(tau)
     assert hand.state.faults == ()
-    assert np.allclose(hand.state.T_base_tool[:3, 3], goal, rtol=0, atol=5e-3)
+    assert np.allclose(hand.state.T_base_tool.position, goal, rtol=0, atol=5e-3)
     assert hand.ask(rci.StopMove()) == 0
     assert not hand.state.dq_c.any()
 
@@ -205,7 +205,7 @@ def test_a_yielding_arm_stops_from_where_it_is_inside_its_limits(make_hand, plan
     assert hand.ask(rci.SetJointImpedance((100.0,) * 7)) == 0
     assert hand.ask(rci.SetCartesianImpedance((100.0,) * 6)) == 0
     hand.start(controller, motion)
-    q_c, T = hand.state.q_c, hand.state.T_base_tool_c.copy()
+    q_c, T = hand.state.q_c, hand.state.T_base_tool_c.matrix
     hand.cycle.plant.push((0.0, 10.0, 0.0, 0.0, 0.0, 0.0))
     for _ in range(40):
         hand.command(q_c, T_base_tool_c=tuple(T.ravel()))

@@ -186,7 +186,7 @@ def state() -> object:
 def test_a_joint_command_repeats_the_measured_pose(state) -> None:
     packet = rci.build_command(5, JointPosition(np.full(7, 0.5)), state)
     assert packet.q_c == (0.5,) * 7
-    assert packet.T_base_tool_c == tuple(state.T_base_tool.ravel())
+    assert packet.T_base_tool_c == state.T_base_tool.as_row_major()
     assert (packet.psi_valid, packet.psi_c, packet.tau_c) == (False, 0.0, (0.0,) * 7)
 
 
