@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from io import TextIOWrapper
 from os import PathLike, fspath
 from pathlib import Path
@@ -16,8 +17,26 @@ from numpy.typing import NDArray
 from rcilab.errors import InvalidValueError
 from rcilab.whole_file import replacing
 
+STATE_FIELDS = ("tau_ext_in_base", "tau_ext_in_stiff", "T_base_tool", "theta")
+"""What else of a state a row holds, by the names that `RobotState` has for it, in the order of the row."""
+OTHER_STATE_FIELDS = (
+    "dq_c", "ddq_c", "T_base_tool_c", "tool_velocity_c", "tool_acceleration_c", "tau_filtered", "tau_c", "dtau_c",
+    "dtheta", "motor_tau", "motor_tau_filtered", "psi", "psi_c", "dpsi_c", "ddpsi_c",
+)  # fmt: skip
+"""What a complete row holds behind those: all that is left of the state, plain numbers at its end."""
 
-def cycle_dtype(n: int) -> np.dtype[np.void]:
+_POSES = ("command_pose", "T_base_tool", "T_base_tool_c")
+_SCALARS = ("psi", "psi_c", "dpsi_c", "ddpsi_c")
+_SCREWS = {
+    "tau_ext_in_base": ("N", "N m"),
+    "tau_ext_in_stiff": ("N", "N m"),
+    "tool_velocity_c": ("m/s", "rad/s"),
+    "tool_acceleration_c": ("m/s^2", "rad/s^2"),
+}
+"""Units of what has a linear and an angular half of three each."""
+
+
+def cycle_dtype(n: int, *, complete: bool = False) -> np.dtype[np.void]:
     """Returns the layout of one recorded cycle of an arm with n joints.
 
     ======================  ==================================================================================
@@ -36,7 +55,18 @@ def cycle_dtype(n: int) -> np.dtype[np.void]:
     command_pose            pose of the tool in base sent in answer, [m], shape (4, 4); NaN when none was sent
     command_psi             arm angle sent with it, [rad]; NaN when none was sent
     command_tau             joint torques sent in answer, [N m], shape (n,); NaN when none were sent
+    tau_ext_in_base         external force and moment in the base frame, shape (6,), [N, N m]
+    tau_ext_in_stiff        external force and moment in the force-control frame, shape (6,), [N, N m]
+    T_base_tool             measured pose of the tool in base, shape (4, 4), [m]
+    theta                   motor positions, motor side of the gear, [rad], shape (n,)
     ======================  ==================================================================================
+
+    A complete one goes on with the rest of the state, by the names of `RobotState`: `OTHER_STATE_FIELDS`. What a file
+    of an earlier version does not have is NaN.
+
+    Args:
+        n: Number of joints.
+        complete: Whether a row holds everything that the state has.
     """
     vector = ("<f8", (n,))
     return np.dtype(
@@ -62,8 +92,17 @@ def cycle_dtype(n: int) -> np.dtype[np.void]:
             ("command_pose", "<f8", (4, 4)),
             ("command_psi", "<f8"),
             ("command_tau", *vector),
+            *((name, "<f8", _shape(name, n)) for name in STATE_FIELDS + (OTHER_STATE_FIELDS if complete else ())),
         ]
     )
+
+
+def _shape(name: str, n: int) -> tuple[int, ...]:
+    if name in _POSES:
+        return (4, 4)
+    if name in _SCALARS:
+        return ()
+    return (6,) if name in _SCREWS else (n,)
 
 
 UNITS = {
@@ -78,8 +117,21 @@ UNITS = {
     "tau": "N m",
     "command_psi": "rad",
     "command_tau": "N m",
+    "theta": "rad",
+    "dq_c": "rad/s",
+    "ddq_c": "rad/s^2",
+    "psi": "rad",
+    "psi_c": "rad",
+    "dpsi_c": "rad/s",
+    "ddpsi_c": "rad/s^2",
+    "tau_filtered": "N m",
+    "tau_c": "N m",
+    "dtau_c": "N m/s",
+    "dtheta": "rad/s",
+    "motor_tau": "N m",
+    "motor_tau_filtered": "N m",
 }
-"""Unit of each field that has one and only one; a pose mixes numbers without a unit and [m]."""
+"""Unit of each field that has one and only one; see `_unit` for the others."""
 
 _HIDDEN = ("reserved",)
 _CHUNK = 2000  # Rows of a CSV between two reports of progress.
@@ -102,12 +154,19 @@ class Column:
         return f"{self.name} [{self.unit}]" if self.unit else self.name
 
 
-def split_columns(name: str, unit: str, values: NDArray[Any]) -> list[Column]:
-    """Returns the columns of an array with one entry a cycle: name[1], name[2], ... or name[1,1], ..., from 1."""
+def split_columns(name: str, unit: str | Callable[[tuple[int, ...]], str], values: NDArray[Any]) -> list[Column]:
+    """Returns the columns of an array with one entry a cycle: name[1], name[2], ... or name[1,1], ..., from 1.
+
+    Args:
+        name: Of the array.
+        unit: Of its numbers, or what tells that of each by its place in an entry, counted from 0.
+        values: The array, shape (N, ...).
+    """
     columns: list[Column] = []
     for place in np.ndindex(values.shape[1:]):
         index = ",".join(str(i + 1) for i in place)
-        columns.append(Column(f"{name}[{index}]" if place else name, unit, values[(slice(None), *place)]))
+        its = unit if isinstance(unit, str) else unit(place)
+        columns.append(Column(f"{name}[{index}]" if place else name, its, values[(slice(None), *place)]))
     return columns
 
 
@@ -115,13 +174,17 @@ def cycle_columns(cycles: NDArray[np.void]) -> list[Column]:
     """Returns every number of recorded cycles, each as a column with its unit."""
     columns: list[Column] = []
     for name in _fields(cycles):
-        found = split_columns(name, UNITS.get(name, ""), cycles[name])
-        if name == "command_pose":  # The last column of the matrix is the position.
-            found = [
-                Column(c.name, "m" if c.name.endswith(",4]") and "[4," not in c.name else "", c.values) for c in found
-            ]
-        columns += found
+        columns += split_columns(name, partial(_unit, name), cycles[name])
     return columns
+
+
+def _unit(name: str, place: tuple[int, ...]) -> str:
+    """Returns the unit of one number of a field; the last column of a pose is the position."""
+    if name in _POSES:
+        return "m" if place[0] < 3 and place[1] == 3 else ""
+    if name in _SCREWS:
+        return _SCREWS[name][place[0] // 3]
+    return UNITS.get(name, "")
 
 
 def write_csv(columns: Sequence[Column], stream: IO[str], progress: Callable[[float], None] | None = None) -> None:

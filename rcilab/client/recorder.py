@@ -6,19 +6,21 @@ import math
 import struct
 from collections import deque
 from collections.abc import Callable, Sequence
+from operator import attrgetter
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rcilab.clock import CYCLE_TIME
 from rcilab.command import CartesianPosition, Command, JointPosition, JointTorque
-from rcilab.cycle_file import cycle_dtype
+from rcilab.cycle_file import OTHER_STATE_FIELDS, STATE_FIELDS, cycle_dtype
 from rcilab.faults import Fault
 from rcilab.state import RobotState
 
 RECORD_TIME = 60.0  # [s] of cycles that a recorder keeps unless told otherwise; a choice.
 _CYCLE_NS = round(CYCLE_TIME * 1e9)
 _NO_POSE = (math.nan,) * 16
+_NUMBERS = struct.Struct("<4d")
 _GRID_CYCLES = 8  # A controller that slips counts as late for so many cycles, a hiccup of ours for as many at most.
 
 
@@ -29,13 +31,20 @@ class Recorder:
         n: Number of joints.
         capacity: Number of rows; when it is full the oldest row is overwritten.
         buffer: Writable memory to use, such as a piece of a shared block; None allocates it.
+        complete: Whether rows hold everything that the state has.
     """
 
     def __init__(
-        self, n: int, capacity: int = round(RECORD_TIME / CYCLE_TIME), buffer: memoryview | bytearray | None = None
+        self,
+        n: int,
+        capacity: int = round(RECORD_TIME / CYCLE_TIME),
+        buffer: memoryview | bytearray | None = None,
+        *,
+        complete: bool = False,
     ) -> None:
-        dtype = cycle_dtype(n)
+        dtype = cycle_dtype(n, complete=complete)
         self.n = n
+        self.complete = complete
         self.capacity = capacity
         self.count = 0
         """Rows written since the beginning; the newest is number `count - 1`."""
@@ -43,7 +52,10 @@ class Recorder:
         memory = bytearray(capacity * self._size) if buffer is None else buffer
         self._memory = memory
         self._rows: NDArray[np.void] = np.frombuffer(memory, dtype=dtype, count=capacity)
-        self._pack = struct.Struct(f"<Qdqqdd{4 * n}dIIBBBB4x{2 * n + 17}d").pack_into
+        start = f"<Qdqqdd{4 * n}dIIBBBB4x{2 * n + 17}d"
+        rest = self._size - struct.calcsize(start)
+        self._unknown = np.full(rest // 8, math.nan).tobytes()
+        self._pack = struct.Struct(f"{start}{rest}s").pack_into
         self._pack_start = struct.Struct("<Qdqqd").pack_into
         self._pack_lost = struct.Struct("<I").pack_into
         self._lost_offset = struct.calcsize(f"<Qdqqdd{4 * n}dI")
@@ -70,10 +82,12 @@ class Recorder:
         command_tau: Sequence[float] | None = None,
         *,
         braking: bool = False,
+        rest: bytes = b"",
     ) -> None:
         """Writes one row; see `cycle_dtype` for the meaning.
 
-        `modes`: robot, controller, motion generator. `pose`: 16 numbers, row-major, sent in answer like `psi`.
+        `modes`: robot, controller, motion generator. `pose`: 16 numbers, row-major, sent in answer like `psi`. `rest`:
+        the fields from `STATE_FIELDS` on, as bytes.
         """
         self._pack(
             self._memory,
@@ -81,7 +95,7 @@ class Recorder:
             message_id, t, received_ns, sent_ns, lateness, success_rate,
             *q, *q_c, *dq, *command,
             faults, lost, *modes, braking,
-            *(tau or self._nothing), *pose, psi, *(command_tau or self._nothing),
+            *(tau or self._nothing), *pose, psi, *(command_tau or self._nothing), rest or self._unknown,
         )  # fmt: skip
         self.count += 1
 
@@ -138,6 +152,8 @@ class CycleLog:
         self._last_id: int | None = None
         self._origins: deque[int] = deque(maxlen=_GRID_CYCLES)
         self._nothing = (math.nan,) * recorder.n
+        self._arrays_of = attrgetter(*STATE_FIELDS, *(OTHER_STATE_FIELDS[:-4] if recorder.complete else ()))
+        self._numbers_of = attrgetter(*OTHER_STATE_FIELDS[-4:]) if recorder.complete else None
         self._idle_count = -1  # What the recorder counted when the newest row was one of no motion, and ours.
 
     def restart(self) -> None:
@@ -219,7 +235,12 @@ class CycleLog:
             psi,
             tau,
             braking=self.braking,
+            rest=self._pack_rest(state),
         )
+
+    def _pack_rest(self, state: RobotState) -> bytes:
+        arrays = b"".join([values.tobytes() for values in self._arrays_of(state)])
+        return arrays if self._numbers_of is None else arrays + _NUMBERS.pack(*self._numbers_of(state))
 
 
 def _is_alike(state: RobotState, other: RobotState) -> bool:
@@ -229,6 +250,9 @@ def _is_alike(state: RobotState, other: RobotState) -> bool:
         and state.q_c is other.q_c
         and state.dq is other.dq
         and state.tau is other.tau
+        and state.tau_ext_in_base is other.tau_ext_in_base
+        and state.T_base_tool is other.T_base_tool
+        and state.theta is other.theta
         and state.faults == other.faults
         and state.success_rate == other.success_rate
         and state.robot_mode is other.robot_mode

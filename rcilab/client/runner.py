@@ -42,14 +42,18 @@ class Runner:
         realtime: False for a controller in lock-step, where timing means nothing.
         silence: Time without a state, while moving, that counts as a lost connection, [s].
         partner: See above.
+        record_all: Whether everything that the state has is recorded.
     """
 
-    def __init__(self, link: Link, turns: Turns, *, realtime: bool, silence: float, partner: int | None) -> None:
+    def __init__(
+        self, link: Link, turns: Turns, *, realtime: bool, silence: float, partner: int | None, record_all: bool
+    ) -> None:
         self.partner = partner
         self._link = link
         self._turns = turns
         self._realtime = realtime
         self._silence = silence
+        self._record_all = record_all
         self._ears: tuple[Ear, ...] = ()
 
     def hear(self, ear: Ear) -> Callable[[], None]:
@@ -88,7 +92,8 @@ class Runner:
             Exception: Whatever the callback raised; the arm was brought to rest.
         """
         time_needed = RECORD_TIME + (0.0 if plan is None else plan.duration)  # It may be held on its way.
-        recorder = Recorder(model.n, math.ceil(time_needed / CYCLE_TIME) + _SPARE_CYCLES)
+        capacity = math.ceil(time_needed / CYCLE_TIME) + _SPARE_CYCLES
+        recorder = Recorder(model.n, capacity, complete=self._record_all)
         loop = ControlLoop(
             self._link,
             RciCommands(self._link),  # Not the session's own: those are refused while a motion runs.

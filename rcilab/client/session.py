@@ -34,7 +34,9 @@ if TYPE_CHECKING:
     from rcilab.model import RobotModel
 
 
-def connect(address: str, model: RobotModel | None = None, timeout: float = 3.0) -> RobotSession:
+def connect(
+    address: str, model: RobotModel | None = None, timeout: float = 3.0, *, record_all: bool = False
+) -> RobotSession:
     """Returns a session with the robot at an address. Nothing moves and no motor is switched.
 
     Args:
@@ -42,13 +44,14 @@ def connect(address: str, model: RobotModel | None = None, timeout: float = 3.0)
             `?client_port=M` when it sends states to another port of ours; `?world_port=W` for `world`.
         model: The arm, with its tool and load; None takes the arm that the controller says it is.
         timeout: How long to wait for the connection, for the first state, and for every answer, [s].
+        record_all: Whether runs hold everything that the state has, three times as much; see `Run.cycles`.
 
     Raises:
         ConnectionLostError: Nobody answers there, or states do not arrive; the message says what to check.
         ModelError: The model is another arm than the controller's, or none was given and that one is not known.
         InvalidValueError: The address, the model or the timeout is none.
     """
-    return open_session(address, model, timeout)
+    return open_session(address, model, timeout, record_all=record_all)
 
 
 def open_session(
@@ -56,6 +59,7 @@ def open_session(
     model: RobotModel | None,
     timeout: float,
     *,
+    record_all: bool = False,
     realtime: bool = True,
     silence: float = SILENCE,
     on_close: Callable[[], None] = lambda: None,
@@ -65,9 +69,10 @@ def open_session(
     """Returns a session as `connect` does, with what only a simulation sets.
 
     Args:
-        address: See `connect`, as the next two.
+        address: See `connect`, as the next three.
         model: The arm.
         timeout: [s].
+        record_all: Also as of `connect`.
         realtime: False for a controller in lock-step, where timing means nothing.
         silence: Time without a state, while moving, that counts as a lost connection, [s].
         on_close: Called once when the session is closed, such as to end a private controller.
@@ -99,7 +104,7 @@ def open_session(
             closing.callback(world.close)
         closing.callback(link.close)
         turns = Turns(closing.close)
-        runner = Runner(link, turns, realtime=realtime, silence=silence, partner=partner)
+        runner = Runner(link, turns, realtime=realtime, silence=silence, partner=partner, record_all=record_all)
         return RobotSession(link, model, turns, runner, world)
     except BaseException:
         transport.close()

@@ -1,8 +1,8 @@
 """A run as MCAP: messages with JSON schemas, for Foxglove and PlotJuggler.
 
-Topics, one message a cycle: /measured, /commanded, /plan, /error, /health, and /tool as a foxglove.PoseInFrame, which
-Foxglove draws in 3D. Times are those of the controller's cycles, counted from when the run began. The facts of the run
-stand in the metadata record "rcilab".
+Topics, one message a cycle: /measured, /commanded, /plan, /error, /health, /state where everything was recorded, and
+/tool as a foxglove.PoseInFrame, which Foxglove draws in 3D. Times are those of the controller's cycles, counted from
+when the run began. The facts of the run stand in the metadata record "rcilab".
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 
+from rcilab.cycle_file import OTHER_STATE_FIELDS
 from rcilab.recording.columns import run_facts
 from rcilab.recording.extra import require_library
 from rcilab.spatial import Pose
@@ -52,7 +53,9 @@ def write_mcap(run: Run, stream: IO[bytes], progress: Callable[[float], None]) -
         topic: _register(writer, topic, f"rcilab.{topic}", _schema(signals)) for topic, signals in topics.items()
     }
     tables = {topic: [(signal.name, signal.values.tolist()) for signal in signals] for topic, signals in topics.items()}
-    tool = None if run.model is None else run.model.forward_path(run.q)
+    tool = run.T_base_tool if np.isfinite(run.T_base_tool).all() else None
+    if tool is None and run.model is not None:
+        tool = run.model.forward_path(run.q)
     tool_channel = None if tool is None else _register(writer, "tool", "foxglove.PoseInFrame", _POSE_SCHEMA)
     for row, stamp in enumerate(stamps.tolist()):
         for topic, table in tables.items():
@@ -68,21 +71,32 @@ def write_mcap(run: Run, stream: IO[bytes], progress: Callable[[float], None]) -
 def _topics(run: Run) -> dict[str, list[_Signal]]:
     cycles, tracking = run.cycles, run.tracking
     planned = run.planned
+    wanted = "commanded" if run.plan is None else "planned"
     return {
         "measured": [
             _Signal("q", "measured joint angles, [rad]", run.q),
             _Signal("dq", "measured joint velocities, [rad/s]", run.dq),
             _Signal("tau", "measured joint torques, [N m]", run.tau),
+            _Signal("theta", "motor positions, motor side of the gear, [rad]", run.theta),
+            _Signal("tau_ext_in_base", "external force and moment, base frame, [N, N m]", run.tau_ext_in_base),
+            _Signal(
+                "tau_ext_in_stiff", "external force and moment, force-control frame, [N, N m]", run.tau_ext_in_stiff
+            ),
         ],
         "commanded": [
             _Signal("q_c", "commanded joint angles as the controller reports them, [rad]", run.q_c),
             _Signal("command", "joint angles sent in answer, [rad]", run.command),
         ],
+        "state": [
+            _Signal(name, f"{name} of the robot's state, SI units", cycles[name].reshape(len(cycles), -1))
+            for name in OTHER_STATE_FIELDS
+            if name in (cycles.dtype.names or ())
+        ],
         "plan": [_Signal("q", "planned joint angles at this instant, [rad]", planned)] if run.plan is not None else [],
         "error": [
-            _Signal("joint", "measured minus planned joint angles, [rad]", tracking.joint),
-            _Signal("tool", "distance of the tool from its plan, [m]", tracking.position),
-            _Signal("tool_turn", "angle of the tool from its plan, [rad]", tracking.rotation),
+            _Signal("joint", f"measured minus {wanted} joint angles, [rad]", tracking.joint),
+            _Signal("tool", f"distance of the tool from where it was {wanted} to be, [m]", tracking.position),
+            _Signal("tool_turn", f"angle of the tool from where it was {wanted} to be, [rad]", tracking.rotation),
         ],
         "health": [
             _Signal("success_rate", "share of commands that arrived in time, 0 to 1", run.success_rate),

@@ -60,7 +60,8 @@ class Run:
     plan: Motion | None
     """What was meant to happen; None for a callback."""
     cycles: NDArray[np.void]
-    """Every recorded cycle in full, see `cycle_dtype`."""
+    """Every recorded cycle in full, see `cycle_dtype`. In a session with `record_all=True` a cycle holds the rest of
+    the state, too, by the names of `RobotState`: `run.cycles["tau_filtered"]`."""
     stopped: str | None = None
     """Why the motion was brought to rest before its end; None when it ran to its end."""
     truncated: bool = False
@@ -105,6 +106,26 @@ class Run:
     def tau(self) -> JointPath:
         """Measured joint torques, shape (N, n), [N m]."""
         return self.cycles["tau"]
+
+    @property
+    def tau_ext_in_base(self) -> Array:
+        """External force and moment in the base frame, shape (N, 6), [N, N m]."""
+        return self.cycles["tau_ext_in_base"]
+
+    @property
+    def tau_ext_in_stiff(self) -> Array:
+        """External force and moment in the force-control frame, shape (N, 6), [N, N m]."""
+        return self.cycles["tau_ext_in_stiff"]
+
+    @property
+    def T_base_tool(self) -> Array:
+        """Measured poses of the tool in base, shape (N, 4, 4), [m]."""
+        return self.cycles["T_base_tool"]
+
+    @property
+    def theta(self) -> JointPath:
+        """Motor positions, motor side of the gear, shape (N, n), [rad]; see `RobotState.theta`."""
+        return self.cycles["theta"]
 
     @property
     def command_pose(self) -> Array:

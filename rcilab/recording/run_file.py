@@ -33,7 +33,7 @@ from typing import IO, TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rcilab.cycle_file import cycle_dtype
+from rcilab.cycle_file import OTHER_STATE_FIELDS, STATE_FIELDS, cycle_dtype
 from rcilab.errors import InvalidValueError, RcilabError
 from rcilab.model import load_model
 from rcilab.motion.motion import Motion
@@ -50,6 +50,7 @@ if TYPE_CHECKING:
 ENDING = ".rcirun"
 BLOCK_CYCLES = 256  # A choice: what a crash may cost at most, about a quarter of a second.
 
+_LATER = {"braking", *STATE_FIELDS}  # What the first versions did not record.
 _ROWS = struct.Struct("<I")
 _MOST_ROWS = 1_000_000  # In one block: half a gigabyte; a choice.
 
@@ -250,9 +251,8 @@ def _build(blocks: tuple[Block, ...]) -> Run:
     dtype = np.dtype([(name, kind, tuple(shape)) for name, kind, shape in head["fields"]])
     if dtype.itemsize != head["bytes"]:
         raise ValueError(f"a cycle takes {head['bytes']} bytes, its fields {dtype.itemsize}")
-    dtype = _known(dtype)
     parts = [_decode_cycles(block.payload, dtype) for block in blocks if block.kind == "CYCL"]
-    cycles = np.concatenate(parts) if parts else np.zeros(0, dtype)
+    cycles = _as_known(np.concatenate(parts) if parts else np.zeros(0, dtype))
     cycles.flags.writeable = False
     plans = [block.payload for block in blocks if block.kind == "PLAN"]
     tails = [json.loads(block.payload) for block in blocks if block.kind == "TAIL"]
@@ -273,20 +273,28 @@ def _build(blocks: tuple[Block, ...]) -> Run:
     )
 
 
-def _known(dtype: np.dtype[np.void]) -> np.dtype[np.void]:
-    """Returns today's layout of a cycle for that of a file: what was reserved when it was written may have a name now.
+def _as_known(cycles: NDArray[np.void]) -> NDArray[np.void]:
+    """Returns cycles of a file in today's layout: 0 or NaN where an earlier version did not record something.
 
     Raises:
-        ValueError: The two do not fit.
+        ValueError: Something is missing that every version recorded, or is there that none did.
     """
-    ours = cycle_dtype(dtype["q"].shape[0]) if "q" in (dtype.names or ()) else None
-    if ours is None or ours.itemsize != dtype.itemsize or not _written(dtype).items() <= _written(ours).items():
+    theirs = _written(cycles.dtype)
+    n = theirs["q"].shape[0] if "q" in theirs else 0
+    ours = cycle_dtype(n, complete=any(name in theirs for name in OTHER_STATE_FIELDS))
+    if cycles.dtype == ours:
+        return cycles
+    known = _written(ours)
+    if not theirs.items() <= known.items() or known.keys() - theirs.keys() - _LATER:
         raise ValueError("its cycles have other fields than this version writes")
-    return ours
+    wide = np.zeros(len(cycles), ours)
+    for name in known:
+        wide[name] = cycles[name] if name in theirs else np.nan if name in STATE_FIELDS else 0
+    return wide
 
 
-def _written(dtype: np.dtype[np.void]) -> dict[str, Any]:
-    return {name: field for name, field in _fields(dtype) if name != "reserved"}
+def _written(dtype: np.dtype[np.void]) -> dict[str, np.dtype[Any]]:
+    return {name: field[0] for name, field in _fields(dtype) if name != "reserved"}
 
 
 def _decode_cycles(payload: bytes, dtype: np.dtype[np.void]) -> NDArray[np.void]:

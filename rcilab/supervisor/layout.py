@@ -38,7 +38,7 @@ from rcilab.errors import UsageError, VersionMismatchError
 from rcilab.supervisor.lateness import SIZE as HISTOGRAM_WORDS
 
 MAGIC = b"RCILABCP"
-VERSION = 6  # Count up with every change of this file, of the snapshot or of `cycle_dtype`.
+VERSION = 7  # Count up with every change of this file, of the snapshot or of `cycle_dtype`.
 
 RING_CYCLES = 32768  # 33 s of cycles: how long a reader may sleep.
 MOTION_TIME = 300.0  # [s] Longest motion that can be handed over.

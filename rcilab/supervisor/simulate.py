@@ -18,7 +18,9 @@ ANSWER_TIMEOUT = 10.0  # [s] The other end is on this machine: if it is slow, th
 SILENCE_IN_LOCKSTEP = 5.0  # [s] A busy machine may pause a controller that has no deadlines to keep for long.
 
 
-def simulate(model: RobotModel, *, plant: str = "ideal", lockstep: bool = True) -> RobotSession:
+def simulate(
+    model: RobotModel, *, plant: str = "ideal", lockstep: bool = True, record_all: bool = False
+) -> RobotSession:
     """Returns a session with a simulated arm; closing the session, or dropping it, ends the simulation.
 
     Args:
@@ -26,6 +28,7 @@ def simulate(model: RobotModel, *, plant: str = "ideal", lockstep: bool = True) 
         plant: "ideal" (the arm is where it is told to be) or "mujoco".
         lockstep: True: each simulated millisecond waits for its command, so that a run comes out the same to the last
             bit on any machine. False: the controller runs free at 1 kHz, as a real one does.
+        record_all: Whether runs hold everything that the state has, three times as much; see `Run.cycles`.
 
     Raises:
         InvalidValueError: The model is none, or the plant is unknown.
@@ -43,6 +46,7 @@ def simulate(model: RobotModel, *, plant: str = "ideal", lockstep: bool = True) 
             controller.address,
             model,
             ANSWER_TIMEOUT,
+            record_all=record_all,
             realtime=not lockstep,
             silence=SILENCE_IN_LOCKSTEP if lockstep else SILENCE,
             on_close=controller.end,

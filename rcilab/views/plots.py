@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from rcilab.arrays import Array, JointPath
 from rcilab.clock import CYCLE_TIME
+from rcilab.conformance.signals import HOLD_SAMPLES
 
 if TYPE_CHECKING:
     from rcilab.limits import JointLimits
@@ -116,14 +117,22 @@ def _first(values: Array, wanted: Array, places: NDArray[np.intp], counts: NDArr
 def plan_curves(motion: Motion, quantity: Quantity, model: RobotModel | None = None) -> Curves:
     """Returns a planned signal, one column a joint; the torque that it takes `model` with its load.
 
-    Velocity, acceleration and jerk are the backward differences that the controller computes and `check` compares.
+    Velocity, acceleration and jerk are the backward differences that the controller computes and `check` compares, in
+    the cycles behind the end, too: what those show is drawn at the end.
     """
+    if quantity == "q":
+        return Curves(t=motion.times, values=motion.q)
+    held = np.repeat(motion.q[-1:], HOLD_SAMPLES, axis=0)
+    t, path = np.append(motion.times, np.repeat(motion.times[-1:], HOLD_SAMPLES)), np.concatenate((motion.q, held))
     if quantity == "tau":
         assert model is not None
-        return Curves(t=motion.times, values=model.torque(motion.q, motion.dq, motion.ddq).full)
-    order = ORDERS[quantity]
-    path = np.concatenate((np.repeat(motion.q[:1], order, axis=0), motion.q))  # The arm stands still before the start.
-    return Curves(t=motion.times, values=np.diff(path, n=order, axis=0) / CYCLE_TIME**order)
+        return Curves(t=t, values=model.torque(path, _differences(path, 1), _differences(path, 2)).full)
+    return Curves(t=t, values=_differences(path, ORDERS[quantity]))
+
+
+def _differences(path: JointPath, order: int) -> JointPath:
+    """Returns the backward differences of rows that follow on standing still, one a cycle."""
+    return np.diff(np.concatenate((np.repeat(path[:1], order, axis=0), path)), n=order, axis=0) / CYCLE_TIME**order
 
 
 def streamed_curves(q: JointPath, quantity: Quantity, model: RobotModel | None = None) -> Curves:

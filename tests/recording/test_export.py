@@ -6,6 +6,7 @@ import csv
 import io
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -122,8 +123,6 @@ def test_the_page_asks_for_nothing_from_elsewhere_and_speaks_both_languages():
 
 
 def test_the_page_of_a_callback_speaks_of_commands_and_of_no_plan(tmp_path):
-    from dataclasses import replace
-
     run = replace(some_run(), plan=None)
     for ending in (".html", ".csv", ".npz", ".rcirun"):
         run.save(tmp_path / f"a{ending}")
@@ -131,3 +130,18 @@ def test_the_page_of_a_callback_speaks_of_commands_and_of_no_plan(tmp_path):
     assert "measured minus commanded" in page
     assert "at its last command" in page
     assert "q_plan" not in (tmp_path / "a.csv").read_text().splitlines()[0]
+
+
+def test_parquet_and_mcap_of_a_callback_have_no_plan_and_compare_with_its_commands():
+    run = replace(some_run(), plan=None)
+    parquet, mcap = pytest.importorskip("pyarrow.parquet"), pytest.importorskip("mcap.reader")
+    table = parquet.read_table(io.BytesIO(export_run(run, ".parquet")))
+    assert not [name for name in table.column_names if "plan" in name]
+    assert table["error[2]"].to_pylist()[5] == pytest.approx(OFFSET)
+    reader = mcap.make_reader(io.BytesIO(export_run(run, ".mcap")))
+    topics = {channel.topic: channel.schema_id for channel in reader.get_summary().channels.values()}
+    assert "/plan" not in topics
+    schema = json.loads(reader.get_summary().schemas[topics["/error"]].data)
+    told = " ".join(entry["description"] for entry in schema["properties"].values())
+    assert "measured minus commanded" in told
+    assert "plan" not in told

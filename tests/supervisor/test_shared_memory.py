@@ -242,18 +242,11 @@ def test_a_row_that_repeats_is_the_row_that_would_have_been_written():
 
 
 def test_lateness_is_against_the_robot_s_grid_and_forgets_a_slip():
-    class State:
-        q = q_c = dq = tau = np.zeros(7)
-        faults = ()
-        success_rate = 1.0
-        robot_mode = controller_mode = motion_generator_mode = 0
-
     def late(arrivals_ms):
         log, found = CycleLog(Recorder(7, 100)), []
         for number, arrival in enumerate(arrivals_ms):
-            state = State()
-            state.message_id = number
-            log.write(state, round(arrival * 1e6))
+            datagram = number.to_bytes(8, "big") + bytes(rci.STATE_SIZE - 8)
+            log.write(rci.decode_state(datagram, 7), round(arrival * 1e6))
             found.append(round(log.lateness * 1e3, 6))
         return found
 

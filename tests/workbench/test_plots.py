@@ -11,7 +11,17 @@ from rcilab.conformance import check
 from rcilab.conformance.conditions import CYCLE_CONDITIONS
 from rcilab.model import load_model
 from rcilab.motion import Motion, plan_joint
-from rcilab.views.plots import QUANTITIES, Curves, bounds_of, build_frame, decimate, plan_curves, recorded_curves
+from rcilab.views.plots import (
+    ORDERS,
+    QUANTITIES,
+    Curves,
+    bounds_of,
+    build_frame,
+    decimate,
+    plan_curves,
+    recorded_curves,
+    streamed_curves,
+)
 from rcilab.workbench.panels.plot_contents import plot_contents
 
 MODEL = load_model("xMatePro7")
@@ -106,3 +116,20 @@ def test_a_plan_is_drawn_as_it_is_checked():
     used = {row.condition.order: row.ratio for row in check(motion, MODEL).rows if row.condition in CYCLE_CONDITIONS}
     drawn = np.abs(plan_curves(motion, "jerk").values / LIMITS.jerk).max()
     assert drawn == pytest.approx(used[3], rel=1e-6)
+
+
+def test_what_is_worst_behind_the_end_is_drawn_at_the_end():
+    whole = plan_joint(MODEL, MODEL.home, MODEL.home + 0.3)
+    motion = Motion.from_cycles(whole.q[: len(whole.q) // 2])  # It ends at full speed: the arm cannot stop within 1 ms.
+    used = {row.condition.order: row.ratio for row in check(motion, MODEL).rows if row.condition in CYCLE_CONDITIONS}
+    for quantity, bound in (("ddq", LIMITS.acceleration), ("jerk", LIMITS.jerk)):
+        curves = plan_curves(motion, quantity)
+        assert np.abs(curves.values / bound).max() == pytest.approx(used[ORDERS[quantity]], rel=1e-6)
+        assert curves.t[-1] == motion.duration
+        assert build_frame(curves, None, LIMITS, quantity, 0).violated.any()
+
+
+def test_a_planned_torque_is_that_of_the_commands():
+    motion = plan_joint(MODEL, MODEL.home, MODEL.home + 0.3)
+    drawn, streamed = plan_curves(motion, "tau", MODEL).values, streamed_curves(motion.q, "tau", MODEL).values
+    assert np.allclose(drawn[2 : len(streamed)], streamed[2:], rtol=0, atol=1e-9)

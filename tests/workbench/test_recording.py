@@ -23,6 +23,7 @@ from rcilab.workbench.app import Workbench, WorkbenchConfig
 from rcilab.workbench.goal.actions import initial_goal
 from rcilab.workbench.panels.outcome import outcome_html, replay_html
 from rcilab.workbench.panels.recording import progress_html, summary_html
+from rcilab.workbench.panels.timeline import TimelinePanel
 from rcilab.workbench.run.export_actions import ENDINGS
 from rcilab.workbench.run.keeper import whole_recording
 from rcilab.workbench.run.readiness import obstacle
@@ -234,3 +235,7 @@ def test_a_run_of_a_callback_is_replayed_by_what_it_commanded():
         assert state.plan is not None
         assert np.allclose(state.plan.motion.q, PLAN.q[: len(state.plan.motion)], rtol=0, atol=1e-9)
         assert state.recording.run.plan is None
+        for language, words in (("en", "solid: recorded, blue: commanded"), ("zh", "蓝色：指令")):
+            caption = TimelinePanel(Text(language), lambda request: None)._read(state, SimpleNamespace(q=None, phase="closed"))
+            assert words in caption
+            assert "plan" not in caption

@@ -96,9 +96,11 @@ class TimelinePanel:
         duration = state.plan.motion.duration
         t, kinds = min(time_shown(state, status), duration), text("timeline.plan_only")
         if state.recording is not None:
-            kinds = text("timeline.kinds", delay=state.recording.delay)
+            run = state.recording.run
+            wanted = "_commanded" if run is not None and run.plan is None else ""
+            kinds = text(f"timeline.kinds{wanted}", delay=state.recording.delay)
             if status.q is None:
-                kinds = text("timeline.replayed")
+                kinds = text(f"timeline.replayed{wanted}")
         where = tell_place(state.plan, t)
         kinds = kinds if where is None else text.say(where)
         if state.plan.short is not None and state.recording is None:
