@@ -236,6 +236,7 @@ def test_a_run_of_a_callback_is_replayed_by_what_it_commanded():
         assert np.allclose(state.plan.motion.q, PLAN.q[: len(state.plan.motion)], rtol=0, atol=1e-9)
         assert state.recording.run.plan is None
         for language, words in (("en", "solid: recorded, blue: commanded"), ("zh", "蓝色：指令")):
-            caption = TimelinePanel(Text(language), lambda request: None)._read(state, SimpleNamespace(q=None, phase="closed"))
+            status = SimpleNamespace(q=None, phase="closed")
+            caption = TimelinePanel(Text(language), lambda request: None)._read(state, status)
             assert words in caption
             assert "plan" not in caption
