@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import time
 
+import numpy as np
 import pytest
 
-from tests.browser.page import wait_for
+from rcilab.workbench import requests
+from tests.browser.page import BenchPage, wait_for
 
 pytestmark = pytest.mark.browser
 
@@ -15,8 +17,8 @@ def test_a_page_that_is_held_up_by_drawing_keeps_the_controls(page) -> None:
     store = page.bench.store
     wait_for(lambda: store.state.lease.holder is not None, "a holder", 20.0, page.tab)
     holder = store.state.lease.holder
-    page.tab.evaluate("setTimeout(() => { const end = Date.now() + 5000; while (Date.now() < end); }, 0)")
-    end, holders = time.monotonic() + 4.5, set()
+    page.tab.evaluate("setTimeout(() => { const end = Date.now() + 3500; while (Date.now() < end); }, 0)")
+    end, holders = time.monotonic() + 3.0, set()
     while time.monotonic() < end:  # Without a word to the page: it could not answer.
         holders.add(store.state.lease.holder)
         time.sleep(0.05)
@@ -33,3 +35,30 @@ def test_a_page_that_is_closed_is_gone_at_once(chromium, page) -> None:
     tab.close()
     wait_for(lambda: store.state.lease.pages == before, "the page to be gone", 2.0 + 3.0)
     context.close()
+
+
+@pytest.mark.parametrize("way", ["closed", "hung"])
+def test_a_moving_arm_stops_when_the_page_that_holds_the_controls_is_gone(chromium, tmp_path, way: str) -> None:
+    from rcilab.workbench.app import Workbench, WorkbenchConfig
+
+    context = chromium.new_context(viewport={"width": 640, "height": 480})
+    try:
+        with Workbench(WorkbenchConfig(port=0, quality="light", runs=tmp_path)) as bench:
+            tab = context.new_page()
+            page = BenchPage(tab, bench)
+            tab.goto(f"{bench.url}?fixedDpr=0.2")
+            page.wait_until_drawn()
+            page.wait(lambda: page.status.phase == "idle" and bool(page.status.powered), "a powered, idle arm", 30.0)
+            page.wait(lambda: page.state.lease.holder is not None, "a holder", 20.0)
+            bench.conductor.ask(requests.SetSpeed(speed=0.01))
+            page.plan_to(1, 50.0)
+            bench.conductor.ask(requests.Drive(what="execute"))
+            page.wait(lambda: page.status.code == "moving" and (page.status.motion_time or 0.0) > 0.1, "a moving arm")
+            if way == "closed":
+                tab.close()
+            else:
+                tab.evaluate("setTimeout(() => { const end = Date.now() + 20000; while (Date.now() < end); }, 0)")
+            wait_for(lambda: page.status.code == "idle.operator", lambda: f"the stop: {page.status}", 12.0)
+            assert np.abs(page.status.q_c - bench.store.state.plan.motion.q[-1]).max() > 0.05, "on its way"
+    finally:
+        context.close()

@@ -2,7 +2,7 @@
 // and a slow page is not a gone page. A page that is held up for longer than `SLOWEST` is as good as gone.
 (() => {
   "use strict";
-  const SLOWEST = 10000;  // [ms] The longest frame that software rendering was seen to take is about a third of it.
+  const SLOWEST = 4000;  // [ms] The longest frame that software rendering was seen to take is 3.3 s.
   const work = (slowest) => {
     let me = null, live = null, heard = 0;
     const hello = () => { if (live && live.readyState === WebSocket.OPEN && me) live.send(JSON.stringify({ kind: "hello", ...me })); };
