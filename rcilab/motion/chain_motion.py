@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -19,6 +20,8 @@ from rcilab.motion.time_law import FastestLaw, TimeLaw, smooth_law
 
 _ROUNDS = 12
 """How often to slow down in places, and then as often as a whole. Seen: 1 to 4 in places."""
+_USUAL_ROUNDS = 4.0
+"""By which half of the work is taken for done. A choice."""
 _SLOWEST = 50.0
 """Beyond this a limit is passed by a jump. A choice."""
 _INSTANTS = (0.25, 0.5, 0.75)
@@ -30,7 +33,7 @@ _HASTE = 1.002
 few rounds do, and places that were good stay so when the cycles fall elsewhere. A choice."""
 
 
-def plan_chain(chain: Chain, limits: Limits) -> tuple[Array, list[float]]:
+def plan_chain(chain: Chain, limits: Limits, tell: Callable[[float], None]) -> tuple[Array, list[float]]:
     """Returns the fastest curve along a chain from rest to rest, and when it passes each corner, [s].
 
     A quintic a cycle, through the chain at every cycle with its velocity and acceleration there: its coefficients,
@@ -39,6 +42,7 @@ def plan_chain(chain: Chain, limits: Limits) -> tuple[Array, list[float]]:
     Args:
         chain: The chain.
         limits: Of the arm.
+        tell: Called before every round with about the part of the work that is done; what it raises ends the planning.
 
     Raises:
         PlanningError: A joint limit or a singularity is in the way.
@@ -53,6 +57,7 @@ def plan_chain(chain: Chain, limits: Limits) -> tuple[Array, list[float]]:
     squares = np.zeros(len(chain.knots))
     worst = 0.0
     for round_ in range(2 * _ROUNDS):
+        tell(round_ / (round_ + _USUAL_ROUNDS))
         before, squares = squares, fastest.slowed(slowdown)
         law = smooth_law(chain.knots, squares, cycles)
         interval = chain.interval(law.s)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -14,7 +15,7 @@ from rcilab.arrays import Array, JointVector, as_number, as_vector, described, s
 from rcilab.clock import CYCLE_TIME
 from rcilab.errors import InvalidValueError, PlanningError
 from rcilab.model import RobotModel, require_model
-from rcilab.motion.blend import build_blend
+from rcilab.motion.blend import Blend, build_blend
 from rcilab.motion.cartesian import plan_path
 from rcilab.motion.chain import build_chain
 from rcilab.motion.chain_motion import plan_chain
@@ -30,6 +31,8 @@ from rcilab.words.text import Remark
 
 _SHORTENED = 1e-6
 """How much shorter than asked a radius must be to be mentioned, [m]."""
+_BLENDS = 0.3
+"""Part of the work on a blended run that it takes to find the blends; about what was seen."""
 _GEOMETRY = 0.3
 """Part of the work that it takes to find the ways; about what was seen."""
 
@@ -102,7 +105,14 @@ def plan_program(
         _require_stops(program)
     if program.T_flange_tool is not None:
         model = model.with_tool(program.T_flange_tool)
-    tell = progress or (lambda part: None)
+    done = 0.0
+
+    def tell(part: float) -> None:
+        nonlocal done
+        done = max(done, part)  # What is planned a second time, more gently, does not take the work back.
+        if progress is not None:
+            progress(done)
+
     approach = None if start is None else as_vector(start, model.n, "start", "rad")
     if approach is not None and np.abs(approach - program.start).max() <= STANDSTILL_DISTANCE:
         program, approach = replace(program, start=tuple(approach.tolist())), None
@@ -113,13 +123,19 @@ def plan_program(
         track.add(_plan_move(model, approach, there, slow, "the way to the start", law))
     curves: list[_Curve] = []
     for run in _runs(segments):
-        curves.append(_plan_run(model, run, speed, track.notes, law))
-        tell(_GEOMETRY + (1.0 - _GEOMETRY) * run[-1].number / count)
+        of_all = partial(_part_of_all, run[0].number, run[-1].number, count)
+        curves.append(_plan_run(model, run, speed, track.notes, law, lambda part, of_all=of_all: tell(of_all(part))))
+        tell(of_all(1.0))
     back = None if rounds == 1 else _plan_move(model, curves[-1].goal, there, slow, "the way back to the start", law)
     for number in range(int(rounds)):
         for curve in (back, *curves) if back is not None and number else curves:
             track.add(curve)
     return track.motion(speed * max(waypoint.speed for waypoint in program.waypoints), law)
+
+
+def _part_of_all(first: int, last: int, count: int, part: float) -> float:
+    """Returns which part of the work is done when a part of the waypoints from `first` to `last`, of `count`, is."""
+    return _GEOMETRY + (1.0 - _GEOMETRY) * (first - 1 + (last - first + 1) * part) / count
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -176,11 +192,21 @@ def _stand(goal: JointVector, dwell: float = 0.0) -> _Curve:
     return _Curve(np.zeros(1), np.zeros((0, len(goal), 1)), goal, dwell)
 
 
-def _plan_run(model: RobotModel, run: list[Segment], scale: float, notes: list[str], law: JointLaw) -> _Curve:
+def _plan_run(
+    model: RobotModel,
+    run: list[Segment],
+    scale: float,
+    notes: list[str],
+    law: JointLaw,
+    tell: Callable[[float], None],
+) -> _Curve:
     segment = run[0]
     speed = scale * segment.waypoint.speed
     if len(run) > 1:
-        blends = [build_blend(model, before, after) for before, after in pairwise(run)]
+        blends: list[Blend] = []
+        for before, after in pairwise(run):
+            blends.append(build_blend(model, before, after))
+            tell(_BLENDS * len(blends) / len(run))
         for before, blend in zip(run[:-1], blends, strict=True):
             asked = before.waypoint.blend
             if blend.radius < asked - _SHORTENED:
@@ -193,7 +219,7 @@ def _plan_run(model: RobotModel, run: list[Segment], scale: float, notes: list[s
         chain, last = build_chain(model, run, blends, scale), run[-1]
 
         def blended(arm: RobotModel) -> _Curve:
-            coefficients, corners = plan_chain(chain, arm.limits)
+            coefficients, corners = plan_chain(chain, arm.limits, lambda part: tell(_BLENDS + (1.0 - _BLENDS) * part))
             breaks = np.arange(len(coefficients) + 1, dtype=np.float64) * CYCLE_TIME
             return _Curve(breaks, coefficients, last.goal, last.waypoint.dwell, tuple(corners))
 

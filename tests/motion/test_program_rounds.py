@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from rcilab.bench.compute import close_program_of
 from rcilab.errors import InvalidValueError, PlanningError
 from rcilab.model import load_model
 from rcilab.motion import Program, Waypoint, plan_joint, plan_program
@@ -102,3 +103,19 @@ def test_a_retyped_waypoint_keeps_its_target_and_all_else():
         Waypoint.nullspace(0.1).retyped("line")
     with pytest.raises(InvalidValueError, match="via"):
         line.retyped("arc")
+
+
+@pytest.mark.parametrize("law", ["jerk_limited", "torque_rate_limited"])
+def test_one_long_blended_run_tells_its_progress_and_can_be_ended_on_the_way(law):
+    program, told = close_program_of(MODEL, 60), []
+    plan_program(MODEL, program, law=law, progress=told.append)
+    assert told == sorted(told)
+    assert told[-1] == 1.0
+    assert len({share for share in told if 0.5 < share < 1.0}) >= 5, "between its first round and its end"
+
+    def give_up(share: float) -> None:
+        if share > 0.6:
+            raise InterruptedError
+
+    with pytest.raises(InterruptedError):
+        plan_program(MODEL, program, law=law, progress=give_up)
