@@ -24,7 +24,7 @@ _RELATIVE = """([root, node]) => {
   return a.matrixWorld.clone().invert().multiply(b.matrixWorld).transpose().elements;
 }"""
 _DRAWN = """() => window.__viserMutable && __viserMutable.nodeRefFromName
-  && __viserMutable.nodeRefFromName['/live'] && __viserMutable.nodeRefFromName['/target']
+  && __viserMutable.nodeRefFromName['/live'] && __viserMutable.nodeRefFromName['/mark']
   && __viserTestpoints.rendererInfo.render.frame > 3"""
 
 _COVERED = """() => [...document.querySelectorAll('#root [role=tab]')].filter((tab) => {

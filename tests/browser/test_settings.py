@@ -55,6 +55,9 @@ def test_the_second_page_watches_asks_for_the_controls_and_is_given_them(page, c
     assert float(other.slider(1).locator("xpath=ancestor::*[contains(@class,'Slider-root')]").evaluate(looks)) < 0.6
     assert float(page.slider(1).locator("xpath=ancestor::*[contains(@class,'Slider-root')]").evaluate(looks)) == 1.0
     assert page.tab.locator("#rl-take").is_hidden()
+    seen = "Boolean(__viserMutable.nodeRefFromName['/target']?.visible)"
+    other.wait(lambda: other.tab.evaluate(seen) is False, "no handles on a page that cannot use them")
+    assert page.tab.evaluate(seen) is True
     other.button("Ask for the controls").first.click()
     question = page.tab.get_by_role("alertdialog", name="Page 2 asks for the controls")
     question.wait_for()
@@ -65,8 +68,11 @@ def test_the_second_page_watches_asks_for_the_controls_and_is_given_them(page, c
     question.get_by_role("button", name="Hand over").click()
     other.wait(lambda: page.chip("controls") == "page 2; this is page 1", "the first page to see who has the controls")
     page.tab.locator("#rl-take").wait_for()
+    other.wait(lambda: other.tab.evaluate(seen) is True, "handles for the page that has the controls now")
+    page.wait(lambda: page.tab.evaluate(seen) is False, "none for the first page")
     context.close()
     page.wait(lambda: page.state.lease.pages == (page.state.lease.holder,), "the controls back with the first page")
+    page.wait(lambda: page.tab.evaluate(seen) is True, "the handles back")
 
 
 def test_a_blind_click_on_a_tab_right_after_a_change_counts_and_nothing_moves(page):

@@ -55,6 +55,11 @@ class ElbowStage:
         """Whether a hand moves the elbow, or has just let go of it."""
         return time.monotonic() - self._touched <= HAND_AWAY
 
+    @property
+    def handles(self) -> tuple[str, ...]:
+        """The nodes that a hand can move just now."""
+        return (_HANDLE,) if self._drawn is not None else ()
+
     def show(self, state: UiState, status: SupervisorStatus, text: Text) -> None:
         """Draws the circle of the goal; while the arm moves there is none."""
         elbow = state.scene.elbow if "elbow" in state.scene.extras and not is_moving(status) else None

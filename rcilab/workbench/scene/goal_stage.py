@@ -72,6 +72,11 @@ class GoalStage:
         """Whether a hand moves the handles, or has just let go of them."""
         return time.monotonic() - self._touched <= HAND_AWAY
 
+    @property
+    def handles(self) -> tuple[str, ...]:
+        """The nodes that a hand can move just now."""
+        return (self._gizmo.name,) if self._gizmo.visible else ()
+
     def show(self, state: UiState, text: Text) -> None:
         """Follows the goal, unless a hand is moving the handles."""
         goal = state.goal

@@ -58,6 +58,14 @@ class SetupStage:
         )
         self._lines = 0
 
+    @property
+    def handles(self) -> tuple[str, ...]:
+        """The nodes that a hand can move just now."""
+        if self._gizmo is None:
+            return ()
+        faces = tuple(f"/safety_box/handle{face}" for face in range(6)) if self._edited == "box" else ()
+        return (self._gizmo.name, *faces)
+
     def show(self, state: UiState, text: Text) -> None:
         """Draws what is chosen to be seen, puts handles on what is edited."""
         setup = state.setup
@@ -100,7 +108,7 @@ class SetupStage:
         if not part:
             return
         pose = _pose_of(state, part)
-        name = "/setup_box" if part == "box" else f"{self._flange}/setup_handles"
+        name = "/setup_box" if part == "box" else f"{self._flange}/handles_{part}"
         self._gizmo = self._server.scene.add_transform_controls(
             name, scale=_SCALES[part], line_width=3.0, depth_test=False, disable_rotations=part == "load",
             wxyz=pose.wxyz, position=pose.position,

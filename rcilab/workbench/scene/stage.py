@@ -18,6 +18,7 @@ from rcilab.workbench.scene.goal_stage import GoalStage
 from rcilab.workbench.scene.grip import Grip
 from rcilab.workbench.scene.ribbon_stage import RibbonStage
 from rcilab.workbench.scene.setup_stage import SetupStage
+from rcilab.workbench.scene.watchers import Watchers
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask
 
@@ -50,6 +51,7 @@ class Stage:
         self._look = self._theme = ""
         self._ghosts: dict[_Ghost, ArmView] = {}
         self._visible: set[_Ghost] = set()
+        self._watchers = Watchers(server)
         place_camera(server)
 
     @property
@@ -85,6 +87,7 @@ class Stage:
         self._extras.show(state)
         self._grip.show(state, status, text)
         self._setup.show(state, text)
+        self._watchers.show(state.lease, self._goal.handles + self._elbow.handles + self._setup.handles)
 
     def _build(self, state: UiState) -> None:
         server, full = self._server, state.quality == "full"

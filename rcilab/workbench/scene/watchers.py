@@ -1,0 +1,60 @@
+"""Handles that only the page with the controls can use, and so only that one sees."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import viser
+
+    from rcilab.workbench.lease import Lease
+
+_SETTLING = 10.0
+"""[s] For so long a change is told again and again: viser replays the scene to a new page, and tells all pages of nodes
+that come back, in an order of its own. A choice."""
+_AGAIN = 0.5
+"""[s] Between two times of telling. A choice."""
+
+
+class Watchers:
+    """Hides handles from the pages that watch. Owned by the stage.
+
+    Args:
+        server: The pages.
+    """
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        self._server = server
+        self._handles: tuple[str, ...] = ()
+        self._watching: dict[int, float] = {}  # Since when each watching page sees these handles no more, [s].
+        self._told = 0.0
+
+    def show(self, lease: Lease, handles: tuple[str, ...]) -> None:
+        """Tells each page what has changed for it.
+
+        Args:
+            lease: Which pages there are, and which has the controls.
+            handles: The nodes that are handles, and that are visible.
+        """
+        now = time.monotonic()
+        if handles != self._handles:
+            self._handles, self._watching = handles, dict.fromkeys(self._watching, now)
+        watching = {page: self._watching.get(page, now) for page in lease.pages if page != lease.holder}
+        is_time = now - self._told >= _AGAIN
+        hidden = [page for page, since in watching.items() if since == now or (is_time and now - since < _SETTLING)]
+        shown = [page for page in self._watching if page == lease.holder]
+        self._watching = watching
+        if hidden or shown:
+            self._told = now
+            clients = self._server.get_clients()
+            for page in (*hidden, *shown):
+                _tell(clients.get(page), handles, page in shown)
+
+
+def _tell(client: Any, nodes: tuple[str, ...], are_visible: bool) -> None:
+    from viser import _messages
+
+    if client is not None:  # It may have gone just now.
+        for name in nodes:
+            client.gui._websock_interface.queue_message(_messages.SetSceneNodeVisibilityMessage(name, are_visible))
