@@ -118,19 +118,23 @@ class JogPanel(Part):
         return lambda degrees: self._move(joint, math.radians(degrees))
 
     def _move(self, joint: int, angle: float) -> None:
-        limits = self.model.limits.joint
         q = np.array(self.state.goal)
-        q[joint] = min(max(angle, limits.lower[joint]), limits.upper[joint])
-        self.state.pose(frozen(q))
+        q[joint] = angle
+        self._pose_inside(q)
+
+    def _pose_inside(self, q: JointVector) -> None:
+        """Poses the arm as near as its limits allow: a session may have set soft ones since."""
+        limits = self.model.limits.joint
+        self.state.pose(frozen(np.clip(q, limits.lower, limits.upper)))
 
     def _on_button(self, name: str) -> None:
         if name == "undo":
             if self._before:
-                self.state.pose(self._before.pop())
+                self._pose_inside(self._before.pop())
             return
         self._remember()
         named = {"home": self.model.home, "zero": np.zeros(self.model.n), "arm": self.state.here}
-        self.state.pose(named[name])
+        self._pose_inside(named[name])
 
     def _remember(self) -> None:
         self._before = [*self._before[-19:], self.state.goal]

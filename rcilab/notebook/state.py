@@ -53,7 +53,7 @@ class LabState:
     """
 
     def __init__(self, model: RobotModel, session: RobotSession | None = None) -> None:
-        self.model = require_model(model)
+        self._model = require_model(model)
         self.session = session
         self.lock = threading.RLock()
         self.robot: RobotSide | None = None
@@ -116,6 +116,11 @@ class LabState:
         """Where a plan begins: at the robot's commanded angles, without a robot where the arm was left, [rad]."""
         status = self.status
         return self._rest if status is None or status.q_c is None else frozen(status.q_c)
+
+    @property
+    def model(self) -> RobotModel:
+        """The arm; of a session with the tool, the load and the soft limits that it has set since."""
+        return self._model if self.session is None else self.session.model
 
     @property
     def seen(self) -> Plan | None:

@@ -413,3 +413,26 @@ def test_a_fault_is_told_with_its_cause_and_remedy() -> None:
         told = text_of(panel._told)
         assert "kCollision" in told
         assert rcilab.Fault.COLLISION.cause in told
+
+
+def test_a_lab_keeps_the_soft_limits_tool_and_load_that_its_session_sets_later():
+    joint = PRO7.limits.joint
+    lower, upper = joint.lower.copy(), joint.upper.copy()
+    upper[1] = PRO7.home[1] - 0.1
+    with rcilab.simulate(PRO7) as robot, notebook.JogPanel(robot) as jog:
+        state = jog.state
+        robot.set_joint_limit(lower, upper)
+        robot.set_coor(rcilab.Pose([0.0, 0.0, 0.1]))
+        assert state.model.limits.joint.upper[1] == upper[1]
+        assert state.model.forward(PRO7.home).is_close(PRO7.forward(PRO7.home) @ rcilab.Pose([0.0, 0.0, 0.1]))
+        with pytest.raises(InvalidValueError, match="q of joint 2"):
+            state.pose(PRO7.home)
+        jog.sliders[0].value = 20.0  # The goal is beyond the soft limit meanwhile: it comes inside.
+        assert state.goal[0] == pytest.approx(np.radians(20.0))
+        assert state.goal[1] == upper[1]
+        jog.sliders[1].value = np.degrees(joint.upper[1])
+        assert state.goal[1] == upper[1]
+        robot.power_on()
+        state.take_motion(rcilab.plan_joint(PRO7, PRO7.home, PRO7.home + 0.05))
+        assert state.plan is not None
+        assert not state.plan.report.ok, "it leaves the soft range"
