@@ -76,6 +76,11 @@ def find_fault(name: Fault | str) -> Fault:
     raise InvalidValueError("fault", name, f"is unknown; known: {known}")
 
 
+def name_faults(faults: Iterable[object]) -> str:
+    """Returns faults as the manual prints them: their one name everywhere."""
+    return ", ".join(fault.manual_name for fault in faults if isinstance(fault, Fault))
+
+
 def faults_from_bits(bits: Iterable[int]) -> tuple[Fault, ...]:
     """Returns the faults whose error byte is set, in wire order."""
     return tuple(Fault(place) for place, bit in enumerate(bits) if bit)

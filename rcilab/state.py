@@ -14,7 +14,7 @@ from typing import Any, Literal, TypeAlias, get_args
 
 from rcilab.arrays import Array, JointVector, described
 from rcilab.errors import InvalidValueError
-from rcilab.faults import Fault
+from rcilab.faults import Fault, name_faults
 from rcilab.spatial import Pose
 
 Mode: TypeAlias = Literal["joint_position", "joint_impedance", "cartesian_position", "cartesian_impedance", "torque"]
@@ -118,7 +118,7 @@ class RobotState:
 
     def __repr__(self) -> str:
         angles = " ".join(f"{degrees(angle):.2f}" for angle in self.q)
-        faults = ", ".join(fault.manual_name for fault in self.faults) or "none"
+        faults = name_faults(self.faults) or "none"
         modes = f"{self.robot_mode.name}, {self.controller_mode.name}"
         return f"<RobotState {self.message_id}: q = {angles} deg; {modes}; faults: {faults}>"
 

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, Literal, TextIO
 from rcilab.cli.motion_file import HELP, as_motion, read_file
 from rcilab.cli.output import drop_output, show
 from rcilab.errors import UsageError
+from rcilab.faults import name_faults
 
 if TYPE_CHECKING:
     from rcilab.arrays import JointVector
@@ -161,7 +162,7 @@ def _plan_to_start(motion: Motion, robot: RobotSession, q: JointVector) -> list[
 
 
 def _recover(robot: RobotSession, state: RobotState, args: Namespace) -> None:
-    names = ", ".join(fault.manual_name for fault in state.faults)
+    names = name_faults(state.faults)
     print(f"The robot is stopped by {names}; clearing it. Nothing moves yet.", file=_reader(args))
     robot.recover()
 

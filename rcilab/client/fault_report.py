@@ -12,7 +12,7 @@ from rcilab.arrays import Array
 from rcilab.client.rotation import nine
 from rcilab.clock import CYCLE_TIME
 from rcilab.conformance import Breach, CartesianMonitor, JointMonitor, TorqueMonitor
-from rcilab.faults import Fault
+from rcilab.faults import Fault, name_faults
 from rcilab.limits import Limits
 from rcilab.spatial import Pose
 
@@ -53,7 +53,7 @@ def describe_faults(
     faults = tuple(faults)
     when = "before the first command" if math.isnan(t) else f"at t = {t:.3f} s"
     if pressed:
-        bits = ", ".join(fault.manual_name for fault in faults)
+        bits = name_faults(faults)
         return (
             f"the controller stopped the motion {when}: {pressed} (reported as {bits}); .record holds the last cycles"
         )

@@ -7,6 +7,7 @@ import time
 from rcilab.client.commands import RciCommands
 from rcilab.client.link import Link
 from rcilab.errors import DeadlineError
+from rcilab.faults import name_faults
 
 RECOVERY_TIMEOUT = 3.0  # [s] for the error bits to go after the controller has agreed to clear them; a choice.
 _FRESH = 0.1  # [s] Longest wait for one state while faults are expected to go.
@@ -24,7 +25,7 @@ def recover(commands: RciCommands, link: Link) -> None:
             faults = states[-1].faults
             if not faults:
                 return
-    names = ", ".join(fault.manual_name for fault in faults)
+    names = name_faults(faults)
     raise DeadlineError(
         f"{link.name}: {names or 'the faults'} did not clear within {RECOVERY_TIMEOUT:g} s; remove the cause first"
         + (f": {faults[0].remedy}" if faults else "")

@@ -41,7 +41,7 @@ from rcilab.controller.state_machine import Event, Phase
 from rcilab.controller.surroundings import Mishaps, Surroundings
 from rcilab.controller.world_port import WorldPort
 from rcilab.errors import UsageError
-from rcilab.faults import Fault
+from rcilab.faults import Fault, name_faults
 from rcilab.model import load_model, require_rci
 from rcilab.protocols.rci import COMMAND_SIZE, decode_command
 from rcilab.realtime import enter_realtime, leave_realtime
@@ -331,9 +331,7 @@ class ControllerServer:
         state = self.cycle.step(is_seen=is_seen)
         self._surroundings.step()
         if state.faults and state.faults != faults:
-            self._log(
-                f"{', '.join(fault.manual_name for fault in state.faults)}: {self.cycle.reason}; the arm comes to rest"
-            )
+            self._log(f"{name_faults(state.faults)}: {self.cycle.reason}; the arm comes to rest")
             if Fault.INSTABILITY_DETECTION in state.faults and self.cycle.playout.lost_in_row:
                 self._log(
                     "a client that pauses needs a deeper play-out (--prefill 50), SCHED_FIFO for itself, or --lockstep"

@@ -156,7 +156,7 @@ class Surroundings:
             plant=self._plant.kind,
             cycle=cycle.state.message_id,
             phase=cycle.phase.name.lower(),
-            faults=tuple(fault.name for fault in cycle.faults),
+            faults=tuple(fault.manual_name for fault in cycle.faults),
             reason=cycle.reason,
             button=cycle.safety_stop.name.lower(),
             q=tuple(cycle.state.q.tolist()),

@@ -17,6 +17,7 @@ import threading
 import weakref
 from collections.abc import Callable
 from contextlib import suppress
+from importlib.util import find_spec
 from typing import Any, Protocol
 
 
@@ -132,7 +133,7 @@ def kernel_cells() -> Cells:
             shell = get_ipython()
         _kernel_cells = Cells(shell)
         atexit.register(_kernel_cells.close)
-        if getattr(shell, "kernel", None) is not None:
+        if getattr(shell, "kernel", None) is not None and find_spec("ipywidgets") is not None:
             from rcilab.notebook.page_watch import PageWatch
 
             _kernel_cells.keep(PageWatch())

@@ -8,7 +8,7 @@ from typing import Any
 import ipywidgets
 
 from rcilab.errors import RcilabError
-from rcilab.faults import Fault
+from rcilab.faults import Fault, name_faults
 from rcilab.gallery.exhibit import Exhibit
 from rcilab.gallery.exhibition import exhibition_of
 from rcilab.gallery.private_arm import PrivateArm
@@ -82,7 +82,7 @@ class FaultPanel(Part):
         if not faults:
             write(self._now, verdict("good", "●", text("run.no_faults")))
             return
-        names = ", ".join(fault.manual_name for fault in faults)
+        names = name_faults(faults)
         write(self._now, verdict("bad", "◆", text("fault.now", faults=names)))
         self.fault.value = faults[0]
 

@@ -11,6 +11,8 @@ import sys
 import threading
 from typing import TYPE_CHECKING
 
+from rcilab.notebook.heart import kernel_heart
+
 if TYPE_CHECKING:
     from rcilab.client.session import RobotSession
 
@@ -21,7 +23,10 @@ _LOOK = 0.1  # [s] Between two looks for a motion.
 
 
 class PageWatch:
-    """Looks after every session of the kernel. One thread; it sends nothing while nothing moves."""
+    """Looks after every session of the kernel. One thread; it sends nothing while nothing moves.
+
+    It imports nothing either: two threads that load the same libraries can find them half loaded.
+    """
 
     def __init__(self) -> None:
         self._ending = threading.Event()
@@ -46,8 +51,6 @@ class PageWatch:
         sessions = _sessions()
         if not sessions:
             return
-        from rcilab.notebook.heart import kernel_heart
-
         heart = kernel_heart()
         heart.open()  # Before anything moves, so that nothing but questions comes meanwhile.
         moving = [session for session in sessions if session.is_moving]

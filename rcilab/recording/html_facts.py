@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from rcilab.faults import name_faults
+
 if TYPE_CHECKING:
     from rcilab.recording.run import Run
     from rcilab.words.text import Text
@@ -30,7 +32,7 @@ def fact_rows(run: Run, text: Text) -> list[list[str]]:
 
 def _ended(run: Run, text: Text) -> str:
     if run.faults:
-        return text("facts.faulted", faults=", ".join(fault.manual_name for fault in run.faults))
+        return text("facts.faulted", faults=name_faults(run.faults))
     if not run.is_complete:
         return text("facts.cut")
     if not run.stopped:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from rcilab.arrays import Array, JointPath
 from rcilab.clock import CYCLE_TIME
 from rcilab.errors import UsageError
-from rcilab.faults import FAULT_COUNT, Fault
+from rcilab.faults import FAULT_COUNT, Fault, name_faults
 from rcilab.recording.setup import Setup
 from rcilab.recording.tracking import Tracking, compute_tracking, find_stop, last_compared
 from rcilab.words.units import USUAL, Units
@@ -339,7 +339,7 @@ class Run:
         if not self.is_complete:
             facts.append("cut off: the end of its file is missing")
         if self.faults:
-            facts.append("faults: " + ", ".join(fault.manual_name for fault in self.faults))
+            facts.append("faults: " + name_faults(self.faults))
         return f"<Run {', '.join(facts)}>"
 
     def _repr_html_(self) -> str:

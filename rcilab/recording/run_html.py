@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from html import escape
 from typing import TYPE_CHECKING
 
+from rcilab.faults import name_faults
 from rcilab.language import load_words, require_language
 
 if TYPE_CHECKING:
@@ -32,7 +33,7 @@ def run_html(run: Run, language: str = "en") -> str:
     rows = [
         ("duration", words["card.cycles"].format(duration=run.duration, cycles=len(run.cycles))),
         ("ended", ended),
-        ("faults", ", ".join(fault.manual_name for fault in run.faults) or words["card.none"]),
+        ("faults", name_faults(run.faults) or words["card.none"]),
         ("error", _error(run, words)),
         ("success", f"{float(run.success_rate[-1]):.3f}" if len(run.cycles) else "-"),
         ("lost", f"{timing.lost}"),

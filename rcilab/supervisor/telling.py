@@ -15,13 +15,11 @@ from rcilab.errors import (
     InvalidValueError,
     RcilabError,
 )
-from rcilab.faults import Fault
+from rcilab.faults import name_faults
 from rcilab.words.errors import tell
 from rcilab.words.text import Finished, Message, message
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
     from rcilab.supervisor import SupervisorStatus
 
 _CRASHES = ("crashed.controller", "crashed.worker", "crashed.frozen")
@@ -82,11 +80,6 @@ def tell_success(status: SupervisorStatus) -> Message:
 def phase_code(status: SupervisorStatus) -> str:
     """Returns the key of the two or three words for what the robot side is doing."""
     return _PHASES.get(status.code, f"phase.{status.phase}")
-
-
-def name_faults(faults: Iterable[object]) -> str:
-    """Returns faults as the manual prints them: their one name everywhere."""
-    return ", ".join(fault.manual_name for fault in faults if isinstance(fault, Fault))
 
 
 def _tell_loss(code: str, status: SupervisorStatus) -> Message:

@@ -27,6 +27,7 @@ from rcilab.client.recovery import recover
 from rcilab.client.setup import give_setup
 from rcilab.client.transport import SocketTransport
 from rcilab.errors import ConnectionLostError, ControlError, InvalidValueError, ModelError, RcilabError, UsageError
+from rcilab.faults import name_faults
 from rcilab.model import load_model
 from rcilab.motion import plan_stop
 from rcilab.protocols.rci import STATE_SIZE
@@ -312,7 +313,7 @@ class Worker:
         if state is not None and state.robot_mode is RobotMode.USER_STOPPED:
             self._publisher.say("fault", "fault.pressed")
         else:
-            self._publisher.say("fault", "fault", faults=_names(faults))
+            self._publisher.say("fault", "fault", faults=name_faults(faults))
 
     def _require_link(self) -> Link:
         if self._link is None:
@@ -332,10 +333,6 @@ def _is_same(told: tuple[JointVector, Pose], before: tuple[JointVector, Pose]) -
     return (q is q_before or q.tobytes() == q_before.tobytes()) and (
         T is T_before or T.as_row_major() == T_before.as_row_major()
     )
-
-
-def _names(faults: Sequence[object]) -> str:
-    return ", ".join(getattr(fault, "name", str(fault)) for fault in faults)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

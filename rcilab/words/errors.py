@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import reduce
 
 from rcilab.errors import InvalidValueError, RcilabError
 from rcilab.words.text import Finished, Message, Remark, message
@@ -43,9 +44,16 @@ def tell_note(note: str) -> Message | Finished:
     """Returns what a planner or a controller remarks; a note without a code keeps its English sentence."""
     if not (isinstance(note, Remark) and note.code):
         return Finished(note)
+    if len(note.parts) != 1:
+        told = [tell_note(part) for part in note.parts] or [Finished(note)]
+        return reduce(_both, reversed(told))
     facts = {name: tell_note(fact) if isinstance(fact, Remark) else fact for name, fact in note.facts.items()}
     facts |= {name: Finished(str(facts[name])) for name in _AMOUNTS & facts.keys()}
     return message(f"remark.{note.code}", **_named(facts))
+
+
+def _both(second: Message | Finished, first: Message | Finished) -> Message | Finished:
+    return message("remark.both", first=first, second=second)
 
 
 def _tell_reason(error: RcilabError, about: str = "error") -> Message | Finished:

@@ -53,11 +53,19 @@ class Remark(str):
     @classmethod
     def all(cls, remarks: Iterable[str]) -> Remark:
         """Returns several in one line."""
-        told = list(remarks)
+        told: list[Remark] = []
+        for remark in remarks:
+            told += remark.parts if isinstance(remark, Remark) else (cls(remark),)
         if len(told) < 2:
-            return cls("") if not told else told[0] if isinstance(told[0], Remark) else cls(told[0])
-        rest = cls.all(told[1:])
-        return cls(f"{told[0]}; {rest}", "both", first=told[0], second=rest)
+            return told[0] if told else cls("")
+        return cls("; ".join(told), "all", **{str(number): remark for number, remark in enumerate(told, 1)})
+
+    @property
+    def parts(self) -> tuple[Remark, ...]:
+        """Those that stand in one line here; itself when it is a single one."""
+        if self.code != "all":
+            return (self,)
+        return tuple(fact for fact in self.facts.values() if isinstance(fact, Remark))
 
     def as_dict(self) -> dict[str, object]:
         """Returns it as JSON has it; `from_dict` makes it anew."""

@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from rcilab.errors import RcilabError, UsageError
+from rcilab.faults import name_faults
 from rcilab.supervisor import telling
-from rcilab.supervisor.telling import name_faults, phase_code, tell_incident, tell_status
+from rcilab.supervisor.telling import phase_code, tell_incident, tell_status
 from rcilab.workbench.text import Message, message
 
 if TYPE_CHECKING:

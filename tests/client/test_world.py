@@ -309,3 +309,14 @@ def test_what_a_bad_network_loses_in_lockstep_is_lost_at_once_and_the_same_every
         robot.world.set_network()
         lost.append(robot.world.status().lost)
     assert lost[0] == lost[1] > 10
+
+
+def test_the_status_names_faults_as_the_manual_does():
+    with simulate(MODEL) as own:
+        own.power_on()
+        with pytest.raises(ControlError, match="kCommandJoint"):
+            own.control(lambda state, t: JointPosition(state.q_c + 0.1 * (t > 0.01)))
+        names = own.world.status().faults
+        assert names == tuple(fault.manual_name for fault in own.state.faults)
+        assert names
+        assert all(name.startswith("kCommandJoint") for name in names)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import json
 import pickle
 from collections.abc import Iterator
 from pathlib import Path
@@ -108,3 +109,20 @@ def test_a_note_keeps_its_words_in_a_file_of_its_own():
         name for _, name, _, _ in Formatter().parse(load_words("rcilab.words", "en")[said.code]) if name
     }
     assert tell_note("plain") == Finished("plain")
+
+
+def test_many_remarks_in_one_line_grow_with_their_number_and_are_said_in_every_language():
+    single = [Remark(f"{n} commands in a row were lost", "lost_in_row", count=n) for n in range(1, 41)]
+    whole = Remark.all([Remark.all(single[:20]), *single[20:], "and so on"])
+    assert str(whole) == "; ".join([*map(str, single), "and so on"])
+    size = [len(json.dumps(Remark.all(single[:count]).as_dict())) for count in (10, 20, 40)]
+    assert size[2] < 2.2 * size[1] < 5.0 * size[0]
+    back = Remark.from_dict(json.loads(json.dumps(whole.as_dict())))
+    assert back == whole
+    assert back.parts == whole.parts
+    for language in ("en", "zh"):
+        said = Text(language, "rcilab.words").say(tell_note(whole))
+        assert said.count("40") == 1
+        assert said.endswith("and so on")
+    assert Remark.all([]) == ""
+    assert Remark.all(single[:1]) is single[0]

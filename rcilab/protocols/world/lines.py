@@ -26,8 +26,8 @@ from rcilab.protocols.world.answers import (
 from rcilab.protocols.world.faults import NetworkFaults
 from rcilab.protocols.world.requests import REQUESTS, WorldRequest
 
-LONGEST_LINE = 16384
-"""[bytes], the end of line included; a status has about 1000."""
+LONGEST_LINE = 65536
+"""[bytes], the end of line included; a status has about 1000, and 350 more for each bound that a fault names."""
 
 _LARGEST_ID = 2**53  # Whole numbers up to here survive every JSON library.
 

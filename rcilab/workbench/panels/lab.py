@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from rcilab.faults import name_faults
 from rcilab.protocols.world import DIRECTIONS
 from rcilab.supervisor.telling import tell_success
 from rcilab.words.errors import tell_note
@@ -87,7 +88,7 @@ class LabPanel:
 def noticed_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
     """Returns what the client and the controller each notice of the network."""
     world = state.drive.world
-    faults = ", ".join(fault.manual_name for fault in status.faults) or text("bar.none")
+    faults = name_faults(status.faults) or text("bar.none")
     rows = [
         ("client_rate", f"{status.rate_hz:.0f} Hz"),
         ("client_lost", f"{status.lost_cycles}"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
+from rcilab.faults import name_faults
 from rcilab.words.text import Finished
 from rcilab.workbench.run.driving import destination
 from rcilab.workbench.text import Text
@@ -80,7 +81,7 @@ def _outcome(recording: Recording, text: Text) -> tuple[str, str, str]:
     assert run is not None
     facts = text("record.facts", duration=f"{run.duration:.3f}", cycles=len(run.t), lost=run.timing.lost)
     if run.faults:
-        faults = ", ".join(fault.manual_name for fault in run.faults)
+        faults = name_faults(run.faults)
         moment = "" if recording.moment is None else f"{recording.moment:.3f}"
         return "bad", text("record.faulted", faults=faults, moment=moment), facts
     if not run.is_complete:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from rcilab.faults import name_faults
 from rcilab.workbench.lease import PATIENCE, Lease
 from rcilab.workbench.run.played import played_at
 from rcilab.workbench.run.readiness import is_moving, time_shown
@@ -60,7 +61,7 @@ def _chips(state: UiState, status: SupervisorStatus, text: Text) -> list[dict[st
     if status.phase == "idle" and status.powered is False:
         doing = text("phase.unpowered")
     mode = "—" if status.robot_mode is None else text(f"robot_mode.{status.robot_mode.name}")
-    faults = text("bar.none") if not status.faults else ", ".join(fault.manual_name for fault in status.faults)
+    faults = text("bar.none") if not status.faults else name_faults(status.faults)
     connected = status.rate_hz > 0.0
     lease = state.lease
     return [

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from rcilab.errors import DecodeError, InvalidValueError
 from rcilab.protocols import world
-from rcilab.protocols.world import LineReader, NetworkFaults
+from rcilab.protocols.world import LONGEST_LINE, LineReader, NetworkFaults
 
 share, moment = st.floats(0, 1), st.floats(0.0, 1.0)
 FAULTS = st.builds(
@@ -131,7 +131,7 @@ def test_any_bytes_are_a_value_or_a_decode_error(line: bytes) -> None:
         (b"", "no JSON"),
         (b"\xff\xfe", "no JSON"),
         (b"[" * 16000, "nested too deeply"),
-        (b'{"x":"' + b"a" * 20000 + b'"}', "longer than 16384 bytes"),
+        (b'{"x":"' + b"a" * 70000 + b'"}', "longer than 65536 bytes"),
         (b"[1]", "no JSON object"),
         (b'{"request":"explode"}', "unknown request 'explode'; known: push, release, press"),
         (b'{"request":["push"]}', "unknown request"),
@@ -196,7 +196,7 @@ def test_lines_are_found_however_the_bytes_were_split(lines: list[bytes], size: 
 
 def test_an_endless_line_is_given_up() -> None:
     reader = LineReader()
-    for _ in range(3):
+    for _ in range(LONGEST_LINE // 4096 - 1):
         assert reader.feed(bytes(4096)) == []
     with pytest.raises(DecodeError, match="longer"):
         reader.feed(bytes(4096))
