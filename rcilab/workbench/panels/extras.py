@@ -24,6 +24,7 @@ class ExtrasPanel:
         """Adds the switches."""
         self._switches: dict[Extra, Linked] = {}
         with gui.add_folder(self._text("extra.title")):
+            gui.add_html('<i class="rl-ticks"></i>')
             for extra in EXTRAS:
                 if extra == "elbow" and state.model.n != 7:
                     continue
