@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from rcilab.arrays import Array, JointPath
 from rcilab.clock import CYCLE_TIME
 from rcilab.conformance.signals import HOLD_SAMPLES
+from rcilab.motion.range import RECOVERY_RANGE, range_from
 
 if TYPE_CHECKING:
     from rcilab.limits import JointLimits
@@ -240,13 +241,15 @@ def build_frame(
     Args:
         plan: Planned curves of all joints, or None.
         actual: Recorded curves of all joints, or None.
-        limits: The arm's limits.
+        limits: The arm's limits; of the angles of a plan that leads back from outside its range, as far as it does.
         quantity: Which signal.
         joint: The joint to show in its own unit, from 1; 0 shows all, each in percent of its limit (of its range, with
             0 in the middle, for q).
         buckets: Number of buckets the time is cut into.
         factor: How many of the unit to be shown one SI unit is; degrees as a rule.
     """
+    if quantity == "q" and plan is not None:  # As `check` judges it: who starts outside may lead back.
+        limits = range_from(limits, plan.values[0], RECOVERY_RANGE)
     low, high = bounds_of(limits, quantity)
 
     def shown(values: Array) -> Array:

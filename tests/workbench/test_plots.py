@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from rcilab.conformance import check
 from rcilab.conformance.conditions import CYCLE_CONDITIONS
 from rcilab.model import load_model
-from rcilab.motion import Motion, plan_joint
+from rcilab.motion import Motion, plan_joint, plan_recovery
 from rcilab.views.plots import (
     ORDERS,
     QUANTITIES,
@@ -127,6 +127,17 @@ def test_what_is_worst_behind_the_end_is_drawn_at_the_end():
         assert np.abs(curves.values / bound).max() == pytest.approx(used[ORDERS[quantity]], rel=1e-6)
         assert curves.t[-1] == motion.duration
         assert build_frame(curves, None, LIMITS, quantity, 0).violated.any()
+
+
+def test_a_plan_that_leads_back_from_outside_its_range_is_no_violation_and_one_that_leads_out_is():
+    outside = MODEL.home.copy()
+    outside[0] = LIMITS.upper[0] + np.radians(0.9)
+    back = plan_recovery(MODEL, outside)
+    assert check(back, MODEL).ok
+    out = Motion.from_cycles(back.q[::-1])
+    for motion, is_violated in ((back, False), (out, True)):
+        for joint in (0, 1):
+            assert build_frame(plan_curves(motion, "q"), None, LIMITS, "q", joint).violated.any() == is_violated
 
 
 def test_a_planned_torque_is_that_of_the_commands():
