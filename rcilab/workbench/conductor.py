@@ -157,6 +157,8 @@ class Conductor:
         kept = self._keepsake.recall(self._store.state.model)
         if kept is not None:
             self._guard(lambda: self._resume(kept))
+        for name, setup in self._keepsake.recall_setups(self._store.state.model).items():
+            self.robot.remember_setup(name, setup)
 
     def start(self) -> None:
         """Starts the thread."""

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from rcilab.arrays import JointVector, as_vector, frozen
 from rcilab.client.setup import RobotSetup
 from rcilab.errors import RcilabError
+from rcilab.model import load_model
 from rcilab.motion.program import Program
 from rcilab.whole_file import write_whole
 from rcilab.workbench.setup.kept import build_setup, setup_facts
@@ -76,6 +77,17 @@ class Keepsake:
             return Kept(q=frozen(as_vector(own["q"], model.n, "q", "rad")), program=program, setup=setup)
         except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError, RcilabError):
             return None
+
+    def recall_setups(self, model: RobotModel) -> dict[str, RobotSetup]:
+        """Returns the edited set-ups of the arms that were chosen before this one, by name; after `recall`."""
+        found: dict[str, RobotSetup] = {}
+        for name, own in self._arms.items():
+            with suppress(ValueError, LookupError, TypeError, AttributeError, RcilabError):
+                setup = build_setup(own.get("setup") or {})
+                if name != model.name and setup.parts:
+                    setup.applied_to(load_model(name))
+                    found[name] = setup
+        return found
 
     def keep(self, state: UiState) -> None:
         """Writes down what is new, at most once a second."""

@@ -112,6 +112,25 @@ def test_the_next_workbench_at_the_port_has_goal_plan_and_program():
         assert np.allclose(plan.motion.goal, GOAL, atol=1e-12)
 
 
+def test_an_arm_that_was_exchanged_before_a_crash_has_its_set_up_again_when_it_is_chosen():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    file, other = keepsake_file(port), load_model("xMate3")
+    kept = Keepsake(file)
+    kept.keep(state_with_all())
+    kept._next = 0.0
+    kept.keep(UiState(model=other, goal=initial_goal(other, other.home)))
+    with Workbench(WorkbenchConfig(port=port, model="xMate3")) as bench:
+        wait_for(lambda: bench.session.status().phase == "idle", what="an idle arm")
+        assert bench.store.state.model.name == "xMate3"
+        bench.conductor.ask(requests.ChooseRobot(model=MODEL.name))
+        wait_for(lambda: bench.store.state.model.name == MODEL.name, what="the other arm")
+        assert bench.store.state.model.T_flange_tool.is_close(SETUP.tool, 1e-12)
+        assert bench.store.state.setup.wanted.load.mass == SETUP.load.mass
+        assert bench.store.state.setup.touched == frozenset(SETUP.parts)
+
+
 def is_kept(file: Path) -> bool:
     if not os.path.exists(file):
         return False

@@ -25,7 +25,7 @@ from rcilab.workbench.telling import StartingError, tell_error, tell_incident
 from rcilab.workbench.text import Message, message
 
 if TYPE_CHECKING:
-    from rcilab.client.setup import RobotSetup
+    from rcilab.client.setup import RobotSetup, SetupPart
     from rcilab.motion.pacing import PacedMotion
     from rcilab.supervisor import SupervisorStatus, Ticket
 
@@ -175,6 +175,12 @@ class RobotActions:
         # First: from here on no state of the old arm is shown on the new one.
         self._session.open(model, target, state.plant, _own_setup(state, target) if is_same else None)
         self._store.update(place=0.0, playing=False, **changes)
+
+    def remember_setup(self, name: str, setup: RobotSetup) -> None:
+        """Takes note of the set-up that an arm had before it was exchanged for another."""
+        fresh = SetupState()
+        touched: frozenset[SetupPart] = frozenset(setup.parts)
+        self._setups[name] = replace(fresh, wanted=fresh.wanted.updated(setup), touched=touched)
 
     def _exchange_setups(self, state: UiState, name: str) -> SetupState:
         """Returns the set-up of an arm that is chosen now, and keeps that of the one before."""
