@@ -120,12 +120,13 @@ class DecodeError(ProtocolError):
     """These bytes are no message.
 
     Attributes:
+        problem: What is wrong, without the place.
         offset: Where the first wrong byte stands.
     """
 
     def __init__(self, message: str, offset: int = 0) -> None:
         super().__init__(f"{message} (at byte {offset})")
-        self.offset = offset
+        self.problem, self.offset = message, offset
 
 
 class VersionMismatchError(ProtocolError):

@@ -13,6 +13,7 @@ EPILOG = """examples, for a controller that has printed "world 127.0.0.2:40123":
   rcilab world 127.0.0.2:40123 push wrench=[0,0,-20,0,0,0] link=4 duration=1
   rcilab world 127.0.0.2:40123 place_box box=wall size=[0.1,1,1] position=[0.9,0,0.5]
   rcilab world 127.0.0.2:40123 press button=estop
+  rcilab world 127.0.0.2:40123 press button=none
   rcilab world 127.0.0.2:40123 status
 Contact (place_box, floor, walls) needs a controller with --plant mujoco."""
 
@@ -49,7 +50,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _request(name: str, texts: list[str]) -> WorldRequest:
-    from rcilab.errors import InvalidValueError
+    from rcilab.errors import InvalidValueError, UsageError
     from rcilab.protocols.world import Refused, decode_world_request
 
     content: dict[str, Any] = {"request": name}
@@ -63,5 +64,5 @@ def _request(name: str, texts: list[str]) -> WorldRequest:
             content[field] = value
     _, request = decode_world_request(json.dumps(content).encode())
     if isinstance(request, Refused):
-        raise InvalidValueError("request", name, request.reason)
+        raise UsageError(request.reason)
     return request

@@ -167,6 +167,13 @@ class ControlLoop:
                 self._brake.begin(state)
                 return state
             self._log.write(state, self._link.received_ns)
+            if state.robot_mode is RobotMode.USER_STOPPED:
+                raise ControlError(
+                    f"{self._link.name}: an emergency stop or the safety gate has stopped the arm before the motion "
+                    "began; release it and switch the power on",
+                    (),
+                    self._log.recorder.last(RECORD_CYCLES),
+                ).coded("user_stopped_start")
             reason = self._watch(0.0)
             if reason is not None:
                 return reason

@@ -17,7 +17,7 @@ from rcilab.controller.cycle import ControlCycle
 from rcilab.controller.faulty_network import FaultyNetwork
 from rcilab.controller.stalls import StallPlan
 from rcilab.dynamics.payload import Payload
-from rcilab.errors import RcilabError
+from rcilab.errors import RcilabError, UsageError
 from rcilab.protocols.rci import SafetyStop
 from rcilab.protocols.world import (
     AutoLimit,
@@ -112,6 +112,8 @@ class Surroundings:
             case Push():
                 self._push(request)
             case Release():
+                if self._cycle.safety_stop is not SafetyStop.NONE and not self._is_pushed:
+                    raise UsageError("nothing pushes the arm; press button=none ends an emergency stop")
                 self._push(_NOTHING)
             case Press(button):
                 self._cycle.press_safety_stop(SafetyStop[button.upper()])

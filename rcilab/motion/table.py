@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import math
 from dataclasses import dataclass
 
@@ -89,7 +90,8 @@ def read_table(content: bytes, name: str) -> Table:
 
 
 def _cells(line: str, mark: str | None) -> list[str]:
-    return [cell.strip().strip('"').strip() for cell in line.split(mark)]
+    cells = line.split() if mark is None else next(csv.reader([line], delimiter=mark, skipinitialspace=True))
+    return [cell.strip().strip('"').strip() for cell in cells]
 
 
 def _number(cell: str) -> float | None:

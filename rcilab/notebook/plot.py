@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from rcilab.conformance.report import Violation
+    from rcilab.conformance.report import Report, Violation
     from rcilab.recording.run import Run
 
 VIOLATION_COLOR = "#B00020"
@@ -110,7 +110,7 @@ def _draw(motion: Motion, model: RobotModel, run: Run | None, chosen: Sequence[i
         max(motion.duration, float(_plan_times(run)[-1]) if run is not None and len(run.t) else 0.0)
         + HOLD_SAMPLES * CYCLE_TIME,
     )
-    figure.suptitle(_title(model, motion, report.violations, text), fontsize="medium")
+    figure.suptitle(_title(model, motion, report, text), fontsize="medium")
     return figure
 
 
@@ -251,10 +251,13 @@ def _color(joint: int) -> str:
     return JOINT_COLORS[joint % len(JOINT_COLORS)]
 
 
-def _title(model: RobotModel, motion: Motion, violations: Sequence[Violation], text: Text) -> str:
+def _title(model: RobotModel, motion: Motion, report: Report, text: Text) -> str:
     # A jump shows in one first difference, two second and three third ones: within HOLD_SAMPLES cycles it is one.
     reach = HOLD_SAMPLES * CYCLE_TIME
-    count = len(_union((v.time - CYCLE_TIME, v.time + v.count * CYCLE_TIME + reach) for v in violations))
+    count = len(_union((v.time - CYCLE_TIME, v.time + v.count * CYCLE_TIME + reach) for v in report.violations))
+    if not count and report.warnings:
+        ids = ", ".join(dict.fromkeys(warning.condition.id for warning in report.warnings))
+        return text("figure.advised", model=model.name, duration=f"{motion.duration:.3f}", ids=ids)
     code = "figure.inside" if not count else "figure.beyond_one" if count == 1 else "figure.beyond"
     return text(code, model=model.name, duration=f"{motion.duration:.3f}", count=count)
 

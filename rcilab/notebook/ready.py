@@ -15,7 +15,7 @@ def obstacle(state: LabState) -> Message | None:
         return message("ready.closed")
     if status.phase == "closed" and state.session is not None:
         return message("ready.session_closed")
-    resting = arm_obstacle(status.phase, status.powered)
+    resting = arm_obstacle(status.phase, status.powered, is_pressed=status.is_pressed)
     if resting is not None or state.plan is None:
         return resting or plan_obstacle(None, status.q_c)
     robot = state.robot

@@ -235,9 +235,10 @@ class RunPanel(Part):
         reason = obstacle(state)
         self.execute.disabled = reason is not None
         powered = None if status is None else status.powered
-        self.power_on.disabled = is_moving or powered is not False
+        is_pressed = status is not None and status.is_pressed
+        self.power_on.disabled = is_moving or powered is not False or is_pressed
         self.power_off.disabled = is_moving or powered is not True
-        self.recover.disabled = phase not in ("fault", "lost", "crashed")
+        self.recover.disabled = phase not in ("fault", "lost", "crashed") or is_pressed
         name = "" if state.robot is None else text("run.at", name=self._name_robot(state.robot))
         tone = PHASE_TONES.get(phase, "none" if status is None else "bad")
         write(self._said, verdict(tone, name_phase(status, text), name))

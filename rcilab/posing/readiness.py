@@ -22,8 +22,16 @@ _NOT_IDLE = {
 }
 
 
-def arm_obstacle(phase: str, powered: bool | None) -> Message | None:
-    """Returns why an arm cannot set out in this phase of its control process, or None."""
+def arm_obstacle(phase: str, powered: bool | None, *, is_pressed: bool = False) -> Message | None:
+    """Returns why an arm cannot set out in this phase of its control process, or None.
+
+    Args:
+        phase: Of the control process.
+        powered: Motor power; None while unknown.
+        is_pressed: Whether an emergency stop or the safety gate holds the arm.
+    """
+    if is_pressed and phase in ("idle", "fault"):
+        return message("ready.pressed")
     if phase in _NOT_IDLE:
         return message(_NOT_IDLE[phase])
     return None if powered else message("ready.power")

@@ -166,7 +166,9 @@ class Run:
             wanted = self._planned(0)
             if self.stop_time is not None:
                 wanted[self.t >= self.stop_time] = np.nan
-        return find_delay(self.q_c, wanted)
+        faulty = np.flatnonzero(self.cycles["faults"])
+        shown = self.q_c if not faulty.size else self.q_c[: faulty[0]]  # From there on the controller obeys no command.
+        return find_delay(shown, wanted[: len(shown)])
 
     @property
     def stop_time(self) -> float | None:

@@ -52,7 +52,7 @@ MESSAGES: dict[str, str] = {
     "stopping": "The arm is being brought to rest.",
     "stopping.operator": "Nobody is at the controls: the arm is being brought to rest.",
     "fault": "The controller stopped the arm: {faults}. Recover leads out.",
-    "fault.pressed": "An emergency stop or the safety gate has stopped the arm. Recover leads out once it is released.",
+    "fault.pressed": "An emergency stop or the safety gate holds the arm: release it, then power on.",
     "lost.unreachable": "{error}",
     "lost.rebooted": "{address} restarts; reconnect once it is up.",
     "lost.other_arm": "{error}",
@@ -175,3 +175,8 @@ class SupervisorStatus:
     """Process id of the virtual controller; None when it is not ours or not running."""
     worker_pid: int | None = None
     """Process id of the control process."""
+
+    @property
+    def is_pressed(self) -> bool:
+        """Whether an emergency stop or the safety gate holds the arm."""
+        return self.robot_mode is RobotMode.USER_STOPPED

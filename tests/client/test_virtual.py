@@ -8,6 +8,7 @@ import time
 import numpy as np
 import pytest
 
+from rcilab.client import connect
 from rcilab.command import CartesianPosition, JointPosition, JointTorque
 from rcilab.conformance import check
 from rcilab.controller.state_machine import QUERIES, Phase, transition
@@ -27,6 +28,7 @@ from rcilab.protocols.rci.statuses import WHILE_MOVING
 from rcilab.safety_box import SafetyBox
 from rcilab.spatial import Pose
 from rcilab.state import RobotMode
+from rcilab.supervisor.launch import start_controller
 from rcilab.supervisor.simulate import simulate
 
 MODEL = load_model("xMate3")
@@ -329,3 +331,22 @@ def test_from_outside_its_box_the_tool_may_only_be_led_in(way):
         play(lead_in)
         with pytest.raises(ControlError, match="a motion that starts outside it may only lead into it"):
             play(plan_joint(model, robot.state.q_c, q))
+
+
+def test_an_emergency_stop_before_the_motion_has_begun_is_named_at_once():
+    controller = start_controller("xMate3", options=("--mode-delay", "1.05"))
+    world_port = (controller.world_address or "").split(":")[1]
+    try:
+        with connect(f"{controller.address}?world_port={world_port}", MODEL) as robot:
+            robot.power_on()
+            press = threading.Timer(0.3, lambda: robot.world.press("estop"))
+            press.start()
+            with pytest.raises(ControlError, match=r"emergency stop or the safety gate .* before the motion began"):
+                robot.move_j(MODEL.home + 0.1)
+            press.join()
+            assert robot.state.robot_mode is RobotMode.USER_STOPPED
+            robot.world.press("none")
+            robot.power_on()
+            robot.move_j(MODEL.home + 0.1)
+    finally:
+        controller.end()

@@ -65,7 +65,7 @@ def test_whatever_is_asked_for_is_done_or_refused_and_the_robot_goes_on(place, r
         assert np.isfinite(place.cycle.state.q).all()
         line = world.encode_world_answer(place.status, 1)
         assert world.decode_world_answer(line) == (1, place.status)
-    for request in (world.Release(), world.Press("none"), world.Mount(), world.Floor(False)):
+    for request in (world.Press("none"), world.Release(), world.Mount(), world.Floor(False)):
         assert place.handle(request) == world.Done()
     assert not place.status.pushed
 

@@ -11,6 +11,7 @@ from rcilab.conformance.check import check
 from rcilab.errors import InvalidValueError
 from rcilab.model import load_model
 from rcilab.motion import Motion, motion_through, plan_joint
+from tests.recording.runs import some_run
 
 MODEL = load_model("xMatePro7")
 PLANNED = plan_joint(MODEL, MODEL.home, MODEL.home + 0.4, speed=0.3)
@@ -181,3 +182,11 @@ def test_samples_that_go_on_for_hours_are_refused_before_they_fill_the_memory(tm
         Motion.load_samples(file_of(tmp_path, "t,q1\n0,0.1\n1e9,0.2\n"))
     with pytest.raises(InvalidValueError, match="duration"):
         Motion.load_samples(file_of(tmp_path, "0.1\n0.2\n"), rate_hz=1e-6)
+
+
+def test_the_csv_of_a_recorded_run_is_read_by_its_columns_t_and_q(tmp_path):
+    run = some_run()
+    run.save(tmp_path / "run.csv")
+    motion = Motion.load_samples(tmp_path / "run.csv")
+    assert motion.duration == pytest.approx(run.t[-1])
+    assert np.abs(motion.q - run.q).max() < 1e-9

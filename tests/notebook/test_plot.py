@@ -69,7 +69,7 @@ def test_every_joint_is_drawn_with_every_sample_and_a_colour_of_its_own() -> Non
 
 
 def test_a_conforming_motion_has_nothing_hatched_and_says_so() -> None:
-    figure = plot(MOTION, PRO7)
+    figure = plot(rcilab.plan_joint(PRO7, PRO7.home, PRO7.home + 0.3, law="torque_rate_limited"), PRO7)
     assert [hatched(ax) for ax in main_axes(figure)] == [[], [], [], []]
     assert "inside all limits" in figure.get_suptitle()
 
@@ -179,3 +179,13 @@ def test_a_run_is_drawn_with_its_plan_or_what_a_callback_commanded():
         assert len(figure.axes) == 5
         drawn = next(line.get_ydata() for line in figure.axes[0].lines if line.get_label() == "joint 1")
         assert np.allclose(drawn[: len(PLAN.q) - 1], PLAN.q[:-1, 0], rtol=0, atol=1e-9)
+
+
+def test_the_headline_names_the_advice_that_is_not_kept():
+    model = rcilab.load_model("xMatePro7")
+    motion = rcilab.plan_joint(model, model.home, model.home + 0.3)
+    report = rcilab.check(motion, model)
+    assert report.ok
+    assert [warning.condition.id for warning in report.warnings] == ["joint.torque_rate"]
+    title = plot(motion, model, language="en")._suptitle.get_text()
+    assert "keeps every limit, not the advice on joint.torque_rate" in title

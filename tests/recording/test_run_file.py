@@ -13,10 +13,11 @@ import pytest
 import rcilab
 from rcilab.cycle_file import cycle_dtype
 from rcilab.errors import InvalidValueError, UsageError, VersionMismatchError
+from rcilab.faults import Fault
 from rcilab.recording.blocks import MAGIC, encode_block, encode_header
 from rcilab.recording.export import export_run
 from rcilab.recording.live import LiveRecording, RunFacts
-from rcilab.recording.run import Run
+from rcilab.recording.run import Run, build_run
 from rcilab.recording.run_file import BLOCK_CYCLES, RunFile, RunWriter, decode_run
 from tests.recording.runs import MODEL, OFFSET, PLAN, SETUP, some_cycles, some_run
 
@@ -197,3 +198,17 @@ def test_a_block_that_lies_is_refused_in_words(kind, make, words):
     head_ends = block_places(content)[1][0]
     with pytest.raises(InvalidValueError, match=words):
         decode_run(content[:head_ends] + encode_block(kind, make()))
+
+
+@pytest.mark.parametrize("delay", [1, 24, 42])
+def test_the_delay_of_a_run_that_a_fault_ended_is_found_from_what_came_before_it(delay):
+    cycles, fault = some_cycles().copy(), 300
+    q = cycles["command"].copy()
+    cycles["q_c"][delay:], cycles["q_c"][:delay] = q[:-delay], q[0]
+    cycles["q_c"][fault:] = cycles["q_c"][fault - 1]  # From here on the controller brakes by itself.
+    cycles["q"] = cycles["q_c"]
+    cycles["faults"][fault:] = 1 << Fault.INSTABILITY_DETECTION
+    cycles["sent_ns"][fault:] = 0
+    run = build_run(cycles, plan=PLAN, model=MODEL)
+    assert run.delay == delay
+    assert run.largest_error < 1e-9

@@ -73,7 +73,7 @@ def decode_world_request(line: bytes) -> tuple[int, WorldRequest | Refused]:
     try:
         return request_id, _request(content)
     except DecodeError as error:
-        return request_id, Refused(str(error))
+        return request_id, Refused(error.problem)
 
 
 def _request(content: dict[str, Any]) -> WorldRequest:

@@ -195,6 +195,8 @@ def no_jog(state: UiState, status: SupervisorStatus) -> Message | None:
         return tell_status(status)
     if status.phase == "moving" and status.code != "moving.jog":
         return message("ready.moving")
+    if status.is_pressed and status.phase in ("idle", "fault"):
+        return message("ready.pressed")
     if status.phase in _NO_JOG:
         return message(_NO_JOG[status.phase])
     if not status.powered:

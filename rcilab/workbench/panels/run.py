@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from rcilab.faults import name_faults
 from rcilab.motion.pacing import SLOWEST_PACE
 from rcilab.workbench import requests
 from rcilab.workbench.check.freshness import outdated
@@ -115,8 +116,8 @@ class RunPanel:
         self._outcome.show("" if moving else outcome_html(state, status, text))
         self._plan.visible, self._to_target.visible = not is_program, is_program
         self._plan.disabled = self._to_target.disabled = moving or not is_connected(status)
-        self._buttons["recover"].disabled = status.phase not in ("fault", "crashed", "lost")
-        self._buttons["power_on"].disabled = moving or status.powered is not False
+        self._buttons["recover"].disabled = status.phase not in ("fault", "crashed", "lost") or status.is_pressed
+        self._buttons["power_on"].disabled = moving or status.powered is not False or status.is_pressed
         self._buttons["power_off"].disabled = moving or status.powered is not True
         self._faults.show(faults_html(status, text))
 
@@ -127,6 +128,10 @@ def _drive(what: Any):  # type: ignore[no-untyped-def]
 
 def faults_html(status: SupervisorStatus, text: Text) -> str:
     """Returns every fault that is set, with its cause and what to do about it; nothing while none is."""
+    if status.is_pressed:  # Whatever bit shows it: it stands for the stop, not for what it means otherwise.
+        names = esc(name_faults(status.faults))
+        said = f'<div class="rl-facts">{esc(text("fault.by_stop"))}</div>'
+        return names and f'<div class="rl-card rl-bad"><div class="rl-line"><b>{names}</b></div>{said}</div>'
     return "".join(
         f'<div class="rl-card rl-bad"><div class="rl-line"><b>{esc(fault.manual_name)}</b></div>'
         f'<div class="rl-facts">{esc(text(f"fault.{fault.name}"))}</div>'

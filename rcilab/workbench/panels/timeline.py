@@ -10,6 +10,7 @@ from rcilab.workbench.check.freshness import outdated
 from rcilab.workbench.panels.outcome import replay_html
 from rcilab.workbench.panels.plots import Plots
 from rcilab.workbench.program.draft import tell_place
+from rcilab.workbench.run.played import paced_of, played_at
 from rcilab.workbench.run.readiness import time_shown
 from rcilab.workbench.text import Text
 from rcilab.workbench.view_actions import PLOTS, RATES, has_plot
@@ -106,6 +107,9 @@ class TimelinePanel:
         if state.plan.short is not None and state.recording is None:
             kinds = text("timeline.short")
         kinds = kinds if state.learn.show is not None or outdated(state) is None else f"▲ {text('check.outdated')}"
+        paced = paced_of(state)
+        if paced is not None:  # On the time axis of the plots: that of the run.
+            t, duration = played_at(state, t), paced.duration
         return f'<p class="rl-clock"><b>{t:.3f}</b> / {duration:.3f} s<span>{esc(kinds)}</span></p>'
 
 

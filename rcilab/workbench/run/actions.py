@@ -311,7 +311,7 @@ class RobotActions:
             return "bad", tell_error(error, self._session.status())
         if isinstance(error, ControlError) and what == "execute":
             self._is_left_alone = self._session.status().code == "idle.operator"
-            return "warn", message("notice.operator" if self._is_left_alone else "notice.stopped")
+            return "warn", message("notice.operator" if self._is_left_alone else _stopped(self._store.state))
         return "bad", message("notice.refused", what=message(f"drive.{what}"), error=tell_error(error))
 
     def _record(self, status: SupervisorStatus) -> None:
@@ -364,3 +364,7 @@ def _own_setup(state: UiState, target: str) -> RobotSetup | None:
     if target != "virtual":
         return None
     return replace(state.setup.wanted.only(state.setup.touched), control=state.drive.control)
+
+
+def _stopped(state: UiState) -> str:
+    return "notice.stopped" if state.plan is None or state.plan.program is None else "notice.stopped_program"
