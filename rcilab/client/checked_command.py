@@ -102,15 +102,23 @@ def distance_to(state: RobotState, command: Command) -> float:
     """Returns how far the controller's commanded state is from a command; torques are always there.
 
     Returns:
-        The largest difference of a joint angle, [rad], or of an element of the pose, [m]; 0 where none counts.
+        The largest difference of a joint angle or a commanded arm angle, [rad], or of an element of the pose, [m]; 0
+        where none counts.
     """
     if isinstance(command, JointPosition):
         off = float(np.abs(state.q_c - command.q).max())
         return 0.0 if off <= _ARRIVED else off
     if isinstance(command, CartesianPosition):
-        off = float(np.abs(state.T_base_tool_c.matrix - command.T_base_tool).max())
+        off = max(float(np.abs(state.T_base_tool_c.matrix - command.T_base_tool).max()), _turned(state, command))
         return 0.0 if off <= _POSE_ARRIVED else off
     return 0.0
+
+
+def _turned(state: RobotState, command: CartesianPosition) -> float:
+    """Returns how far the commanded arm angle is from a command, [rad]; 0 where it was left to the controller."""
+    if command.psi is None or len(state.q_c) != 7:
+        return 0.0
+    return abs(math.remainder(command.psi - state.psi_c, math.tau))
 
 
 def describe_distance(state: RobotState, command: Command) -> str:
@@ -121,6 +129,9 @@ def describe_distance(state: RobotState, command: Command) -> str:
         return f"joint {joint + 1} is {math.degrees(off[joint]):.4g} deg"
     assert isinstance(command, CartesianPosition)  # Torques are always there.
     length = float(np.linalg.norm(state.T_base_tool_c.position - command.T_base_tool[:3, 3]))
+    turned = _turned(state, command)
+    if turned > length:
+        return f"the arm angle is {math.degrees(turned):.4g} deg"
     return f"the tool is {1e3 * length:.4g} mm"
 
 

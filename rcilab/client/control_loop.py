@@ -45,6 +45,7 @@ SETTLE_CYCLES = 200  # Cycles that the last command is repeated for at most whil
 ARRIVAL_TOLERANCE = 1e-6  # [rad], [m] What a motion may end off its last command: far below what an arm resolves.
 _NEARER = 0.95  # What is left of a distance after SETTLE_CYCLES where a low pass approaches, at 0.1 Hz 0.88.
 REST_TIMEOUT = 1.0  # [s] for the controller's own stop after a fault; the slowest joint needs 0.3 s from full speed.
+_FELT = 1e-3  # [N m] Torques below it are no different from none; a choice.
 _NEAR_CYCLES = 2  # Cycles in a row that a filter is at its command until it counts as standing there.
 RECORD_CYCLES = 50  # Cycles that a ControlError carries, as many as the vendor's client writes.
 
@@ -108,7 +109,7 @@ class ControlLoop:
         self._silence = silence
         self._filters = tuple(filters)
         self._first_id = 0
-        self._first_q_c = np.zeros(0)
+        self._first_q_c = self._first_tau_c = np.zeros(0)
         self._answered_id = -1
         self._t = math.nan
         self._slowest, self._slowest_t = 0, 0.0  # [ns], [s] The longest call of the callback, and when it was.
@@ -163,7 +164,7 @@ class ControlLoop:
             if state.faults:
                 raise self._fault(state)
             if state.controller_mode == self._mode and state.motion_generator_mode == shown:
-                self._first_id, self._first_q_c = state.message_id, state.q_c
+                self._first_id, self._first_q_c, self._first_tau_c = state.message_id, state.q_c, state.tau_c
                 self._brake.begin(state)
                 return state
             self._log.write(state, self._link.received_ns)
@@ -221,9 +222,15 @@ class ControlLoop:
             self._answer(state, sent)
         last = wanted if near else sent
         state = self._hold(last)
-        if distance_to(state, last) > ARRIVAL_TOLERANCE:
+        if distance_to(state, last) > ARRIVAL_TOLERANCE or self._is_unplayed(state, last):
             raise self._not_arrived(state, last)
         return None
+
+    def _is_unplayed(self, state: RobotState, command: Command) -> bool:
+        """Returns whether torques were sent and the controller commands what it did before the first of them."""
+        if not isinstance(command, JointTorque) or np.abs(command.tau).max() < _FELT:
+            return False
+        return np.array_equal(state.tau_c, self._first_tau_c)
 
     def _next(self) -> RobotState:
         """Returns the next state that has not been answered yet, oldest first.
@@ -385,7 +392,7 @@ class ControlLoop:
         return Refusal.GSTOP if is_gate else Refusal.ESTOP
 
     def _not_arrived(self, state: RobotState, command: Command) -> ControlError:
-        if np.array_equal(state.q_c, self._first_q_c):
+        if isinstance(command, JointTorque) or np.array_equal(state.q_c, self._first_q_c):
             cause = "the controller has played none of the commands: they are lost on their way, look at the network"
         elif state.success_rate < 1.0:
             cause = (
@@ -394,8 +401,8 @@ class ControlLoop:
         else:
             cause = "something in the controller holds it back: look at the filters (set_filters) and soft limits"
         record = self._log.recorder.last(RECORD_CYCLES)
-        off = describe_distance(state, command)
-        return ControlError(f"the motion was executed and did not arrive: {off} from its end; {cause}", (), record)
+        off = "" if isinstance(command, JointTorque) else f": {describe_distance(state, command)} from its end"
+        return ControlError(f"the motion was executed and did not arrive{off}; {cause}", (), record)
 
     def _ended_by_controller(self, state: RobotState) -> ControlError:
         self._log.write(state, self._link.received_ns, self._time(state))

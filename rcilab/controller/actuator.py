@@ -125,7 +125,7 @@ class Actuator:
                 tool_c.pose,
                 tool_c.twist,
                 tool_c.acceleration,
-                commanded.arrays[0],
+                commanded.arrays,
                 measured,
                 settings.cartesian_stiffness,
                 settings.desired_wrench,

@@ -63,7 +63,7 @@ def cartesian_impedance(
     T_c: Pose,
     twist_c: Sequence[float],
     acc_c: Sequence[float],
-    q_null: JointVector,
+    null: tuple[JointVector, JointVector, JointVector],
     measured: Measurement,
     stiffness6: Sequence[float],
     desired_wrench6: Sequence[float] = (0.0,) * 6,
@@ -73,7 +73,7 @@ def cartesian_impedance(
     """Returns the torque of springs between the commanded and the measured tool, without gravity, shape (n,), [N m].
 
     The orientation spring acts on the rotation vector from the measured to the commanded orientation. A 7-axis arm
-    keeps its elbow near `q_null`, softly and without a force on the tool. Stiffness, damping and desired force act
+    keeps its elbow near `null`, softly and without a force on the tool. Stiffness, damping and desired force act
     at the tool's origin, along the axes of setFcCoor.
 
     Args:
@@ -81,7 +81,8 @@ def cartesian_impedance(
         T_c: Commanded pose of the tool in base.
         twist_c: Its velocity, base axes, linear first, shape (6,), [m/s, rad/s].
         acc_c: Its acceleration, shape (6,), [m/s^2, rad/s^2].
-        q_null: Joint angles whose arm angle a 7-axis arm keeps, shape (n,), [rad]. Others have no choice.
+        null: Joint angles whose arm angle a 7-axis arm keeps, and how they move: angles, velocities, accelerations, each
+            of shape (n,), [rad], [rad/s], [rad/s^2]. Others have no choice.
         measured: Where the arm is.
         stiffness6: Three translations [N/m], three rotations [N m/rad].
         desired_wrench6: Force and moment that the arm exerts on its surroundings in addition, [N, N m].
@@ -97,7 +98,7 @@ def cartesian_impedance(
     if axes is not None:
         error = _turned(np.array(error), axes).tolist()
     wrench = np.array([k * e + w for k, e, w in zip(stiffness6, error, desired_wrench6, strict=True)])
-    dq_c, ddq_c = _reference(model, terms, twist_c, acc_c, q_null, measured)
+    dq_c, ddq_c = _reference(model, terms, twist_c, acc_c, null, measured)
     tau = (damper or Damper()).torque(
         lambda: design_damping(terms.mass_inverse, along.T * stiffness6 @ along), along.T.dot(wrench), dq_c - dq
     )
@@ -121,7 +122,7 @@ def _reference(
     terms: ToolTerms,
     twist: Sequence[float],
     acc: Sequence[float],
-    q_null: JointVector,
+    null: tuple[JointVector, JointVector, JointVector],
     measured: Measurement,
 ) -> tuple[JointVector, JointVector]:
     """Returns the joint velocities and accelerations that move the tool as commanded, shape (n,), [rad/s], [rad/s^2].
@@ -130,15 +131,17 @@ def _reference(
 
         dq_c = M^-1 J^T L twist        ddq_c = M^-1 J^T L (acc - dJ/dt dq - J free) + free
 
-    On a 7-axis arm `free` is the acceleration of a damped spring at `q_null`, of which the tool feels nothing.
+    On a 7-axis arm `free` is the acceleration of a damped spring at `null`, which moves along, and dq_c has the part of
+    its velocity of which the tool feels nothing, as it does of the spring.
     """
     J = terms.jacobian
     wanted = np.array([*twist, *acc])
+    along = free = np.zeros(model.n)
     if model.n == 7:
-        free = _PULL * (q_null - measured.q) - _DRAG * measured.dq
-    else:
-        free = np.zeros(model.n)
+        q_null, along, ddq_null = null
+        free = _PULL * (q_null - measured.q) + _DRAG * (along - measured.dq) + ddq_null
+        wanted[:6] -= J.dot(along)
     wanted[6:] -= terms.acceleration(free) if any(twist) or any(acc) else J.dot(free)
     back = terms.mass_inverse.dot(J.T)
     joints = back.dot(model.rigid_body.tool_solver.solve(J.dot(back) + _DAMPED_INVERSE, wanted.reshape(2, 6).T))
-    return joints[:, 0], joints[:, 1] + free
+    return joints[:, 0] + along, joints[:, 1] + free

@@ -15,7 +15,9 @@ from rcilab.controller.mujoco_plant import MuJoCoPlant
 from rcilab.controller.plant import Drive, Measurement, Plant, Setpoint
 from rcilab.controller.servo import cartesian_impedance, joint_impedance
 from rcilab.model import RobotModel, load_model
+from rcilab.motion import plan_joint
 from rcilab.spatial import Pose
+from rcilab.supervisor.simulate import simulate
 
 Law = Callable[[Measurement], Array]
 Maker = Callable[[RobotModel], Plant]
@@ -41,7 +43,7 @@ def joints(model: RobotModel, q: Array, stiffness: list[float]) -> Law:
 
 def tool(model: RobotModel, T: Pose, stiffness: list[float], **more: object) -> Law:
     q = model.home
-    return lambda measured: cartesian_impedance(model, T, STILL, STILL, q, measured, stiffness, **more)  # type: ignore[arg-type]
+    return lambda measured: cartesian_impedance(model, T, STILL, STILL, (q, 0.0 * q, 0.0 * q), measured, stiffness, **more)  # type: ignore[arg-type]
 
 
 def offset(T_c: Pose, T: Pose) -> Array:
@@ -111,7 +113,7 @@ def test_the_greatest_stiffness_is_stable_also_with_a_long_tool(make: Maker, nam
     rest, T_c = plant.reset(q), load_model(name, tool=Pose([0.2, 0.0, 0.5])).forward(q)
     laws: list[Law] = [
         joints(model, q, model.limits.joint.stiffness.tolist()),
-        lambda measured: cartesian_impedance(model, T_c, STILL, STILL, q, measured, STIFF),
+        lambda measured: cartesian_impedance(model, T_c, STILL, STILL, (q, 0.0 * q, 0.0 * q), measured, STIFF),
     ]
     for law in laws:
         plant.push([20.0, -30.0, 10.0, 1.0, 2.0, -1.0])
@@ -169,7 +171,7 @@ def test_an_untouched_tool_follows_its_reference() -> None:
         T_c = Pose.from_parts(T.parts[0], tuple((T.position + out[:3]).tolist()))  # type: ignore[arg-type]
         if k > 1500:  # It began at speed, from rest.
             worst = max(worst, float(np.abs(offset(T_c, model.forward(measured.q))).max()))
-        tau = cartesian_impedance(model, T_c, speed, acc, model.home, measured, SOFT)
+        tau = cartesian_impedance(model, T_c, speed, acc, (model.home, np.zeros(6), np.zeros(6)), measured, SOFT)
         measured = plant.step(Setpoint(Drive.TORQUE, [0.0] * 6, [0.0] * 6, [0.0] * 6, tau))
     assert worst < 3e-4  # [m, rad]
 
@@ -181,7 +183,7 @@ def test_the_elbow_of_a_seven_axis_arm_is_led_softly_and_the_tool_does_not_feel_
     q_null = np.array(model.inverse(T_c, psi=0.3).nearest(model.home))
     measured, worst = plant.reset(model.home), 0.0
     for _ in range(2500):
-        tau = cartesian_impedance(model, T_c, STILL, STILL, q_null, measured, STIFF)
+        tau = cartesian_impedance(model, T_c, STILL, STILL, (q_null, np.zeros(7), np.zeros(7)), measured, STIFF)
         measured = plant.step(Setpoint(Drive.TORQUE, [0.0] * 7, [0.0] * 7, [0.0] * 7, tau))
         worst = max(worst, float(np.abs(offset(model.forward(measured.q), T_c)).max()))
     assert model.arm_angle(measured.q) == pytest.approx(0.3, abs=0.01)
@@ -199,3 +201,15 @@ def test_a_damper_keeps_its_design_for_some_cycles_and_then_follows_the_arm() ->
     kept = [k - k % DESIGN_PERIOD for k in range(2 * DESIGN_PERIOD)]
     assert all(np.allclose(tau, designs[k], rtol=1e-12) for tau, k in zip(found, kept, strict=True))
     assert not np.allclose(designs[0], designs[DESIGN_PERIOD], rtol=1e-3)
+
+
+@pytest.mark.parametrize("plant", ["ideal", "mujoco"])
+def test_the_elbow_of_a_soft_arm_follows_a_quick_motion(plant: str) -> None:
+    model = load_model("xMatePro7")
+    goal = model.home + np.array([0.3, 0.1, 0, 0, 0, 0, 0])
+    with simulate(model, plant=plant) as robot:
+        robot.power_on()
+        run = robot.execute(plan_joint(model, model.home, goal, speed=0.5), mode="cartesian_impedance")
+        assert np.abs(run.q[-1] - goal).max() < (0.003 if plant == "ideal" else 0.02)  # Drives have friction in MuJoCo.
+        assert np.abs(run.dq[-1]).max() < 0.02
+        assert np.linalg.norm(run.T_base_tool[-1, :3, 3] - model.forward(goal).position) < 1e-4
