@@ -124,7 +124,16 @@ _GAINS = (
 
 _BOX = "keep the tool inside the safety box; a motion that starts outside it may only lead into it"
 
+_RANGE = (
+    "the joint is beyond its range or its soft limit, and without auto_limit the motors are off: power_off() and "
+    "power_on(), then execute(plan_recovery(robot.model, robot.state.q_c)) leads it back inside"
+)
+RANGE_FAULTS = frozenset({Fault.ACTUAL_JOINT_POSITION_LIMITS_VIOLATION, Fault.COMMAND_JOINT_POSITION_LIMITS_VIOLATION})
+"""After which `recover()` may not do: the arm can be farther out than it recovers from by itself."""
+
 _REMEDIES = {
+    Fault.ACTUAL_JOINT_POSITION_LIMITS_VIOLATION: _RANGE,
+    Fault.COMMAND_JOINT_POSITION_LIMITS_VIOLATION: _RANGE,
     Fault.ACTUAL_CARTESIAN_POSITION_LIMITS_VIOLATION: _BOX,
     Fault.COMMAND_CARTESIAN_POSITION_LIMITS_VIOLATION: _BOX,
     Fault.COLLISION: "look for contact; if it fires without contact, raise the collision thresholds "

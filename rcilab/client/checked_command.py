@@ -8,10 +8,12 @@ from typing import Any
 import numpy as np
 
 from rcilab.arrays import Array
+from rcilab.client.rotation import nine
 from rcilab.clock import CYCLE_TIME
 from rcilab.command import CartesianPosition, Command, JointPosition, JointTorque
 from rcilab.errors import InvalidValueError
 from rcilab.limits import Limits
+from rcilab.spatial import find_rotation_error
 from rcilab.state import RobotState
 
 START_TOLERANCE = 1e-6  # [rad] or [m] A first command this far off makes a jerk of 1000 rad/s^3, below every limit.
@@ -40,7 +42,11 @@ def check_command(command: Any, kind: type[Command], n: int, t: float) -> Comman
         return JointTorque(_numbers(name, command.tau, (n,), "N m"), command.finished)
     if command.psi is not None and not math.isfinite(command.psi):
         raise InvalidValueError("psi", command.psi, "must be finite [rad], or None")
-    return CartesianPosition(_numbers(name, command.T_base_tool, (4, 4), "m"), command.psi, command.finished)
+    T = _numbers(name, command.T_base_tool, (4, 4), "m")
+    error = find_rotation_error(nine(T[:3, :3]))
+    if error is not None:
+        raise InvalidValueError(name, "T_base_tool", error)
+    return CartesianPosition(T, command.psi, command.finished)
 
 
 def require_first(command: Command, state: RobotState, limits: Limits) -> None:

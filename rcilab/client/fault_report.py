@@ -12,7 +12,7 @@ from rcilab.arrays import Array
 from rcilab.client.rotation import nine
 from rcilab.clock import CYCLE_TIME
 from rcilab.conformance import Breach, CartesianMonitor, JointMonitor, TorqueMonitor
-from rcilab.faults import Fault, name_faults
+from rcilab.faults import RANGE_FAULTS, Fault, name_faults
 from rcilab.limits import Limits
 from rcilab.spatial import Pose
 
@@ -59,13 +59,12 @@ def describe_faults(
         )
     names = ", ".join(f"{fault.manual_name} ({fault.cause})" for fault in faults)
     parts = [f"the controller stopped the motion {when}: {names}"]
-    numbers = _numbers(faults, record, limits)
-    if numbers:
-        parts.append(numbers)
+    parts += [said for said in (_numbers(faults, record, limits), *_measured(faults, record, limits)) if said]
     if faults:
         is_torque = bool(np.isfinite(record["command_tau"]).any())
         parts.append(late or (faults[0].torque_remedy if is_torque else faults[0].remedy))
-    parts.append("recover() clears the fault; .record holds the last cycles")
+    clears = "" if RANGE_FAULTS & set(faults) else "recover() clears the fault; "
+    parts.append(f"{clears}.record holds the last cycles")
     return "; ".join(parts)
 
 
@@ -91,6 +90,27 @@ def _numbers(faults: tuple[Fault, ...], record: NDArray[np.void], limits: Limits
                     return f"{breach.text} in the command at t = {rows['t'][place]:.3f} s"
         return f"last command at t = {rows['t'][-1]:.3f} s, {describe(rows)}"
     return ""
+
+
+def _measured(faults: tuple[Fault, ...], record: NDArray[np.void], limits: Limits) -> Iterator[str]:
+    """Yields what was measured in the last cycles of what the faults name: a joint, its value and its bound."""
+    if not len(record):
+        return
+    joint, q, dq = limits.joint, record["q"], record["dq"]
+    if Fault.ACTUAL_JOINT_VELOCITY_LIMITS_VIOLATION in faults:
+        place = np.unravel_index((np.abs(dq) / joint.velocity).argmax(), dq.shape)
+        bound = joint.velocity[place[1]]
+        yield f"joint {place[1] + 1} was measured at {dq[place]:.3g} rad/s ({bound:g} rad/s are allowed)"
+    if Fault.ACTUAL_JOINT_POSITION_LIMITS_VIOLATION in faults:
+        beyond = np.maximum(joint.lower - q, q - joint.upper)
+        place = np.unravel_index(beyond.argmax(), q.shape)
+        low, high = math.degrees(joint.lower[place[1]]), math.degrees(joint.upper[place[1]])
+        angle = math.degrees(q[place])
+        yield f"joint {place[1] + 1} was measured at {angle:.2f} deg (from {low:.2f} to {high:.2f} deg)"
+    if Fault.COLLISION in faults:
+        force = np.linalg.norm(record["tau_ext_in_base"][:, :3], axis=1)
+        if np.isfinite(force).any():
+            yield f"the force from outside at the tool was estimated at {np.nanmax(force):.3g} N"
 
 
 def _judge_joints(rows: NDArray[np.void], limits: Limits) -> Iterator[tuple[int, list[Breach]]]:

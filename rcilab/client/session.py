@@ -128,7 +128,10 @@ class RobotSession(Motions, Closing):
     """
 
     def __init__(self, link: Link, model: RobotModel, turns: Turns, runner: Runner, world: World | None) -> None:
-        super().__init__(link, model.limits, turns, runner)
+        from rcilab.model import load_model
+
+        own = load_model(model.name).limits  # A model may have soft limits: they bound motions, not what may be set.
+        super().__init__(link, own, turns, runner)
         self._model = model
         self._safety_box: SafetyBox | None = None
         self._world = world

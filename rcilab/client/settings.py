@@ -20,7 +20,14 @@ from rcilab.dynamics.payload import Payload
 from rcilab.errors import CommandRejectedError, InvalidValueError
 from rcilab.limits import Limits
 from rcilab.protocols import rci
-from rcilab.protocols.rci.bounds import FARTHEST_BOX, FILTER_OFF, LARGEST_BOX, LONGEST_TOOL, LOWEST_FREQUENCY
+from rcilab.protocols.rci.bounds import (
+    FARTHEST_BOX,
+    FILTER_OFF,
+    LARGEST_BOX,
+    LIMIT_TOLERANCE,
+    LONGEST_TOOL,
+    LOWEST_FREQUENCY,
+)
 from rcilab.safety_box import SafetyBox, require_box
 from rcilab.spatial import Pose, as_pose
 
@@ -35,8 +42,8 @@ _ADVICE: dict[tuple[type[rci.Request], IntEnum], str] = {
     (rci.StartMove, rci.StartStatus.USER_STOP): Refusal.ESTOP.sentence,
     (rci.AutomaticErrorRecovery, rci.RecoveryStatus.NOT_POSSIBLE): "the arm still moves: try again at standstill",
     (rci.AutomaticErrorRecovery, rci.RecoveryStatus.MANUAL_RECOVERY_NEEDED): (
-        "the arm is too far outside its soft limits or its safety box: power_off() clears the fault; "
-        "then power_on() and guide it back by hand (start_drag()), or widen them and move it back"
+        "the arm is too far outside its soft limits or its safety box: power_off() clears the fault; then power_on(), "
+        "and execute(plan_recovery(robot.model, robot.state.q_c)) leads the joints back; a hand can, too (start_drag())"
     ),
     (rci.AutomaticErrorRecovery, rci.RecoveryStatus.REFLEX): (
         "the cause is still there: look what touches or loads the arm and remove it, set the load (set_load()) or "
@@ -88,7 +95,9 @@ class RciSettings:
         What happens there is the controller's choice: the manual's `auto_limit` never goes over the wire.
         """
         joint = None if self._limits is None else self._limits.joint
-        least, largest = (None, None) if joint is None else (joint.lower, joint.upper)
+        least = largest = None
+        if joint is not None:
+            least, largest = joint.lower - LIMIT_TOLERANCE, joint.upper + LIMIT_TOLERANCE
         low = _vector("lower", lower, self._joints(), "rad", least, largest)
         high = _vector("upper", upper, self._joints(), "rad", least, largest)
         for i in range(self.n):
@@ -236,7 +245,8 @@ def _vector(
         if not math.isfinite(value):
             raise InvalidValueError(place, value, f"must be finite [{unit}]")
         if not lowest <= value <= highest:
-            bounds = f"must not be below {lowest:g}" if highest == math.inf else f"is outside {lowest:g} to {highest:g}"
+            span = f"is outside {lowest:.9g} to {highest:.9g}"
+            bounds = f"must not be below {lowest:g}" if highest == math.inf else span
             raise InvalidValueError(place, value, f"{bounds} [{unit}]")
     return array
 

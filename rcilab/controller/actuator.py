@@ -14,6 +14,7 @@ impedance, wherever the arm yields: under both impedances and while it is guided
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from enum import Enum
 from typing import Final
 
@@ -32,6 +33,8 @@ from rcilab.model import RobotModel
 from rcilab.protocols import rci
 from rcilab.safety_box import SafetyBox, active_box
 
+# In a cycle: so that the largest wrench there is, 60 N and 30 N m, is there after 0.5 s. A choice.
+_WRENCH_STEP = (0.12,) * 3 + (0.06,) * 3
 _DRIVES = {"position": Drive.POSITION, "braked": Drive.BRAKED}
 
 
@@ -64,6 +67,7 @@ class Actuator:
 
     def __init__(self, model: RobotModel, settings: Settings) -> None:
         self._axes = ForceAxes(model, settings)
+        self._wrench = (0.0,) * 6  # As it acts just now.
         self.configure(model, settings)
         self._space, self._kind = rci.DragSpace.JOINT, rci.DragType.FREE
 
@@ -100,6 +104,8 @@ class Actuator:
         """
         if law is not self._law:
             self._law, self._damper = law, Damper()
+        if law is not Law.CARTESIAN_IMPEDANCE:
+            self._wrench = (0.0,) * 6
         if not law.yields:
             return Setpoint(law.drive, commanded.q, commanded.dq, commanded.ddq, None, commanded.arrays)
         if law is Law.TORQUE:
@@ -119,6 +125,7 @@ class Actuator:
             return joint_impedance(model, *commanded.arrays, measured, settings.joint_stiffness, self._damper)
         if law is Law.CARTESIAN_IMPEDANCE:
             self._axes.follow(tool_c.twist[:3])
+            self._wrench = _approach(self._wrench, settings.desired_wrench)
             tool = model.rigid_body.tool_terms(measured.q, measured.dq)
             return cartesian_impedance(
                 model,
@@ -128,11 +135,18 @@ class Actuator:
                 commanded.arrays,
                 measured,
                 settings.cartesian_stiffness,
-                settings.desired_wrench,
+                self._wrench,
                 axes=None if self._axes.is_world else np.array(self._axes.rotation(tool.pose)).reshape(3, 3),
                 damper=self._damper,
             )
         return guide_torque(model, measured, self._space, self._kind, self._T_held, self._soft_limits)
+
+
+def _approach(wrench: Sequence[float], wanted: Sequence[float]) -> tuple[float, ...]:
+    """Returns a wrench a cycle later on its way to the one that is wanted: a step of it would throw the arm."""
+    return tuple(
+        now + min(max(goal - now, -step), step) for now, goal, step in zip(wrench, wanted, _WRENCH_STEP, strict=True)
+    )
 
 
 def guiding_box(settings: Settings) -> SafetyBox | None:

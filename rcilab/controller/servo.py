@@ -81,8 +81,8 @@ def cartesian_impedance(
         T_c: Commanded pose of the tool in base.
         twist_c: Its velocity, base axes, linear first, shape (6,), [m/s, rad/s].
         acc_c: Its acceleration, shape (6,), [m/s^2, rad/s^2].
-        null: Joint angles whose arm angle a 7-axis arm keeps, and how they move: angles, velocities, accelerations, each
-            of shape (n,), [rad], [rad/s], [rad/s^2]. Others have no choice.
+        null: Joint angles whose arm angle a 7-axis arm keeps, their velocities and accelerations, each of shape (n,),
+            [rad], [rad/s], [rad/s^2]. Other arms have no choice.
         measured: Where the arm is.
         stiffness6: Three translations [N/m], three rotations [N m/rad].
         desired_wrench6: Force and moment that the arm exerts on its surroundings in addition, [N, N m].

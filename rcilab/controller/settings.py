@@ -19,13 +19,19 @@ from rcilab.dynamics.payload import NO_LOAD, Payload
 from rcilab.errors import InvalidValueError
 from rcilab.limits import JointLimits
 from rcilab.protocols import rci
-from rcilab.protocols.rci.bounds import FARTHEST_BOX, FILTER_OFF, LARGEST_BOX, LONGEST_TOOL, LOWEST_FREQUENCY
+from rcilab.protocols.rci.bounds import (
+    FARTHEST_BOX,
+    FILTER_OFF,
+    LARGEST_BOX,
+    LIMIT_TOLERANCE,
+    LONGEST_TOOL,
+    LOWEST_FREQUENCY,
+)
 from rcilab.robots import RobotDescription
 from rcilab.safety_box import SafetyBox
 from rcilab.spatial import IDENTITY, Pose
 
 SIGNAL_COUNT = 6  # Digital inputs, and outputs: DI0_0 to DI0_3, DI1_0, DI1_1 (manual 3.1.13 and 3.1.14).
-_LIMIT_TOLERANCE = 1e-9  # [rad] For soft limits that were converted from degrees elsewhere.
 
 Floats = tuple[float, ...]
 
@@ -183,7 +189,7 @@ def _soft_limits(request: rci.SetJointLimit, arm: RobotDescription) -> dict[str,
     upper, lower = request.upper[: arm.n], request.lower[: arm.n]
     bounds = zip(lower, upper, arm.limits.joint.lower.tolist(), arm.limits.joint.upper.tolist(), strict=True)
     for low, high, lowest, highest in bounds:
-        if not lowest - _LIMIT_TOLERANCE <= low < high <= highest + _LIMIT_TOLERANCE:
+        if not lowest - LIMIT_TOLERANCE <= low < high <= highest + LIMIT_TOLERANCE:
             return None
     return {"joint_lower": lower, "joint_upper": upper}
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import weakref
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from rcilab.client.control_loop import SILENCE
 from rcilab.client.session import RobotSession, open_session
 from rcilab.client.world import World
@@ -24,7 +26,7 @@ def simulate(
     """Returns a session with a simulated arm; closing the session, or dropping it, ends the simulation.
 
     Args:
-        model: The arm, with its tool and load; the virtual controller is told of both.
+        model: The arm, with its tool, load and soft limits; the virtual controller is told of all three.
         plant: "ideal" (the arm is where it is told to be) or "mujoco".
         lockstep: True: each simulated millisecond waits for its command, so that a run comes out the same to the last
             bit on any machine. False: the controller runs free at 1 kHz, as a real one does.
@@ -35,7 +37,7 @@ def simulate(
         ModelError: The arm does not speak the RCI.
         ConnectionLostError: The virtual controller did not start; the message carries what it said.
     """
-    from rcilab.model import require_model, require_rci
+    from rcilab.model import load_model, require_model, require_rci
 
     require_rci(require_model(model))
     require_plant(plant)
@@ -59,6 +61,9 @@ def simulate(
     try:
         if not model.T_flange_tool.is_close(IDENTITY, 0.0):
             session.set_coor(model.T_flange_tool)
+        own, joint = load_model(model.name).limits.joint, model.limits.joint
+        if not (np.array_equal(joint.lower, own.lower) and np.array_equal(joint.upper, own.upper)):
+            session.set_joint_limit(joint.lower, joint.upper)
         if model.load.mass > 0.0:
             session.set_load(model.load.mass, model.load.center_of_mass, model.load.inertia)
     except BaseException:

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from rcilab.errors import ControlError
+from rcilab.command import CartesianPosition, JointPosition
+from rcilab.errors import ControlError, InvalidValueError
 from rcilab.model import load_model
-from rcilab.motion import plan_joint, plan_nullspace
+from rcilab.motion import plan_joint, plan_nullspace, plan_recovery
 from rcilab.protocols.world import NetworkFaults
 from rcilab.supervisor.simulate import simulate
 
@@ -33,3 +34,40 @@ def test_commands_that_were_all_lost_are_no_success(mode):
         with pytest.raises(ControlError, match=r"did not arrive.*played none of the commands"):
             robot.execute(motion, mode=mode)
         assert np.array_equal(robot.state.q_c, MODEL.home) or mode == "torque"
+
+
+def test_soft_limits_of_the_model_reach_the_controller_and_can_be_widened():
+    joint = MODEL.limits.joint
+    upper = joint.upper.copy()
+    upper[0] = 0.3
+    with simulate(MODEL.with_joint_limits(joint.lower, upper)) as robot:
+        robot.power_on()
+        with pytest.raises(ControlError, match=r"kCommandJointPosition.*power_off\(\) and power_on\(\)") as caught:
+            robot.control(lambda state, t: JointPosition(state.q_c + 2e-4 * np.eye(7)[0] * min(t / 0.2, 1.0)))
+        assert "recover()" not in str(caught.value)
+        robot.power_off()
+        robot.power_on()
+        robot.execute(plan_recovery(robot.model, robot.state.q_c))
+        robot.set_joint_limit(joint.lower - 1e-10, joint.upper + 1e-10)
+        robot.move_j(robot.state.q_c + 0.4 * np.eye(7)[0])
+
+
+@pytest.mark.parametrize("axis", [3, 4, 5])
+def test_a_desired_moment_builds_up_and_throws_nothing(axis):
+    wrench = np.zeros(6)
+    wrench[axis] = 5.0
+    with simulate(MODEL, plant="mujoco") as robot:
+        robot.power_on()
+        robot.set_cart_imp_desired_tau(wrench)
+        T = robot.state.T_base_tool_c
+        run = robot.control(lambda state, t: CartesianPosition(T, finished=t >= 0.4), "cartesian_impedance")
+        assert run.faults == ()
+
+
+def test_a_matrix_that_is_no_rotation_is_refused_before_it_is_sent():
+    with simulate(MODEL) as robot:
+        robot.power_on()
+        T = robot.state.T_base_tool_c.matrix
+        T[0, 0] *= 1.1
+        with pytest.raises(InvalidValueError, match="holds no rotation"):
+            robot.control(lambda state, t: CartesianPosition(T), "cartesian_position")

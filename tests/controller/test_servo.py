@@ -42,8 +42,8 @@ def joints(model: RobotModel, q: Array, stiffness: list[float]) -> Law:
 
 
 def tool(model: RobotModel, T: Pose, stiffness: list[float], **more: object) -> Law:
-    q = model.home
-    return lambda measured: cartesian_impedance(model, T, STILL, STILL, (q, 0.0 * q, 0.0 * q), measured, stiffness, **more)  # type: ignore[arg-type]
+    null = (model.home, np.zeros(model.n), np.zeros(model.n))
+    return lambda measured: cartesian_impedance(model, T, STILL, STILL, null, measured, stiffness, **more)  # type: ignore[arg-type]
 
 
 def offset(T_c: Pose, T: Pose) -> Array:
