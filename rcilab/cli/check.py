@@ -62,7 +62,7 @@ def run(args: Namespace) -> int:
     if name is None:
         raise UsageError("a motion does not say for which arm it is: add --model NAME, such as --model xMatePro7")
     model = load_model(name, tool=found.T_flange_tool if isinstance(found, Program) else None)
-    motion = as_motion(found, model, show=(lambda line: None) if args.json else show)
+    motion = as_motion(found, model, args.file, show=(lambda line: None) if args.json else show)
     report = check(motion, model, mode=args.mode)
     out: Path | None = args.slow_down
     slowed = None if out is None else report.slow_down()

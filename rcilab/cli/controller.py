@@ -62,7 +62,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         metavar="N",
         help="lost commands in a row that stop a motion, 10 to 20; 0: none do (%(default)s)",
     )
-    parser.add_argument("--auto-limit", action="store_true", help="lead commands to rest inside the soft joint limits")
+    parser.add_argument(
+        "--auto-limit",
+        action="store_true",
+        help="lead commands to rest inside the soft joint limits, each joint by itself: under poses the tool "
+        "then leaves the pose that is commanded",
+    )
     parser.add_argument("--loop-back", action="store_true", help="wire digital outputs to the inputs")
     parser.add_argument(
         "--limits", default="manual", metavar="TABLE", help="Cartesian limits: manual or sdk (%(default)s)"

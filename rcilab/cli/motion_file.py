@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rcilab.model import RobotModel
@@ -25,23 +25,39 @@ def read_file(file: Path) -> Motion | Program:
     return Program.load(file) if file.suffix.lower() == ".json" else Motion.load(file)
 
 
-def as_motion(found: Motion | Program, model: RobotModel, show: Callable[[str], None] = print) -> Motion:
+def as_motion(found: Motion | Program, model: RobotModel, file: Path, show: Callable[[str], None] = print) -> Motion:
     """Returns the motion; a program is planned, and the notes of its planner are shown.
 
     Args:
         found: What `read_file` has returned.
         model: The arm.
+        file: What it was read from, to name the line of a waypoint that cannot be planned.
         show: Called with every line of text.
 
     Raises:
         PlanningError: The program cannot be planned.
         InvalidValueError: It is for another arm.
     """
+    from rcilab.errors import PlanningError
     from rcilab.motion import Program, plan_program
 
     if not isinstance(found, Program):
         return found
-    motion = plan_program(model, found, law="torque_rate_limited")
+    try:
+        motion = plan_program(model, found, law="torque_rate_limited")
+    except PlanningError as error:
+        if error.waypoint is None:
+            raise
+        line = _line_of(error.waypoint, file)
+        raise PlanningError(f"{file.name}, line {line}, {error}", waypoint=error.waypoint) from error
     for note in motion.notes:
         show(f"note: {note}")
     return motion
+
+
+def _line_of(waypoint: int, file: Path) -> int:
+    """Returns the line of a waypoint, from 1, in the file of a program that was read before."""
+    from rcilab.motion.lined_json import read_json
+
+    content: Any = read_json(file.read_bytes(), file.name).value
+    return content["waypoints"].value[waypoint - 1].line

@@ -124,7 +124,7 @@ def _run(args: Namespace, stopper: _Stopper) -> int:
     model = load_model(args.model) if args.model else None
     moves: list[_Move] = []
     with connect(args.robot, model, args.timeout) as robot:
-        motion = as_motion(found, robot.model, show=partial(print, file=_reader(args)))
+        motion = as_motion(found, robot.model, args.file, show=partial(print, file=_reader(args)))
         state = robot.state
         mismatch = describe_start_mismatch(motion.q[0], state.q_c)
         if mismatch is None or not args.to_start:

@@ -178,6 +178,8 @@ class ControlLoop:
             reason = self._watch(0.0)
             if reason is not None:
                 return reason
+        if not self._has_power():
+            raise self._cut_off()
         raise DeadlineError(
             f"{self._link.name} accepted StartMove and then did not show {self._mode.name} within {MODE_TIMEOUT:g} s; "
             "try again, and look at the teach pendant if it goes on"
@@ -404,8 +406,21 @@ class ControlLoop:
         off = "" if isinstance(command, JointTorque) else f": {describe_distance(state, command)} from its end"
         return ControlError(f"the motion was executed and did not arrive{off}; {cause}", (), record)
 
+    def _has_power(self) -> bool:
+        try:
+            return self._commands.motor_state()
+        except RcilabError:  # Whoever is gone has another error.
+            return True
+
+    def _cut_off(self) -> ControlError:
+        record = self._log.recorder.last(RECORD_CYCLES)
+        said = "the motors were switched off while the motion ran, and the brakes hold the arm; power_on() leads on"
+        return ControlError(f"{self._link.name}: {said}", (), record)
+
     def _ended_by_controller(self, state: RobotState) -> ControlError:
         self._log.write(state, self._link.received_ns, self._time(state))
+        if not self._has_power():
+            return self._cut_off()
         record = self._log.recorder.last(RECORD_CYCLES)
         mode = state.robot_mode.name.lower().replace("_", " ")
         return ControlError(

@@ -24,7 +24,7 @@ from rcilab.client.turns import Turns
 from rcilab.client.world import World
 from rcilab.closing import Closing
 from rcilab.errors import ConnectionLostError, InvalidValueError, UsageError
-from rcilab.protocols.rci import STATE_SIZE, Request
+from rcilab.protocols.rci import STATE_SIZE, Request, SetMotorPower
 from rcilab.protocols.rci.statuses import WHILE_MOVING
 from rcilab.safety_box import SafetyBox
 from rcilab.spatial import Pose
@@ -115,9 +115,9 @@ class RobotSession(Motions, Closing):
     """A connected arm: its state, every RCI command, and motions at 1 kHz. Made by `connect` and `simulate`.
 
     While a motion runs, `stop`, `close`, `state` and what a controller answers then may be called, from any thread and
-    from a callback: `set_do`, `get_di`, `safety_stop`, `motor_state`, `load_model` and `set_cart_imp_desired_tau`. In a
-    callback such a request takes about a millisecond. All else is refused and does not disturb the motion. A session
-    stays usable after faults: `recover()`.
+    from a callback: `set_do`, `get_di`, `safety_stop`, `motor_state`, `load_model`, `set_cart_imp_desired_tau`, and
+    `power_off`, which ends the motion. In a callback such a request takes about a millisecond. All else is refused and
+    does not disturb the motion. A session stays usable after faults: `recover()`.
 
     Args:
         link: The connection.
@@ -310,7 +310,7 @@ class RobotSession(Motions, Closing):
         return f"<RobotSession {self.model.name} at {self._link.name}{', closed' if self.is_closed else ''}>"
 
     def _request(self, request: Request, timeout: float | None = None) -> Any:
-        if self._turns.is_moving and request.code in WHILE_MOVING:
+        if self._turns.is_moving and (request.code in WHILE_MOVING or request == SetMotorPower(0)):
             return self._link.request_alongside(request, timeout)
         with self._turns.take(type(request).__name__):
             return super()._request(request, timeout)

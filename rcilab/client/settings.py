@@ -56,6 +56,9 @@ _ADVICE: dict[tuple[type[rci.Request], IntEnum], str] = {
 _TEMPORARY = frozenset({"NOT_POSSIBLE", "USER_STOP", "FAILED"})
 """Names of statuses that refuse a request because of what the controller is doing, whatever its values."""
 
+_COUNTED_FROM_1 = (rci.ForceFrame, rci.DragSpace, rci.DragType)
+"""What the manual counts from 1 (3.1.16, 3.1.17) and the wire from 0."""
+
 _Member = TypeVar("_Member", bound=IntEnum)
 
 
@@ -211,7 +214,10 @@ def member(kind: type[_Member], name: str, value: object) -> _Member:
     if isinstance(value, str) and value.upper() in kind.__members__:
         return kind[value.upper()]
     known = ", ".join(repr(name.lower()) for name in kind.__members__)
-    raise InvalidValueError(name, described(value), f"is unknown; known: {known}")
+    hint = ""
+    if kind in _COUNTED_FROM_1 and isinstance(value, int) and 1 <= value <= len(kind):
+        hint = f"; the manual's {value} is {list(kind)[value - 1].name.lower()!r}"
+    raise InvalidValueError(name, described(value), f"is unknown; known: {known}{hint}")
 
 
 def flag(name: str, value: object) -> bool:

@@ -89,3 +89,13 @@ def test_a_reader_that_goes_away_leaves_the_exit_code_and_no_traceback(file):
         assert process.wait(30) == code, err
         assert "Traceback" not in err
         assert "BrokenPipe" not in err
+
+
+def test_a_waypoint_that_cannot_be_planned_is_named_with_its_file_and_line(tmp_path, capsys):
+    home = list(MODEL.home)
+    waypoints = [{"type": "joint", "q": home}, {"type": "line", "position": [5.5, 0.1, 0.4], "wxyz": [0, 0, 1, 0]}]
+    rows = ",\n".join(json.dumps(waypoint) for waypoint in waypoints)
+    text = f'{{"format": "rcilab program", "version": 1, "model": "{MODEL.name}",\n"start": {json.dumps(home)},\n'
+    (tmp_path / "far.json").write_text(f'{text}"waypoints": [\n{rows}]}}\n')
+    assert main(["check", str(tmp_path / "far.json")]) == 2
+    assert "far.json, line 5, waypoint 2 (line)" in capsys.readouterr().err

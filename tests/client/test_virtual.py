@@ -17,6 +17,7 @@ from rcilab.errors import (
     CommandRejectedError,
     ConformanceError,
     ControlError,
+    InvalidValueError,
     PlanningError,
     UsageError,
 )
@@ -350,3 +351,30 @@ def test_an_emergency_stop_before_the_motion_has_begun_is_named_at_once():
             robot.move_j(MODEL.home + 0.1)
     finally:
         controller.end()
+
+
+@pytest.mark.parametrize("after", [0.0, 0.2], ids=["before it has begun", "on its way"])
+def test_motors_that_are_switched_off_end_a_motion_and_the_error_says_so(after):
+    with simulate(MODEL, lockstep=False) as robot:
+        robot.power_on()
+
+        def cut():
+            while not robot.is_moving:
+                time.sleep(1e-4)
+            time.sleep(after)
+            robot.power_off()
+
+        thread = threading.Thread(target=cut)
+        thread.start()
+        with pytest.raises(ControlError, match="motors were switched off while the motion ran"):
+            robot.move_j(MODEL.home + 0.5, speed=0.1)
+        thread.join()
+        robot.power_on()
+        robot.move_j(robot.state.q_c + 0.05)
+
+
+def test_the_manual_s_numbers_are_answered_with_the_name_they_mean(robot):
+    with pytest.raises(InvalidValueError, match="the manual's 1 is 'world'"):
+        robot.set_fc_coor(Pose(), 1)
+    with pytest.raises(InvalidValueError, match="the manual's 2 is 'cartesian'"):
+        robot.start_drag(2, "free")
