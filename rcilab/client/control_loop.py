@@ -35,6 +35,7 @@ from rcilab.state import ControllerMode, RobotMode, RobotState
 
 if TYPE_CHECKING:
     from rcilab.model import RobotModel
+    from rcilab.safety_box import SafetyBox
 
 SILENCE = 0.1  # [s] without a state while moving means that the connection is lost; a choice.
 CATCH_UP = 20  # Cycles: as many lost commands as a controller bridges at most (manual 4.6: 10 to 20).
@@ -80,6 +81,7 @@ class ControlLoop:
         watch: Asked in every cycle whether to stop.
         model: The arm, for stopping a tool within what its joints allow.
         filters: What every command of a callback passes before it is sent, in this order.
+        box: The safety box that the controller has, as far as it is known, for what is said of faults.
         silence: Time without a state that counts as a lost connection, [s].
     """
 
@@ -94,6 +96,7 @@ class ControlLoop:
         watch: Watch,
         model: RobotModel,
         filters: Sequence[CommandFilter],
+        box: SafetyBox | None = None,
         silence: float = SILENCE,
     ) -> None:
         if mode not in _MOTION_MODES:
@@ -108,6 +111,7 @@ class ControlLoop:
         self._watch = watch
         self._silence = silence
         self._filters = tuple(filters)
+        self._box = box
         self._first_id = 0
         self._first_q_c = self._first_tau_c = np.zeros(0)
         self._answered_id = -1
@@ -378,7 +382,13 @@ class ControlLoop:
             late = describe_late_callback(1e-9 * self._slowest, self._slowest_t)
         pressed = self._find_safety_stop(state)
         message = describe_faults(
-            state.faults, record, t, self._limits, late=late, pressed="" if pressed is None else pressed.sentence
+            state.faults,
+            record,
+            t,
+            self._limits,
+            late=late,
+            pressed="" if pressed is None else pressed.sentence,
+            box=self._box,
         )
         error = ControlError(message, state.faults, record)
         return error if pressed is None else error.coded("safety_stop", status=pressed.word)

@@ -14,8 +14,13 @@ from rcilab.clock import CYCLE_TIME
 from rcilab.conformance import Breach, CartesianMonitor, JointMonitor, TorqueMonitor
 from rcilab.faults import RANGE_FAULTS, Fault, name_faults
 from rcilab.limits import Limits
+from rcilab.safety_box import SafetyBox
 from rcilab.spatial import Pose
 
+_BOX_FAULTS = {
+    Fault.ACTUAL_CARTESIAN_POSITION_LIMITS_VIOLATION, Fault.COMMAND_CARTESIAN_POSITION_LIMITS_VIOLATION
+}  # fmt: skip
+_CLOSE = math.radians(1.0)  # A joint farther inside than this has not come near the limits that we know of.
 _HISTORY = 3  # Commands that a third difference looks back to.
 _LATE_CYCLES = 5  # A delay that the play-out of a controller does not always absorb; shorter ones are not worth words.
 
@@ -37,7 +42,14 @@ def describe_late_callback(duration: float, t: float) -> str:
 
 
 def describe_faults(
-    faults: Iterable[Fault], record: NDArray[np.void], t: float, limits: Limits, *, late: str = "", pressed: str = ""
+    faults: Iterable[Fault],
+    record: NDArray[np.void],
+    t: float,
+    limits: Limits,
+    *,
+    late: str = "",
+    pressed: str = "",
+    box: SafetyBox | None = None,
 ) -> str:
     """Returns the message of the error that a motion ends with.
 
@@ -49,6 +61,7 @@ def describe_faults(
         late: What `describe_late_callback` returned, for a motion that a slow callback may have ended.
         pressed: Which safety stop ended the motion, in a sentence with what to do; "" for none. The RCI has no error
             bit for it, so that the bits which a controller sets meanwhile say something else.
+        box: The safety box that the controller has, as far as it is known.
     """
     faults = tuple(faults)
     when = "before the first command" if math.isnan(t) else f"at t = {t:.3f} s"
@@ -59,7 +72,15 @@ def describe_faults(
         )
     names = ", ".join(f"{fault.manual_name} ({fault.cause})" for fault in faults)
     parts = [f"the controller stopped the motion {when}: {names}"]
-    parts += [said for said in (_numbers(faults, record, limits), *_measured(faults, record, limits)) if said]
+    parts += [
+        said
+        for said in (
+            _numbers(faults, record, limits),
+            *_measured(faults, record, limits),
+            _outside(faults, record, box),
+        )
+        if said
+    ]
     if faults:
         is_torque = bool(np.isfinite(record["command_tau"]).any())
         parts.append(late or (faults[0].torque_remedy if is_torque else faults[0].remedy))
@@ -101,16 +122,34 @@ def _measured(faults: tuple[Fault, ...], record: NDArray[np.void], limits: Limit
         place = np.unravel_index((np.abs(dq) / joint.velocity).argmax(), dq.shape)
         bound = joint.velocity[place[1]]
         yield f"joint {place[1] + 1} was measured at {dq[place]:.3g} rad/s ({bound:g} rad/s are allowed)"
-    if Fault.ACTUAL_JOINT_POSITION_LIMITS_VIOLATION in faults:
+    if RANGE_FAULTS & set(faults):
+        is_measured = Fault.ACTUAL_JOINT_POSITION_LIMITS_VIOLATION in faults
+        q = q if is_measured else record["q_c"]
         beyond = np.maximum(joint.lower - q, q - joint.upper)
         place = np.unravel_index(beyond.argmax(), q.shape)
         low, high = math.degrees(joint.lower[place[1]]), math.degrees(joint.upper[place[1]])
         angle = math.degrees(q[place])
-        yield f"joint {place[1] + 1} was measured at {angle:.2f} deg (from {low:.2f} to {high:.2f} deg)"
+        was = "measured" if is_measured else "commanded"
+        said = f"joint {place[1] + 1} was {was} at {angle:.2f} deg (from {low:.2f} to {high:.2f} deg)"
+        inside = "every joint was inside the limits of this model: the controller has narrower ones (set_joint_limit)"
+        yield inside if beyond[place] < -_CLOSE else said
     if Fault.COLLISION in faults:
         force = np.linalg.norm(record["tau_ext_in_base"][:, :3], axis=1)
         if np.isfinite(force).any():
             yield f"the force from outside at the tool was estimated at {np.nanmax(force):.3g} N"
+
+
+def _outside(faults: tuple[Fault, ...], record: NDArray[np.void], box: SafetyBox | None) -> str:
+    """Returns which face of the safety box the tool passed, and how far; "" where that is not known."""
+    if box is None or not _BOX_FAULTS & set(faults) or not len(record):
+        return ""
+    measured = record["T_base_tool"][:, :3, 3]
+    sent = record["command_pose"][:, :3, 3]
+    places = [place for place in (*sent, *measured) if np.isfinite(place).all()]
+    if not places:
+        return ""
+    face, beyond = max((box.passed_face(place) for place in places), key=lambda passed: passed[1])
+    return f"the tool came {1e3 * max(beyond, 0.0):.1f} mm past the {face} face of the safety box"
 
 
 def _judge_joints(rows: NDArray[np.void], limits: Limits) -> Iterator[tuple[int, list[Breach]]]:

@@ -100,7 +100,7 @@ class Motions(RciCommands):
             self._streamed = streamed
             try:
                 filters = [RateLimiter(self.model.limits)] if mode == "torque" else []
-                return self._runner.run(streamed.stream, mode, self.model, streamed, filters)
+                return self._runner.run(streamed.stream, mode, self.model, streamed, filters, box=self.safety_box)
             finally:
                 self._streamed = None
 
@@ -182,7 +182,7 @@ class Motions(RciCommands):
 
             filters.append(RateLimiter(cartesian_limits(self.model.limits, rate_limit)))
         with self._turns.set_out("control"):
-            return self._runner.run(callback, mode, self.model, filters=filters)
+            return self._runner.run(callback, mode, self.model, filters=filters, box=self.safety_box)
 
     def move_j(self, goal: ArrayLike, speed: float = 0.2, progress: Progress | None = None) -> Run:
         """Moves to joint angles by the manual's S profile and returns when the arm is there: the vendor's MOVEJ.
@@ -207,7 +207,7 @@ class Motions(RciCommands):
             motion = plan_joint(self.model, state.q_c, goal, speed=speed, law="s_profile")
             self._require_allowed(motion, state)
             callback = follow(motion.q, report_progress(motion, progress))
-            return self._runner.run(callback, "joint_position", self.model, motion)
+            return self._runner.run(callback, "joint_position", self.model, motion, box=self.safety_box)
 
     def move_l(self, goal: Pose, speed: float = 0.2, psi: float | None = None, progress: Progress | None = None) -> Run:
         """Moves the tool straight to a pose by the manual's S profile, and returns when it is there: MOVEL.
@@ -294,4 +294,4 @@ class Motions(RciCommands):
         motion = follow_path(self.model, state.q_c, path, speed)
         self._require_allowed(motion, state, "cartesian_position")
         callback = follow_poses(path, schedule(path, speed), with_psi, report_progress(motion, progress))
-        return self._runner.run(callback, "cartesian_position", self.model, motion)
+        return self._runner.run(callback, "cartesian_position", self.model, motion, box=self.safety_box)

@@ -24,6 +24,7 @@ from rcilab.state import ControllerMode, Mode
 if TYPE_CHECKING:
     from rcilab.model import RobotModel
     from rcilab.motion import Motion
+    from rcilab.safety_box import SafetyBox
 
 Ear: TypeAlias = Callable[[Run, BaseException | None], None]
 
@@ -76,6 +77,8 @@ class Runner:
         model: RobotModel,
         plan: Motion | PacedStream | None = None,
         filters: Sequence[CommandFilter] = (),
+        *,
+        box: SafetyBox | None = None,
     ) -> Run:
         """Runs the motion that has set out, and returns what became of it.
 
@@ -85,6 +88,7 @@ class Runner:
             model: The arm.
             plan: What is to be commanded, and may change on the way; None where only the callback knows.
             filters: What every command passes before it is sent.
+            box: The safety box that the controller has, as far as it is known: to say what passed which face of it.
 
         Raises:
             ControlError: The controller stopped it.
@@ -104,6 +108,7 @@ class Runner:
             silence=self._silence,
             model=model,
             filters=filters,
+            box=box,
         )
         setup = Setup(target=self._link.name, mode=mode, started_ns=time.time_ns())
 

@@ -8,6 +8,8 @@ from rcilab.errors import ControlError, InvalidValueError
 from rcilab.model import load_model
 from rcilab.motion import plan_joint, plan_nullspace, plan_recovery
 from rcilab.protocols.world import NetworkFaults
+from rcilab.safety_box import SafetyBox
+from rcilab.spatial import Pose
 from rcilab.supervisor.simulate import simulate
 
 MODEL = load_model("xMatePro7")
@@ -71,3 +73,33 @@ def test_a_matrix_that_is_no_rotation_is_refused_before_it_is_sent():
         T[0, 0] *= 1.1
         with pytest.raises(InvalidValueError, match="holds no rotation"):
             robot.control(lambda state, t: CartesianPosition(T), "cartesian_position")
+
+
+@pytest.mark.parametrize("mode", ["joint_position", "cartesian_position"])
+def test_a_tool_that_passes_a_face_of_its_box_is_told_which_and_how_far(mode):
+    with simulate(MODEL) as robot:
+        robot.power_on()
+        T = robot.state.T_base_tool_c
+        robot.set_cartesian_limit(SafetyBox(size=(0.1, 0.1, 0.1), T_base_box=Pose(T.position), active=True))
+
+        def callback(state, t):
+            share = min(t / 0.5, 1.0)
+            smooth = share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
+            if mode == "joint_position":
+                return JointPosition(MODEL.home + 0.15 * smooth * np.eye(7)[0])
+            return CartesianPosition(Pose([0.0, 0.08 * smooth, 0.0]) @ T)
+
+        with pytest.raises(ControlError, match=r"past the \+y face of the safety box"):
+            robot.control(callback, mode)
+
+
+def test_limits_that_another_session_has_narrowed_are_guessed_from_the_fault():
+    joint = MODEL.limits.joint
+    upper = joint.upper.copy()
+    upper[0] = 0.2
+    with simulate(MODEL) as robot:
+        robot.power_on()
+        robot.set_joint_limit(joint.lower, upper)
+        robot._model = MODEL  # As a session that does not know of it.
+        with pytest.raises(ControlError, match="the controller has narrower ones"):
+            robot.move_j(MODEL.home + 0.5 * np.eye(7)[0])
