@@ -16,6 +16,7 @@ from rcilab.kinematics.inverse import build_geometry
 from rcilab.kinematics.singularity import find_singularity
 from rcilab.model import RobotModel
 from rcilab.protocols import rci
+from rcilab.protocols.rci.bounds import LOWEST_CLIENT_PORT
 from rcilab.safety_box import active_box
 from rcilab.state import ControllerMode
 
@@ -58,6 +59,8 @@ def judge_request(request: rci.Request, phase: Phase, settings: Settings, arm: A
     match request:
         case rci.SetMotorPower(power=0):
             return POWER_OFF[phase]
+        case rci.Connect(udp_port=port):
+            refusal = None if port >= LOWEST_CLIENT_PORT else rci.SettingStatus.INVALID_ARGUMENT
         case rci.SetMotorPower(power=power):
             refusal = None if power == 1 else rci.SettingStatus.INVALID_ARGUMENT
         case rci.StartMove() if cell.status is rci.StartStatus.SUCCESS:  # What the phase says comes first.

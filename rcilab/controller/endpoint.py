@@ -43,9 +43,18 @@ class FrameArrived:
 
 @dataclass(frozen=True, slots=True)
 class DatagramArrived:
-    """A UDP datagram, from whoever sent it."""
+    """A UDP datagram of the client's."""
 
     datagram: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class StrangerHeard:
+    """The first UDP datagram on a connection that is not its client's; it is left out, as all others are."""
+
+    address: str
+    client: str
+    """Who the client is."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,11 +72,20 @@ class GuestsReady:
     sockets: list[socket.socket]
 
 
-Arrival: TypeAlias = ClientJoined | ClientLeft | FrameArrived | DatagramArrived | ClientRefused | GuestsReady
+Arrival: TypeAlias = (
+    ClientJoined | ClientLeft | FrameArrived | DatagramArrived | StrangerHeard | ClientRefused | GuestsReady
+)
 
 
 class Endpoint:
     """Owns every socket of a controller. Never blocks longer than it is told to.
+
+    Commands count that come from the address of the TCP client, or of `--client`, and from the port that states go to:
+    both ends of the RCI have one port number for both ways. A client that sends from another port is taken at its first
+    datagram's, until one comes from where states go. Others are strangers.
+
+    Attributes:
+        strangers: Datagrams that were left out because somebody else sent them.
 
     Args:
         config: Addresses and ports.
@@ -80,11 +98,14 @@ class Endpoint:
         self._listener, self._datagrams = _open(config)
         self.host, self.port = self._listener.getsockname()
         self.udp_port: int = self._datagrams.getsockname()[1]
-        self._state_port = self.port if config.client_port is None else config.client_port
+        self._own_port = self._state_port = self.port if config.client_port is None else config.client_port
         self._fixed_target = None if config.client_host is None else (_resolve(config.client_host), self._state_port)
         self._target = self._fixed_target
         self._connection: socket.socket | None = None
         self._holder = ""
+        self._sender: tuple[str, int] | None = None  # Whose datagrams count, once one has come.
+        self._has_met_stranger = False
+        self.strangers = 0
         self._reader = FrameReader()
         self._arrivals: deque[Arrival] = deque()
 
@@ -150,11 +171,12 @@ class Endpoint:
             return
         self._connection.close()
         self._connection = None
+        self._state_port = self._own_port
         self._target = self._fixed_target
         self._arrivals.append(ClientLeft(reason))
 
     def redirect_states(self, port: int) -> None:
-        """Sends states to another UDP port of the client from now on (the RCI's Connect command)."""
+        """Sends states to another UDP port of this client from now on (the RCI's Connect command)."""
         self._state_port = port
         if self._target is not None:
             self._target = (self._target[0], port)
@@ -169,10 +191,25 @@ class Endpoint:
     def _receive_datagrams(self) -> None:
         for _ in range(_DATAGRAMS_AT_ONCE):
             try:
-                datagram = self._datagrams.recv(_LARGEST_DATAGRAM)
+                datagram, sender = self._datagrams.recvfrom(_LARGEST_DATAGRAM)
             except OSError:  # Nothing more, or an error report that concerns an earlier send.
                 return
-            self._arrivals.append(DatagramArrived(datagram))
+            if sender == self._sender or self._meets(sender):
+                self._arrivals.append(DatagramArrived(datagram))
+
+    def _meets(self, sender: tuple[str, int]) -> bool:
+        """Returns whether a sender that was not heard just before is the client; others are counted, one is named."""
+        hosts = {self.fixed_host} if self._connection is None else {self._holder, self.fixed_host}
+        if sender[0] in hosts and (self._sender is None or sender[1] == self._state_port):
+            self._sender = sender
+            return True
+        self.strangers += 1
+        if not self._has_met_stranger:
+            self._has_met_stranger = True
+            self._arrivals.append(
+                StrangerHeard("{}:{}".format(*sender), "" if self._connection is None else self._holder)
+            )
+        return False
 
     def _receive_frames(self, connection: socket.socket) -> None:
         try:
@@ -203,6 +240,7 @@ class Endpoint:
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._connection = connection
         self._holder = address
+        self._sender, self._has_met_stranger = None, False
         self._reader = FrameReader()
         if self._fixed_target is None:
             self._target = (address, self._state_port)

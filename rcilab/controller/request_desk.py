@@ -11,6 +11,7 @@ from rcilab.controller.faulty_network import FaultyNetwork
 from rcilab.controller.state_machine import When
 from rcilab.errors import DecodeError
 from rcilab.protocols.rci import Connect, Request, decode_request, encode_response
+from rcilab.protocols.rci.bounds import LOWEST_CLIENT_PORT
 
 
 class RequestDesk:
@@ -62,7 +63,7 @@ class RequestDesk:
                 self._network.drop_client(f"sent bytes that are no RCI: {error}")
                 return
             reply = self._cycle.handle(request)
-            if isinstance(request, Connect):
+            if isinstance(request, Connect) and request.udp_port >= LOWEST_CLIENT_PORT:
                 self._endpoint.redirect_states(request.udp_port)
             # Idle modes are to be seen before StopMove is answered, so even an arm at rest answers after a cycle.
             if reply.when is When.AT_REST:

@@ -14,7 +14,6 @@ one is the one to answer.
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Callable
 
 from rcilab.awake import AwakeCores
@@ -30,8 +29,10 @@ from rcilab.controller.endpoint import (
     Endpoint,
     FrameArrived,
     GuestsReady,
+    StrangerHeard,
 )
 from rcilab.controller.faulty_network import FaultyNetwork
+from rcilab.controller.log_lines import LogLines
 from rcilab.controller.pace import Pace
 from rcilab.controller.plant import Plant
 from rcilab.controller.plants import build_plant
@@ -55,6 +56,8 @@ SPOILED_PATIENCE = 0.05  # [s] The same where the network spoils datagrams on pu
 FAREWELL = 20  # [cycles] In which a client learns of the end from the error bit of its states.
 SLIP = 20  # [cycles] A motion that took so much longer than it should is worth a line.
 GRACE = 2.0  # [s] For the arm to come to rest when the controller shall end.
+_REFUSALS = 10.0  # [s] Clients that are refused are named once in this time, and then counted; a choice.
+_STDERR = 2
 _QUIET = (Phase.OFF, Phase.IDLE)
 _LOOK = 0.1  # [s] Between looks at whether the parent process still lives, or a stalled controller shall end.
 
@@ -69,7 +72,7 @@ class ControllerServer:
     Args:
         config: How it is set up.
         plant: What moves; None: what the configuration says.
-        log: Takes one line about everything unusual.
+        log: Takes one line about everything unusual, and must not wait; None: a thread writes them to stderr.
 
     Raises:
         ModelError: The configuration names no known arm, or one that does not speak the RCI.
@@ -99,20 +102,26 @@ class ControllerServer:
         self.cycle.limit_table = config.limit_table
         self.misfits = 0
         self._is_out_of_patience = False
-        self._log = log if log is not None else _to_stderr
+        self._lines = LogLines(_STDERR) if log is None else None
+        self._log: Callable[[str], None] = self._lines.write if self._lines is not None else log or print
         self._clock = SystemClock()
         self._pace = Pace(self._clock.now())
         self._is_ending = False
         self._next_look = 0.0
         self._cores = AwakeCores()
         self._missed_before = 0
+        self._refused, self._next_refusal = 0, 0.0
         self._endpoint = Endpoint(config)
         states_network = config.network if config.states_network is None else config.states_network
         self._network = FaultyNetwork(self._endpoint, self._clock, config.network, states_network)
         self._desk = RequestDesk(self.cycle, self._endpoint, self._network)
         self._stalls = StallPlan()
         self._surroundings = Surroundings(
-            self.cycle, self._network, self._stalls, self._clock, lambda: Mishaps(self.missed, self.misfits)
+            self.cycle,
+            self._network,
+            self._stalls,
+            self._clock,
+            lambda: Mishaps(self.missed, self.misfits, self._endpoint.strangers),
         )
         self._world = self._open_world()
 
@@ -155,6 +164,8 @@ class ControllerServer:
             if use_realtime:
                 leave_realtime()
             self.close()
+            if self._lines is not None:
+                self._lines.close()
 
     def request_stop(self) -> None:
         """Asks for the end: one controlled stop if the arm moves, then `run` returns."""
@@ -358,8 +369,19 @@ class ControllerServer:
                 case GuestsReady(sockets):
                     if self._world is not None:
                         self._world.serve(sockets)
+                case StrangerHeard(address, client):
+                    whose = f"the client is at {client}" if client else "no client is connected"
+                    self._log(f"left out a UDP datagram from {address}, and will all others: {whose}")
                 case ClientRefused(address, holder):
-                    self._log(f"refused a second client from {address}: {holder} is connected; one at a time")
+                    self._tell_refusal(address, holder)
+
+    def _tell_refusal(self, address: str, holder: str) -> None:
+        if self._clock.now() < self._next_refusal:
+            self._refused += 1
+            return
+        more = f" ({self._refused} more were refused since the last line)" if self._refused else ""
+        self._log(f"refused a second client from {address}: {holder} is connected; one at a time{more}")
+        self._refused, self._next_refusal = 0, self._clock.now() + _REFUSALS
 
     def _warn_of_other_target(self, address: str) -> None:
         target = self._endpoint.fixed_host
@@ -377,7 +399,3 @@ class ControllerServer:
             self._log(f"the client {reason} in mid-motion: the arm comes to rest")
         elif reason != "closed the connection":
             self._log(f"the client {reason}")
-
-
-def _to_stderr(line: str) -> None:
-    print(f"rcilab controller: {line}", file=sys.stderr, flush=True)

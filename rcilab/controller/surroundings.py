@@ -49,10 +49,11 @@ _NOTHING = Push((0.0,) * 6)
 
 @dataclass(frozen=True, slots=True)
 class Mishaps:
-    """What the server counts: cycles left out, datagrams of a wrong size."""
+    """What the server counts: cycles left out, datagrams of a wrong size, and those of somebody else."""
 
     missed: int
     misfits: int
+    strangers: int
 
 
 class Surroundings:
@@ -167,6 +168,7 @@ class Surroundings:
             success_rate=cycle.playout.success_rate,
             missed=mishaps.missed,
             misfits=mishaps.misfits,
+            strangers=mishaps.strangers,
             ignored=cycle.ignored,
             pushed=self._is_pushed,
             stalls=self._stalls.count,

@@ -24,7 +24,7 @@ def test_whoever_calls_in_mid_motion_is_refused_and_the_motion_goes_on(make_robo
     refused = []
 
     def disturb():
-        for call in (robot.receive_state, robot.recover, robot.power_off, lambda: robot.set_coor(Pose()),
+        for call in (robot.receive_state, robot.recover, robot.power_on, lambda: robot.set_coor(Pose()),
                      lambda: robot.set_filters(100, 100, 100), lambda: robot.control(wave(10))):  # fmt: skip
             with pytest.raises(UsageError, match="a motion is running already") as caught:
                 call()

@@ -51,12 +51,12 @@ def test_the_next_good_client_works_after_fuzzed_frames() -> None:
 
 
 def test_fuzzed_datagrams_change_nothing_while_nothing_moves(watcher: Watcher) -> None:
-    with place_for(watcher) as place, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp:
+    with place_for(watcher) as place:
         before = watcher.look()
         noise = datagrams(5, DATAGRAMS)
         for start in range(0, DATAGRAMS, BATCH):
             for datagram in noise[start : start + BATCH]:
-                udp.sendto(datagram, (place.host, place.port))
+                watcher.send(datagram, (place.host, place.port))
             after = watcher.look()
         assert after.data[8:] == before.data[8:]
         assert arrived(place) > DATAGRAMS // 2
@@ -68,7 +68,7 @@ def arrived(place: Arena) -> int:
 
 def test_datagrams_of_a_wrong_size_do_not_disturb_a_motion() -> None:
     noise = [datagram for datagram in datagrams(6, 2000) if len(datagram) != wire.COMMAND_SIZE]
-    with arena() as place, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp, place.connect() as robot:
+    with arena() as place, place.connect() as robot:
         programs.prepare(robot, factor=1.0)
         robot.start_move(wire.JOINT_POSITION, wire.JOINT)
         q = robot.receive_fresh_state().q
@@ -76,7 +76,7 @@ def test_datagrams_of_a_wrong_size_do_not_disturb_a_motion() -> None:
 
         def callback(state: wire.State, t: float) -> Output:
             for _ in range(3):
-                udp.sendto(next(left, b""), (place.host, place.port))
+                robot.send_raw(next(left, b""))
             delta = programs.swing(0.01, 0.4, t)
             return Output(q=tuple(value + delta for value in q), finished=t > 0.4)
 

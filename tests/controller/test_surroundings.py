@@ -33,7 +33,7 @@ class Place:
         self.endpoint = Endpoint(ControllerConfig(model=MODEL.name, port=0))
         network = FaultyNetwork(self.endpoint, self.clock, NetworkFaults(), NetworkFaults())
         self.stalls = StallPlan()
-        self.surroundings = Surroundings(self.cycle, network, self.stalls, self.clock, lambda: Mishaps(3, 4))
+        self.surroundings = Surroundings(self.cycle, network, self.stalls, self.clock, lambda: Mishaps(3, 4, 5))
         self.handle = self.surroundings.handle
 
     def step(self, count: int = 1) -> None:
@@ -89,7 +89,8 @@ def test_the_status_has_what_was_chosen_and_counted(place) -> None:
     assert place.cycle.limit_table == "sdk"
     assert place.cycle.auto_limit
     assert place.cycle.settings.inputs == (False, False, True, False, False, False)
-    assert (place.status.missed, place.status.misfits, place.status.phase) == (3, 4, "idle")
+    assert (place.status.missed, place.status.misfits, place.status.strangers) == (3, 4, 5)
+    assert place.status.phase == "idle"
     place.handle(world.Press("gstop"))
     place.step()
     assert (place.status.button, place.status.phase) == ("gstop", "user_stopped")

@@ -138,12 +138,12 @@ def fuzz_frames_then_work(count: int, seed: int) -> None:
 def fuzz_datagrams(count: int, seed: int) -> None:
     """Sends fuzzed datagrams to a resting controller; its state must stay the same, and a good client must work."""
     with Process("--lockstep") as controller:
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp, _observer(controller) as robot:
+        with _observer(controller) as robot:
             before = robot.receive_fresh_state()
             noise = datagrams(seed, min(count, 20_000))
             for start in range(0, count, _BATCH):
                 for number in range(start, start + _BATCH):
-                    udp.sendto(noise[number % len(noise)], (controller.host, controller.port))
+                    robot.send_raw(noise[number % len(noise)])
                 assert robot.receive_fresh_state().data[8:] == before.data[8:]
         good_client_works(controller.host, controller.port, **PATIENT)
 

@@ -175,6 +175,11 @@ class Watcher:
         self.seen = 0
         self.last: State | None = None
 
+    def send(self, datagram: bytes, address: tuple[str, int]) -> None:
+        """Sends a datagram from where states come to: a controller takes it for its client's."""
+        self._udp.setblocking(True)
+        self._udp.sendto(datagram, address)
+
     def look(self) -> State:
         """Waits for a state and judges it and all that have come meanwhile."""
         self._udp.settimeout(PATIENCE)

@@ -314,6 +314,10 @@ class Robot:
         self._udp.sendto(data, self._address)
         self.sent += 1
 
+    def send_raw(self, datagram: bytes) -> None:
+        """Sends any bytes from where commands come from."""
+        self._udp.sendto(datagram, self._address)
+
     def _receive(self) -> State | None:
         self._udp.settimeout(self._receive_timeout)
         try:

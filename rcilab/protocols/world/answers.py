@@ -58,6 +58,8 @@ class WorldStatus:
     """Cycles that the controller's process was too late for and left out."""
     misfits: int = 0
     """Datagrams that had not the size of a command."""
+    strangers: int = 0
+    """Datagrams that somebody else than the client sent."""
     ignored: int = 0
     """Commands that came while none was wanted."""
     pushed: bool = False
@@ -72,7 +74,7 @@ class WorldStatus:
 
 WorldAnswer: TypeAlias = Done | Refused | WorldStatus
 
-_COUNTS = ("cycle", "lost", "lost_in_row", "missed", "misfits", "ignored", "stalls")
+_COUNTS = ("cycle", "lost", "lost_in_row", "missed", "misfits", "strangers", "ignored", "stalls")
 _LARGEST_COUNT = 2**63
 
 

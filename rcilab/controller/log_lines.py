@@ -1,0 +1,58 @@
+"""Lines for a person, from a loop that must never wait: a thread of their own writes them, as far as somebody reads."""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections import deque
+
+_MOST = 200  # Lines that wait; a choice: what a stream takes at once, and a person reads.
+_GRACE = 0.5  # [s] For the last lines, when the controller ends and nobody reads.
+
+
+class LogLines:
+    """Writes lines to a descriptor. `write` may be called from one thread, and never waits.
+
+    Args:
+        descriptor: Where to, such as 2. It is written to directly: a stream's own lock would hold up the interpreter's
+            end for as long as nobody reads.
+    """
+
+    def __init__(self, descriptor: int) -> None:
+        self._descriptor = descriptor
+        self._lines: deque[str] = deque()
+        self._left_out = 0
+        self._wake, self._is_ending = threading.Event(), False
+        self._thread = threading.Thread(target=self._run, name="log", daemon=True)
+        self._thread.start()
+
+    def write(self, line: str) -> None:
+        """Has a line written; where too many wait already it is left out, and a later one says how many were."""
+        if len(self._lines) >= _MOST:
+            self._left_out += 1
+            return
+        if self._left_out:
+            self._lines.append(f"{self._left_out} lines were left out: nobody read them")
+            self._left_out = 0
+        self._lines.append(line)
+        self._wake.set()
+
+    def close(self) -> None:
+        """Waits a moment for the last lines to be written. May be called twice."""
+        self._is_ending = True
+        self._wake.set()
+        self._thread.join(_GRACE)
+
+    def _run(self) -> None:
+        while True:
+            self._wake.wait()
+            self._wake.clear()
+            while self._lines:
+                data = f"rcilab controller: {self._lines.popleft()}\n".encode(errors="replace")
+                try:
+                    while data:
+                        data = data[os.write(self._descriptor, data) :]
+                except OSError:  # Nobody can read it any more.
+                    return
+            if self._is_ending:
+                return
