@@ -334,14 +334,27 @@ def test_from_outside_its_box_the_tool_may_only_be_led_in(way):
             play(plan_joint(model, robot.state.q_c, q))
 
 
+def in_motion(robot, after, act):
+    """Has something done so long after a motion has set out, [s], however busy this machine is."""
+
+    def wait_and_act():
+        while not robot.is_moving:
+            time.sleep(1e-3)
+        time.sleep(after)
+        act()
+
+    thread = threading.Thread(target=wait_and_act)
+    thread.start()
+    return thread
+
+
 def test_an_emergency_stop_before_the_motion_has_begun_is_named_at_once():
     controller = start_controller("xMate3", options=("--mode-delay", "1.05"))
     world_port = (controller.world_address or "").split(":")[1]
     try:
         with connect(f"{controller.address}?world_port={world_port}", MODEL) as robot:
             robot.power_on()
-            press = threading.Timer(0.3, lambda: robot.world.press("estop"))
-            press.start()
+            press = in_motion(robot, 0.3, lambda: robot.world.press("estop"))
             with pytest.raises(ControlError, match=r"emergency stop or the safety gate .* before the motion began"):
                 robot.move_j(MODEL.home + 0.1)
             press.join()
@@ -359,8 +372,7 @@ def test_motors_that_are_switched_off_end_a_motion_and_the_error_says_so(after):
     try:
         with connect(str(controller.address), MODEL) as robot:
             robot.power_on()
-            cut = threading.Timer(after, robot.power_off)
-            cut.start()
+            cut = in_motion(robot, after, robot.power_off)
             with pytest.raises(ControlError, match="motors were switched off while the motion ran"):
                 robot.move_j(MODEL.home + 0.5, speed=0.05)
             cut.join()
