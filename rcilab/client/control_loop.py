@@ -46,7 +46,7 @@ SETTLE_CYCLES = 200  # Cycles that the last command is repeated for at most whil
 ARRIVAL_TOLERANCE = 1e-6  # [rad], [m] What a motion may end off its last command: far below what an arm resolves.
 _NEARER = 0.95  # What is left of a distance after SETTLE_CYCLES where a low pass approaches, at 0.1 Hz 0.88.
 REST_TIMEOUT = 1.0  # [s] for the controller's own stop after a fault; the slowest joint needs 0.3 s from full speed.
-_FELT = 1e-3  # [N m] Torques below it are no different from none; a choice.
+_FELT = 1e-3  # [N m] Torques below it are no different from none; a tuning value.
 _NEAR_CYCLES = 2  # Cycles in a row that a filter is at its command until it counts as standing there.
 RECORD_CYCLES = 50  # Cycles that a ControlError carries, as many as the vendor's client writes.
 

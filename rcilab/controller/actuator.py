@@ -33,7 +33,7 @@ from rcilab.model import RobotModel
 from rcilab.protocols import rci
 from rcilab.safety_box import SafetyBox, active_box
 
-# In a cycle: so that the largest wrench there is, 60 N and 30 N m, is there after 0.5 s. A choice.
+# In a cycle: so that the largest wrench there is, 60 N and 30 N m, is reached after 0.5 s. A tuning value.
 _WRENCH_STEP = (0.12,) * 3 + (0.06,) * 3
 _DRIVES = {"position": Drive.POSITION, "braked": Drive.BRAKED}
 

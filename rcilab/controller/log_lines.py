@@ -6,7 +6,7 @@ import os
 import threading
 from collections import deque
 
-_MOST = 200  # Lines that wait; a choice: what a stream takes at once, and a person reads.
+_MOST = 200  # Lines that wait; a tuning value: what a stream takes at once, and a person reads.
 _GRACE = 0.5  # [s] For the last lines, when the controller ends and nobody reads.
 
 

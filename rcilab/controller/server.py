@@ -56,7 +56,7 @@ SPOILED_PATIENCE = 0.05  # [s] The same where the network spoils datagrams on pu
 FAREWELL = 20  # [cycles] In which a client learns of the end from the error bit of its states.
 SLIP = 20  # [cycles] A motion that took so much longer than it should is worth a line.
 GRACE = 2.0  # [s] For the arm to come to rest when the controller shall end.
-_REFUSALS = 10.0  # [s] Clients that are refused are named once in this time, and then counted; a choice.
+_REFUSALS = 10.0  # [s] Clients that are refused are named once in this time, and then counted; a tuning value.
 _STDERR = 2
 _QUIET = (Phase.OFF, Phase.IDLE)
 _LOOK = 0.1  # [s] Between looks at whether the parent process still lives, or a stalled controller shall end.
@@ -102,8 +102,11 @@ class ControllerServer:
         self.cycle.limit_table = config.limit_table
         self.misfits = 0
         self._is_out_of_patience = False
-        self._lines = LogLines(_STDERR) if log is None else None
-        self._log: Callable[[str], None] = self._lines.write if self._lines is not None else log or print
+        self._lines: LogLines | None = None
+        if log is None:
+            self._lines = LogLines(_STDERR)
+            log = self._lines.write
+        self._log = log
         self._clock = SystemClock()
         self._pace = Pace(self._clock.now())
         self._is_ending = False

@@ -12,9 +12,9 @@ if TYPE_CHECKING:
 
 _SETTLING = 10.0
 """[s] For so long a change is told again and again: viser replays the scene to a new page, and tells all pages of nodes
-that come back, in an order of its own. A choice."""
+that come back, in an order of its own. A tuning value."""
 _AGAIN = 0.5
-"""[s] Between two times of telling. A choice."""
+"""[s] Between two messages. A tuning value."""
 
 
 class Watchers:
