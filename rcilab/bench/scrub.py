@@ -10,12 +10,14 @@ from websockets.sync.client import connect
 
 from rcilab.bench.browser import find_chromium
 from rcilab.bench.compute import motion_of
+from rcilab.bench.loop import wait_for
 from rcilab.bench.measure import Absent, Measurement, summarise
 from rcilab.bench.tab import no_browser, open_tab
 from rcilab.cycle_file import cycle_dtype
 from rcilab.errors import RcilabError
 from rcilab.model import RobotModel, load_model
 from rcilab.recording.run import Run, build_run
+from rcilab.workbench import requests
 from rcilab.workbench.app import Workbench, WorkbenchConfig
 from rcilab.workbench.live import LIVE_PATH
 
@@ -25,6 +27,7 @@ _SEEKS = 100
 _SCRUB_TIME = 8.0  # [s] From one end of the recording to the other and back.
 _MOVE_TIME = 0.04  # [s] Between two moves of the mouse.
 _STALL = 500.0  # [ms] A choice: longer than this the picture stands still for somebody who scrubs.
+_PAGE = 1  # Client id of the page that asks: only the one with the controls may.
 _READY = """!!window.__viserMutable?.nodeRefFromName?.['/live/joint1']
   && __viserTestpoints.rendererInfo.render.frame > 3 && document.querySelectorAll('.u-over .rl-cursor').length > 3"""
 _SLIDER = """(() => { const strip = document.querySelector('div:has(> div > .rl-strip)');
@@ -50,12 +53,15 @@ def bench_scrub() -> Measurement:
     with Workbench(WorkbenchConfig(port=0, quality="light", replay=run)) as bench:
         origin = {"Origin": f"http://127.0.0.1:{bench.port}"}
         with connect(f"ws://127.0.0.1:{bench.port}{LIVE_PATH}", additional_headers=origin, compression=None) as link:
-            link.recv(timeout=30.0)
+            bench.conductor.ask(requests.PageCame(page=_PAGE))
+            link.send(json.dumps({"kind": "hello", "page": _PAGE, "key": bench.live.introduce(_PAGE)}))
+            wait_for("the controls", lambda: bench.store.state.lease.holder == _PAGE, 30.0)
             for place in np.random.default_rng(1).uniform(0.02, 0.98, _SEEKS).tolist():
                 start = time.perf_counter()
                 link.send(json.dumps({"kind": "seek", "place": place}))
-                while "cursor" not in json.loads(link.recv(timeout=30.0)):
-                    pass
+                while "cursor" not in (said := json.loads(link.recv(timeout=30.0))):
+                    if "beat" in said:
+                        link.send('{"kind": "here"}')
                 times.append(time.perf_counter() - start)
     longest = f"{1e3 * max(times):.0f} ms at most"
     return summarise("scrub", times, "ms", 70.0, f"{_SEEKS} places in {run.duration:.0f} s of 7 joints; {longest}")

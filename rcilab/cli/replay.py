@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from rcilab.cli.workbench import add_page_options, page_config, serve
+from rcilab.cli.workbench import add_page_options, find_page_token, page_config, serve
 
 
 def add_parser(subparsers: Any) -> None:
@@ -26,6 +26,7 @@ def run(args: argparse.Namespace) -> int:
     """Serves the page until Ctrl-C or a termination signal."""
     from rcilab.recording.run_file import load_run
 
+    token = find_page_token(args)
     found = load_run(args.file)
     print(f"{args.file}: {found!r}")
-    return serve(page_config(args, replay=found), browser=not args.no_browser)
+    return serve(page_config(args, token, replay=found), browser=not args.no_browser)

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import argparse
+import os
 import signal
 import sys
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from rcilab.errors import UsageError
 
 if TYPE_CHECKING:
     from rcilab.supervisor import SupervisorStatus
@@ -30,9 +35,21 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def add_page_options(parser: argparse.ArgumentParser) -> None:
     """Adds what any page can be told."""
-    parser.add_argument("--host", default="127.0.0.1", help="address to listen on; others than loopback need --token")
+    parser.add_argument(
+        "--host", default="127.0.0.1", help="address to listen on; others than loopback have every page bring a token"
+    )
     parser.add_argument("--port", type=_port, default=None, help="port of the page (default: 8080; 0: any free one)")
-    parser.add_argument("--token", default=None, help="secret that every page must bring")
+    parser.add_argument(
+        "--private",
+        action="store_true",
+        help="have every page bring a token on loopback, too: other accounts of this machine are kept out",
+    )
+    parser.add_argument(
+        "--token-file",
+        type=Path,
+        metavar="FILE",
+        help="file that holds the token, at least 16 characters; else it is $RCILAB_TOKEN, else a new one is made",
+    )
     parser.add_argument("--no-browser", action="store_true", help="do not open a browser")
     parser.add_argument(
         "--runs",
@@ -53,11 +70,26 @@ def run(args: argparse.Namespace) -> int:
     """Serves the page until Ctrl-C or a termination signal."""
     from rcilab.workbench.security import require_openable
 
-    require_openable(args.host, args.token, args.robot, args.model)  # Before the page and its libraries are loaded.
-    return serve(page_config(args, model=args.model, target=args.robot), browser=not args.no_browser)
+    token = find_page_token(args)
+    require_openable(args.host, token, args.robot, args.model)  # Before the page and its libraries are loaded.
+    return serve(page_config(args, token, model=args.model, target=args.robot), browser=not args.no_browser)
 
 
-def page_config(args: argparse.Namespace, **options: Any) -> WorkbenchConfig:
+def find_page_token(args: argparse.Namespace) -> str | None:
+    """Returns the token that pages must bring, from the options of `add_page_options`; None where none is needed."""
+    from rcilab.workbench.access import VARIABLE, find_token
+
+    token = find_token(args.host, is_private=args.private, file=args.token_file)
+    is_made = token is not None and args.token_file is None and not os.environ.get(VARIABLE)
+    if is_made and args.no_browser and not sys.stdout.isatty():
+        raise UsageError(
+            f"nobody would learn the token: it is not printed where the output is no terminal; give one in ${VARIABLE} "
+            "or with --token-file FILE"
+        )
+    return token
+
+
+def page_config(args: argparse.Namespace, token: str | None, **options: Any) -> WorkbenchConfig:
     """Returns how to start the page, from the options of `add_page_options` and more."""
     from rcilab.workbench.app import WorkbenchConfig
     from rcilab.workbench.security import DEFAULT_PORT
@@ -65,7 +97,7 @@ def page_config(args: argparse.Namespace, **options: Any) -> WorkbenchConfig:
     return WorkbenchConfig(
         host=args.host,
         port=DEFAULT_PORT if args.port is None else args.port,
-        token=args.token,
+        token=token,
         language=args.language,
         quality=args.quality,
         runs=args.runs,
@@ -81,15 +113,29 @@ def serve(config: WorkbenchConfig, *, browser: bool) -> int:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: ending.set())
     with Workbench(config) as bench:
-        print(f"rcilab workbench: {bench.url}  (Ctrl-C ends it)", flush=True)
-        if browser:
-            import webbrowser
-
-            webbrowser.open(bench.url)
+        is_secret = config.token is not None and not sys.stdout.isatty()
+        address = f"{bench.url.partition('?')[0]} with its token" if is_secret else bench.url
+        print(f"rcilab workbench: {address}  (Ctrl-C ends it)", flush=True)
         trouble = ""
-        while not ending.wait(0.5):
-            trouble = _tell_trouble(bench.session.status(), trouble)
+        with _browser(bench.url if browser else None, is_private=config.token is not None):
+            while not ending.wait(0.5):
+                trouble = _tell_trouble(bench.session.status(), trouble)
     return 0
+
+
+@contextmanager
+def _browser(url: str | None, *, is_private: bool) -> Iterator[None]:
+    """Opens an address in a browser, if there is one to open; a token in it does not show among the processes."""
+    if url is None:
+        yield
+        return
+    import webbrowser
+
+    from rcilab.workbench.access import private_address
+
+    with private_address(url) if is_private else nullcontext(url) as address:
+        webbrowser.open(address)
+        yield
 
 
 def _tell_trouble(status: SupervisorStatus, told: str) -> str:

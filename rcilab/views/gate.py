@@ -3,12 +3,26 @@
 from __future__ import annotations
 
 import hmac
+import ipaddress
+import socket
+import time
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from http.cookies import CookieError, SimpleCookie
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import parse_qs, quote, unquote, urlsplit
 
-COOKIE = "rcilab_token"
 _LOOPBACK = ("127.0.0.1", "::1", "localhost")
+_FIRST_DELAY = 0.1  # [s] A tuning value: somebody who mistypes a token does not notice it.
+_LONGEST_DELAY = 5.0  # [s] A tuning value: as long as a browser and its user wait without giving up.
+_FORGOTTEN = 60.0  # [s] A tuning value: after so long without a wrong token the next one is the first again.
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """Why a request is not answered."""
+
+    reason: str
+    is_guess: bool = False
+    """Whether it came with a wrong token."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,47 +49,80 @@ class Gate:
         hosts = {self.host, *(_LOOPBACK if self.host in _LOOPBACK else ())}
         return frozenset(f"{_bracketed(name)}:{self.port}" for name in hosts)
 
-    def refuse_page(self, host: str | None, path: str, cookie: str | None) -> str | None:
+    @property
+    def cookie(self) -> str | None:
+        """What a page that brought the token is to keep: one cookie a port, as browsers share them among ports."""
+        return None if self.token is None else f"{self._cookie_name}={quote(self.token, safe='')}"
+
+    def refuse_page(self, host: str | None, path: str, cookie: str | None) -> Refusal | None:
         """Returns why a page may not be served, or None when it may.
 
         A foreign Host means that somebody's DNS points at this machine (rebinding), so it is refused too.
         """
         if self.names and host not in self.names:
-            return f"{self.title} answers to {' and '.join(sorted(self.names))} only"
-        if self.token is not None and not (self._fits(_token_in(path)) or self._fits(_token_from(cookie))):
-            return f"{self.title} needs its token: open the address that `rcilab --token` printed"
+            return Refusal(f"{self.title} answers to {' and '.join(sorted(self.names))} only")
+        given = [*parse_qs(urlsplit(path).query).get("token", ()), *self._tokens_in(cookie)]
+        if self._is_short_of_token(given):
+            return Refusal(f"{self.title} needs its token: open the address that rcilab printed", bool(given))
         return None
 
-    def refuse_socket(self, host: str | None, origin: str | None, cookie: str | None) -> str | None:
+    def refuse_socket(self, host: str | None, origin: str | None, cookie: str | None) -> Refusal | None:
         """Returns why a websocket may not be opened, or None when it may; a missing Origin is refused."""
         if origin is None:
-            return "a websocket needs an Origin"
+            return Refusal("a websocket needs an Origin")
         scheme, _, name = origin.partition("://")
         if scheme not in ("http", "https") or name != host or (self.names and name not in self.names):
-            return f"origin {origin!r} is not {self.title}"
-        if self.token is not None and not self._fits(_token_from(cookie)):
-            return "the token is missing or wrong"
+            return Refusal(f"origin {origin!r} is not {self.title}")
+        given = list(self._tokens_in(cookie))
+        if self._is_short_of_token(given):
+            return Refusal("the token is missing or wrong", bool(given))
         return None
 
-    def _fits(self, given: str | None) -> bool:
-        return given is not None and hmac.compare_digest(given.encode(), (self.token or "").encode())
+    @property
+    def _cookie_name(self) -> str:
+        return f"rcilab_token_{self.port}"
+
+    def _is_short_of_token(self, given: list[str]) -> bool:
+        if self.token is None:
+            return False
+        wanted = self.token.encode()
+        return not any([hmac.compare_digest(one.encode(errors="replace"), wanted) for one in given])
+
+    def _tokens_in(self, cookie: str | None) -> Iterator[str]:
+        for part in (cookie or "").split(";"):
+            name, _, value = part.strip().partition("=")
+            if name == self._cookie_name:
+                yield unquote(value)
+
+
+class Guesses:
+    """Makes whoever tries tokens wait for each answer: longer each time, until nobody has tried for a while.
+
+    Args:
+        clock: Returns the time, [s].
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
+        self._last, self._delay = float("-inf"), 0.0
+
+    def delay(self) -> float:
+        """Returns for how long the answer to a wrong token that has just come is to be held back, [s]."""
+        now = self._clock()
+        is_first = now - self._last > _FORGOTTEN
+        self._last = now
+        self._delay = _FIRST_DELAY if is_first else min(2.0 * self._delay, _LONGEST_DELAY)
+        return self._delay
 
 
 def is_loopback(host: str) -> bool:
-    """Returns whether only this machine can reach an address, as far as its spelling tells."""
-    return host in _LOOPBACK or host.startswith("127.")
+    """Returns whether only this machine can reach an address, by what it resolves to.
 
-
-def _token_in(path: str) -> str | None:
-    return (parse_qs(urlsplit(path).query).get("token") or [None])[0]
-
-
-def _token_from(cookie: str | None) -> str | None:
-    try:
-        morsel = SimpleCookie(cookie or "").get(COOKIE)
-    except CookieError:
-        return None
-    return morsel.value if morsel is not None else None
+    Raises:
+        OSError: It is no address and no name of one.
+    """
+    found = {info[4][0] for info in socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)}
+    return all(ipaddress.ip_address(str(address).partition("%")[0]).is_loopback for address in found)
 
 
 def _bracketed(host: str) -> str:

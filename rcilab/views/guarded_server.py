@@ -8,6 +8,7 @@ stands against this is in this file, in `gate` and in `message_guard`, and the t
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import socket
 from collections.abc import Callable, Iterator, Mapping
@@ -18,7 +19,7 @@ from urllib.parse import urlsplit
 
 from rcilab.closing import Closing
 from rcilab.views import assignments, icons, loop_event
-from rcilab.views.gate import COOKIE, Gate
+from rcilab.views.gate import Gate, Guesses, Refusal
 from rcilab.views.message_guard import LARGEST_MESSAGE, MessageGuard
 
 if TYPE_CHECKING:
@@ -54,9 +55,12 @@ class GuardedServer(Closing):
         decorate: Makes our page out of viser's `index.html`. Such a page is not cached, and pages of other machines
             may not show it in a frame.
         routes: Other websockets that are served here: path -> async function of the connection.
+        may_act: Whether a page, by its client id, may use the controls; any may by default.
+        refuse: Called with the client id of a page that has used one and may not.
 
     Attributes:
         viser: The server itself.
+        guard: Looks at what pages send.
     """
 
     def __init__(
@@ -66,11 +70,14 @@ class GuardedServer(Closing):
         *,
         decorate: Callable[[bytes], bytes] | None = None,
         routes: Mapping[str, Callable[[Any], Any]] | None = None,
+        may_act: Callable[[int], bool] = lambda page: True,
+        refuse: Callable[[int], None] = lambda page: None,
     ) -> None:
         import viser
         from viser import _messages
 
-        self._gate = gate
+        self._gate, self._guesses = gate, Guesses()
+        self._protocol = f"viser-v{viser.__version__}"
         self._decorate = decorate
         self._routes = dict(routes or {})
         loop_event.install()
@@ -81,7 +88,7 @@ class GuardedServer(Closing):
         sockets = self.viser._websock_server  # What is called on it below has no public spelling in viser 1.1.
         sockets.unregister_handler(_messages.ShareUrlRequest)
         sockets.unregister_handler(_messages.ShareUrlDisconnect)
-        MessageGuard(self.viser)
+        self.guard = MessageGuard(self.viser, may_act, refuse)
 
     def close(self) -> None:
         """Stops serving."""
@@ -100,8 +107,12 @@ class GuardedServer(Closing):
             answer = options.pop("process_request")
 
             async def route(connection: Any) -> None:
-                chosen = self._routes.get(urlsplit(connection.request.path).path) or handler
-                await chosen(connection)
+                own = self._routes.get(_path_of(connection.request))
+                if own is not None:
+                    await own(connection)
+                else:
+                    self.guard.listen(connection)
+                    await handler(connection)
 
             def process(connection: Any, request: Any) -> Any:
                 return self._answer(answer, connection, request)
@@ -121,15 +132,30 @@ class GuardedServer(Closing):
 
     def _answer(self, answer: Callable[[Any, Any], Any], connection: Any, request: Any) -> Any:
         """Returns the response to a request, or None to go on and open a websocket."""
+        from websockets.datastructures import MultipleValuesError
+
+        try:
+            return self._answer_sound(answer, connection, request)
+        except MultipleValuesError as error:
+            return _refusal(f"the header {error.args[0]} is there more than once", HTTPStatus.BAD_REQUEST)
+        except (OSError, ValueError):  # No file system has such a name.
+            return _refusal("there cannot be such a path", HTTPStatus.BAD_REQUEST)
+
+    def _answer_sound(self, answer: Callable[[Any, Any], Any], connection: Any, request: Any) -> Any:
         headers = request.headers
         host, cookie = headers.get("Host"), headers.get("Cookie")
         if headers.get("Upgrade", "").lower() == "websocket":
             reason = self._gate.refuse_socket(host, headers.get("Origin"), cookie)
-            return None if reason is None else _refusal(reason)
+            if reason is not None:
+                return self._refuse(reason)
+            said = headers.get("Sec-WebSocket-Protocol", "").split(",")
+            if _path_of(request) not in self._routes and self._protocol not in map(str.strip, said):
+                return _refusal("a page of another version; load it again", HTTPStatus.BAD_REQUEST)
+            return None
         reason = self._gate.refuse_page(host, request.path, cookie)
         if reason is not None:
-            return _refusal(reason)
-        if self._decorate is None or urlsplit(request.path).path not in ("/", "/index.html"):
+            return self._refuse(reason)
+        if self._decorate is None or _path_of(request) not in ("/", "/index.html"):
             return answer(connection, request)
         if "Accept-Encoding" in headers:
             del headers["Accept-Encoding"]  # We want to read the page before it is packed.
@@ -137,6 +163,11 @@ class GuardedServer(Closing):
         if response is None or response.status_code != HTTPStatus.OK:
             return response
         return self._dress(self._decorate(response.body))
+
+    def _refuse(self, refusal: Refusal) -> Any:
+        """Returns the answer to a request that is not let in; to one that guesses, only after a while."""
+        answer = _refusal(refusal.reason)
+        return answer if not refusal.is_guess else _later(answer, self._guesses.delay())
 
     def _dress(self, body: bytes) -> Any:
         from websockets.datastructures import Headers
@@ -151,18 +182,27 @@ class GuardedServer(Closing):
             # A page of another site must not show ours in a frame and steer the operator's clicks.
             "Content-Security-Policy": "frame-ancestors 'self' http://localhost:* http://127.0.0.1:*",
         })  # fmt: skip
-        if self._gate.token is not None:
-            headers["Set-Cookie"] = f"{COOKIE}={self._gate.token}; Path=/; HttpOnly; SameSite=Strict"
+        if self._gate.cookie is not None:
+            headers["Set-Cookie"] = f"{self._gate.cookie}; Path=/; HttpOnly; SameSite=Strict"
         return Response(HTTPStatus.OK.value, "OK", headers, body)
 
 
-def _refusal(reason: str) -> Any:
+async def _later(answer: Any, delay: float) -> Any:
+    await asyncio.sleep(delay)
+    return answer
+
+
+def _path_of(request: Any) -> str:
+    return urlsplit(request.path).path
+
+
+def _refusal(reason: str, status: HTTPStatus = HTTPStatus.FORBIDDEN) -> Any:
     from websockets.datastructures import Headers
     from websockets.http11 import Response
 
-    body = f"403: {reason}\n".encode()
+    body = f"{status.value}: {reason}\n".encode()
     headers = Headers({"Content-Type": "text/plain; charset=utf-8", "Content-Length": str(len(body))})
-    return Response(HTTPStatus.FORBIDDEN.value, "Forbidden", headers, body)
+    return Response(status.value, status.phrase, headers, body)
 
 
 @contextmanager

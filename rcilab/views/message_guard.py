@@ -3,12 +3,19 @@
 viser 1.1 writes whatever a client sends into its handles: NaN, numbers outside a slider's range, choices that are on no
 list, strings and uploads of any size, and even its list of Python callbacks (`updates={"update_cb": []}`). A page of
 ours sends none of that, but a script in its place could. What is not in order is dropped without an answer.
+
+viser keeps one value per control for all pages, so a page that only watches must not reach them at all: what it sends
+beyond its camera is dropped, too, and its own control goes back to what everybody sees.
 """
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+import sys
+import time
+from collections.abc import Callable
+from functools import cache
+from typing import TYPE_CHECKING, Any, get_type_hints
 
 if TYPE_CHECKING:
     import viser
@@ -22,32 +29,79 @@ _MOST_PARTS = 256
 _DEEPEST = 8
 
 
+_REFUSED_AGAIN = 1.0  # [s] A tuning value: a page that keeps pressing is told so often that it only watches.
+
+_for_anyone: set[str] = set()  # Identifiers of controls.
+
+
+def for_anyone(handle: Any) -> None:
+    """Lets pages that only watch use this control, too."""
+    _for_anyone.add(handle._impl.uuid)
+
+
 class MessageGuard:
     """Looks at every message of every page before viser does.
 
     Args:
         server: A viser server that nobody has connected to yet.
+        may_act: Whether a page, by its client id, may use the controls; any may by default.
+        refuse: Called with the client id of a page that has used one and may not, once a second at most.
+
+    Attributes:
+        malformed: How many messages were none that a page sends. The first is reported on stderr.
     """
 
-    def __init__(self, server: viser.ViserServer) -> None:
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        may_act: Callable[[int], bool] = lambda page: True,
+        refuse: Callable[[int], None] = lambda page: None,
+    ) -> None:
         from viser import _messages
 
         self._kinds = _messages
         self._gui: Any = server.gui
+        self._may_act, self._refuse = may_act, refuse
+        self._refused: dict[int, float] = {}  # Client -> when it was told last, [s].
         self._uploads: dict[str, list[int]] = {}  # Transfer -> client, declared and received bytes.
+        self.malformed = 0
         sockets: Any = server._websock_server  # Neither this nor what is replaced has a public spelling in viser 1.1.
+        self._sockets = sockets
         handle = sockets._handle_incoming_message
 
         async def guarded(client_id: int, message: Any) -> None:
-            if self.admits(client_id, message):
+            if type(message) in sockets._incoming_handlers and self.admits(client_id, message):
                 await handle(client_id, message)
 
         sockets._handle_incoming_message = guarded
+        sockets.on_client_connect(self._guard_camera)
         sockets.on_client_disconnect(self._forget)
+
+    def listen(self, connection: Any) -> None:
+        """Has only what can be read as a message leave a connection: viser would end it with a traceback."""
+        receive, read = connection.recv, self._kinds.Message.deserialize
+
+        async def recv() -> bytes:
+            while True:
+                raw = await receive()
+                try:
+                    read(raw)
+                except Exception:  # Whatever viser trips over.
+                    self.count_malformed()
+                else:
+                    return raw
+
+        connection.recv = recv
 
     def admits(self, client: int, message: Any) -> bool:
         """Returns whether viser may see a message; a number out of range is moved into it."""
         kinds = self._kinds
+        if not is_well_formed(message):
+            self.count_malformed()
+            return False
+        if not self._may_act(client) and not self._is_for_anyone(message):
+            self._put_back(client, message)
+            return False
         if isinstance(message, kinds.FileTransferPart):
             return self._admits_part(message)
         if not is_orderly(vars(message)):
@@ -55,6 +109,42 @@ class MessageGuard:
         if isinstance(message, kinds.GuiUpdateMessage):
             return self._admits_update(message)
         return not isinstance(message, kinds.FileTransferStartUpload) or self._admits_upload(client, message)
+
+    def count_malformed(self) -> None:
+        """Counts a message that is none, and says so of the first."""
+        self.malformed += 1
+        if self.malformed == 1:
+            print("a page has sent a message that is none of a page; such messages are dropped", file=sys.stderr)
+
+    def _guard_camera(self, connection: Any) -> None:
+        """Lets a client tell where its camera is and send its pictures, and nothing else about itself alone."""
+        own = (self._kinds.ViewerCameraMessage, self._kinds.GetRenderResponseMessage)
+        handle = connection._handle_incoming_message
+
+        async def guarded(client_id: int, message: Any) -> None:
+            if not isinstance(message, own):
+                return
+            if not is_well_formed(message):
+                self.count_malformed()
+            elif is_orderly(vars(message)):
+                await handle(client_id, message)
+
+        connection._handle_incoming_message = guarded
+
+    def _is_for_anyone(self, message: Any) -> bool:
+        return isinstance(message, self._kinds.GuiUpdateMessage) and message.uuid in _for_anyone
+
+    def _put_back(self, client: int, message: Any) -> None:
+        """Shows a page that only watches what everybody sees, and has it told that it does."""
+        state = self._sockets._client_state_from_id.get(client)
+        if isinstance(message, self._kinds.GuiUpdateMessage) and state is not None:
+            handle = self._gui._gui_input_handle_from_uuid.get(message.uuid)
+            if handle is not None and not handle._impl.is_button:
+                state.message_buffer.push(self._kinds.GuiUpdateMessage(message.uuid, {"value": handle.value}))
+        now = time.monotonic()
+        if now - self._refused.get(client, float("-inf")) >= _REFUSED_AGAIN:
+            self._refused[client] = now
+            self._refuse(client)
 
     def _admits_update(self, message: Any) -> bool:
         """Lets a client change the value of a control, and nothing else about it."""
@@ -92,8 +182,29 @@ class MessageGuard:
 
     def _forget(self, connection: Any) -> None:
         gone = connection.client_id
+        self._refused.pop(gone, None)
         self._uploads = {name: upload for name, upload in self._uploads.items() if upload[0] != gone}
         self._gui._drop_uploads_from_client(gone)  # viser forgets a client that never said where its camera was.
+
+
+def is_well_formed(message: Any) -> bool:
+    """Returns whether each field of a message of viser is of the type that it is declared to be."""
+    import msgspec
+
+    try:
+        for name, hint in _fields(type(message)):
+            msgspec.convert(getattr(message, name), hint)
+    except (msgspec.ValidationError, AttributeError):
+        return False
+    return True
+
+
+@cache
+def _fields(kind: type) -> tuple[tuple[str, Any], ...]:
+    from viser.infra._messages import wire_field_names
+
+    hints = get_type_hints(kind)
+    return tuple((name, hints[name]) for name in wire_field_names(kind))
 
 
 def is_orderly(value: object, depth: int = 0) -> bool:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
 from typing import IO, TYPE_CHECKING
+from urllib.parse import quote
 
 from rcilab.views.gate import Gate
 from rcilab.views.guarded_server import GuardedServer
@@ -44,6 +45,7 @@ class WorkbenchConfig:
     port: int = security.DEFAULT_PORT
     """0 takes any free port."""
     token: str | None = None
+    """Secret that every page must bring, at least 16 characters; `access.find_token` makes one."""
     language: str = "en"
     quality: str | None = None
     """"full" or "light"; None is full, or light where the browser draws without a graphics card."""
@@ -70,7 +72,7 @@ class Workbench:
         if replay is not None:
             model = require_replayable(replay)
         self._config = config
-        self._bound = security.bind(config.host, config.port)
+        self._bound = security.bind(config.host, config.port, config.token)
         self.port: int = self._bound.getsockname()[1]
         """Port the page is served on."""
         goal = initial_goal(model, model.home)
@@ -97,9 +99,9 @@ class Workbench:
     @property
     def url(self) -> str:
         """What to open in a browser."""
-        host = {"0.0.0.0": "127.0.0.1", "::": "[::1]"}.get(self._config.host, self._config.host)
-        secret = f"?token={self._config.token}" if self._config.token else ""
-        return f"http://{host}:{self.port}/{secret}"
+        host = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(self._config.host, self._config.host)
+        secret = f"?token={quote(self._config.token, safe='')}" if self._config.token else ""
+        return f"http://{f'[{host}]' if ':' in host else host}:{self.port}/{secret}"
 
     def start(self) -> None:
         """Serves the page, then connects to the robot in the background."""
@@ -110,8 +112,8 @@ class Workbench:
             Heard(
                 stop=self.session.stop,
                 here=self._here,
-                seek=lambda share: ask(requests.Seek(place=self.presenter.place_at(share))),
-                size=lambda height: ask(requests.SetView(name="height", value=height)),
+                seek=lambda page, share: ask(requests.Seek(page=page, place=self.presenter.place_at(share))),
+                size=lambda page, height: ask(requests.SetView(page=page, name="height", value=height)),
                 peek=lambda page, branch: ask(requests.Peek(page=page, index=branch if branch >= 0 else None)),
                 entered=lambda page: ask(requests.Enter(page=page)),
                 tab=lambda page, index: ask(requests.OpenTab(page=page, name=tab_name(index))),
@@ -122,7 +124,14 @@ class Workbench:
             )
         )
         gate = Gate(host=self._config.host, port=self.port, token=self._config.token, title="this workbench")
-        self._door = GuardedServer(self._bound, gate, decorate=self._decorate, routes={LIVE_PATH: live.serve})
+        self._door = GuardedServer(
+            self._bound,
+            gate,
+            decorate=self._decorate,
+            routes={LIVE_PATH: live.serve},
+            may_act=lambda page: self.store.state.lease.allows(page),
+            refuse=lambda page: ask(requests.Refuse(page=page)),
+        )
         self.server = self._door.viser
         self._opened = True
         self._follow_pages()

@@ -140,6 +140,7 @@ class Conductor:
             requests.CancelExport: self._export.cancel,
             requests.ClearRuns: self._folder.clear,
             requests.SetRecording: self._view.set_recording,
+            requests.Refuse: self._refuse,
             requests.TakeControls: self._lease.take_controls,
             requests.AnswerControls: self._lease.answer,
             requests.PageCame: self._lease.page_came,
@@ -184,13 +185,9 @@ class Conductor:
     def act(self, request: requests.Request) -> None:
         """Carries out one request; what goes wrong becomes a sentence on the page."""
         lease = self._store.state.lease
-        if not requests.is_harmless(request) and not lease.allows(request.page) and not _is_stop(request):
-            if isinstance(request, requests.OpenTab | requests.DrawInSoftware):
-                return  # Nothing was pressed.
-            code = "lease.free" if lease.holder is None else "notice.watching"
-            self._refused_for = lease.holder
-            said = message(code, page=lease.number(lease.holder))
-            self._store.say("warn", said, page=request.page, trouble="lease")
+        if not isinstance(request, requests.Harmless) and not lease.allows(request.page) and not _is_stop(request):
+            if not isinstance(request, requests.Silent):
+                self._refuse(request)
             return
         if _reloads_pages(request) and is_moving(self._session.status()):
             self._store.say("warn", message("ready.moving"), page=request.page)
@@ -230,6 +227,16 @@ class Conductor:
         if kept.program is not None and kept.program.model == self._store.state.model.name:
             self._program.restore(kept.program)
         self._store.say("good", message("notice.resumed"))
+
+    def _refuse(self, request: requests.Request) -> None:
+        """Tells a page that it only watches, unless it has got the controls meanwhile."""
+        lease = self._store.state.lease
+        if lease.allows(request.page):
+            return
+        self._refused_for = lease.holder
+        code = "lease.free" if lease.holder is None else "notice.watching"
+        said = message(code, page=lease.number(lease.holder))
+        self._store.say("warn", said, page=request.page, trouble="lease")
 
     def _drive(self, request: requests.Drive) -> None:
         if request.what == "pause":

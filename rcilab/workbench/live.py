@@ -27,10 +27,10 @@ class Heard:
     """Somebody pressed Stop or Esc."""
     here: Callable[[int], None]
     """A page has answered a beat: somebody who could press Stop is there."""
-    seek: Callable[[float], None]
-    """A place on the time axis was clicked in a plot, 0 to 1."""
-    size: Callable[[float], None]
-    """Height of a page's window, [px], when it opens and when it changes."""
+    seek: Callable[[int, float], None]
+    """A place on the time axis was clicked in a page's plot, 0 to 1."""
+    size: Callable[[int, float], None]
+    """Height of a page's window, [px], when it gets the controls and when it changes."""
     peek: Callable[[int, int], None] = lambda page, branch: None
     """The branch that is under a page's mouse, from 0; -1 when it is left."""
     entered: Callable[[int], None] = lambda page: None
@@ -104,12 +104,12 @@ class LiveChannel:
             return self._greet(said)
         if kind == "stop":
             self._heard.stop()
-        elif kind == "seek":
-            _pass_on(said.get("place"), 0.0, 1.0, self._heard.seek)
-        elif kind == "size":
-            _pass_on(said.get("height"), 200.0, 4000.0, self._heard.size)
         elif page not in self._keys:
             pass  # Nobody that we know.
+        elif kind == "seek":
+            _pass_on(said.get("place"), 0.0, 1.0, lambda place: self._heard.seek(page, place))
+        elif kind == "size":
+            _pass_on(said.get("height"), 200.0, 4000.0, lambda height: self._heard.size(page, height))
         elif kind == "here":
             self._heard.here(page)
         elif kind == "peek":

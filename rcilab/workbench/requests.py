@@ -492,6 +492,11 @@ class TakeControls(Request):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Refuse(Request):
+    """A page without the controls has tried to use one."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class AnswerControls(Request):
     """The page that holds the controls was asked for them."""
 
@@ -508,19 +513,8 @@ class PageWent(Request):
     """A page has gone."""
 
 
-Harmless: TypeAlias = (
-    PageCame | PageWent | TakeControls | AnswerControls | Seek | Play | SetView | ShowPlot | ShowBead | ShowExtra
-    | Peek | Enter | Export | CancelExport
-)  # fmt: skip
-"""What a watching page may ask for as well: nothing of it moves a goal or a robot."""
+Harmless: TypeAlias = PageCame | PageWent | Refuse | TakeControls | AnswerControls | Enter
+"""What a watching page may ask for as well: nothing of it changes what other pages show."""
 
-
-def is_harmless(request: Request) -> bool:
-    """Returns whether a watching page may ask for this as well.
-
-    To look at the moment of a row, or of a fault on show, is like seeking: timeline and scene are one for all pages.
-    """
-    if isinstance(request, SetView) and request.name == "quality":
-        return False  # Every page loads itself again for it.
-    looks = {Check: ("row",), Learn: ("moment",)}.get(type(request), ())
-    return isinstance(request, Harmless) or getattr(request, "what", None) in looks
+Silent: TypeAlias = OpenTab | DrawInSoftware | Peek
+"""What a watching page does without pressing anything: it is not told that this does not count."""

@@ -10,17 +10,19 @@ import socket
 
 from rcilab.errors import UsageError
 from rcilab.model import RobotModel, load_model, require_rci
-from rcilab.views.gate import is_loopback
+from rcilab.workbench.access import is_local, require_token
 
 DEFAULT_PORT = 8080
 
 
 def check_host(host: str, token: str | None) -> None:
-    """Raises UsageError when the address is open to others and no token guards it."""
-    if not is_loopback(host) and not token:
+    """Raises UsageError when the address is open to others and no token guards it, or too short a one."""
+    if token is not None:
+        require_token(token, "WorkbenchConfig")
+    elif not is_local(host):
         raise UsageError(
-            f"--host {host} opens the workbench to the network, and whoever opens the page can move the robot; "
-            "add --token SECRET, or leave --host away to stay on this machine"
+            f"host {host} opens the workbench to the network, and whoever opens the page can move the robot; "
+            "give a token, or leave the host away to stay on this machine"
         )
 
 
@@ -45,16 +47,18 @@ def require_openable(host: str, token: str | None, target: str, model: str) -> R
     return require_rci(load_model(model))
 
 
-def bind(host: str, port: int) -> socket.socket:
+def bind(host: str, port: int, token: str | None = None) -> socket.socket:
     """Returns a listening socket on exactly this port; port 0 takes any free one.
 
+    A name may resolve to another address than it did when it was checked: what counts is the address of the socket.
+
     Raises:
-        UsageError: The port is taken or the address is not ours; the message says what to change.
+        UsageError: The port is taken, or the address is not ours or needs a token; the message says what to change.
     """
     from rcilab.views.guarded_server import listen
 
     try:
-        return listen(host, port)
+        bound = listen(host, port)
     except socket.gaierror as error:
         raise UsageError(f"--host {host} is not an address of this machine; leave it away for 127.0.0.1") from error
     except OSError as error:
@@ -67,3 +71,9 @@ def bind(host: str, port: int) -> socket.socket:
         raise UsageError(
             f"cannot listen on {host} port {port} ({error.strerror}): choose another with --port or --host"
         ) from error
+    try:
+        check_host(bound.getsockname()[0], token)
+    except UsageError:
+        bound.close()
+        raise
+    return bound

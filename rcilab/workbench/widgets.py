@@ -13,6 +13,7 @@ import numpy as np
 from rcilab.spatial import Pose
 from rcilab.words.rounding import fixed
 from rcilab.words.units import Unit
+from rcilab.workbench.lease import Lease
 from rcilab.workbench.requests import Request, TypeField
 from rcilab.workbench.text import Message
 
@@ -119,6 +120,34 @@ class NumberField:
         if self._answer is None:
             self._answer = said
         return past < self._stands_for and said == self._answer
+
+
+class PageText:
+    """A text box whose words lead somewhere: they are those of the page that typed them, and gone with its controls.
+
+    Args:
+        handle: From `gui.add_text`.
+    """
+
+    def __init__(self, handle: Any) -> None:
+        self.handle = handle
+        self._page: int | None = None
+
+        @handle.on_update
+        async def _(event: Any) -> None:
+            if event.client_id is not None:
+                self._page = event.client_id
+
+    def of(self, page: int | None) -> str:
+        """Returns what this page has typed, or what stands there of our own doing; "" when another page typed it."""
+        return self.handle.value if page is None or self._page in (None, page) else ""
+
+    def show(self, lease: Lease, text: str) -> bool:
+        """Writes the state's own words in place of those of a page without the controls; returns whether it did."""
+        is_over = self._page is not None and lease.holder not in (None, self._page)
+        if is_over:
+            self._page, self.handle.value = None, text
+        return is_over
 
 
 class Html:

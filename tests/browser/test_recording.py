@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 
 from rcilab.recording.export import export_run
+from rcilab.recording.run import build_run
+from rcilab.recording.setup import Setup
 from rcilab.workbench import requests
 from rcilab.workbench.run.keeper import whole_recording
-from tests.recording.runs import some_ideal_run, some_long_run, some_run
+from tests.recording.runs import MODEL, some_cycles, some_ideal_run, some_long_run, some_run
 
 
 def plot_numbers(page) -> list[list[str]]:
@@ -145,3 +147,30 @@ def test_the_exported_page_lives_without_a_network(chromium, tmp_path):
     assert problems == []
     assert asked == [file.as_uri()]
     context.close()
+
+
+_HOSTILE = (
+    "@@PAGE@@ @@TITLE@@ </script><script>window.hurt = 1</script> "
+    "<!--<script <img src=x onerror='window.hurt = 2'> \\u003c"
+)
+
+
+def test_words_of_a_run_are_words_on_the_exported_page_whatever_they_are(chromium, tmp_path):
+    setup = Setup(target=f"{_HOSTILE} 1", plant=f"{_HOSTILE} 2", mode=f"{_HOSTILE} 3", started_ns=1)
+    run = build_run(some_cycles(), plan=None, model=MODEL, setup=setup, stopped=f"{_HOSTILE} 4")
+    file = Path(tmp_path / "run.html")
+    file.write_bytes(export_run(run, ".html"))
+    tab = chromium.new_page()
+    problems: list[str] = []
+    tab.on("pageerror", lambda error: problems.append(str(error)))
+    tab.on("console", lambda said: problems.append(said.text) if said.type == "error" else None)
+    tab.goto(file.as_uri())
+    tab.wait_for_selector("body[data-ready=yes]", state="attached", timeout=60_000)
+    shown = tab.locator("#tables").inner_text()
+    assert [f"{_HOSTILE} {number}" in shown for number in (1, 2, 3, 4)] == [True] * 4
+    assert tab.evaluate("window.hurt") is None
+    tab.evaluate("document.body.insertAdjacentHTML('beforeend', '<img src=x onerror=\"window.hurt = 3\">')")
+    tab.evaluate("document.body.append(Object.assign(document.createElement('script'), {text: 'window.hurt = 4'}))")
+    assert tab.evaluate("window.hurt") is None, "the policy of the page lets no other script run"
+    tab.close()
+    assert [problem for problem in problems if "Content Security Policy" not in problem] == []

@@ -68,7 +68,9 @@ def test_it_prints_one_line_serves_the_page_and_ends_cleanly(number):
     ("arguments", "answer"),
     [
         (["--model", "kuka"], "known robots: xMatePro3"),
-        (["--host", "0.0.0.0"], "--token"),
+        (["--host", "0.0.0.0"], "nobody would learn the token"),
+        (["--private"], "RCILAB_TOKEN"),
+        (["--token-file", "/nowhere/token"], "cannot read the token in /nowhere/token"),
         (["--robot", "http://x"], "rci://"),
         (["--robot", "foo"], "'foo' is no address; write it like rci://"),
         (["--port", "70000"], "0 to 65535"),

@@ -112,3 +112,31 @@ def test_with_an_open_address_every_page_that_brings_the_token_gets_in_and_no_ot
                 assert page.recv(timeout=20)
         with pytest.raises(InvalidStatus):
             connect(address, additional_headers={"Origin": headers["Origin"]}, subprotocols=[PROTOCOL])  # type: ignore[list-item]
+
+
+@pytest.mark.parametrize(
+    "request_line",
+    ["GET /" + "x" * 300 + " HTTP/1.1", "GET /" + "%41" * 300 + ".js HTTP/1.1"],
+)
+def test_a_path_that_cannot_be_is_a_bad_request(guarded, request_line: str) -> None:
+    assert answer_to(guarded[1], request_line) == 400
+
+
+@pytest.mark.parametrize("name", ["Host", "Cookie", "Upgrade", "Accept-Encoding"])
+def test_a_doubled_header_is_a_bad_request(guarded, name: str) -> None:
+    assert answer_to(guarded[1], "GET / HTTP/1.1", *2 * [f"{name}: websocket"]) == 400
+
+
+def test_a_page_of_another_version_is_told_to_load_again(guarded) -> None:
+    origin = {"Origin": f"http://127.0.0.1:{guarded[1]}"}
+    with pytest.raises(InvalidStatus) as caught:
+        connect(f"ws://127.0.0.1:{guarded[1]}/", additional_headers=origin, subprotocols=["viser-v0.0.1"])  # type: ignore[list-item]
+    assert caught.value.response.status_code == 400
+
+
+def answer_to(port: int, request_line: str, *headers: str) -> int:
+    """The status of the answer to a request that no library would send."""
+    own = [] if any(header.startswith("Host") for header in headers) else [f"Host: 127.0.0.1:{port}"]
+    with socket.create_connection(("127.0.0.1", port), timeout=10) as link:
+        link.sendall("\r\n".join([request_line, *own, *headers, "", ""]).encode())
+        return int(link.recv(4096).split()[1])

@@ -10,12 +10,13 @@ from contextlib import suppress
 import msgspec
 import pytest
 import viser
+import zstandard
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 from rcilab.views.gate import Gate
 from rcilab.views.guarded_server import GuardedServer, listen
-from rcilab.views.message_guard import LARGEST_MESSAGE, LARGEST_UPLOAD, LONGEST_TEXT
+from rcilab.views.message_guard import LARGEST_MESSAGE, LARGEST_UPLOAD, LONGEST_TEXT, for_anyone
 
 NAN, INF = float("nan"), float("inf")
 
@@ -26,7 +27,14 @@ class Page:
     def __init__(self) -> None:
         bound = listen("127.0.0.1", 0)
         self.port = bound.getsockname()[1]
-        self.guard = GuardedServer(bound, Gate(host="127.0.0.1", port=self.port))
+        self.watching: set[int] = set()  # Clients that may not act.
+        self.refused: list[int] = []
+        self.guard = GuardedServer(
+            bound,
+            Gate(host="127.0.0.1", port=self.port),
+            may_act=lambda page: page not in self.watching,
+            refuse=self.refused.append,
+        )
         server = self.guard.viser
         self.heard: list[object] = []
         gui = server.gui
@@ -203,3 +211,90 @@ def test_a_message_without_an_end_costs_its_sender_the_connection(page):
             link.send(b"x" * (LARGEST_MESSAGE + 1))
         with pytest.raises(ConnectionClosed):
             deque((link.recv(timeout=20) for _ in range(10_000)), maxlen=0)
+
+
+def client_of(page) -> int:
+    """The newest client."""
+    wait_until(lambda: page.guard.viser.get_clients())
+    return max(page.guard.viser.get_clients())
+
+
+def values_sent(link, handle) -> list[object]:
+    """What the server has told this page about a control until now."""
+    values: list[object] = []
+    with suppress(TimeoutError):
+        while True:
+            raw = link.recv(timeout=0.3)
+            packed = raw[16 : 16 + int.from_bytes(raw[8:16], "little")]
+            said = msgspec.msgpack.decode(zstandard.ZstdDecompressor().decompress(packed, max_output_size=10**8))
+            values += [
+                message["updates"]["value"]
+                for message in said["messages"]
+                if message.get("uuid") == handle._impl.uuid and message["type"] == "GuiUpdateMessage"
+            ]
+    return values
+
+
+def test_a_page_that_watches_changes_nothing_and_is_shown_what_all_see(page, link):
+    with page.open() as other:
+        page.enter(other)
+        page.settle(other)
+        watcher = client_of(page)
+        page.watching.add(watcher)
+        page.refused.clear()
+        values_sent(other, page.text)
+        page.update(other, page.text, "rci://192.0.2.1")
+        page.update(other, page.slider, 0.9)
+        page.send(
+            other, "TransformControlsUpdateMessage", name="/gizmo", wxyz=(1.0, 0.0, 0.0, 0.0),
+            position=(1.0, 0.0, 0.0), owner="",
+        )  # fmt: skip
+        start_upload(page, other, "watched", 4, 1)
+        send_part(page, other, "watched", 0, b"evil")
+        assert values_sent(other, page.text) == ["start"], "its own box goes back to what all see"
+        page.settle(link)
+        assert (page.text.value, page.slider.value, tuple(page.gizmo.position)) == ("start", 0.5, (0.0, 0.0, 0.0))
+        assert page.heard == []
+        assert page.refused == [watcher], "said once a second"
+        for_anyone(page.box)
+        page.update(other, page.box, True)
+        wait_until(lambda: page.box.value)
+        page.box.value = False
+        page.watching.clear()
+        page.update(other, page.slider, 0.9)
+        wait_until(lambda: page.slider.value == 0.9)
+        page.slider.value = 0.5
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        {"type": "GuiUpdateMessage", "uuid": [], "updates": {"value": 1}},
+        {"type": "GuiUpdateMessage", "uuid": "x", "updates": []},
+        {"type": "GuiUpdateMessage"},
+        {"type": "GuiButtonHoldMessage", "uuid": {}, "frequency": 10.0},
+        {"type": "CommandTriggerMessage", "uuid": []},
+        {"type": "FileTransferPart", "source_component_uuid": [], "transfer_uuid": [], "part_index": 0, "content": "x"},
+        {"type": "ViewerCameraMessage", "wxyz": 1},
+        {"type": "ViewerCameraMessage", "wxyz": ["x"] * 4, "position": [0.0] * 3, "fov": 1.0, "near": 0.1, "far": 1.0,
+         "image_height": 1, "image_width": 1, "look_at": [0.0], "up_direction": [0.0] * 3},
+        {"type": "SceneNodeClickMessage", "name": [], "instance_index": None, "ray_origin": [0.0] * 3,
+         "ray_direction": [0.0] * 3, "screen_pos": [0.0] * 2, "modifier": "none", "owner": ""},
+        {"type": "nothing"},
+        {},
+        [],
+        "text",
+        None,
+    ],
+)  # fmt: skip
+def test_what_is_no_message_is_dropped_counted_and_said_once(page, link, message, capfd):
+    before = page.guard.guard.malformed
+    for _ in range(3):
+        link.send(msgspec.msgpack.encode(message))
+    link.send(b"\xc1 no msgpack")
+    link.send("words")
+    page.settle(link)  # The page is still there.
+    assert page.guard.guard.malformed == before + 5
+    said = capfd.readouterr()
+    first = "a page has sent a message that is none of a page; such messages are dropped\n"
+    assert said.out + said.err == ("" if before else first)

@@ -328,7 +328,7 @@ def test_a_bad_robot_address_is_refused_before_anything_starts():
 
 
 def test_an_open_address_needs_a_token():
-    with pytest.raises(UsageError, match="--token"):
+    with pytest.raises(UsageError, match="give a token"):
         Workbench(WorkbenchConfig(host="0.0.0.0", port=0))
 
 

@@ -156,13 +156,3 @@ def test_a_page_that_still_loads_is_waited_for(desk):
     desk.actions.page_came(requests.PageCame(page=3))
     desk.wait(10.0)
     assert desk.lease.holder == 3
-
-
-def test_a_watching_page_may_look_at_the_moment_of_a_row_and_change_nothing():
-    assert requests.is_harmless(requests.Check(what="row", row="joint.velocity"))
-    assert requests.is_harmless(requests.Learn(what="moment"))
-    assert requests.is_harmless(requests.Seek(place=0.5))
-    for what in ("slow", "undo", "explain", "again", "cancel"):
-        assert not requests.is_harmless(requests.Check(what=what)), what
-    assert not requests.is_harmless(requests.Learn(what="provoke", fault=1))
-    assert not requests.is_harmless(requests.Drive(what="execute"))

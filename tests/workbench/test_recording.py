@@ -100,6 +100,8 @@ def test_exports_reach_the_page_that_asked_and_problems_are_told(bench, monkeypa
     if bench.store.state.recording is None:
         execute(bench, 0.1)
     run = finished(bench).run
+    bench.conductor.ask(requests.PageCame(page=7))
+    wait(lambda: bench.store.state.lease.holder == 7, "the controls")
     sent = []
     actions = bench.conductor._export
 
@@ -109,6 +111,7 @@ def test_exports_reach_the_page_that_asked_and_problems_are_told(bench, monkeypa
         return not is_unwanted()
 
     monkeypatch.setattr(actions, "_deliver", deliver)
+    bench.conductor.ask(requests.Export(page=8, ending=".csv"))  # A page that only watches gets none.
     for ending in (".csv", ".html", ".rcirun"):
         bench.conductor.ask(requests.Export(page=7, ending=ending))
         wait(lambda ending=ending: bool(sent) and sent[-1][1].endswith(ending), f"the {ending}")
@@ -127,7 +130,7 @@ def test_exports_reach_the_page_that_asked_and_problems_are_told(bench, monkeypa
     )
     bench.conductor.ask(requests.Export(page=7, ending=".csv"))
     wait(lambda: bench.store.state.export is not None, "an export")
-    bench.conductor.ask(requests.CancelExport(page=8))
+    bench.conductor.ask(requests.CancelExport(page=7))
     wait(lambda: told(bench) == "export.cancelled", "that it was cancelled")
     wait(lambda: bench.store.state.export is None, "the end of the export")
     monkeypatch.setattr(actions, "_deliver", deliver)

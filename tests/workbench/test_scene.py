@@ -186,8 +186,8 @@ def test_a_page_says_which_branch_is_under_the_mouse():
         Heard(
             stop=lambda: None,
             here=lambda page: None,
-            seek=lambda place: None,
-            size=lambda height: None,
+            seek=lambda page, place: None,
+            size=lambda page, height: None,
             take=lambda page: None,
             answer=lambda page, yes: None,
             peek=lambda page, branch: heard.append((page, branch)),

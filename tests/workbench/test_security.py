@@ -15,7 +15,7 @@ from websockets.sync.client import connect
 
 from rcilab.errors import UsageError
 from rcilab.views.gate import Gate
-from rcilab.views.guarded_server import GuardedServer
+from rcilab.views.guarded_server import GuardedServer, listen
 from rcilab.workbench import security
 from rcilab.workbench.live import LIVE_PATH, Heard, LiveChannel
 from rcilab.workbench.page import decorate
@@ -29,10 +29,33 @@ def test_loopback_needs_no_token(host):
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "192.168.0.5", "::"])
 def test_an_open_address_without_a_token_is_refused_in_one_sentence(host):
-    with pytest.raises(UsageError, match="--token") as caught:
+    with pytest.raises(UsageError, match="give a token") as caught:
         check_host(host, None)
     assert "\n" not in str(caught.value)
-    check_host(host, "s3cret")
+    check_host(host, "sixteen letters!")
+
+
+def test_a_name_that_begins_like_loopback_is_not_loopback(monkeypatch):
+    def resolve(host, *args, **kwargs):
+        assert host == "127.evil.example"
+        return [(socket.AF_INET, socket.SOCK_STREAM, 6, "", ("192.0.2.1", 0))]
+
+    monkeypatch.setattr(socket, "getaddrinfo", resolve)
+    with pytest.raises(UsageError, match="opens the workbench to the network"):
+        check_host("127.evil.example", None)
+
+
+def test_a_name_that_leads_nowhere_is_refused():
+    with pytest.raises(UsageError, match="is not an address of this machine"):
+        check_host("127.evil.invalid", None)
+
+
+def test_what_counts_is_where_the_socket_is(monkeypatch):
+    """A name may lead elsewhere by the time that it is listened on."""
+    monkeypatch.setattr("rcilab.views.guarded_server.listen", lambda host, port: listen("0.0.0.0", 0))
+    with pytest.raises(UsageError, match="opens the workbench to the network"):
+        bind("127.0.0.1", 0)
+    bind("127.0.0.1", 0, "sixteen letters!").close()
 
 
 def test_a_busy_port_is_refused_and_says_what_to_change():
@@ -61,8 +84,8 @@ class Door:
             Heard(
                 stop=self.stops.set,
                 here=self.here.append,
-                seek=self.seeks.append,
-                size=lambda height: None,
+                seek=lambda page, place: self.seeks.append(place),
+                size=lambda page, height: None,
                 take=self.asked.append,
                 answer=lambda page, yes: self.asked.append((page, yes)),
             )
@@ -180,6 +203,8 @@ def test_stop_and_seek_arrive_over_the_live_channel_and_garbage_does_not_hurt_it
     door.stops.clear()
     with door.connect("/rcilab/live") as page:
         assert isinstance(json.loads(page.recv(timeout=10)), dict)
+        page.send(json.dumps({"kind": "seek", "place": 0.5}))  # Of nobody that we know.
+        page.send(json.dumps({"kind": "hello", "page": 7, "key": door.live.introduce(7)}))
         for garbage in (
             "",
             "{",
@@ -210,6 +235,7 @@ def test_published_values_reach_every_page_and_the_next_one_too(door):
 
 
 def test_only_a_page_that_brings_its_key_is_somebody(door):
+    door.here.clear()
     key = door.live.introduce(5)
     words = [{"kind": "here"}, {"kind": "take"}, {"kind": "answer", "yes": True}]
     with door.connect("/rcilab/live") as page:

@@ -126,7 +126,8 @@
     if (!take) return;
     take.hidden = !me || !said.take || said.holder === me.page;
     take.textContent = said.take || "";
-    document.documentElement.toggleAttribute("data-rl-watching", Boolean(me) && said.holder !== me.page);
+    document.documentElement.toggleAttribute("data-rl-watching", Boolean(me) && !acts());
+    size();  // Plots are as high as the page with the controls has room for.
     if (said.chips) draw(said.chips);  // It says which page this one is.
     const asked = said.question && me && said.question.page === me.page ? said.question : null;
     question.hidden = !asked;
@@ -209,7 +210,7 @@
   const connect = () => {
     const scheme = location.protocol === "https:" ? "wss://" : "ws://";
     live = new WebSocket(scheme + location.host + "/rcilab/live");
-    live.onopen = () => { greeted = false; bar.classList.remove("rl-lost"); size(); greet(); };
+    live.onopen = () => { greeted = false; bar.classList.remove("rl-lost"); greet(); };
     live.onmessage = hear;
     live.onclose = () => {
       bar.classList.add("rl-lost");
@@ -220,7 +221,8 @@
 
   window.addEventListener("rl-say", (event) => send(event.detail));  // What the other scripts of the page have to say.
 
-  const size = () => send({ kind: "size", height: window.innerHeight });
+  const acts = () => Boolean(me) && said.holder === me.page;
+  const size = () => { if (acts()) send({ kind: "size", height: window.innerHeight }); };
   window.addEventListener("resize", () => { size(); place(); });
 
   // A page that is loaded anew opens the tab that was open.
@@ -234,7 +236,6 @@
     if (shown === null) document.documentElement.dataset.rlReady = "";
     const open = Math.max(0, found.findIndex((tab) => tab.getAttribute("aria-selected") === "true"));
     const panel = list.closest(".mantine-ScrollArea-root");
-    if (panel) panel.toggleAttribute("data-rl-acts", open < found.length - 1);  // Language and theme are for watchers, too.
     if (shown === null && open !== before) {
       // viser's tabs hear keys and fingers, not click().
       found[before].dispatchEvent(new KeyboardEvent("keydown", { key: "Enter", bubbles: true }));

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from rcilab.workbench import requests
 from rcilab.workbench.text import Text
-from rcilab.workbench.widgets import Ask, Linked
+from rcilab.workbench.widgets import Ask, Linked, PageText
 
 if TYPE_CHECKING:
     from rcilab.supervisor import SupervisorStatus
@@ -49,12 +49,12 @@ class PosesPanel:
                 what = whats[event.target.value]
                 ask(requests.NamedPose(page=event.client_id, what=what, name=self._shown.jog.pose))
 
-            self._name = gui.add_text(text("poses.name"), "", hint=text("poses.store_hint"))
+            self._name = PageText(gui.add_text(text("poses.name"), "", hint=text("poses.store_hint")))
             store = gui.add_button_group("   ", [text("poses.store")], hint=text("poses.store_hint"))
 
             @store.on_click
             async def _(event: Any) -> None:
-                ask(requests.NamedPose(page=event.client_id, what="store", name=self._name.value))
+                ask(requests.NamedPose(page=event.client_id, what="store", name=self._name.of(event.client_id)))
 
         self._shown = state
 
@@ -64,7 +64,8 @@ class PosesPanel:
             self._list.options = self._options(state)
             self._list.value = self._chosen(state)
             if set(state.jog.poses) > set(self._shown.jog.poses):
-                self._name.value = ""
+                self._name.handle.value = ""
+        self._name.show(state.lease, "")
         self._shown = state
         self._pose.show(self._chosen(state))
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from rcilab.conformance.explain import explain_limit
 from rcilab.robots import RCI_ROBOT_NAMES
+from rcilab.views.message_guard import for_anyone
 from rcilab.words.units import ANGLES, LENGTHS
 from rcilab.workbench import requests
 from rcilab.workbench.text import LANGUAGES, Text
@@ -50,10 +51,12 @@ class SettingsPanel:
             self._choices.append((self._choice(gui, name, labels), self._labelled(labels, chosen)))
         with gui.add_folder(text("settings.controls")):
             self._who = Html(gui)
+            gui.add_html('<i class="rl-anyone"></i>')
             self._take = gui.add_button(
                 text("lease.ask"), icon="hand-grab", color="gray", hint=text("settings.take_hint")
             )
             on_press(self._take, ask, lambda page: requests.TakeControls(page=page))
+            for_anyone(self._take)
         source = explain_limit(state.model.limits.source("joint.velocity"), text.language)
         gui.add_html(f'<p class="rl-note">{esc(text("settings.limits", source=source))}</p>')
 

@@ -9,7 +9,7 @@ from rcilab.workbench.run.driving import DESTINATIONS, destination
 from rcilab.workbench.run.readiness import is_moving
 from rcilab.workbench.telling import phase_code, tell_status
 from rcilab.workbench.text import Text
-from rcilab.workbench.widgets import Ask, Html, Linked, esc, on_press
+from rcilab.workbench.widgets import Ask, Html, Linked, PageText, esc, on_press
 
 if TYPE_CHECKING:
     from rcilab.supervisor import SupervisorStatus
@@ -45,19 +45,19 @@ class WherePanel:
                 text("destination.title"), tuple(names), initial_value=self._names[first], hint=text("destination.hint")
             )
             self._choice = Linked(choice, ask, lambda v, p: self._pick(names.get(v, ""), p))
-            typed = state.target if state.target != "virtual" else ""
-            self._address = gui.add_text(text("run.address"), typed, hint=text("run.address_hint"))
+            box = gui.add_text(text("run.address"), _address_of(state), hint=text("run.address_hint"))
+            self._address = PageText(box)
             self._connect = gui.add_button(text("run.connect"), icon="plug-connected", color="gray")
-            on_press(self._connect, ask, lambda page: _choose(page, "address", self._address.value))
+            on_press(self._connect, ask, lambda page: _choose(page, "address", self._address.of(page)))
 
-            @self._address.on_update
+            @box.on_update
             async def _(event: Any) -> None:
                 if self._asked and event.target.value.strip() != self._asked:
                     ask(_choose(event.client_id, "address", answer="no"))
 
             self._question = Html(gui)
             self._yes = gui.add_button(text("destination.yes"), icon="plug-connected", color="red", visible=False)
-            on_press(self._yes, ask, lambda page: _choose(page, "address", self._address.value, "yes"))
+            on_press(self._yes, ask, lambda page: _choose(page, "address", self._address.of(page), "yes"))
             self._no = gui.add_button(text("destination.no"), color="gray", visible=False)
             on_press(self._no, ask, lambda page: _choose(page, "address", answer="no"))
             self._again = gui.add_button(text("destination.again"), icon="refresh", color="gray", visible=False)
@@ -73,7 +73,9 @@ class WherePanel:
         self._choice.show(self._names[self._picked or where])
         self._choice.handle.disabled = self._connect.disabled = moving
         is_address = (self._picked or where) == "address"
-        self._address.visible = self._connect.visible = is_address
+        if self._address.show(state.lease, _address_of(state)) and state.drive.typed_address:
+            self._ask(_choose(None, "address", answer="no"))  # Who asked has the controls no more.
+        self._address.handle.visible = self._connect.visible = is_address
         asked = self._asked = state.drive.typed_address
         said = "" if not asked else esc(text("destination.ask", address=asked, model=state.model.name))
         self._question.show(said and f'<p class="rl-verdict rl-warn" role="alert">{said}</p>')
@@ -95,6 +97,10 @@ class WherePanel:
     def _pick(self, name: str, page: int | None) -> requests.Request | None:
         self._picked = "address" if name == "address" else None
         return None if name in ("", "address") else _choose(page, name)
+
+
+def _address_of(state: UiState) -> str:
+    return state.target if state.target != "virtual" else ""
 
 
 def _choose(page: int | None, where: str, address: str = "", answer: Any = "") -> requests.Request:
