@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import stat
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -76,20 +77,21 @@ def write_whole(file: Path, text: str, *, survives_power_loss: bool = True) -> N
         stream.write(text.encode())
 
 
-def read_whole(file: Path, what: str, most: int = -1) -> bytes:
+def read_whole(file: Path, what: str, most: int) -> bytes:
     """Returns what is in a file.
 
     Args:
         file: Where.
         what: What it should be, for the error: "program file".
-        most: Bytes that are read at most; -1 is all.
+        most: Bytes that are read at most.
 
     Raises:
         InvalidValueError: There is none, or it cannot be read.
     """
     try:
         with file.open("rb") as stream:
-            return stream.read(most)
+            status = os.fstat(stream.fileno())  # A file is given as much room as it needs, not as it may.
+            return stream.read(min(most, status.st_size + 1) if stat.S_ISREG(status.st_mode) else most)
     except FileNotFoundError as error:
         raise InvalidValueError(what, str(file), "does not exist").coded("no_file", file=str(file)) from error
     except OSError as error:

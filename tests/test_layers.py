@@ -34,6 +34,7 @@ LAYERS = [  # From the bottom. A part imports from lines below its own, and from
         "closing",
         "background",
         "whole_file",
+        "file_bounds",
         "cycle_file",
         "words",
     },

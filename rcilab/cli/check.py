@@ -6,7 +6,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rcilab.cli.motion_file import HELP, as_motion, read_file
+from rcilab.cli.motion_file import HELP, add_max_rows, as_motion, read_file
 from rcilab.cli.output import show
 from rcilab.errors import UsageError
 from rcilab.language import LANGUAGES
@@ -40,6 +40,7 @@ def add_parser(subparsers: Any) -> None:
         default="joint_position",
         help="how it will be sent, which decides what is judged: %(default)s, cartesian_position, torque ...",
     )
+    add_max_rows(parser)
     form = parser.add_mutually_exclusive_group()
     form.add_argument("--explain", choices=tuple(LANGUAGES), help="say it in whole sentences, in English or Chinese")
     form.add_argument("--json", action="store_true", help="print one JSON object instead; SI units")
@@ -57,12 +58,12 @@ def run(args: Namespace) -> int:
     from rcilab.model import load_model
     from rcilab.motion import Program
 
-    found = read_file(args.file)
+    found = read_file(args.file, args.max_rows)
     name = found.model if args.model is None and isinstance(found, Program) else args.model
     if name is None:
         raise UsageError("a motion does not say for which arm it is: add --model NAME, such as --model xMatePro7")
     model = load_model(name, tool=found.T_flange_tool if isinstance(found, Program) else None)
-    motion = as_motion(found, model, args.file, show=(lambda line: None) if args.json else show)
+    motion = as_motion(found, model, args.file, show=(lambda line: None) if args.json else show, max_rows=args.max_rows)
     report = check(motion, model, mode=args.mode)
     out: Path | None = args.slow_down
     slowed = None if out is None else report.slow_down()

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from argparse import ArgumentParser
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from rcilab.file_bounds import MOST_ROWS
 
 if TYPE_CHECKING:
     from rcilab.model import RobotModel
@@ -13,19 +16,40 @@ if TYPE_CHECKING:
 HELP = "motion (.npz or .csv, from Motion.save) or program (.json, from Program.save)"
 
 
-def read_file(file: Path) -> Motion | Program:
+def add_max_rows(parser: ArgumentParser) -> None:
+    """Adds the option that lets a large file in."""
+    parser.add_argument(
+        "--max-rows",
+        type=int,
+        default=MOST_ROWS,
+        metavar="N",
+        help="cycles of 1 ms that the file may hold, with 1 KiB each, unpacked (default: %(default)s, 17 minutes)",
+    )
+
+
+def read_file(file: Path, max_rows: int = MOST_ROWS) -> Motion | Program:
     """Returns the motion or, where the name ends in .json, the program in a file.
 
+    Args:
+        file: Its name.
+        max_rows: How many cycles of 1 ms a motion may have.
+
     Raises:
-        InvalidValueError: There is no such file, or it holds neither.
+        InvalidValueError: There is no such file, it holds neither, or too much.
         VersionMismatchError: It was written by another version of its format.
     """
     from rcilab.motion import Motion, Program
 
-    return Program.load(file) if file.suffix.lower() == ".json" else Motion.load(file)
+    return Program.load(file) if file.suffix.lower() == ".json" else Motion.load(file, max_rows=max_rows)
 
 
-def as_motion(found: Motion | Program, model: RobotModel, file: Path, show: Callable[[str], None] = print) -> Motion:
+def as_motion(
+    found: Motion | Program,
+    model: RobotModel,
+    file: Path,
+    show: Callable[[str], None] = print,
+    max_rows: int = MOST_ROWS,
+) -> Motion:
     """Returns the motion; a program is planned, and the notes of its planner are shown.
 
     Args:
@@ -33,6 +57,7 @@ def as_motion(found: Motion | Program, model: RobotModel, file: Path, show: Call
         model: The arm.
         file: What it was read from, to name the line of a waypoint that cannot be planned.
         show: Called with every line of text.
+        max_rows: How many cycles of 1 ms it may take.
 
     Raises:
         PlanningError: The program cannot be planned.
@@ -44,7 +69,7 @@ def as_motion(found: Motion | Program, model: RobotModel, file: Path, show: Call
     if not isinstance(found, Program):
         return found
     try:
-        motion = plan_program(model, found, law="torque_rate_limited")
+        motion = plan_program(model, found, law="torque_rate_limited", max_rows=max_rows)
     except PlanningError as error:
         if error.waypoint is None:
             raise

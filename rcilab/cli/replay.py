@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from rcilab.cli.motion_file import add_max_rows
 from rcilab.cli.workbench import add_page_options, find_page_token, page_config, serve
 
 
@@ -18,6 +19,7 @@ def add_parser(subparsers: Any) -> None:
         "scrubs plan and actual. Nothing is connected until you ask for it on the Run tab.",
     )
     parser.add_argument("file", type=Path, help="the run, .rcirun; one that was cut off by a crash opens, too")
+    add_max_rows(parser)
     add_page_options(parser)
     parser.set_defaults(run=run)
 
@@ -27,6 +29,6 @@ def run(args: argparse.Namespace) -> int:
     from rcilab.recording.run_file import load_run
 
     token = find_page_token(args)
-    found = load_run(args.file)
+    found = load_run(args.file, max_rows=args.max_rows)
     print(f"{args.file}: {found!r}")
     return serve(page_config(args, token, replay=found), browser=not args.no_browser)

@@ -14,7 +14,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TextIO
 
-from rcilab.cli.motion_file import HELP, as_motion, read_file
+from rcilab.cli.motion_file import HELP, add_max_rows, as_motion, read_file
 from rcilab.cli.output import drop_output, show
 from rcilab.errors import UsageError
 from rcilab.faults import name_faults
@@ -53,6 +53,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument(
         "--json", action="store_true", help="print one JSON object, SI units; reports and questions go to stderr"
     )
+    add_max_rows(parser)
     parser.add_argument("--timeout", type=float, default=3.0, metavar="S", help="for every answer of the robot [s]")
     parser.set_defaults(run=run)
 
@@ -120,11 +121,12 @@ def _run(args: Namespace, stopper: _Stopper) -> int:
     from rcilab.client.start_check import describe_start_mismatch
     from rcilab.model import load_model
 
-    found = read_file(args.file)
+    found = read_file(args.file, args.max_rows)
     model = load_model(args.model) if args.model else None
     moves: list[_Move] = []
     with connect(args.robot, model, args.timeout) as robot:
-        motion = as_motion(found, robot.model, args.file, show=partial(print, file=_reader(args)))
+        tell = partial(print, file=_reader(args))
+        motion = as_motion(found, robot.model, args.file, show=tell, max_rows=args.max_rows)
         state = robot.state
         mismatch = describe_start_mismatch(motion.q[0], state.q_c)
         if mismatch is None or not args.to_start:

@@ -1,16 +1,19 @@
-"""Arrays in numpy's files, of which nobody knows yet whether they are sound."""
+"""Arrays in numpy's files, of which nobody knows yet whether they are sound, nor how large they are unpacked."""
 
 from __future__ import annotations
 
 import struct
 import zlib
 from io import BytesIO
+from math import prod
 from tokenize import TokenError
-from zipfile import BadZipFile
+from typing import IO
+from zipfile import BadZipFile, ZipFile
 
 import numpy as np
 
 from rcilab.errors import InvalidValueError
+from rcilab.file_bounds import require_bytes
 
 SINGLE_ARRAY = "a single array"
 """The name of the array in a file that holds one without a name."""
@@ -22,7 +25,7 @@ _DAMAGE = (
 """What numpy and those it reads with raise on foreign or damaged bytes; a mistake in the code is none of them."""
 
 
-def read_arrays(content: bytes, what: str, name: str, problem: str) -> dict[str, np.ndarray]:
+def read_arrays(content: bytes, what: str, name: str, problem: str, max_rows: int) -> dict[str, np.ndarray]:
     """Returns the arrays in the bytes of an .npz or .npy, by name.
 
     Args:
@@ -30,10 +33,16 @@ def read_arrays(content: bytes, what: str, name: str, problem: str) -> dict[str,
         what: What the file is, for the error.
         name: The file's name.
         problem: What the error says of it.
+        max_rows: How much there may be in it, as of `file_bounds`.
 
     Raises:
-        InvalidValueError: The bytes are damaged, something else, or hold objects of Python's.
+        InvalidValueError: The bytes are damaged, something else, too many unpacked, or hold objects of Python's.
     """
+    try:
+        size = _unpacked_size(content)
+    except _DAMAGE as error:
+        raise InvalidValueError(what, name, problem) from error
+    require_bytes(size, max_rows, what, name)
     try:
         archive = np.load(BytesIO(content), allow_pickle=False)
         if isinstance(archive, np.ndarray):
@@ -42,3 +51,23 @@ def read_arrays(content: bytes, what: str, name: str, problem: str) -> dict[str,
             return {key: archive[key] for key in archive.files}
     except _DAMAGE as error:
         raise InvalidValueError(what, name, problem) from error
+
+
+def _unpacked_size(content: bytes) -> int:
+    """Returns what the arrays will take, [bytes], by the headers of archive and arrays."""
+    if not content.startswith(b"PK"):
+        return _array_size(BytesIO(content))
+    size = 0
+    with ZipFile(BytesIO(content)) as archive:
+        for member in archive.infolist():
+            with archive.open(member) as stream:
+                size += max(member.file_size, _array_size(stream))
+    return size
+
+
+def _array_size(stream: IO[bytes]) -> int:
+    """Returns what an array takes by its own header, [bytes]; 0 for what is none, which numpy will refuse."""
+    version = np.lib.format.read_magic(stream)
+    read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+    shape, _, dtype = read(stream)
+    return prod(shape) * dtype.itemsize

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from rcilab.arrays import Array, JointPath, JointVector, as_number, as_path, as_vector, described, frozen
 from rcilab.clock import CYCLE_TIME
 from rcilab.errors import InvalidValueError
+from rcilab.file_bounds import MOST_ROWS
 from rcilab.language import Language
 from rcilab.motion.piecewise import DERIVATIVES, PiecewisePolynomial
 from rcilab.spoken import language
@@ -255,22 +256,31 @@ class Motion:
         save_motion(self, file)
 
     @classmethod
-    def load(cls, file: str | PathLike[str] | BinaryIO) -> Motion:
+    def load(cls, file: str | PathLike[str] | BinaryIO, *, max_rows: int = MOST_ROWS) -> Motion:
         """Returns the motion in a file (.npz or .csv, see `save`).
 
         A CSV whose times are not the 1 ms grid is read as `load_samples` reads it.
 
+        Args:
+            file: Its name, or an open binary file.
+            max_rows: How many cycles of 1 ms it may hold, and with 1 KiB each how many bytes, unpacked: 17 minutes.
+
         Raises:
-            InvalidValueError: There is no such file, or it holds no sound motion.
+            InvalidValueError: There is no such file, it holds no sound motion, or too much.
             VersionMismatchError: It was written by another version of this format.
         """
         from rcilab.motion.storage import load_motion
 
-        return load_motion(file)
+        return load_motion(file, max_rows)
 
     @classmethod
     def load_samples(
-        cls, file: str | PathLike[str], *, rate_hz: float | None = None, unit: Literal["rad", "deg"] = "rad"
+        cls,
+        file: str | PathLike[str],
+        *,
+        rate_hz: float | None = None,
+        unit: Literal["rad", "deg"] = "rad",
+        max_rows: int = MOST_ROWS,
     ) -> Motion:
         """Returns the motion through joint samples from elsewhere, at any rate, even or not, to be judged.
 
@@ -286,13 +296,15 @@ class Motion:
             file: Name of the file, ending in .csv or .npz.
             rate_hz: Samples a second, for a file without times, [Hz].
             unit: Of the angles that do not say theirs.
+            max_rows: How much it may hold, as of `load`.
 
         Raises:
-            InvalidValueError: There is no such file, or it holds no sound samples; the message names the line.
+            InvalidValueError: There is no such file, or it holds no sound samples, or too many; the message names the
+                line.
         """
         from rcilab.motion.samples import load_samples
 
-        return load_samples(file, rate_hz=rate_hz, unit=unit)
+        return load_samples(file, rate_hz=rate_hz, unit=unit, max_rows=max_rows)
 
     def __reduce__(self) -> tuple[object, ...]:
         return _rebuild, (self.polynomial, self.goal, self.law, self.speed, self.segment_starts, self.notes)

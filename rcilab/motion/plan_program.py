@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from rcilab.arrays import Array, JointVector, as_number, as_vector, described, sealed
 from rcilab.clock import CYCLE_TIME
 from rcilab.errors import InvalidValueError, PlanningError
+from rcilab.file_bounds import MOST_ROWS, require_max_rows
 from rcilab.model import RobotModel, require_model
 from rcilab.motion.blend import Blend, build_blend
 from rcilab.motion.cartesian import plan_path
@@ -46,6 +47,7 @@ def plan_program(
     rounds: int = 1,
     law: JointLaw = "jerk_limited",
     progress: Callable[[float], None] | None = None,
+    max_rows: int = MOST_ROWS,
 ) -> Motion:
     """Returns the motion through the waypoints of a program, from rest to rest.
 
@@ -70,10 +72,11 @@ def plan_program(
         law: How every segment runs, see `plan_joint`. By the S profile the tool stops at every waypoint, so that there
             can be no blends.
         progress: Called now and then with the part of the work that is done, 0 to 1; what it raises ends the planning.
+        max_rows: How many cycles of 1 ms the motion may take: 17 minutes, as judging it takes 1.1 KB a cycle.
 
     Raises:
         PlanningError: A target is out of reach, or a joint limit or a singularity is in the way; the message names the
-            waypoint, the place and the reason.
+            waypoint, the place and the reason. Or the motion takes too long.
         InvalidValueError: The program is for another arm, or an argument is out of range.
     """
     require_model(model)
@@ -99,6 +102,7 @@ def plan_program(
         raise InvalidValueError(
             "rounds", rounds, f"must be whole, 1 to {MOST_WAYPOINTS // count} for {count} waypoints"
         ).coded("rounds", most=MOST_WAYPOINTS // count)
+    require_max_rows(max_rows)
     if law not in JOINT_LAWS:
         raise InvalidValueError("law", described(law), f"is unknown; known: {', '.join(JOINT_LAWS)}")
     if law == "s_profile":
@@ -130,7 +134,13 @@ def plan_program(
     for number in range(int(rounds)):
         for curve in (back, *curves) if back is not None and number else curves:
             track.add(curve)
-    return track.motion(speed * max(waypoint.speed for waypoint in program.waypoints), law)
+    motion = track.motion(speed * max(waypoint.speed for waypoint in program.waypoints), law)
+    if len(motion) > max_rows:
+        raise PlanningError(
+            f"the program takes {motion.duration:.0f} s, {len(motion)} rows of 1 ms, more than {max_rows}: take "
+            f"fewer rounds or shorter dwells, or pass max_rows={len(motion)} (in a shell --max-rows {len(motion)})"
+        ).coded("program_long", duration=f"{motion.duration:.0f}", most=f"{1e-3 * max_rows:.0f}")
+    return motion
 
 
 def _part_of_all(first: int, last: int, count: int, part: float) -> float:

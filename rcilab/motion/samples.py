@@ -13,6 +13,7 @@ import numpy as np
 from rcilab.arrays import Array, JointPath, as_number, as_path, as_vector
 from rcilab.clock import CYCLE_TIME
 from rcilab.errors import InvalidValueError
+from rcilab.file_bounds import MOST_ROWS, ROW_BYTES, require_bytes, require_max_rows, require_rows
 from rcilab.motion.archive import read_arrays
 from rcilab.motion.motion import Motion
 from rcilab.motion.spline import motion_through
@@ -33,27 +34,36 @@ _JOINT = re.compile(r"(?:(?:\w*[_./])?joint|q|j|axis)[ _]*(?:\[(\d+)\]|(\d+))[ _
 _SECONDS = {None: 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 
 
-def load_samples(file: str | PathLike[str], *, rate_hz: float | None = None, unit: AngleUnit = "rad") -> Motion:
+def load_samples(
+    file: str | PathLike[str], *, rate_hz: float | None = None, unit: AngleUnit = "rad", max_rows: int = MOST_ROWS
+) -> Motion:
     """Returns the motion through the joint samples in a file; see `Motion.load_samples`.
 
     Raises:
         InvalidValueError: There is no such file, or it holds no sound samples; one sentence with the line.
     """
-    return motion_through(*_read(file, rate_hz, unit))
+    return _short_enough(motion_through(*_read(file, rate_hz, unit, require_max_rows(max_rows))), max_rows, file)
 
 
-def load_rows(file: str | PathLike[str]) -> Motion:
+def load_rows(file: str | PathLike[str], max_rows: int) -> Motion:
     """Returns the motion in a CSV file: rows of the 1 ms grid as they are, others as `load_samples` reads them.
 
     Raises:
         InvalidValueError: As for `load_samples`.
     """
-    times, q = _read(file, None, "rad")
+    times, q = _read(file, None, "rad", max_rows)
     grid = times[0] + CYCLE_TIME * np.arange(len(times))
-    return Motion.from_cycles(q) if np.abs(times - grid).max() < _ON_GRID else motion_through(times, q)
+    if np.abs(times - grid).max() < _ON_GRID:
+        return Motion.from_cycles(q)
+    return _short_enough(motion_through(times, q), max_rows, file)
 
 
-def _read(file: str | PathLike[str], rate_hz: float | None, unit: AngleUnit) -> tuple[Array, JointPath]:
+def _short_enough(motion: Motion, max_rows: int, file: str | PathLike[str]) -> Motion:
+    require_rows(len(motion), max_rows, "samples", Path(file).name)
+    return motion
+
+
+def _read(file: str | PathLike[str], rate_hz: float | None, unit: AngleUnit, max_rows: int) -> tuple[Array, JointPath]:
     """Returns times [s] and joint angles [rad]."""
     if unit not in get_args(AngleUnit):
         raise InvalidValueError("unit", unit, f"is unknown; known: {', '.join(get_args(AngleUnit))}")
@@ -64,8 +74,9 @@ def _read(file: str | PathLike[str], rate_hz: float | None, unit: AngleUnit) -> 
     path = Path(fspath(file))
     if path.suffix.lower() not in _READERS:
         raise InvalidValueError("samples", str(path), f"must end in {' or '.join(_READERS)}, which tells the format")
-    content = read_whole(path, "samples")
-    times, q, place = _READERS[path.suffix.lower()](content, path.name, rate_hz is not None, unit)
+    content = read_whole(path, "samples", max_rows * ROW_BYTES + 1)
+    require_bytes(len(content), max_rows, "samples", path.name)
+    times, q, place = _READERS[path.suffix.lower()](content, path.name, rate_hz is not None, unit, max_rows)
     if times is None:
         if rate_hz is None:
             raise InvalidValueError(
@@ -79,8 +90,10 @@ def _read(file: str | PathLike[str], rate_hz: float | None, unit: AngleUnit) -> 
     return times, q
 
 
-def _from_csv(content: bytes, name: str, has_rate: bool, unit: AngleUnit) -> tuple[Array | None, Array, list[str]]:
-    table = read_table(content, name)
+def _from_csv(
+    content: bytes, name: str, has_rate: bool, unit: AngleUnit, max_rows: int
+) -> tuple[Array | None, Array, list[str]]:
+    table = read_table(content, name, max_rows)
     place = [f"{name}, line {line}" for line in table.lines]
     if table.header is not None:
         times, q = _by_header(table, table.header, name, unit)
@@ -118,9 +131,11 @@ def _by_header(table: Table, header: list[str], name: str, unit: AngleUnit) -> t
     return times, np.stack([joints[number] for number in sorted(joints)], axis=1)
 
 
-def _from_npz(content: bytes, name: str, has_rate: bool, unit: AngleUnit) -> tuple[Array | None, Array, list[str]]:
+def _from_npz(
+    content: bytes, name: str, has_rate: bool, unit: AngleUnit, max_rows: int
+) -> tuple[Array | None, Array, list[str]]:
     problem = "cannot be read: it is damaged, or no archive of numpy's; numpy.savez(file, t=..., q=...) writes one"
-    arrays = read_arrays(content, "samples", name, problem)
+    arrays = read_arrays(content, "samples", name, problem, max_rows)
     if str(arrays.get("kind", "")) == KIND:
         raise InvalidValueError("samples", name, "is a saved motion; Motion.load reads it, to the last bit")
     if "q" not in arrays:

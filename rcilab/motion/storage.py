@@ -12,6 +12,7 @@ import numpy as np
 from rcilab.arrays import as_number
 from rcilab.cycle_file import Column, write_csv
 from rcilab.errors import InvalidValueError, VersionMismatchError
+from rcilab.file_bounds import MOST_ROWS, ROW_BYTES, require_bytes, require_max_rows, require_rows
 from rcilab.motion.archive import read_arrays
 from rcilab.motion.motion import Motion
 from rcilab.motion.piecewise import PiecewisePolynomial
@@ -74,21 +75,22 @@ def _require_suffix(file: str | PathLike[str]) -> str:
     return suffix
 
 
-def load_motion(file: str | PathLike[str] | BinaryIO) -> Motion:
-    """Returns the motion in a file.
+def load_motion(file: str | PathLike[str] | BinaryIO, max_rows: int = MOST_ROWS) -> Motion:
+    """Returns the motion in a file; see `Motion.load`.
 
     Raises:
-        InvalidValueError: There is no such file, or it holds no sound motion.
+        InvalidValueError: There is no such file, it holds no sound motion, or too long a one.
         VersionMismatchError: It was written by another version of this format.
     """
+    require_max_rows(max_rows)
     if not isinstance(file, str | PathLike):
         _require_stream(file, "read")
     elif Path(file).suffix.lower() == ".csv":
         from rcilab.motion.samples import load_rows
 
-        return load_rows(file)
+        return load_rows(file, max_rows)
     name = fspath(file) if isinstance(file, str | PathLike) else "stream"
-    content = _read(file, name)
+    content = _read(file, name, max_rows)
     if str(content.get("kind", "")) != KIND:
         found = ", ".join(content) or "nothing"
         raise InvalidValueError("motion file", name, f"holds no motion (found: {found}); save one with Motion.save")
@@ -99,7 +101,7 @@ def load_motion(file: str | PathLike[str] | BinaryIO) -> Motion:
         raise VersionMismatchError(f"motion file {name!r}", found, VERSION, advice)
     try:
         curve = PiecewisePolynomial(content["breaks"], content["coefficients"])
-        return Motion(
+        motion = Motion(
             polynomial=curve,
             goal=content["goal"],
             law=str(content["law"]),  # type: ignore[arg-type]  # Motion checks it.
@@ -115,19 +117,20 @@ def load_motion(file: str | PathLike[str] | BinaryIO) -> Motion:
     except (TypeError, ValueError) as error:
         problem = "holds a damaged motion: breaks and coefficients are not all numbers"
         raise InvalidValueError("motion file", name, problem) from error
+    require_rows(len(motion), max_rows, "motion file", name)
+    return motion
 
 
-def _read(file: str | PathLike[str] | BinaryIO, name: str) -> dict[str, np.ndarray]:
-    if isinstance(file, str | PathLike):
-        content = read_whole(Path(file), "motion file")
-    else:
-        content = file.read()
+def _read(file: str | PathLike[str] | BinaryIO, name: str, max_rows: int) -> dict[str, np.ndarray]:
+    most = max_rows * ROW_BYTES + 1
+    content = read_whole(Path(file), "motion file", most) if isinstance(file, str | PathLike) else file.read(most)
     if not content:
         raise InvalidValueError("motion file", name, "cannot be read as a motion: it is empty")
     if not content.startswith(_SIGNATURES):
         raise InvalidValueError("motion file", name, "cannot be read as a motion: Motion.save did not write it")
     problem = "cannot be read as a motion: it is damaged, or holds something else; save the motion again"
-    return read_arrays(content, "motion file", name, problem)
+    require_bytes(len(content), max_rows, "motion file", name)
+    return read_arrays(content, "motion file", name, problem, max_rows)
 
 
 def _require_stream(file: object, method: str) -> None:

@@ -1,15 +1,21 @@
-"""Tables in text, with the line of everything that is wrong."""
+"""Tables in text, with the line of everything that is wrong; a line is in memory once, as numbers."""
 
 from __future__ import annotations
 
 import csv
 import math
+from array import array
+from collections.abc import Iterator
 from dataclasses import dataclass
+from io import StringIO
 
 import numpy as np
 
 from rcilab.arrays import Array
 from rcilab.errors import InvalidValueError
+from rcilab.file_bounds import require_rows
+
+_LONGEST_LINE = 65_536  # Characters. A choice: a line of ours has some hundreds.
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,15 +28,17 @@ class Table:
     """Names of the columns, when the first line names them."""
     header_line: int
     """Its line, from 1; 0 without one."""
-    rows: list[list[str]]
-    """At least one, all of the same length."""
+    values: Array
+    """Shape (N, columns), at least one row; NaN where a cell holds no number."""
     lines: list[int]
     """Line of each row, from 1."""
+    text: str
+    """Where all of it was read from."""
 
     @property
     def columns(self) -> int:
         """Number of columns."""
-        return len(self.rows[0])
+        return self.values.shape[1]
 
     def column(self, index: int) -> Array:
         """Returns the numbers in a column, counted from 0, shape (N,).
@@ -38,17 +46,19 @@ class Table:
         Raises:
             InvalidValueError: A cell holds no finite number; the message names its line.
         """
-        numbers = [_number(row[index]) for row in self.rows]
-        for line, row, number in zip(self.lines, self.rows, numbers, strict=True):
-            if number is None or not math.isfinite(number):
-                problem = f"in column {index + 1} is no finite number; decimals need a point"
-                raise InvalidValueError(f"{self.name}, line {line}", row[index], problem).coded(
-                    "table_cell", column=index + 1
-                )
-        return np.array(numbers, dtype=np.float64)
+        numbers = self.values[:, index]
+        wrong = np.flatnonzero(~np.isfinite(numbers))
+        if wrong.size:
+            line = self.lines[int(wrong[0])]
+            cell = next(_cells(text, _mark_of(self.text)) for number, text in _lines(self.text) if number == line)[
+                index
+            ]
+            problem = f"in column {index + 1} is no finite number; decimals need a point"
+            raise InvalidValueError(f"{self.name}, line {line}", cell, problem).coded("table_cell", column=index + 1)
+        return numbers
 
 
-def read_table(content: bytes, name: str) -> Table:
+def read_table(content: bytes, name: str, max_rows: int) -> Table:
     """Returns the table in a text: columns parted by semicolons, commas, tabs or blanks, whichever the first line has.
 
     Empty lines and lines that begin with # are passed over. The first line is a header if no cell of it is a number.
@@ -56,9 +66,10 @@ def read_table(content: bytes, name: str) -> Table:
     Args:
         content: The text, UTF-8.
         name: What to call it in an error.
+        max_rows: How many rows it may have.
 
     Raises:
-        InvalidValueError: It is no text, has no rows, or a line has not as many columns as the first.
+        InvalidValueError: It is no text, has no rows or too many, or a line has not as many columns as the first.
     """
     try:
         text = content.decode("utf-8-sig")
@@ -68,25 +79,48 @@ def read_table(content: bytes, name: str) -> Table:
         raise InvalidValueError(f"{name}, line {line}", content[error.start : error.end], problem).coded(
             "table_no_text", file=name, line=line
         ) from error
-    lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip()]
-    lines = [(number, line) for number, line in lines if not line.lstrip().startswith("#")]
-    if not lines:
-        raise InvalidValueError("samples", name, "holds no rows").coded("table_empty", file=name)
-    mark = next((mark for mark in ";,\t" if mark in lines[0][1]), None)
-    rows = [(number, _cells(line, mark)) for number, line in lines]
-    header_line, header = 0, None
-    if all(_number(cell) is None for cell in rows[0][1]):
-        header_line, header = rows[0]
-        rows = rows[1:]
-        if not rows:
-            raise InvalidValueError("samples", name, "holds no rows below its header").coded("table_empty", file=name)
-    columns = len(header if header is not None else rows[0][1])
-    for number, cells in rows:
+    rows = text.count("\n") + 1
+    if rows > max_rows + 1000:  # Comments and a header; what counts is counted below.
+        require_rows(rows, max_rows, "samples", name)
+    mark = _mark_of(text)
+    header, header_line, columns = None, 0, 0
+    values, lines = array("d"), array("q")
+    for number, line in _lines(text):
+        if len(line) > _LONGEST_LINE:
+            raise InvalidValueError(
+                f"{name}, line {number}", len(line), f"characters are more than a line has, {_LONGEST_LINE}"
+            ).coded("table_line", count=len(line), most=_LONGEST_LINE)
+        cells = _cells(line, mark)
+        numbers = [_number(cell) for cell in cells]
+        if columns == 0:
+            columns = len(cells)
+            if all(math.isnan(value) and not _says_nan(cell) for cell, value in zip(cells, numbers, strict=True)):
+                header, header_line = cells, number
+                continue
         if len(cells) != columns:
             raise InvalidValueError(
                 f"{name}, line {number}", len(cells), f"columns; the first line has {columns}"
             ).coded("table_columns", count=columns)
-    return Table(name, header, header_line, [cells for _, cells in rows], [number for number, _ in rows])
+        values.extend(numbers)
+        lines.append(number)
+    if not lines:
+        below = " below its header" if header is not None else ""
+        raise InvalidValueError("samples", name, f"holds no rows{below}").coded("table_empty", file=name)
+    require_rows(len(lines), max_rows, "samples", name)
+    return Table(name, header, header_line, np.array(values).reshape(-1, columns), lines.tolist(), text)
+
+
+def _lines(text: str) -> Iterator[tuple[int, str]]:
+    """Yields the lines that count and their numbers, from 1."""
+    for number, line in enumerate(StringIO(text, newline=None), 1):
+        if (line := line.strip("\r\n")).strip() and not line.lstrip().startswith("#"):
+            yield number, line
+
+
+def _mark_of(text: str) -> str | None:
+    """Returns what parts the columns; None: blanks."""
+    first = next(_lines(text), (0, ""))[1]
+    return next((mark for mark in ";,\t" if mark in first), None)
 
 
 def _cells(line: str, mark: str | None) -> list[str]:
@@ -94,8 +128,12 @@ def _cells(line: str, mark: str | None) -> list[str]:
     return [cell.strip().strip('"').strip() for cell in cells]
 
 
-def _number(cell: str) -> float | None:
+def _number(cell: str) -> float:
     try:
         return float(cell)
     except ValueError:
-        return None
+        return math.nan
+
+
+def _says_nan(cell: str) -> bool:
+    return cell.lower().lstrip("+-") == "nan"

@@ -35,6 +35,7 @@ from numpy.typing import NDArray
 
 from rcilab.cycle_file import OTHER_STATE_FIELDS, STATE_FIELDS, cycle_dtype
 from rcilab.errors import InvalidValueError, RcilabError
+from rcilab.file_bounds import MOST_ROWS, require_max_rows, require_rows
 from rcilab.model import load_model
 from rcilab.motion.motion import Motion
 from rcilab.recording.blocks import Block, decode_blocks, encode_block, encode_header
@@ -52,7 +53,7 @@ BLOCK_CYCLES = 256  # A choice: what a crash may cost at most, about a quarter o
 
 _LATER = {"braking", *STATE_FIELDS}  # What the first versions did not record.
 _ROWS = struct.Struct("<I")
-_MOST_ROWS = 1_000_000  # In one block: half a gigabyte; a choice.
+_LARGEST_ROW = 4096  # [bytes] A choice: a cycle with all that the state has takes a third of it.
 
 
 class RunWriter:
@@ -197,32 +198,35 @@ def write_run(run: Run, stream: IO[bytes]) -> None:
     writer.finish(stopped=run.stopped, truncated=run.truncated, paced=run.paced)
 
 
-def load_run(file: str | PathLike[str]) -> Run:
+def load_run(file: str | PathLike[str], *, max_rows: int = MOST_ROWS) -> Run:
     """Returns the run in a `.rcirun` file; of one that was cut off, all up to its last whole block.
 
     Args:
         file: The file's name.
+        max_rows: How many cycles it may hold: 17 minutes.
 
     Returns:
         The run. `is_complete` is False when the file was cut off.
 
     Raises:
-        InvalidValueError: There is no such file, it holds no run, or not even its beginning is whole.
+        InvalidValueError: There is no such file, it holds no run or too long a one, or not even its beginning is whole.
         VersionMismatchError: It was written by another version of this format.
     """
     name = fspath(file)
-    return decode_run(read_whole(Path(name), "run file"), name)
+    content = read_whole(Path(name), "run file", require_max_rows(max_rows) * _LARGEST_ROW + 1)
+    return decode_run(content, name, max_rows=max_rows)
 
 
-def decode_run(content: bytes, name: str = "stream") -> Run:
+def decode_run(content: bytes, name: str = "stream", *, max_rows: int = MOST_ROWS) -> Run:
     """Returns the run in the bytes of a `.rcirun` file; see `load_run`."""
     blocks = decode_blocks(content, name)
     if not blocks or blocks[0].kind != "HEAD":
         raise InvalidValueError("run file", name, "ends before its first block; nothing was recorded in it").coded(
             "run_empty", file=name
         )
+    require_rows(sum(_count_cycles(block) for block in blocks), max_rows, "run file", name)
     try:
-        return _build(blocks)
+        return _build(blocks, max_rows)
     except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RecursionError) as error:
         raise InvalidValueError("run file", name, f"is damaged: {error}").coded("run_damaged", file=name) from error
     except (RcilabError, zlib.error, struct.error) as error:
@@ -246,11 +250,18 @@ def report_facts(report: Report) -> list[dict[str, Any]]:
     ]
 
 
-def _build(blocks: tuple[Block, ...]) -> Run:
+def _count_cycles(block: Block) -> int:
+    """Returns how many cycles a block says that it holds."""
+    return _ROWS.unpack_from(block.payload)[0] if block.kind == "CYCL" and len(block.payload) >= _ROWS.size else 0
+
+
+def _build(blocks: tuple[Block, ...], max_rows: int) -> Run:
     head = json.loads(blocks[0].payload)
     dtype = np.dtype([(name, kind, tuple(shape)) for name, kind, shape in head["fields"]])
     if dtype.itemsize != head["bytes"]:
         raise ValueError(f"a cycle takes {head['bytes']} bytes, its fields {dtype.itemsize}")
+    if dtype.itemsize > _LARGEST_ROW:
+        raise ValueError(f"a cycle takes {dtype.itemsize} bytes; {_LARGEST_ROW} are the most")
     parts = [_decode_cycles(block.payload, dtype) for block in blocks if block.kind == "CYCL"]
     cycles = _as_known(np.concatenate(parts) if parts else np.zeros(0, dtype))
     cycles.flags.writeable = False
@@ -261,7 +272,7 @@ def _build(blocks: tuple[Block, ...]) -> Run:
     if not isinstance(stopped, str | None):
         raise TypeError("why it was stopped is no text")
     return Run(
-        plan=Motion.load(BytesIO(plans[-1])) if plans else None,
+        plan=Motion.load(BytesIO(plans[-1]), max_rows=max_rows) if plans else None,
         cycles=cycles,
         stopped=stopped,
         truncated=tail.get("truncated", False),
@@ -299,8 +310,6 @@ def _written(dtype: np.dtype[np.void]) -> dict[str, np.dtype[Any]]:
 
 def _decode_cycles(payload: bytes, dtype: np.dtype[np.void]) -> NDArray[np.void]:
     (rows,) = _ROWS.unpack_from(payload)
-    if rows > _MOST_ROWS:
-        raise ValueError(f"a block says that it holds {rows} cycles; {_MOST_ROWS} are the most")
     size = rows * dtype.itemsize
     data = zlib.decompressobj().decompress(payload[_ROWS.size :], size + 1)
     planes = np.frombuffer(data, np.uint8).reshape(dtype.itemsize, rows)

@@ -188,7 +188,7 @@ def test_what_a_stranger_wrote_into_a_file_is_shown_and_not_run():
         ("TAIL", lambda: b'{"stopped": 7}', "no text"),
         ("TAIL", lambda: b"[1]", "is damaged"),
         ("TAIL", lambda: b"[" * 100_000, "is damaged"),
-        ("CYCL", lambda: struct.pack("<I", 4_000_000_000) + zlib.compress(b""), "are the most"),
+        ("CYCL", lambda: struct.pack("<I", 4_000_000_000) + zlib.compress(b""), "are more than 1000000"),
         ("CYCL", lambda: struct.pack("<I", 1) + zlib.compress(bytes(50_000_000)), "is damaged"),
     ],
 )

@@ -34,7 +34,7 @@ class ProgramActions:
 
     def __init__(self, store: Store, session: Session, goal: GoalActions) -> None:
         self._store, self._session = store, session
-        self._planner: Background[Job, Plan | Message] = Background("program")
+        self._planner: Background[Job, Plan] = Background("program")
         self._shelves = Shelves(store, self._drop_planning)
         self.editing = EditActions(store, session, goal, self._shelves)
 
@@ -145,11 +145,8 @@ class ProgramActions:
         plan, slowed = self._store.state.plan, self._store.state.check.slowed
         return slowed is not None and slowed.draft is None and plan is not None and plan.program is not None
 
-    def _finish(self, job: Job, result: Plan | Message | RcilabError) -> None:
+    def _finish(self, job: Job, result: Plan | RcilabError) -> None:
         steps = job.draft.steps
-        if isinstance(result, Message):
-            self._shelves.set(tone="bad", answer=result, failed=None, planned=None)
-            return
         if isinstance(result, RcilabError):
             number = result.waypoint if isinstance(result, PlanningError) else None
             failed = None if number is None else steps[number - 1].key

@@ -11,9 +11,8 @@ from rcilab.motion.joint import JointLaw
 from rcilab.motion.program import Program
 from rcilab.posing.planning import Plan, picture
 from rcilab.safety_box import SafetyBox
-from rcilab.supervisor.layout import MOTION_TIME
+from rcilab.supervisor.layout import MOTION_ROWS
 from rcilab.workbench.program.draft import Draft
-from rcilab.workbench.text import Message, message
 
 PROGRAM_LAW: JointLaw = "torque_rate_limited"
 """How programs run: they may take a hundredth of their time longer to keep what the manual recommends."""
@@ -36,8 +35,8 @@ class Job:
     """The safety box to judge with."""
 
 
-def plan_job(job: Job, tell: Tell) -> Plan | Message:
-    """Returns the plan of a program, or that it takes longer than any motion may."""
+def plan_job(job: Job, tell: Tell) -> Plan:
+    """Returns the plan of a program."""
     from rcilab.conformance import check
     from rcilab.motion import plan_program
 
@@ -48,10 +47,9 @@ def plan_job(job: Job, tell: Tell) -> Plan | Message:
         rounds=job.rounds,
         law=PROGRAM_LAW,
         progress=lambda part: tell(_MOTION * part),
+        max_rows=MOTION_ROWS,
     )
     tell(_MOTION)
-    if motion.duration > MOTION_TIME:
-        return message("program.long", duration=f"{motion.duration:.0f}", most=f"{MOTION_TIME:.0f}")
     report = check(motion, job.model, start=job.here, box=job.box, distance=None)
     plan = replace(picture(job.model, motion, report, job.box), program=job.program)
     tell(_JUDGED)
