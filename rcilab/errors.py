@@ -220,7 +220,9 @@ class InvalidValueError(UsageError, ValueError):
 
     def __init__(self, name: str, value: object, requirement: str) -> None:
         text = repr(value)
-        super().__init__(f"{name}: {text if len(text) < 120 else text[:117] + '...'} {requirement}")
+        said = text if len(text) < 120 else text[:117] + "..."
+        is_missing = text in ("None", "nothing") and requirement.startswith("is missing")
+        super().__init__(f"{name} {requirement}" if is_missing else f"{name}: {said} {requirement}")
         self.name = name
         self.value = value
         self.requirement = requirement

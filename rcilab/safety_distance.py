@@ -43,7 +43,7 @@ class SafetyDistance:
                 continue
             number = as_number(value, name, "m")
             if not isfinite(number):
-                raise InvalidValueError(name, number, "must be finite, [m]")
+                raise InvalidValueError(name, number, "must be finite [m]")
             if number < 0.0 and name != "floor_height":
                 raise InvalidValueError(name, number, "m must not be below 0")
             object.__setattr__(self, name, number)

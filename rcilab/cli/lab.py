@@ -14,11 +14,16 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "lab",
         help="open JupyterLab on the lessons",
         description=f"Opens JupyterLab on your own copies of the lessons, in {FOLDER} in your home directory, or on a "
-        "directory of yours. A copy that you have edited is never overwritten: a newer lesson goes beside it. It "
-        "listens on this machine only and asks for the token in the address it prints. Ctrl-C twice ends it.",
+        "directory of yours as it is. A copy that you have edited is never overwritten: a newer lesson goes beside "
+        "it. It listens on this machine only and asks for the token in the address it prints. Ctrl-C twice ends it.",
     )
     where = parser.add_mutually_exclusive_group()
-    where.add_argument("directory", nargs="?", type=Path, help=f"your notebooks (default: ~/{FOLDER})")
+    where.add_argument(
+        "directory",
+        nargs="?",
+        type=Path,
+        help=f"your own notebooks, as they are (default: ~/{FOLDER}, with the lessons)",
+    )
     where.add_argument("--in-place", action="store_true", help="the lessons themselves, to write on them as an author")
     parser.add_argument("--port", type=int, help="TCP port (default: 8888 or the next free one)")
     parser.add_argument("--no-browser", action="store_true", help="only print the address")
@@ -34,6 +39,7 @@ def run(args: argparse.Namespace) -> int:
     require_lab(allow_root=args.allow_root)  # Before anything is copied.
     if args.directory is not None:
         directory = args.directory
+        print(f"notebooks: {directory}, as it is; leave the directory out for the lessons, in ~/{FOLDER}")
     elif args.in_place:
         directory = find_lessons()
         print(f"lessons: {directory}, in place")

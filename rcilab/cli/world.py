@@ -29,7 +29,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     parser.add_argument("address", metavar="ADDRESS", help="world port, HOST:PORT, as the controller prints it")
     parser.add_argument("request", metavar="REQUEST", help="what happens, such as push, place_box, press or status")
-    parser.add_argument("fields", nargs="*", metavar="FIELD=VALUE", help="what it needs; values are JSON, or a word")
+    parser.add_argument(
+        "fields", nargs="*", metavar="FIELD=VALUE", default=[], help="what it needs; values are JSON, or a word"
+    )
     parser.set_defaults(run=run)
 
 

@@ -33,7 +33,7 @@ class JointFriction:
         for name, unit in (("viscous", "N m s/rad"), ("coulomb", "N m"), ("offset", "N m")):
             values = as_vector(getattr(self, name), n, f"{name} friction", unit)
             if name != "offset" and (values < 0.0).any():
-                raise InvalidValueError(f"{name} friction", values.tolist(), f"must not be negative, [{unit}]")
+                raise InvalidValueError(f"{name} friction", values.tolist(), f"must not be negative [{unit}]")
             object.__setattr__(self, name, values)
 
     def torque(self, dq: Array) -> Array:

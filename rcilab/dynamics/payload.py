@@ -6,9 +6,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from rcilab.arrays import Matrix, Vector3, as_vector, frozen
+from rcilab.arrays import Matrix, Vector3, as_number, as_vector, frozen
 from rcilab.errors import InvalidValueError
 
+_HEAVIEST = 100.0  # [kg] A choice: more than ten times what an xMate can carry. Grams are above it.
+_FARTHEST = 5.0  # [m] A choice: from the flange; millimetres are above it.
 _LARGEST = 100.0  # [kg m^2] A choice: a hundred times that of anything an xMate can carry.
 
 
@@ -29,9 +31,9 @@ class Payload:
 
     def __post_init__(self) -> None:
         """Checks the values and makes them read-only."""
-        mass = float(as_vector([self.mass], 1, "load mass", "kg")[0])
-        if mass < 0.0:
-            raise InvalidValueError("load mass", mass, "must not be negative, [kg]")
+        mass = as_number(self.mass, "load mass", "kg")
+        if not 0.0 <= mass <= _HEAVIEST:
+            raise InvalidValueError("load mass", mass, f"must be from 0 to {_HEAVIEST:g} [kg]")
         if mass == 0.0 and np.any(np.asarray(self.inertia)):
             raise InvalidValueError("load inertia", self.inertia, "must be zero: a load without mass has none")
         inertia = as_vector(np.ravel(self.inertia), 9, "load inertia", "kg m^2").reshape(3, 3)
@@ -39,7 +41,12 @@ class Payload:
             raise InvalidValueError("load inertia", inertia.tolist(), "must be symmetric")
         inertia = _nearest_possible(0.5 * inertia + 0.5 * inertia.T)
         object.__setattr__(self, "mass", mass)
-        object.__setattr__(self, "center_of_mass", as_vector(self.center_of_mass, 3, "load centre of mass", "m"))
+        center = as_vector(self.center_of_mass, 3, "load centre of mass", "m")
+        if np.abs(center).max() > _FARTHEST:
+            raise InvalidValueError(
+                "load centre of mass", center.tolist(), f"is farther than {_FARTHEST:g} m; give metres"
+            )
+        object.__setattr__(self, "center_of_mass", center)
         object.__setattr__(self, "inertia", frozen(inertia))
 
     def __repr__(self) -> str:

@@ -21,6 +21,9 @@ from rcilab.robots.description import RobotDescription
 from rcilab.safety_box import SafetyBox, active_box
 from rcilab.spatial import Pose
 
+_MOST_PSI = 4.0 * math.pi
+"""No arm angle is as large, [rad]: whoever gives more means degrees."""
+
 
 class ReachingArm(MovingArm):
     """The geometry and the joint limits of an arm with its tool. Immutable.
@@ -64,7 +67,9 @@ class ReachingArm(MovingArm):
             raise InvalidValueError("pose", repr(pose), "must be finite in every element")
         guess = None if near is None else self._floats(near)
         if psi is not None and not math.isfinite(psi := as_number(psi, "psi", "rad")):
-            raise InvalidValueError("psi", psi, "must be finite, [rad]")
+            raise InvalidValueError("psi", psi, "must be finite [rad]")
+        if psi is not None and abs(psi) > _MOST_PSI:
+            raise InvalidValueError("psi", psi, "is more than two turns; it is wanted in rad")
         if psi is not None and self.n != 7:
             name = self.description.name
             problem = f"has no meaning for {name}: a 6-axis arm has no arm angle"

@@ -16,7 +16,7 @@ from rcilab.clock import CYCLE_TIME
 from rcilab.errors import InvalidValueError, PlanningError
 from rcilab.file_bounds import MOST_ROWS, require_max_rows
 from rcilab.model import RobotModel, require_model
-from rcilab.motion.blend import Blend, build_blend
+from rcilab.motion.blend import Blend, build_blend, turn
 from rcilab.motion.cartesian import plan_path
 from rcilab.motion.chain import build_chain
 from rcilab.motion.chain_motion import plan_chain
@@ -32,6 +32,8 @@ from rcilab.words.text import Remark
 
 _SHORTENED = 1e-6
 """How much shorter than asked a radius must be to be mentioned, [m]."""
+_SHARP = math.radians(150.0)
+"""Turn of the way at a waypoint from which on it is looked whether to stop takes less time than to blend. A choice."""
 _BLENDS = 0.3
 """Part of the work on a blended run that it takes to find the blends; about what was seen."""
 _GEOMETRY = 0.3
@@ -58,7 +60,8 @@ def plan_program(
 
     Which segment a row belongs to is in `motion.segment`, counted from 0: a segment ends in the middle of its blend,
     or, where the tool stops, with its dwell. A blend takes no more than half of a neighbouring segment; where the
-    radius is longer, it is shortened to what fits, and `motion.notes` says so.
+    radius is longer, it is shortened to what fits, and `motion.notes` says so; as it does where the way turns by 150
+    degrees or more and it is quicker to stop there than to blend, which is what is done then.
 
     Args:
         model: The arm; with its own tool, unless the program has one.
@@ -126,7 +129,8 @@ def plan_program(
     if approach is not None:
         track.add(_plan_move(model, approach, there, slow, "the way to the start", law))
     curves: list[_Curve] = []
-    for run in _runs(segments):
+    stops_at = partial(_is_quicker_to_stop, model, scale=speed, law=law, notes=track.notes)
+    for run in _runs(segments, stops_at):
         of_all = partial(_part_of_all, run[0].number, run[-1].number, count)
         curves.append(_plan_run(model, run, speed, track.notes, law, lambda part, of_all=of_all: tell(of_all(part))))
         tell(of_all(1.0))
@@ -173,18 +177,43 @@ def _require_stops(program: Program) -> None:
             ).coded("s_profile_blend", waypoint=number, blend=f"{1e3 * waypoint.blend:g}")
 
 
-def _runs(segments: list[Segment]) -> list[list[Segment]]:
-    """Returns the segments between full stops."""
+def _runs(segments: list[Segment], stops_at: Callable[[Segment, Segment], bool]) -> list[list[Segment]]:
+    """Returns the segments between full stops; asked is where a blend could be left out."""
     runs: list[list[Segment]] = []
     goes_on = False
-    for segment in segments:
-        if goes_on and not segment.stands:
+    for number, segment in enumerate(segments):
+        if goes_on and not segment.stands and not stops_at(segments[number - 1], segment):
             runs[-1].append(segment)
         else:
             runs.append([segment])
         waypoint = segment.waypoint
         goes_on = waypoint.blend > 0.0 and waypoint.dwell == 0.0 and not segment.stands
     return runs
+
+
+def _is_quicker_to_stop(
+    model: RobotModel, before: Segment, after: Segment, scale: float, law: JointLaw, notes: list[str]
+) -> bool:
+    """Returns whether a sharp corner takes less time without its blend, and notes that.
+
+    So it is where the way turns back: the blend comes close to a cusp.
+    """
+    angle = turn(model, before, after)
+    if angle < _SHARP:
+        return False
+
+    def duration(run: list[Segment]) -> float:
+        return float(_plan_run(model, run, scale, [], law, lambda part: None).breaks[-1])
+
+    try:
+        is_quicker = duration([before, after]) > duration([before]) + duration([after])
+    except PlanningError:  # What the blend cannot do; what the ways cannot do, is told when they are planned.
+        is_quicker = True
+    if is_quicker:
+        degrees = f"{math.degrees(angle):.0f}"
+        said = f"{before.label}: no blend, as the way turns by {degrees} deg there: to stop is quicker"
+        notes.append(Remark(said, "sharp", number=before.number, angle=degrees))
+    return is_quicker
 
 
 def _plan_move(

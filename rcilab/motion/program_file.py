@@ -43,8 +43,12 @@ def save_program(program: Program, file: str | PathLike[str]) -> None:
     """Writes a program as JSON.
 
     Raises:
-        InvalidValueError: The file cannot be written.
+        InvalidValueError: The name does not end in .json, or the file cannot be written.
     """
+    if not isinstance(file, str | PathLike):
+        raise InvalidValueError("program file", described(file), "is no file name")
+    if Path(fspath(file)).suffix.lower() != ".json":
+        raise InvalidValueError("program file", fspath(file), "must end in .json")
     try:
         with replacing(file) as stream:
             stream.write(program_text(program).encode())

@@ -8,6 +8,7 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, TypeAlias
 
+from rcilab.arrays import described
 from rcilab.cycle_file import write_csv, write_npz
 from rcilab.errors import InvalidValueError
 from rcilab.whole_file import replacing
@@ -32,6 +33,8 @@ def save_run(
     units: Units = USUAL,
 ) -> None:
     """Writes a run to a file; see `Run.save`."""
+    if not isinstance(file, str | PathLike):
+        raise InvalidValueError("file", described(file), "is no file name")
     path = Path(fspath(file))
     require_ending(path.suffix)
     try:

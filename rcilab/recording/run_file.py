@@ -33,6 +33,7 @@ from typing import IO, TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rcilab.arrays import described
 from rcilab.cycle_file import OTHER_STATE_FIELDS, STATE_FIELDS, cycle_dtype
 from rcilab.errors import InvalidValueError, RcilabError
 from rcilab.file_bounds import MOST_ROWS, require_max_rows, require_rows
@@ -212,6 +213,8 @@ def load_run(file: str | PathLike[str], *, max_rows: int = MOST_ROWS) -> Run:
         InvalidValueError: There is no such file, it holds no run or too long a one, or not even its beginning is whole.
         VersionMismatchError: It was written by another version of this format.
     """
+    if not isinstance(file, str | PathLike):
+        raise InvalidValueError("run file", described(file), "is no file name")
     name = fspath(file)
     content = read_whole(Path(name), "run file", require_max_rows(max_rows) * _LARGEST_ROW + 1)
     return decode_run(content, name, max_rows=max_rows)

@@ -180,7 +180,7 @@ class Conductor:
         self._scene.close()
         self.robot.close()
         self._export.close()
-        self._keepsake.drop()
+        self._keepsake.close(self._store.state)
 
     def act(self, request: requests.Request) -> None:
         """Carries out one request; what goes wrong becomes a sentence on the page."""
@@ -223,10 +223,11 @@ class Conductor:
 
     def _resume(self, kept: Kept) -> None:
         self._setup.restore(kept.setup)
-        self._goal.pose(kept.q)
+        if kept.q is not None:
+            self._goal.pose(kept.q)
         if kept.program is not None and kept.program.model == self._store.state.model.name:
             self._program.restore(kept.program)
-        self._store.say("good", message("notice.resumed"))
+        self._store.say("good", message("notice.program_back" if kept.q is None else "notice.resumed"))
 
     def _refuse(self, request: requests.Request) -> None:
         """Tells a page that it only watches, unless it has got the controls meanwhile."""

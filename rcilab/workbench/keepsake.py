@@ -1,4 +1,4 @@
-"""What a workbench had when it ended without being closed: goal, program and set-up come back with the next one."""
+"""What a workbench had comes back with the next one: the program; after a crash goal and set-up, too."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ _PAUSE = 1.0  # [s] A choice: between two writings, while somebody drags.
 class Kept:
     """What came back of one arm."""
 
-    q: JointVector
-    """The goal, shape (n,), [rad]."""
+    q: JointVector | None
+    """The goal, shape (n,), [rad]; None where the workbench was closed."""
     program: Program | None = None
     setup: RobotSetup = field(default_factory=RobotSetup)
     """Those parts of the set-up that were edited."""
@@ -60,7 +60,7 @@ class Keepsake:
         self._next = 0.0
 
     def recall(self, model: RobotModel) -> Kept | None:
-        """Returns what the workbench before kept of an arm, if it was not closed and the file can be understood."""
+        """Returns what the workbench before kept of an arm, if the file can be understood."""
         if self._file is None:
             return None
         try:
@@ -72,9 +72,10 @@ class Keepsake:
             if own is None:
                 return None
             program = None if own["program"] is None else Program.from_json(own["program"])
+            q = None if own.get("q") is None else frozen(as_vector(own["q"], model.n, "q", "rad"))
             setup = build_setup(own.get("setup") or {})
             setup.applied_to(model)  # A load that it cannot bear is not brought back.
-            return Kept(q=frozen(as_vector(own["q"], model.n, "q", "rad")), program=program, setup=setup)
+            return Kept(q=q, program=program, setup=setup)
         except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError, RcilabError):
             return None
 
@@ -109,12 +110,23 @@ class Keepsake:
             "program": None if program is None else program.to_json(),
             "setup": setup_facts(state.setup.wanted.only(state.setup.touched)),
         }
-        text = json.dumps({"format": _FORMAT, "version": _VERSION, "arms": self._arms})
         with suppress(OSError):
-            write_whole(self._file, text, survives_power_loss=False)
+            self._write(self._arms)
 
-    def drop(self) -> None:
-        """Forgets it all: the workbench was closed by somebody who wanted that."""
-        if self._file is not None:
-            with suppress(OSError):
+    def close(self, state: UiState) -> None:
+        """Forgets goals and set-ups: the workbench was closed by somebody who wanted that. Programs stay, as work."""
+        if self._file is None:
+            return
+        self._next = 0.0
+        self.keep(state)
+        programs = {name: {"program": own["program"]} for name, own in self._arms.items() if own.get("program")}
+        with suppress(OSError):
+            if programs:
+                self._write(programs)
+            else:
                 self._file.unlink(missing_ok=True)
+
+    def _write(self, arms: dict[str, Any]) -> None:
+        assert self._file is not None
+        text = json.dumps({"format": _FORMAT, "version": _VERSION, "arms": arms})
+        write_whole(self._file, text, survives_power_loss=False)

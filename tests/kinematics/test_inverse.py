@@ -214,3 +214,9 @@ def test_a_pose_with_a_joint_right_at_its_limit_is_refused_in_words() -> None:
     q[1] = model.limits.joint.upper[1]
     with pytest.raises(UnreachableError, match=r"at 120\.0 deg, right at its limit, and has to stay inside"):
         model.inverse(model.forward(q), psi=model.arm_angle(q))
+
+
+def test_an_arm_angle_in_degrees_is_refused():
+    model = load_model("xMatePro7")
+    with pytest.raises(InvalidValueError, match=r"psi: 30\.0 is more than two turns; it is wanted in rad"):
+        model.inverse(model.forward(model.home), psi=30)

@@ -104,8 +104,9 @@ def test_a_file_comes_back(tmp_path):
         Program.load(tmp_path / "b.json")
     with pytest.raises(InvalidValueError, match="cannot be read"):
         Program.load(tmp_path)
+    (tmp_path / "c.json").mkdir()
     with pytest.raises(InvalidValueError, match="cannot be written"):
-        PROGRAM.save(tmp_path)
+        PROGRAM.save(tmp_path / "c.json")
     with pytest.raises(InvalidValueError, match="is no file name"):
         Program.load(7)
 
@@ -182,7 +183,7 @@ GOOD = '{"type": "nullspace", "psi": 0.1}'
             '{"type": "nullspace", "psi": 4}',
             r"line 6, waypoint 2 \(nullspace\), psi: 4.0 must be from -3.1416 to 3.1416 \[rad\]",
         ),
-        ('{"type": "nullspace"}', r"waypoint 2 \(nullspace\), psi: nothing is missing: nullspace needs psi"),
+        ('{"type": "nullspace"}', r"waypoint 2 \(nullspace\), psi is missing: nullspace needs psi"),
         (
             '{"type": "nullspace",\n"psi": 0.1,\n"speed": 2}',
             r"line 8, waypoint 2 \(nullspace\), speed: 2.0 must be from 0.001 to 1 ",
@@ -196,11 +197,11 @@ GOOD = '{"type": "nullspace", "psi": 0.1}'
             'line 6: "psi" is there already, in line 6; keep one|is there already',
         ),
         ('{"type": "nullspace", "psi": 0.1, "q": [1]}', "q: .* has no meaning here; nullspace takes: psi, way, speed"),
-        ('{"psi": 0.1}', "line 6, waypoint 2, type: None is missing; known: joint, line"),
+        ('{"psi": 0.1}', "line 6, waypoint 2, type is missing; known: joint, line"),
         ('{"type": "spline"}', r"waypoint 2 \(spline\), type: 'spline' is unknown; known: joint, line"),
         ('{"type": 3}', "waypoint 2, type: 3.0 must be text"),
         ("[1, 2]", r"line 6: \[1.0, 2.0\] must be waypoint 2: an object"),
-        ('{"type": "line", "position": [0.5, 0, 0.5]}', r"wxyz: nothing is missing beside position"),
+        ('{"type": "line", "position": [0.5, 0, 0.5]}', r"wxyz is missing beside position"),
         (
             '{"type": "line", "position": [500, 0, 500], "wxyz": [1,0,0,0]}',
             "position: .* is beyond 10 m; millimetres divided",
@@ -212,7 +213,7 @@ GOOD = '{"type": "nullspace", "psi": 0.1}'
             '{"type": "line", "position": [0.5, 0, 0.5], "wxyz": [2,0,0,0]}',
             "wxyz: .* has length 2, must be 1 within 0.001",
         ),
-        ('{"type": "line"}', "target: nothing is missing: line needs q, or position and wxyz"),
+        ('{"type": "line"}', "target is missing: line needs q, or position and wxyz"),
         ('{"type": "line", "q": [0,0,0,0,0,0,0], "psi": 0.1}', "psi: 0.1 is a second arm angle"),
         ('{"type": "line", "q": [0,0,0,0,0,0,0], "wxyz": [1,0,0,0]}', "q: .* is a second target"),
         (
@@ -237,7 +238,7 @@ GOOD = '{"type": "nullspace", "psi": 0.1}'
             '{"type": "nullspace", "psi": 1, "orientation": "held"}',
             "orientation: 'held' has no meaning here; nullspace",
         ),
-        ('{"type": "arc", "q": [0,0,0,0,0,0,0]}', "via: nothing is missing: arc needs via"),
+        ('{"type": "arc", "q": [0,0,0,0,0,0,0]}', "via is missing: arc needs via"),
         ('{"type": "line" "q": 1}', 'line 6: "q" is neither a comma|is neither a comma nor the end of the object'),
         ('{"type": "line", q: 1}', "line 6: q is no key; a key is text in double quotes"),
         ('{"type" "line"}', "is no colon; one must follow the key 'type'"),
@@ -260,7 +261,7 @@ def test_what_is_wrong_with_a_waypoint_is_told_with_its_line_key_value_and_bound
         ('{"waypoints"', "line 1: the end of the text is no colon"),
         (lines(GOOD) + "{}", "line 8: { follows after the end|follows after the end of the first value"),
         (lines(GOOD, head='"format": "x", "version": 1'), "line 2, format: 'x' must be 'rcilab program'"),
-        (lines(GOOD, head='"version": 1'), 'format: None is missing; a program has "rcilab program"'),
+        (lines(GOOD, head='"version": 1'), 'format is missing; a program has "rcilab program"'),
         (lines(GOOD, model="kuka"), "line 3, model: 'kuka' is no robot: .*known robots: xMatePro3"),
         (
             lines(GOOD, model="xMate3", start=[0.1] * 6),
@@ -276,7 +277,7 @@ def test_what_is_wrong_with_a_waypoint_is_told_with_its_line_key_value_and_bound
             lines(GOOD, head='"format": "rcilab program", "version": 1, "name": "a\\nb"'),
             "line 2, name: .* must be text in one line",
         ),
-        ('{"format": "rcilab program", "version": 1, "start": [], "waypoints": []}', "model: None is missing"),
+        ('{"format": "rcilab program", "version": 1, "start": [], "waypoints": []}', "model is missing"),
         (lines(GOOD).replace(f"[\n    {GOOD}\n  ]", "[]"), "line 4, waypoints: 0 must be 1 to 10000"),
         (lines(GOOD).replace(f"[\n    {GOOD}\n  ]", "{}"), "line 4, waypoints: {} must be a list"),
         ("[" * 100_000, "opens more than 8 levels"),
@@ -328,3 +329,15 @@ def test_values_from_python_are_checked_as_well():
 def test_a_position_alone_is_no_target_and_the_error_says_what_is() -> None:
     with pytest.raises(InvalidValueError, match=r"target: \[0\.5, 0, 0\.3\] is not a target: give a Pose"):
         Waypoint.line([0.5, 0, 0.3])
+
+
+@pytest.mark.parametrize("name", ["motion.npz", "script.py", "plain"])
+def test_a_program_is_saved_as_json_and_never_over_another_kind_of_file(tmp_path, name):
+    file, model = tmp_path / name, load_model("xMatePro7")
+    program = Program(model=model.name, start=model.home, waypoints=(Waypoint.joint(model.home + 0.1),))
+    file.write_bytes(b"mine")
+    with pytest.raises(InvalidValueError, match=r"must end in \.json"):
+        program.save(file)
+    assert file.read_bytes() == b"mine"
+    with pytest.raises(InvalidValueError, match="is no file name"):
+        program.save(None)

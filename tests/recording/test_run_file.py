@@ -212,3 +212,10 @@ def test_the_delay_of_a_run_that_a_fault_ended_is_found_from_what_came_before_it
     run = build_run(cycles, plan=PLAN, model=MODEL)
     assert run.delay == delay
     assert run.largest_error < 1e-9
+
+
+def test_what_is_no_file_name_is_said_to_be_none():
+    with pytest.raises(InvalidValueError, match="run file: None is no file name"):
+        rcilab.load_run(None)
+    with pytest.raises(InvalidValueError, match="None is no file name"):
+        some_run().save(None)

@@ -1,4 +1,4 @@
-"""A workbench that is killed leaves its goal and its program to the next one; one that is closed leaves nothing."""
+"""A workbench that is killed leaves its goal, set-up and program to the next one; one that is closed its program."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def test_where_nothing_can_be_written_the_page_goes_on(tmp_path):
     keepsake = Keepsake(tmp_path / "file" / "kept.json")
     keepsake.keep(state_with_all())
     assert keepsake.recall(MODEL) is None
-    keepsake.drop()
+    keepsake.close(state_with_all())
 
 
 def test_the_next_workbench_at_the_port_has_goal_plan_and_program():
@@ -100,6 +100,13 @@ def test_the_next_workbench_at_the_port_has_goal_plan_and_program():
         bench.conductor.ask(requests.LoadProgram(name="mine.json", content=PROGRAM.to_json().encode()))
         wait_for(lambda: is_kept(file), what="the goal and the program to be written down")
         left = file.read_text()
+    with Workbench(WorkbenchConfig(port=port)) as bench:
+        assert bench.store.state.notice.text.code == "notice.program_back"
+        assert len(bench.store.state.program.draft.steps) == 2
+        assert not np.allclose(bench.store.state.goal.q, GOAL, atol=1e-3)
+        assert bench.store.state.setup.touched == frozenset()
+        bench.conductor.ask(requests.EditProgram(what="clear"))
+        wait_for(lambda: not bench.store.state.program.draft.steps, what="an empty program")
     assert not file.exists()
     file.write_text(left)  # As if it had been killed.
     with Workbench(WorkbenchConfig(port=port)) as bench:

@@ -503,3 +503,15 @@ def test_a_bug_in_the_planning_leaves_the_page_usable(square, monkeypatch):
         square.plan()
     assert square.state.busy is None
     assert square.program.progress is None
+
+
+def test_another_name_leaves_the_plan_as_it_is(square):
+    square.plan()
+    planned = square.program.planned
+    assert planned is square.program.draft
+    square.actions.editing.type_field(requests.TypeField(field="program.0.name", text="abc"))
+    assert square.program.draft.name == "abc"
+    assert square.program.planned is square.program.draft
+    assert outdated(square.state) is None
+    square.edit("undo")
+    assert square.program.draft.name == "square"

@@ -70,7 +70,8 @@ class LabPanel:
         pressed = "none" if world is None else world.button
         for name, button in self._buttons.items():
             button.disabled = not ours or name == pressed
-        said = text("world.not_ours", address=status.target) if not ours else text(f"safety.{pressed}_is")
+        nobody = text("world.nobody") if status.phase == "closed" else text("world.not_ours", address=status.target)
+        said = text(f"safety.{pressed}_is") if ours else nobody
         tone = "good" if ours and pressed == "none" else "warn"
         self._button.show(f'<p class="rl-verdict rl-{tone}">{esc(said)}</p>')
         for name, slider in self._sliders.items():
@@ -80,7 +81,7 @@ class LabPanel:
         self._way.handle.disabled = not ours or drive.pulled
         self._pull.visible, self._plug.visible = not drive.pulled, drive.pulled
         self._pull.disabled = self._plug.disabled = not ours
-        note = text("network.note") if ours else text("world.not_ours", address=status.target)
+        note = text("network.note") if ours else nobody
         self._note.show(f'<p class="rl-note">{esc(note)}</p>')
         self._noticed.show(noticed_html(state, status, text) if ours else "")
 

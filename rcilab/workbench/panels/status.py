@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from rcilab.faults import name_faults
 from rcilab.workbench.lease import PATIENCE, Lease
+from rcilab.workbench.run.driving import destination
 from rcilab.workbench.run.played import played_at
 from rcilab.workbench.run.readiness import is_moving, time_shown
 from rcilab.workbench.telling import phase_code, tell_status
@@ -55,6 +56,10 @@ def status_values(state: UiState, status: SupervisorStatus, text: Text, cursor_e
     return values
 
 
+def _target_name(state: UiState, text: Text) -> str:
+    return text(f"where.{state.plant}") if state.target == "virtual" else state.target
+
+
 def _chips(state: UiState, status: SupervisorStatus, text: Text) -> list[dict[str, Any]]:
     phase = text(phase_code(status))
     doing = text.say(state.busy) if state.busy is not None else phase
@@ -63,10 +68,10 @@ def _chips(state: UiState, status: SupervisorStatus, text: Text) -> list[dict[st
     mode = "—" if status.robot_mode is None else text(f"robot_mode.{status.robot_mode.name}")
     faults = text("bar.none") if not status.faults else name_faults(status.faults)
     connected = status.rate_hz > 0.0
-    lease = state.lease
+    lease, where = state.lease, destination(state, status)
     return [
         _chip(text, "model", state.model.name),
-        _chip(text, "where", text(f"where.{state.plant}") if state.target == "virtual" else state.target),
+        _chip(text, "where", text("destination.preview") if where == "preview" else _target_name(state, text)),
         _chip(
             text,
             "phase",

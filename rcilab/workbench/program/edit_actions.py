@@ -86,7 +86,7 @@ class EditActions:
         name = request.text.strip()
         good = name.isprintable() and len(name) <= LONGEST_NAME
         if self._shelves.answer(request.field, None if good else message("program.name_bad", most=LONGEST_NAME)):
-            self._shelves.change(replace(self._draft, name=name), self._shelves.state.selected)
+            self._shelves.rename(name)
 
     def _configuration(self, source: str) -> JointVector | None:
         """Returns the joint angles of the arm or of the goal; what they lack is said."""

@@ -77,6 +77,14 @@ class Shelves:
         if typed:
             self._store.update(problems=problems)
 
+    def rename(self, name: str) -> None:
+        """Gives the program another name, which changes no plan of it."""
+        state, shelf = self.state, self._shelf
+        shelf.past, shelf.future = [*shelf.past[-_UNDO_DEPTH:], self.draft], []
+        draft = replace(self.draft, name=name)
+        planned = draft if state.planned is state.draft else state.planned
+        self.set(draft=draft, planned=planned, can_undo=True, can_redo=False)
+
     def undo(self) -> None:
         """Takes the last change back."""
         if self._shelf.past:
