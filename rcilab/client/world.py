@@ -9,6 +9,7 @@ may be called from any thread, while a motion runs and from inside a callback, a
 
 from __future__ import annotations
 
+import select
 import socket
 import threading
 from collections.abc import Sequence
@@ -202,6 +203,8 @@ class World(Closing):
         return answer
 
     def _connect(self) -> socket.socket:
+        if self._socket is not None and _is_over(self._socket):
+            self._disconnect()  # We have said nothing for long, and somebody else wanted the place.
         if self._socket is None:
             self._socket = socket.create_connection(self._address, self._timeout)
             self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -221,6 +224,13 @@ class World(Closing):
         if self._socket is not None:
             self._socket.close()
             self._socket = None
+
+
+def _is_over(connection: socket.socket) -> bool:
+    """Returns whether the other side has closed a connection on which no answer is awaited."""
+    look = select.poll()
+    look.register(connection, select.POLLIN)
+    return bool(look.poll(0))
 
 
 def _numbers(value: ArrayLike, count: int, name: str, unit: str) -> tuple[float, ...]:

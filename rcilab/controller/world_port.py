@@ -1,15 +1,19 @@
 """The world port: a second listener, on loopback, through which things happen to the virtual robot from outside.
 
-Lines of JSON, see `rcilab.protocols.world`. Whoever sends a line that is no request gets one line that says why and is
-cut off, so that a web page's POST gets nowhere: its first line already is none, and what follows is not looked at.
+For the user who started the controller; other accounts of the machine are refused. A guest that says nothing may stay
+until somebody else wants its place. Lines of JSON, see `rcilab.protocols.world`. Whoever sends a line that is no
+request gets one line that says why and is cut off, so that a web page's POST gets nowhere: its first line already is
+none, and what follows is not looked at.
 """
 
 from __future__ import annotations
 
 import ipaddress
 import socket
+import time
 from collections.abc import Callable, Sequence
 
+from rcilab.controller.peer_user import is_ours
 from rcilab.errors import DecodeError, UsageError
 from rcilab.protocols.world import (
     LineReader,
@@ -21,6 +25,7 @@ from rcilab.protocols.world import (
 )
 
 MOST_GUESTS = 8  # At once; a choice. One script and one page need two.
+IDLE = 60.0  # [s] A choice: a guest that has been silent for so long gives its place to the next one.
 _FALLBACK = "127.0.0.1"  # For a controller that listens on an address which others can reach.
 _BYTES_AT_ONCE = 4096
 
@@ -32,15 +37,23 @@ class WorldPort:
         host: Address of the controller; the world port is there, too, if that is a loopback address.
         port: TCP port; 0 takes any free one.
         handle: Carries a request out.
+        clock: Returns the time, [s].
 
     Raises:
         UsageError: The port cannot be used.
     """
 
-    def __init__(self, host: str, port: int, handle: Callable[[WorldRequest], WorldAnswer]) -> None:
-        self._handle = handle
+    def __init__(
+        self,
+        host: str,
+        port: int,
+        handle: Callable[[WorldRequest], WorldAnswer],
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._handle, self._clock = handle, clock
         self._listener = _listen(host if ipaddress.ip_address(host).is_loopback else _FALLBACK, port)
         self._guests: dict[socket.socket, LineReader] = {}
+        self._heard: dict[socket.socket, float] = {}  # When each guest has said something last, [s].
         self.sockets: Sequence[socket.socket] = (self._listener,)
         """What to watch; another object whenever it changes."""
 
@@ -71,11 +84,17 @@ class WorldPort:
         except OSError:  # It was gone before we looked.
             return
         if len(self._guests) >= MOST_GUESTS:
+            self._drop_idle()
+        if len(self._guests) >= MOST_GUESTS:
             guest.close()
             return
         guest.setblocking(False)
         guest.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        self._guests[guest] = LineReader()
+        self._guests[guest], self._heard[guest] = LineReader(), self._clock()
+        if not is_ours(guest):
+            if self._answer(guest, Refused("this world port is for the user who started the controller"), 0):
+                self._drop(guest)
+            return
         self.sockets = (self._listener, *self._guests)
 
     def _read(self, guest: socket.socket) -> None:
@@ -88,6 +107,7 @@ class WorldPort:
         if not data:
             self._drop(guest)
             return
+        self._heard[guest] = self._clock()
         try:
             for line in self._guests[guest].feed(data):
                 request_id, request = decode_world_request(line)
@@ -109,9 +129,15 @@ class WorldPort:
             self._drop(guest)
         return is_sent
 
+    def _drop_idle(self) -> None:
+        """Lets go of the guest that has been silent the longest, if that was long."""
+        guest = min(self._heard, key=self._heard.__getitem__)
+        if self._clock() - self._heard[guest] > IDLE:
+            self._drop(guest)
+
     def _drop(self, guest: socket.socket) -> None:
         guest.close()
-        del self._guests[guest]
+        del self._guests[guest], self._heard[guest]
         self.sockets = (self._listener, *self._guests)
 
 

@@ -17,7 +17,7 @@ import signal
 import socket
 import sys
 import traceback
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from importlib import import_module
@@ -26,7 +26,6 @@ from pathlib import Path
 from rcilab.supervisor.fork_order import FIRST_FILES, MOST_FILES, TOLD, Order
 
 _NAME_SIZE = 15  # Of a process, in Linux.
-_FREE = 256  # Descriptors from here on are out of the way of those that an order names.
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,14 +113,23 @@ def _close(files: Sequence[int]) -> None:
 
 def _take_files(files: Sequence[int]) -> Order:
     """Returns the order, and gives the files that it came with the numbers by which they are known."""
-    kept = [fcntl.fcntl(file, fcntl.F_DUPFD_CLOEXEC, _FREE) for file in files]
+    order = Order.unpack(os.pread(files[0], os.fstat(files[0]).st_size, 0))
+    kept = [_away_from({1, 2, *order.descriptors}, file) for file in files]
     _close(files)
     text, channel, stdout, stderr, *others = kept
-    order = Order.unpack(os.pread(text, os.fstat(text).st_size, 0))
     for source, number in zip((stdout, stderr, *others), (1, 2, *order.descriptors), strict=True):
         os.dup2(source, number)
     _close([text, channel, stdout, stderr, *others])
     return order
+
+
+def _away_from(numbers: Collection[int], file: int) -> int:
+    """Returns another descriptor of a file, none of these numbers; few are free where `ulimit -n` is low."""
+    number = fcntl.fcntl(file, fcntl.F_DUPFD_CLOEXEC, 3)
+    while number in numbers:
+        os.close(number)
+        number = fcntl.fcntl(file, fcntl.F_DUPFD_CLOEXEC, number + 1)
+    return number
 
 
 def become(order: Order) -> None:

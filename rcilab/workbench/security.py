@@ -6,6 +6,7 @@ Who may come in through it is decided by `rcilab.views.gate`.
 from __future__ import annotations
 
 import errno
+import resource
 import socket
 
 from rcilab.errors import UsageError
@@ -13,6 +14,7 @@ from rcilab.model import RobotModel, load_model, require_rci
 from rcilab.workbench.access import is_local, require_token
 
 DEFAULT_PORT = 8080
+_FILES = 48  # Open ones: 22 with an idle arm, three more a page. A tuning value.
 
 
 def check_host(host: str, token: str | None) -> None:
@@ -40,11 +42,21 @@ def require_openable(host: str, token: str | None, target: str, model: str) -> R
         UsageError: The address needs a token, or the controller's is none.
     """
     check_host(host, token)
+    _require_files()
     if target != "virtual":
         from rcilab.client.address import parse_address
 
         parse_address(target)
     return require_rci(load_model(model))
+
+
+def _require_files() -> None:
+    """Takes as many open files as the page may need, or says that it may not."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if soft != resource.RLIM_INFINITY and soft < _FILES:
+        if hard != resource.RLIM_INFINITY and hard < _FILES:
+            raise UsageError(f"only {hard} files may be open, the page needs {_FILES}: run `ulimit -n {_FILES}` before")
+        resource.setrlimit(resource.RLIMIT_NOFILE, (_FILES, hard))
 
 
 def bind(host: str, port: int, token: str | None = None) -> socket.socket:

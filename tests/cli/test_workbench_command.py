@@ -128,3 +128,42 @@ def test_the_app_script_is_the_same_command():
     )
     assert done.returncode == 2
     assert "known robots" in done.stderr
+
+
+def limited(files: int) -> list[str]:
+    """The page's command with few file descriptors."""
+    start = f"import resource, runpy; resource.setrlimit(resource.RLIMIT_NOFILE, ({files}, {files})); "
+    return [sys.executable, "-c", start + "runpy.run_module('rcilab', run_name='__main__', alter_sys=True)"]
+
+
+def test_the_page_starts_with_64_file_descriptors():
+    process = subprocess.Popen(
+        [*limited(64), "--no-browser", "--port", "0", "--quality", "light"],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    try:
+        address = process.stdout.readline().split()[2]
+        end = time.monotonic() + 30.0
+        while "rcilab worker" not in names_of(children(process.pid)) and time.monotonic() < end:
+            time.sleep(0.05)
+        assert "rcilab worker" in names_of(children(process.pid)), "the control process runs"
+        with urllib.request.urlopen(address, timeout=10) as page:
+            assert page.status == 200
+        process.send_signal(signal.SIGINT)
+        _, errors = process.communicate(timeout=30)
+    finally:
+        process.kill()
+        process.wait()
+    assert (process.returncode, errors) == (0, "")
+
+
+def test_too_few_file_descriptors_get_one_sentence():
+    done = subprocess.run([*limited(40), "--no-browser"], capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 2
+    assert done.stderr == "rcilab: only 40 files may be open, the page needs 48: run `ulimit -n 48` before\n"
+
+
+def names_of(pids: list[int]) -> list[str]:
+    """What `top` shows for processes; those that have gone are left out."""
+    files = [Path(f"/proc/{pid}/comm") for pid in pids]
+    return [file.read_text().strip() for file in files if file.exists()]

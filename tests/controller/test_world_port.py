@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import json
+import os
 import socket
+import time
 from collections.abc import Iterator
+from contextlib import ExitStack, suppress
 
 import numpy as np
 import pytest
 
+from rcilab.client.world import World
+from rcilab.controller.world_port import MOST_GUESTS
 from rcilab.errors import InvalidValueError, UsageError
 from rcilab.protocols import rci
 from rcilab.protocols.world import LONGEST_LINE, NetworkFaults, Stall
@@ -119,6 +124,51 @@ def test_eight_guests_are_welcome_and_the_ninth_is_not(lockstep: Running) -> Non
     finally:
         for guest in guests:
             guest.__exit__()
+
+
+def test_who_holds_a_place_and_says_nothing_gives_it_to_the_next_and_comes_back(
+    lockstep: Running, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rcilab.controller.world_port.IDLE", 0.05)
+    assert lockstep.server.world_address is not None
+    host, _, port = lockstep.server.world_address.partition(":")
+    with World(host, int(port)) as world, ExitStack() as stack:
+        assert world.status().phase == "off"
+        idle = [stack.enter_context(Guest(lockstep)) for _ in range(MOST_GUESTS - 1)]
+        assert all(guest.ask(request="status")["ok"] for guest in idle)
+        time.sleep(0.1)
+        for _ in range(2 * MOST_GUESTS):
+            with Guest(lockstep) as guest:
+                assert guest.ask(request="status")["ok"]
+        assert world.status().phase == "off", "it has connected again by itself"
+
+
+@pytest.mark.skipif(os.getuid() != 0, reason="only root can become another user")
+def test_another_account_of_this_machine_is_refused(lockstep: Running) -> None:
+    assert lockstep.server.world_address is not None
+    host, _, port = lockstep.server.world_address.partition(":")
+    reading, writing = os.pipe()
+    child = os.fork()
+    if child == 0:
+        try:
+            os.setuid(65534)
+            with socket.create_connection((host, int(port)), timeout=PATIENCE) as link:
+                link.sendall(b'{"id": 1, "request": "press", "button": "estop"}\n')
+                said = b""
+                with suppress(ConnectionResetError):
+                    while part := link.recv(4096):
+                        said += part
+                os.write(writing, said)
+        finally:
+            os._exit(0)
+    os.waitpid(child, 0)
+    os.close(writing)
+    with os.fdopen(reading, "rb") as stream:
+        answer = json.loads(stream.read())
+    assert answer["ok"] is False
+    assert "for the user who started the controller" in answer["error"]
+    with Guest(lockstep) as guest:
+        assert guest.ask(request="status")["status"]["button"] == "none"
 
 
 def test_the_world_port_is_on_loopback_also_where_the_controller_is_not() -> None:
