@@ -1,4 +1,4 @@
-"""Sound input, spoilt: bits turned, parts cut out, doubled, exchanged, and words in it that mean something elsewhere."""
+"""Sound input, spoilt: bits turned, parts cut out, doubled or exchanged, and words that mean something elsewhere."""
 
 from __future__ import annotations
 
