@@ -157,16 +157,19 @@ class RunFile:
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._stream = path.open("wb")
-            self._writer = RunWriter(self._stream, dtype, **facts)
         except OSError as error:
             raise _unwritable(path, error) from error
+        try:
+            self._writer = RunWriter(self._stream, dtype, **facts)
+        except OSError as error:
+            raise self._given_up(error) from error
 
     def add(self, cycles: NDArray[np.void]) -> None:
         """Adds cycles."""
         try:
             self._writer.add(cycles)
         except OSError as error:
-            raise _unwritable(self.path, error) from error
+            raise self._given_up(error) from error
 
     def close(self, *, stopped: str | None = None, truncated: bool = False, plan: Motion | None = None) -> None:
         """Writes the end and closes the file; arguments as of `RunWriter.finish`."""
@@ -176,6 +179,12 @@ class RunFile:
                 os.fsync(self._stream.fileno())
         except OSError as error:
             raise _unwritable(self.path, error) from error
+
+    def _given_up(self, error: OSError) -> InvalidValueError:
+        """Closes the file as it is and returns what to raise."""
+        with suppress(OSError):
+            self._stream.close()  # It tries once more to write, and closes in any case.
+        return _unwritable(self.path, error)
 
     def discard(self) -> None:
         """Closes the file and takes it away: nothing was recorded."""

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import socket
-from contextlib import suppress
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from typing import Any
 
 import msgspec
@@ -95,6 +97,38 @@ def _enter(bench: Workbench) -> ClientConnection:
     )  # fmt: skip
     link.recv(timeout=30.0)
     return link
+
+
+@contextmanager
+def open_page(bench: Workbench, *, reads: bool = True) -> Iterator[ClientConnection]:
+    """A page that says where its camera is, as every browser does, and holds the controls; it answers in its bar.
+
+    Args:
+        bench: What to open.
+        reads: Whether it reads what the bar is told, and so shows that somebody is there.
+    """
+    before = set(bench.server.get_clients())
+    camera = next(m for m in _page_messages(bench) if b"ViewerCameraMessage" in m)
+    origin = {"Origin": f"http://127.0.0.1:{bench.port}"}
+    with (
+        _enter(bench) as link,
+        connect(f"ws://127.0.0.1:{bench.port}/rcilab/live", additional_headers=origin, max_size=None) as bar,
+    ):
+        link.send(camera)
+        wait(lambda: set(bench.server.get_clients()) != before, "the page")
+        (page,) = set(bench.server.get_clients()) - before
+        wait(lambda: page in bench.store.state.lease.pages, "the page to be listed")
+        bar.send(json.dumps({"kind": "hello", "page": page, "key": bench.live.introduce(page)}))
+
+        def answer() -> None:
+            with suppress(ConnectionClosed):
+                for said in bar:
+                    if "beat" in json.loads(said):
+                        bar.send('{"kind": "here"}')
+
+        if reads:
+            threading.Thread(target=answer, daemon=True).start()
+        yield link
 
 
 def fuzz_page(count: int, seed: int) -> None:
