@@ -93,7 +93,7 @@ def _enter(bench: Workbench) -> ClientConnection:
     protocol: Any = f"viser-v{viser.__version__}"
     link = connect(
         f"ws://127.0.0.1:{bench.port}/", additional_headers={"Origin": f"http://127.0.0.1:{bench.port}"},
-        subprotocols=[protocol], max_size=None,
+        subprotocols=[protocol], max_size=None, ping_interval=None,
     )  # fmt: skip
     link.recv(timeout=30.0)
     return link
@@ -112,7 +112,9 @@ def open_page(bench: Workbench, *, reads: bool = True) -> Iterator[ClientConnect
     origin = {"Origin": f"http://127.0.0.1:{bench.port}"}
     with (
         _enter(bench) as link,
-        connect(f"ws://127.0.0.1:{bench.port}/rcilab/live", additional_headers=origin, max_size=None) as bar,
+        connect(
+            f"ws://127.0.0.1:{bench.port}/rcilab/live", additional_headers=origin, max_size=None, ping_interval=None
+        ) as bar,
     ):
         link.send(camera)
         wait(lambda: set(bench.server.get_clients()) != before, "the page")

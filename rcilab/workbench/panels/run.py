@@ -116,7 +116,7 @@ class RunPanel:
         self._outcome.show("" if moving else outcome_html(state, status, text))
         self._plan.visible, self._to_target.visible = not is_program, is_program
         self._plan.disabled = self._to_target.disabled = moving or not is_connected(status)
-        self._buttons["recover"].disabled = status.phase not in ("fault", "crashed", "lost") or status.is_pressed
+        self._buttons["recover"].disabled = status.phase != "fault" or status.is_pressed
         self._buttons["power_on"].disabled = moving or status.powered is not False or status.is_pressed
         self._buttons["power_off"].disabled = moving or status.powered is not True
         self._faults.show(faults_html(status, text))
