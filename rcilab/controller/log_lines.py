@@ -2,12 +2,30 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import threading
 from collections import deque
+from collections.abc import Callable
 
 _MOST = 200  # Lines that wait; a tuning value: what a stream takes at once, and a person reads.
 _GRACE = 0.5  # [s] For the last lines, when the controller ends and nobody reads.
+
+
+class LineHandler(logging.Handler):
+    """Hands what the controller's own parts log to whoever writes lines, instead of to a stream.
+
+    Args:
+        write: Takes a line and never waits.
+    """
+
+    def __init__(self, write: Callable[[str], None]) -> None:
+        super().__init__()
+        self._write = write
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Takes one entry."""
+        self._write(record.getMessage())
 
 
 class LogLines:

@@ -13,6 +13,7 @@ one is the one to answer.
 
 from __future__ import annotations
 
+import logging
 import os
 from collections.abc import Callable
 
@@ -32,7 +33,7 @@ from rcilab.controller.endpoint import (
     StrangerHeard,
 )
 from rcilab.controller.faulty_network import FaultyNetwork
-from rcilab.controller.log_lines import LogLines
+from rcilab.controller.log_lines import LineHandler, LogLines
 from rcilab.controller.pace import Pace
 from rcilab.controller.plant import Plant
 from rcilab.controller.plants import build_plant
@@ -57,6 +58,7 @@ FAREWELL = 20  # [cycles] In which a client learns of the end from the error bit
 SLIP = 20  # [cycles] A motion that took so much longer than it should is worth a line.
 GRACE = 2.0  # [s] For the arm to come to rest when the controller shall end.
 _REFUSALS = 10.0  # [s] Clients that are refused are named once in this time, and then counted; a tuning value.
+_parts_log = logging.getLogger("rcilab.controller")
 _STDERR = 2
 _QUIET = (Phase.OFF, Phase.IDLE)
 _LOOK = 0.1  # [s] Between looks at whether the parent process still lives, or a stalled controller shall end.
@@ -106,6 +108,8 @@ class ControllerServer:
         if log is None:
             self._lines = LogLines(_STDERR)
             log = self._lines.write
+            self._handler = LineHandler(log)
+            _parts_log.addHandler(self._handler)
         self._log = log
         self._clock = SystemClock()
         self._pace = Pace(self._clock.now())
@@ -168,6 +172,7 @@ class ControllerServer:
                 leave_realtime()
             self.close()
             if self._lines is not None:
+                _parts_log.removeHandler(self._handler)
                 self._lines.close()
 
     def request_stop(self) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import signal
 import socket
@@ -12,7 +13,7 @@ import time
 import numpy as np
 import pytest
 
-from rcilab.controller.log_lines import LogLines
+from rcilab.controller.log_lines import LineHandler, LogLines
 from rcilab.model import load_model
 from rcilab.motion import plan_joint
 from rcilab.protocols import rci
@@ -89,3 +90,16 @@ def test_a_controller_whose_stderr_is_never_read_goes_on_and_ends_when_it_is_tol
                 time.sleep(2e-3)  # It takes one at a time; a queue that is full costs a second.
             process.send_signal(signal.SIGINT)
             assert process.wait(20.0) in (0, 130, -signal.SIGINT)
+
+
+def test_what_the_simulation_finds_odd_goes_the_way_of_all_lines(capfd: pytest.CaptureFixture[str]) -> None:
+    """A warning of MuJoCo comes in the middle of a cycle."""
+    lines: list[str] = []
+    handler, log = LineHandler(lines.append), logging.getLogger("rcilab.controller")
+    log.addHandler(handler)
+    try:
+        log.warning("MuJoCo: %s", "odd")
+    finally:
+        log.removeHandler(handler)
+    assert lines == ["MuJoCo: odd"]
+    assert capfd.readouterr().err == ""
