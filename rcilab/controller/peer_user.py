@@ -16,13 +16,20 @@ _HEADER = struct.Struct("=IHHII")  # struct nlmsghdr: length, type, flags, seque
 _ASKED = struct.Struct("=BBBxI")  # Family, protocol, extensions, states.
 _ENDS = struct.Struct(">HH16s16s")  # struct inet_diag_sockid: ports and addresses of the other end and of ours,
 _NO_COOKIE = struct.pack("=III", 0, 0xFFFFFFFF, 0xFFFFFFFF)  # interface, cookie.
-_FOUND = struct.Struct("=4x48x12xI")  # struct inet_diag_msg up to the user.
+_FOUND = struct.Struct("=4x48x12xII")  # struct inet_diag_msg up to user and inode.
 _ANY_STATE = 0xFFFFFFFF
 
 
-def peer_user(connection: socket.socket) -> int | None:
-    """Returns the id of the user whose process is at the other end of a TCP connection; None: the kernel is silent."""
-    (host, port), (own_host, own_port) = connection.getpeername(), connection.getsockname()
+def is_ours(connection: socket.socket) -> bool:
+    """Returns whether the user of this process is at the other end of a TCP connection, or root, or who called sudo.
+
+    Nobody is who has gone already: the kernel calls the user of a closed socket 0, which is root. Where it answers no
+    such questions at all, anybody on this machine may be.
+    """
+    try:
+        (host, port), (own_host, own_port) = connection.getpeername(), connection.getsockname()
+    except OSError:
+        return False
     ends = _ENDS.pack(port, own_port, socket.inet_aton(host), socket.inet_aton(own_host))
     asked = _ASKED.pack(socket.AF_INET, socket.IPPROTO_TCP, 0, _ANY_STATE) + ends + _NO_COOKIE
     try:
@@ -31,16 +38,13 @@ def peer_user(connection: socket.socket) -> int | None:
             kernel.sendto(_HEADER.pack(_HEADER.size + len(asked), _BY_FAMILY, _REQUEST, 1, 0) + asked, (0, 0))
             answer = kernel.recv(4096)
     except OSError:
-        return None
+        return True
     if len(answer) < _HEADER.size + _FOUND.size or _HEADER.unpack_from(answer)[1] != _BY_FAMILY:
-        return None
-    return int(_FOUND.unpack_from(answer, _HEADER.size)[0])
+        return False
+    user, inode = _FOUND.unpack_from(answer, _HEADER.size)
+    return inode != 0 and user in _allowed_users()
 
 
-def is_ours(connection: socket.socket) -> bool:
-    """Returns whether the user of this process is at the other end, or root, or who has called sudo.
-
-    Where the kernel does not say who it is, anybody on this machine may be.
-    """
-    user = peer_user(connection)
-    return user is None or user in (0, os.getuid(), int(os.environ.get("SUDO_UID", "0")))
+def _allowed_users() -> set[int]:
+    caller = os.environ.get("SUDO_UID", "")
+    return {0, os.getuid(), *([int(caller)] if caller.isascii() and caller.isdigit() else ())}

@@ -88,7 +88,8 @@ class Workbench:
             state = replayed(state, replay)
         self.store = Store(replace(state, runs=config.runs))
         self.session = Session(lambda error: self.store.say("bad", tell_error(error, self.session.status())))
-        keepsake = Keepsake(keepsake_file(self.port) if config.port else None)  # Any free port is nobody's own.
+        is_own = config.port and replay is None  # Any free port is nobody's own, and whoever replays looks at a run.
+        keepsake = Keepsake(keepsake_file(self.port) if is_own else None)
         self._presence = Presence()
         self.conductor = Conductor(self.store, self.session, self._deliver, keepsake, self._presence)
         self.server: viser.ViserServer

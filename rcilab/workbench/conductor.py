@@ -154,12 +154,14 @@ class Conductor:
         self._mailbox.put(request, _coalescing_key(request))
 
     def resume(self) -> None:
-        """Brings back what a workbench had that ended here without being closed; before `start`."""
+        """Brings back what the workbench before this one had; before `start`."""
         kept = self._keepsake.recall(self._store.state.model)
         if kept is not None:
             self._guard(lambda: self._resume(kept))
         for name, setup in self._keepsake.recall_setups(self._store.state.model).items():
             self.robot.remember_setup(name, setup)
+        for program in self._keepsake.recall_programs(self._store.state.model):
+            self._program.lay_aside(program)
 
     def start(self) -> None:
         """Starts the thread."""

@@ -90,6 +90,15 @@ class Keepsake:
                     found[name] = setup
         return found
 
+    def recall_programs(self, model: RobotModel) -> tuple[Program, ...]:
+        """Returns the programs of the other arms; after `recall`."""
+        found: list[Program] = []
+        for name, own in self._arms.items():
+            with suppress(ValueError, LookupError, TypeError, AttributeError, RecursionError, RcilabError):
+                if name != model.name and own["program"] is not None:
+                    found.append(Program.from_json(own["program"]))
+        return tuple(found)
+
     def keep(self, state: UiState) -> None:
         """Writes down what is new, at most once a second."""
         now = time.monotonic()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import socket
+import struct
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, suppress
@@ -13,6 +14,7 @@ import numpy as np
 import pytest
 
 from rcilab.client.world import World
+from rcilab.controller.peer_user import is_ours
 from rcilab.controller.world_port import MOST_GUESTS
 from rcilab.errors import InvalidValueError, UsageError
 from rcilab.protocols import rci
@@ -141,6 +143,44 @@ def test_who_holds_a_place_and_says_nothing_gives_it_to_the_next_and_comes_back(
             with Guest(lockstep) as guest:
                 assert guest.ask(request="status")["ok"]
         assert world.status().phase == "off", "it has connected again by itself"
+
+
+def test_guests_that_are_gone_before_they_are_looked_at_disturb_nobody(lockstep: Running) -> None:
+    """A reset connection has no other end any more."""
+    for _ in range(50):
+        with Guest(lockstep) as guest:
+            guest.socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+    with Guest(lockstep) as guest:
+        assert guest.ask(request="status")["ok"]
+
+
+@pytest.mark.skipif(os.getuid() != 0, reason="only root can become another user")
+@pytest.mark.parametrize(("user", "stays", "allowed"), [(0, True, True), (65534, True, False), (65534, False, False)])
+def test_an_account_is_not_taken_for_root_because_it_has_hung_up(user: int, stays: bool, allowed: bool) -> None:
+    """The kernel says of a closed socket that it is root's."""
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        ready, done = os.pipe(), os.pipe()
+        child = os.fork()
+        if child == 0:
+            with suppress(BaseException):
+                os.setuid(user)
+                link = socket.socket()
+                link.connect(listener.getsockname())
+                if not stays:
+                    link.close()
+                os.write(ready[1], b"!")
+                os.read(done[0], 1)
+            os._exit(0)
+        os.read(ready[0], 1)
+        guest, _ = listener.accept()
+        with guest:
+            if not stays:
+                assert guest.recv(1) == b"", "it has hung up"
+            assert is_ours(guest) is allowed
+        os.write(done[1], b"!")
+        os.waitpid(child, 0)
+        for end in (*ready, *done):
+            os.close(end)
 
 
 @pytest.mark.skipif(os.getuid() != 0, reason="only root can become another user")

@@ -24,6 +24,7 @@ from rcilab.workbench.goal.actions import initial_goal
 from rcilab.workbench.keepsake import Keepsake, keepsake_file
 from rcilab.workbench.program.draft import draft_of
 from rcilab.workbench.store import UiState
+from tests.recording.runs import some_run
 from tests.waiting import wait_for
 
 MODEL = load_model("xMatePro7")
@@ -143,3 +144,20 @@ def is_kept(file: Path) -> bool:
         return False
     kept = json.loads(file.read_text())["arms"][MODEL.name]
     return kept["program"] is not None and np.allclose(kept["q"], GOAL)
+
+
+def test_programs_of_other_arms_and_a_look_at_a_recording_lose_nothing():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    keepsake = Keepsake(keepsake_file(port))
+    keepsake.close(state_with_all())
+    with Workbench(WorkbenchConfig(port=port, replay=some_run())):
+        pass
+    with Workbench(WorkbenchConfig(port=port, model="xMate3")) as bench:
+        wait_for(lambda: bench.session.status().phase == "idle", what="an idle arm")
+        assert not bench.store.state.program.draft.steps
+        bench.conductor.ask(requests.ChooseRobot(model=MODEL.name))
+        wait_for(lambda: len(bench.store.state.program.draft.steps) == 2, what="the program of the other arm")
+    assert len(Keepsake(keepsake_file(port)).recall(MODEL).program.waypoints) == 2
+    keepsake_file(port).unlink()

@@ -9,6 +9,7 @@ import numpy as np
 from rcilab.arrays import frozen
 from rcilab.background import Background
 from rcilab.errors import InvalidValueError, PlanningError, RcilabError, VersionMismatchError
+from rcilab.model import load_model
 from rcilab.motion.program import Program
 from rcilab.motion.program_file import read_program
 from rcilab.posing.planning import Plan
@@ -95,6 +96,10 @@ class ProgramActions:
         self._shelves.open()
         draft = draft_of(program, self._store.state.model)
         self._shelves.change(draft, draft.steps[0].key)
+
+    def lay_aside(self, program: Program) -> None:
+        """Keeps a program for when its arm is chosen."""
+        self._shelves.lay_aside(draft_of(program, load_model(program.model)))
 
     def exchange(self, draft: Draft, plan: Plan) -> None:
         """Takes a changed program that has been planned already; undo brings the old one back."""

@@ -63,6 +63,11 @@ class Shelves:
         elif found.state.draft.steps:
             self._store.say("good", message("program.back", count=len(found.state.draft.steps), model=model))
 
+    def lay_aside(self, draft: Draft) -> None:
+        """Keeps the program of an arm that is not chosen."""
+        state = ProgramState(draft=draft, selected=draft.steps[0].key if draft.steps else None)
+        self._shelves[draft.model] = _Shelf(state)
+
     def change(self, draft: Draft, selected: int | None, *, typed: bool = False) -> None:
         """Exchanges the program; what it was can be had back.
 
