@@ -118,8 +118,8 @@ _SMOOTHNESS = (
 
 _GAINS = (
     "let torques grow gradually and keep them inside the limits of section 4.4; where a control law of yours rings, "
-    "lower its damping first: above a joint's inertia divided by the delay of the loop it is unstable, and the wrist "
-    "is light"
+    "lower its damping first: above the inertia that a joint feels while the others are free, divided by the delay of "
+    "the loop, it is unstable, and the wrist is light"
 )
 
 _BOX = "keep the tool inside the safety box; a motion that starts outside it may only lead into it"

@@ -159,7 +159,7 @@ def _plan_to_start(motion: Motion, robot: RobotSession, q: JointVector) -> list[
     if len(motion.q[0]) != len(q):
         raise UsageError(f"the motion is for {len(motion.q[0])} joints and the arm has {len(q)}: it is for another arm")
     back = plan_recovery(robot.model, q)
-    way = plan_joint(robot.model, back.q[-1], motion.q[0], speed=_TO_START_SPEED)
+    way = plan_joint(robot.model, back.q[-1], motion.q[0], speed=_TO_START_SPEED, law="torque_rate_limited")
     return [back, way] if back.duration > 0.0 else [way]
 
 

@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from rcilab.client.brake import Brake, CartesianBrake, JointBrake, TorqueBrake
+from rcilab.client.call_times import CallTimes
 from rcilab.client.checked_command import check_command, describe_distance, distance_to, require_first
 from rcilab.client.commands import RciCommands
-from rcilab.client.fault_report import describe_faults, describe_late_callback
+from rcilab.client.fault_report import describe_faults
 from rcilab.client.filters import CommandFilter, is_near
 from rcilab.client.link import Link
 from rcilab.client.recorder import CycleLog
@@ -116,7 +117,7 @@ class ControlLoop:
         self._first_q_c = self._first_tau_c = np.zeros(0)
         self._answered_id = -1
         self._t = math.nan
-        self._slowest, self._slowest_t = 0, 0.0  # [ns], [s] The longest call of the callback, and when it was.
+        self._calls = CallTimes()
         self._command: Command | None = None
         self._pending: deque[RobotState] = deque()
         self._brake: Brake = {
@@ -199,9 +200,7 @@ class ControlLoop:
             try:
                 begun_ns = time.monotonic_ns()
                 answer = callback(state, t)
-                taken = time.monotonic_ns() - begun_ns
-                if taken > self._slowest:
-                    self._slowest, self._slowest_t = taken, t
+                self._calls.add(1e-9 * (time.monotonic_ns() - begun_ns), t)
                 wanted = self._checked(answer, state)
                 command = self._filtered(wanted, state)
             except BaseException:
@@ -374,12 +373,16 @@ class ControlLoop:
         return (state.message_id - self._first_id) * CYCLE_TIME
 
     def _fault(self, state: RobotState) -> ControlError:
+        if state.faults == (Fault.INSTABILITY_DETECTION,) and self._find_safety_stop(state) is None:
+            if not self._has_power():
+                self._log.write(state, self._link.received_ns, self._time(state))
+                return self._cut_off()
         t = self._time(state) if self._command is not None else math.nan
         self._log.write(state, self._link.received_ns, t)
         record = self._log.recorder.last(RECORD_CYCLES)
         late = ""
         if Fault.INSTABILITY_DETECTION in state.faults:
-            late = describe_late_callback(1e-9 * self._slowest, self._slowest_t)
+            late = self._calls.describe()
         pressed = self._find_safety_stop(state)
         message = describe_faults(
             state.faults,

@@ -22,23 +22,6 @@ _BOX_FAULTS = {
 }  # fmt: skip
 _CLOSE = math.radians(1.0)  # A joint farther inside than this has not come near the limits that we know of.
 _HISTORY = 3  # Commands that a third difference looks back to.
-_LATE_CYCLES = 5  # A delay that the play-out of a controller does not always absorb; shorter ones are not worth words.
-
-
-def describe_late_callback(duration: float, t: float) -> str:
-    """Returns what a callback that held up the loop did and what helps, in one sentence; "" for one that was in time.
-
-    Args:
-        duration: The longest time that one call took, [s].
-        t: Motion time of that call, [s].
-    """
-    missed = int(duration / CYCLE_TIME)
-    if missed < _LATE_CYCLES:
-        return ""
-    return (
-        f"the callback took {1e3 * duration:.1f} ms at t = {t:.3f} s, so that {missed} cycles had no command in time; "
-        "return within 1 ms: compute beforehand or in another thread, and do not sleep, print or read files in it"
-    )
 
 
 def describe_faults(
@@ -58,7 +41,7 @@ def describe_faults(
         record: The last cycles, see `cycle_dtype`.
         t: Motion time of the state that carried the faults, [s]; NaN before the first command.
         limits: Bounds of the arm.
-        late: What `describe_late_callback` returned, for a motion that a slow callback may have ended.
+        late: What `CallTimes.describe` returned, for a motion that a slow callback may have ended.
         pressed: Which safety stop ended the motion, in a sentence with what to do; "" for none. The RCI has no error
             bit for it, so that the bits which a controller sets meanwhile say something else.
         box: The safety box that the controller has, as far as it is known.

@@ -27,6 +27,8 @@ class Reply(NamedTuple):
     response: rci.Response
     when: When = When.NOW
     ends_connection: bool = False
+    refusal: str = ""
+    """Why it refuses, in words; "" for what was granted."""
 
 
 def answer_query(
@@ -108,6 +110,21 @@ def judge_recovery(settings: Settings, watch: Watch) -> rci.RecoveryStatus | Non
         if box.excess(watch.tool.position) > BOX_ALLOWANCE:
             return rci.RecoveryStatus.MANUAL_RECOVERY_NEEDED
     return None if watch.find_collision(settings.collision_thresholds) is None else rci.RecoveryStatus.REFLEX
+
+
+def describe_refusal(request: rci.Request, status: rci.Status, phase: Phase, settings: Settings, arm: Arm) -> str:
+    """Returns why a request was refused, for whoever looks at the controller and not at its answers."""
+    name, mode = type(request).__name__, phase.name.lower().replace("_", " ")
+    why: object = f"the robot is {mode}"
+    if status is rci.StartStatus.SINGULAR_START_POSE:
+        why = find_singularity(build_geometry(arm.model.description), arm.commanded.q)
+    elif status is rci.RecoveryStatus.REFLEX:
+        why = arm.watch.find_collision(settings.collision_thresholds)
+    elif status is rci.RecoveryStatus.MANUAL_RECOVERY_NEEDED:
+        why = "the arm is beyond a joint's range or the safety box: power off and on, then lead it back"
+    elif status.name == "INVALID_ARGUMENT":
+        why = f"what it asks for is out of its bounds: {request}"
+    return f"refused {name} ({status.name.lower().replace('_', ' ')}): {why}"
 
 
 def conclude(reply: Reply, phase: Phase) -> rci.Response:

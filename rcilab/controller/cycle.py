@@ -16,7 +16,7 @@ from dataclasses import replace
 from rcilab.arrays import JointVector
 from rcilab.conformance import LimitTable
 from rcilab.controller.actuator import Law
-from rcilab.controller.answers import Reply, answer_query, conclude, judge_request
+from rcilab.controller.answers import Reply, answer_query, conclude, describe_refusal, judge_request
 from rcilab.controller.arm import Arm
 from rcilab.controller.client_motion import LOST_LIMIT, PREFILL, ClientMotion
 from rcilab.controller.model_download import model_response
@@ -37,6 +37,7 @@ _PRESSED = {
     rci.SafetyStop.ESTOP: Remark("an emergency stop was pressed", "estop"),
     rci.SafetyStop.GSTOP: Remark("the safety gate was opened", "gstop"),
 }
+_POWER_OFF = Remark("the client switched motor power off in mid-motion", "power_off")
 _JOINT_RANGE = frozenset((Fault.ACTUAL_JOINT_POSITION_LIMITS_VIOLATION, Fault.COMMAND_JOINT_POSITION_LIMITS_VIOLATION))
 _WAITING = (Phase.STARTING, Phase.RECOVERING)
 _MOVING = (Phase.MOVING, Phase.STOPPING)
@@ -190,12 +191,20 @@ class ControlCycle:
             return Reply(content)
         cell = judge_request(request, self.phase, self.settings, self._arm)
         if not isinstance(cell, Transition):
-            return Reply(rci.StatusResponse(cell))
+            return self._refuse(request, cell)
         if Action.APPLY in cell.actions and not self._apply(request):
-            return Reply(rci.StatusResponse(rci.SettingStatus.INVALID_ARGUMENT))
-        self._enter(cell, request=request)
+            return self._refuse(request, rci.SettingStatus.INVALID_ARGUMENT)
+        if Action.SET_FAULTS in cell.actions:
+            self.reason = _POWER_OFF
+        self._enter(cell, request=request, faults=(Fault.INSTABILITY_DETECTION,))
         assert cell.status is not None
+        if cell.status:  # Zero is success, in every answer.
+            return self._refuse(request, cell.status)
         return Reply(rci.StatusResponse(cell.status), cell.when, Action.REBOOT in cell.actions)
+
+    def _refuse(self, request: rci.Request, status: rci.Status) -> Reply:
+        why = describe_refusal(request, status, self.phase, self.settings, self._arm)
+        return Reply(rci.StatusResponse(status), refusal=why)
 
     def conclude(self, reply: Reply) -> rci.Response:
         """Returns what to answer now that a reply is due: meanwhile a recovery may have been overtaken."""
@@ -208,7 +217,8 @@ class ControlCycle:
     def press_safety_stop(self, kind: rci.SafetyStop) -> None:
         """Presses an emergency stop or opens the safety gate, or ends either with NONE.
 
-        Both stop the arm and hold it stopped; in mid-motion they also set an error bit, or the client would not notice.
+        Both stop the arm and hold it stopped; from StartMove to the end of a motion they also set an error bit, or the
+        client would not notice.
         """
         if kind is not self.safety_stop:
             self.safety_stop = kind
@@ -239,7 +249,7 @@ class ControlCycle:
         step = motion.follow() if motion.is_followed else None
         has_moved = step is not None and not step.faults
         if step is not None and step.faults:
-            self._raise(step.faults, step.reason)
+            self._raise(step.faults, step.reason, is_number=step.is_number)
         law = self._current_law()
         if law is not Law.TORQUE:
             motion.tau = None
@@ -272,9 +282,9 @@ class ControlCycle:
         elif self._arm.commanded.is_at_rest:
             self.happen(Event.RECOVERED)
 
-    def _raise(self, faults: tuple[Fault, ...], reason: Remark) -> None:
+    def _raise(self, faults: tuple[Fault, ...], reason: Remark, *, is_number: bool = True) -> None:
         self.reason = reason
-        is_limit = not self.settings.auto_limit and not _JOINT_RANGE.isdisjoint(faults)
+        is_limit = is_number and not self.settings.auto_limit and not _JOINT_RANGE.isdisjoint(faults)
         self.happen(Event.JOINT_LIMIT if is_limit else Event.FAULT, *faults)
 
     def _current_law(self) -> Law:

@@ -19,6 +19,7 @@ accelerations need up to 3.9 times of it. The arm does not touch itself: the con
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -39,6 +40,7 @@ BANDWIDTH = 80.0  # [rad/s] of the position servo, critically damped; a choice, 
 KP, KD = BANDWIDTH**2, 2.0 * BANDWIDTH  # [1/s^2], [1/s]
 FRICTION_KNOWN = 0.9  # Share of the friction that the drives compensate; no drive knows it exactly.
 PEAK_TORQUE = 4.0  # Times the manual's torque limit, what a drive adds at most; a choice, see above
+END_STOP = math.radians(10.0)  # [rad] of the end stops beyond the manual's joint range; a choice: room to come to rest
 BRAKE_TIME = 0.02  # [s] time constant of the brakes; a choice
 
 _KP, _KD, _STEP = scalar(KP), scalar(KD), scalar(TIMESTEP)
@@ -214,6 +216,7 @@ class MuJoCoPlant:
         self._model: Any = spec.compile()
         self._obstacles.install(self._model, mj)
         self._model.dof_damping *= self._share_of_friction
+        self._model.jnt_range[: self._n] += [-END_STOP, END_STOP]
         self._data: Any = mj.MjData(self._model)
         self._q: Array = self._data.qpos  # These are windows into MuJoCo's memory, not copies.
         self._dq: Array = self._data.qvel

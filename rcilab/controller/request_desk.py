@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 
 from rcilab.controller.answers import Reply
 from rcilab.controller.cycle import ControlCycle
@@ -21,14 +22,19 @@ class RequestDesk:
         cycle: What grants or refuses them.
         endpoint: Where states go, as `Connect` asks.
         network: What carries the answers.
+        log: Takes a line about each refusal.
     """
 
-    def __init__(self, cycle: ControlCycle, endpoint: Endpoint, network: FaultyNetwork) -> None:
+    def __init__(
+        self, cycle: ControlCycle, endpoint: Endpoint, network: FaultyNetwork, log: Callable[[str], None]
+    ) -> None:
+        self._log = log
         self._cycle = cycle
         self._endpoint = endpoint
         self._network = network
         self._frames: deque[bytes] = deque()
         self._pending: tuple[Request, int, Reply] | None = None
+        self._asked = 0  # Number of the last state before the request that waits.
 
     @property
     def is_waiting(self) -> bool:
@@ -42,10 +48,14 @@ class RequestDesk:
 
     def settle(self) -> None:
         """Gives the answer that had to wait if it is due, and goes on to the requests behind it."""
-        if self._pending is not None and self._cycle.is_settled:
+        if self._pending is not None and self._is_due(self._pending[2].when):
             waited, self._pending = self._pending, None
             self._answer(*waited)
             self._serve()
+
+    def _is_due(self, when: When) -> bool:
+        is_shown = self._cycle.state.message_id > self._asked
+        return is_shown and (when is When.SHOWN or self._cycle.is_settled)
 
     def clear(self) -> None:
         """Forgets everything: who asked is gone."""
@@ -63,13 +73,15 @@ class RequestDesk:
                 self._network.drop_client(f"sent bytes that are no RCI: {error}")
                 return
             reply = self._cycle.handle(request)
+            if reply.refusal:
+                self._log(reply.refusal)
             if isinstance(request, Connect) and request.udp_port >= LOWEST_CLIENT_PORT:
                 self._endpoint.redirect_states(request.udp_port)
-            # Idle modes are to be seen before StopMove is answered, so even an arm at rest answers after a cycle.
-            if reply.when is When.AT_REST:
-                self._pending = (request, command_id, reply)
-            else:
+            # What was answered is to be seen: after a reply that waits, every state shows the new mode.
+            if reply.when is When.NOW:
                 self._answer(request, command_id, reply)
+            else:
+                self._pending, self._asked = (request, command_id, reply), self._cycle.state.message_id
 
     def _answer(self, request: Request, command_id: int, reply: Reply) -> None:
         self._network.send_frame(encode_response(request.code, command_id, self._cycle.conclude(reply)))

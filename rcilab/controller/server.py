@@ -108,8 +108,6 @@ class ControllerServer:
         if log is None:
             self._lines = LogLines(_STDERR)
             log = self._lines.write
-            self._handler = LineHandler(log)
-            _parts_log.addHandler(self._handler)
         self._log = log
         self._clock = SystemClock()
         self._pace = Pace(self._clock.now())
@@ -117,11 +115,12 @@ class ControllerServer:
         self._next_look = 0.0
         self._cores = AwakeCores()
         self._missed_before = 0
+        self._told: tuple[Fault, ...] = ()
         self._refused, self._next_refusal = 0, 0.0
         self._endpoint = Endpoint(config)
         states_network = config.network if config.states_network is None else config.states_network
         self._network = FaultyNetwork(self._endpoint, self._clock, config.network, states_network)
-        self._desk = RequestDesk(self.cycle, self._endpoint, self._network)
+        self._desk = RequestDesk(self.cycle, self._endpoint, self._network, log)
         self._stalls = StallPlan()
         self._surroundings = Surroundings(
             self.cycle,
@@ -164,15 +163,17 @@ class ControllerServer:
             warning = enter_realtime(PRIORITY).warning
             if warning is not None:
                 self._log(warning)
+        parts = LineHandler(self._log)
+        _parts_log.addHandler(parts)
         try:
             self._loop(on_ready)
         finally:
+            _parts_log.removeHandler(parts)
             self._cores.switch(False)
             if use_realtime:
                 leave_realtime()
             self.close()
             if self._lines is not None:
-                _parts_log.removeHandler(self._handler)
                 self._lines.close()
 
     def request_stop(self) -> None:
@@ -230,8 +231,7 @@ class ControllerServer:
         if self.cycle.phase is not Phase.MOVING:
             self.cycle.happen(Event.CLIENT_LOST)
             return 0
-        self.cycle.reason = Remark("the controller was told to end", "told_to_end")
-        self._log("told to end in mid-motion: the arm comes to rest, and the error bit tells the client")
+        self.cycle.reason = Remark("the controller was told to end in mid-motion", "told_to_end")
         self.cycle.happen(Event.FAULT, Fault.INSTABILITY_DETECTION)
         return FAREWELL
 
@@ -346,12 +346,17 @@ class ControllerServer:
         """Lives through one millisecond."""
         if self.config.realtime and not self.config.lockstep:
             self._cores.switch(self.cycle.is_moving)
-        faults = self.cycle.faults
         state = self.cycle.step(is_seen=is_seen)
         self._surroundings.step()
-        if state.faults and state.faults != faults:
-            self._log(f"{name_faults(state.faults)}: {self.cycle.reason}; the arm comes to rest")
-            if Fault.INSTABILITY_DETECTION in state.faults and self.cycle.playout.lost_in_row:
+        if state.faults != self._told:
+            self._tell_faults(state.faults)
+
+    def _tell_faults(self, faults: tuple[Fault, ...]) -> None:
+        """Says why error bits were set, whoever set them: a condition, somebody at the world port, a request."""
+        self._told = faults
+        if faults:
+            self._log(f"{name_faults(faults)}: {self.cycle.reason}; the arm comes to rest")
+            if Fault.INSTABILITY_DETECTION in faults and self.cycle.playout.lost_in_row:
                 self._log(
                     "a client that pauses needs a deeper play-out (--prefill 50), SCHED_FIFO for itself, or --lockstep"
                 )

@@ -88,6 +88,7 @@ class When(Enum):
     """When a reply is sent."""
 
     NOW = "now"
+    SHOWN = "once a state has shown it"
     AT_REST = "once the arm rests"
     """And, in RECOVERING and STOPPING, once that phase is over."""
 
@@ -134,6 +135,9 @@ REMEDIES: Final = (C.SET_COLLISION_BEHAVIOR, C.SET_LOAD)
 """Those of them that also a stopped arm takes: the manual's way out of a collision without contact is to raise the
 thresholds (4.6), and an error recovery waits until nothing is above them."""
 
+_TELLING = (P.STARTING, P.MOVING, P.STOPPING)
+"""Phases that a client takes for its motion: only an error bit stops it there."""
+
 _BUSY = (P.STARTING, P.MOVING, P.STOPPING, P.GUIDING, P.RECOVERING)
 _START_REFUSED = dict.fromkeys((P.OFF, *_BUSY), StartStatus.NOT_POSSIBLE) | {
     P.REFLEX: StartStatus.REFLEX,
@@ -176,7 +180,7 @@ def _motion(phase: Phase) -> dict[Trigger, Transition]:
     else:  # An arm in somebody's hand need not come to rest at all.
         rows[C.STOP_MOVE] = Transition(phase, (), stopped, When.NOW if phase is P.GUIDING else When.AT_REST)
     if phase is P.IDLE:
-        rows[C.START_DRAG] = Transition(P.GUIDING, (A.GUIDE,), SettingStatus.SUCCESS)
+        rows[C.START_DRAG] = Transition(P.GUIDING, (A.GUIDE,), SettingStatus.SUCCESS, When.SHOWN)
     else:
         rows[C.START_DRAG] = Transition(phase, (), SettingStatus.NOT_POSSIBLE)
     if phase is P.GUIDING:
@@ -190,7 +194,7 @@ def _power(phase: Phase) -> dict[Trigger, Transition]:
     """SetMotorPower is two commands in one: this is the row for "on"; `POWER_OFF` holds the one for "off"."""
     rows: dict[Trigger, Transition] = {}
     if phase is P.OFF:
-        rows[C.SET_MOTOR_POWER] = Transition(P.IDLE, (), SettingStatus.SUCCESS)
+        rows[C.SET_MOTOR_POWER] = Transition(P.IDLE, (A.CLEAR_FAULTS,), SettingStatus.SUCCESS, When.SHOWN)
     elif phase in (P.USER_STOPPED, P.CUT_OFF):
         rows[C.SET_MOTOR_POWER] = Transition(phase, (), SettingStatus.NOT_POSSIBLE)
     else:
@@ -210,8 +214,8 @@ def _recovery(phase: Phase) -> dict[Trigger, Transition]:
         return {command: Transition(P.RECOVERING, (), RecoveryStatus.SUCCESS, When.AT_REST)}
     if phase is P.CUT_OFF:
         return {command: Transition(P.OFF, (A.CLEAR_FAULTS,), RecoveryStatus.SUCCESS, When.AT_REST)}
-    if phase in (P.OFF, P.IDLE):  # Nothing to recover from.
-        return {command: Transition(phase, (), RecoveryStatus.SUCCESS)}
+    if phase in (P.OFF, P.IDLE):  # All there may be is the bit of a motion that power-off ended.
+        return {command: Transition(phase, (A.CLEAR_FAULTS,), RecoveryStatus.SUCCESS)}
     status = RecoveryStatus.USER_STOP if phase is P.USER_STOPPED else RecoveryStatus.NOT_POSSIBLE
     return {command: Transition(phase, (), status)}
 
@@ -231,7 +235,7 @@ def _events(phase: Phase) -> dict[Trigger, Transition]:
         actions = (A.SET_FAULTS, A.HIDE_MODES, A.DISCARD)
         rows[E.FAULT] = Transition(phase if phase is P.CUT_OFF else P.REFLEX, actions)
         rows[E.JOINT_LIMIT] = Transition(P.CUT_OFF, actions)
-    tells = (A.SET_FAULTS,) if phase in (P.MOVING, P.STOPPING) else ()  # A bit is the only thing that stops a client.
+    tells = (A.SET_FAULTS,) if phase in _TELLING else ()
     rows[E.SAFETY_STOP] = Transition(P.USER_STOPPED, (*tells, A.HIDE_MODES, A.DISCARD))
     if phase in (P.STARTING, P.GUIDING):
         rows[E.CLIENT_LOST] = Transition(P.IDLE, (A.HIDE_MODES, A.DISCARD))
@@ -247,15 +251,15 @@ def _row(phase: Phase) -> dict[Trigger, Transition]:
 TABLE: Final = {(phase, trigger): cell for phase in Phase for trigger, cell in _row(phase).items()}
 """Every phase with every command and every event."""
 
-POWER_OFF: Final = {
-    phase: Transition(
-        phase if phase is P.USER_STOPPED else P.OFF,
-        () if phase in (P.OFF, P.USER_STOPPED) else (A.HIDE_MODES, A.DISCARD, A.CLEAR_FAULTS),
-        SettingStatus.SUCCESS,
-        When.AT_REST,
-    )
-    for phase in Phase
-}
+
+def _power_off(phase: Phase) -> Transition:
+    after = phase if phase is P.USER_STOPPED else P.OFF
+    tells = A.SET_FAULTS if phase in _TELLING else A.CLEAR_FAULTS
+    actions = () if phase in (P.OFF, P.USER_STOPPED) else (A.HIDE_MODES, A.DISCARD, tells)
+    return Transition(after, actions, SettingStatus.SUCCESS, When.AT_REST)
+
+
+POWER_OFF: Final = {phase: _power_off(phase) for phase in Phase}
 """SetMotorPower(0): obeyed in every phase; a moving arm is brought to rest first, then the brakes close."""
 
 

@@ -240,7 +240,6 @@ def _crossings(lower: tuple[float, ...], upper: tuple[float, ...], offsets: tupl
         bounds = set[float]() if high - low >= tau else {low - offsets[joint], high - offsets[joint]}
         if joint in _TURNS:
             x = _TURNS[joint]
-            bounds |= {acos(SINGULAR), acos(-SINGULAR)} if joint in (2, 4) else set()
             for bound in bounds:
                 add({x: sin(bound), x + 4: -cos(bound)}, 0.0)
         elif joint in _BENDS:
@@ -260,14 +259,13 @@ def _angles_at(values: Array, q4: float, offsets: Angles) -> tuple[Array, NDArra
     np.arctan2(values[4:8], values[0:4], out=q[_TURNING])
     np.arccos(np.minimum(np.maximum(values[8:10], -1.0), 1.0), out=q[_BENDING])
     q[3] = q4
-    unbent, across = np.sin(q[_BENDING]) < SINGULAR, np.abs(np.cos(q[2:5:2])) < SINGULAR
-    crossed = unbent & across
+    unbent = np.sin(q[_BENDING]) < SINGULAR
     np.negative(q, out=twin)
     np.add(q[_TURNING], pi, out=twin[_TURNING])
     if any(offsets):
         both += np.array(offsets)[:, None, None]
     both -= tau * np.ceil((both - pi) / tau)
-    return both, crossed[0] | crossed[1] | (unbent[0] & unbent[1])
+    return both, unbent[0] | unbent[1]
 
 
 def _broken(both: Array, lower: Array, upper: Array) -> NDArray[np.uint8]:

@@ -59,9 +59,9 @@ def dexterity_path(J: Array) -> DexterityPath:
 def find_singularity(arm: ArmGeometry, q: Sequence[float]) -> str | None:
     """Returns which singularity an arm is at, in words, or None where it can move its tool in every direction.
 
-    7 axes lose a direction where sin q4 = 0; sin q2 = cos q3 = 0; cos q5 = sin q6 = 0; or sin q2 = sin q6 = 0. Because
-    poses are followed at an arm angle, it counts as well when shoulder and wrist are above each other. 6 axes: sin q3 =
-    0, sin q5 = 0, and the wrist on axis 1 (Siciliano et al., Robotics, 2009, section 3.3).
+    7 axes follow a pose at an arm angle: seven numbers for seven joints. These lose a direction where sin q4 = 0, where
+    sin q2 = 0 (axes 1 and 3 in line) or sin q6 = 0 (axes 5 and 7), and where shoulder and wrist are above each other.
+    6 axes: sin q3 = 0, sin q5 = 0, and the wrist on axis 1 (Siciliano et al., Robotics, 2009, section 3.3).
 
     Args:
         arm: From `rcilab.kinematics.inverse.build_geometry`.
@@ -91,20 +91,11 @@ def singularity_path(arm: ArmGeometry, q: JointPath) -> Array:
 
 
 def _away_seven(arm: ArmGeometry, q: JointPath) -> Array:
-    c2, c3, c4, c5 = (np.cos(q[:, i]) for i in (1, 2, 3, 4))
+    c2, c3, c4 = (np.cos(q[:, i]) for i in (1, 2, 3))
     s2, s3, s4, s6 = (np.sin(q[:, i]) for i in (1, 2, 3, 5))
     side, along = arm.fore * s4, arm.upper + arm.fore * c4
-    horizontal = np.hypot(s2 * along + c2 * c3 * side, s3 * side)
-    s2, s6 = np.abs(s2), np.abs(s6)
-    return np.minimum.reduce(
-        (
-            np.abs(s4),
-            np.maximum(s2, np.abs(c3)),
-            np.maximum(s6, np.abs(c5)),
-            np.maximum(s2, s6),
-            horizontal / np.sqrt(side * side + along * along),
-        )
-    )
+    horizontal = np.hypot(s2 * along + c2 * c3 * side, s3 * side) / np.sqrt(side * side + along * along)
+    return np.minimum.reduce((np.abs(s2), np.abs(s4), np.abs(s6), horizontal))
 
 
 def _away_six(arm: ArmGeometry, q: JointPath) -> Array:
@@ -114,15 +105,12 @@ def _away_six(arm: ArmGeometry, q: JointPath) -> Array:
 
 
 def _singular_seven(arm: ArmGeometry, q: Sequence[float]) -> str | None:
-    s2, s4, s6 = abs(sin(q[1])), abs(sin(q[3])), abs(sin(q[5]))
-    if s4 < SINGULAR:
+    if abs(sin(q[3])) < SINGULAR:
         return f"the arm is stretched or folded: joint 4 is at {degrees(q[3]):.2f} deg"
-    if s2 < SINGULAR and abs(cos(q[2])) < SINGULAR:
-        return f"axes 1 and 3 are in line: joints 2 and 3 are at {degrees(q[1]):.2f} and {degrees(q[2]):.2f} deg"
-    if s6 < SINGULAR and abs(cos(q[4])) < SINGULAR:
-        return f"axes 5 and 7 are in line: joints 5 and 6 are at {degrees(q[4]):.2f} and {degrees(q[5]):.2f} deg"
-    if s2 < SINGULAR and s6 < SINGULAR:
-        return f"shoulder and wrist are in line: joints 2 and 6 are at {degrees(q[1]):.2f} and {degrees(q[5]):.2f} deg"
+    if abs(sin(q[1])) < SINGULAR:
+        return f"axes 1 and 3 are in line: joint 2 is at {degrees(q[1]):.2f} deg"
+    if abs(sin(q[5])) < SINGULAR:
+        return f"axes 5 and 7 are in line: joint 6 is at {degrees(q[5]):.2f} deg"
     c2, c3, c4 = cos(q[1]), cos(q[2]), cos(q[3])
     side, along = arm.fore * sin(q[3]), arm.upper + arm.fore * c4
     # Wrist from shoulder in the plane of the upper arm; its distance from the vertical through the shoulder.

@@ -26,7 +26,8 @@ def plan_recovery(model: RobotModel, q: ArrayLike, *, speed: float = RECOVERY_SP
 
     Each of these joints moves straight inwards; all others stay. `check` accepts the motion, and `execute` runs it. Of
     joints that are all inside, it returns a motion without length. A controller that has stopped for a joint limit
-    also switches motor power off: `recover()`, `power_on()`, then this motion.
+    also switches motor power off: `power_off()`, `power_on()`, then this motion. `recover()` in place of `power_off()`
+    is refused where a joint is more than 1 degree outside.
 
     Args:
         model: The arm; with soft limits, their range counts.

@@ -133,6 +133,8 @@ def test_a_command_that_is_no_number_is_a_fault_and_not_followed(hand, bad: floa
     state = hand.command([*hand.state.q_c[:6], bad])
     assert F.COMMAND_JOINT_POSITION_LIMITS_VIOLATION in state.faults
     hand.rest()
+    beyond_every_range = math.isfinite(bad)  # That takes motor power, and nonsense does not.
+    assert hand.ask(rci.GetMotorState()) == rci.MotorStateResponse(int(not beyond_every_range))
     assert all(np.isfinite(state.q_c).all() and np.isfinite(state.q).all() for state in hand.states)
     hand.assert_smooth()
 

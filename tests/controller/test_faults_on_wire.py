@@ -266,3 +266,28 @@ def test_starting_a_cartesian_motion_at_a_singular_pose_is_refused(robot: Robot)
         robot.start_move(*faults.CARTESIAN_MODE)
     assert refused.value.status == 4
     programs.joint_sine(robot, 0.05, amplitude=0.001, period=0.1)
+
+
+@pytest.mark.parametrize("joint", [2, 6], ids=["axes 1 and 3 in line", "axes 5 and 7 in line"])
+def test_a_wrist_or_shoulder_that_is_straight_is_singular_too(robot: Robot, joint: int) -> None:
+    q = list(robot.receive_fresh_state().q)
+    q[joint - 1] = 0.005
+    programs.move_j(robot, 1.0, robot.receive_fresh_state().q, tuple(q))
+    with pytest.raises(CommandException) as refused:
+        robot.start_move(*faults.CARTESIAN_MODE)
+    assert refused.value.status == 4
+
+
+def test_motors_switched_off_in_mid_motion_set_a_bit_until_they_are_on_again(robot: Robot) -> None:
+    state = begin(robot, faults.JOINT_MODE)
+    still = Output(q=state.q_c)
+    for _ in range(30):
+        robot.answer(state, still)
+        state = robot.next_state(state.message_id)
+    robot.set_motor_power(0)
+    state = answer_until_error(robot, state, lambda _: still, 20)
+    assert state.errors == (19,)
+    robot.stop_move()
+    robot.set_motor_power(1)
+    assert robot.receive_fresh_state().errors == ()
+    programs.joint_sine(robot, 0.05, amplitude=0.001, period=0.1)

@@ -452,6 +452,35 @@ def test_told_to_end_in_mid_motion_it_tells_the_client_with_an_error_bit() -> No
     assert any("told to end in mid-motion" in line for line in found.lines)
 
 
+def test_what_an_answer_says_is_in_every_state_after_it() -> None:
+    for lockstep in (True, False):
+        with running(lockstep=lockstep) as found, Peer(found) as peer:
+            for request, mode in (
+                (rci.SetMotorPower(1), RobotMode.IDLE),
+                (rci.StartDrag(1, 2), RobotMode.GUIDING),
+                (rci.StopDrag(), RobotMode.IDLE),
+                (rci.SetMotorPower(0), RobotMode.OTHER),
+            ):
+                assert peer.ask(request) == 0
+                peer.receive_newest_state()  # Those before the answer; what comes now was sent after it.
+                assert peer.receive_state().robot_mode is mode
+
+
+def test_refusals_are_told_with_their_reason(lockstep: Running) -> None:
+    with Peer(lockstep) as peer:
+        assert peer.ask(rci.StartMove(0, 1)) is rci.StartStatus.NOT_POSSIBLE
+        assert peer.ask(rci.SetCollisionBehavior((math.nan,) * 7)) is rci.SettingStatus.INVALID_ARGUMENT
+        lockstep.server.cycle.reset(np.zeros(7))
+        assert peer.ask(rci.SetMotorPower(1)) == 0
+        assert peer.ask(rci.StartMove(1, 2)) is rci.StartStatus.SINGULAR_START_POSE
+    assert lockstep.lines[:3] == [
+        "refused StartMove (not possible): the robot is off",
+        "refused SetCollisionBehavior (invalid argument): what it asks for is out of its bounds: "
+        f"{rci.SetCollisionBehavior((math.nan,) * 7)}",
+        "refused StartMove (singular start pose): the arm is stretched or folded: joint 4 is at 0.00 deg",
+    ]
+
+
 def test_states_that_go_to_another_address_than_the_client_are_pointed_out() -> None:
     with running(client_host="127.0.0.3", udp_port=0) as found, Peer(found):
         assert "--client 127.0.0.1" in found.wait_for_line("it will not see any")

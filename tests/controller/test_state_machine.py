@@ -109,11 +109,12 @@ def test_only_the_delay_after_start_move_leads_into_a_motion() -> None:
     assert into == {(Phase.STARTING, Event.MODES_SHOWN)}
 
 
-def test_faults_are_cleared_only_by_recovery_release_power_off_and_reboot() -> None:
+def test_faults_are_cleared_only_by_recovery_release_power_and_reboot() -> None:
     clearing = {trigger for (_, trigger), cell in TABLE.items() if Action.CLEAR_FAULTS in cell.actions}
     assert clearing == {
         Event.RECOVERED,
         Event.SAFETY_RELEASE,
+        CommandCode.SET_MOTOR_POWER,
         CommandCode.REBOOT_ROBOT,
         CommandCode.AUTOMATIC_ERROR_RECOVERY,
     }

@@ -19,6 +19,7 @@ from rcilab.controller.world_port import MOST_GUESTS
 from rcilab.errors import InvalidValueError, UsageError
 from rcilab.protocols import rci
 from rcilab.protocols.world import LONGEST_LINE, NetworkFaults, Stall
+from rcilab.state import RobotMode
 from tests.controller.test_server import MODEL, MOTION, PATIENCE, Peer, Running, bind_udp, closes, running
 
 
@@ -242,6 +243,19 @@ def test_things_happen_in_the_middle_of_a_motion(lockstep: Running) -> None:
         assert status["button"] == "estop"
         assert status["faults"] == ["kInstabilityDetection"]
         assert peer.ask(rci.GetSafetyStopState()) == rci.SafetyStopResponse(rci.SafetyStop.ESTOP)
+    line = lockstep.wait_for_line("kInstabilityDetection")
+    assert "an emergency stop was pressed" in line
+
+
+def test_an_emergency_stop_between_start_move_and_its_modes_sets_a_bit_and_says_why() -> None:
+    with running(lockstep=True, mode_delay=5.0) as found, Guest(found) as guest, Peer(found) as peer:
+        assert peer.ask(rci.SetMotorPower(1)) == 0
+        assert peer.ask(rci.StartMove(0, 1)) in (0, 1)
+        assert guest.ask(request="press", button="estop")["ok"]
+        while not peer.receive_state().faults:
+            assert peer.seen[-1].motion_generator_mode == 0
+        assert peer.seen[-1].robot_mode is RobotMode.USER_STOPPED
+        assert "an emergency stop was pressed" in found.wait_for_line("kInstabilityDetection")
 
 
 def test_a_motion_arrives_over_a_slow_network_that_repeats_every_state() -> None:

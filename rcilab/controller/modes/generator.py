@@ -61,6 +61,8 @@ class Step(NamedTuple):
     """What broke, in words and numbers."""
     differences: tuple[list[float], list[float]] | None = None
     """First and second backward difference of `q` over one cycle, [rad/s], [rad/s^2], where they are known already."""
+    is_number: bool = True
+    """Whether the command was finite. One that was not is no joint beyond its range, which takes motor power."""
 
 
 class MotionGenerator(Protocol):

@@ -51,7 +51,7 @@ class JointGenerator:
                 q = self._stream.predict(1, q, playback.steps)
         if not isfinite(sum(q)):  # Not a number is in no range; the derivatives say nothing then.
             reason = Remark(f"commanded positions {q} rad are not all finite numbers", "no_numbers")
-            return Step(faults=(Fault.COMMAND_JOINT_POSITION_LIMITS_VIOLATION,), reason=reason)
+            return Step(faults=(Fault.COMMAND_JOINT_POSITION_LIMITS_VIOLATION,), reason=reason, is_number=False)
         if not self._has_begun:
             self._begin(q)
         self._stream.take(q)
