@@ -18,6 +18,9 @@ from rcilab.kinematics.least_norm import JointRates, least_norm
 from rcilab.robots.description import DhRow
 from rcilab.spatial import IDENTITY, Pose, as_pose
 
+MOST_ANGLE = 4.0 * math.pi
+"""[rad] The largest joint or arm angle that is taken for one: two turns. Degrees by mistake are soon beyond it."""
+
 
 class MovingArm:
     """The geometry of an arm with its tool. Immutable.
@@ -197,9 +200,18 @@ class MovingArm:
         return values
 
     def _floats(self, q: ArrayLike) -> list[float]:
-        """Returns q as n finite plain floats; the cheap way for what is an array already."""
+        """Returns q as n finite plain floats; the cheap way for what is an array already.
+
+        Raises:
+            InvalidValueError: It is no n finite numbers, or an angle is of a size that only degrees have.
+        """
         if isinstance(q, np.ndarray) and q.dtype == np.float64 and q.shape == (self.n,):
             values = q.tolist()
-            if math.isfinite(sum(values)):
+            if math.isfinite(sum(values)) and -MOST_ANGLE <= min(values) and max(values) <= MOST_ANGLE:
                 return values
-        return as_vector(q, self.n, "q", "rad").tolist()
+        values = as_vector(q, self.n, "q", "rad").tolist()
+        joint = max(range(self.n), key=lambda i: abs(values[i]))
+        if abs(values[joint]) > MOST_ANGLE:
+            problem = "rad is more than two turns; angles are wanted in rad: np.radians(q) makes them of degrees"
+            raise InvalidValueError(f"q of joint {joint + 1}", values[joint], problem)
+        return values

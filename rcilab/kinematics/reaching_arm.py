@@ -14,14 +14,13 @@ from rcilab.kinematics.elbow_circle import ElbowCircle, elbow_circle
 from rcilab.kinematics.feasible_arcs import FeasibleArcs
 from rcilab.kinematics.inverse_batch import SolutionBatch, as_pose_batch
 from rcilab.kinematics.inverse_search import InverseSearch
-from rcilab.kinematics.moving_arm import MovingArm
+from rcilab.kinematics.moving_arm import MOST_ANGLE, MovingArm
 from rcilab.kinematics.reach import Reach, closest_reachable
 from rcilab.kinematics.solutions import Solutions
 from rcilab.robots.description import RobotDescription
 from rcilab.safety_box import SafetyBox, active_box
 from rcilab.spatial import Pose
 
-_MOST_PSI = 4.0 * math.pi
 """No arm angle is as large, [rad]: whoever gives more means degrees."""
 
 
@@ -68,7 +67,7 @@ class ReachingArm(MovingArm):
         guess = None if near is None else self._floats(near)
         if psi is not None and not math.isfinite(psi := as_number(psi, "psi", "rad")):
             raise InvalidValueError("psi", psi, "must be finite [rad]")
-        if psi is not None and abs(psi) > _MOST_PSI:
+        if psi is not None and abs(psi) > MOST_ANGLE:
             raise InvalidValueError("psi", psi, "is more than two turns; it is wanted in rad")
         if psi is not None and self.n != 7:
             name = self.description.name

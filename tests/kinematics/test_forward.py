@@ -85,3 +85,13 @@ def test_manipulability_vanishes_where_the_arm_is_stretched():
     model = load_model("xMatePro7")
     assert model.manipulability(np.zeros(7)) < 1e-9
     assert model.manipulability(model.home) > 0.01
+
+
+@pytest.mark.parametrize("give", [list, tuple, np.array])
+def test_degrees_by_mistake_are_not_taken_for_radians(give):
+    model = load_model("xMatePro7")
+    degrees = [0.0, 30.0, 0.0, 60.0, 0.0, 90.0, 0.0]
+    for method in (model.forward, model.arm_angle):
+        with pytest.raises(InvalidValueError, match=r"q of joint 6: 90\.0 rad is more than two turns; .* np\.radians"):
+            method(give(degrees))
+    assert model.forward(np.radians(degrees)).is_close(model.forward(model.home), 1e-12)
