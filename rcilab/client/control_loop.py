@@ -373,17 +373,15 @@ class ControlLoop:
         return (state.message_id - self._first_id) * CYCLE_TIME
 
     def _fault(self, state: RobotState) -> ControlError:
-        if state.faults == (Fault.INSTABILITY_DETECTION,) and self._find_safety_stop(state) is None:
-            if not self._has_power():
-                self._log.write(state, self._link.received_ns, self._time(state))
-                return self._cut_off()
         t = self._time(state) if self._command is not None else math.nan
         self._log.write(state, self._link.received_ns, t)
+        pressed = self._find_safety_stop(state)
+        if pressed is None and state.faults == (Fault.INSTABILITY_DETECTION,) and not self._has_power():
+            return self._cut_off()
         record = self._log.recorder.last(RECORD_CYCLES)
         late = ""
         if Fault.INSTABILITY_DETECTION in state.faults:
             late = self._calls.describe()
-        pressed = self._find_safety_stop(state)
         message = describe_faults(
             state.faults,
             record,

@@ -116,14 +116,17 @@ def describe_refusal(request: rci.Request, status: rci.Status, phase: Phase, set
     """Returns why a request was refused, for whoever looks at the controller and not at its answers."""
     name, mode = type(request).__name__, phase.name.lower().replace("_", " ")
     why: object = f"the robot is {mode}"
-    if status is rci.StartStatus.SINGULAR_START_POSE:
+    if isinstance(request, rci.StartMove) and phase is Phase.IDLE and status is rci.StartStatus.NOT_POSSIBLE:
+        pair = f"controller mode {request.controller_mode} with motion mode {request.motion_mode}"
+        why = f"there is no {pair}" if arm.commanded.is_at_rest else "the arm still moves"
+    elif status is rci.StartStatus.SINGULAR_START_POSE:
         why = find_singularity(build_geometry(arm.model.description), arm.commanded.q)
     elif status is rci.RecoveryStatus.REFLEX:
         why = arm.watch.find_collision(settings.collision_thresholds)
     elif status is rci.RecoveryStatus.MANUAL_RECOVERY_NEEDED:
         why = "the arm is beyond a joint's range or the safety box: power off and on, then lead it back"
     elif status.name == "INVALID_ARGUMENT":
-        why = f"what it asks for is out of its bounds: {request}"
+        why = f"a value is out of its bounds, or the values do not fit each other: {request}"
     return f"refused {name} ({status.name.lower().replace('_', ' ')}): {why}"
 
 

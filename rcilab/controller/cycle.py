@@ -324,6 +324,8 @@ class ControlCycle:
             case Action.SHOW_MODES:
                 self._shown = self._requested
                 self._motion.begin(self.settings, self.limit_table)
+            case Action.REVEAL_MODES:
+                self._shown = self._requested
             case Action.HIDE_MODES:
                 self._shown = _IDLE_MODES
             case Action.DRAIN:

@@ -75,6 +75,7 @@ class Action(Enum):
     APPLY = "take the request's values into the settings"
     BEGIN = "arm the play-out and count down to the modes"
     SHOW_MODES = "show the requested modes and listen for commands"
+    REVEAL_MODES = "show the requested modes and follow nothing"
     HIDE_MODES = "show idle modes"
     DRAIN = "play what is queued, then come to rest"
     DISCARD = "forget commands that were not played and come to rest"
@@ -136,7 +137,11 @@ REMEDIES: Final = (C.SET_COLLISION_BEHAVIOR, C.SET_LOAD)
 thresholds (4.6), and an error recovery waits until nothing is above them."""
 
 _TELLING = (P.STARTING, P.MOVING, P.STOPPING)
-"""Phases that a client takes for its motion: only an error bit stops it there."""
+"""Phases that a client takes for its motion: only an error bit stops it there.
+
+In STARTING the vendor's client looks at nothing but the modes, without end, so what stops it there shows them with the
+bit; they are hidden again when it stops the motion.
+"""
 
 _BUSY = (P.STARTING, P.MOVING, P.STOPPING, P.GUIDING, P.RECOVERING)
 _START_REFUSED = dict.fromkeys((P.OFF, *_BUSY), StartStatus.NOT_POSSIBLE) | {
@@ -144,6 +149,11 @@ _START_REFUSED = dict.fromkeys((P.OFF, *_BUSY), StartStatus.NOT_POSSIBLE) | {
     P.CUT_OFF: StartStatus.REFLEX,
     P.USER_STOPPED: StartStatus.USER_STOP,
 }
+
+
+def _modes_after(phase: Phase) -> Action:
+    """Returns what becomes of the modes when something stops the arm in a phase."""
+    return A.REVEAL_MODES if phase is P.STARTING else A.HIDE_MODES
 
 
 def _refusal(command: CommandCode) -> Status:
@@ -178,7 +188,8 @@ def _motion(phase: Phase) -> dict[Trigger, Transition]:
     elif phase is P.MOVING:
         rows[C.STOP_MOVE] = Transition(P.STOPPING, (A.HIDE_MODES, A.DRAIN), stopped, When.AT_REST)
     else:  # An arm in somebody's hand need not come to rest at all.
-        rows[C.STOP_MOVE] = Transition(phase, (), stopped, When.NOW if phase is P.GUIDING else When.AT_REST)
+        when = When.NOW if phase is P.GUIDING else When.AT_REST
+        rows[C.STOP_MOVE] = Transition(phase, (A.HIDE_MODES,), stopped, when)
     if phase is P.IDLE:
         rows[C.START_DRAG] = Transition(P.GUIDING, (A.GUIDE,), SettingStatus.SUCCESS, When.SHOWN)
     else:
@@ -194,7 +205,7 @@ def _power(phase: Phase) -> dict[Trigger, Transition]:
     """SetMotorPower is two commands in one: this is the row for "on"; `POWER_OFF` holds the one for "off"."""
     rows: dict[Trigger, Transition] = {}
     if phase is P.OFF:
-        rows[C.SET_MOTOR_POWER] = Transition(P.IDLE, (A.CLEAR_FAULTS,), SettingStatus.SUCCESS, When.SHOWN)
+        rows[C.SET_MOTOR_POWER] = Transition(P.IDLE, (A.HIDE_MODES, A.CLEAR_FAULTS), SettingStatus.SUCCESS, When.SHOWN)
     elif phase in (P.USER_STOPPED, P.CUT_OFF):
         rows[C.SET_MOTOR_POWER] = Transition(phase, (), SettingStatus.NOT_POSSIBLE)
     else:
@@ -213,9 +224,9 @@ def _recovery(phase: Phase) -> dict[Trigger, Transition]:
     if phase is P.REFLEX:
         return {command: Transition(P.RECOVERING, (), RecoveryStatus.SUCCESS, When.AT_REST)}
     if phase is P.CUT_OFF:
-        return {command: Transition(P.OFF, (A.CLEAR_FAULTS,), RecoveryStatus.SUCCESS, When.AT_REST)}
-    if phase in (P.OFF, P.IDLE):  # All there may be is the bit of a motion that power-off ended.
-        return {command: Transition(phase, (A.CLEAR_FAULTS,), RecoveryStatus.SUCCESS)}
+        return {command: Transition(P.OFF, (A.HIDE_MODES, A.CLEAR_FAULTS), RecoveryStatus.SUCCESS, When.AT_REST)}
+    if phase in (P.OFF, P.IDLE):  # All there may be is the bit of a motion that a stop or power-off ended.
+        return {command: Transition(phase, (A.HIDE_MODES, A.CLEAR_FAULTS), RecoveryStatus.SUCCESS)}
     status = RecoveryStatus.USER_STOP if phase is P.USER_STOPPED else RecoveryStatus.NOT_POSSIBLE
     return {command: Transition(phase, (), status)}
 
@@ -227,16 +238,16 @@ def _events(phase: Phase) -> dict[Trigger, Transition]:
     if phase is P.STOPPING:
         rows[E.AT_REST] = Transition(P.IDLE, (A.DISCARD,))
     if phase is P.RECOVERING:
-        rows[E.RECOVERED] = Transition(P.IDLE, (A.CLEAR_FAULTS,))
-    if phase is P.USER_STOPPED:
-        rows[E.SAFETY_RELEASE] = Transition(P.OFF, (A.CLEAR_FAULTS,))
+        rows[E.RECOVERED] = Transition(P.IDLE, (A.HIDE_MODES, A.CLEAR_FAULTS))
+    if phase is P.USER_STOPPED:  # A stop that was pressed and released between two states is seen by its bit alone.
+        rows[E.SAFETY_RELEASE] = Transition(P.OFF)
         rows[E.FAULT] = rows[E.JOINT_LIMIT] = Transition(phase, (A.SET_FAULTS,))
     elif phase is not P.OFF:
-        actions = (A.SET_FAULTS, A.HIDE_MODES, A.DISCARD)
+        actions = (A.SET_FAULTS, _modes_after(phase), A.DISCARD)
         rows[E.FAULT] = Transition(phase if phase is P.CUT_OFF else P.REFLEX, actions)
         rows[E.JOINT_LIMIT] = Transition(P.CUT_OFF, actions)
     tells = (A.SET_FAULTS,) if phase in _TELLING else ()
-    rows[E.SAFETY_STOP] = Transition(P.USER_STOPPED, (*tells, A.HIDE_MODES, A.DISCARD))
+    rows[E.SAFETY_STOP] = Transition(P.USER_STOPPED, (*tells, _modes_after(phase), A.DISCARD))
     if phase in (P.STARTING, P.GUIDING):
         rows[E.CLIENT_LOST] = Transition(P.IDLE, (A.HIDE_MODES, A.DISCARD))
     elif phase in (P.MOVING, P.STOPPING):
@@ -255,7 +266,7 @@ TABLE: Final = {(phase, trigger): cell for phase in Phase for trigger, cell in _
 def _power_off(phase: Phase) -> Transition:
     after = phase if phase is P.USER_STOPPED else P.OFF
     tells = A.SET_FAULTS if phase in _TELLING else A.CLEAR_FAULTS
-    actions = () if phase in (P.OFF, P.USER_STOPPED) else (A.HIDE_MODES, A.DISCARD, tells)
+    actions = () if phase in (P.OFF, P.USER_STOPPED) else (_modes_after(phase), A.DISCARD, tells)
     return Transition(after, actions, SettingStatus.SUCCESS, When.AT_REST)
 
 

@@ -200,30 +200,23 @@ def test_a_fault_before_the_first_command_is_a_control_error_that_names_it(plant
 
 
 @pytest.mark.realtime
-def test_a_slow_callback_is_named_with_its_duration_and_the_cycles_it_missed():
+@pytest.mark.parametrize(
+    ("pause", "said"),
+    [
+        (lambda t: 0.06 * (t > 0.05), r"the callback took \d+\.\d ms at t = .* (\d+) cycles had no"),
+        (lambda t: 0.0015, r"\d+ of \d+ calls .* more than 1 ms, \d+\.\d ms on average"),
+        (lambda t: 0.03, r"\d+ of \d+ calls .* more than 1 ms, \d+\.\d ms on average"),
+    ],
+    ids=["one long call", "all calls a little", "all calls long"],
+)
+def test_a_slow_callback_is_named_with_its_times_and_not_the_network(pause, said):
     def slow(state, t):
-        if t > 0.05:
-            time.sleep(0.06)
+        time.sleep(pause(t))
         return JointPosition(state.q_c)
 
     with simulate(MODEL, lockstep=False) as robot:
         robot.power_on()
-        with pytest.raises(ControlError, match=r"the callback took \d+\.\d ms at t = .* (\d+) cycles had no") as caught:
-            robot.control(slow)
-        assert caught.value.faults == (Fault.INSTABILITY_DETECTION,)
-        assert "network" not in str(caught.value)
-
-
-@pytest.mark.realtime
-@pytest.mark.parametrize("takes", [0.0015, 0.03])
-def test_a_callback_that_is_always_slow_is_not_taken_for_the_network(takes):
-    def slow(state, t):
-        time.sleep(takes)
-        return JointPosition(state.q_c)
-
-    with simulate(MODEL, lockstep=False) as robot:
-        robot.power_on()
-        with pytest.raises(ControlError, match=r"\d+ of \d+ calls .* more than 1 ms, \d+\.\d ms on average") as caught:
+        with pytest.raises(ControlError, match=said) as caught:
             robot.control(slow)
         assert caught.value.faults == (Fault.INSTABILITY_DETECTION,)
         assert "network" not in str(caught.value)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
 
 from rcilab.controller.cycle import ControlCycle
+from rcilab.controller.state_machine import Phase
+from rcilab.protocols.rci import SafetyStop, SetMotorPower
 from tests.peers import faults, programs, wire
 from tests.peers.arena import PLANTS, Arena, arena
 from tests.peers.faults import CASES, Case
@@ -234,8 +237,6 @@ def test_a_client_that_falls_silent_is_an_instability(robot: Robot, modes: tuple
 def test_a_safety_stop_in_mid_motion_sets_a_bit_and_waits_for_its_release(
     place: Arena, robot: Robot, kind: int
 ) -> None:
-    from rcilab.protocols.rci import SafetyStop
-
     state = begin(robot, faults.JOINT_MODE)
     second = np.minimum(0.2 * np.arange(400), 2.0)
     q = np.cumsum(np.cumsum(second)) * 1e-6
@@ -276,6 +277,28 @@ def test_a_wrist_or_shoulder_that_is_straight_is_singular_too(robot: Robot, join
     with pytest.raises(CommandException) as refused:
         robot.start_move(*faults.CARTESIAN_MODE)
     assert refused.value.status == 4
+
+
+@pytest.mark.parametrize("what", ["estop", "power off"])
+def test_what_stops_the_arm_before_the_modes_ends_the_clients_wait_for_them(
+    robot: Robot, place: Arena, what: str
+) -> None:
+    def stop(cycle: ControlCycle) -> None:
+        if what == "estop":
+            cycle.press_safety_stop(SafetyStop.ESTOP)
+        else:
+            cycle.handle(SetMotorPower(0))
+
+    waiting = threading.Thread(target=robot.start_move, args=faults.JOINT_MODE)
+    waiting.start()
+    while place.cycle.phase is not Phase.STARTING:
+        assert waiting.is_alive()
+    place.between(stop)
+    waiting.join()
+    state = robot.receive_fresh_state()
+    assert state.errors == (19,)
+    robot.stop_move()
+    assert robot.receive_fresh_state().controller_mode != faults.JOINT_MODE[0]
 
 
 def test_motors_switched_off_in_mid_motion_set_a_bit_until_they_are_on_again(robot: Robot) -> None:

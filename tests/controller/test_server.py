@@ -473,10 +473,12 @@ def test_refusals_are_told_with_their_reason(lockstep: Running) -> None:
         lockstep.server.cycle.reset(np.zeros(7))
         assert peer.ask(rci.SetMotorPower(1)) == 0
         assert peer.ask(rci.StartMove(1, 2)) is rci.StartStatus.SINGULAR_START_POSE
+        assert peer.ask(rci.StartMove(0, 0)) is rci.StartStatus.NOT_POSSIBLE
+    assert lockstep.lines[3] == "refused StartMove (not possible): there is no controller mode 0 with motion mode 0"
     assert lockstep.lines[:3] == [
         "refused StartMove (not possible): the robot is off",
-        "refused SetCollisionBehavior (invalid argument): what it asks for is out of its bounds: "
-        f"{rci.SetCollisionBehavior((math.nan,) * 7)}",
+        "refused SetCollisionBehavior (invalid argument): a value is out of its bounds, or the values do not fit each "
+        f"other: {rci.SetCollisionBehavior((math.nan,) * 7)}",
         "refused StartMove (singular start pose): the arm is stretched or folded: joint 4 is at 0.00 deg",
     ]
 

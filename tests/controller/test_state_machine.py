@@ -91,10 +91,20 @@ def test_power_off_is_obeyed_everywhere(phase: Phase) -> None:
 
 
 def test_whatever_leaves_a_motion_hides_its_modes_and_forgets_or_drains_its_commands() -> None:
-    for (phase, _), cell in TABLE.items():
+    """Before the modes are shown, what stops the arm shows them with the bit: the vendor's client waits for them."""
+    cells = [*TABLE.items(), *(((phase, None), cell) for phase, cell in POWER_OFF.items())]
+    for (phase, _), cell in cells:
         if phase in (Phase.STARTING, Phase.MOVING) and cell.phase not in (Phase.STARTING, Phase.MOVING):
-            assert Action.HIDE_MODES in cell.actions
+            is_surprise = phase is Phase.STARTING and Action.SET_FAULTS in cell.actions
+            assert (Action.REVEAL_MODES if is_surprise else Action.HIDE_MODES) in cell.actions
             assert {Action.DISCARD, Action.DRAIN} & {*cell.actions}
+
+
+def test_modes_that_were_revealed_are_hidden_by_all_that_leads_on() -> None:
+    for (_, trigger), cell in TABLE.items():
+        is_stop = trigger is CommandCode.STOP_MOVE
+        if is_stop or Action.CLEAR_FAULTS in cell.actions:
+            assert Action.HIDE_MODES in cell.actions
 
 
 def test_what_is_queued_is_played_no_longer_than_the_stop_takes() -> None:
@@ -109,11 +119,10 @@ def test_only_the_delay_after_start_move_leads_into_a_motion() -> None:
     assert into == {(Phase.STARTING, Event.MODES_SHOWN)}
 
 
-def test_faults_are_cleared_only_by_recovery_release_power_and_reboot() -> None:
+def test_faults_are_cleared_only_by_recovery_power_and_reboot() -> None:
     clearing = {trigger for (_, trigger), cell in TABLE.items() if Action.CLEAR_FAULTS in cell.actions}
     assert clearing == {
         Event.RECOVERED,
-        Event.SAFETY_RELEASE,
         CommandCode.SET_MOTOR_POWER,
         CommandCode.REBOOT_ROBOT,
         CommandCode.AUTOMATIC_ERROR_RECOVERY,

@@ -247,6 +247,19 @@ def test_things_happen_in_the_middle_of_a_motion(lockstep: Running) -> None:
     assert "an emergency stop was pressed" in line
 
 
+def test_a_stop_that_is_released_before_a_state_could_show_it_is_seen_by_its_bit(lockstep: Running) -> None:
+    with Guest(lockstep) as guest, Peer(lockstep) as peer:
+        peer.run(MOTION.q[:100])
+        press = b'{"request": "press", "button": "%b"}\n'
+        guest.socket.sendall(press % b"estop" + press % b"none")
+        while not peer.receive_state().faults:
+            pass
+        assert peer.ask(rci.StopMove()) == 0
+        assert peer.ask(rci.SetMotorPower(1)) == 0
+        assert peer.receive_live_state().faults == ()
+    assert "an emergency stop was pressed" in lockstep.wait_for_line("kInstabilityDetection")
+
+
 def test_an_emergency_stop_between_start_move_and_its_modes_sets_a_bit_and_says_why() -> None:
     with running(lockstep=True, mode_delay=5.0) as found, Guest(found) as guest, Peer(found) as peer:
         assert peer.ask(rci.SetMotorPower(1)) == 0
@@ -254,7 +267,11 @@ def test_an_emergency_stop_between_start_move_and_its_modes_sets_a_bit_and_says_
         assert guest.ask(request="press", button="estop")["ok"]
         while not peer.receive_state().faults:
             assert peer.seen[-1].motion_generator_mode == 0
-        assert peer.seen[-1].robot_mode is RobotMode.USER_STOPPED
+        first = peer.seen[-1]  # The vendor's client waits for the modes, without end, and then looks at the bits.
+        assert (first.controller_mode, first.motion_generator_mode) == (0, 1)
+        assert first.robot_mode is RobotMode.USER_STOPPED
+        assert peer.ask(rci.StopMove()) == 0
+        assert peer.receive_live_state().motion_generator_mode == 0
         assert "an emergency stop was pressed" in found.wait_for_line("kInstabilityDetection")
 
 
