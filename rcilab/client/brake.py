@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -12,9 +12,12 @@ from rcilab.arrays import Array, JointVector
 from rcilab.client.rotation import rotation_matrix, rotation_vector
 from rcilab.clock import CYCLE_TIME
 from rcilab.command import CartesianPosition, Command, JointPosition, JointTorque
+from rcilab.conformance import Breach, CartesianMonitor, JointMonitor
 from rcilab.errors import SingularError
+from rcilab.faults import Fault
 from rcilab.limits import JointLimits, Limits
 from rcilab.motion import LIMIT_MARGIN, plan_stop
+from rcilab.spatial import Pose
 from rcilab.state import RobotState
 
 if TYPE_CHECKING:
@@ -24,6 +27,7 @@ _JOINT_SHARE = 0.6  # Part of the joints' acceleration and jerk that a stop of t
 _STEP = 1e-6  # [rad] Of a difference.
 _SINGULAR = 1e-3  # Part of the largest singular value below which a direction counts as lost.
 _FLOOR = 1e-9  # So that a joint with nothing to do asks for no division by zero.
+_HISTORY = 3  # Commands that a third difference looks back to.
 _FAR = 1e3  # Position bounds that a Cartesian brake never meets: [m], [rad].
 
 
@@ -40,6 +44,10 @@ class Brake(Protocol):
 
     def plan(self) -> Sequence[Command]:
         """Returns the commands that lead to rest within the limits, one a cycle after the last; at least one."""
+        ...
+
+    def find_motion(self) -> Breach | None:
+        """Returns what the last command breaks when it is repeated, because it still moved; None: it may stand."""
         ...
 
 
@@ -68,12 +76,21 @@ class StreamBrake:
 
     def rows(self) -> Array:
         """Returns the samples from the one after the last to rest, shape (N, n)."""
+        near, ddq = self.differences()
+        dq = near + ddq * ((self._past[-1][0] - self._past[-2][0]) * CYCLE_TIME / 2.0)
+        rows = plan_stop(self._limits, self.last, dq, ddq).q
+        return rows[1:] if len(rows) > 1 else rows
+
+    def differences(self) -> tuple[Array, Array]:
+        """Returns the first and second divided difference of the last samples, shape (n,) each, per s and s^2."""
         (t0, x0), (t1, x1), (t2, x2) = self._past
         near, far = (x2 - x1) / ((t2 - t1) * CYCLE_TIME), (x1 - x0) / ((t1 - t0) * CYCLE_TIME)
-        ddq = 2.0 * (near - far) / ((t2 - t0) * CYCLE_TIME)
-        dq = near + ddq * ((t2 - t1) * CYCLE_TIME / 2.0)
-        rows = plan_stop(self._limits, x2, dq, ddq).q
-        return rows[1:] if len(rows) > 1 else rows
+        return near, 2.0 * (near - far) / ((t2 - t0) * CYCLE_TIME)
+
+    @property
+    def last(self) -> Array:
+        """The last sample."""
+        return self._past[-1][1]
 
 
 class JointBrake:
@@ -84,6 +101,7 @@ class JointBrake:
     """
 
     def __init__(self, limits: JointLimits) -> None:
+        self._limits = limits
         self._stream = StreamBrake(limits)
 
     def begin(self, state: RobotState) -> None:
@@ -97,6 +115,13 @@ class JointBrake:
     def plan(self) -> Sequence[Command]:
         """Returns the angles that lead to rest."""
         return [JointPosition(row) for row in self._stream.rows()]
+
+    def find_motion(self) -> Breach | None:
+        """Returns what the last command breaks when it is repeated; None: it may stand."""
+        q = self._stream.last.tolist()
+        monitor = JointMonitor(self._limits)
+        monitor.reset(q, *(difference.tolist() for difference in self._stream.differences()))
+        return _first_breach(monitor, lambda: monitor.step(q))
 
 
 class CartesianBrake:
@@ -148,6 +173,18 @@ class CartesianBrake:
             way.append(CartesianPosition(T, None if last.psi is None else last.psi + float(row[6])))
         return way
 
+    def find_motion(self) -> Breach | None:
+        """Returns what the last command breaks when it is repeated; None: it may stand. Joints are not computed."""
+        monitor = CartesianMonitor(self._limits)
+        (before, first), *later = self._poses
+        monitor.reset(Pose.from_matrix(first.T_base_tool), first.psi)
+        for cycle, command in later:
+            monitor.step(Pose.from_matrix(command.T_base_tool), command.psi, cycle - before)
+            before = cycle
+        last = self._poses[-1][1]
+        pose = Pose.from_matrix(last.T_base_tool)
+        return _first_breach(monitor, lambda: monitor.step(pose, last.psi))
+
     def _bounds(self) -> JointLimits:
         """Returns bounds of position, rotation and arm angle, seven coordinates, as if they were joints."""
         c, psi = self._limits.cartesian, self._limits.arm_angle
@@ -195,6 +232,18 @@ class TorqueBrake:
             tau = way[-1].tau
             way.append(JointTorque(np.sign(tau) * np.maximum(np.abs(tau) - self._step, 0.0)))
         return way
+
+    def find_motion(self) -> Breach | None:
+        """Returns None: torques may be repeated."""
+        return None
+
+
+def _first_breach(monitor: JointMonitor | CartesianMonitor, repeat: Callable[[], tuple[Fault, ...]]) -> Breach | None:
+    """Returns what the first broken cycle of as many repetitions breaks as a third difference looks back to."""
+    for _ in range(_HISTORY):
+        if repeat():
+            return monitor.broken()[0]
+    return None
 
 
 def _joint_shares(model: RobotModel, q: JointVector) -> Array:

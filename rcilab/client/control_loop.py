@@ -27,6 +27,7 @@ from rcilab.errors import (
     ControlError,
     DeadlineError,
     InvalidValueError,
+    PlanningError,
     RcilabError,
 )
 from rcilab.faults import Fault
@@ -226,6 +227,14 @@ class ControlLoop:
             sent = self._filtered(wanted, state)
             self._answer(state, sent)
         last = wanted if near else sent
+        breach = self._brake.find_motion()
+        if breach is not None:
+            raise InvalidValueError(
+                f"last command at t = {self._t:.3f} s",
+                round(breach.value, 3),
+                f"{breach.condition.unit} is what standing still from there would take ({breach.text}), so the arm was "
+                "brought to rest within the limits, farther on; let the commands come to rest before finished=True",
+            )
         state = self._hold(last)
         if distance_to(state, last) > ARRIVAL_TOLERANCE or self._is_unplayed(state, last):
             raise self._not_arrived(state, last)
@@ -306,13 +315,11 @@ class ControlLoop:
                 self._come_to_rest()
             except BaseException as worse:
                 surprise = worse
-        first, others = self._log.recorder.count, self._link.on_states
-        if isinstance(surprise, ControlError) and not self._link.is_heard:
-            self._link.on_states = self._record  # The controller's own stop has begun.
-        try:
-            self._stop_move(surprise)
-        finally:
-            self._link.on_states, self._log.braking = others, False
+        first = self._log.recorder.count
+        if surprise is None:
+            surprise = self._end_well()
+        else:
+            self._end_badly(surprise)
         if isinstance(surprise, ControlError):
             self._watch_standstill()
             surprise.stop = self._log.recorder.rows(first)
@@ -320,7 +327,10 @@ class ControlLoop:
             raise surprise from error
 
     def _come_to_rest(self) -> None:
-        way = self._brake.plan()
+        try:
+            way = self._brake.plan()
+        except PlanningError:  # The commands were beyond every bound: StopMove alone ends this.
+            return
         self._log.braking = True
         last_id = self._answered_id
         step = 0
@@ -330,14 +340,43 @@ class ControlLoop:
             self._answer(state, way[step - 1])
         self._hold(way[-1])
 
-    def _stop_move(self, error: BaseException | None) -> None:
-        if error is None:
+    def _end_well(self) -> ControlError | None:
+        """Ends a motion that went well so far; returns what the controller found wrong with the last that it played."""
+        states: list[RobotState] = []
+
+        def take(arrived: list[RobotState]) -> None:
+            others(arrived)
+            states.extend(arrived)
+
+        others, self._link.on_states = self._link.on_states, take
+        try:
             self._commands.stop_move()
-            return
+            deadline = time.monotonic() + REST_TIMEOUT
+            while self._is_running(states) and time.monotonic() < deadline:
+                take(self._link.poll(min(self._silence, REST_TIMEOUT)))
+        finally:
+            self._link.on_states, self._log.braking = others, False
+        faulty = next((state for state in states if state.faults), None)
+        return None if faulty is None else self._fault(faulty)
+
+    def _is_running(self, states: list[RobotState]) -> bool:
+        """Returns whether the newest of these states still shows the motion without a fault, or there is none."""
+        shown = (self._mode, self._motion_mode.shown_as)
+        return not states or (
+            not any(state.faults for state in states)
+            and (states[-1].controller_mode, states[-1].motion_generator_mode) == shown
+        )
+
+    def _end_badly(self, error: BaseException) -> None:
+        others = self._link.on_states
+        if isinstance(error, ControlError) and not self._link.is_heard:
+            self._link.on_states = self._record  # The controller's own stop has begun.
         try:
             self._commands.stop_move(STOP_TIMEOUT)
         except (CommandRejectedError, ConnectionLostError, DeadlineError) as refusal:
             error.add_note(f"StopMove did not go well either: {refusal}")
+        finally:
+            self._link.on_states, self._log.braking = others, False
 
     def _watch_standstill(self) -> None:
         """Records the controller's own stop, so that the record shows it and the next motion starts from rest."""

@@ -39,6 +39,7 @@ class Script:
     stale_responses: bool = False
     fault_at: int | None = None
     fault: Fault = Fault.COMMAND_JOINT_VELOCITY_LIMITS_VIOLATION
+    fault_on_stop: bool = False
     silent_at: int | None = None
     end_at: int | None = None
     skip_at: int | None = None
@@ -171,9 +172,11 @@ class Peer:
             self._next_mode, self._pending_mode = (ControllerMode(request.controller_mode), shown), MODE_DELAY
         if isinstance(request, rci.StopMove):
             self._mode, self._pending_mode = None, 0
+            if self.script.fault_on_stop:
+                self._faults = (self.script.fault,)
         if isinstance(request, rci.AutomaticErrorRecovery):
             self._faults = ()
-            self.script.fault_at = None
+            self.script.fault_at, self.script.fault_on_stop = None, False
         response = {
             rci.GetMotorState: rci.MotorStateResponse(1),
             rci.GetSafetyStopState: rci.SafetyStopResponse(self.script.safety_stop),
