@@ -104,6 +104,7 @@ class Actuator:
         """
         if law is not self._law:
             self._law, self._damper = law, Damper()
+            self._axes.begin()
         if law is not Law.CARTESIAN_IMPEDANCE:
             self._wrench = (0.0,) * 6
         if not law.yields:
@@ -124,9 +125,9 @@ class Actuator:
         if law is Law.JOINT_IMPEDANCE:
             return joint_impedance(model, *commanded.arrays, measured, settings.joint_stiffness, self._damper)
         if law is Law.CARTESIAN_IMPEDANCE:
-            self._axes.follow(tool_c.twist[:3])
-            self._wrench = _approach(self._wrench, settings.desired_wrench)
             tool = model.rigid_body.tool_terms(measured.q, measured.dq)
+            self._axes.follow(tool_c.twist[:3], tool.pose)
+            self._wrench = _approach(self._wrench, settings.desired_wrench)
             return cartesian_impedance(
                 model,
                 tool_c.pose,

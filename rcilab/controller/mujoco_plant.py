@@ -4,7 +4,7 @@ Each millisecond is one `mj_step`. What the drives put on the joints:
 
     POSITION   M (ddq_c + K_d (dq_c - dq) + K_p (q_c - q)) + C dq + g + friction  computed torque
     TORQUE     tau_c + g_model + friction                               for M ddq + C dq = tau_c + J^T w
-    BRAKED     the brakes take the speed out within some 0.1 s, then the arm is rigid
+    BRAKED     the brakes take the speed out within some 0.1 s and bear what presses, then the arm is rigid
 
 w is what presses from outside. The position servo knows the load that is really there, as one with an integrating
 controller learns it; TORQUE compensates the gravity of the load that setLoad says (`g_model`). The drives compensate
@@ -132,7 +132,7 @@ class MuJoCoPlant:
         motor = drive_torque + compensated + self._known_friction * dq
         self._applied[:] = motor
         if self._push.is_active:
-            self._applied += self._push.torque(self._q)
+            self._applied += self._push_torque()
         mj.mj_step2(model, data)
         mj.mj_step1(model, data)  # Forces and contacts of the place it has come to.
         # What is left of the motor torque behind rotor and friction, brought to the end of the millisecond.
@@ -149,11 +149,15 @@ class MuJoCoPlant:
         if setpoint.drive is Drive.TORQUE:
             return np.zeros(self._n) if setpoint.tau is None else np.array(setpoint.tau, dtype=np.float64)
         if setpoint.drive is Drive.BRAKED:
-            return self._times_inertia(dq * (-1.0 / BRAKE_TIME))
+            return self._times_inertia(dq * (-1.0 / BRAKE_TIME)) - self._push_torque()
         # The setpoint is where the arm is to be at the end of this millisecond; q and dq are those of its beginning:
         # ddq_c + KD (dq_c - h ddq_c - dq) + KP (q_c - h dq_c - q), with the two steps back taken out of the brackets.
         q_c, dq_c, ddq_c = setpoint.as_arrays()
         return self._times_inertia(_KP * (q_c - q) + _KD * (dq_c - dq) - _BACK * dq_c + _AHEAD * ddq_c)
+
+    def _push_torque(self) -> Array | float:
+        """Returns what presses from outside as joint torques, shape (n,), [N m]; 0 where nothing does."""
+        return self._push.torque(self._q) if self._push.is_active else 0.0
 
     def _settle(self, setpoint: Setpoint) -> None:
         """Lets an arm that has come to rest be at rest: its last 1e-7 rad/s would otherwise never end."""
@@ -179,8 +183,7 @@ class MuJoCoPlant:
         self._q[:] = q
         self._dq[:] = 0.0
         self._mj.mj_step1(self._model, self._data)
-        outside = self._push.torque(self._q) if self._push.is_active else 0.0
-        self._measurement = self._measure(self._bias - outside)
+        self._measurement = self._measure(self._bias - self._push_torque())
         self._rests, self._rest_q = True, q
         return self._measurement
 

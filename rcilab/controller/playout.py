@@ -10,9 +10,12 @@
 * Without a first command within `FIRST_COMMAND_TIMEOUT`, the cycles from then on are lost: the commands go elsewhere.
 * A repeated id is the next command: the vendor's client answers the last state again when none came in time. A
   datagram that is the same in every number is the network's copy and dropped; it only shows that the client lives.
-* A command that was overtaken on its way is put back in its place.
 * A short gap in the ids is either a lost command, or a lost state whose cycle the client never saw; only the command
-  itself can tell, so the caller is asked whether it continues the motion by one step or by the whole gap.
+  itself can tell, so the caller is asked whether it continues the motion by one step or by the whole gap. A repeated
+  id right before the gap speaks for the lost state.
+* A command that was overtaken on its way fills the gap. Where states overtake each other, it is the ids of their
+  answers that are out of order: then the command behind the gap continues the motion, and those with the ids of the
+  gap come after it, in the order of their arrival.
 * Clearly more commands than the prefill in stock for a long time mean a client that made more of them than there are
   cycles; the loop is told to live through some more, or their delay would only ever grow.
 * Commands that close a control loop (torques) must be fresh: more than the prefill in stock are skipped, oldest first.
@@ -22,7 +25,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 from rcilab.protocols.rci import CommandPacket
@@ -89,7 +92,8 @@ class Playout:
         self._played_in_window = 0
         self._last_id = 0
         self._was_lost = False  # The cycle `_last_id` had no command.
-        self._surplus = 0
+        self._surplus = 0  # Commands that had an id again, right before the next one in the queue.
+        self._passed_over: set[int] = set()  # Ids of a gap that was none: their commands may come yet.
         self._waited = 0
         self.is_playing = False
         self.is_finished = False
@@ -124,8 +128,8 @@ class Playout:
             self._newest = packet
         if self._is_late(packet):
             self.late += 1
-        elif is_overtaken:
-            self._put_in_place(packet)
+        elif is_overtaken and packet in queue:
+            self.copies += 1
         else:
             if len(queue) >= CAPACITY:
                 queue.popleft()
@@ -142,12 +146,12 @@ class Playout:
         self._excess -= 1
         return True
 
-    def take(self, is_next: Callable[[CommandPacket, int], bool]) -> Playback:
+    def take(self, is_next: Callable[[CommandPacket, int, bool], bool]) -> Playback:
         """Returns what this cycle plays.
 
         Args:
-            is_next: Asked about a command whose id is a few cycles ahead: does it continue the motion by one step
-                (true) or by that many (false)?
+            is_next: Asked about a command whose id is a few cycles ahead, `(packet, steps, in_doubt)`: does it continue
+                the motion by one step (true) or by that many (false)? `in_doubt` is the answer where neither is clear.
         """
         if self.is_finished:
             return _WAITING
@@ -160,41 +164,42 @@ class Playout:
                 return _WAITING
             self.is_playing = True
             self._skip_old()
-            self._last_id = self._queue[0].message_id - 1
+            first = self._queue[0].message_id
+            self._last_id = min(i for i in self._ids() if 0 <= first - i <= LONGEST_GAP) - 1
         self._look_for_excess()
         skipped = self._skip_old()
         lives, self._lives = self._lives, False
         if not self._queue:
             return self._wait_alive() if lives else self._lose(_EMPTY)
         packet = self._queue[0]
-        ahead = packet.message_id - self._last_id
-        if ahead == 0:
-            self._surplus += 1
-        elif 1 < ahead <= LONGEST_GAP:
-            explained = min(self._surplus, ahead - 1)
-            self._surplus -= explained
-            ahead -= explained
-            if ahead > 1 and not is_next(packet, ahead):
-                self._surplus += explained
-                return self._lose(Playback(packet, ahead, True))
-        elif ahead != 1:
-            self._surplus = 0
+        steps = self._steps_to(packet, is_next)
+        if steps > 1:  # Unless a command that was overtaken fills the gap, its cycles are lost.
+            between = (other for other in self._queue if self._last_id < other.message_id < packet.message_id)
+            packet = min(between, key=lambda other: other.message_id, default=packet)
+            steps = self._steps_to(packet, is_next)
+            if steps > 1:
+                return self._lose(Playback(packet, steps, True))
         return self._play(packet, skipped)
+
+    def _ids(self) -> Iterator[int]:
+        return (packet.message_id for packet in self._queue)
+
+    def _steps_to(self, packet: CommandPacket, is_next: Callable[[CommandPacket, int, bool], bool]) -> int:
+        """Returns how many cycles from now a command is due, 1 for now."""
+        ahead = packet.message_id - self._last_id
+        if not 1 < ahead <= LONGEST_GAP:
+            return 1
+        unexplained = max(ahead - self._surplus, 1)
+        if unexplained == 1:
+            return 1 if is_next(packet, ahead, True) else ahead
+        return 1 if is_next(packet, unexplained, False) else unexplained
 
     def _is_late(self, packet: CommandPacket) -> bool:
         """Returns whether the cycle that a command is for has passed already."""
         behind = self._last_id - packet.message_id
+        if packet.message_id in self._passed_over:
+            return False
         return 0 <= behind <= LONGEST_GAP and (behind > 0 or self._was_lost) and self.is_playing
-
-    def _put_in_place(self, packet: CommandPacket) -> None:
-        """Takes a command that was overtaken."""
-        queue, place = self._queue, len(self._queue)
-        while place > 0 and queue[place - 1].message_id > packet.message_id:
-            place -= 1
-        if place > 0 and queue[place - 1] == packet:
-            self.copies += 1
-        else:
-            queue.insert(place, packet)
 
     def _look_for_excess(self) -> None:
         self._lowest = min(self._lowest, len(self._queue) - 1)
@@ -210,7 +215,7 @@ class Playout:
             return 0
         skipped = max(0, len(self._queue) - self._stock - 1)
         for _ in range(skipped):
-            self._last_id, self._was_lost = self._queue.popleft().message_id, False
+            self._advance_to(self._queue.popleft().message_id)
         return skipped
 
     def _wait_alive(self) -> Playback:
@@ -221,12 +226,25 @@ class Playout:
         return _EMPTY
 
     def _play(self, packet: CommandPacket, skipped: int) -> Playback:
-        self._queue.popleft()
-        self._last_id, self._was_lost = packet.message_id, False
+        self._queue.remove(packet)
+        self._advance_to(packet.message_id)
         self.lost_in_row = 0
         self.is_finished = packet.finished
         self._count(True)
         return Playback(packet, 1, False, skipped)
+
+    def _advance_to(self, played: int) -> None:
+        """Takes note of the id that is played now."""
+        last, self._was_lost = self._last_id, False
+        if played in self._passed_over:
+            self._passed_over.remove(played)
+            return
+        ahead = played - last
+        self._surplus = self._surplus + 1 if ahead == 0 else 0
+        self._passed_over = {i for i in self._passed_over if 0 < played - i <= LONGEST_GAP}
+        if 1 < ahead <= LONGEST_GAP:
+            self._passed_over.update(range(last + 1, played))
+        self._last_id = played
 
     def _lose(self, playback: Playback) -> Playback:
         self._last_id, self._was_lost = self._last_id + 1, True

@@ -13,7 +13,8 @@ What this virtual arm knows and how (each documented here because a state must n
   wrench on the tool, base axes, at the tool's origin. `tau_ext_in_stiff` is the same wrench at the origin of the force
   frame of setFcCoor, in axes that its type names: WORLD those of the base, TOOL those of the force frame, PATH x along
   the commanded velocity of the tool (where it stands still, its last direction), z as near to the force frame's z as
-  that allows.
+  that allows; where a path turns sharply its axes turn within 0.5 s. The sign is that of what acts on the arm: a hand
+  that presses down shows as a negative z in base axes. The manual leaves it open; the opposite is what the arm exerts.
 * Motor angles, velocities and torques come from the drive model. Filtered torques pass a first-order low pass at the
   frequency of SetTorqueFilterCutOffFrequency.
 """
@@ -102,7 +103,8 @@ class StateReporter:
     ) -> RobotState:
         """Returns the state of this cycle."""
         body = self._body
-        self.has_repeated = body is not None and self._is_settled and self._is_same(readings)
+        is_settled = self._is_settled and self._axes.is_settled
+        self.has_repeated = body is not None and is_settled and self._is_same(readings)
         if body is None or not self.has_repeated:
             body = self._body = self._compute(readings)
             self._readings, self._version = readings, readings.commanded.version
@@ -171,7 +173,7 @@ class StateReporter:
 
     def _in_force_frame(self, wrench: Array, tool: ToolMotion, velocity: Sequence[float]) -> Array:
         """Returns a wrench on the tool (base axes, tool's origin) at the force frame's origin, in its type's axes."""
-        self._axes.follow(velocity)
+        self._axes.follow(velocity, tool.pose)
         fx, fy, fz, mx, my, mz = wrench.tolist()
         if self._is_wrench_at_tool or not (fx or fy or fz or mx or my or mz):
             return wrench

@@ -46,12 +46,16 @@ class Stream:
         there = self.predict(target_steps)
         return [x + share * (goal - far) for x, goal, far in zip(even, target, there, strict=True)]
 
-    def is_next(self, values: Sequence[float], steps: int) -> bool:
+    def is_next(self, values: Sequence[float], steps: int, in_doubt: bool = False) -> bool:
         """Returns whether a command continues the stream by one step rather than by `steps`.
 
-        In doubt it does not: a step too small for the time harms a motion less than one too large.
+        Args:
+            values: The command.
+            steps: More than 1.
+            in_doubt: The answer where neither is clearly nearer. A step too small for the time harms a motion less than
+                one too large, so it is false unless something else speaks for one step.
         """
         near, far = self.predict(1), self.predict(steps)
         off_near = sum(abs(a - b) for a, b in zip(values, near, strict=True))
         off_far = sum(abs(a - b) for a, b in zip(values, far, strict=True))
-        return _CLEARLY * off_near <= off_far
+        return off_near <= _CLEARLY * off_far if in_doubt else _CLEARLY * off_near <= off_far

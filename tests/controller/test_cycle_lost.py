@@ -198,3 +198,27 @@ def play_badly(
         hand.cycle.receive(packet)
     hand.ask(rci.StopMove())
     assert hand.state.faults == (), hand.cycle.reason
+
+
+@pytest.mark.parametrize("prefill", [0, 4])
+def test_answers_to_states_that_overtook_each_other_are_played_as_they_came(make_hand, prefill: int) -> None:
+    """Their ids are swapped, the motion is not."""
+    hand = make_hand(prefill=prefill)
+    hand.start()
+    for k, row in enumerate(hand.swing(1, 2.0, 0.5)):
+        swap = {10: 1, 11: -1}.get(k % 37, 0)
+        hand.cycle.receive(rci.CommandPacket(hand.state.message_id + swap, tuple(row)))
+        hand.step()
+    assert not any(state.faults for state in hand.states)
+    assert (hand.cycle.playout.lost, hand.cycle.playout.late) == (0, 0)
+
+
+def test_a_command_lost_long_after_an_id_was_repeated_is_bridged(make_hand) -> None:
+    hand = make_hand(prefill=4)
+    hand.start()
+    for k, row in enumerate(hand.swing(1, 2.0, 0.5)):
+        if k != 250:
+            hand.cycle.receive(rci.CommandPacket(hand.state.message_id - (k >= 50), tuple(row)))
+        hand.step()
+    assert not any(state.faults for state in hand.states)
+    assert hand.cycle.playout.lost == 1

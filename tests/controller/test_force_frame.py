@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from rcilab.command import CartesianPosition
+from rcilab.controller.force_frame import ForceAxes
+from rcilab.controller.settings import default_settings
 from rcilab.model import load_model
-from rcilab.spatial import Pose
+from rcilab.protocols.rci import ForceFrame
+from rcilab.spatial import Pose, turn_between
 from rcilab.supervisor.simulate import simulate
 
 MODEL = load_model("xMatePro7")
@@ -67,3 +71,39 @@ def test_in_the_frame_of_the_world_both_act_in_base_axes(robot):
     robot.set_cart_imp_desired_tau([0.0, 10.0, 0.0, 0.0, 0.0, 0.0])
     moved, _ = hold(robot)
     assert moved == pytest.approx([0.0, 10.0 / SOFT[1], 0.0], abs=2e-3)
+
+
+@pytest.mark.parametrize("direction", [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], ids=["across", "along the tool"])
+def test_a_path_that_reverses_does_not_throw_the_arm_that_presses(robot, direction):
+    """What it presses with goes round with the path's axes, within half a second and not within a cycle."""
+    robot.set_fc_coor(Pose(), "path")
+    robot.set_cartesian_impedance([1000.0] * 3 + [200.0] * 3)
+    robot.set_cart_imp_desired_tau([8.0, 0.0, 8.0, 0.0, 4.0, 0.0])
+    start = robot.state.T_base_tool_c.matrix
+    seen = []
+
+    def to_and_fro(state, t):
+        T = start.copy()
+        T[:3, 3] += 0.02 * (1.0 - math.cos(3.0 * t)) * np.array(direction)
+        seen.append(state.tau.copy())
+        return CartesianPosition(T, finished=t >= 2.0 * math.pi / 3.0)
+
+    run = robot.control(to_and_fro, mode="cartesian_impedance")
+    assert run.faults == ()
+    jerks = np.abs(np.diff(seen, axis=0)).max(axis=1)
+    assert jerks.max() < 2.0  # [N m] in a cycle
+
+
+def test_the_axes_of_a_path_turn_by_a_bounded_step_and_arrive():
+    settings = replace(default_settings(MODEL.description), force_frame=ForceFrame.PATH)
+    axes = ForceAxes(MODEL, settings)
+    tool = MODEL.forward(MODEL.home)
+    axes.follow([0.0, 0.1, 0.0], tool)
+    before = axes.rotation(tool)
+    for cycle in range(600):
+        axes.follow([0.0, -0.1, 1e-7], tool)
+        now = axes.rotation(tool)
+        assert math.hypot(*turn_between(before, now)) < 0.007
+        assert axes.is_settled or cycle < 510
+        before = now
+    assert np.array(before).reshape(3, 3)[:, 0] == pytest.approx([0.0, -1.0, 0.0], abs=1e-5)

@@ -110,6 +110,31 @@ def test_brakes_stop_a_fast_arm_and_then_hold_it_still() -> None:
     assert np.abs(stopped.q - moving.q).max() < 2.0 * 0.05  # [rad] within some 20 ms of full speed
 
 
+def test_closed_brakes_bear_a_push_and_the_sensors_feel_it() -> None:
+    model = load_model("xMatePro7")
+    plant = MuJoCoPlant(model)
+    free = run(plant, hold(Drive.BRAKED, model.home), 10)
+    wrench = np.array([0.0, 20.0, -20.0, 0.0, 0.0, 0.0])
+    plant.push(wrench)
+    pushed = run(plant, hold(Drive.BRAKED, model.home), 1000)
+    assert np.abs(pushed.q - model.home).max() < 1e-9
+    assert free.tau - pushed.tau == pytest.approx(model.jacobian(model.home).T @ wrench, abs=1e-9)
+
+
+def test_brakes_that_close_under_a_push_hold_the_arm_where_it_stops() -> None:
+    model = load_model("xMatePro7")
+    plant = MuJoCoPlant(model)
+    plant.push([0.0, 20.0, 0.0, 0.0, 0.0, 0.0])
+    for _ in range(200):
+        moving = plant.step(Setpoint(Drive.TORQUE, model.home.tolist(), [0.0] * 7, [0.0] * 7, [0.0] * 7))
+    assert np.abs(moving.dq).max() > 0.1
+    run(plant, hold(Drive.BRAKED, model.home), 300)
+    stopped = plant.step(hold(Drive.BRAKED, model.home))
+    later = run(plant, hold(Drive.BRAKED, model.home), 1000)
+    assert later.q == pytest.approx(stopped.q, abs=1e-9)
+    assert (np.abs(later.q - moving.q) < 0.1 * np.abs(moving.dq).max()).all()  # [rad] within some 20 ms of that speed
+
+
 def test_what_the_drives_do_not_know_of_the_friction_brings_a_free_arm_to_rest() -> None:
     model = load_model("xMatePro7")
     plant = MuJoCoPlant(model)

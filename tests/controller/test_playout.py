@@ -15,11 +15,11 @@ def command(message_id: int, *, finished: bool = False) -> CommandPacket:
     return CommandPacket(message_id, psi_c=next(_numbers), finished=finished)
 
 
-def by_whole_gap(packet: CommandPacket, steps: int) -> bool:
-    return False
+def by_whole_gap(packet: CommandPacket, steps: int, in_doubt: bool) -> bool:
+    return in_doubt
 
 
-def by_one_step(packet: CommandPacket, steps: int) -> bool:
+def by_one_step(packet: CommandPacket, steps: int, in_doubt: bool) -> bool:
     return True
 
 
@@ -117,6 +117,35 @@ def test_a_repeated_id_explains_the_gap_that_follows() -> None:
     for k in (5, 5, 7):  # The state 6 never reached the client, which answered 5 again instead.
         playout.push(command(k))
     assert take_ids(playout, 3) == [5, 5, 7]
+
+
+def test_a_repeated_id_explains_no_gap_that_comes_later() -> None:
+    playout = Playout(prefill=0)
+    for k in (5, 5, 6, 7, 9):
+        playout.push(command(k))
+    assert take_ids(playout, 6) == [5, 5, 6, 7, "lost", 9]
+
+
+def test_a_repeated_id_explains_nothing_where_the_motion_says_otherwise() -> None:
+    playout = Playout(prefill=0)
+    for k in (5, 5, 7):
+        playout.push(command(k))
+    played = [playout.take(lambda packet, steps, in_doubt: False) for _ in range(4)]
+    assert [playback.is_lost for playback in played] == [False, False, True, False]
+
+
+@pytest.mark.parametrize("prefill", [0, 3])
+def test_answers_with_swapped_ids_are_played_as_the_motion_goes_on(prefill: int) -> None:
+    """The states overtook each other, and the client answered in the order in which they came."""
+    playout, played = Playout(prefill), []
+    for k in (5, 7, 6, 8, 11, 9, 10, 12, 13, 14, 15):
+        playout.push(command(k))
+        playback = playout.take(by_one_step)
+        if playback.packet is not None:
+            played.append(playback.packet.message_id)
+    assert played == [5, 7, 6, 8, 11, 9, 10, 12, 13, 14, 15][: len(played)]
+    assert len(played) == 11 - prefill
+    assert (playout.late, playout.lost) == (0, 0)
 
 
 def test_a_lost_command_leaves_a_gap_that_can_be_bridged_to_the_next_one() -> None:

@@ -63,11 +63,11 @@ class CartesianGenerator:
         self._reference = JointReference(terms, q, judges_box=False)
         self._reference_has_begun = False
 
-    def is_next(self, packet: CommandPacket, steps: int) -> bool:
-        """Returns whether a command continues the motion by one cycle rather than by `steps`."""
+    def is_next(self, packet: CommandPacket, steps: int, in_doubt: bool) -> bool:
+        """Returns whether a command continues the motion by one cycle rather than by `steps`; see `Stream.is_next`."""
         if find_frame_error(packet.T_base_tool_c) is not None:
             return True  # It is refused when it is played.
-        return self._stream.is_next(self._read(packet), steps)
+        return self._stream.is_next(self._read(packet), steps, in_doubt)
 
     def step(self, playback: Playback) -> Step:
         """Takes this cycle's pose, or bridges a cycle that has none."""

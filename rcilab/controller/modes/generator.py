@@ -68,8 +68,8 @@ class Step(NamedTuple):
 class MotionGenerator(Protocol):
     """Turns what the play-out gives into a reference, and judges it. Made when a motion begins, at rest."""
 
-    def is_next(self, packet: CommandPacket, steps: int) -> bool:
-        """Returns whether a command continues the motion by one cycle rather than by `steps`."""
+    def is_next(self, packet: CommandPacket, steps: int, in_doubt: bool) -> bool:
+        """Returns whether a command continues the motion by one cycle rather than by `steps`; see `Stream.is_next`."""
         ...
 
     def step(self, playback: Playback) -> Step:

@@ -35,9 +35,9 @@ class JointGenerator:
         self._gap = Gap()
         self._reference = JointReference(terms, q, judges_box=True)
 
-    def is_next(self, packet: CommandPacket, steps: int) -> bool:
-        """Returns whether a command continues the motion by one cycle rather than by `steps`."""
-        return self._stream.is_next(packet.q_c[: self._n], steps)
+    def is_next(self, packet: CommandPacket, steps: int, in_doubt: bool) -> bool:
+        """Returns whether a command continues the motion by one cycle rather than by `steps`; see `Stream.is_next`."""
+        return self._stream.is_next(packet.q_c[: self._n], steps, in_doubt)
 
     def step(self, playback: Playback) -> Step:
         """Takes this cycle's angles, or bridges a cycle that has none."""

@@ -38,9 +38,9 @@ class TorqueGenerator:
         self._monitor = TorqueMonitor(terms.limits.joint)
         self._monitor.reset(nothing)
 
-    def is_next(self, packet: CommandPacket, steps: int) -> bool:
-        """Returns whether a command continues the motion by one cycle rather than by `steps`."""
-        return self._stream.is_next(packet.tau_c[: self._n], steps)
+    def is_next(self, packet: CommandPacket, steps: int, in_doubt: bool) -> bool:
+        """Returns whether a command continues the motion by one cycle rather than by `steps`; see `Stream.is_next`."""
+        return self._stream.is_next(packet.tau_c[: self._n], steps, in_doubt)
 
     def step(self, playback: Playback) -> Step:
         """Takes this cycle's torques, or bridges a cycle that has none."""
