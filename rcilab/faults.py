@@ -56,6 +56,16 @@ class Fault(IntEnum):
         """The same for a motion that commands torques, where no planner's advice helps."""
         return _REMEDIES.get(self, _GAINS)
 
+    @property
+    def impedance_remedy(self) -> str:
+        """The same for a motion under impedance, where forces move the arm, and not its commands alone."""
+        return _YIELDED if self in _MEASURED_RATES else self.remedy
+
+    @property
+    def outside_remedy(self) -> str:
+        """The same for a motion whose commands kept their limits."""
+        return _PUSHED if self in _MEASURED_RATES else self.remedy
+
 
 FAULT_COUNT = len(Fault)
 
@@ -108,7 +118,9 @@ _CAUSES = {
     Fault.CARTESIAN_POSITION_MOTION_GENERATOR_INVALID_FRAME: "the arm is at a singularity or the pose is no pose",
     Fault.COMMAND_TORQUE_DISCONTINUITY: "a commanded torque jumps (torque rate too high)",
     Fault.COMMAND_TORQUE_RANGE_VIOLATION: "a commanded torque is too high",
-    Fault.INSTABILITY_DETECTION: "too many commands in a row were lost",
+    Fault.INSTABILITY_DETECTION: (
+        "too many commands in a row were lost, or those that were could not be bridged smoothly"
+    ),
 }
 
 _SMOOTHNESS = (
@@ -120,6 +132,26 @@ _GAINS = (
     "let torques grow gradually and keep them inside the limits of section 4.4; where a control law of yours rings, "
     "lower its damping first: above the inertia that a joint feels while the others are free, divided by the delay of "
     "the loop, it is unstable, and the wrist is light"
+)
+
+_YIELDED = (
+    "forces moved the arm faster than it may be, whatever was commanded: look for a push, let a desired wrench grow "
+    "gradually and keep it below what holds the arm (set_cart_imp_desired_tau), or raise the stiffness"
+)
+
+_PUSHED = (
+    "the last commands kept their limits, so look for what else moves the arm: contact, a push, or a load that the "
+    "controller does not know of (set_load)"
+)
+
+_MEASURED_RATES = frozenset(
+    {
+        Fault.ACTUAL_CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION,
+        Fault.ACTUAL_JOINT_VELOCITY_LIMITS_VIOLATION,
+        Fault.ACTUAL_CARTESIAN_VELOCITY_LIMITS_VIOLATION,
+        Fault.ACTUAL_JOINT_ACCELERATION_LIMITS_VIOLATION,
+        Fault.ACTUAL_CARTESIAN_ACCELERATION_LIMITS_VIOLATION,
+    }
 )
 
 _BOX = "keep the tool inside the safety box; a motion that starts outside it may only lead into it"
@@ -141,6 +173,7 @@ _REMEDIES = {
     Fault.CARTESIAN_POSITION_MOTION_GENERATOR_INVALID_FRAME: "keep Cartesian motions away from singular poses",
     Fault.COMMAND_TORQUE_DISCONTINUITY: _GAINS,
     Fault.COMMAND_TORQUE_RANGE_VIOLATION: _GAINS,
-    Fault.INSTABILITY_DETECTION: "look at the network and the real-time set-up, or raise the packet-loss "
-    "threshold (usually 10 to 20); an emergency stop can also raise this bit",
+    Fault.INSTABILITY_DETECTION: "look at the network and the real-time set-up, and let the controller play "
+    "commands later (a virtual one: --prefill 50); only where ever so many in a row were lost does a higher "
+    "packet-loss threshold help (usually 10 to 20); an emergency stop can also raise this bit",
 }

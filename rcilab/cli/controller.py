@@ -60,7 +60,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         type=int,
         default=20,
         metavar="N",
-        help="lost commands in a row that stop a motion, 10 to 20; 0: none do (%(default)s)",
+        help="lost commands in a row that stop a motion, 10 to 20; 0: none do (%(default)s). Fewer stop it all the "
+        "same where what comes next could only be reached with a jump: --prefill helps there",
     )
     parser.add_argument(
         "--auto-limit",

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
+from rcilab.arrays import JointVector
 from rcilab.client.brake import Brake, CartesianBrake, JointBrake, TorqueBrake
 from rcilab.client.call_times import CallTimes
 from rcilab.client.checked_command import check_command, describe_distance, distance_to, require_first
@@ -84,6 +85,7 @@ class ControlLoop:
         model: The arm, for stopping a tool within what its joints allow.
         filters: What every command of a callback passes before it is sent, in this order.
         box: The safety box that the controller has, as far as it is known, for what is said of faults.
+        collision_thresholds: Those of the controller, shape (n,), [N m], as far as they are known, for the same.
         silence: Time without a state that counts as a lost connection, [s].
     """
 
@@ -99,12 +101,14 @@ class ControlLoop:
         model: RobotModel,
         filters: Sequence[CommandFilter],
         box: SafetyBox | None = None,
+        collision_thresholds: JointVector | None = None,
         silence: float = SILENCE,
     ) -> None:
         if mode not in _MOTION_MODES:
             raise InvalidValueError("mode", mode, f"is no mode to move in; there are {[m.name for m in _MOTION_MODES]}")
         self._link = link
         self._commands = commands
+        self._model = model
         self._limits = limits
         self._mode = mode
         self._motion_mode = _MOTION_MODES[mode]
@@ -114,6 +118,7 @@ class ControlLoop:
         self._silence = silence
         self._filters = tuple(filters)
         self._box = box
+        self._thresholds = collision_thresholds
         self._first_id = 0
         self._first_q_c = self._first_tau_c = np.zeros(0)
         self._answered_id = -1
@@ -425,10 +430,13 @@ class ControlLoop:
             state.faults,
             record,
             t,
+            self._model,
             self._limits,
+            self._mode,
             late=late,
             pressed="" if pressed is None else pressed.sentence,
             box=self._box,
+            collision_thresholds=self._thresholds,
         )
         error = ControlError(message, state.faults, record)
         return error if pressed is None else error.coded("safety_stop", status=pressed.word)

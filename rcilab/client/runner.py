@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, TypeAlias
 
+from rcilab.arrays import JointVector
 from rcilab.client.commands import RciCommands
 from rcilab.client.control_loop import Callback, ControlLoop
 from rcilab.client.filters import CommandFilter
@@ -36,6 +37,7 @@ class Runner:
 
     Attributes:
         partner: Process id of a controller on this machine that is in lock-step with us; None: it is not.
+        collision_thresholds: Those that were set, shape (n,), [N m]; None as long as none were.
 
     Args:
         link: The connection.
@@ -50,6 +52,7 @@ class Runner:
         self, link: Link, turns: Turns, *, realtime: bool, silence: float, partner: int | None, record_all: bool
     ) -> None:
         self.partner = partner
+        self.collision_thresholds: JointVector | None = None
         self._link = link
         self._turns = turns
         self._realtime = realtime
@@ -109,6 +112,7 @@ class Runner:
             model=model,
             filters=filters,
             box=box,
+            collision_thresholds=self.collision_thresholds,
         )
         setup = Setup(target=self._link.name, mode=mode, started_ns=time.time_ns())
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
 
-from rcilab.arrays import as_number
+from rcilab.arrays import as_number, as_vector
 from rcilab.client.address import parse_address
 from rcilab.client.commands import RciCommands
 from rcilab.client.control_loop import SILENCE
@@ -245,6 +245,12 @@ class RobotSession(Motions, Closing):
         with self._turns.take("SetCartesianLimit"):
             super().set_cartesian_limit(box)
             self._safety_box = box
+
+    def set_collision_behavior(self, thresholds: ArrayLike) -> None:
+        """Sets the external torques that count as a collision, shape (n,), [N m]; see `limits.joint`."""
+        with self._turns.take("SetCollisionBehavior"):
+            super().set_collision_behavior(thresholds)
+            self._runner.collision_thresholds = as_vector(thresholds, self._model.n, "thresholds")
 
     def set_joint_limit(self, lower: ArrayLike, upper: ArrayLike) -> None:
         """Sets soft limits of the joint angles; `model` has them from then on, so that motions are checked with them.

@@ -10,13 +10,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 
+from rcilab.arrays import frozen
 from rcilab.conformance.condition import MANUAL, AnyLimits, Bounds, Condition, joint_limits, same
 from rcilab.conformance.tool_conditions import arm_angle_bounds, tool_bounds
 from rcilab.faults import Fault
+from rcilab.limits import Limits
 
 ANGLE_ALLOWANCE = math.radians(1.0)  # [rad] A choice: what a servo may overshoot at the end of a joint's range.
 BOX_ALLOWANCE = 0.01  # [m] A choice: about what that angle is at the tool, and what a soft spring gives.
@@ -25,11 +28,28 @@ ACCELERATION_ALLOWANCE = 1.5  # A choice, on the commanded bound.
 ACCELERATION_CUTOFF = (
     30.0  # [Hz] A choice: below the first resonances of arms of this size, above any motion of theirs.
 )
+YIELDING_ALLOWANCE = 8.0
+"""How much more acceleration than under the position servo a yielding arm may have. A choice: the light last joints of
+an arm that is pushed with 30 N, or told a torque of a few N m, are thrown harder than any command could ask for."""
 LOST_IN_ROW = 20  # [cycles] Manual 4.6: the packet-loss threshold is usually 10 to 20.
 
 _CHOICE = f"{MANUAL}, 4.6; bound: the commanded one"
 _FASTER = f"{_CHOICE} x {VELOCITY_ALLOWANCE:g} (our allowance)"
 _HARDER = f"{_CHOICE} x {ACCELERATION_ALLOWANCE:g} (our allowance), low-passed at {ACCELERATION_CUTOFF:g} Hz"
+
+
+def yielding_limits(limits: Limits) -> Limits:
+    """Returns the bounds of an arm that forces move, as under impedance: more acceleration, the rest as it is."""
+    joint, cartesian = limits.joint, limits.cartesian
+    return replace(
+        limits,
+        joint=replace(joint, acceleration=frozen(YIELDING_ALLOWANCE * joint.acceleration)),
+        cartesian=replace(
+            cartesian,
+            translation_acceleration=YIELDING_ALLOWANCE * cartesian.translation_acceleration,
+            rotation_acceleration=YIELDING_ALLOWANCE * cartesian.rotation_acceleration,
+        ),
+    )
 
 
 def _joint_range(limits: AnyLimits) -> Bounds:

@@ -356,7 +356,7 @@ class ControllerServer:
         self._told = faults
         if faults:
             self._log(f"{name_faults(faults)}: {self.cycle.reason}; the arm comes to rest")
-            if Fault.INSTABILITY_DETECTION in faults and self.cycle.playout.lost_in_row:
+            if Fault.INSTABILITY_DETECTION in faults and self.cycle.playout.lost:
                 self._log(
                     "a client that pauses needs a deeper play-out (--prefill 50), SCHED_FIFO for itself, or --lockstep"
                 )

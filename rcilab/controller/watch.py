@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from operator import gt
 
-from rcilab.arrays import frozen
 from rcilab.conformance.breach import describe_breaches
+from rcilab.conformance.measured_conditions import yielding_limits
 from rcilab.conformance.measured_monitor import MeasuredMonitor
 from rcilab.controller.commanded import CommandedMotion
 from rcilab.controller.observer import Observer
@@ -18,10 +17,6 @@ from rcilab.limits import Limits
 from rcilab.model import RobotModel
 from rcilab.safety_box import EntryBox, SafetyBox
 from rcilab.words.text import Remark
-
-YIELDING_ALLOWANCE = 8.0
-"""How much more acceleration than under the position servo a yielding arm may have. A choice: the light last joints of
-an arm that is pushed with 30 N, or told a torque of a few N m, are thrown harder than any command could ask for."""
 
 _ANYWHERE = (0.0, 0.0, 0.0)
 _NO_REASON = Remark("")
@@ -77,7 +72,7 @@ class Watch:
             judges_tool: Whether the motion is one of the tool, so that its speed and the arm angle's count.
             yields: Whether forces move the arm, and not its commands alone.
         """
-        self._monitor = MeasuredMonitor(_widened(limits) if yields else limits, box)
+        self._monitor = MeasuredMonitor(yielding_limits(limits) if yields else limits, box)
         self._monitor.reset(self.measured.q.tolist())
         self._thresholds = thresholds
         self._judges_tool = judges_tool
@@ -120,16 +115,3 @@ class Watch:
         torque, threshold = torques[joint], thresholds[joint]
         said = f"joint {joint + 1}: external torque {torque:.3g} N m is above its threshold {threshold:g} N m"
         return Remark(said, "collision", joint=joint + 1, value=f"{torque:.3g} N m", bound=f"{threshold:g} N m")
-
-
-def _widened(limits: Limits) -> Limits:
-    joint, cartesian = limits.joint, limits.cartesian
-    return replace(
-        limits,
-        joint=replace(joint, acceleration=frozen(YIELDING_ALLOWANCE * joint.acceleration)),
-        cartesian=replace(
-            cartesian,
-            translation_acceleration=YIELDING_ALLOWANCE * cartesian.translation_acceleration,
-            rotation_acceleration=YIELDING_ALLOWANCE * cartesian.rotation_acceleration,
-        ),
-    )

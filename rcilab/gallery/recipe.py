@@ -10,7 +10,7 @@ import numpy as np
 
 from rcilab.arrays import JointVector, frozen
 from rcilab.client.control_loop import Callback
-from rcilab.controller.watch import YIELDING_ALLOWANCE
+from rcilab.conformance.measured_conditions import yielding_limits
 from rcilab.faults import Fault
 from rcilab.limits import Limits
 from rcilab.safety_box import SafetyBox
@@ -48,14 +48,7 @@ class Scene:
 
     def yielding(self) -> Scene:
         """Returns the scene with the wider bounds on accelerations that a yielding arm has."""
-        joint, tool = self.limits.joint, self.limits.cartesian
-        joint = replace(joint, acceleration=frozen(YIELDING_ALLOWANCE * joint.acceleration))
-        tool = replace(
-            tool,
-            translation_acceleration=YIELDING_ALLOWANCE * tool.translation_acceleration,
-            rotation_acceleration=YIELDING_ALLOWANCE * tool.rotation_acceleration,
-        )
-        return replace(self, limits=replace(self.limits, joint=joint, cartesian=tool))
+        return replace(self, limits=yielding_limits(self.limits))
 
 
 def _as_it_is(scene: Scene) -> Scene:
