@@ -241,8 +241,9 @@ class TorqueBrake:
 def _first_breach(monitor: JointMonitor | CartesianMonitor, repeat: Callable[[], tuple[Fault, ...]]) -> Breach | None:
     """Returns what the first broken cycle of as many repetitions breaks as a third difference looks back to."""
     for _ in range(_HISTORY):
-        if repeat():
-            return monitor.broken()[0]
+        breaches = [breach for breach in monitor.broken() if breach.condition.order > 0] if repeat() else []
+        if breaches:  # Where a joint or the tool is, is no motion.
+            return breaches[0]
     return None
 
 

@@ -90,6 +90,8 @@ def _describe_commanded(faults: tuple[Fault, ...], record: NDArray[np.void], lim
     """
     sent = record[record["sent_ns"] != 0]
     is_broken = False
+    if not len(sent):
+        return "", is_broken
     for field, judge, describe in (
         ("command", _judge_joints, _describe_joints),
         ("command_pose", _judge_poses, _describe_pose),

@@ -106,6 +106,6 @@ def test_short_long_and_foreign_datagrams_are_ignored(make_robot):
         udp.sendto(b"\xff" * 1247, to)
 
     _peer, robot = make_robot(Script(on_state=litter))
-    run = robot.control(wave(20))
-    assert len(run.t) > 20
+    run = robot.control(wave(150))
+    assert len(run.t) > 150
     assert robot.state.message_id > 1000

@@ -108,8 +108,8 @@ def test_a_callback_in_a_closed_loop_gets_every_cycle_once(robot):
     def callback(state, t):
         ids.append(state.message_id)
         times.append(t)
-        # Towards the goal with a slow first-order lag started smoothly: feedback on the commanded state.
-        ramp = min(1.0, t / 0.2) ** 3
+        # Towards the goal with a slow first-order lag, let in and out smoothly: feedback on the commanded state.
+        ramp = np.sin(np.pi * min(1.0, t / 0.4)) ** 4
         return JointPosition(state.q_c + 0.0005 * ramp * (GOAL - state.q_c), finished=t >= 0.4)
 
     run = robot.control(callback)
