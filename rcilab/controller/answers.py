@@ -9,9 +9,10 @@ from rcilab.controller.actuator import guiding_box
 from rcilab.controller.arm import Arm
 from rcilab.controller.commanded import CommandedMotion
 from rcilab.controller.modes import MODES
-from rcilab.controller.settings import SIGNAL_COUNT, Settings
+from rcilab.controller.settings import SIGNAL_COUNT, Settings, apply_request
 from rcilab.controller.state_machine import GROUNDED, POWER_OFF, Action, Phase, Transition, When, transition
 from rcilab.controller.watch import Watch
+from rcilab.errors import InvalidValueError
 from rcilab.kinematics.inverse import build_geometry
 from rcilab.kinematics.singularity import find_singularity
 from rcilab.model import RobotModel
@@ -126,8 +127,17 @@ def describe_refusal(request: rci.Request, status: rci.Status, phase: Phase, set
     elif status is rci.RecoveryStatus.MANUAL_RECOVERY_NEEDED:
         why = "the arm is beyond a joint's range or the safety box: power off and on, then lead it back"
     elif status.name == "INVALID_ARGUMENT":
-        why = f"a value is out of its bounds, or the values do not fit each other: {request}"
+        why = _describe_argument(request, settings, arm)
     return f"refused {name} ({status.name.lower().replace('_', ' ')}): {why}"
+
+
+def _describe_argument(request: rci.Request, settings: Settings, arm: Arm) -> str:
+    """Returns which value of a request is out of its bounds."""
+    try:
+        apply_request(settings, request, arm.model.description)
+    except InvalidValueError as error:
+        return str(error)
+    return f"a value does not exist: {request}"
 
 
 def conclude(reply: Reply, phase: Phase) -> rci.Response:

@@ -25,6 +25,7 @@ from rcilab.controller.plant import Plant
 from rcilab.controller.reporter import StateReporter
 from rcilab.controller.settings import apply_request, default_settings
 from rcilab.controller.state_machine import Action, Event, Phase, Transition, transition
+from rcilab.errors import InvalidValueError
 from rcilab.faults import Fault
 from rcilab.model import RobotModel
 from rcilab.protocols import rci
@@ -348,8 +349,9 @@ class ControlCycle:
                 pass  # Done before, because it may fail.
 
     def _apply(self, request: rci.Request) -> bool:
-        settings = apply_request(self.settings, request, self.model.description)
-        if settings is None:
+        try:
+            settings = apply_request(self.settings, request, self.model.description)
+        except InvalidValueError:
             return False
         self.settings = settings
         self._arm.configure(settings)

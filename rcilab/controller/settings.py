@@ -7,10 +7,9 @@ argument" and changes nothing. On 6-axis arms the seventh elements are not even 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain, repeat
-from math import hypot, isfinite
+from math import hypot
 
 import numpy as np
 
@@ -113,111 +112,131 @@ def default_settings(arm: RobotDescription) -> Settings:
     )
 
 
-def apply_request(settings: Settings, request: rci.Request, arm: RobotDescription) -> Settings | None:
-    """Returns the settings with a request's values in them, or None when the request has an invalid argument.
+def apply_request(settings: Settings, request: rci.Request, arm: RobotDescription) -> Settings:
+    """Returns the settings with a request's values in them.
 
     Args:
         settings: The settings so far.
         request: A setter; anything else leaves them as they are.
         arm: Whose ranges count.
+
+    Raises:
+        InvalidValueError: A value is out of its bounds, or values do not fit each other; it names the first.
     """
-    changes = _judge(request, arm, settings)
-    return None if changes is None else replace(settings, **changes)
+    return replace(settings, **_changes(request, arm, settings))
 
 
-def _judge(request: rci.Request, arm: RobotDescription, settings: Settings) -> dict[str, object] | None:
-    """Returns the fields to change, or None when a value is invalid."""
+def _changes(request: rci.Request, arm: RobotDescription, settings: Settings) -> dict[str, object]:
+    """Returns the fields to change."""
     n, joint, cartesian = arm.n, arm.limits.joint, arm.limits.cartesian
     match request:
         case rci.SetCollisionBehavior(thresholds=values):
-            return _ranged("collision_thresholds", values[:n], joint.collision_threshold.tolist())
+            _require_joints("threshold", values[:n], joint.collision_threshold.tolist(), "N m")
+            return {"collision_thresholds": values[:n]}
         case rci.SetJointImpedance(stiffness=values):
-            return _ranged("joint_stiffness", values[:n], joint.stiffness.tolist())
+            _require_joints("stiffness", values[:n], joint.stiffness.tolist(), "N m/rad")
+            return {"joint_stiffness": values[:n]}
         case rci.SetCartesianImpedance(stiffness=values):
-            largest = [cartesian.translation_stiffness] * 3 + [cartesian.rotation_stiffness] * 3
-            return _ranged("cartesian_stiffness", values, largest)
+            for name, value, largest, unit in (
+                *_along("stiffness", values, cartesian.translation_stiffness, "N/m"),
+                *_about("stiffness", values, cartesian.rotation_stiffness, "N m/rad"),
+            ):
+                _require(name, value, 0.0, largest, unit)
+            return {"cartesian_stiffness": values}
         case rci.SetCartImpDesiredTau(wrench=values):
-            largest = [cartesian.force] * 3 + [cartesian.moment] * 3
-            return _ranged("desired_wrench", values, largest, symmetric=True)
+            for name, value, largest, unit in (
+                *_along("force", values, cartesian.force, "N"),
+                *_about("moment", values, cartesian.moment, "N m"),
+            ):
+                _require(name, value, -largest, largest, unit)
+            return {"desired_wrench": values}
         case rci.SetTorqueFilterCutOffFrequency(frequency=value):
-            return {"torque_report_filter": value} if LOWEST_FREQUENCY <= value <= FILTER_OFF else None
+            return {"torque_report_filter": _frequency("frequency", value)}
         case rci.SetFilters():
-            frequencies = (request.joint_frequency, request.cartesian_frequency, request.torque_frequency)
-            if not all(LOWEST_FREQUENCY <= value <= FILTER_OFF for value in frequencies):
-                return None
-            return dict(zip(("joint_filter", "cartesian_filter", "torque_filter"), frequencies, strict=True))
+            return {
+                "joint_filter": _frequency("joint frequency", request.joint_frequency),
+                "cartesian_filter": _frequency("Cartesian frequency", request.cartesian_frequency),
+                "torque_filter": _frequency("torque frequency", request.torque_frequency),
+            }
         case rci.SetJointLimit():
             return _soft_limits(request, arm)
         case rci.SetCartesianLimit():
-            pose = _pose(request.frame)
-            if pose is None or not all(abs(x) <= FARTHEST_BOX for x in pose.parts[1]):
-                return None
-            if not all(0.0 < edge <= LARGEST_BOX for edge in request.size):
-                return None
+            pose = Pose.from_row_major(request.frame)
+            for axis, x, edge in zip("xyz", pose.parts[1], request.size, strict=True):
+                _require(f"{axis} of the box's centre", x, -FARTHEST_BOX, FARTHEST_BOX, "m")
+                _require(f"{axis} of the box's size", edge, 0.0, LARGEST_BOX, "m")
             return {"safety_box": SafetyBox(size=request.size, T_base_box=pose, active=request.active)}
         case rci.SetCoor(T_flange_tool=numbers):
-            pose = _pose_at_flange(numbers)
-            return None if pose is None else {"T_flange_tool": pose}
+            return {"T_flange_tool": _pose_at_flange("tool", numbers)}
         case rci.SetFcCoor(frame=numbers, type=kind):
-            pose = _pose_at_flange(numbers)
-            if pose is None or kind not in tuple(rci.ForceFrame):
-                return None
-            return {"T_flange_force": pose, "force_frame": rci.ForceFrame(kind)}
+            if kind not in tuple(rci.ForceFrame):
+                raise InvalidValueError("type", kind, "is no force-control frame; there are 0 to 2")
+            return {"T_flange_force": _pose_at_flange("frame", numbers), "force_frame": rci.ForceFrame(kind)}
         case rci.SetLoad():
-            return _load(request, arm)
+            return {"load": _load(request, arm)}
         case rci.EnableVirtualGuide(enable=enable):
             return {"virtual_guide": enable}
         case rci.SetDO(signal=signal, level=level):
             if signal >= SIGNAL_COUNT:
-                return None
+                raise InvalidValueError("signal", signal, f"does not exist; there are 0 to {SIGNAL_COUNT - 1}")
             outputs = (*settings.outputs[:signal], level, *settings.outputs[signal + 1 :])
             return {"outputs": outputs, "inputs": outputs if settings.loop_back else settings.inputs}
         case _:
             return {}
 
 
-def _ranged(
-    name: str, values: Floats, largest: Sequence[float], *, symmetric: bool = False
-) -> dict[str, object] | None:
-    lowest = (-bound for bound in largest) if symmetric else repeat(0.0)
-    if all(low <= value <= high for value, low, high in zip(values, lowest, largest, strict=False)):
-        return {name: values}
-    return None  # Also for NaN, which is in no range.
+def _require(name: str, value: float, lowest: float, largest: float, unit: str) -> None:
+    if not lowest <= value <= largest:  # Nor is NaN, which is in no range.
+        raise InvalidValueError(name, _round(value), f"{unit} is outside {lowest:g} to {largest:g} {unit}")
 
 
-def _soft_limits(request: rci.SetJointLimit, arm: RobotDescription) -> dict[str, object] | None:
+def _round(value: float) -> float:
+    return float(f"{value:.9g}")
+
+
+def _require_joints(name: str, values: Floats, largest: Sequence[float], unit: str) -> None:
+    for number, (value, bound) in enumerate(zip(values, largest, strict=True), 1):
+        _require(f"{name} of joint {number}", value, 0.0, bound, unit)
+
+
+def _along(name: str, values: Floats, largest: float, unit: str) -> Iterator[tuple[str, float, float, str]]:
+    return ((f"{name} along {axis}", value, largest, unit) for axis, value in zip("xyz", values[:3], strict=True))
+
+
+def _about(name: str, values: Floats, largest: float, unit: str) -> Iterator[tuple[str, float, float, str]]:
+    return ((f"{name} about {axis}", value, largest, unit) for axis, value in zip("xyz", values[3:], strict=True))
+
+
+def _frequency(name: str, value: float) -> float:
+    _require(name, value, LOWEST_FREQUENCY, FILTER_OFF, "Hz")
+    return value
+
+
+def _soft_limits(request: rci.SetJointLimit, arm: RobotDescription) -> dict[str, object]:
     upper, lower = request.upper[: arm.n], request.lower[: arm.n]
     bounds = zip(lower, upper, arm.limits.joint.lower.tolist(), arm.limits.joint.upper.tolist(), strict=True)
-    for low, high, lowest, highest in bounds:
-        if not lowest - LIMIT_TOLERANCE <= low < high <= highest + LIMIT_TOLERANCE:
-            return None
+    for number, (low, high, lowest, highest) in enumerate(bounds, 1):
+        _require(f"lower limit of joint {number}", low, lowest - LIMIT_TOLERANCE, highest, "rad")
+        _require(f"upper limit of joint {number}", high, lowest, highest + LIMIT_TOLERANCE, "rad")
+        if not low < high:
+            raise InvalidValueError(
+                f"lower limit of joint {number}", _round(low), f"rad is not below the upper, {high:g} rad"
+            )
     return {"joint_lower": lower, "joint_upper": upper}
 
 
-def _load(request: rci.SetLoad, arm: RobotDescription) -> dict[str, object] | None:
-    numbers = chain(request.center_of_mass, request.inertia)
-    if not 0.0 <= request.mass <= arm.rated_payload or not all(map(isfinite, numbers)):
-        return None
-    if not hypot(*request.center_of_mass) <= LONGEST_TOOL:
-        return None
-    try:
-        load = Payload(
-            mass=request.mass,
-            center_of_mass=np.array(request.center_of_mass),
-            inertia=np.array(request.inertia).reshape(3, 3),
-        )
-    except InvalidValueError:
-        return None
-    return {"load": load}
+def _load(request: rci.SetLoad, arm: RobotDescription) -> Payload:
+    _require("mass", request.mass, 0.0, arm.rated_payload, "kg")
+    load = Payload(
+        mass=request.mass,
+        center_of_mass=np.array(request.center_of_mass),
+        inertia=np.array(request.inertia).reshape(3, 3),
+    )
+    _require("distance of the centre of mass from the flange", hypot(*request.center_of_mass), 0.0, LONGEST_TOOL, "m")
+    return load
 
 
-def _pose(numbers: Floats) -> Pose | None:
-    try:
-        return Pose.from_row_major(numbers)
-    except InvalidValueError:
-        return None
-
-
-def _pose_at_flange(numbers: Floats) -> Pose | None:
-    pose = _pose(numbers)
-    return pose if pose is not None and hypot(*pose.parts[1]) <= LONGEST_TOOL else None
+def _pose_at_flange(name: str, numbers: Floats) -> Pose:
+    pose = Pose.from_row_major(numbers)
+    _require(f"distance of the {name} from the flange", hypot(*pose.parts[1]), 0.0, LONGEST_TOOL, "m")
+    return pose

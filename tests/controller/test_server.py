@@ -477,8 +477,7 @@ def test_refusals_are_told_with_their_reason(lockstep: Running) -> None:
     assert lockstep.lines[3] == "refused StartMove (not possible): there is no controller mode 0 with motion mode 0"
     assert lockstep.lines[:3] == [
         "refused StartMove (not possible): the robot is off",
-        "refused SetCollisionBehavior (invalid argument): a value is out of its bounds, or the values do not fit each "
-        f"other: {rci.SetCollisionBehavior((math.nan,) * 7)}",
+        "refused SetCollisionBehavior (invalid argument): threshold of joint 1: nan N m is outside 0 to 75 N m",
         "refused StartMove (singular start pose): the arm is stretched or folded: joint 4 is at 0.00 deg",
     ]
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from rcilab.controller.settings import Settings, apply_request, default_settings
+from rcilab.errors import InvalidValueError
 from rcilab.protocols import rci
 from rcilab.robots import RobotDescription, describe_robot
 
@@ -100,17 +101,42 @@ def settings(arm: RobotDescription) -> Settings:
 
 @pytest.mark.parametrize("request_", GOOD, ids=lambda request_: type(request_).__name__)
 def test_values_on_the_edge_of_their_range_are_taken(settings, arm, request_: rci.Request) -> None:
-    assert apply_request(settings, request_, arm) is not None
+    apply_request(settings, request_, arm)
 
 
 @pytest.mark.parametrize("request_", BAD, ids=lambda request_: type(request_).__name__)
 def test_values_beyond_their_range_are_refused(settings, arm, request_: rci.Request) -> None:
-    assert apply_request(settings, request_, arm) is None
+    with pytest.raises(InvalidValueError):
+        apply_request(settings, request_, arm)
+
+
+@pytest.mark.parametrize(
+    ("request_", "said"),
+    [
+        (rci.SetCollisionBehavior(more(THRESHOLDS, 2)), "threshold of joint 3: 60.000001 N m is outside 0 to 60 N m"),
+        (rci.SetCartImpDesiredTau(more((0.0,) * 6, 5, -30.1)), "moment about z: -30.1 N m is outside -30 to 30 N m"),
+        (rci.SetFilters(1.0, 0.0, 1.0), "Cartesian frequency: 0.0 Hz is outside 0.1 to 1000 Hz"),
+        (
+            rci.SetJointLimit(LOWER, UPPER),
+            "lower limit of joint 1: 2.96705973 rad is not below the upper",
+        ),
+        (
+            rci.SetCoor((*POSE[:3], 25.0, *POSE[4:])),
+            "distance of the tool from the flange: 25.0162447 m is",
+        ),
+        (rci.SetDO(6, True), "signal: 6 does not exist; there are 0 to 5"),
+    ],
+    ids=lambda value: type(value).__name__,
+)
+def test_a_refusal_names_the_value_its_bound_and_its_unit(settings, arm, request_: rci.Request, said: str) -> None:
+    with pytest.raises(InvalidValueError) as caught:
+        apply_request(settings, request_, arm)
+    assert said in str(caught.value)
 
 
 def test_taken_values_are_in_the_settings(settings, arm) -> None:
     for request_ in GOOD:
-        settings = apply_request(settings, request_, arm) or settings
+        settings = apply_request(settings, request_, arm)
     assert settings.collision_thresholds == (0.0,) * 7
     assert settings.desired_wrench == WRENCH
     assert (settings.joint_filter, settings.cartesian_filter, settings.torque_filter) == (0.1, 1000.0, 55.5)
@@ -131,10 +157,10 @@ def test_a_6_axis_arm_looks_at_six_elements_only() -> None:
         rci.SetJointLimit((1.0,) * 6 + (NAN,), (-1.0,) * 6 + (NAN,)),
     ):
         settings = apply_request(settings, request_, arm)
-        assert settings is not None
     assert settings.collision_thresholds == (75.0, 75.0, 45.0, 30.0, 30.0, 20.0)
     assert settings.joint_upper == (1.0,) * 6
-    assert apply_request(settings, rci.SetLoad(3.1, (0.0,) * 3, INERTIA), arm) is None
+    with pytest.raises(InvalidValueError, match=r"mass: 3\.1 kg is outside 0 to 3 kg"):
+        apply_request(settings, rci.SetLoad(3.1, (0.0,) * 3, INERTIA), arm)
 
 
 def test_a_controller_wakes_up_with_the_widest_limits(settings, arm) -> None:
