@@ -18,14 +18,13 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
 from rcilab.closing import Closing
-from rcilab.views import assignments, icons, loop_event
+from rcilab.views import assignments, icons, loop_event, sendable
+from rcilab.views.arrivals import BACKLOG, Arrivals, watch_loop
 from rcilab.views.gate import Gate, Guesses, Refusal
 from rcilab.views.message_guard import LARGEST_MESSAGE, MessageGuard
 
 if TYPE_CHECKING:
     import viser
-
-_BACKLOG = 100  # As viser.
 
 
 def listen(host: str, port: int) -> socket.socket:
@@ -39,7 +38,7 @@ def listen(host: str, port: int) -> socket.socket:
     try:
         bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         bound.bind(address)
-        bound.listen(_BACKLOG)
+        bound.listen(BACKLOG)
     except OSError:
         bound.close()
         raise
@@ -83,6 +82,7 @@ class GuardedServer(Closing):
         loop_event.install()
         assignments.install()
         icons.install()
+        sendable.install()
         with self._serving(bound), _quiet():
             self.viser: viser.ViserServer = viser.ViserServer(host=gate.host, port=gate.port, verbose=False)
         sockets = self.viser._websock_server  # What is called on it below has no public spelling in viser 1.1.
@@ -105,6 +105,8 @@ class GuardedServer(Closing):
         def serve(handler: Any, host: str, port: int, **options: Any) -> Any:
             del host, port  # viser would try the next port; the socket is bound to the one we want.
             answer = options.pop("process_request")
+            arrivals = Arrivals()
+            watch_loop(asyncio.get_running_loop())
 
             async def route(connection: Any) -> None:
                 own = self._routes.get(_path_of(connection.request))
@@ -115,14 +117,21 @@ class GuardedServer(Closing):
                     await handler(connection)
 
             def process(connection: Any, request: Any) -> Any:
+                arrivals.served(connection)
                 return self._answer(answer, connection, request)
 
             # A browser opens connections ahead of need and drops them unused; that is no error worth a traceback.
             quiet = logging.getLogger("rcilab.page")
             quiet.setLevel(logging.CRITICAL)
-            return original(
-                route, sock=bound, process_request=process, **{**options, "logger": quiet, "max_size": LARGEST_MESSAGE}
-            )
+            ours = {
+                "sock": bound,
+                "backlog": BACKLOG,
+                "process_request": process,
+                "create_connection": arrivals.build_connection,
+                "logger": quiet,
+                "max_size": LARGEST_MESSAGE,
+            }
+            return original(route, **{**options, **ours})
 
         serving.serve = serve
         try:

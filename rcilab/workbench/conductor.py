@@ -39,6 +39,7 @@ from rcilab.workbench.text import message
 from rcilab.workbench.view_actions import ViewActions
 
 _TICK = 0.03  # [s] A choice: about the display's rate; also how often the robot is looked at.
+_AGAIN = 1.0  # [s] A choice: a page that acts without the controls is told so once in that time.
 
 
 class Conductor:
@@ -83,6 +84,7 @@ class Conductor:
         self._mailbox: Mailbox[requests.Request] = Mailbox()
         self._thread: threading.Thread | None = None
         self._ending = threading.Event()
+        self._refused_at: dict[int | None, float] = {}  # When a page was last refused, [s].
         self._refused_for: int | None = None  # Who held the controls when another page was last refused.
         self.errors = Failures()
         """Failures of our own code; one a second at most is printed and shown on the page."""
@@ -234,8 +236,11 @@ class Conductor:
     def _refuse(self, request: requests.Request) -> None:
         """Tells a page that it only watches, unless it has got the controls meanwhile."""
         lease = self._store.state.lease
-        if lease.allows(request.page):
+        now = time.monotonic()
+        if lease.allows(request.page) or now - self._refused_at.get(request.page, -_AGAIN) < _AGAIN:
             return
+        self._refused_at = {page: at for page, at in self._refused_at.items() if now - at < _AGAIN}
+        self._refused_at[request.page] = now
         self._refused_for = lease.holder
         code = "lease.free" if lease.holder is None else "notice.watching"
         said = message(code, page=lease.number(lease.holder))

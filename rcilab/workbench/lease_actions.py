@@ -33,11 +33,12 @@ class LeaseActions:
         if request.page is not None:
             self._presence.went(request.page)
             self._store.update(lease=self._store.state.lease.leave(request.page, self._presence.now()))
+            self._store.forget_page(request.page)
 
     def take_controls(self, request: requests.TakeControls) -> None:
         """Gives a page free controls, or asks their holder."""
         page, lease = request.page, self._store.state.lease
-        if page is None or lease.allows(page):
+        if page is None or lease.allows(page) or lease.asking == page:
             return
         after = lease.ask(page, self._presence.now())
         self._store.update(lease=after)
@@ -46,7 +47,7 @@ class LeaseActions:
         elif after.asking == page:
             self._store.say("good", message("lease.asked", page=lease.number(page), holder=lease.number(lease.holder)))
         else:
-            self._store.say("warn", message("lease.busy", page=lease.number(lease.asking)))
+            self._store.say("warn", message("lease.busy", page=lease.number(lease.asking)), page=page)
 
     def answer(self, request: requests.AnswerControls) -> None:
         """Hears whether the holder hands over."""

@@ -170,4 +170,4 @@ def _decode(message: str | bytes) -> dict[str, Any]:
 
 def _pass_on(number: object, low: float, high: float, act: Callable[[float], None]) -> None:
     if isinstance(number, int | float) and not isinstance(number, bool) and abs(number) < math.inf:
-        act(min(max(float(number), low), high))
+        act(float(min(max(number, low), high)))

@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 Theme = Literal["light", "dark"]
 
 _UNDO_DEPTH = 100
+_NOTICES = 4  # Kept of each page, and of all pages together; a choice.
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,11 +175,17 @@ class UiState:
     height: float = 800.0
     """Height of the newest page's window, [px]: the plots fill it."""
     lease: Lease = field(default_factory=Lease)
-    notice: Notice | None = None
+    notices: tuple[Notice, ...] = ()
+    """The newest of each page and of all pages together, oldest first: what one is told takes no place of another's."""
     entered: Mapping[int | None, float] = field(default_factory=lambda: MappingProxyType({}))
     """When a page last said that what is typed in it is complete, by page, [s] of the monotonic clock."""
     problems: Mapping[str, Message] = field(default_factory=lambda: MappingProxyType({}))
     """What is wrong with typed numbers, by field."""
+
+    @property
+    def notice(self) -> Notice | None:
+        """The newest notice, whomever it concerns."""
+        return self.notices[-1] if self.notices else None
 
 
 class Store:
@@ -214,14 +221,23 @@ class Store:
         """
         with self._lock:
             self._notices += 1
-            self._state = replace(self._state, notice=Notice(self._notices, tone, text, page, trouble))
+            new = Notice(self._notices, tone, text, page, trouble)
+            same = [notice for notice in self._state.notices if notice.page == page]
+            gone = same[: -(_NOTICES - 1)]
+            kept = (notice for notice in self._state.notices if notice not in gone)
+            self._state = replace(self._state, notices=(*kept, new))
+
+    def forget_page(self, page: int) -> None:
+        """Drops what was to be said to a page that has gone."""
+        with self._lock:
+            self._state = replace(self._state, notices=tuple(n for n in self._state.notices if n.page != page))
 
     def settle(self, trouble: str) -> None:
-        """Withdraws the notice of a trouble that is over, if it is still the last one."""
+        """Withdraws the notices of a trouble that is over."""
         with self._lock:
-            notice = self._state.notice
-            if notice is not None and notice.trouble == trouble:
-                self._state = replace(self._state, notice=None)
+            notices = self._state.notices
+            if any(notice.trouble == trouble for notice in notices):
+                self._state = replace(self._state, notices=tuple(n for n in notices if n.trouble != trouble))
 
     def complain(self, field: str, problem: Message) -> None:
         """Says beside a field what is wrong with what was typed."""

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import http.client
 import socket
+import subprocess
+import sys
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 
 import msgspec
 import pytest
@@ -13,6 +16,7 @@ import viser
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
+from rcilab.views.arrivals import MOST_WAITING
 from rcilab.views.gate import Gate
 from rcilab.views.guarded_server import GuardedServer, listen
 from rcilab.views.message_guard import is_orderly
@@ -140,3 +144,67 @@ def answer_to(port: int, request_line: str, *headers: str) -> int:
     with socket.create_connection(("127.0.0.1", port), timeout=10) as link:
         link.sendall("\r\n".join([request_line, *own, *headers, "", ""]).encode())
         return int(link.recv(4096).split()[1])
+
+
+def open_page(port: int):
+    origin = {"Origin": f"http://127.0.0.1:{port}"}
+    return connect(f"ws://127.0.0.1:{port}/", additional_headers=origin, subprotocols=[PROTOCOL], compression=None)  # type: ignore[list-item]
+
+
+def test_text_that_is_no_unicode_ends_no_page(guarded) -> None:
+    """Such as a file name, or a key of a hostile file; viser says it again to every page that comes."""
+    server, port = guarded
+    label = server.viser.gui.add_text("half \ud800", initial_value="caf\udce9")
+    for _ in range(2):
+        with open_page(port) as page:
+            assert page.recv(timeout=10)
+            time.sleep(0.3)
+            page.ping().wait(10)
+            assert page.close_code is None
+    label.remove()
+
+
+def test_who_only_connects_takes_nobodys_place(guarded) -> None:
+    _, port = guarded
+    idle = [socket.create_connection(("127.0.0.1", port)) for _ in range(3 * MOST_WAITING)]
+    try:
+        assert fetch(port, f"127.0.0.1:{port}")[0] == 200
+        with open_page(port) as page:
+            assert page.recv(timeout=10)
+        for link in idle[: 2 * MOST_WAITING]:  # The oldest are gone.
+            link.settimeout(10.0)
+            with suppress(ConnectionResetError):
+                assert link.recv(1) == b""
+    finally:
+        for link in idle:
+            link.close()
+
+
+def test_a_server_without_a_file_left_says_so_once_and_goes_on() -> None:
+    code = """
+import resource, socket, sys, time
+from rcilab.views.gate import Gate
+from rcilab.views.guarded_server import GuardedServer, listen
+bound = listen("127.0.0.1", 0)
+port = bound.getsockname()[1]
+server = GuardedServer(bound, Gate(host="127.0.0.1", port=port))
+links = [socket.socket() for _ in range(60)]
+resource.setrlimit(resource.RLIMIT_NOFILE, (links[-1].fileno() + 1, resource.getrlimit(resource.RLIMIT_NOFILE)[1]))
+for link in links:
+    link.setblocking(False)
+    link.connect_ex(("127.0.0.1", port))
+time.sleep(1.5)
+for link in links:
+    link.close()
+time.sleep(1.5)
+page = socket.create_connection(("127.0.0.1", port), timeout=10)
+page.sendall(f"GET / HTTP/1.1\\r\\nHost: 127.0.0.1:{port}\\r\\n\\r\\n".encode())
+print(page.recv(12).decode())
+server.close()
+"""
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
+    assert ran.stdout.strip() == "HTTP/1.1 200"
+    assert [line for line in ran.stderr.splitlines() if line] == [
+        "no page can be connected just now: Too many open files; those that are open go on. Close programs, or allow "
+        "more open files (ulimit -n)"
+    ]

@@ -9,10 +9,12 @@ from hypothesis import strategies as st
 from rcilab.model import load_model
 from rcilab.supervisor import SupervisorStatus
 from rcilab.workbench import requests
+from rcilab.workbench.conductor import Conductor
 from rcilab.workbench.goal.actions import initial_goal
 from rcilab.workbench.lease import PATIENCE, SILENCE, Lease, Presence
 from rcilab.workbench.lease_actions import LeaseActions
 from rcilab.workbench.store import Store, UiState
+from rcilab.workbench.text import message
 
 MODEL = load_model("xMatePro7")
 
@@ -156,3 +158,21 @@ def test_a_page_that_still_loads_is_waited_for(desk):
     desk.actions.page_came(requests.PageCame(page=3))
     desk.wait(10.0)
     assert desk.lease.holder == 3
+
+
+def test_what_one_page_is_told_takes_no_place_of_what_another_is_told(desk):
+    """However fast a page without the controls presses."""
+    conductor = Conductor(desk.store, desk.robot)
+    for page in (1, 2):
+        conductor.act(requests.PageCame(page=page))
+    for number in range(3):
+        desk.store.say("bad", message("notice.taken", page=number), page=1)
+        for _ in range(100):
+            conductor.act(requests.Seek(page=2, place=0.5))
+            conductor.act(requests.TakeControls(page=2))
+    notices = desk.store.state.notices
+    assert [notice.text.values["page"] for notice in notices if notice.page == 1] == [0, 1, 2]
+    assert sum(notice.page == 2 for notice in notices) <= 4
+    assert sum(notice.page is None for notice in notices) <= 4
+    desk.actions.page_went(requests.PageWent(page=1))
+    assert all(notice.page != 1 for notice in desk.store.state.notices)

@@ -99,7 +99,7 @@ def test_no_control_of_a_watching_page_leads_anywhere(bench):
         watcher.settle()
         wait(lambda: told(bench) == "notice.watching", "the watching page to be told")
         after = bench.store.state
-        ours = [name for name in before.__dataclass_fields__ if name not in ("notice", "entered", "lease")]
+        ours = [name for name in before.__dataclass_fields__ if name not in ("notices", "entered", "lease")]
         assert [name for name in ours if getattr(after, name) is not getattr(before, name)] == []
         assert {name: handle.value for name, handle in controls(bench).items() if name in shown} == shown
         assert bench.session.status().phase == "idle"

@@ -16,8 +16,9 @@
 
   const NARROWEST = 240;  // [px] of the scene that a notice is shown over; else it is shown at the window's lower edge.
   const PAUSE = 50;  // [ms] A choice: between two looks at tabs and plots, whatever changes meanwhile.
+  const TOGETHER = 1000;  // [ms] A choice: notices that come closer than this are shown together, at most three.
   const SHOWN = 7000;  // [ms] A choice: long enough to read a notice twice.
-  let live = null, said = {}, bar, chips, stop, home, take, question, toast, me = null, notice = recall("notice"), greeted = false, hideTimer = 0;
+  let live = null, said = {}, bar, chips, stop, home, take, question, toast, me = null, notice = recall("notice"), greeted = false, hideTimer = 0, lines = [], shownAt = 0;
 
   const send = (message) => {
     if (live && live.readyState === WebSocket.OPEN) { live.send(JSON.stringify(message)); return true; }
@@ -32,7 +33,10 @@
   const goHome = () => send({ kind: "home" });
 
   const show = (message) => {
-    toast.textContent = message.text;
+    const isLater = Date.now() - shownAt > TOGETHER || !toast.className;
+    lines = isLater ? [message.text] : [...lines.filter((line) => line !== message.text), message.text].slice(-3);
+    shownAt = Date.now();
+    toast.textContent = lines.join("\n");
     toast.className = "rl-shown rl-" + message.tone;
     toast.dataset.serial = message.serial || "";
     place();
@@ -169,6 +173,15 @@
     });
   };
 
+  const hearNotices = (notices) => {
+    const serials = notices.map((said) => said.serial), newest = Math.max(0, ...serials);
+    if (notice === null && !greeted) notice = newest;  // What was said before this page came is no news to it.
+    if (notice > newest && !greeted) notice = 0;  // A workbench that has begun anew.
+    if (toast.dataset.serial && !serials.includes(Number(toast.dataset.serial))) hide();  // That trouble is over.
+    notices.filter((said) => said.serial > notice && (said.page === null || (me && said.page === me.page))).forEach(show);
+    keep("notice", notice = Math.max(notice, newest));
+  };
+
   const hear = (event) => {
     const news = JSON.parse(event.data);
     if (news.beat) { send({ kind: "here" }); return; }
@@ -179,12 +192,7 @@
     if (news.quality && news.quality !== document.documentElement.dataset.rlQuality) { reloadFor(news.quality); return; }
     if ("stop" in news || "stopHint" in news || "homeHint" in news) label();
     if (news.chips) draw(news.chips);
-    if (news.notice && news.notice.serial !== notice) {
-      const concerns = news.notice.page === null || (me && news.notice.page === me.page);
-      if (concerns && (greeted || notice !== null)) show(news.notice);  // What was said before this page came is no news to it.
-      keep("notice", notice = news.notice.serial);
-    }
-    if (news.notice === null && toast.dataset.serial) hide();  // The trouble that it reported is over.
+    if (news.notices) hearNotices(news.notices);
     if (!greeted && said.stopHint) welcome();
     greeted = true;
     if ("cursor" in news) followSoon();

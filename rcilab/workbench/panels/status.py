@@ -46,13 +46,10 @@ def status_values(state: UiState, status: SupervisorStatus, text: Text, cursor_e
         "take": text("lease.take" if state.lease.holder is None else "lease.ask"),
         "question": _question(state, text),
     }
-    notice = state.notice
-    values["notice"] = notice and {
-        "serial": notice.serial,
-        "tone": notice.tone,
-        "text": text.say(notice.text),
-        "page": notice.page,
-    }
+    values["notices"] = [
+        {"serial": notice.serial, "tone": notice.tone, "text": text.say(notice.text), "page": notice.page}
+        for notice in state.notices
+    ]
     return values
 
 
