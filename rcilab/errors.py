@@ -23,10 +23,27 @@ Facts stay on the exception as attributes; nobody has to search a message for me
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from os import PathLike
 from types import MappingProxyType
 from typing import Any, Self
+
+_UNSHOWN = re.compile("[\x00-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
+"""What would act on a terminal, break a line, turn the direction of writing, or is half a character."""
+_LONGEST = 2000  # Characters of what an error says of a value; a choice: the longest of ours have some 600.
+
+
+def plain_text(text: str, most: int = _LONGEST) -> str:
+    """Returns a text in one line that anybody may print: with the escapes of what is not to be seen, and not too long.
+
+    Args:
+        text: From anywhere.
+        most: Characters; of a longer text the end is left out.
+    """
+    if len(text) > most:
+        text = text[: most - 1] + "…"
+    return _UNSHOWN.sub(lambda match: match[0].encode("unicode_escape").decode(), text)
 
 
 class RcilabError(Exception):
@@ -219,7 +236,8 @@ class InvalidValueError(UsageError, ValueError):
     """
 
     def __init__(self, name: str, value: object, requirement: str) -> None:
-        text = repr(value)
+        name, requirement = plain_text(name), plain_text(requirement)
+        text = plain_text(repr(value))
         said = text if len(text) < 120 else text[:117] + "..."
         is_missing = text in ("None", "nothing") and requirement.startswith("is missing")
         super().__init__(f"{name} {requirement}" if is_missing else f"{name}: {said} {requirement}")

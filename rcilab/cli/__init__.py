@@ -8,7 +8,7 @@ import sys
 from collections.abc import Sequence
 from importlib import import_module
 
-from rcilab.cli.output import drop_output
+from rcilab.cli.output import drop_output, is_unwritable, one_line_each, prepare_streams
 from rcilab.errors import RcilabError
 
 COMMANDS = ("workbench", "controller", "world", "run", "replay", "check", "urdf", "mjcf", "lab", "doctor", "bench")
@@ -21,6 +21,7 @@ _CLOSED_PIPE = 141  # Exit status of a command that ended early because its outp
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs one command and returns its exit status; an error of ours is one line on stderr."""
+    prepare_streams()
     arguments = list(sys.argv[1:] if argv is None else argv)
     if not arguments or (arguments[0].startswith("-") and arguments[0] not in ("-h", "--help", "--version")):
         arguments.insert(0, "workbench")
@@ -38,7 +39,13 @@ def main(argv: Sequence[str] | None = None) -> int:
         drop_output()
         return _CLOSED_PIPE
     except RcilabError as error:
-        print(f"rcilab: {error}", file=sys.stderr)
+        print(f"rcilab: {one_line_each(str(error))}", file=sys.stderr)
+        return _USAGE
+    except OSError as error:
+        if not is_unwritable(error):
+            raise
+        drop_output()
+        print(f"rcilab: the output could not be written: {error.strerror}", file=sys.stderr)
         return _USAGE
     except KeyboardInterrupt:
         return _INTERRUPTED

@@ -12,14 +12,14 @@ from __future__ import annotations
 import select
 import socket
 import threading
-from collections.abc import Sequence
+import time
 
 from numpy.typing import ArrayLike
 
 from rcilab.arrays import as_vector
 from rcilab.closing import Closing
 from rcilab.dynamics.payload import Payload
-from rcilab.errors import ConnectionLostError, DecodeError, ProtocolError, UsageError
+from rcilab.errors import ConnectionLostError, DecodeError, ProtocolError, UsageError, plain_text
 from rcilab.protocols.world import (
     LONGEST_STALL,
     AutoLimit,
@@ -199,7 +199,7 @@ class World(Closing):
                     f"{self} does not answer {request.name} ({error}); look whether the virtual controller still runs"
                 ).coded("world_silent") from error
         if isinstance(answer, Refused):
-            raise UsageError(answer.reason).coded(answer.code, **answer.facts)
+            raise UsageError(plain_text(answer.reason)).coded(answer.code, **answer.facts)
         return answer
 
     def _connect(self) -> socket.socket:
@@ -212,13 +212,17 @@ class World(Closing):
         return self._socket
 
     def _receive(self, connection: socket.socket) -> WorldAnswer:
-        lines: Sequence[bytes] = ()
-        while not lines:
+        deadline = time.monotonic() + self._timeout
+        while True:
+            if time.monotonic() > deadline:
+                raise TimeoutError("it answers other requests")
             data = connection.recv(65536)
             if not data:
                 raise ConnectionResetError("it closed the connection")
-            lines = self._reader.feed(data)
-        return decode_world_answer(lines[0])[1]
+            for line in self._reader.feed(data):
+                number, answer = decode_world_answer(line)
+                if number == self._last_id:
+                    return answer
 
     def _disconnect(self) -> None:
         if self._socket is not None:

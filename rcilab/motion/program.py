@@ -15,6 +15,18 @@ MOST_WAYPOINTS = 10_000
 """A choice; a motion through them has a gigabyte."""
 
 
+def require_count(count: int) -> None:
+    """Refuses a program of no waypoint, or of too many.
+
+    Raises:
+        InvalidValueError: It is not 1 to `MOST_WAYPOINTS`.
+    """
+    if not 1 <= count <= MOST_WAYPOINTS:
+        raise InvalidValueError("waypoints", Words(str(count)), f"must be 1 to {MOST_WAYPOINTS}").coded(
+            "span", low="1", high=str(MOST_WAYPOINTS)
+        )
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Program:
     """Waypoints in a row, for one model, from one start. `plan_program` makes the motion.
@@ -42,10 +54,7 @@ class Program:
         n = len(robot.home)
         object.__setattr__(self, "start", angles_of(self.start, "start", n, robot.name))
         object.__setattr__(self, "waypoints", tuple(self.waypoints))
-        if not 1 <= len(self.waypoints) <= MOST_WAYPOINTS:
-            raise InvalidValueError(
-                "waypoints", Words(str(len(self.waypoints))), f"must be 1 to {MOST_WAYPOINTS}"
-            ).coded("span", low="1", high=str(MOST_WAYPOINTS))
+        require_count(len(self.waypoints))
         for number, waypoint in enumerate(self.waypoints, 1):
             if not isinstance(waypoint, Waypoint):
                 raise InvalidValueError(f"waypoint {number}", described(waypoint), "is none; Waypoint.line makes one")

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from rcilab.arrays import Words, described
-from rcilab.errors import InvalidValueError, ModelError, VersionMismatchError
+from rcilab.errors import InvalidValueError, ModelError, VersionMismatchError, plain_text
 from rcilab.motion.lined_json import LONGEST, Node, read_json
-from rcilab.motion.program import Program
+from rcilab.motion.program import Program, require_count
 from rcilab.motion.waypoint import ALLOWED, ALWAYS, WORDS, Waypoint, require_fit
 from rcilab.robots import RobotDescription, describe_robot
 from rcilab.whole_file import read_whole, replacing
@@ -114,8 +114,12 @@ def read_program(content: bytes, name: str) -> Program:
         robot = describe_robot(str(texts["model"]))
     except ModelError as error:
         raise InvalidValueError(_at(name, found["model"], "model"), texts["model"], f"is no robot: {error}").coded(
-            "file_model", file=name, line=found["model"].line, model=texts["model"]
+            "file_model", file=name, line=found["model"].line, model=_shown(texts["model"])
         ) from error
+    try:
+        require_count(len(listed.value))  # Said at once, before each of them is read.
+    except InvalidValueError as error:
+        raise _placed(error, name, listed) from error
     waypoints = tuple(_waypoint(node, number, name, robot) for number, node in enumerate(listed.value, 1))
     try:
         return Program(waypoints=waypoints, **texts, **vectors)  # type: ignore[arg-type]  # Program checks them.
@@ -159,8 +163,7 @@ def _placed(error: InvalidValueError, name: str, node: Node, prefix: str = "", n
 
 
 def _shown(value: object) -> str:
-    text = "" if value is None else str(value)
-    return text if len(text) <= _SHOWN else text[: _SHOWN - 1] + "…"
+    return plain_text("" if value is None else str(value), _SHOWN)
 
 
 def _object(node: Node, name: str, kind: str, keys: tuple[str, ...]) -> dict[str, Node]:
@@ -172,7 +175,7 @@ def _object(node: Node, name: str, kind: str, keys: tuple[str, ...]) -> dict[str
         if key not in keys:
             raise InvalidValueError(
                 f"{name}, line {value.line}, {kind}, {key}", value.plain(), f"is unknown; known: {', '.join(keys)}"
-            ).coded("file_unknown", file=name, line=value.line, key=key)
+            ).coded("file_unknown", file=name, line=value.line, key=_shown(key))
     return node.value
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from rcilab.arrays import Array, JointPath
 from rcilab.clock import CYCLE_TIME
-from rcilab.errors import UsageError
+from rcilab.errors import UsageError, plain_text
 from rcilab.faults import FAULT_COUNT, Fault, name_faults
 from rcilab.recording.setup import Setup
 from rcilab.recording.tracking import Tracking, compute_tracking, find_stop, last_compared
@@ -337,7 +337,7 @@ class Run:
             facts.append(f"largest error {self._told_error()}")
             facts.append(f"success rate {float(self.success_rate[-1]):.3f}")
         if self.stopped:
-            facts.append(f"stopped: {self.stopped}")
+            facts.append(f"stopped: {plain_text(self.stopped)}")
         if not self.is_complete:
             facts.append("cut off: the end of its file is missing")
         if self.faults:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from importlib import import_module
 
-from rcilab.errors import ModelError
+from rcilab.errors import ModelError, plain_text
 from rcilab.robots.description import DhRow, Link, RobotDescription
 
 __all__ = ["RCI_ROBOT_NAMES", "ROBOT_NAMES", "DhRow", "Link", "RobotDescription", "describe_robot"]
@@ -27,4 +27,4 @@ def describe_robot(name: str) -> RobotDescription:
     for known, module in _MODULES.items():
         if known.lower() == str(name).lower():
             return import_module(f"rcilab.robots.{module}").DESCRIPTION
-    raise ModelError(f"unknown robot {name!r}; known robots: {', '.join(ROBOT_NAMES)}")
+    raise ModelError(f"unknown robot {plain_text(repr(name), 60)}; known robots: {', '.join(ROBOT_NAMES)}")
