@@ -96,7 +96,7 @@ def as_vector(value: ArrayLike, size: int, name: str, unit: str = "") -> Array:
     """
     try:
         array = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise InvalidValueError(name, value, f"is not {size} numbers{_in(unit)}").coded(
             "numbers", count=size
         ) from error
@@ -123,7 +123,7 @@ def as_path(value: ArrayLike, columns: int | None, name: str, unit: str = "") ->
     """
     try:
         array = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise InvalidValueError(name, described(value), f"is not a table of numbers{_in(unit)}") from error
     if array.ndim != 2 or 0 in array.shape or columns not in (None, array.shape[1]):
         needed = f"needs shape (N, {'n' if columns is None else columns}){_in(unit)}"

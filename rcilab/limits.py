@@ -101,5 +101,5 @@ class Limits:
         """
         try:
             return self.sources[name]
-        except KeyError:
+        except (KeyError, TypeError):
             raise InvalidValueError("limit", name, f"is unknown; known: {', '.join(self.sources)}") from None

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
-from math import hypot, isfinite
+from math import hypot
 
 import numpy as np
 
-from rcilab.arrays import Array, described
+from rcilab.arrays import Array, as_vector, described
 from rcilab.errors import InvalidValueError
 from rcilab.spatial import Pose, as_pose
 
@@ -31,8 +31,8 @@ class SafetyBox:
 
     def __post_init__(self) -> None:
         """Checks the values."""
-        size = tuple(float(edge) for edge in self.size)
-        if len(size) != 3 or not all(isfinite(edge) and edge > 0.0 for edge in size):
+        size = tuple(as_vector(self.size, 3, "safety box size", "m").tolist())
+        if not all(edge > 0.0 for edge in size):
             raise InvalidValueError("safety box size", size, "must be three lengths above 0 [m]")
         object.__setattr__(self, "T_base_box", as_pose(self.T_base_box, "safety box pose"))
         object.__setattr__(self, "size", size)

@@ -74,7 +74,7 @@ class Pose:
         """
         try:
             m = np.array(matrix, dtype=np.float64)
-        except (TypeError, ValueError) as error:
+        except (TypeError, ValueError, OverflowError) as error:
             raise InvalidValueError("pose", described(matrix), "is not a 4 x 4 matrix of numbers") from error
         if m.shape != (4, 4):
             shown = described(m) if m.ndim else matrix
@@ -215,7 +215,7 @@ class Pose:
             return self @ as_pose(other)
         try:
             points = np.asarray(other, dtype=np.float64)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise _no_pose("pose", other) from None
         if points.ndim not in (1, 2) or points.shape[-1] != 3:
             raise InvalidValueError("factor", described(other), "is no Pose, and no points of shape (3,) or (N, 3)")

@@ -144,6 +144,6 @@ def require_mode(mode: object) -> Mode:
         InvalidValueError: It is not; the message lists those that exist.
     """
     for known in MODES:
-        if mode == known:
+        if isinstance(mode, str) and mode == known:
             return known
     raise InvalidValueError("mode", described(mode), f"is unknown; known: {', '.join(MODES)}")

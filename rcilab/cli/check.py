@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from rcilab.cli.motion_file import HELP, add_max_rows, as_motion, read_file
 from rcilab.cli.output import show
-from rcilab.errors import UsageError
+from rcilab.errors import InvalidValueError, UsageError
 from rcilab.language import LANGUAGES
 
 if TYPE_CHECKING:
@@ -58,6 +58,9 @@ def run(args: Namespace) -> int:
     from rcilab.model import load_model
     from rcilab.motion import Program
 
+    out: Path | None = args.slow_down
+    if out is not None and out.exists() and out.samefile(args.file):
+        raise InvalidValueError("--slow-down", str(out), "is the file that is judged; name another one to write")
     found = read_file(args.file, args.max_rows)
     name = found.model if args.model is None and isinstance(found, Program) else args.model
     if name is None:
@@ -65,7 +68,6 @@ def run(args: Namespace) -> int:
     model = load_model(name, tool=found.T_flange_tool if isinstance(found, Program) else None)
     motion = as_motion(found, model, args.file, show=(lambda line: None) if args.json else show, max_rows=args.max_rows)
     report = check(motion, model, mode=args.mode)
-    out: Path | None = args.slow_down
     slowed = None if out is None else report.slow_down()
     if out is not None and slowed is not None and slowed.motion is not None:
         slowed.motion.save(out)

@@ -6,6 +6,7 @@ import errno
 import io
 import os
 import sys
+from contextlib import suppress
 
 from rcilab.errors import plain_text
 
@@ -25,7 +26,8 @@ def prepare_streams() -> None:
             nowhere = os.open(os.devnull, os.O_RDWR)  # The lowest free number: this one.
             setattr(sys, name, _Gone() if number == 1 else os.fdopen(nowhere, "w" if number else "r"))
         elif number and hasattr(stream, "reconfigure"):
-            stream.reconfigure(errors="backslashreplace")
+            with suppress(OSError):  # A stream that is read as well, such as a socket, cannot be changed any more.
+                stream.reconfigure(errors="backslashreplace")
 
 
 def show(content: object) -> None:

@@ -144,7 +144,7 @@ def describe_distance(state: RobotState, command: Command) -> str:
 def _numbers(name: str, values: Any, shape: tuple[int, ...], unit: str) -> Array:
     try:
         numbers = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise InvalidValueError(name, values, f"is not {shape} numbers [{unit}]") from error
     if numbers.shape != shape:
         raise InvalidValueError(name, values, f"has shape {numbers.shape}, needs {shape} [{unit}]")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from numpy.typing import ArrayLike
 
+from rcilab.arrays import described
 from rcilab.client.commands import RciCommands
 from rcilab.client.control_loop import Callback
 from rcilab.client.filters import CommandFilter, LowPass, RateLimiter
@@ -17,7 +18,7 @@ from rcilab.client.runner import Runner
 from rcilab.client.start_check import describe_start_mismatch, require_motion
 from rcilab.client.turns import Turns
 from rcilab.client.under_way import UnderWay
-from rcilab.errors import UsageError
+from rcilab.errors import InvalidValueError, UsageError
 from rcilab.limits import Limits
 from rcilab.motion.pacing import require_pace
 from rcilab.recording.run import Run
@@ -176,6 +177,8 @@ class Motions(RciCommands):
             Exception: Whatever the callback raised; the arm was brought to rest.
         """
         require_mode(mode)
+        if not callable(callback):
+            raise InvalidValueError("callback", described(callback), "is no function (state, t) -> command")
         filters: list[CommandFilter] = [] if cut_off is None else [LowPass(cut_off)]
         if rate_limit is not None:
             from rcilab.conformance import cartesian_limits

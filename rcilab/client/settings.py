@@ -149,7 +149,7 @@ class RciSettings:
         _require_near("center_of_mass", center.tolist())
         try:
             flat = np.asarray(inertia, dtype=np.float64).ravel()
-        except (TypeError, ValueError) as error:
+        except (TypeError, ValueError, OverflowError) as error:
             raise InvalidValueError("inertia", described(inertia), "is not 3 x 3 numbers [kg m^2]") from error
         names = [f"row {row}, column {column}" for row in (1, 2, 3) for column in (1, 2, 3)]
         values = _vector("inertia", flat, names, "kg m^2")
@@ -238,7 +238,7 @@ def _vector(
     """Returns a vector, one number an axis, each finite and inside its bounds; None is no bound."""
     try:
         array = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         if len(axes) == 1:
             as_number(values[0], name, unit)  # type: ignore[index]  # A single number was put in a list.
         raise InvalidValueError(name, described(values), f"is not {len(axes)} numbers [{unit}]") from error

@@ -334,8 +334,8 @@ class Motion:
             derivative = ("q", "dq", "ddq", "jerk").index(name)
             array = self.polynomial.sample(self.times, derivative)
             array[-1] = 0.0 if derivative else self.goal
-        array.flags.writeable = False
-        return array
+        # Rows of bytes: what was judged cannot be made writable again, as an array of its own could.
+        return np.frombuffer(array.tobytes()).reshape(array.shape)
 
 
 def require_motion(motion: object) -> Motion:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from os import PathLike
 
@@ -53,6 +54,10 @@ class Program:
         object.__setattr__(self, "model", robot.name)
         n = len(robot.home)
         object.__setattr__(self, "start", angles_of(self.start, "start", n, robot.name))
+        if not isinstance(self.waypoints, Iterable):
+            raise InvalidValueError(
+                "waypoints", described(self.waypoints), "are no list; give [Waypoint.line(...), ...]"
+            )
         object.__setattr__(self, "waypoints", tuple(self.waypoints))
         require_count(len(self.waypoints))
         for number, waypoint in enumerate(self.waypoints, 1):

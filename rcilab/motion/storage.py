@@ -114,7 +114,7 @@ def load_motion(file: str | PathLike[str] | BinaryIO, max_rows: int = MOST_ROWS)
         raise InvalidValueError("motion file", name, f"is incomplete: no {error}") from error
     except InvalidValueError as error:
         raise InvalidValueError("motion file", name, f"holds a damaged motion: {error}") from error
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         problem = "holds a damaged motion: breaks and coefficients are not all numbers"
         raise InvalidValueError("motion file", name, problem) from error
     require_rows(len(motion), max_rows, "motion file", name)

@@ -181,9 +181,12 @@ class RunFile:
             raise _unwritable(self.path, error) from error
 
     def _given_up(self, error: OSError) -> InvalidValueError:
-        """Closes the file as it is and returns what to raise."""
+        """Closes the file as it is, unless nothing of it was written, and returns what to raise."""
         with suppress(OSError):
             self._stream.close()  # It tries once more to write, and closes in any case.
+        with suppress(OSError):
+            if self.path.stat().st_size == 0:
+                self.path.unlink()
         return _unwritable(self.path, error)
 
     def discard(self) -> None:

@@ -65,6 +65,15 @@ def test_check_judges_as_it_will_be_sent_and_refuses_a_mode_that_is_none(file, c
     assert "known: joint_position" in capsys.readouterr().err
 
 
+def test_a_slow_down_does_not_take_the_place_of_what_is_judged(file, tmp_path, capsys):
+    rows = tmp_path / "rows.csv"
+    rcilab.plan_joint(MODEL, MODEL.home, MODEL.home + 0.1).save(rows)
+    before = rows.read_bytes()
+    assert main(["check", str(rows), "--model", "xMatePro7", "--slow-down", str(tmp_path / "." / "rows.csv")]) == 2
+    assert "is the file that is judged" in capsys.readouterr().err
+    assert rows.read_bytes() == before
+
+
 def test_json_has_the_verdict_every_condition_and_the_slow_down(file, tmp_path, capsys):
     fast = Motion.from_cycles(plan_program(MODEL, PROGRAM).q[::2])
     fast.save(tmp_path / "fast.csv")

@@ -144,6 +144,7 @@ def fill_the_disk(plant: str, folder: Path) -> None:
             wait(lambda: bench.store.state.recording is not None, "the run")
             wait(lambda: told(bench) == "record.unwritable", "to be told")
             move_on(bench)
+            assert all(file.stat().st_size for file in folder.glob("*.rcirun"))
     finally:
         subprocess.run(["umount", "-l", str(folder)], check=True)
 
