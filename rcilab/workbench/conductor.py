@@ -84,7 +84,7 @@ class Conductor:
         self._mailbox: Mailbox[requests.Request] = Mailbox()
         self._thread: threading.Thread | None = None
         self._ending = threading.Event()
-        self._refused_at: dict[int | None, float] = {}  # When a page was last refused, [s].
+        self._refused_at: dict[tuple[int | None, int | None], float] = {}  # Of page and holder, when: [s].
         self._refused_for: int | None = None  # Who held the controls when another page was last refused.
         self.errors = Failures()
         """Failures of our own code; one a second at most is printed and shown on the page."""
@@ -237,10 +237,11 @@ class Conductor:
         """Tells a page that it only watches, unless it has got the controls meanwhile."""
         lease = self._store.state.lease
         now = time.monotonic()
-        if lease.allows(request.page) or now - self._refused_at.get(request.page, -_AGAIN) < _AGAIN:
+        refused = (request.page, lease.holder)
+        if lease.allows(request.page) or now - self._refused_at.get(refused, -_AGAIN) < _AGAIN:
             return
-        self._refused_at = {page: at for page, at in self._refused_at.items() if now - at < _AGAIN}
-        self._refused_at[request.page] = now
+        self._refused_at = {key: at for key, at in self._refused_at.items() if now - at < _AGAIN}
+        self._refused_at[refused] = now
         self._refused_for = lease.holder
         code = "lease.free" if lease.holder is None else "notice.watching"
         said = message(code, page=lease.number(lease.holder))

@@ -67,7 +67,7 @@ def test_check_judges_as_it_will_be_sent_and_refuses_a_mode_that_is_none(file, c
 
 def test_a_slow_down_does_not_take_the_place_of_what_is_judged(file, tmp_path, capsys):
     rows = tmp_path / "rows.csv"
-    rcilab.plan_joint(MODEL, MODEL.home, MODEL.home + 0.1).save(rows)
+    plan_joint(MODEL, MODEL.home, MODEL.home + 0.1).save(rows)
     before = rows.read_bytes()
     assert main(["check", str(rows), "--model", "xMatePro7", "--slow-down", str(tmp_path / "." / "rows.csv")]) == 2
     assert "is the file that is judged" in capsys.readouterr().err
