@@ -55,12 +55,15 @@ class FastestLaw:
     """
 
     def __init__(self, bounds: PathBounds) -> None:
-        self._bounds = bounds
         # A step on, x has grown by 2 step s'', and each row bounds s'' by tilt * x -+ reserve: the most that x can
         # become, and the most that it can have been, are the least of many straight lines, hence concave in x.
         step = 2.0 * np.diff(bounds.knots)
         self._gain, self._factor = step * bounds.reserve[:, :-1], 1.0 + step * bounds.tilt[:, :-1]
         count = len(bounds.knots)
+        # Where a row hardly depends on s'' (first is near 0), a large x leaves only an s'' that ends in a stop at the
+        # next knot, or before it. There x stays where the row also allows s'' = 0.
+        even = np.where(self._factor < 0.0, self._gain / (1.0 - np.minimum(self._factor, 0.0)), np.inf)
+        self._most = np.minimum(bounds.most, np.append(even.min(axis=0), np.inf))
         self._slowdown = np.zeros(count)
         self._limits = [0.0] * count
         self._backward: list[list[float]] = [[]] * (count - 1)
@@ -91,7 +94,7 @@ class FastestLaw:
     def _bound(self, knots: NDArray[np.intp], steps: NDArray[np.intp]) -> None:
         """Computes bounds at some knots, and over some steps between knots."""
         squares = self._slowdown**2
-        most = self._bounds.most / squares
+        most = self._most / squares
         for k, limit in zip(knots.tolist(), most[knots].tolist(), strict=True):
             self._limits[k] = limit
         gain, factor = self._gain[:, steps] / squares[steps], self._factor[:, steps]
