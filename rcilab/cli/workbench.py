@@ -58,7 +58,7 @@ def add_page_options(parser: argparse.ArgumentParser) -> None:
         default=Path.home() / "rcilab-runs",
         help="folder that every motion is recorded in, cycle by cycle (default: %(default)s)",
     )
-    parser.add_argument("--language", choices=("en", "zh"), default="en", help="language of the page")
+    parser.add_argument("--language", choices=("en", "zh"), help="language of the page (the one that was chosen last)")
     parser.add_argument(
         "--quality",
         choices=("full", "light"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from difflib import get_close_matches
 from typing import Any
 
 import ipywidgets
@@ -38,6 +39,16 @@ class Part(Closing):
         self._root: Any = None
         self._closed = False
         kernel_cells().adopt(self)
+
+    def __setattr__(self, name: str, value: object) -> None:
+        """Sets what there is: a slip in a name is no new attribute that nobody reads."""
+        is_known = name.startswith("_") or name in vars(self) or hasattr(type(self), name)
+        if not is_known and vars(self).get("_root") is not None:
+            known = [other for other in {*vars(self), *dir(type(self))} if not other.startswith("_")]
+            close = get_close_matches(name, known, 1)
+            hint = f"; did you mean {close[0]}?" if close else f"; there are {', '.join(sorted(known))}"
+            raise AttributeError(f"{type(self).__name__} has no {name}{hint}")
+        super().__setattr__(name, value)
 
     @property
     def model(self) -> RobotModel:

@@ -46,7 +46,8 @@ class WorkbenchConfig:
     """0 takes any free port."""
     token: str | None = None
     """Secret that every page must bring, at least 16 characters; `access.find_token` makes one."""
-    language: str = "en"
+    language: str | None = None
+    """None is the one that was chosen last on this port, at first English."""
     quality: str | None = None
     """"full" or "light"; None is full, or light where the browser draws without a graphics card."""
     runs: Path | None = None
@@ -80,7 +81,7 @@ class Workbench:
             model=model,
             target=config.target,
             goal=goal,
-            language=config.language,
+            language=config.language or "en",
             quality=config.quality or "full",
             is_quality_chosen=config.quality is not None,
         )
@@ -137,7 +138,7 @@ class Workbench:
         self._opened = True
         self._follow_pages()
         if self._config.replay is None:
-            self.conductor.resume()
+            self.conductor.resume(language=self._config.language)
         self.presenter = Presenter(self.server, self.store, self.session, live, ask)
         self.presenter.start()
         self.conductor.start()

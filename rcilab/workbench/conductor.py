@@ -155,9 +155,16 @@ class Conductor:
             request = replace(request, stops=self._session.stops)
         self._mailbox.put(request, _coalescing_key(request))
 
-    def resume(self) -> None:
-        """Brings back what the workbench before this one had; before `start`."""
+    def resume(self, *, language: str | None = None) -> None:
+        """Brings back what the workbench before this one had; before `start`.
+
+        Args:
+            language: The one that was asked for this time; None is the one that was chosen last.
+        """
         kept = self._keepsake.recall(self._store.state.model)
+        for name, value in self._keepsake.recall_looks().items():
+            if name != "language" or language is None:
+                self._view.set_view(requests.SetView(page=None, name=name, value=value))
         if kept is not None:
             self._guard(lambda: self._resume(kept))
         for name, setup in self._keepsake.recall_setups(self._store.state.model).items():

@@ -1,4 +1,4 @@
-"""What a workbench had comes back with the next one: the program; after a crash goal and set-up, too."""
+"""What a workbench had comes back with the next one: program and looks; after a crash goal and set-up, too."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import time
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from rcilab.arrays import JointVector, as_vector, frozen
 from rcilab.client.setup import RobotSetup
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from rcilab.workbench.store import UiState
 
 _FORMAT, _VERSION = "rcilab workbench", 1
+Look: TypeAlias = Literal["language", "theme", "angle", "length"]
+_AT_FIRST: dict[Look, str] = {"language": "en", "theme": "light", "angle": "deg", "length": "mm"}
 _PAUSE = 1.0  # [s] A choice: between two writings, while somebody drags.
 
 
@@ -37,6 +39,17 @@ class Kept:
     """Those parts of the set-up that were edited."""
 
 
+def looks_of(state: UiState) -> dict[Look, str]:
+    """Returns what of the page's settings is not as at first, by the names in `SetView`."""
+    looks: dict[Look, str] = {
+        "language": state.language,
+        "theme": state.theme,
+        "angle": state.units.angle,
+        "length": state.units.length,
+    }
+    return {name: value for name, value in looks.items() if value != _AT_FIRST[name]}
+
+
 def keepsake_file(port: int) -> Path:
     """Returns where the workbench at a port keeps it: in $XDG_STATE_HOME/rcilab, or ~/.local/state/rcilab."""
     home = os.environ.get("XDG_STATE_HOME", "")
@@ -45,7 +58,9 @@ def keepsake_file(port: int) -> Path:
 
 
 class Keepsake:
-    """Writes goal, program and set-up of every arm down when they have changed. Owned by the conductor's thread.
+    """Writes down how the page looks, and goal, program and set-up of every arm, when they have changed.
+
+    Owned by the conductor's thread.
 
     Nobody asked for this file, so where it cannot be written or read it is done without, silently.
 
@@ -56,6 +71,7 @@ class Keepsake:
     def __init__(self, file: Path | None) -> None:
         self._file = file
         self._arms: dict[str, Any] = {}
+        self._looks: dict[Look, str] = {}
         self._written: tuple[object, ...] | None = None
         self._next = 0.0
 
@@ -68,6 +84,7 @@ class Keepsake:
             if (content["format"], content["version"]) != (_FORMAT, _VERSION):
                 return None
             self._arms = dict(content["arms"])
+            self._looks = dict(content.get("looks") or {})
             own = self._arms.get(model.name)
             if own is None:
                 return None
@@ -78,6 +95,10 @@ class Keepsake:
             return Kept(q=q, program=program, setup=setup)
         except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError, RcilabError):
             return None
+
+    def recall_looks(self) -> dict[Look, str]:
+        """Returns the settings of the page that were chosen, by their names in `SetView`; after `recall`."""
+        return dict(self._looks)
 
     def recall_setups(self, model: RobotModel) -> dict[str, RobotSetup]:
         """Returns the edited set-ups of the arms that were chosen before this one, by name; after `recall`."""
@@ -108,6 +129,7 @@ class Keepsake:
             state.program.draft,
             state.setup.wanted,
             state.setup.touched,
+            (looks := looks_of(state)),
         )
         if self._file is None or content == self._written or now < self._next:
             return
@@ -119,23 +141,24 @@ class Keepsake:
             "program": None if program is None else program.to_json(),
             "setup": setup_facts(state.setup.wanted.only(state.setup.touched)),
         }
+        self._looks = looks
         with suppress(OSError):
             self._write(self._arms)
 
     def close(self, state: UiState) -> None:
-        """Forgets goals and set-ups: the workbench was closed by somebody who wanted that. Programs stay, as work."""
+        """Forgets goals and set-ups: the workbench was closed by somebody who wanted that. Programs and looks stay."""
         if self._file is None:
             return
         self._next = 0.0
         self.keep(state)
         programs = {name: {"program": own["program"]} for name, own in self._arms.items() if own.get("program")}
         with suppress(OSError):
-            if programs:
+            if programs or self._looks:
                 self._write(programs)
             else:
                 self._file.unlink(missing_ok=True)
 
     def _write(self, arms: dict[str, Any]) -> None:
         assert self._file is not None
-        text = json.dumps({"format": _FORMAT, "version": _VERSION, "arms": arms})
+        text = json.dumps({"format": _FORMAT, "version": _VERSION, "arms": arms, "looks": self._looks})
         write_whole(self._file, text, survives_power_loss=False)

@@ -436,3 +436,10 @@ def test_a_lab_keeps_the_soft_limits_tool_and_load_that_its_session_sets_later()
         state.take_motion(rcilab.plan_joint(PRO7, PRO7.home, PRO7.home + 0.05))
         assert state.plan is not None
         assert not state.plan.report.ok, "it leaves the soft range"
+
+
+def test_a_slip_in_the_name_of_an_attribute_is_not_taken_in_silence():
+    panel = notebook.TargetPanel(rcilab.load_model("xMatePro7"))
+    with pytest.raises(AttributeError, match=r"TargetPanel has no languge; "):
+        panel.languge = "zh"
+    panel.close()

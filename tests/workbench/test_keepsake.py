@@ -161,3 +161,23 @@ def test_programs_of_other_arms_and_a_look_at_a_recording_lose_nothing():
         wait_for(lambda: len(bench.store.state.program.draft.steps) == 2, what="the program of the other arm")
     assert len(Keepsake(keepsake_file(port)).recall(MODEL).program.waypoints) == 2
     keepsake_file(port).unlink()
+
+
+def test_how_the_page_looks_comes_back_and_a_language_that_is_asked_for_wins(monkeypatch, tmp_path):
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    with Workbench(WorkbenchConfig(port=port)) as bench:
+        for name, value in (("language", "zh"), ("theme", "dark"), ("angle", "rad"), ("length", "m")):
+            bench.conductor.ask(requests.SetView(page=None, name=name, value=value))
+        wait_for(lambda: bench.store.state.units.length == "m", what="the settings")
+    with Workbench(WorkbenchConfig(port=port)) as bench:
+        state = bench.store.state
+        assert (state.language, state.theme, state.units.angle, state.units.length) == ("zh", "dark", "rad", "m")
+        assert state.notices == ()
+    with Workbench(WorkbenchConfig(port=port, language="en")) as bench:
+        assert (bench.store.state.language, bench.store.state.theme) == ("en", "dark")
+    keepsake_file(port).write_text('{"format": "rcilab workbench", "version": 1, "arms": {}, "looks": {"theme": 7}}')
+    with Workbench(WorkbenchConfig(port=port)) as bench:
+        assert bench.store.state.theme == "light"
