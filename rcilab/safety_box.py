@@ -31,7 +31,10 @@ class SafetyBox:
 
     def __post_init__(self) -> None:
         """Checks the values."""
-        size = tuple(as_vector(self.size, 3, "safety box size", "m").tolist())
+        try:
+            size = tuple(as_vector(self.size, 3, "safety box size", "m").tolist())
+        except InvalidValueError as error:
+            raise InvalidValueError(error.name, error.value, "must be three lengths above 0 [m]") from error
         if not all(edge > 0.0 for edge in size):
             raise InvalidValueError("safety box size", size, "must be three lengths above 0 [m]")
         object.__setattr__(self, "T_base_box", as_pose(self.T_base_box, "safety box pose"))

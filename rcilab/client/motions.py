@@ -177,13 +177,13 @@ class Motions(RciCommands):
             Exception: Whatever the callback raised; the arm was brought to rest.
         """
         require_mode(mode)
-        if not callable(callback):
-            raise InvalidValueError("callback", described(callback), "is no function (state, t) -> command")
         filters: list[CommandFilter] = [] if cut_off is None else [LowPass(cut_off)]
         if rate_limit is not None:
             from rcilab.conformance import cartesian_limits
 
             filters.append(RateLimiter(cartesian_limits(self.model.limits, rate_limit)))
+        if not callable(callback):
+            raise InvalidValueError("callback", described(callback), "is no function (state, t) -> command")
         with self._turns.set_out("control"):
             return self._runner.run(callback, mode, self.model, filters=filters, box=self.safety_box)
 
