@@ -145,8 +145,9 @@ class Jog:
         accelerate; from rest it moves in the asked direction at once. Where joints would pass a velocity limit or come
         to the end of their range, all are slowed down by one factor; what comes up too suddenly for that, at high
         speed near a singularity, bends the tool's way for a moment, never a joint's limits. Closer still, the
-        direction that is lost is damped (`is_damped`). A 7-axis arm takes the smallest joint velocities that give the
-        twist.
+        direction that is lost is damped (`is_damped`), and a tool that would leave its line for that stops: at the
+        edge of the reach it stands, and goes back as it came. A 7-axis arm takes the smallest joint velocities that
+        give the twist.
 
         Args:
             twist: Velocity of the tool tip and angular velocity, shape (6,), linear first, [m/s, rad/s]; lowered as a

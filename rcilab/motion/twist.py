@@ -34,6 +34,10 @@ TOOL_MARGIN = 0.99
 """Part of the tool's velocity limits that a twist uses. A choice: joints follow each cycle's velocity with a lag of up
 to acceleration^2 / (2 jerk), some mm/s at the tool, and not all of them with the same."""
 
+MISSED_PART = 0.1
+"""Part of a twist that the tool misses where it stops on the way into a singularity: it is 6 degrees off its line."""
+
+_LOOK = 1e-3  # [rad] How far the fastest joint is moved to see whether a singularity comes nearer.
 _CHANGE = RAMP_PART * CYCLE_TIME  # [s] Times an acceleration: how much a velocity may change in a cycle.
 _IDENTITY = np.eye(6)
 _SAME = 1e-9  # [m/s, rad/s] Twists closer than this are the same; as a number, a weight closer to 1 is 1.
@@ -136,12 +140,33 @@ class TwistFollower:
         wanted = None if self._weight == 1.0 else self._blended(J, inverse, dq, ddq)
         if wanted is None:
             wanted = inverse.dot(self._goal).tolist()
+        fidelity = 1.0
+        if self.is_damped:
+            fidelity = self._fidelity(J, inverse, q, wanted)
+            wanted = [fidelity * v for v in wanted]
         # While the twist changes, so do the joint velocities, on purpose.
         last = wanted if self._weight != 1.0 or self._last is None else self._last
         part = self._allowed = self._part_inside(q, wanted, last)
         self._last = wanted
-        self.part = part * self._cut
+        self.part = part * self._cut * fidelity
         return [part * v for v in wanted]
+
+    def _fidelity(self, J: Matrix, inverse: Matrix, q: Sequence[float], wanted: Sequence[float]) -> float:
+        """Returns the part of the velocities that is kept on the way into a singularity, 1 to 0; 1 on the way out.
+
+        There the tool would leave the asked direction and slide along the edge of the reach, and come back by another
+        way. It slows down instead as it misses the twist, and stands where it misses `MISSED_PART` of it.
+        """
+        length = float(np.linalg.norm(self._goal))
+        fastest = max(map(abs, wanted))
+        if length < _SAME or fastest < _SLOWEST:
+            return 1.0
+        missed = float(np.linalg.norm(self._goal - J.dot(inverse.dot(self._goal)))) / length
+        ahead = [angle + _LOOK / fastest * v for angle, v in zip(q, wanted, strict=True)]
+        J_ahead, _ = tool_jacobian(self._chain, ahead, self._T_flange_tool)
+        if np.linalg.eigvalsh(J_ahead.dot(J_ahead.T))[0] >= np.linalg.eigvalsh(J.dot(J.T))[0]:
+            return 1.0
+        return max(0.0, 1.0 - missed / MISSED_PART)
 
     def _blended(self, J: Matrix, inverse: Matrix, dq: Sequence[float], ddq: Sequence[float]) -> list[float] | None:
         """Returns joint velocities for the twist of this cycle; None when it is the goal.

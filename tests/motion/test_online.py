@@ -381,3 +381,23 @@ def test_far_inside_the_ranges_looking_at_all_joints_at_once_changes_nothing(mon
     shortcut = path()
     monkeypatch.setattr(Jog, "_is_far_inside", lambda *_: False)
     assert np.array_equal(path(), shortcut)
+
+
+@pytest.mark.parametrize("frame", ["base", "tool"])
+def test_a_tool_that_is_led_past_its_reach_stands_at_the_edge_and_goes_back_as_it_came(frame):
+    wanted = np.array([0.075, 0.0, 0.0, 0.0, 0.0, 0.0]) if frame == "base" else np.array([-0.075, 0, 0, 0, 0, 0])
+    jog = Jog(MODEL, MODEL.home)
+    jog.set_twist(wanted, frame=frame)
+    rows = [MODEL.home] * 4 + [jog.step() for _ in range(4000)]
+    start, edge = MODEL.forward(MODEL.home).position, MODEL.forward(jog.q).position
+    assert np.abs(jog.dq).max() < 1e-4
+    assert jog.part < 0.01
+    assert edge[0] > start[0] + 0.1
+    assert np.abs(edge[1:] - start[1:]).max() < 0.01
+    jog.set_twist(-wanted, frame=frame)
+    rows += [jog.step() for _ in range(2000)]
+    assert_inside_limits(MODEL, rows)
+    back = MODEL.forward(jog.q).position
+    assert back[0] < start[0] + 0.05
+    assert np.abs(back[1:] - start[1:]).max() < 0.01
+    assert jog.q[3] > 0.0  # The elbow has not folded to the other side.

@@ -10,6 +10,7 @@ import numpy as np
 
 from rcilab.arrays import Array, JointVector, frozen
 from rcilab.motion.online import POSITION_MARGIN
+from rcilab.motion.twist import DAMPED_BELOW
 from rcilab.safety_box import SafetyBox, active_box
 from rcilab.safety_distance import ADVISED_DISTANCE
 from rcilab.workbench.setup.wanted import setup_obstacle
@@ -122,13 +123,15 @@ def inside(model: RobotModel, q: JointVector) -> JointVector:
 
 
 def at_limit(model: RobotModel, q: JointVector, axis: Axis) -> Message | None:
-    """Returns which joint has come to which limit, so that this button leads no further; None when none has."""
+    """Returns why this button leads no further: a joint at its limit, or the edge of the reach; None for neither."""
     limits, joint = model.limits.joint, axis.joint
     for number in range(model.n) if joint is None else (joint,):
         for end, bound in (("lower", limits.lower[number]), ("upper", limits.upper[number])):
             is_ahead = joint is None or (end == "upper") == (axis.sign > 0)
             if is_ahead and abs(q[number] - bound) < _AT_LIMIT:
                 return message(f"jog.at_{end}", joint=number + 1, angle=f"{math.degrees(bound):.0f}")
+    if joint is None and np.linalg.svd(model.jacobian(q), compute_uv=False)[-1] < DAMPED_BELOW:
+        return message("jog.at_edge")
     return None
 
 
