@@ -187,9 +187,10 @@ class RobotSession(Motions, Closing):
     @property
     def state(self) -> RobotState:
         """The state of this very millisecond; inside a callback, the one that it was given."""
-        if self._turns.is_moving and self._link.latest is not None:
-            return self._link.latest
-        return self.receive_state()
+        with self._turns.take_unless_moving() as is_mine:
+            if is_mine or self._link.latest is None:
+                return self.receive_state()
+        return self._link.latest
 
     def receive_states(self, timeout: float = 1.0) -> list[RobotState]:
         """Returns every state that has arrived since the last look, oldest first; waits for the first one.
@@ -316,7 +317,10 @@ class RobotSession(Motions, Closing):
         return f"<RobotSession {self.model.name} at {self._link.name}{', closed' if self.is_closed else ''}>"
 
     def _request(self, request: Request, timeout: float | None = None) -> Any:
-        if self._turns.is_moving and (request.code in WHILE_MOVING or request == SetMotorPower(0)):
+        if request.code in WHILE_MOVING or request == SetMotorPower(0):
+            with self._turns.take_unless_moving() as is_mine:
+                if is_mine:
+                    return super()._request(request, timeout)
             return self._link.request_alongside(request, timeout)
         with self._turns.take(type(request).__name__):
             return super()._request(request, timeout)

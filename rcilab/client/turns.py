@@ -62,6 +62,23 @@ class Turns:
             self._busy.release()
 
     @contextmanager
+    def take_unless_moving(self) -> Iterator[bool]:
+        """Has the connection for itself as `take`, or gives False: a motion runs, or began while it was waited for.
+
+        Raises:
+            UsageError: The connection closes.
+        """
+        is_mine = False
+        while not (self.is_moving or is_mine):
+            self._require_open()
+            is_mine = self._busy.acquire(timeout=_LOOK)
+        try:
+            yield is_mine and not self.is_moving
+        finally:
+            if is_mine:
+                self._busy.release()
+
+    @contextmanager
     def set_out(self, what: str) -> Iterator[None]:
         """Has the connection for a motion; a stop while it is still being checked counts. Raises as `take` does."""
         with self.take(what):
@@ -103,9 +120,12 @@ class Turns:
             if is_mine:
                 self._busy.release()
 
-    def _require_free(self, what: str) -> None:
+    def _require_open(self) -> None:
         if self.is_closing:
             raise UsageError("this session is closed; connect again").coded("session_closed")
+
+    def _require_free(self, what: str) -> None:
+        self._require_open()
         if self.is_moving:
             said = f"a motion is running already: no {what} meanwhile; let it end, or stop() it first"
             raise UsageError(said).coded("moving")
