@@ -154,7 +154,10 @@ _MEASURED_RATES = frozenset(
     }
 )
 
-_BOX = "keep the tool inside the safety box; a motion that starts outside it may only lead into it"
+_BOX = (
+    "keep the tool inside the safety box; where it is outside now, recover(), or power_off() where that is refused, "
+    "and power_on(), then execute(plan_recovery(robot.model, robot.state.q_c, robot.safety_box)) leads it back inside"
+)
 
 _RANGE = (
     "the joint is beyond its range or its soft limit, and without auto_limit the motors are off: power_off() and "
@@ -162,6 +165,10 @@ _RANGE = (
 )
 RANGE_FAULTS = frozenset({Fault.ACTUAL_JOINT_POSITION_LIMITS_VIOLATION, Fault.COMMAND_JOINT_POSITION_LIMITS_VIOLATION})
 """After which `recover()` may not do: the arm can be farther out than it recovers from by itself."""
+BOX_FAULTS = frozenset(
+    {Fault.ACTUAL_CARTESIAN_POSITION_LIMITS_VIOLATION, Fault.COMMAND_CARTESIAN_POSITION_LIMITS_VIOLATION}
+)
+"""The same for the safety box."""
 
 _REMEDIES = {
     Fault.ACTUAL_JOINT_POSITION_LIMITS_VIOLATION: _RANGE,

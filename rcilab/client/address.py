@@ -35,6 +35,14 @@ class RobotAddress:
     """Where a virtual controller lets things happen to its robot; None: unknown, or a real robot."""
 
     @property
+    def is_here(self) -> bool:
+        """Whether it is a loopback address: a virtual controller on this machine."""
+        try:
+            return IPv4Address(self.host).is_loopback
+        except AddressValueError:
+            return self.host == "localhost"
+
+    @property
     def command_port(self) -> int:
         """UDP port that commands go to."""
         return self.port if self.udp_port is None else self.udp_port

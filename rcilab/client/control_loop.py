@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from rcilab.safety_box import SafetyBox
 
 SILENCE = 0.1  # [s] without a state while moving means that the connection is lost; a choice.
+SILENCE_HERE = 1.0  # [s] The same of a controller on this machine, which pauses both ends when it is busy.
 CATCH_UP = 20  # Cycles: as many lost commands as a controller bridges at most (manual 4.6: 10 to 20).
 MODE_TIMEOUT = 3.0  # [s] for the controller to show the requested modes; virtual ones take 0.2 to 1.05 s.
 STOP_TIMEOUT = 1.0  # [s] for the answer to StopMove when something has gone wrong already.

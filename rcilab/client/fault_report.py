@@ -14,7 +14,7 @@ from rcilab.client.measured_report import YIELDING_MODES, describe_measured, des
 from rcilab.client.rotation import nine
 from rcilab.clock import CYCLE_TIME
 from rcilab.conformance import Breach, CartesianMonitor, JointMonitor, TorqueMonitor
-from rcilab.faults import RANGE_FAULTS, Fault, name_faults
+from rcilab.faults import BOX_FAULTS, RANGE_FAULTS, Fault, name_faults
 from rcilab.limits import Limits
 from rcilab.safety_box import SafetyBox
 from rcilab.spatial import Pose
@@ -23,6 +23,12 @@ from rcilab.state import ControllerMode
 if TYPE_CHECKING:
     from rcilab.model import RobotModel
 
+_OF_JOINTS = (
+    "poses inside the tool's limits are not enough: the joints that they lead to have limits of their own "
+    "(check(motion, model, mode='cartesian_position') computes them); move the tool more slowly or with less "
+    "acceleration there, and stay away from singular poses"
+)
+_FOLLOWED = 10  # Cycles before the fault that are looked at for the joint that came nearest to a bound.
 _HISTORY = 3  # Commands that a third difference looks back to.
 
 
@@ -65,10 +71,12 @@ def describe_faults(
     parts = [f"the controller stopped the motion {when}: {names}"]
     commanded, is_broken = _describe_commanded(faults, record, limits)
     measured = describe_measured(faults, record, model, limits, mode, collision_thresholds)
-    parts += [said for said in (commanded, *measured, describe_passed_face(faults, record, box)) if said]
+    followed = _describe_followed(faults, record, limits) if np.isfinite(record["command_pose"]).any() else ""
+    passed = describe_passed_face(faults, record, box)
+    parts += [said for said in (commanded, followed, *measured, passed) if said]
     if faults:
-        parts.append(late or _remedy(faults[0], mode, is_broken=is_broken))
-    clears = "" if RANGE_FAULTS & set(faults) else "recover() clears the fault; "
+        parts.append(late or (_OF_JOINTS if followed else _remedy(faults[0], mode, is_broken=is_broken)))
+    clears = "" if (RANGE_FAULTS | BOX_FAULTS) & set(faults) else "recover() clears the fault; "
     parts.append(f"{clears}.record holds the last cycles")
     return "; ".join(parts)
 
@@ -80,6 +88,31 @@ def _remedy(fault: Fault, mode: ControllerMode, *, is_broken: bool) -> str:
     if mode in YIELDING_MODES:
         return fault.impedance_remedy
     return fault.remedy if is_broken else fault.outside_remedy
+
+
+def _describe_followed(faults: tuple[Fault, ...], record: NDArray[np.void], limits: Limits) -> str:
+    """Returns which joint was nearest to a bound of the faults, where joints follow from poses; "" for other faults.
+
+    The joint angles that broke it are the controller's; the state shows those before, that were still followed.
+    """
+    q, joint = record["q_c"][-_FOLLOWED:], limits.joint
+    for order, (fault, bounds, name, unit) in enumerate(
+        (
+            (Fault.COMMAND_JOINT_VELOCITY_LIMITS_VIOLATION, joint.velocity, "velocity", "rad/s"),
+            (Fault.COMMAND_JOINT_ACCELERATION_LIMITS_VIOLATION, joint.acceleration, "acceleration", "rad/s^2"),
+            (Fault.COMMAND_JOINT_ACCELERATION_DISCONTINUITY, joint.jerk, "jerk", "rad/s^3"),
+        ),
+        1,
+    ):
+        if fault in faults and len(q) > order:
+            values = np.diff(q, order, axis=0) / CYCLE_TIME**order
+            place = np.unravel_index((np.abs(values) / bounds).argmax(), values.shape)
+            number, bound = place[1] + 1, bounds[place[1]]
+            return (
+                f"of the joints that follow from the poses joint {number} came nearest, with a commanded {name} of "
+                f"{values[place]:.4g} {unit} before the pose that broke its bound ({bound:g} {unit})"
+            )
+    return ""
 
 
 def _describe_commanded(faults: tuple[Fault, ...], record: NDArray[np.void], limits: Limits) -> tuple[str, bool]:

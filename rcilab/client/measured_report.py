@@ -13,7 +13,7 @@ from rcilab.arrays import Array, JointVector
 from rcilab.conformance import Breach, MeasuredMonitor
 from rcilab.conformance.measured_conditions import yielding_limits
 from rcilab.errors import KinematicsError
-from rcilab.faults import RANGE_FAULTS, Fault
+from rcilab.faults import BOX_FAULTS, RANGE_FAULTS, Fault
 from rcilab.limits import Limits
 from rcilab.safety_box import SafetyBox
 from rcilab.state import ControllerMode
@@ -21,9 +21,6 @@ from rcilab.state import ControllerMode
 if TYPE_CHECKING:
     from rcilab.model import RobotModel
 
-_BOX_FAULTS = {
-    Fault.ACTUAL_CARTESIAN_POSITION_LIMITS_VIOLATION, Fault.COMMAND_CARTESIAN_POSITION_LIMITS_VIOLATION
-}  # fmt: skip
 _CLOSE = math.radians(1.0)  # A joint farther inside than this has not come near the limits that we know of.
 _LEAST = 1e-3  # [N m] So that a threshold of zero divides nothing by zero.
 _CARTESIAN = (ControllerMode.CARTESIAN_POSITION, ControllerMode.CARTESIAN_IMPEDANCE)
@@ -83,7 +80,7 @@ def describe_measured(
 
 def describe_passed_face(faults: Iterable[Fault], record: NDArray[np.void], box: SafetyBox | None) -> str:
     """Returns which face of the safety box the tool passed, and how far; "" where that is not known."""
-    if box is None or not _BOX_FAULTS & set(faults) or not len(record):
+    if box is None or not BOX_FAULTS & set(faults) or not len(record):
         return ""
     measured = record["T_base_tool"][:, :3, 3]
     sent = record["command_pose"][:, :3, 3]

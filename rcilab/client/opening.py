@@ -3,12 +3,22 @@
 from __future__ import annotations
 
 import math
+import warnings
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from rcilab.client.address import RobotAddress
 from rcilab.client.commands import RciCommands
 from rcilab.client.identify import Lengths, require_same_arm
 from rcilab.client.link import Link
 from rcilab.errors import CommandRejectedError, ConnectionLostError, InvalidValueError
+from rcilab.spatial import IDENTITY, as_pose, turn_between
+
+if TYPE_CHECKING:
+    from rcilab.model import RobotModel
+
+_SAME_TOOL = 1e-3  # [m], [rad] Less is how well the arm's own geometry is known.
 
 
 def require_timeout(timeout: object) -> None:
@@ -49,3 +59,26 @@ def await_first_state(link: Link, place: RobotAddress, local: tuple[str, int], t
             "that the teach pendant's RCI page names this computer's address and that no firewall drops UDP; if the "
             "robot sends to another port of ours, add ?client_port=N to its address"
         ).coded("no_state", address=str(place), seconds=f"{timeout:g}")
+
+
+def with_tool_of(link: Link, model: RobotModel) -> RobotModel:
+    """Returns the model with the tool that the controller's state shows; warns where that is another one.
+
+    Poses of a session with another tool than its controller's would be off by the difference.
+    """
+    state = link.latest
+    assert state is not None  # `await_first_state` has seen one.
+    flange = model.with_tool(IDENTITY).forward(state.q_c)
+    tool = flange.inverse() @ as_pose(state.T_base_tool_c)
+    mine = model.T_flange_tool
+    off = float(np.linalg.norm(tool.position - mine.position))
+    turned = math.hypot(*turn_between(tool.parts[0], mine.parts[0]))
+    if off < _SAME_TOOL and turned < _SAME_TOOL:
+        return model
+    if not mine.is_close(IDENTITY, 0.0):
+        warnings.warn(
+            f"the tool of {link.name} is {1e3 * off:.1f} mm and {math.degrees(turned):.1f} deg from the model's; the "
+            "session goes on with the controller's. robot.set_coor(model.T_flange_tool) sets the model's",
+            stacklevel=4,
+        )
+    return model.with_tool(tool)

@@ -11,12 +11,12 @@ from numpy.typing import ArrayLike
 from rcilab.arrays import as_number, as_vector
 from rcilab.client.address import parse_address
 from rcilab.client.commands import RciCommands
-from rcilab.client.control_loop import SILENCE
+from rcilab.client.control_loop import SILENCE, SILENCE_HERE
 from rcilab.client.identify import dh_lengths, identify_robot
 from rcilab.client.link import Link
 from rcilab.client.motions import Motions
 from rcilab.client.open_sessions import enlist
-from rcilab.client.opening import await_first_state, require_arm_there, require_timeout
+from rcilab.client.opening import await_first_state, require_arm_there, require_timeout, with_tool_of
 from rcilab.client.recovery import recover
 from rcilab.client.runner import Ear, Runner
 from rcilab.client.transport import SocketTransport
@@ -42,7 +42,8 @@ def connect(
     Args:
         address: `rci://HOST:PORT`; `?udp_port=N` when the robot takes commands at another UDP port,
             `?client_port=M` when it sends states to another port of ours; `?world_port=W` for `world`.
-        model: The arm, with its tool and load; None takes the arm that the controller says it is.
+        model: The arm, with its tool and load; None takes the arm that the controller says it is. The tool is the
+            controller's: where it has another one, a warning says so, and `robot.set_coor` sets yours.
         timeout: How long to wait for the connection, for the first state, and for every answer, [s].
         record_all: Whether runs hold everything that the state has, three times as much; see `Run.cycles`.
 
@@ -61,7 +62,7 @@ def open_session(
     *,
     record_all: bool = False,
     realtime: bool = True,
-    silence: float = SILENCE,
+    silence: float | None = None,
     on_close: Callable[[], None] = lambda: None,
     world: World | None = None,
     partner: int | None = None,
@@ -74,7 +75,8 @@ def open_session(
         timeout: [s].
         record_all: Also as of `connect`.
         realtime: False for a controller in lock-step, where timing means nothing.
-        silence: Time without a state, while moving, that counts as a lost connection, [s].
+        silence: Time without a state, while moving, that counts as a lost connection, [s]; None is `SILENCE`, or
+            `SILENCE_HERE` for a controller on this machine: there is no cable to lose, and a busy machine pauses it.
         on_close: Called once when the session is closed, such as to end a private controller.
         world: What surrounds a virtual robot; None where nothing of the kind is known.
         partner: Process id of a controller on this machine that is in lock-step with us; None: it is not.
@@ -96,6 +98,7 @@ def open_session(
         else:
             require_arm_there(RciCommands(link), model.name, dh_lengths(model.description.dh), str(place))
         await_first_state(link, place, transport.local_address, timeout)
+        model = with_tool_of(link, model)
         if world is None and place.world_port is not None:
             world = World(place.host, place.world_port)
         closing = ExitStack()
@@ -104,6 +107,8 @@ def open_session(
             closing.callback(world.close)
         closing.callback(link.close)
         turns = Turns(closing.close)
+        if silence is None:
+            silence = SILENCE_HERE if place.is_here else SILENCE
         runner = Runner(link, turns, realtime=realtime, silence=silence, partner=partner, record_all=record_all)
         return RobotSession(link, model, turns, runner, world)
     except BaseException:

@@ -43,7 +43,9 @@ _ADVICE: dict[tuple[type[rci.Request], IntEnum], str] = {
     (rci.AutomaticErrorRecovery, rci.RecoveryStatus.NOT_POSSIBLE): "the arm still moves: try again at standstill",
     (rci.AutomaticErrorRecovery, rci.RecoveryStatus.MANUAL_RECOVERY_NEEDED): (
         "the arm is too far outside its soft limits or its safety box: power_off() clears the fault; then power_on(), "
-        "and execute(plan_recovery(robot.model, robot.state.q_c)) leads the joints back; a hand can, too (start_drag())"
+        "and execute(plan_recovery(robot.model, robot.state.q_c, robot.safety_box)) leads joints and tool back inside "
+        "what this session has set (set_joint_limit() and set_cartesian_limit() replace what another client has left); "
+        "a hand can, too (start_drag())"
     ),
     (rci.AutomaticErrorRecovery, rci.RecoveryStatus.REFLEX): (
         "the cause is still there: look what touches or loads the arm and remove it, set the load (set_load()) or "

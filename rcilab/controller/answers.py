@@ -66,6 +66,8 @@ def judge_request(request: rci.Request, phase: Phase, settings: Settings, arm: A
             refusal = None if port >= LOWEST_CLIENT_PORT else rci.SettingStatus.INVALID_ARGUMENT
         case rci.SetMotorPower(power=power):
             refusal = None if power == 1 else rci.SettingStatus.INVALID_ARGUMENT
+            if refusal is None and phase is Phase.OFF and not arm.stands:  # The brakes have not stopped it yet.
+                return cell._replace(when=When.AT_REST)
         case rci.StartMove() if cell.status is rci.StartStatus.SUCCESS:  # What the phase says comes first.
             refusal = _judge_start(request, arm.model, arm.commanded)
         case rci.StartDrag(space=space, type=kind):

@@ -1,4 +1,4 @@
-"""The way back inside the joint ranges, for an arm that was stopped beyond them."""
+"""The way back inside the joint ranges and the safety box, for an arm that was stopped beyond them."""
 
 from __future__ import annotations
 
@@ -7,25 +7,33 @@ from math import degrees, radians
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.arrays import as_vector
+from rcilab.arrays import Vector3, as_vector
 from rcilab.errors import PlanningError
 from rcilab.model import RobotModel, require_model
+from rcilab.motion.cartesian import plan_line
 from rcilab.motion.joint import plan_joint
 from rcilab.motion.motion import Motion
 from rcilab.motion.range import RECOVERY_RANGE, angle_text, range_from
+from rcilab.safety_box import SafetyBox
+from rcilab.spatial import Pose
 
 RECOVERY_MARGIN = radians(1.0)
 """How far inside its range a joint is led, [rad]. A tuning value: far enough that the next motion starts inside where
 a compliant arm yields a little."""
+RECOVERY_DEPTH = 0.01
+"""How far inside its safety box the tool is led, [m]. A tuning value, as `RECOVERY_MARGIN`."""
 RECOVERY_SPEED = 0.05
 """Part of the velocity and acceleration limits. A tuning value: slow, for an arm that has just been stopped."""
 
 
-def plan_recovery(model: RobotModel, q: ArrayLike, *, speed: float = RECOVERY_SPEED) -> Motion:
+def plan_recovery(
+    model: RobotModel, q: ArrayLike, box: SafetyBox | None = None, *, speed: float = RECOVERY_SPEED
+) -> Motion:
     """Returns the motion that leads joints that are outside their range back inside, 1 degree deep, and stops there.
 
-    Each of these joints moves straight inwards; all others stay. `check` accepts the motion, and `execute` runs it. Of
-    joints that are all inside, it returns a motion without length. A controller that has stopped for a joint limit
+    Each of these joints moves straight inwards; all others stay. Where all are inside and the tool is outside its
+    safety box, the tool is led straight back in, 1 cm deep. `check` accepts the motion, and `execute` runs it. Where
+    there is nothing to lead back, it is a motion without length. A controller that has stopped for a joint limit
     also switches motor power off: `power_off()`, `power_on()`, then this motion. `recover()` in place of `power_off()`
     is refused where a joint is more than 1 degree outside.
 
@@ -33,6 +41,7 @@ def plan_recovery(model: RobotModel, q: ArrayLike, *, speed: float = RECOVERY_SP
         model: The arm; with soft limits, their range counts.
         q: Where the arm is, shape (n,), [rad]: `state.q_c`. A joint may be outside by at most `RECOVERY_RANGE`, 20
             degrees.
+        box: The safety box that the controller has, such as `robot.safety_box`; None: no box is looked at.
         speed: Part of the velocity and acceleration limits to use, 0.001 to 1.
 
     Raises:
@@ -55,8 +64,20 @@ def plan_recovery(model: RobotModel, q: ArrayLike, *, speed: float = RECOVERY_SP
             beyond=f"{degrees(beyond[farthest]):.2f}",
             most=f"{degrees(RECOVERY_RANGE):g}",
         )
+    if box is not None and beyond[farthest] < 0.0:
+        T = model.forward(start)
+        if box.active and box.excess(T.parts[1]) > 0.0:
+            return plan_line(model, start, Pose(_nearest_inside(box, T.position), T.wxyz), speed=speed)
     margin = np.minimum(RECOVERY_MARGIN, (limits.upper - limits.lower) / 2.0)
     goal = np.where(beyond >= 0.0, np.clip(start, limits.lower + margin, limits.upper - margin), start)
     opened = range_from(limits, start)
     arm = model.with_joint_limits(opened.lower, opened.upper)
     return plan_joint(arm, start, goal, speed=speed, law="torque_rate_limited")
+
+
+def _nearest_inside(box: SafetyBox, position: Vector3) -> Vector3:
+    """Returns the nearest point `RECOVERY_DEPTH` inside the box, or at its middle where it is thin, shape (3,), [m]."""
+    room = np.array(box.size) / 2.0
+    room -= np.minimum(RECOVERY_DEPTH, room)
+    into = box.T_base_box.inverse()
+    return box.T_base_box @ np.clip(into @ position, -room, room)

@@ -131,12 +131,12 @@ def make_plan(
 
 
 def make_recovery(model: RobotModel, start: JointVector, box: SafetyBox | None = None) -> Plan | Message:
-    """Returns the motion that leads joints back inside their range, checked but for collisions, or why none does."""
+    """Returns the motion that leads joints and tool back inside, checked but for collisions, or why none does."""
     from rcilab.conformance import check
     from rcilab.motion import plan_recovery
 
     try:
-        motion = plan_recovery(model, start)
+        motion = plan_recovery(model, start, box)
         report = check(motion, model, start=start, box=box, distance=None)
     except RcilabError as error:
         return message("plan.failed", error=tell(error))

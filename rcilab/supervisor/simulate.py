@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rcilab.client.control_loop import SILENCE
 from rcilab.client.session import RobotSession, open_session
 from rcilab.client.world import World
 from rcilab.spatial import IDENTITY
@@ -46,11 +45,11 @@ def simulate(
         assert controller.address is not None  # start_controller waits for it.
         session = open_session(
             controller.address,
-            model,
+            model.with_tool(IDENTITY),  # As the controller wakes up; it is told of the tool below.
             ANSWER_TIMEOUT,
             record_all=record_all,
             realtime=not lockstep,
-            silence=SILENCE_IN_LOCKSTEP if lockstep else SILENCE,
+            silence=SILENCE_IN_LOCKSTEP if lockstep else None,
             on_close=controller.end,
             world=_world(controller.world_address),
             partner=controller.pid if lockstep else None,

@@ -122,3 +122,19 @@ def test_commands_that_were_lost_are_counted_and_a_higher_threshold_is_not_all_t
     assert "kInstabilityDetection" in said
     assert "% of the last second's commands did not arrive in time" in said
     assert "--prefill 50" in said
+
+
+def test_a_joint_fault_under_poses_names_the_joint_and_does_not_blame_the_tool(robot):
+    """7.7 m/s^2 downwards keeps every limit of the tool; joint 4 may have 10 rad/s^2."""
+    T = robot.state.T_base_tool_c.matrix
+
+    def drop(state, t):
+        rise = min(7.7, 833.0 * t)
+        moved = T.copy()
+        moved[2, 3] -= 833.0 * t**3 / 6.0 if t < 7.7 / 833.0 else rise * t * t / 2.0 - 0.0003
+        return CartesianPosition(moved)
+
+    said = fault_of(robot, drop, "cartesian_position")
+    assert "kCommandJointAcceleration" in said
+    assert "of the joints that follow from the poses joint " in said
+    assert "section 4.4" not in said

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import threading
 import time
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -445,3 +446,39 @@ def test_the_manual_s_numbers_are_answered_with_the_name_they_mean(robot):
         robot.set_fc_coor(Pose(), 1)
     with pytest.raises(InvalidValueError, match="the manual's 2 is 'cartesian'"):
         robot.start_drag(2, "free")
+
+
+def test_a_session_has_the_tool_of_its_controller_and_says_where_the_model_has_another():
+    tool = Pose((0.0, 0.0, 0.15))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with simulate(MODEL.with_tool(tool)) as first:
+            assert first.model.T_flange_tool.is_close(tool, 1e-12)
+    controller = start_controller("xMate3", lockstep=True)
+    try:
+        with connect(controller.address) as first:
+            first.set_coor(tool)
+        with connect(controller.address) as second:
+            assert second.model.T_flange_tool.is_close(tool, 1e-9)
+            state = second.state
+            assert second.model.forward(state.q_c).is_close(state.T_base_tool_c, 1e-9)
+        with pytest.warns(UserWarning, match=r"is 50\.0 mm and 0\.0 deg from the model's"):
+            connect(controller.address, MODEL.with_tool(Pose((0.0, 0.0, 0.10)))).close()
+    finally:
+        controller.end()
+
+
+def test_power_comes_back_to_an_arm_that_stands():
+    """Guided, pushed, stopped and released while it still moves."""
+    with simulate(MODEL, plant="mujoco") as robot:
+        robot.power_on()
+        robot.start_drag("joint", "free")
+        robot.world.push([20.0, 0.0, 0.0, 0.0, 0.0, 0.0], duration=0.3)
+        until = time.monotonic() + 5.0
+        while np.abs(robot.state.dq).max() < 0.5 and time.monotonic() < until:
+            pass
+        robot.world.press("estop")
+        robot.world.press("none")
+        robot.power_on()
+        assert np.abs(robot.state.dq).max() < 1e-3
+        robot.move_j(MODEL.home)
