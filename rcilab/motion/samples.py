@@ -165,6 +165,6 @@ def _require_angles(q: Array, place: list[str]) -> None:
         row, joint = (int(i) for i in beyond[0])
         turns = (
             f"rad of joint {joint + 1} is more than two turns; if these are degrees, say so in a header, "
-            f"q{joint + 1} [deg], or pass unit='deg'"
+            f"q{joint + 1} [deg], or, in Python, pass unit='deg'"
         )
         raise InvalidValueError(place[row], float(q[row, joint]), turns).coded("turns", joint=joint + 1)

@@ -341,3 +341,20 @@ def test_a_workbench_that_never_started_closes():
     bench = Workbench(WorkbenchConfig(port=0))
     bench.close()
     bench.close()
+
+
+def test_undo_takes_back_a_drag_of_the_target_and_a_turn_at_a_slider(bench, ask):
+    ask(requests.PoseGoal(name="home"))
+    home = bench.store.state.goal.q
+    target = bench.store.state.goal.target
+    for step in range(5):  # One drag.
+        moved = target.position + [0.01 * step, 0.0, 0.0]
+        ask(requests.MoveTarget(position=tuple(moved), wxyz=tuple(target.wxyz), ended=step == 4))
+    assert not np.array_equal(bench.store.state.goal.q, home)
+    dragged = bench.store.state.goal.q
+    for step in range(5):
+        ask(requests.MoveJoint(joint=0, angle=0.01 * step))
+    ask(requests.PoseGoal(name="undo"))
+    assert np.array_equal(bench.store.state.goal.q, dragged)
+    ask(requests.PoseGoal(name="undo"))
+    assert np.array_equal(bench.store.state.goal.q, home)

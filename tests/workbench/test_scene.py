@@ -252,7 +252,7 @@ def test_an_arc_needs_a_place_to_lead_over_and_then_does(bench):
     bench.aim(-0.03, 0.08, 0.0)
     bench.goal.plan(requests.Plan())
     assert bench.state.no_plan.code == "plan.no_via"
-    said = TimelinePanel(Text("en"), lambda request: None)._read(bench.state, SimpleNamespace(q_c=HOME))
+    said = TimelinePanel(Text("en"), lambda request: None)._read(bench.state, SimpleNamespace(q_c=HOME, code="idle"))
     assert Text("en")("plan.no_via") in said, "not how to begin, but what is missing"
     bench.goal.set_way(requests.SetWay(via=True))
     via = bench.state.via.position

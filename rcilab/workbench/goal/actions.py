@@ -28,6 +28,7 @@ QUATERNION = "wxyz"
 FURTHEST = 3.0  # [m] A choice: no arm of ours reaches half as far, and the gizmo should stay in sight.
 SLOWEST = 0.01
 SETTLED = 0.15  # [s] A choice: a goal that has not moved for so long has come to rest.
+_ONE_DRAG = 1.0  # [s] A choice: what moves again within that time is one drag, or one turn at a slider's keys.
 RESTED = 0.6  # [s] The same of a target that a hand still holds: it has only paused, and looks at the arm.
 
 
@@ -40,6 +41,7 @@ class GoalActions:
         self._planned = 0.0  # [s] When the last plan was made.
         self._due: float | None = None  # [s] When a path of the tool is to be planned.
         self._is_held = False  # A hand has the target and has not let go of it.
+        self._hand, self._moved = "", 0.0  # What a hand moved last, and when, [s].
 
     def move_joint(self, request: requests.MoveJoint) -> None:
         """Poses one joint of the candidate arm."""
@@ -48,12 +50,13 @@ class GoalActions:
             return
         q = np.array(self._store.state.goal.q)
         limits = model.limits.joint
+        self._remember_hand(f"joint {request.joint}")
         q[request.joint] = min(max(request.angle, limits.lower[request.joint]), limits.upper[request.joint])
         self._pose(frozen(q))
 
     def pose_goal(self, request: requests.PoseGoal) -> None:
         """Poses the candidate arm by name."""
-        state = self._store.state
+        state, self._hand = self._store.state, ""
         if request.name == "undo":
             goal = self._store.undo()
             if goal is not None:
@@ -79,10 +82,18 @@ class GoalActions:
         if math.hypot(*request.wxyz) < 1e-6:
             return
         position = [min(max(number, -FURTHEST), FURTHEST) for number in request.position]
+        self._remember_hand("target")
         self._is_held = not request.ended
         if request.ended:
             self._store.clear_problems("pose.")
         self._aim(Pose(position, request.wxyz))
+
+    def _remember_hand(self, what: str) -> None:
+        """Keeps the goal from before a hand moved something: once for all that one drag asks for."""
+        now = time.monotonic()
+        if what != self._hand or now - self._moved > _ONE_DRAG:
+            self._store.remember()
+        self._hand, self._moved = what, now
 
     def set_arm_angle(self, request: requests.SetArmAngle, branch: int | None = None) -> None:
         """Turns the elbow about the shoulder-wrist line while the tool stays, as near as limits allow."""

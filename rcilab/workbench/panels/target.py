@@ -76,7 +76,7 @@ def planned_html(state: UiState, text: Text) -> str:
     code = code if plan.program is None else "program.planned"
     said = text(code, duration=f"{plan.motion.duration:.3f}")
     if plan.short is not None:
-        said += " " + text("target.leads_short", short=text.say(plan.short))
+        said += ". " + text("target.leads_short", short=text.say(plan.short))
         tone, word = (tone, word) if not report.ok else ("warn", "target.not_there")
     if not report.ok:
         worst, more = report.violations[0].condition.id, report.broken_conditions - 1

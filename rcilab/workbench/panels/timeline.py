@@ -61,7 +61,7 @@ class TimelinePanel:
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Moves the scrubber; redraws plots when plan, recording or choice have changed."""
-        text, banner = self._text, replay_html(state, status, self._text)
+        text, banner = self._text, replay_html(state, status, self._text) or _exhibit_html(state, self._text)
         self._banner.show(banner)
         self._play.label = text("timeline.hold" if state.playing else "timeline.play")
         self._play.disabled = state.plan is None
@@ -92,6 +92,8 @@ class TimelinePanel:
         text = self._text
         if state.plan is None:
             why = state.no_plan
+            if state.jog.robot or status.code == "moving.guided":
+                return f'<p class="rl-note rl-welcome">{esc(text("timeline.by_hand"))}</p>'
             said = text("timeline.nothing") if why is None or why.code == "plan.here" else text.say(why)
             return f'<p class="rl-note rl-welcome">{esc(said)}</p>'
         duration = state.plan.motion.duration
@@ -115,3 +117,11 @@ class TimelinePanel:
 
 def _choice(name: str):  # type: ignore[no-untyped-def]
     return lambda value, page: requests.ShowPlot(page=page, name=name, on=bool(value))
+
+
+def _exhibit_html(state: UiState, text: Text) -> str:
+    """Returns whose curves these are while a fault of the gallery is on show; "" otherwise."""
+    if state.learn.show is None:
+        return ""
+    said = f"<b>{esc(text('timeline.exhibit'))}</b> {esc(text('timeline.exhibit_long'))}"
+    return f'<p class="rl-verdict rl-warn">{said}</p>'
