@@ -152,6 +152,7 @@ class _Judge:
             time=first_time + row * CYCLE_TIME,
             broken=0 if bad is None else int(np.count_nonzero(bad)),
             links=self._signals.links(condition, row),
+            led_in=self._signals.start_outside if condition.signal == "position" else 0.0,
         )
         if bad is None:
             return result, []

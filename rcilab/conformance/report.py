@@ -43,6 +43,8 @@ class ConditionResult:
     """Number of samples that break the condition, over all joints."""
     links: LinkPair | None = None
     """Between whom the worst distance is; None for anything that is no distance."""
+    led_in: float = 0.0
+    """How far outside the safety box the tool starts, to be led in, [m]; 0 inside, and in all other rows."""
 
     @property
     def ok(self) -> bool:
@@ -85,6 +87,8 @@ class ConditionResult:
         condition = self.condition
         if condition.is_measured or (condition.signal != "position" and condition.stage == "throughout"):
             return self.value, self.bound
+        if self.ok and self.led_in:
+            return self.led_in, 0.0
         return 0.0 if self.ok and abs(self.value) <= abs(self.bound) else self.value, 0.0
 
     @property
@@ -93,14 +97,14 @@ class ConditionResult:
         condition = self.condition
         if condition.is_clearance:
             return False
-        return self.ok if condition.signal == "position" else condition.stage == "throughout"
+        return self.ok and not self.led_in if condition.signal == "position" else condition.stage == "throughout"
 
     @property
     def texts(self) -> tuple[str, str, str]:
         """Worst value, bound and used part as text; what is to be zero at an end, and is, reads 0."""
         used = share(self.ratio) if self.has_share else ""
         if self.condition.signal == "position":
-            return f"{self.value:.4g}", "0", used
+            return f"{self.shown[0]:.4g}", "0", used
         if self.condition.stage == "throughout":
             return *amount(self.value, self.bound), used
         return "0" if self.ok else f"{self.value:.4g}", f"0 ± {abs(self.bound):g}", ""

@@ -109,6 +109,13 @@ class MotionSignals:
             return np.array([entry.excess(position) for position in way.tolist()])
         return box.excess_path(way)
 
+    @property
+    def start_outside(self) -> float:
+        """How far outside the safety box the tool starts, [m]; 0 inside it, or without one."""
+        if self._box is None:
+            return 0.0
+        return max(0.0, self._box.excess(self._model.forward(self._start.q).parts[1]))
+
     def _at_start(self, condition: Condition) -> Array:
         """Returns how far the first command is from what the arm has, shape (n,) or (1,)."""
         if condition.signal == "translation":

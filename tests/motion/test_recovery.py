@@ -75,3 +75,24 @@ def test_a_tool_that_starts_outside_its_box_may_only_move_in(height, is_allowed)
     box = SafetyBox(size=(0.2, 0.2, 0.2), T_base_box=Pose(here.position - [0.0, 0.0, 0.15]))
     motion = plan_line(model, model.home, Pose(here.position + [0.0, 0.0, height], here.wxyz), speed=0.2)
     assert check(motion, model, box=box).ok is is_allowed
+
+
+def test_the_row_of_the_box_says_how_far_outside_the_tool_starts():
+    model = load_model("xMatePro7")
+    x, y, z = model.forward(model.home).position
+    box = SafetyBox(size=(0.4, 0.4, 0.4), T_base_box=Pose((x, y, z - 0.25)), active=True)
+    motion = plan_recovery(model, model.home, box)
+    report = check(motion, model, box=box)
+    row = next(row for row in report.rows if row.condition.signal == "position")
+    assert row.ok
+    assert row.led_in == pytest.approx(0.05)
+    assert row.texts == ("0.05", "0", "")
+    assert not row.has_share
+    assert box.excess(model.forward(motion.goal).position) == pytest.approx(-0.01, abs=1e-6)
+    inside = next(
+        row
+        for row in check(motion, model, box=SafetyBox(size=(2, 2, 2), T_base_box=Pose())).rows
+        if row.condition.signal == "position"
+    )
+    assert inside.led_in == 0.0
+    assert inside.has_share

@@ -34,12 +34,20 @@ def count_unheeded(report: Report) -> int:
 def row_html(row: ConditionResult, model: RobotModel, chosen: str, text: Text) -> str:
     """Returns one row."""
     condition, tone = row.condition, row_tone(row)
-    word = text("check.kept" if tone == "good" else "check.broken" if tone == "bad" else _AMBER[not row.ok])
+    word = text(
+        "check.kept"
+        if tone == "good" or (row.ok and row.led_in)
+        else "check.broken"
+        if tone == "bad"
+        else _AMBER[not row.ok]
+    )
     facts = [value_against_bound(*row.shown, condition.unit, text)]
     if row.links is not None:
         facts.append(explain_place(row, text.language))
     elif row.joint:
         facts.append(text("check.joint", joint=row.joint))
+    elif row.led_in:
+        facts.append(text("check.led_in"))
     facts.append(f"t = {row.time:.3f} s")
     if condition.signal == "torque":
         facts.append(load_words(model, text))
@@ -70,6 +78,8 @@ def row_tone(row: ConditionResult) -> str:
     """Returns good, warn (near a bound, or a recommendation that is not met) or bad."""
     if not row.ok:
         return "bad" if row.condition.necessity == "necessary" else "warn"
+    if row.led_in:
+        return "warn"
     return "warn" if row.ratio > TIGHT and row.condition.stage == "throughout" else "good"
 
 
