@@ -155,8 +155,9 @@ _MEASURED_RATES = frozenset(
 )
 
 _BOX = (
-    "keep the tool inside the safety box; where it is outside now, recover(), or power_off() where that is refused, "
-    "and power_on(), then execute(plan_recovery(robot.model, robot.state.q_c, robot.safety_box)) leads it back inside"
+    "keep the tool inside the safety box; a motion that starts outside it may only lead into it: after recover(), or "
+    "power_off() and power_on() where that is refused, execute(plan_recovery(robot.model, robot.state.q_c, "
+    "robot.safety_box)) does"
 )
 
 _RANGE = (
