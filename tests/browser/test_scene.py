@@ -92,3 +92,43 @@ def test_words_stay_inside_the_scene_and_a_lost_camera_comes_back(page):
         lambda: abs(page.tab.evaluate("__viserMutable.camera.position.y") - standing_place(camera.aspect)[2]) < 0.01,
         "the camera where the page opened it",
     )
+
+
+BOXES = EDGES.replace(
+    "const [left, , width] = aRect.array.slice(4 * i, 4 * i + 4);",
+    "const [left, low, width, height] = aRect.array.slice(4 * i, 4 * i + 4);"
+    "const up = V[1] * x + V[5] * y + V[9] * z + V[13];",
+).replace(
+    "found.push((right + (left + width) * scale) * P[0] / depth, (right + left * scale) * P[0] / depth)",
+    "found.push([[left, left + width].map((e) => (right + e * scale) * P[0] / depth),"
+    "[low, low + height].map((e) => (up + e * scale) * P[5] / depth)])",
+)
+"""The edges of every label that is shown, across and along the picture."""
+
+
+def test_no_words_lie_on_others(page):
+    """A waypoint's number, where the path leaves the box, and the verdict below the target, all at one place."""
+    labels = [
+        page.bench.server.scene.add_label(
+            f"/test_label/{k}", f"words that are long {k}", position=(0.3, 0.0, 0.3), anchor="bottom-left",
+            depth_test=False, font_screen_scale=1.0,
+        )
+        for k in range(3)
+    ]  # fmt: skip
+
+    def apart() -> bool:
+        boxes = page.tab.evaluate(BOXES)
+        return len(boxes) >= 3 and not any(
+            a[0][0] < b[0][1] - 1e-4
+            and b[0][0] < a[0][1] - 1e-4
+            and a[1][0] < b[1][1] - 1e-4
+            and b[1][0] < a[1][1] - 1e-4
+            for i, a in enumerate(boxes)
+            for b in boxes[:i]
+        )
+
+    try:
+        page.wait(apart, lambda: f"labels apart: {page.tab.evaluate(BOXES)}")
+    finally:
+        for label in labels:
+            label.remove()

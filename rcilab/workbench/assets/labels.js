@@ -1,5 +1,6 @@
 // Words in the scene stay inside it: viser draws a label from its anchor on, past the edge where a panel begins. Just
-// before a frame's labels are drawn, those that would be seen in part are moved until they are seen whole.
+// before a frame's labels are drawn, those that would be seen in part are moved until they are seen whole, and those that
+// would lie on another one are moved above it.
 // viser 1.1 has no public way to its labels; where they are not found as expected, they stay as viser has them.
 (() => {
   "use strict";
@@ -11,11 +12,19 @@
   // Returns how far to move what reaches from low to high so that it lies within -half to half; its beginning does at least.
   const inward = (low, high, half) => Math.max(Math.min(0, half - high), -half - low);
 
+  // Returns how far up, or else down, a label must go to lie on none of the others, by its edges in the picture.
+  const clear = (left, right, low, high, others) => {
+    const free = (lift) => others.every((o) => left >= o[1] || right <= o[0] || low + lift >= o[3] || high + lift <= o[2]);
+    const lifts = [0, ...others.flatMap((o) => [o[3] - low, o[2] - high])].filter((lift) => low + lift >= -1 && high + lift <= 1 && free(lift));
+    return lifts.reduce((best, lift) => (Math.abs(lift) < Math.abs(best) ? lift : best), lifts.length ? lifts[0] : 0);
+  };
+
   const keepInside = (camera) => {
     const { uLabelData, uFovScale, uViewportHeight, uIsOrtho } = boxes[0].material.uniforms;
     const data = uLabelData.value.image.data, view = camera.matrixWorldInverse.elements, world = camera.matrixWorld.elements;
     if (drawn === uLabelData.value.version || uIsOrtho.value > 0.5) return;  // Uploaded once a frame.
     drawn = uLabelData.value.version;
+    const placed = [];
     for (const { geometry } of boxes) {
       const { aLabelIndex, aRect, aParams } = geometry.attributes;
       for (let i = 0; aLabelIndex && i < geometry.instanceCount; i++) {
@@ -29,7 +38,12 @@
         const margin = MARGIN * 2 * halfHeight / uViewportHeight.value;
         const [west, east] = [right + left * scale, right + (left + width) * scale], [south, north] = [up + low * scale, up + (low + height) * scale];
         if (east < -halfWidth || west > halfWidth || north < -halfHeight || south > halfHeight) continue;  // Out of sight.
-        const dx = inward(west, east, halfWidth - margin), dy = inward(south, north, halfHeight - margin);
+        const dx = inward(west, east, halfWidth - margin);
+        let dy = inward(south, north, halfHeight - margin);
+        const across = [(west + dx) / halfWidth, (east + dx) / halfWidth], along = [(south + dy) / halfHeight, (north + dy) / halfHeight];
+        const lift = clear(...across, ...along, placed);
+        placed.push([...across, along[0] + lift, along[1] + lift]);
+        dy += lift * halfHeight;
         for (let k = 0; k < 3; k++) data[at + k] += dx * world[k] + dy * world[4 + k];
       }
     }
