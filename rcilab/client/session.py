@@ -19,6 +19,7 @@ from rcilab.client.open_sessions import enlist
 from rcilab.client.opening import await_first_state, require_arm_there, require_timeout, with_tool_of
 from rcilab.client.recovery import recover
 from rcilab.client.runner import Ear, Runner
+from rcilab.client.settings import load_center
 from rcilab.client.transport import SocketTransport
 from rcilab.client.turns import Turns
 from rcilab.client.world import World
@@ -280,7 +281,8 @@ class RobotSession(Motions, Closing):
         from rcilab.dynamics.payload import Payload
 
         with self._turns.take("SetLoad"):
-            load = Payload(mass=mass, center_of_mass=center_of_mass, inertia=inertia)  # type: ignore[arg-type]
+            center = load_center(center_of_mass)
+            load = Payload(mass=mass, center_of_mass=center, inertia=inertia)  # type: ignore[arg-type]
             model = self._model.with_load(load)
             super().set_load(load.mass, load.center_of_mass, load.inertia)
             self._model = model

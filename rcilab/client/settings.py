@@ -147,8 +147,7 @@ class RciSettings:
             inertia: About the centre of mass, shape (3, 3), [kg m^2].
         """
         kilograms = float(_vector("mass", [mass], ("",), "kg", 0.0)[0])
-        center = _vector("center_of_mass", center_of_mass, _AXES[:3], "m")
-        _require_near("center_of_mass", center.tolist())
+        center = load_center(center_of_mass)
         try:
             flat = np.asarray(inertia, dtype=np.float64).ravel()
         except (TypeError, ValueError, OverflowError) as error:
@@ -257,6 +256,17 @@ def _vector(
             bounds = f"must not be below {lowest:g}" if highest == math.inf else span
             raise InvalidValueError(place, value, f"{bounds} [{unit}]")
     return array
+
+
+def load_center(center_of_mass: ArrayLike) -> Array:
+    """Returns a load's centre of mass in the flange frame, as far from the flange as the controller takes it, [m].
+
+    Raises:
+        InvalidValueError: It is not three finite numbers, or farther away.
+    """
+    center = _vector("center_of_mass", center_of_mass, _AXES[:3], "m")
+    _require_near("center_of_mass", center.tolist())
+    return center
 
 
 def _pose_at_flange(name: str, value: object) -> Pose:

@@ -75,6 +75,11 @@ def test_every_command_reaches_the_controller_as_the_protocol_spells_it(make_rob
         (lambda r: r.set_do(6, True), "0 to 5"),
         (lambda r: r.set_load(-1, [0, 0, 0], np.eye(3)), "from 0 to"),
         (lambda r: RciSettings.set_load(r, 0, [0, 0, 0], np.eye(3)), "a load without mass has none"),
+        (
+            lambda r: r.set_load(0, [0, 0, 0], np.eye(3)),
+            r"inertia: \[\[1\.0, 0\.0, 0\.0\], .*a load without mass has none",
+        ),
+        (lambda r: r.set_load(1, [0, 0, 10], np.eye(3)), r"10\.0 m from the flange is farther than 2 m; give metres"),
         (lambda r: r.set_load(100, [0, 0, 0], np.eye(3)), "load mass: 100.* kg is above 7 kg for xMatePro7"),
         (lambda r: r.set_coor(None), "Pose"),
         (lambda r: r.set_coor(Pose((0.0, 0.0, 99.0))), r"99\.0 m from the flange is farther than 2 m; give metres"),
