@@ -41,7 +41,26 @@ def recording(path: Path) -> Path:
     return path
 
 
-def archive(path: Path) -> Path:
+def broad(path: Path) -> Path:
+    """A million cycles of 4 kB, zeros: what no version has written fills three quarters of each."""
+    fields = [[name, field[0].base.str, list(field[0].shape)] for name, field in some_run().cycles.dtype.fields.items()]
+    size = some_run().cycles.dtype.itemsize
+    fields = [[name, kind, [shape[0] + 4096 - size] if name == "reserved" else shape] for name, kind, shape in fields]
+    head = {"arm": None, "fields": fields, "bytes": 4096, "realtime": True, "setup": {}, "report": None}
+    rows = 1_000_000
+    pack, zeros = zlib.compressobj(1), bytes(4096 * 1000)
+    packed = b"".join(pack.compress(zeros) for _ in range(rows // 1000)) + pack.flush()
+    block = encode_block("CYCL", struct.pack("<I", rows) + packed)
+    path.write_bytes(encode_header() + encode_block("HEAD", json.dumps(head).encode()) + block)
+    return path
+
+
+def within(path: Path) -> Path:
+    """Coefficients of 0.9 GB, zeros: below what a file may hold, and above what there is room for."""
+    return archive(path, pieces=4_000_000, order=4)
+
+
+def archive(path: Path, pieces: int = 1_300_000, order: int = 18) -> Path:
     """Coefficients of 1.3 GB, zeros, in 1.3 MB."""
     motion = rcilab.plan_joint(MODEL, MODEL.home, MODEL.home + 0.1)
     motion.save(path)
@@ -51,10 +70,10 @@ def archive(path: Path) -> Path:
             with file.open(f"{name}.npy", "w", force_zip64=True) as stream:
                 if name == "coefficients":
                     np.lib.format.write_array_header_1_0(
-                        stream, {"descr": "<f8", "fortran_order": False, "shape": (1_300_000, 7, 18)}
+                        stream, {"descr": "<f8", "fortran_order": False, "shape": (pieces, 7, order)}
                     )
-                    for _ in range(21):
-                        stream.write(bytes(64_000_000))
+                    for _ in range(7 * order):
+                        stream.write(bytes(8 * pieces))
                 else:
                     np.lib.format.write_array(stream, array)
     return path
@@ -106,6 +125,8 @@ CHECK = ("check", "--model", "xMatePro7")
             ("replay", "--no-browser", "--port", "0"),
             "9000000 rows of 1 ms are more than 1000000",
         ),
+        (broad, "a.rcirun", ("replay", "--no-browser", "--port", "0"), "a cycle takes 4096 bytes"),
+        (within, "a.npz", CHECK, "not enough free memory"),
         (archive, "a.npz", CHECK, "MB, unpacked, are more than 1024.0"),
         (header, "a.npz", CHECK, "MB, unpacked, are more than 1024.0"),
         (slow, "a.npz", CHECK, "rows of 1 ms are more than 1000000"),

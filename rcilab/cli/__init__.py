@@ -47,6 +47,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         drop_output()
         print(f"rcilab: the output could not be written: {error.strerror}", file=sys.stderr)
         return _USAGE
+    except MemoryError:
+        print(
+            "rcilab: there is not enough free memory for this; close other programs or raise ulimit -v", file=sys.stderr
+        )
+        return _USAGE
     except KeyboardInterrupt:
         return _INTERRUPTED
 

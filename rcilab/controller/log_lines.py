@@ -9,6 +9,7 @@ from collections import deque
 from collections.abc import Callable
 
 _MOST = 200  # Lines that wait; a tuning value: what a stream takes at once, and a person reads.
+_SELDOM = 10.0  # [s] A line that anybody can cause is written once in this time, and then counted; a tuning value.
 _GRACE = 0.5  # [s] For the last lines, when the controller ends and nobody reads.
 
 
@@ -26,6 +27,36 @@ class LineHandler(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         """Takes one entry."""
         self._write(record.getMessage())
+
+
+class SeldomLines:
+    """Writes lines that anybody who connects can cause: one of a kind in a while, which says how many came between.
+
+    Args:
+        write: Takes a line and never waits.
+        clock: Returns the time, [s].
+    """
+
+    def __init__(self, write: Callable[[str], None], clock: Callable[[], float]) -> None:
+        self._write, self._clock = write, clock
+        self._next: dict[str, float] = {}  # Kind -> when it is written again, [s].
+        self._counted: dict[str, int] = {}
+
+    def write(self, kind: str, line: str, more: str) -> None:
+        """Writes a line, or counts it.
+
+        Args:
+            kind: One of a few names: lines of a kind are counted together.
+            line: What to write.
+            more: What happened to those that were counted, such as "were refused".
+        """
+        now = self._clock()
+        if now < self._next.get(kind, now):
+            self._counted[kind] = self._counted.get(kind, 0) + 1
+            return
+        self._next[kind] = now + _SELDOM
+        count = self._counted.pop(kind, 0)
+        self._write(f"{line} ({count} more {more} since the last line)" if count else line)
 
 
 class LogLines:

@@ -33,7 +33,7 @@ from rcilab.controller.endpoint import (
     StrangerHeard,
 )
 from rcilab.controller.faulty_network import FaultyNetwork
-from rcilab.controller.log_lines import LineHandler, LogLines
+from rcilab.controller.log_lines import LineHandler, LogLines, SeldomLines
 from rcilab.controller.pace import Pace
 from rcilab.controller.plant import Plant
 from rcilab.controller.plants import build_plant
@@ -57,7 +57,6 @@ SPOILED_PATIENCE = 0.05  # [s] The same where the network spoils datagrams on pu
 FAREWELL = 20  # [cycles] In which a client learns of the end from the error bit of its states.
 SLIP = 20  # [cycles] A motion that took so much longer than it should is worth a line.
 GRACE = 2.0  # [s] For the arm to come to rest when the controller shall end.
-_REFUSALS = 10.0  # [s] Clients that are refused are named once in this time, and then counted; a tuning value.
 _parts_log = logging.getLogger("rcilab.controller")
 _STDERR = 2
 _QUIET = (Phase.OFF, Phase.IDLE)
@@ -116,7 +115,7 @@ class ControllerServer:
         self._cores = AwakeCores()
         self._missed_before = 0
         self._told: tuple[Fault, ...] = ()
-        self._refused, self._next_refusal = 0, 0.0
+        self._seldom = SeldomLines(log, self._clock.now)
         self._endpoint = Endpoint(config)
         states_network = config.network if config.states_network is None else config.states_network
         self._network = FaultyNetwork(self._endpoint, self._clock, config.network, states_network)
@@ -384,25 +383,20 @@ class ControllerServer:
                         self._world.serve(sockets)
                 case StrangerHeard(address, client):
                     whose = f"the client is at {client}" if client else "no client is connected"
-                    self._log(f"left out a UDP datagram from {address}, and will all others: {whose}")
+                    line = f"left out a UDP datagram from {address}, and will all others: {whose}"
+                    self._seldom.write("stranger", line, "were left out")
                 case ClientRefused(address, holder):
-                    self._tell_refusal(address, holder)
-
-    def _tell_refusal(self, address: str, holder: str) -> None:
-        if self._clock.now() < self._next_refusal:
-            self._refused += 1
-            return
-        more = f" ({self._refused} more were refused since the last line)" if self._refused else ""
-        self._log(f"refused a second client from {address}: {holder} is connected; one at a time{more}")
-        self._refused, self._next_refusal = 0, self._clock.now() + _REFUSALS
+                    line = f"refused a second client from {address}: {holder} is connected; one at a time"
+                    self._seldom.write("refused", line, "were refused")
 
     def _warn_of_other_target(self, address: str) -> None:
         target = self._endpoint.fixed_host
         if target not in (None, address):
-            self._log(
+            line = (
                 f"{address} connected, but states go to {target}, as --client says: it will not see any; start with "
                 f"--client {address}, or without"
             )
+            self._seldom.write("elsewhere", line, "connected")
 
     def _lose_client(self, reason: str) -> None:
         was_moving = self.cycle.phase in (Phase.MOVING, Phase.STOPPING, Phase.GUIDING)
@@ -411,4 +405,4 @@ class ControllerServer:
         if was_moving:
             self._log(f"the client {reason} in mid-motion: the arm comes to rest")
         elif reason != "closed the connection":
-            self._log(f"the client {reason}")
+            self._seldom.write("left", f"the client {reason}", "clients were lost")

@@ -20,7 +20,7 @@ SINGLE_ARRAY = "a single array"
 
 _DAMAGE = (
     *(BadZipFile, zlib.error, EOFError, OSError, RuntimeError, struct.error),  # The archive; encrypted; other methods.
-    *(ValueError, TypeError, SyntaxError, TokenError, LookupError, OverflowError, MemoryError),  # A header of an array.
+    *(ValueError, TypeError, SyntaxError, TokenError, LookupError, OverflowError),  # A header of an array.
 )
 """What numpy and those it reads with raise on foreign or damaged bytes; a mistake in the code is none of them."""
 
@@ -40,7 +40,7 @@ def read_arrays(content: bytes, what: str, name: str, problem: str, max_rows: in
     """
     try:
         size = _unpacked_size(content)
-    except _DAMAGE as error:
+    except (*_DAMAGE, MemoryError) as error:  # Of the parser, on a header with too many brackets.
         raise InvalidValueError(what, name, problem) from error
     require_bytes(size, max_rows, what, name)
     try:

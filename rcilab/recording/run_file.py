@@ -277,6 +277,7 @@ def _build(blocks: tuple[Block, ...], max_rows: int) -> Run:
         raise ValueError(f"a cycle takes {head['bytes']} bytes, its fields {dtype.itemsize}")
     if dtype.itemsize > _LARGEST_ROW:
         raise ValueError(f"a cycle takes {dtype.itemsize} bytes; {_LARGEST_ROW} are the most")
+    _layout_for(dtype)  # Before room is made for the cycles.
     parts = [_decode_cycles(block.payload, dtype) for block in blocks if block.kind == "CYCL"]
     cycles = _as_known(np.concatenate(parts) if parts else np.zeros(0, dtype))
     cycles.flags.writeable = False
@@ -305,18 +306,31 @@ def _as_known(cycles: NDArray[np.void]) -> NDArray[np.void]:
     Raises:
         ValueError: Something is missing that every version recorded, or is there that none did.
     """
-    theirs = _written(cycles.dtype)
-    n = theirs["q"].shape[0] if "q" in theirs else 0
-    ours = cycle_dtype(n, complete=any(name in theirs for name in OTHER_STATE_FIELDS))
+    ours = _layout_for(cycles.dtype)
     if cycles.dtype == ours:
         return cycles
+    theirs = _written(cycles.dtype)
+    wide = np.zeros(len(cycles), ours)
+    for name in _written(ours):
+        wide[name] = cycles[name] if name in theirs else np.nan if name in STATE_FIELDS else 0
+    return wide
+
+
+def _layout_for(dtype: np.dtype[np.void]) -> np.dtype[np.void]:
+    """Returns today's layout for cycles of a file.
+
+    Raises:
+        ValueError: Something is missing that every version recorded, or is there that none did.
+    """
+    theirs = _written(dtype)
+    n = theirs["q"].shape[0] if "q" in theirs else 0
+    ours = cycle_dtype(n, complete=any(name in theirs for name in OTHER_STATE_FIELDS))
     known = _written(ours)
     if not theirs.items() <= known.items() or known.keys() - theirs.keys() - _LATER:
         raise ValueError("its cycles have other fields than this version writes")
-    wide = np.zeros(len(cycles), ours)
-    for name in known:
-        wide[name] = cycles[name] if name in theirs else np.nan if name in STATE_FIELDS else 0
-    return wide
+    if dtype.itemsize > ours.itemsize:
+        raise ValueError(f"a cycle takes {dtype.itemsize} bytes; {ours.itemsize} are the most with its fields")
+    return ours
 
 
 def _written(dtype: np.dtype[np.void]) -> dict[str, np.dtype[Any]]:

@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 import sys
 import time
+import warnings
 from collections.abc import Callable
 from functools import cache
 from typing import TYPE_CHECKING, Any, get_type_hints
@@ -59,6 +60,7 @@ class MessageGuard:
     ) -> None:
         from viser import _messages
 
+        _refuse_what_viser_warns_of()
         self._kinds = _messages
         self._gui: Any = server.gui
         self._may_act, self._refuse = may_act, refuse
@@ -185,6 +187,11 @@ class MessageGuard:
         self._refused.pop(gone, None)
         self._uploads = {name: upload for name, upload in self._uploads.items() if upload[0] != gone}
         self._gui._drop_uploads_from_client(gone)  # viser forgets a client that never said where its camera was.
+
+
+def _refuse_what_viser_warns_of() -> None:
+    """Has viser raise where it warns of a field of another type: the warning quotes the whole field, each one anew."""
+    warnings.filterwarnings("error", message=r"\[viser\] ", module=r"viser\.infra\._messages")
 
 
 def is_well_formed(message: Any) -> bool:

@@ -6,19 +6,22 @@ import logging
 import os
 import signal
 import socket
+import struct
 import subprocess
 import sys
 import time
+from contextlib import suppress
 
 import numpy as np
 import pytest
 
-from rcilab.controller.log_lines import LineHandler, LogLines
+from rcilab.controller.log_lines import LineHandler, LogLines, SeldomLines
 from rcilab.model import load_model
 from rcilab.motion import plan_joint
 from rcilab.protocols import rci
 from rcilab.protocols.rci.bounds import LOWEST_CLIENT_PORT
 from rcilab.supervisor.simulate import simulate
+from tests.controller.test_server import running
 
 MODEL = load_model("xMatePro7")
 
@@ -60,6 +63,33 @@ def test_a_connect_request_is_for_its_own_connection_and_for_ports_of_programs()
         udp.settimeout(10.0)
         robot._link.request(rci.Connect(udp.getsockname()[1]))
         assert len(udp.recv(2000)) == rci.STATE_SIZE
+
+
+def test_what_anybody_can_cause_is_written_once_in_a_while_and_summed_up():
+    written, now = [], 100.0
+    lines = SeldomLines(written.append, lambda: now)
+    for number in range(1000):
+        lines.write("left", f"the client left {number}", "were lost")
+    lines.write("refused", "another kind", "were refused")
+    now += 60.0
+    lines.write("left", "the client left", "were lost")
+    lines.write("refused", "another kind", "were refused")
+    assert written == [
+        "the client left 0", "another kind", "the client left (999 more were lost since the last line)", "another kind",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("sent", [b"oops, a line of text", struct.pack("<HHH", 10, 1, 999) + bytes(4)])
+def test_connections_that_speak_no_rci_are_summed_up(sent):
+    with running() as found:
+        for _ in range(30):
+            with socket.create_connection((found.host, found.port), timeout=30.0) as link:
+                link.sendall(sent)
+                with suppress(ConnectionResetError):
+                    while link.recv(4096):
+                        pass
+        found.wait_for_line("no RCI")
+    assert len(found.lines) == 1
 
 
 def test_lines_that_nobody_reads_are_left_out_and_counted_and_hold_up_nobody():

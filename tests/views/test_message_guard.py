@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import warnings
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -298,3 +299,25 @@ def test_what_is_no_message_is_dropped_counted_and_said_once(page, link, message
     said = capfd.readouterr()
     first = "a page has sent a message that is none of a page; such messages are dropped\n"
     assert said.out + said.err == ("" if before else first)
+
+
+@pytest.mark.parametrize("position", ["x" * 300, [1] * 3000], ids=["a text", "too many numbers"])
+def test_a_field_that_viser_would_warn_of_is_dropped_and_not_quoted(capfd, position):
+    """Outside a test a warning is printed with the whole value, once for each value, and each one is kept in memory."""
+    camera = {
+        "type": "ViewerCameraMessage", "wxyz": [1.0, 0.0, 0.0, 0.0], "position": position, "fov": 1.0, "near": 0.1,
+        "far": 9.0, "image_height": 9, "image_width": 9, "look_at": [0.0] * 3, "up_direction": [0.0, 0.0, 1.0],
+    }  # fmt: skip
+    with warnings.catch_warnings(record=True) as quoted:
+        warnings.resetwarnings()  # As a program of a user has them.
+        page = Page()
+        try:
+            with page.open() as link:
+                link.send(msgspec.msgpack.encode(camera))
+                page.settle(link)
+            assert page.guard.guard.malformed == 1
+        finally:
+            page.guard.close()
+    assert quoted == []
+    said = capfd.readouterr()
+    assert said.out + said.err == "a page has sent a message that is none of a page; such messages are dropped\n"
