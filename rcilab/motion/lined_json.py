@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_right
+from collections.abc import Mapping
 from dataclasses import dataclass
 from json import JSONDecodeError, JSONDecoder
+from types import MappingProxyType
 from typing import TypeAlias
 
 from rcilab.arrays import Words
@@ -22,7 +24,7 @@ DEEPEST = 8
 _BLANK = re.compile(r"[ \t\r\n]*")
 _NUMBER = re.compile(r"-?(?:0|[1-9]\d*)(?:\.\d+)?(?:[eE][+-]?\d+)?(?![\w.])", re.ASCII)
 _WORD = re.compile(r"[^\s,:\[\]{}\"]+")
-_DECODER = JSONDecoder()  # For text, with its escapes.
+_DECODER = JSONDecoder()  # For text, with its escapes, and for what is only counted.
 _CONSTANTS = {"true": True, "false": False, "null": None}
 
 Content: TypeAlias = "dict[str, Node] | list[Node] | str | float | bool | None"
@@ -44,14 +46,24 @@ class Node:
         return [node.plain() for node in self.value] if isinstance(self.value, list) else self.value
 
 
-def read_json(content: bytes, name: str) -> Node:
+class LongListError(Exception):
+    """A list has more values than its reader takes; nothing behind them was looked at."""
+
+    def __init__(self, count: int, line: int) -> None:
+        super().__init__(f"{count} values in line {line}")
+        self.count, self.line = count, line
+
+
+def read_json(content: bytes, name: str, most: Mapping[str, int] = MappingProxyType({})) -> Node:
     """Returns what a text holds, with lines.
 
     Args:
         content: JSON in UTF-8.
         name: What to call it in an error.
+        most: How many values the lists under these keys may hold; other lists are bounded by the text alone.
 
     Raises:
+        LongListError: One of those lists holds more.
         InvalidValueError: It is no JSON, or not what this reader takes; the message names the line.
     """
     if len(content) > LONGEST:
@@ -66,14 +78,14 @@ def read_json(content: bytes, name: str) -> Node:
         raise InvalidValueError(f"{name}, line {line}", content[error.start : error.end], problem).coded(
             "file_no_text", file=name, line=line
         ) from error
-    return _Reader(text, name).read()
+    return _Reader(text, name, most).read()
 
 
 class _Reader:
     """Walks through one text. Owned by the call of `read_json` that made it."""
 
-    def __init__(self, text: str, name: str) -> None:
-        self._text, self._name = text, name
+    def __init__(self, text: str, name: str, most: Mapping[str, int]) -> None:
+        self._text, self._name, self._most = text, name, most
         self._at = 0
         self._breaks = [match.start() for match in re.finditer("\n", text)]
 
@@ -83,14 +95,14 @@ class _Reader:
             raise self._error("follows after the end of the first value; a file holds one object")
         return node
 
-    def _value(self, depth: int) -> Node:
+    def _value(self, depth: int, key: str = "") -> Node:
         mark = self._next()
         line = self._line()
         if mark and mark in "{[":
             if depth == DEEPEST:
                 raise self._error(f"opens more than {DEEPEST} levels; a program needs 4")
             self._at += 1
-            return Node(self._object(depth) if mark == "{" else self._list(depth), line)
+            return Node(self._object(depth) if mark == "{" else self._list(depth, self._most.get(key)), line)
         if mark == '"':
             return Node(self._string(), line)
         number = _NUMBER.match(self._text, self._at)
@@ -122,22 +134,32 @@ class _Reader:
                 )
             if not self._takes(":"):
                 raise self._error(f"is no colon; one must follow the key {key!r}")
-            found[key] = self._value(depth + 1)
+            found[key] = self._value(depth + 1, key)
             if self._takes("}"):
                 return found
             if not self._takes(","):
                 raise self._error("is neither a comma nor the end of the object }")
 
-    def _list(self, depth: int) -> list[Node]:
+    def _list(self, depth: int, most: int | None) -> list[Node]:
+        start, line = self._at - 1, self._line()
         found: list[Node] = []
         if self._takes("]"):
             return found
         while True:
             found.append(self._value(depth + 1))
+            if most is not None and len(found) > most:
+                raise LongListError(self._count(start, len(found)), line)
             if self._takes("]"):
                 return found
             if not self._takes(","):
                 raise self._error("is neither a comma nor the end of the list ]")
+
+    def _count(self, start: int, least: int) -> int:
+        """Returns how many values the list at a place has, without their lines; `least` where it is not sound."""
+        try:
+            return len(_DECODER.raw_decode(self._text, start)[0])
+        except (ValueError, RecursionError):
+            return least
 
     def _string(self) -> str:
         try:

@@ -10,8 +10,8 @@ from typing import Any
 
 from rcilab.arrays import Words, described
 from rcilab.errors import InvalidValueError, ModelError, VersionMismatchError, plain_text
-from rcilab.motion.lined_json import LONGEST, Node, read_json
-from rcilab.motion.program import Program, require_count
+from rcilab.motion.lined_json import LONGEST, LongListError, Node, read_json
+from rcilab.motion.program import MOST_WAYPOINTS, Program, require_count
 from rcilab.motion.waypoint import ALLOWED, ALWAYS, WORDS, Waypoint, require_fit
 from rcilab.robots import RobotDescription, describe_robot
 from rcilab.whole_file import read_whole, replacing
@@ -83,7 +83,14 @@ def read_program(content: bytes, name: str) -> Program:
         InvalidValueError: It holds no sound program; one sentence with line, key, value, bound and what to do.
         VersionMismatchError: It was written for another version of this format.
     """
-    root = read_json(content, name)
+    try:
+        root = read_json(content, name, {"waypoints": MOST_WAYPOINTS})
+    except LongListError as long:  # Said at once, before each of them is read.
+        try:
+            require_count(long.count)
+        except InvalidValueError as error:
+            raise _placed(error, name, Node([], long.line)) from error
+        raise
     found = _object(root, name, "a program", _PROGRAM_KEYS)
     for key, expected in (("format", FORMAT), ("version", float(VERSION))):
         if key not in found:
@@ -117,7 +124,7 @@ def read_program(content: bytes, name: str) -> Program:
             "file_model", file=name, line=found["model"].line, model=_shown(texts["model"])
         ) from error
     try:
-        require_count(len(listed.value))  # Said at once, before each of them is read.
+        require_count(len(listed.value))
     except InvalidValueError as error:
         raise _placed(error, name, listed) from error
     waypoints = tuple(_waypoint(node, number, name, robot) for number, node in enumerate(listed.value, 1))

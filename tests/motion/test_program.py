@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 import rcilab
 from rcilab.errors import InvalidValueError, ModelError, VersionMismatchError
 from rcilab.model import load_model
-from rcilab.motion import Motion, Program, Waypoint, plan_program
+from rcilab.motion import Motion, Program, Waypoint, lined_json, plan_program, program_file
 from rcilab.motion.program_file import SCHEMA
 from rcilab.motion.waypoint import ALLOWED, ALWAYS, WORDS
 from rcilab.spatial import Pose
@@ -341,3 +341,24 @@ def test_a_program_is_saved_as_json_and_never_over_another_kind_of_file(tmp_path
     assert file.read_bytes() == b"mine"
     with pytest.raises(InvalidValueError, match="is no file name"):
         program.save(None)
+
+
+def test_far_too_many_waypoints_are_counted_and_not_read():
+    listed = 60_000 * [{"type": "joint", "q": 7 * [0.1]}]
+    text = json.dumps(
+        {"format": "rcilab program", "version": 1, "model": "xMatePro7", "start": [], "waypoints": listed}
+    )
+    read = []
+    node = lined_json.Node
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(lined_json, "Node", lambda value, line: read.append(line) or node(value, line))
+        with pytest.raises(InvalidValueError, match="line 1, waypoints: 60000 must be 1 to 10000"):
+            program_file.read_program(text.encode(), "program.json")
+    assert len(read) < 12 * 10_000
+
+
+@pytest.mark.parametrize("end", ["", "]", ', {"q": 1'])
+def test_too_many_waypoints_in_a_spoiled_file_are_one_kind_of_error(end: str):
+    text = '{"waypoints": [' + ",".join(10_001 * ["1"]) + end
+    with pytest.raises(InvalidValueError, match="waypoints: 10001 must be 1 to 10000"):
+        program_file.read_program(text.encode(), "program.json")
