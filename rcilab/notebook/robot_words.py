@@ -17,8 +17,6 @@ def name_phase(status: SupervisorStatus | None, text: Text) -> str:
     """Returns the two or three words for what the robot does."""
     if status is None:
         return text("phase.closed")
-    if status.phase == "idle" and status.powered is False:
-        return text("phase.unpowered")
     return text(phase_code(status))
 
 

@@ -79,6 +79,10 @@ def tell_success(status: SupervisorStatus) -> Message:
 
 def phase_code(status: SupervisorStatus) -> str:
     """Returns the key of the two or three words for what the robot side is doing."""
+    if status.phase == "idle" and status.is_pressed:
+        return "phase.pressed"
+    if status.phase == "idle" and status.powered is False:
+        return "phase.unpowered"
     return _PHASES.get(status.code, f"phase.{status.phase}")
 
 

@@ -247,6 +247,22 @@ def test_a_line_is_planned_once_the_goal_stands_still_and_keeps_the_tool_on_it(b
     )
 
 
+def test_the_arm_is_said_to_be_moved_only_while_it_is(bench):
+    bench.store.update(plan=None, no_plan=None, jog=replace(bench.state.jog, robot=True))
+
+    def said(phase: str, code: str) -> str:
+        status = SimpleNamespace(q_c=HOME, phase=phase, code=code)
+        return TimelinePanel(Text("en"), lambda request: None)._read(bench.state, status)
+
+    by_hand = Text("en")("timeline.by_hand")
+    assert by_hand not in said("idle", "idle"), "only ticked: nothing moves"
+    assert "Move the robot" in said("idle", "idle")
+    assert by_hand in said("moving", "moving.jog")
+    bench.store.update(jog=replace(bench.state.jog, robot=False))
+    assert by_hand in said("moving", "moving.guided")
+    assert Text("en")("timeline.nothing") in said("idle", "idle")
+
+
 def test_an_arc_needs_a_place_to_lead_over_and_then_does(bench):
     bench.goal.set_way(requests.SetWay(kind="arc"))
     bench.aim(-0.03, 0.08, 0.0)

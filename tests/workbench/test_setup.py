@@ -152,6 +152,8 @@ def test_an_arm_that_stands_outside_the_box_is_told_so_in_setup_and_beside_execu
     wait(lambda: "74.0 mm outside the safety box, past its +x face" in panel._verdict._shown, "Setup to say so")
     ask(requests.Check(what="again"))
     wait(lambda: obstacle(bench.store.state, bench.session.status()) is None, "a motion that leads in to be allowed")
+    arrived = replace(bench.session.status(), q_c=bench.store.state.plan.motion.goal)
+    assert obstacle(bench.store.state, arrived).code == "ready.done", "the arm stands inside now"
     ask(requests.MoveJoint(joint=0, angle=float(bench.session.status().q_c[0])))
     ask(requests.MoveJoint(joint=1, angle=float(bench.session.status().q_c[1]) + 0.2))
     reason = obstacle(bench.store.state, bench.session.status())

@@ -13,6 +13,7 @@ from rcilab.errors import CertificateError, ConnectionLostError, ControlError, I
 from rcilab.faults import Fault
 from rcilab.posing.planning import Plan, make_plan
 from rcilab.protocols.world import WorldStatus
+from rcilab.state import RobotMode
 from rcilab.supervisor import SupervisorStatus
 from rcilab.supervisor.status import MESSAGES, Incident
 from rcilab.workbench.panels.health import health_html
@@ -86,6 +87,14 @@ def test_states_and_incidents_are_told_from_the_catalogues(code):
 def test_the_chip_names_what_died(code, english, chinese):
     died = status(phase="crashed", code=code)
     assert (Text("en")(phase_code(died)), Text("zh")(phase_code(died))) == (english, chinese)
+
+
+def test_a_pressed_stop_is_not_called_ready():
+    pressed = status(robot_mode=RobotMode.USER_STOPPED, powered=False)
+    assert Text("en")(phase_code(pressed)) == "stop pressed, power off"
+    assert Text("zh")(phase_code(pressed)) == "已按下停止，未上电"
+    assert phase_code(status(powered=False)) == "phase.unpowered"
+    assert phase_code(status(powered=True)) == "phase.idle"
 
 
 def test_a_request_that_failed_with_its_controller_does_not_ask_for_a_cable():

@@ -60,8 +60,6 @@ def _target_name(state: UiState, text: Text) -> str:
 def _chips(state: UiState, status: SupervisorStatus, text: Text) -> list[dict[str, Any]]:
     phase = text(phase_code(status))
     doing = text.say(state.busy) if state.busy is not None else phase
-    if status.phase == "idle" and status.powered is False:
-        doing = text("phase.unpowered")
     mode = "—" if status.robot_mode is None else text(f"robot_mode.{status.robot_mode.name}")
     faults = text("bar.none") if not status.faults else name_faults(status.faults)
     connected = status.rate_hz > 0.0
@@ -73,7 +71,7 @@ def _chips(state: UiState, status: SupervisorStatus, text: Text) -> list[dict[st
             text,
             "phase",
             doing,
-            _TONES.get(status.code, _TONES.get(status.phase, "bad")),
+            "warn" if status.is_pressed else _TONES.get(status.code, _TONES.get(status.phase, "bad")),
             hint=text.say(tell_status(status)),
         ),
         _chip(text, "mode", mode),

@@ -11,7 +11,7 @@ from rcilab.workbench.panels.outcome import replay_html
 from rcilab.workbench.panels.plots import Plots
 from rcilab.workbench.program.draft import tell_place
 from rcilab.workbench.run.played import paced_of, played_at
-from rcilab.workbench.run.readiness import time_shown
+from rcilab.workbench.run.readiness import is_moving, time_shown
 from rcilab.workbench.text import Text
 from rcilab.workbench.view_actions import PLOTS, RATES, has_plot
 from rcilab.workbench.widgets import Ask, Html, Linked, esc, on_press
@@ -92,9 +92,12 @@ class TimelinePanel:
         text = self._text
         if state.plan is None:
             why = state.no_plan
-            if state.jog.robot or status.code == "moving.guided":
-                return f'<p class="rl-note rl-welcome">{esc(text("timeline.by_hand"))}</p>'
-            said = text("timeline.nothing") if why is None or why.code == "plan.here" else text.say(why)
+            if status.code == "moving.guided" or (state.jog.robot and is_moving(status)):
+                said = text("timeline.by_hand")
+            elif why is None or why.code == "plan.here":
+                said = text("timeline.jog" if state.jog.robot else "timeline.nothing")
+            else:
+                said = text.say(why)
             return f'<p class="rl-note rl-welcome">{esc(said)}</p>'
         duration = state.plan.motion.duration
         t, kinds = min(time_shown(state, status), duration), text("timeline.plan_only")

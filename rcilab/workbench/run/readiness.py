@@ -44,7 +44,8 @@ def obstacle(state: UiState, status: SupervisorStatus) -> Message | None:
     if untold is not None:
         return untold
     reason = plan_obstacle(state.plan, status.q_c)
-    if reason is not None:  # From outside a motion may lead into the box; one that does not is refused for that.
+    if reason is not None and reason.code == "ready.violations":
+        # From outside a motion may lead into the box; one that does not is refused for that.
         reason = tool_outside(state, state.plan.path[0]) or reason
     if reason is None or state.plan.program is None or reason.code not in _OF_PROGRAMS:
         return reason
