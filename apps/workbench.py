@@ -9,7 +9,7 @@ import argparse
 import sys
 
 from rcilab.cli.workbench import add_options, run
-from rcilab.errors import RcilabError
+from rcilab.core.errors import RcilabError
 
 
 def main() -> int:

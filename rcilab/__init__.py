@@ -9,19 +9,23 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from rcilab.client.session import RobotSession as RobotSession
-    from rcilab.client.session import connect as connect
-    from rcilab.command import CartesianPosition as CartesianPosition
-    from rcilab.command import JointPosition as JointPosition
-    from rcilab.command import JointTorque as JointTorque
     from rcilab.conformance.check import check as check
     from rcilab.conformance.motion_monitor import Monitor as Monitor
     from rcilab.conformance.report import Report as Report
-    from rcilab.dynamics.payload import Payload as Payload
-    from rcilab.errors import RcilabError as RcilabError
-    from rcilab.faults import Fault as Fault
-    from rcilab.model import RobotModel as RobotModel
-    from rcilab.model import load_model as load_model
+    from rcilab.control_process.simulate import simulate as simulate
+    from rcilab.core.clearance import SafetyDistance as SafetyDistance
+    from rcilab.core.command import CartesianPosition as CartesianPosition
+    from rcilab.core.command import JointPosition as JointPosition
+    from rcilab.core.command import JointTorque as JointTorque
+    from rcilab.core.errors import RcilabError as RcilabError
+    from rcilab.core.faults import Fault as Fault
+    from rcilab.core.safety_box import SafetyBox as SafetyBox
+    from rcilab.core.spatial import Pose as Pose
+    from rcilab.execution.session import RobotSession as RobotSession
+    from rcilab.execution.session import connect as connect
+    from rcilab.model.dynamics.payload import Payload as Payload
+    from rcilab.model.robot_model import RobotModel as RobotModel
+    from rcilab.model.robot_model import load_model as load_model
     from rcilab.motion.cartesian import plan_arc as plan_arc
     from rcilab.motion.cartesian import plan_circle as plan_circle
     from rcilab.motion.cartesian import plan_line as plan_line
@@ -36,34 +40,30 @@ if TYPE_CHECKING:
     from rcilab.notebook.preview import preview as preview
     from rcilab.recording.run import Run as Run
     from rcilab.recording.run_file import load_run as load_run
-    from rcilab.safety_box import SafetyBox as SafetyBox
-    from rcilab.safety_distance import SafetyDistance as SafetyDistance
-    from rcilab.spatial import Pose as Pose
-    from rcilab.supervisor.simulate import simulate as simulate
 
 __version__ = "0.2.0"
 
 _HOMES = {
-    "CartesianPosition": "rcilab.command",
-    "Fault": "rcilab.faults",
-    "JointPosition": "rcilab.command",
-    "JointTorque": "rcilab.command",
+    "CartesianPosition": "rcilab.core.command",
+    "Fault": "rcilab.core.faults",
+    "JointPosition": "rcilab.core.command",
+    "JointTorque": "rcilab.core.command",
     "Monitor": "rcilab.conformance.motion_monitor",
     "Motion": "rcilab.motion.motion",
-    "Payload": "rcilab.dynamics.payload",
-    "Pose": "rcilab.spatial",
+    "Payload": "rcilab.model.dynamics.payload",
+    "Pose": "rcilab.core.spatial",
     "Program": "rcilab.motion.program",
-    "RcilabError": "rcilab.errors",
+    "RcilabError": "rcilab.core.errors",
     "Report": "rcilab.conformance.report",
-    "RobotModel": "rcilab.model",
-    "RobotSession": "rcilab.client.session",
+    "RobotModel": "rcilab.model.robot_model",
+    "RobotSession": "rcilab.execution.session",
     "Run": "rcilab.recording.run",
-    "SafetyBox": "rcilab.safety_box",
-    "SafetyDistance": "rcilab.safety_distance",
+    "SafetyBox": "rcilab.core.safety_box",
+    "SafetyDistance": "rcilab.core.clearance",
     "Waypoint": "rcilab.motion.waypoint",
     "check": "rcilab.conformance.check",
-    "connect": "rcilab.client.session",
-    "load_model": "rcilab.model",
+    "connect": "rcilab.execution.session",
+    "load_model": "rcilab.model.robot_model",
     "load_run": "rcilab.recording.run_file",
     "plan_arc": "rcilab.motion.cartesian",
     "plan_circle": "rcilab.motion.cartesian",
@@ -74,7 +74,7 @@ _HOMES = {
     "plan_recovery": "rcilab.motion.recovery",
     "plot": "rcilab.notebook.plot",
     "preview": "rcilab.notebook.preview",
-    "simulate": "rcilab.supervisor.simulate",
+    "simulate": "rcilab.control_process.simulate",
 }
 
 __all__ = sorted(_HOMES)  # pyright: ignore[reportUnsupportedDunderAll]

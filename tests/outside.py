@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from rcilab import JointPosition, RobotSession, plan_joint
-from rcilab.errors import ControlError
-from rcilab.faults import Fault
+from rcilab.core.errors import ControlError
+from rcilab.core.faults import Fault
 
 JOINT = 4
 """Index of the joint that goes out."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from contextlib import suppress
 
-from rcilab.supervisor import forked
+from rcilab.control_process import forked
 
 
 def processes(of: str = "self") -> set[str]:

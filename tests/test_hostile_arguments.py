@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import rcilab
-from rcilab.errors import InvalidValueError
+from rcilab.core.errors import InvalidValueError
 
 MODEL = rcilab.load_model("xMatePro7")
 HUGE = [10**400, 0, 0, 0, 0, 0, 0]

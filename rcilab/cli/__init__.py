@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from importlib import import_module
 
 from rcilab.cli.output import drop_output, is_unwritable, one_line_each, prepare_streams
-from rcilab.errors import RcilabError
+from rcilab.core.errors import RcilabError
 
 COMMANDS = ("workbench", "controller", "world", "run", "replay", "check", "urdf", "mjcf", "lab", "doctor", "bench")
 """Each is a module here with `add_parser(subparsers)` and `run(args) -> int`."""

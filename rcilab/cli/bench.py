@@ -10,14 +10,14 @@ from contextlib import redirect_stdout
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from rcilab.bench.rows import ROWS
-from rcilab.errors import UsageError
+from rcilab.core.errors import UsageError
+from rcilab.diagnostics.bench.rows import ROWS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from rcilab.bench.measure import Absent, Measurement
-    from rcilab.bench.pace_watch import PaceWatch
+    from rcilab.diagnostics.bench.cpu_speed_monitor import PaceWatch
+    from rcilab.diagnostics.bench.measure import Absent, Measurement
 
 BENCHES = tuple(ROWS)
 """In the order they run; the slow ones last."""
@@ -71,14 +71,14 @@ def run(args: argparse.Namespace) -> int:
     names = _chosen(args.names)
     if not 0.5 <= args.seconds <= 600.0:
         raise UsageError(f"--seconds {args.seconds:g} is not from 0.5 to 600 s")
-    from rcilab.bench.machine import describe_machine
+    from rcilab.diagnostics.bench.machine import describe_machine
 
     machine = describe_machine()
     if args.json:
         print("[\n" + json.dumps(machine), end="", flush=True)
     else:
         _print_machine(machine)
-    from rcilab.bench.pace_watch import PaceWatch
+    from rcilab.diagnostics.bench.cpu_speed_monitor import PaceWatch
 
     kept, out, pace = True, sys.stdout, PaceWatch()
     for name in names:
@@ -108,17 +108,17 @@ def _chosen(names: list[str]) -> list[str]:
 def _measured(name: str, seconds: float) -> Iterable[Measurement | Absent]:
     """Returns the rows of one name; most have a single one."""
     if name == COMPARE:
-        from rcilab.bench.compare.comparison import compare
+        from rcilab.diagnostics.bench.compare.comparison import compare
 
         return compare()
-    from rcilab.bench.apart import measure_apart
+    from rcilab.diagnostics.bench.isolated_run import measure_apart
 
     return (measure_apart(name, seconds),)
 
 
 def _with_pace(note: str, pace: PaceWatch) -> str:
     """Returns the note of a row, with a word about the machine where that was slow meanwhile."""
-    from rcilab.bench.pace_watch import SLOW
+    from rcilab.diagnostics.bench.cpu_speed_monitor import SLOW
 
     slowness = pace.slowness
     if slowness < SLOW:
@@ -136,7 +136,7 @@ def _print_machine(machine: dict[str, Any]) -> None:
 
 
 def _row(found: Measurement | Absent) -> str:
-    from rcilab.bench.measure import Absent, plain
+    from rcilab.diagnostics.bench.measure import Absent, plain
 
     verdict = {True: "ok", False: "SLOW", None: "-"}[found.ok]
     if isinstance(found, Absent):

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 from rcilab.cli.motion_file import HELP, add_max_rows, as_motion, read_file
 from rcilab.cli.output import show
-from rcilab.errors import InvalidValueError, UsageError
-from rcilab.language import LANGUAGES
+from rcilab.core.errors import InvalidValueError, UsageError
+from rcilab.i18n.locale import LANGUAGES
 
 if TYPE_CHECKING:
-    from rcilab.conformance.slow_down import SlowDown
+    from rcilab.conformance.time_scaling import SlowDown
 
 
 def add_parser(subparsers: Any) -> None:
@@ -55,7 +55,7 @@ def run(args: Namespace) -> int:
     """
     from rcilab.cli.report_json import as_json_text, report_as_json
     from rcilab.conformance import check
-    from rcilab.model import load_model
+    from rcilab.model.robot_model import load_model
     from rcilab.motion import Program
 
     out: Path | None = args.slow_down

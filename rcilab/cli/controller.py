@@ -9,9 +9,9 @@ import sys
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from rcilab.controller.config import ControllerConfig
-    from rcilab.errors import InvalidValueError
-    from rcilab.protocols.world import NetworkFaults, Stall
+    from rcilab.core.errors import InvalidValueError
+    from rcilab.makers.rokae.controller.config import ControllerConfig
+    from rcilab.sim.api import NetworkFaults, Stall
 
 DESCRIPTION = """\
 Runs a virtual RCI controller. Any RCI client can connect to it: this package, or a C++ program that uses the vendor's
@@ -117,8 +117,8 @@ def _add_network_options(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Runs the controller until it is told to end."""
-    from rcilab.controller.server import ControllerServer
-    from rcilab.errors import InvalidValueError
+    from rcilab.core.errors import InvalidValueError
+    from rcilab.makers.rokae.controller.server import ControllerServer
 
     try:
         config = _config(args)
@@ -149,7 +149,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _config(args: argparse.Namespace) -> ControllerConfig:
-    from rcilab.controller.config import ControllerConfig
+    from rcilab.makers.rokae.controller.config import ControllerConfig
 
     client_host, client_port = _client(args.client)
     network, states_network = _networks(args)
@@ -187,7 +187,7 @@ def _named(error: InvalidValueError, args: argparse.Namespace) -> InvalidValueEr
 
 
 def _client(text: str | None) -> tuple[str | None, int | None]:
-    from rcilab.errors import InvalidValueError
+    from rcilab.core.errors import InvalidValueError
 
     if text is None:
         return None, None
@@ -199,8 +199,8 @@ def _client(text: str | None) -> tuple[str | None, int | None]:
 
 def _networks(args: argparse.Namespace) -> tuple[NetworkFaults, NetworkFaults]:
     """Returns what is wrong with the network towards the controller, and towards the client."""
-    from rcilab.errors import InvalidValueError
-    from rcilab.protocols.world import DIRECTIONS, NetworkFaults
+    from rcilab.core.errors import InvalidValueError
+    from rcilab.sim.api import DIRECTIONS, NetworkFaults
 
     if args.faults_on not in DIRECTIONS:
         raise InvalidValueError("--faults-on", args.faults_on, f"is unknown; known: {', '.join(DIRECTIONS)}")
@@ -217,8 +217,8 @@ def parse_stall(text: str) -> Stall:
     Raises:
         InvalidValueError: It is none.
     """
-    from rcilab.errors import InvalidValueError
-    from rcilab.protocols.world import Stall
+    from rcilab.core.errors import InvalidValueError
+    from rcilab.sim.api import Stall
 
     rest, slash, period = text.partition("/")
     duration, at, after = rest.partition("@")

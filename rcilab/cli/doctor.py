@@ -6,8 +6,8 @@ import argparse
 import json
 import sys
 
-from rcilab.doctor.finding import Finding, summary
-from rcilab.errors import InvalidValueError
+from rcilab.core.errors import InvalidValueError
+from rcilab.diagnostics.doctor.finding import Finding, summary
 
 DESCRIPTION = """\
 Says what this machine lacks, and the exact remedy. "ok": nothing to do; "note": works, with a drawback; "bad": a part
@@ -31,9 +31,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Prints every finding as it is found; returns 1 when something does not work, else 0."""
-    from rcilab.client.address import parse_address
-    from rcilab.doctor.examine import examine
-    from rcilab.doctor.system import System
+    from rcilab.diagnostics.doctor.run_checks import examine
+    from rcilab.diagnostics.doctor.system import System
+    from rcilab.makers.rokae.driver.address import parse_address
 
     if not 0.0 <= args.seconds <= LONGEST:
         raise InvalidValueError("--seconds", args.seconds, f"must be from 0 to {LONGEST:g} s")

@@ -7,10 +7,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rcilab.file_bounds import MOST_ROWS
+from rcilab.core.file_bounds import MOST_ROWS
 
 if TYPE_CHECKING:
-    from rcilab.model import RobotModel
+    from rcilab.model.robot_model import RobotModel
     from rcilab.motion import Motion, Program
 
 HELP = "motion (.npz or .csv, from Motion.save) or program (.json, from Program.save)"
@@ -63,7 +63,7 @@ def as_motion(
         PlanningError: The program cannot be planned.
         InvalidValueError: It is for another arm.
     """
-    from rcilab.errors import PlanningError
+    from rcilab.core.errors import PlanningError
     from rcilab.motion import Program, plan_program
 
     if not isinstance(found, Program):

@@ -8,7 +8,7 @@ import os
 import sys
 from contextlib import suppress
 
-from rcilab.errors import plain_text
+from rcilab.core.errors import plain_text
 
 _UNWRITABLE = {errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EFBIG, errno.EBADF}
 

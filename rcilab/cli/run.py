@@ -16,15 +16,15 @@ from typing import TYPE_CHECKING, Any, Literal, TextIO
 
 from rcilab.cli.motion_file import HELP, add_max_rows, as_motion, read_file
 from rcilab.cli.output import drop_output, show
-from rcilab.errors import UsageError
-from rcilab.faults import name_faults
+from rcilab.core.errors import UsageError
+from rcilab.core.faults import name_faults
 
 if TYPE_CHECKING:
-    from rcilab.arrays import JointVector
-    from rcilab.client import RobotSession, Run
     from rcilab.conformance import Certificate, Report
+    from rcilab.core.arrays import JointVector
+    from rcilab.core.state import RobotState
+    from rcilab.execution import RobotSession, Run
     from rcilab.motion import Motion
-    from rcilab.state import RobotState
 
 _DONE, _NOT_DONE = 0, 1
 _TO_START_SPEED = 0.2  # Part of the limits; slow, because the way is not the program's.
@@ -117,9 +117,9 @@ def _stopping_on_signals() -> Iterator[_Stopper]:
 
 def _run(args: Namespace, stopper: _Stopper) -> int:
     from rcilab.cli.report_json import as_json_text
-    from rcilab.client import connect
-    from rcilab.client.start_check import describe_start_mismatch
-    from rcilab.model import load_model
+    from rcilab.execution import connect
+    from rcilab.execution.start_pose_check import describe_start_mismatch
+    from rcilab.model.robot_model import load_model
 
     found = read_file(args.file, args.max_rows)
     model = load_model(args.model) if args.model else None

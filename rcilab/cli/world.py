@@ -7,7 +7,7 @@ import json
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from rcilab.protocols.world import WorldRequest
+    from rcilab.sim.api import WorldRequest
 
 EPILOG = """examples, for a controller that has printed "world 127.0.0.2:40123":
   rcilab world 127.0.0.2:40123 push wrench=[0,0,-20,0,0,0] link=4 duration=1
@@ -37,9 +37,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Asks for it and prints what the answer says, as JSON when that is more than that it was done."""
-    from rcilab.client.world import World
-    from rcilab.errors import InvalidValueError
-    from rcilab.protocols.world import WorldStatus, status_as_dict
+    from rcilab.core.errors import InvalidValueError
+    from rcilab.execution.simulation_control import World
+    from rcilab.sim.api import WorldStatus, status_as_dict
 
     host, colon, port = args.address.rpartition(":")
     if not colon or not host or not (port.isascii() and port.isdigit() and 0 < int(port) < 65536):
@@ -52,8 +52,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _request(name: str, texts: list[str]) -> WorldRequest:
-    from rcilab.errors import InvalidValueError, UsageError
-    from rcilab.protocols.world import Refused, decode_world_request
+    from rcilab.core.errors import InvalidValueError, UsageError
+    from rcilab.sim.api import Refused, decode_world_request
 
     content: dict[str, Any] = {"request": name}
     for text in texts:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from rcilab.conformance.box_monitor import BoxMonitor
-from rcilab.conformance.breach import Breach, describe_breaches
 from rcilab.conformance.cartesian_monitor import CartesianMonitor
 from rcilab.conformance.certificate import Certificate, verify_certificate
 from rcilab.conformance.check import check
@@ -13,12 +12,13 @@ from rcilab.conformance.condition import Condition
 from rcilab.conformance.condition_tables import CONDITION_TABLES, ConditionTable, condition_table
 from rcilab.conformance.conditions import CONDITIONS, CYCLE_CONDITIONS, explain_fault, find_condition
 from rcilab.conformance.limit_tables import LimitTable, cartesian_limits
+from rcilab.conformance.limit_violation import Breach, describe_breaches
 from rcilab.conformance.measured_monitor import MeasuredMonitor
 from rcilab.conformance.monitor import JointMonitor
 from rcilab.conformance.motion_monitor import Monitor
 from rcilab.conformance.report import ConditionResult, Report, Violation
-from rcilab.conformance.slow_down import SlowDown
 from rcilab.conformance.start import StartState
+from rcilab.conformance.time_scaling import SlowDown
 from rcilab.conformance.torque_monitor import TorqueMonitor
 
 __all__ = [

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from rcilab.conformance.breach import Breach
 from rcilab.conformance.condition import Condition
+from rcilab.conformance.limit_violation import Breach
 from rcilab.conformance.tool_conditions import BOX_TOLERANCE, CARTESIAN_POSITION
-from rcilab.faults import Fault
-from rcilab.safety_box import EntryBox, SafetyBox, active_box
+from rcilab.core.faults import Fault
+from rcilab.core.safety_box import EntryBox, SafetyBox, active_box
 
 
 class BoxMonitor:

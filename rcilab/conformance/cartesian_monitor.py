@@ -6,15 +6,15 @@ import math
 from collections.abc import Sequence
 from typing import TypeAlias
 
-from rcilab.conformance.bound_rows import BoundRows
-from rcilab.conformance.breach import Breach
+from rcilab.conformance.bounds_table import BoundRows
 from rcilab.conformance.condition import Condition
-from rcilab.conformance.spans import spans
+from rcilab.conformance.divided_differences import spans
+from rcilab.conformance.limit_violation import Breach
 from rcilab.conformance.tool_conditions import TOOL_CONDITIONS
-from rcilab.faults import Fault
-from rcilab.limits import Limits
-from rcilab.safety_box import EntryBox, SafetyBox, active_box
-from rcilab.spatial import IDENTITY, Pose, turn_between
+from rcilab.core.faults import Fault
+from rcilab.core.limits import Limits
+from rcilab.core.safety_box import EntryBox, SafetyBox, active_box
+from rcilab.core.spatial import IDENTITY, Pose, turn_between
 
 _TURN = 2.0 * math.pi  # [rad]
 Six: TypeAlias = tuple[float, float, float, float, float, float]

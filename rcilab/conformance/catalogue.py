@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from rcilab.language import Language, load_words, require_language
+from rcilab.i18n.locale import Language, load_words, require_language
 
 __all__ = ["Language", "Phrase", "load_catalogue", "say"]
 

@@ -11,15 +11,15 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.arrays import Words
 from rcilab.conformance.conditions import START_POSITION_TOLERANCE
 from rcilab.conformance.start import StartState, as_start
-from rcilab.errors import CertificateError, InvalidValueError
-from rcilab.model import RobotModel, require_model
+from rcilab.core.arrays import Words
+from rcilab.core.clearance import SafetyDistance
+from rcilab.core.errors import CertificateError, InvalidValueError
+from rcilab.core.safety_box import SafetyBox, active_box
+from rcilab.core.state import Mode
+from rcilab.model.robot_model import RobotModel, require_model
 from rcilab.motion.motion import Motion, require_motion
-from rcilab.safety_box import SafetyBox, active_box
-from rcilab.safety_distance import SafetyDistance
-from rcilab.state import Mode
 
 NO_SAFETY_BOX = "none"
 """The part of a certificate that says that the motion was judged without a safety box."""

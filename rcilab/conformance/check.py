@@ -8,27 +8,27 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rcilab.arrays import Array, described
-from rcilab.clock import CYCLE_TIME
+from rcilab.conformance.advice import advise
 from rcilab.conformance.catalogue import Phrase
 from rcilab.conformance.certificate import issue_certificate
 from rcilab.conformance.clearance_conditions import FAR, clearance_conditions
 from rcilab.conformance.condition import Condition
 from rcilab.conformance.condition_tables import condition_table
+from rcilab.conformance.limit_utilisation import Usage, near_bound, worst_of
 from rcilab.conformance.report import ConditionResult, Report, Violation
 from rcilab.conformance.signals import HOLD_SAMPLES as HOLD_SAMPLES
 from rcilab.conformance.signals import MotionSignals
 from rcilab.conformance.start import StartState, as_start
-from rcilab.conformance.usage import Usage, near_bound, worst_of
-from rcilab.conformance.wording import advise
-from rcilab.errors import InvalidValueError
-from rcilab.limits import Limits
-from rcilab.model import RobotModel, require_model
+from rcilab.core.arrays import Array, described
+from rcilab.core.clearance import STANDARD_DISTANCE, SafetyDistance
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.errors import InvalidValueError
+from rcilab.core.limits import Limits
+from rcilab.core.safety_box import SafetyBox, active_box
+from rcilab.core.state import Mode, require_mode
+from rcilab.model.robot_model import RobotModel, require_model
 from rcilab.motion.motion import Motion, require_motion
 from rcilab.motion.range import RECOVERY_RANGE, range_from
-from rcilab.safety_box import SafetyBox, active_box
-from rcilab.safety_distance import STANDARD_DISTANCE, SafetyDistance
-from rcilab.state import Mode, require_mode
 
 
 def check(

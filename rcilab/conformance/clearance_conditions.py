@@ -13,7 +13,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from rcilab.conformance.condition import AnyLimits, Bounds, Condition, Necessity
-from rcilab.safety_distance import STANDARD_DISTANCE, SafetyDistance
+from rcilab.core.clearance import STANDARD_DISTANCE, SafetyDistance
 
 OWN = "rcilab's own, not the controller's; capsules of the URDF"
 FAR = 0.1  # [m]

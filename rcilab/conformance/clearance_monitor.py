@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from rcilab.arrays import JointVector, as_vector
-from rcilab.conformance.breach import Breach
 from rcilab.conformance.clearance_conditions import clearance_conditions
 from rcilab.conformance.clearance_path import in_between
-from rcilab.safety_distance import STANDARD_DISTANCE, SafetyDistance
+from rcilab.conformance.limit_violation import Breach
+from rcilab.core.arrays import JointVector, as_vector
+from rcilab.core.clearance import STANDARD_DISTANCE, SafetyDistance
 
 if TYPE_CHECKING:
-    from rcilab.kinematics.collision import LinkPair
-    from rcilab.model import RobotModel
+    from rcilab.model.kinematics.collision import LinkPair
+    from rcilab.model.robot_model import RobotModel
 
 
 class ClearanceMonitor:
@@ -31,7 +31,7 @@ class ClearanceMonitor:
     """
 
     def __init__(self, model: RobotModel, distance: SafetyDistance = STANDARD_DISTANCE) -> None:
-        from rcilab.kinematics.collision import ClearanceQuery
+        from rcilab.model.kinematics.collision import ClearanceQuery
 
         geometry = model.collision_geometry(distance)
         self._n, self._levers = model.n, geometry.levers

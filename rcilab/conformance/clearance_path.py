@@ -17,10 +17,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rcilab.arrays import Array, JointPath, JointVector
+from rcilab.core.arrays import Array, JointPath, JointVector
 
 if TYPE_CHECKING:
-    from rcilab.kinematics.collision import LinkPair
+    from rcilab.model.kinematics.collision import LinkPair
 
 MOST_TRAVEL = 5e-3  # [m]
 """How far any point of a link may move between two looks, unless the distance found leaves room for more."""

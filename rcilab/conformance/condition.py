@@ -8,11 +8,11 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from rcilab.arrays import Array
-from rcilab.errors import InvalidValueError
-from rcilab.faults import Fault
-from rcilab.franka_errors import FrankaError
-from rcilab.limits import JointLimits, Limits
+from rcilab.core.arrays import Array
+from rcilab.core.errors import InvalidValueError
+from rcilab.core.faults import Fault
+from rcilab.core.franka_errors import FrankaError
+from rcilab.core.limits import JointLimits, Limits
 
 Necessity: TypeAlias = Literal["necessary", "recommended"]
 Stage: TypeAlias = Literal["throughout", "start", "end"]

@@ -21,9 +21,9 @@ from rcilab.conformance.franka_conditions import (
     FRANKA_TORQUE_MOTION_CONDITIONS,
 )
 from rcilab.conformance.tool_conditions import CARTESIAN_POSITION
-from rcilab.errors import InvalidValueError
+from rcilab.core.errors import InvalidValueError
+from rcilab.core.state import Mode
 from rcilab.robots.description import Interface, RobotDescription
-from rcilab.state import Mode
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -13,24 +13,24 @@ from typing import Literal
 
 import numpy as np
 
-from rcilab.arrays import JointVector
 from rcilab.conformance.clearance_conditions import CLEARANCE_CONDITIONS
 from rcilab.conformance.condition import MANUAL, AnyLimits, Bounds, Condition, joint_limits
 from rcilab.conformance.measured_conditions import EXTERNAL_TORQUE, LOST_COMMANDS, MEASURED_CONDITIONS
+from rcilab.conformance.start_end_conditions import (
+    REST_ACCELERATION_TOLERANCE,
+    REST_VELOCITY_TOLERANCE,
+    start_pose,
+    tool_rest,
+)
 from rcilab.conformance.tool_conditions import (
     CARTESIAN_FRAME,
     CARTESIAN_POSITION,
     TOOL_CONDITIONS,
     TORQUE_CONDITIONS,
 )
-from rcilab.conformance.tool_ends import (
-    REST_ACCELERATION_TOLERANCE,
-    REST_VELOCITY_TOLERANCE,
-    start_pose,
-    tool_rest,
-)
-from rcilab.errors import InvalidValueError
-from rcilab.faults import Fault
+from rcilab.core.arrays import JointVector
+from rcilab.core.errors import InvalidValueError
+from rcilab.core.faults import Fault
 
 START_POSITION_TOLERANCE = 1e-9  # [rad]
 """How far from the arm a motion may start, in [m] too. A step of 1 nrad is a jerk of 2 rad/s^3: inside the planner's

@@ -6,14 +6,14 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from rcilab.conformance.advice import amount, with_degrees
 from rcilab.conformance.catalogue import Language, Phrase, load_catalogue, say
 from rcilab.conformance.condition import Condition
 from rcilab.conformance.report import LISTED, ConditionResult, Report, Violation
-from rcilab.conformance.wording import amount, with_degrees
-from rcilab.words.units import Units
+from rcilab.i18n.units import Units
 
 if TYPE_CHECKING:
-    from rcilab.conformance.slow_down import SlowDown
+    from rcilab.conformance.time_scaling import SlowDown
 
 _TIMES = 10.0
 """From this share of a bound on it is told as a factor, not in percent."""
@@ -238,7 +238,7 @@ def explain_limit(source: str, language: Language = "en") -> str:
 
 
 def _link(number: int, voice: _Voice) -> str:
-    from rcilab.kinematics.collision import FLOOR, TOOL
+    from rcilab.model.kinematics.collision import FLOOR, TOOL
 
     key = {FLOOR: "floor", TOOL: "tool", 0: "base"}.get(number, "link")
     return voice.say(f"place.{key}", number=str(number))

@@ -23,6 +23,7 @@ from rcilab.conformance.conditions import (
     MOTION_CONDITIONS,
 )
 from rcilab.conformance.measured_conditions import EXTERNAL_TORQUE, LOST_COMMANDS, MEASURED_CONDITIONS
+from rcilab.conformance.start_end_conditions import start_pose, tool_rest
 from rcilab.conformance.tool_conditions import (
     CARTESIAN_FRAME,
     CARTESIAN_POSITION,
@@ -30,8 +31,7 @@ from rcilab.conformance.tool_conditions import (
     TORQUE_RANGE,
     TORQUE_RATE,
 )
-from rcilab.conformance.tool_ends import start_pose, tool_rest
-from rcilab.franka_errors import FrankaError
+from rcilab.core.franka_errors import FrankaError
 
 _PAGE = "Franka's page Robot and interface specifications"
 _ERRORS = "Franka's page Errors"

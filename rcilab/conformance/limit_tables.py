@@ -6,8 +6,8 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Literal, TypeAlias, get_args
 
-from rcilab.errors import InvalidValueError
-from rcilab.limits import Limits
+from rcilab.core.errors import InvalidValueError
+from rcilab.core.limits import Limits
 
 LimitTable: TypeAlias = Literal["manual", "sdk"]
 

@@ -15,11 +15,11 @@ from typing import Literal
 
 import numpy as np
 
-from rcilab.arrays import frozen
 from rcilab.conformance.condition import MANUAL, AnyLimits, Bounds, Condition, joint_limits, same
 from rcilab.conformance.tool_conditions import arm_angle_bounds, tool_bounds
-from rcilab.faults import Fault
-from rcilab.limits import Limits
+from rcilab.core.arrays import frozen
+from rcilab.core.faults import Fault
+from rcilab.core.limits import Limits
 
 ANGLE_ALLOWANCE = math.radians(1.0)  # [rad] A choice: what a servo may overshoot at the end of a joint's range.
 BOX_ALLOWANCE = 0.01  # [m] A choice: about what that angle is at the tool, and what a soft spring gives.

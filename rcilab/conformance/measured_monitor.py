@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from rcilab.clock import CYCLE_TIME
-from rcilab.conformance.bound_rows import BoundRows
-from rcilab.conformance.breach import Breach
+from rcilab.conformance.bounds_table import BoundRows
+from rcilab.conformance.limit_violation import Breach
 from rcilab.conformance.measured_conditions import ACCELERATION_CUTOFF, MEASURED_CONDITIONS
-from rcilab.errors import InvalidValueError
-from rcilab.faults import Fault
-from rcilab.limits import Limits
-from rcilab.safety_box import EntryBox, SafetyBox, active_box
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.errors import InvalidValueError
+from rcilab.core.faults import Fault
+from rcilab.core.limits import Limits
+from rcilab.core.safety_box import EntryBox, SafetyBox, active_box
 
 _SHARE = CYCLE_TIME / (CYCLE_TIME + 1.0 / (2.0 * math.pi * ACCELERATION_CUTOFF))
 """How much of a new difference the first-order low pass takes in one cycle."""

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from operator import sub
 
-from rcilab.conformance.bound_rows import BoundRows
-from rcilab.conformance.breach import Breach
+from rcilab.conformance.bounds_table import BoundRows
 from rcilab.conformance.condition import Condition
 from rcilab.conformance.conditions import JOINT_CONDITIONS
-from rcilab.conformance.spans import EVEN, spans
-from rcilab.errors import InvalidValueError
-from rcilab.faults import Fault
-from rcilab.limits import JointLimits
+from rcilab.conformance.divided_differences import EVEN, spans
+from rcilab.conformance.limit_violation import Breach
+from rcilab.core.errors import InvalidValueError
+from rcilab.core.faults import Fault
+from rcilab.core.limits import JointLimits
 
 
 class JointMonitor:

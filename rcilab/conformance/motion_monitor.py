@@ -9,29 +9,29 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.arrays import Array, JointVector, as_vector, described
-from rcilab.command import CartesianPosition, Command, JointPosition, JointTorque
 from rcilab.conformance.box_monitor import BoxMonitor
-from rcilab.conformance.breach import Breach
 from rcilab.conformance.cartesian_monitor import CartesianMonitor
 from rcilab.conformance.clearance_monitor import ClearanceMonitor
 from rcilab.conformance.condition import Condition
 from rcilab.conformance.condition_tables import condition_table
-from rcilab.conformance.frame import find_frame_error
+from rcilab.conformance.limit_violation import Breach
 from rcilab.conformance.measured_monitor import MeasuredMonitor
 from rcilab.conformance.monitor import JointMonitor
-from rcilab.conformance.rest_monitor import RestMonitor
+from rcilab.conformance.pose_validation import find_frame_error
+from rcilab.conformance.standstill_monitor import RestMonitor
 from rcilab.conformance.start import StartState, as_start
 from rcilab.conformance.tool_signals import commands_before
 from rcilab.conformance.torque_monitor import TorqueMonitor
-from rcilab.errors import InvalidValueError
-from rcilab.kinematics.closed_form import build_closed_form
-from rcilab.model import RobotModel, require_model
+from rcilab.core.arrays import Array, JointVector, as_vector, described
+from rcilab.core.clearance import SafetyDistance
+from rcilab.core.command import CartesianPosition, Command, JointPosition, JointTorque
+from rcilab.core.errors import InvalidValueError
+from rcilab.core.safety_box import SafetyBox, active_box, box_from
+from rcilab.core.spatial import IDENTITY, Pose
+from rcilab.core.state import Mode, require_mode
+from rcilab.model.kinematics.closed_form import build_closed_form
+from rcilab.model.robot_model import RobotModel, require_model
 from rcilab.motion.range import RECOVERY_RANGE, range_from
-from rcilab.safety_box import SafetyBox, active_box, box_from
-from rcilab.safety_distance import SafetyDistance
-from rcilab.spatial import IDENTITY, Pose
-from rcilab.state import Mode, require_mode
 
 
 class Monitor:

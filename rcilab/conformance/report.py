@@ -6,19 +6,19 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from rcilab.conformance.advice import amount, share, with_degrees
 from rcilab.conformance.catalogue import Language, Phrase
 from rcilab.conformance.certificate import Certificate
 from rcilab.conformance.condition import AnyFault, Condition, Necessity
+from rcilab.conformance.limit_utilisation import Usage
 from rcilab.conformance.start import StartState
-from rcilab.conformance.usage import Usage
-from rcilab.conformance.wording import amount, share, with_degrees
-from rcilab.errors import ConformanceError
+from rcilab.core.errors import ConformanceError
 from rcilab.motion.motion import Motion
 
 if TYPE_CHECKING:
-    from rcilab.conformance.slow_down import SlowDown
-    from rcilab.kinematics.collision import LinkPair
-    from rcilab.words.units import Units
+    from rcilab.conformance.time_scaling import SlowDown
+    from rcilab.i18n.units import Units
+    from rcilab.model.kinematics.collision import LinkPair
 
 LISTED = 8  # Violations printed in full; a thousand sentences help nobody.
 
@@ -297,7 +297,7 @@ class Report:
         Raises:
             InvalidValueError: `at_most` is no number of at least 1.
         """
-        from rcilab.conformance.slow_down import find_slow_down
+        from rcilab.conformance.time_scaling import find_slow_down
 
         return find_slow_down(self, recommended=recommended, at_most=at_most, progress=progress)
 
@@ -343,7 +343,7 @@ class Report:
 
     def _repr_html_(self) -> str:
         from rcilab.conformance.html import report_html
-        from rcilab.spoken import language
+        from rcilab.i18n.localized_text import language
 
         return report_html(self, language())
 

@@ -8,23 +8,23 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rcilab.arrays import Array
-from rcilab.clock import CYCLE_TIME
 from rcilab.conformance.clearance_conditions import clearance_conditions
 from rcilab.conformance.condition import Condition
 from rcilab.conformance.conditions import START_POSITION_TOLERANCE
-from rcilab.conformance.rest import beyond_a_cycle
+from rcilab.conformance.standstill import beyond_a_cycle
 from rcilab.conformance.start import StartState
 from rcilab.conformance.tool_signals import ToolSignals
-from rcilab.model import RobotModel
+from rcilab.core.arrays import Array
+from rcilab.core.clearance import SafetyDistance
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.safety_box import EntryBox, SafetyBox, box_from
+from rcilab.core.state import Mode
+from rcilab.model.robot_model import RobotModel
 from rcilab.motion.motion import Motion
-from rcilab.safety_box import EntryBox, SafetyBox, box_from
-from rcilab.safety_distance import SafetyDistance
-from rcilab.state import Mode
 
 if TYPE_CHECKING:
     from rcilab.conformance.clearance_path import ClearancePath
-    from rcilab.kinematics.collision import LinkPair
+    from rcilab.model.kinematics.collision import LinkPair
 
 HOLD_SAMPLES = 3
 """Cycles judged after the last row, in which the controller repeats it: a third difference looks back that far."""
@@ -82,7 +82,7 @@ class MotionSignals:
         """Returns between whom the distance in a row of a table is; None for anything that is no distance."""
         if not condition.is_clearance:
             return None
-        from rcilab.kinematics.collision import LinkPair
+        from rcilab.model.kinematics.collision import LinkPair
 
         return LinkPair(*self._clearance[condition.signal].links[row].tolist())
 
@@ -134,7 +134,7 @@ class MotionSignals:
     def _clearance(self) -> dict[str, ClearancePath]:
         """The smallest distance between links, and that from the floor, by signal."""
         from rcilab.conformance.clearance_path import clearance_path
-        from rcilab.kinematics.collision import ClearanceQuery
+        from rcilab.model.kinematics.collision import ClearanceQuery
 
         assert self._distance is not None
         geometry = self._model.collision_geometry(self._distance)

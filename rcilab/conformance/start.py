@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.arrays import JointVector, as_vector
+from rcilab.core.arrays import JointVector, as_vector
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -13,7 +13,7 @@ from collections.abc import Callable
 import numpy as np
 
 from rcilab.conformance.condition import MANUAL, AnyLimits, Bounds, Condition, all_limits, joint_limits, same
-from rcilab.faults import Fault
+from rcilab.core.faults import Fault
 
 BOX_TOLERANCE = 1e-9  # [m]
 """How far outside the safety box a tool still counts as inside. A choice: a tool on the wall must not stop the arm."""

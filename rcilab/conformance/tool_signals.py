@@ -8,12 +8,12 @@ from typing import TypeAlias
 
 import numpy as np
 
-from rcilab.arrays import Array, JointPath
-from rcilab.clock import CYCLE_TIME
 from rcilab.conformance.start import StartState
-from rcilab.kinematics.closed_form import build_closed_form
-from rcilab.model import RobotModel
-from rcilab.spatial import Rotation9, turn_between
+from rcilab.core.arrays import Array, JointPath
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.spatial import Rotation9, turn_between
+from rcilab.model.kinematics.closed_form import build_closed_form
+from rcilab.model.robot_model import RobotModel
 
 BEFORE = 3
 """Commands before the first that is judged: a third difference looks back that far."""

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from rcilab.clock import CYCLE_TIME
-from rcilab.conformance.bound_rows import BoundRows
-from rcilab.conformance.breach import Breach
+from rcilab.conformance.bounds_table import BoundRows
 from rcilab.conformance.condition import Condition
+from rcilab.conformance.limit_violation import Breach
 from rcilab.conformance.tool_conditions import TORQUE_CONDITIONS
-from rcilab.errors import InvalidValueError
-from rcilab.faults import Fault
-from rcilab.limits import JointLimits
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.errors import InvalidValueError
+from rcilab.core.faults import Fault
+from rcilab.core.limits import JointLimits
 
 
 class TorqueMonitor:

@@ -16,9 +16,9 @@ import numpy as np
 import ruckig
 from ruckig import Result
 
-from rcilab.arrays import Array, JointVector
-from rcilab.clock import CYCLE_TIME
-from rcilab.errors import PlanningError
+from rcilab.core.arrays import Array, JointVector
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.errors import PlanningError
 from rcilab.motion.piecewise import PiecewisePolynomial, join_pieces
 
 _FACTORIALS = (1.0, 1.0, 2.0, 6.0)

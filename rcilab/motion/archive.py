@@ -12,8 +12,8 @@ from zipfile import BadZipFile, ZipFile
 
 import numpy as np
 
-from rcilab.errors import InvalidValueError
-from rcilab.file_bounds import require_bytes
+from rcilab.core.errors import InvalidValueError
+from rcilab.core.file_bounds import require_bytes
 
 SINGLE_ARRAY = "a single array"
 """The name of the array in a file that holds one without a name."""

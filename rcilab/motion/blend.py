@@ -14,12 +14,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rcilab.arrays import Array
-from rcilab.model import RobotModel
+from rcilab.core.arrays import Array
+from rcilab.core.spatial import Pose, wxyz_from_rotation
+from rcilab.model.robot_model import RobotModel
 from rcilab.motion.hermite import State, evaluate, quintic
 from rcilab.motion.path import Path
 from rcilab.motion.segment import Segment
-from rcilab.spatial import Pose, wxyz_from_rotation
 
 _LOOKS = 33
 """Places at which a segment's half, or a blend, is looked at; a choice."""

@@ -9,14 +9,13 @@ from typing import TypeAlias, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.arrays import Array, JointVector, as_number, as_vector, described
-from rcilab.clock import CYCLE_TIME
-from rcilab.errors import InvalidValueError, PlanningError, SingularError
-from rcilab.model import RobotModel, require_model
-from rcilab.motion.along import curve_through, plan_along, require_path
+from rcilab.core.arrays import Array, JointVector, as_number, as_vector, described
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.errors import InvalidValueError, PlanningError, SingularError
+from rcilab.core.spatial import Pose
+from rcilab.model.robot_model import RobotModel, require_model
 from rcilab.motion.joint import JOINT_LAWS, MIN_SPEED, JointLaw
 from rcilab.motion.motion import Motion, standing
-from rcilab.motion.obstacle import examine, refusal
 from rcilab.motion.path import (
     ArcOrientation,
     CircleOrientation,
@@ -27,12 +26,13 @@ from rcilab.motion.path import (
     build_line,
     circle_through,
 )
+from rcilab.motion.path_infeasibility import examine, refusal
+from rcilab.motion.path_timing import curve_through, plan_along, require_path
 from rcilab.motion.piecewise import join_pieces
 from rcilab.motion.range import require_inside
 from rcilab.motion.s_curve import plan_s_curve
-from rcilab.motion.time_law import TimeLaw
+from rcilab.motion.time_parametrization import TimeLaw
 from rcilab.motion.torque_rate import plan_within_torque_rate
-from rcilab.spatial import Pose
 
 PathLaw: TypeAlias = JointLaw
 """How a path is followed: by the same laws as a joint motion, the S profile being that of MOVEL (manual 3.5)."""

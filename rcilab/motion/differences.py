@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.arrays import JointVector
-from rcilab.clock import CYCLE_TIME
+from rcilab.core.arrays import JointVector
+from rcilab.core.clock import CYCLE_TIME
 
 
 def derivatives_from_differences(

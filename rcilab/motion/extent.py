@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rcilab.arrays import JointVector
-from rcilab.clock import CYCLE_TIME
-from rcilab.model import RobotModel
+from rcilab.core.arrays import JointVector
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.model.robot_model import RobotModel
 from rcilab.motion.motion import Motion
 
 _STILL = 1e-6  # [rad] A joint that turns less stands still.

@@ -6,7 +6,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from rcilab.arrays import Array
+from rcilab.core.arrays import Array
 
 State: TypeAlias = tuple[Array, Array, Array]
 """Values with their first two derivatives, each of the same shape."""

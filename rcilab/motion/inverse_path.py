@@ -1,14 +1,14 @@
-"""The inverse along a path of the tool: `rcilab.kinematics.branch` for an arm with its tool."""
+"""The inverse along a path of the tool: `rcilab.model.kinematics.branch` for an arm with its tool."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from rcilab.arrays import Array, JointPath, JointVector
-from rcilab.kinematics.branch import Loss
-from rcilab.kinematics.closed_form import build_closed_form
-from rcilab.model import RobotModel
-from rcilab.spatial import IDENTITY
+from rcilab.core.arrays import Array, JointPath, JointVector
+from rcilab.core.spatial import IDENTITY
+from rcilab.model.kinematics.branch import Loss
+from rcilab.model.kinematics.closed_form import build_closed_form
+from rcilab.model.robot_model import RobotModel
 
 
 def inverse_path(model: RobotModel, T: Array, psi: Array | None, start: JointVector) -> tuple[JointPath, Loss | None]:

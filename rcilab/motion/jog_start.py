@@ -6,9 +6,9 @@ from math import degrees
 
 import numpy as np
 
-from rcilab.arrays import JointVector
-from rcilab.errors import PlanningError
-from rcilab.limits import JointLimits
+from rcilab.core.arrays import JointVector
+from rcilab.core.errors import PlanningError
+from rcilab.core.limits import JointLimits
 from rcilab.motion.stop import plan_stop
 
 

@@ -8,10 +8,10 @@ from typing import Literal, Protocol, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.arrays import JointVector, as_number, as_vector
-from rcilab.errors import InvalidValueError, PlanningError
-from rcilab.limits import JointLimits, Limits
-from rcilab.model import require_model
+from rcilab.core.arrays import JointVector, as_number, as_vector
+from rcilab.core.errors import InvalidValueError, PlanningError
+from rcilab.core.limits import JointLimits, Limits
+from rcilab.model.robot_model import require_model
 from rcilab.motion import _ruckig
 from rcilab.motion.margin import LIMIT_MARGIN
 from rcilab.motion.motion import Motion, standing

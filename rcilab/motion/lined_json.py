@@ -13,8 +13,8 @@ from json import JSONDecodeError, JSONDecoder
 from types import MappingProxyType
 from typing import TypeAlias
 
-from rcilab.arrays import Words
-from rcilab.errors import InvalidValueError
+from rcilab.core.arrays import Words
+from rcilab.core.errors import InvalidValueError
 
 LONGEST = 8_000_000
 """Largest text, [bytes]; a choice: a program of 10 000 waypoints has 4 million."""

@@ -11,14 +11,14 @@ from typing import BinaryIO, Literal, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rcilab.arrays import Array, JointPath, JointVector, as_number, as_path, as_vector, described, frozen
-from rcilab.clock import CYCLE_TIME
-from rcilab.errors import InvalidValueError
-from rcilab.file_bounds import MOST_ROWS
-from rcilab.language import Language
+from rcilab.core.arrays import Array, JointPath, JointVector, as_number, as_path, as_vector, described, frozen
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.errors import InvalidValueError
+from rcilab.core.file_bounds import MOST_ROWS
+from rcilab.i18n.locale import Language
+from rcilab.i18n.localized_text import language
+from rcilab.i18n.translator import Remark
 from rcilab.motion.piecewise import DERIVATIVES, PiecewisePolynomial
-from rcilab.spoken import language
-from rcilab.words.text import Remark
 
 Law: TypeAlias = Literal["jerk_limited", "torque_rate_limited", "s_profile", "stop", "samples"]
 """How a motion runs along its path: as fast as all limits allow, the same with the recommended torque rate kept too, by

@@ -7,9 +7,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.arrays import JointVector, as_number, as_vector, frozen
-from rcilab.errors import InvalidValueError
-from rcilab.model import RobotModel, require_model
+from rcilab.core.arrays import JointVector, as_number, as_vector, frozen
+from rcilab.core.errors import InvalidValueError
+from rcilab.model.robot_model import RobotModel, require_model
 from rcilab.motion import _ruckig
 from rcilab.motion.jog_start import require_stoppable
 from rcilab.motion.joint import MIN_SPEED

@@ -13,11 +13,11 @@ from typing import Literal, TypeAlias, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.arrays import Array, as_number, as_vector, described
-from rcilab.errors import InvalidValueError, PlanningError
+from rcilab.core.arrays import Array, as_number, as_vector, described
+from rcilab.core.errors import InvalidValueError, PlanningError
+from rcilab.core.spatial import Pose, Rotation9, as_pose, rotation_from_wxyz, wxyz_from_rotation
+from rcilab.motion.orientation_path import SteadyTurn, Turning, turn_through, turn_to
 from rcilab.motion.s_curve import STANDSTILL_DISTANCE
-from rcilab.motion.turning import SteadyTurn, Turning, turn_through, turn_to
-from rcilab.spatial import Pose, Rotation9, as_pose, rotation_from_wxyz, wxyz_from_rotation
 
 _COLLINEAR = 1e-4
 """Sine of the angle between two chords below which three points make no circle: its radius would be 5 000 chords."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rcilab.arrays import Array
+from rcilab.core.arrays import Array
 
 LEAST = 1e-12
 """A slope by s below which a row bounds nothing, and the least square of s'."""

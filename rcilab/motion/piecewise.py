@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rcilab.arrays import Array, JointPath, JointVector, frozen
-from rcilab.errors import InvalidValueError
+from rcilab.core.arrays import Array, JointPath, JointVector, frozen
+from rcilab.core.errors import InvalidValueError
 
 DERIVATIVES = 4
 """Position, velocity, acceleration and jerk."""

@@ -11,24 +11,24 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.arrays import Array, JointVector, as_number, as_vector, described, sealed
-from rcilab.clock import CYCLE_TIME
-from rcilab.errors import InvalidValueError, PlanningError
-from rcilab.file_bounds import MOST_ROWS, require_max_rows
-from rcilab.model import RobotModel, require_model
+from rcilab.core.arrays import Array, JointVector, as_number, as_vector, described, sealed
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.errors import InvalidValueError, PlanningError
+from rcilab.core.file_bounds import MOST_ROWS, require_max_rows
+from rcilab.i18n.translator import Remark
+from rcilab.model.robot_model import RobotModel, require_model
 from rcilab.motion.blend import Blend, build_blend, turn
 from rcilab.motion.cartesian import plan_path
-from rcilab.motion.chain import build_chain
-from rcilab.motion.chain_motion import plan_chain
 from rcilab.motion.joint import JOINT_LAWS, MIN_SPEED, JointLaw, plan_joint
 from rcilab.motion.motion import Motion
 from rcilab.motion.piecewise import PiecewisePolynomial
 from rcilab.motion.program import MOST_WAYPOINTS, Program
 from rcilab.motion.s_curve import STANDSTILL_DISTANCE
 from rcilab.motion.segment import Segment, build_segments, naming
+from rcilab.motion.segment_spline import build_chain
+from rcilab.motion.segment_spline_motion import plan_chain
 from rcilab.motion.torque_rate import plan_within_torque_rate
 from rcilab.motion.waypoint import label
-from rcilab.words.text import Remark
 
 _SHORTENED = 1e-6
 """How much shorter than asked a radius must be to be mentioned, [m]."""

@@ -6,11 +6,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from os import PathLike
 
-from rcilab.arrays import Words, as_vector, described
-from rcilab.errors import InvalidValueError
+from rcilab.core.arrays import Words, as_vector, described
+from rcilab.core.errors import InvalidValueError
+from rcilab.core.spatial import Pose
 from rcilab.motion.waypoint import Floats, Waypoint, angles_of, named_value, require_fit, vector_of
 from rcilab.robots import describe_robot
-from rcilab.spatial import Pose
 
 MOST_WAYPOINTS = 10_000
 """A choice; a motion through them has a gigabyte."""

@@ -8,13 +8,13 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
 
-from rcilab.arrays import Words, described
-from rcilab.errors import InvalidValueError, ModelError, VersionMismatchError, plain_text
+from rcilab.core.arrays import Words, described
+from rcilab.core.atomic_file import read_whole, replacing
+from rcilab.core.errors import InvalidValueError, ModelError, VersionMismatchError, plain_text
 from rcilab.motion.lined_json import LONGEST, LongListError, Node, read_json
 from rcilab.motion.program import MOST_WAYPOINTS, Program, require_count
 from rcilab.motion.waypoint import ALLOWED, ALWAYS, WORDS, Waypoint, require_fit
 from rcilab.robots import RobotDescription, describe_robot
-from rcilab.whole_file import read_whole, replacing
 
 FORMAT = "rcilab program"
 VERSION = 1

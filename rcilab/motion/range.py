@@ -7,9 +7,9 @@ from math import degrees, inf, radians
 
 import numpy as np
 
-from rcilab.arrays import JointVector, frozen
-from rcilab.errors import PlanningError
-from rcilab.limits import JointLimits
+from rcilab.core.arrays import JointVector, frozen
+from rcilab.core.errors import PlanningError
+from rcilab.core.limits import JointLimits
 
 RECOVERY_RANGE = radians(20.0)
 """How far outside its range a joint may start to be led back, [rad]. A tuning value: from their highest speed the arms

@@ -13,8 +13,8 @@ from math import copysign, isfinite, sqrt
 
 import numpy as np
 
-from rcilab.arrays import Array
-from rcilab.errors import InvalidValueError
+from rcilab.core.arrays import Array
+from rcilab.core.errors import InvalidValueError
 
 STANDSTILL_DISTANCE = 1e-6
 """A coordinate that is to move no farther than this does not move at all, [rad or m]."""

@@ -10,16 +10,16 @@ from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 
-from rcilab.arrays import Array, JointPath, as_number, as_path, as_vector
-from rcilab.clock import CYCLE_TIME
-from rcilab.errors import InvalidValueError
-from rcilab.file_bounds import MOST_ROWS, ROW_BYTES, require_bytes, require_max_rows, require_rows
+from rcilab.core.arrays import Array, JointPath, as_number, as_path, as_vector
+from rcilab.core.atomic_file import read_whole
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.errors import InvalidValueError
+from rcilab.core.file_bounds import MOST_ROWS, ROW_BYTES, require_bytes, require_max_rows, require_rows
 from rcilab.motion.archive import read_arrays
 from rcilab.motion.motion import Motion
 from rcilab.motion.spline import motion_through
 from rcilab.motion.storage import KIND
 from rcilab.motion.table import Table, read_table
-from rcilab.whole_file import read_whole
 
 AngleUnit: TypeAlias = Literal["rad", "deg"]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rcilab.arrays import Array
+from rcilab.core.arrays import Array
 
 
 def spread(factor: Array, s: Array, knots: Array, reach: int) -> Array:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.arrays import Array, JointPath, as_path, as_vector
-from rcilab.errors import InvalidValueError
+from rcilab.core.arrays import Array, JointPath, as_path, as_vector
+from rcilab.core.errors import InvalidValueError
 from rcilab.motion.motion import Motion, standing
 from rcilab.motion.piecewise import PiecewisePolynomial
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from numpy.typing import ArrayLike
 
-from rcilab.arrays import as_vector, described
-from rcilab.errors import InvalidValueError
-from rcilab.limits import JointLimits
+from rcilab.core.arrays import as_vector, described
+from rcilab.core.errors import InvalidValueError
+from rcilab.core.limits import JointLimits
 from rcilab.motion import _ruckig
 from rcilab.motion.margin import LIMIT_MARGIN
 from rcilab.motion.motion import Motion, standing

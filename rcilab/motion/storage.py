@@ -9,14 +9,14 @@ from typing import IO, BinaryIO
 
 import numpy as np
 
-from rcilab.arrays import as_number
-from rcilab.cycle_file import Column, write_csv
-from rcilab.errors import InvalidValueError, VersionMismatchError
-from rcilab.file_bounds import MOST_ROWS, ROW_BYTES, require_bytes, require_max_rows, require_rows
+from rcilab.core.arrays import as_number
+from rcilab.core.atomic_file import read_whole, replacing
+from rcilab.core.cycle_log import Column, write_csv
+from rcilab.core.errors import InvalidValueError, VersionMismatchError
+from rcilab.core.file_bounds import MOST_ROWS, ROW_BYTES, require_bytes, require_max_rows, require_rows
 from rcilab.motion.archive import read_arrays
 from rcilab.motion.motion import Motion
 from rcilab.motion.piecewise import PiecewisePolynomial
-from rcilab.whole_file import read_whole, replacing
 
 KIND = "rcilab motion"
 VERSION = 1

@@ -11,9 +11,9 @@ from io import StringIO
 
 import numpy as np
 
-from rcilab.arrays import Array
-from rcilab.errors import InvalidValueError
-from rcilab.file_bounds import require_rows
+from rcilab.core.arrays import Array
+from rcilab.core.errors import InvalidValueError
+from rcilab.core.file_bounds import require_rows
 
 _LONGEST_LINE = 65_536  # Characters. A choice: a line of ours has some hundreds.
 

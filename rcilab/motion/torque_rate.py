@@ -8,9 +8,9 @@ from typing import TypeVar
 
 import numpy as np
 
-from rcilab.arrays import Array
-from rcilab.clock import CYCLE_TIME
-from rcilab.model import RobotModel
+from rcilab.core.arrays import Array
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.model.robot_model import RobotModel
 from rcilab.motion.piecewise import PiecewisePolynomial
 
 _ATTEMPTS = 6

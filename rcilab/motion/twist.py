@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING, Literal, TypeAlias, get_args
 
 import numpy as np
 
-from rcilab.arrays import Array, Matrix
-from rcilab.clock import CYCLE_TIME
-from rcilab.errors import InvalidValueError
-from rcilab.kinematics.forward import build_chain
-from rcilab.kinematics.jacobian import tool_jacobian
-from rcilab.model import RobotModel
+from rcilab.core.arrays import Array, Matrix
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.errors import InvalidValueError
+from rcilab.model.kinematics.forward import build_chain
+from rcilab.model.kinematics.jacobian import tool_jacobian
+from rcilab.model.robot_model import RobotModel
 from rcilab.motion import _ruckig
 
 if TYPE_CHECKING:
-    from rcilab.dynamics.symmetric_solver import SymmetricSolver
+    from rcilab.model.dynamics.symmetric_solver import SymmetricSolver
 
 Frame: TypeAlias = Literal["base", "tool"]
 """Axes in which a twist is given; its point is the tool tip in both."""
@@ -71,7 +71,7 @@ class TwistFollower:
         jerk: Sequence[float],
         speed: float,
     ) -> None:
-        from rcilab.dynamics.symmetric_solver import SymmetricSolver  # Loads for 0.1 s.
+        from rcilab.model.dynamics.symmetric_solver import SymmetricSolver  # Loads for 0.1 s.
 
         tool = model.limits.cartesian
         self._chain, self._T_flange_tool = build_chain(model.description.dh), model.T_flange_tool

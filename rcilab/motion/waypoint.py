@@ -9,12 +9,12 @@ from typing import Any, Literal, TypeAlias, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.arrays import as_number, as_vector, described
-from rcilab.errors import InvalidValueError
+from rcilab.core.arrays import as_number, as_vector, described
+from rcilab.core.errors import InvalidValueError
+from rcilab.core.spatial import Pose, as_pose, is_transform
 from rcilab.motion.joint import MIN_SPEED
 from rcilab.motion.path import CircleOrientation, Way
 from rcilab.motion.samples import MOST
-from rcilab.spatial import Pose, as_pose, is_transform
 
 WaypointType: TypeAlias = Literal["joint", "line", "arc", "circle", "nullspace"]
 

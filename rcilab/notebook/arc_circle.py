@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from rcilab.kinematics.feasible_arcs import FeasibleArcs
-from rcilab.notebook.look import esc
-from rcilab.words.text import Text
+from rcilab.i18n.translator import Text
+from rcilab.model.kinematics.elbow_ranges import FeasibleArcs
+from rcilab.notebook.style import esc
 
 _SIZE, _RADIUS, _WIDTH = 190.0, 62.0, 13.0
 _GOOD, _BAD, _GREY = "#1f9d57", "#d1392b", "#8a94a3"

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from rcilab.posing.planning import Plan, picture
+from rcilab.app.planning import Plan, picture
 
 if TYPE_CHECKING:
-    from rcilab.model import RobotModel
+    from rcilab.model.robot_model import RobotModel
     from rcilab.motion import Motion
     from rcilab.recording.run import Run
 

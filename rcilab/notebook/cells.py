@@ -134,7 +134,7 @@ def kernel_cells() -> Cells:
         _kernel_cells = Cells(shell)
         atexit.register(_kernel_cells.close)
         if getattr(shell, "kernel", None) is not None and find_spec("ipywidgets") is not None:
-            from rcilab.notebook.page_watch import PageWatch
+            from rcilab.notebook.browser_watchdog import PageWatch
 
             _kernel_cells.keep(PageWatch())
     return _kernel_cells

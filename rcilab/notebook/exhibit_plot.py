@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from rcilab.gallery.exhibit import Exhibit
-from rcilab.gallery.shown import seen_lower
-from rcilab.notebook.look import esc
+from rcilab.app.fault_lab.demo_view import seen_lower
+from rcilab.app.fault_lab.fault_demo import Exhibit
+from rcilab.notebook.style import esc
 from rcilab.notebook.svg_plot import BAD, LINE, SOFT, number, ticks
 
 _WIDTH, _HEIGHT = 420.0, 150.0  # Units; the browser scales them to its place.

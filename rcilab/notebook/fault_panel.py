@@ -7,21 +7,21 @@ from typing import Any
 
 import ipywidgets
 
-from rcilab.errors import RcilabError
-from rcilab.faults import Fault, name_faults
-from rcilab.gallery.exhibit import Exhibit
-from rcilab.gallery.exhibition import exhibition_of
-from rcilab.gallery.private_arm import PrivateArm
-from rcilab.gallery.shown import body_html, head_html
-from rcilab.gallery.table import FAULTS
+from rcilab.app.fault_lab.demo_motion import exhibition_of
+from rcilab.app.fault_lab.demo_view import body_html, head_html
+from rcilab.app.fault_lab.fault_demo import Exhibit
+from rcilab.app.fault_lab.private_arm import PrivateArm
+from rcilab.app.fault_lab.table import FAULTS
+from rcilab.control_process.status_messages import tell_error
+from rcilab.core.errors import RcilabError
+from rcilab.core.faults import Fault, name_faults
+from rcilab.i18n.translator import Text, message
 from rcilab.notebook.exhibit_plot import draw_exhibit
 from rcilab.notebook.flight_recorder import record_html
-from rcilab.notebook.lean import lean
-from rcilab.notebook.long_work import LongWork
-from rcilab.notebook.look import block, esc, problem, soft, verdict, write
+from rcilab.notebook.long_task import LongWork
 from rcilab.notebook.part import Part
-from rcilab.supervisor.telling import tell_error
-from rcilab.words.text import Text, message
+from rcilab.notebook.style import block, esc, problem, soft, verdict, write
+from rcilab.notebook.widget_sharing import lean
 
 
 class FaultPanel(Part):

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rcilab.limits import JointLimits
-from rcilab.notebook.look import head, soft, table
+from rcilab.core.limits import JointLimits
+from rcilab.i18n.translator import Text
 from rcilab.notebook.state import LabState
+from rcilab.notebook.style import head, soft, table
 from rcilab.notebook.svg_plot import Panel, draw
 from rcilab.views.plots import Quantity, build_frame, recorded_curves
-from rcilab.words.text import Text
 
 _RECORDED = 400  # Cycles before the end that are drawn; a choice: 0.4 s.
 _LISTED = 8

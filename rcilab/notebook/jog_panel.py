@@ -9,13 +9,13 @@ import ipywidgets
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.arrays import JointVector, frozen
-from rcilab.notebook.lean import lean
-from rcilab.notebook.look import block, verdict, write
+from rcilab.core.arrays import JointVector, frozen
+from rcilab.i18n.rounding import fixed
 from rcilab.notebook.number_field import NumberField
 from rcilab.notebook.part import Part
 from rcilab.notebook.slider_echo import SliderEcho
-from rcilab.words.rounding import fixed
+from rcilab.notebook.style import block, verdict, write
+from rcilab.notebook.widget_sharing import lean
 
 _STEP_DEG = 0.5
 

@@ -8,9 +8,9 @@ from collections.abc import Mapping
 from hashlib import sha256
 from pathlib import Path
 
-from rcilab.errors import UsageError
-from rcilab.notebook.installed import require_installed
+from rcilab.core.errors import UsageError
 from rcilab.notebook.lessons import INDEX
+from rcilab.notebook.optional_deps import require_installed
 
 _CONFIG_PATH = "JUPYTER_CONFIG_PATH"
 

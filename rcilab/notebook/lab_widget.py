@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING, Any
 
 import ipywidgets
 
-from rcilab.errors import UsageError
-from rcilab.notebook.at_once import hear_at_once
+from rcilab.core.errors import UsageError
 from rcilab.notebook.jog_panel import JogPanel
-from rcilab.notebook.lean import lean
-from rcilab.notebook.look import PHASE_TONES, Tone, block, esc, write
+from rcilab.notebook.kernel_reachability import Place
 from rcilab.notebook.motion_plot import MotionPlot
 from rcilab.notebook.part import Part
-from rcilab.notebook.place import Place
 from rcilab.notebook.robot_words import name_phase
 from rcilab.notebook.scene import Scene, View
+from rcilab.notebook.style import PHASE_TONES, Tone, block, esc, write
+from rcilab.notebook.subshell_routing import hear_at_once
 from rcilab.notebook.timeline import Timeline
+from rcilab.notebook.widget_sharing import lean
 
 if TYPE_CHECKING:
     from rcilab.notebook.fault_panel import FaultPanel

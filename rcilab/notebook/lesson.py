@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from rcilab.language import Language
-from rcilab.spoken import language
+from rcilab.i18n.locale import Language
+from rcilab.i18n.localized_text import language
 
 __all__ = ["answer", "language"]
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 
-from rcilab.errors import UsageError
-from rcilab.whole_file import write_whole
+from rcilab.core.atomic_file import write_whole
+from rcilab.core.errors import UsageError
 
 INDEX = "index.md"
 """The page of the course: every lesson by its title, English and Chinese apart."""

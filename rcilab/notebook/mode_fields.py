@@ -7,16 +7,28 @@ from typing import Any
 
 import ipywidgets
 
-from rcilab.client.control_settings import ControlPart, ControlSettings, control_ranges, standard_control
-from rcilab.notebook.lean import lean
-from rcilab.notebook.look import block, esc, head, problem, soft, table, verdict, write
+from rcilab.app.mode_parameters import (
+    PARTS_OF_MODE,
+    held_rows,
+    is_control_pending,
+    name_number,
+    name_part,
+    shown_numbers,
+)
+from rcilab.control_process import SupervisorStatus
+from rcilab.core.state import MODES
+from rcilab.i18n.translator import Text
+from rcilab.makers.rokae.driver.controller_parameters import (
+    ControlPart,
+    ControlSettings,
+    control_ranges,
+    standard_control,
+)
 from rcilab.notebook.number_field import NumberField
-from rcilab.notebook.parameter_desk import ParameterDesk
+from rcilab.notebook.parameter_sync import ParameterDesk
 from rcilab.notebook.state import LabState
-from rcilab.posing.driving import PARTS_OF_MODE, held_rows, is_control_pending, name_number, name_part, shown_numbers
-from rcilab.state import MODES
-from rcilab.supervisor import SupervisorStatus
-from rcilab.words.text import Text
+from rcilab.notebook.style import block, esc, head, problem, soft, table, verdict, write
+from rcilab.notebook.widget_sharing import lean
 
 _WIDTHS = ("8em", "3.4em", "4.2em")  # So that two fields stand in a row inside `Lab`.
 _OPEN: tuple[ControlPart, ...] = ("joint_stiffness", "cartesian_stiffness")

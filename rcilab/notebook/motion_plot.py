@@ -7,11 +7,12 @@ from typing import Any
 import ipywidgets
 import numpy as np
 
-from rcilab.clock import CYCLE_TIME
-from rcilab.notebook.lean import lean
-from rcilab.notebook.look import block, soft, write
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.i18n.plot_scale import plot_scale
 from rcilab.notebook.part import Part
+from rcilab.notebook.style import block, soft, write
 from rcilab.notebook.svg_plot import Panel, draw, share_of
+from rcilab.notebook.widget_sharing import lean
 from rcilab.recording.run import Run
 from rcilab.views.plots import (
     QUANTITIES,
@@ -24,7 +25,6 @@ from rcilab.views.plots import (
     recorded_curves,
     streamed_curves,
 )
-from rcilab.words.plot_scale import plot_scale
 
 _BUCKETS = 200  # Of time; each shows its smallest and largest value, so no spike is lost.
 _UNITS: dict[Quantity, str] = {"q": "deg", "dq": "deg/s", "ddq": "deg/s²", "jerk": "deg/s³"}

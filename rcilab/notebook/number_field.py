@@ -7,11 +7,11 @@ from typing import Any
 
 import ipywidgets
 
-from rcilab.notebook.lean import lean
-from rcilab.notebook.look import block, problem, write
-from rcilab.words.number import parse_number
-from rcilab.words.rounding import fixed
-from rcilab.words.text import Text
+from rcilab.i18n.number_parsing import parse_number
+from rcilab.i18n.rounding import fixed
+from rcilab.i18n.translator import Text
+from rcilab.notebook.style import block, problem, write
+from rcilab.notebook.widget_sharing import lean
 
 _LABELLED, _BARE = ("9.5em", "4em", "2.6em"), ("5.2em", "", "2.6em")
 

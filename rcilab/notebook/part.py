@@ -8,14 +8,14 @@ from typing import Any
 
 import ipywidgets
 
-from rcilab.closing import Closing
-from rcilab.model import RobotModel
+from rcilab.core.closeable import Closing
+from rcilab.i18n.localized_text import chosen_language
+from rcilab.i18n.translator import Text
+from rcilab.model.robot_model import RobotModel
 from rcilab.notebook.cells import kernel_cells
-from rcilab.notebook.lean import lean
-from rcilab.notebook.look import close_tree, style_sheet
 from rcilab.notebook.state import LabState, Topic, state_of
-from rcilab.spoken import chosen_language
-from rcilab.words.text import Text
+from rcilab.notebook.style import close_tree, style_sheet
+from rcilab.notebook.widget_sharing import lean
 
 _PACKAGE = "rcilab.notebook"
 

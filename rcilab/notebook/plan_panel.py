@@ -8,19 +8,19 @@ from typing import Any
 
 import ipywidgets
 
-from rcilab.background import Tell
-from rcilab.conformance.slow_down import SlowDown
-from rcilab.errors import RcilabError
-from rcilab.notebook.lean import lean
-from rcilab.notebook.long_work import LongWork
-from rcilab.notebook.look import block, problem, soft, verdict, write
+from rcilab.app.planning import LAWS, Plan, picture
+from rcilab.conformance.time_scaling import SlowDown
+from rcilab.core.background_job import Tell
+from rcilab.core.errors import RcilabError
+from rcilab.i18n.error_messages import tell
+from rcilab.i18n.translator import Message, message
+from rcilab.notebook.long_task import LongWork
 from rcilab.notebook.number_field import NumberField
 from rcilab.notebook.part import Part
 from rcilab.notebook.slider_echo import SliderEcho
 from rcilab.notebook.state import WAYS
-from rcilab.posing.planning import LAWS, Plan, picture
-from rcilab.words.errors import tell
-from rcilab.words.text import Message, message
+from rcilab.notebook.style import block, problem, soft, verdict, write
+from rcilab.notebook.widget_sharing import lean
 
 _SLOWEST = 1.0  # [%]
 _UNSEEN = 0.3  # [s] A choice: what is planned sooner needs no bar; most are.

@@ -9,21 +9,21 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rcilab.arrays import Array, as_vector
-from rcilab.clock import CYCLE_TIME
 from rcilab.conformance.check import HOLD_SAMPLES, check
 from rcilab.conformance.condition import Condition
 from rcilab.conformance.conditions import CYCLE_CONDITIONS
-from rcilab.errors import InvalidValueError
-from rcilab.limits import JointLimits
-from rcilab.model import RobotModel, require_model
+from rcilab.core.arrays import Array, as_vector
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.errors import InvalidValueError
+from rcilab.core.limits import JointLimits
+from rcilab.i18n.localized_text import chosen_language
+from rcilab.i18n.translator import Text
+from rcilab.model.robot_model import RobotModel, require_model
 from rcilab.motion.motion import Motion, require_motion
-from rcilab.notebook.installed import require_installed
+from rcilab.notebook.fonts import writing
+from rcilab.notebook.optional_deps import require_installed
 from rcilab.notebook.palette import JOINT_COLORS
-from rcilab.notebook.writing import writing
-from rcilab.spoken import chosen_language
 from rcilab.views.plots import QUANTITIES, recorded_curves
-from rcilab.words.text import Text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

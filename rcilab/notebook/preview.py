@@ -11,17 +11,17 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.arrays import Array, as_vector
-from rcilab.closing import Closing
-from rcilab.errors import InvalidValueError, UsageError
-from rcilab.model import RobotModel, require_model
-from rcilab.notebook.installed import require_installed
-from rcilab.notebook.place import find_place
+from rcilab.core.arrays import Array, as_vector
+from rcilab.core.atomic_file import replacing
+from rcilab.core.closeable import Closing
+from rcilab.core.errors import InvalidValueError, UsageError
+from rcilab.i18n.localized_text import chosen_language
+from rcilab.i18n.translator import Text
+from rcilab.model.robot_model import RobotModel, require_model
+from rcilab.notebook.kernel_reachability import find_place
+from rcilab.notebook.optional_deps import require_installed
 from rcilab.robots.upright import upright_joints
-from rcilab.spoken import chosen_language
 from rcilab.views.arm_view import ArmView
-from rcilab.whole_file import replacing
-from rcilab.words.text import Text
 
 if TYPE_CHECKING:
     from rcilab.motion.motion import Motion
@@ -179,7 +179,7 @@ def preview(
         motion: What to play; or joint angles, shape (n,), [rad], to show the arm standing there.
         model: The arm.
         live: Served by the kernel (True) or part of the notebook (False); None serves it wherever the browser can
-            reach the kernel, see `rcilab.notebook.place`.
+            reach the kernel, see `rcilab.notebook.kernel_reachability`.
         height: Height in the notebook, [px].
         language: "en" or "zh"; that of the notebook when absent.
 

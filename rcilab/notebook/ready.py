@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from rcilab.app.mode_parameters import control_obstacle
+from rcilab.app.readiness import arm_obstacle, plan_obstacle
+from rcilab.i18n.translator import Message, message
 from rcilab.notebook.state import LabState
-from rcilab.posing.driving import control_obstacle
-from rcilab.posing.readiness import arm_obstacle, plan_obstacle
-from rcilab.words.text import Message, message
 
 
 def obstacle(state: LabState) -> Message | None:

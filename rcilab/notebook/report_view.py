@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from rcilab.conformance.explain import explain_formula, explain_place, explain_source, explain_violation
 from rcilab.conformance.report import ConditionResult, Report
-from rcilab.notebook.look import Tone, block, esc, soft, verdict, write
+from rcilab.i18n.shown import value_against_bound
 from rcilab.notebook.part import Part
-from rcilab.words.shown import value_against_bound
+from rcilab.notebook.style import Tone, block, esc, soft, verdict, write
 
 _TIGHT = 0.95  # A choice: from this share of a bound on, a row is amber.
 _LISTED = 8

@@ -14,19 +14,19 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from numpy.typing import NDArray
 
-from rcilab.client.control_settings import ControlSettings
-from rcilab.client.setup import RobotSetup
-from rcilab.errors import RcilabError, UsageError
+from rcilab.control_process import Supervisor, SupervisorStatus, Ticket
+from rcilab.control_process.supervisor import VIRTUAL
+from rcilab.core.errors import RcilabError, UsageError
+from rcilab.makers.rokae.driver.configuration import RobotSetup
+from rcilab.makers.rokae.driver.controller_parameters import ControlSettings
 from rcilab.recording.live import LiveRecording, RunFacts
 from rcilab.recording.run import Run
 from rcilab.recording.setup import Setup
-from rcilab.supervisor import Supervisor, SupervisorStatus, Ticket
-from rcilab.supervisor.supervisor import VIRTUAL
 
 if TYPE_CHECKING:
-    from rcilab.model import RobotModel
+    from rcilab.app.planning import Plan
+    from rcilab.model.robot_model import RobotModel
     from rcilab.motion import Motion
-    from rcilab.posing.planning import Plan
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from rcilab.errors import ModelError, RcilabError
-from rcilab.model import RobotModel
-from rcilab.notebook.look import head, table, verdict
+from rcilab.control_process import SupervisorStatus
+from rcilab.control_process.status_messages import phase_code, tell_error, tell_status, tell_success
+from rcilab.core.errors import ModelError, RcilabError
+from rcilab.i18n.translator import Message, Text, message
+from rcilab.model.robot_model import RobotModel
 from rcilab.notebook.robot_side import BusyError, Outcome
-from rcilab.supervisor import SupervisorStatus
-from rcilab.supervisor.telling import phase_code, tell_error, tell_status, tell_success
-from rcilab.words.text import Message, Text, message
+from rcilab.notebook.style import head, table, verdict
 
 
 def name_phase(status: SupervisorStatus | None, text: Text) -> str:

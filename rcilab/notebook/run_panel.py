@@ -8,24 +8,24 @@ from typing import Any
 
 import ipywidgets
 
-from rcilab.errors import PlanningError, RcilabError
-from rcilab.notebook.at_once import hear_at_once
-from rcilab.notebook.heart import kernel_heart
-from rcilab.notebook.lean import lean
-from rcilab.notebook.look import PHASE_TONES, block, problem, soft, verdict, write
+from rcilab.app.readiness import ask_to_move
+from rcilab.control_process import SupervisorStatus
+from rcilab.control_process.supervisor import VIRTUAL
+from rcilab.core.errors import PlanningError, RcilabError
+from rcilab.notebook.browser_heartbeat import kernel_heart
 from rcilab.notebook.mode_fields import ModeFields
-from rcilab.notebook.pace_desk import PaceDesk
-from rcilab.notebook.pace_fields import PaceFields
-from rcilab.notebook.parameter_desk import ParameterDesk
+from rcilab.notebook.parameter_sync import ParameterDesk
 from rcilab.notebook.part import Part
 from rcilab.notebook.ready import obstacle
 from rcilab.notebook.robot_side import Outcome, RobotSide, SupervisedRobot
 from rcilab.notebook.robot_words import health_html, name_phase, outcome_html, tell_refusal, tell_trouble
 from rcilab.notebook.session_robot import SessionRobot
 from rcilab.notebook.signal_fields import SignalFields
-from rcilab.posing.readiness import ask_to_move
-from rcilab.supervisor import SupervisorStatus
-from rcilab.supervisor.supervisor import VIRTUAL
+from rcilab.notebook.speed_fields import PaceFields
+from rcilab.notebook.speed_override import PaceDesk
+from rcilab.notebook.style import PHASE_TONES, block, problem, soft, verdict, write
+from rcilab.notebook.subshell_routing import hear_at_once
+from rcilab.notebook.widget_sharing import lean
 
 _LOOK = 0.1  # [s] Between two looks at the robot.
 _TARGETS = ("ideal", "mujoco", "address")

@@ -8,14 +8,14 @@ from typing import Any, Literal
 
 import numpy as np
 
-from rcilab.arrays import JointVector
-from rcilab.errors import InvalidValueError
-from rcilab.notebook.installed import require_installed
-from rcilab.notebook.look import block, soft, write
+from rcilab.app.planning import Plan
+from rcilab.core.arrays import JointVector
+from rcilab.core.errors import InvalidValueError
+from rcilab.notebook.kernel_reachability import Place, find_place
+from rcilab.notebook.optional_deps import require_installed
 from rcilab.notebook.part import Part
-from rcilab.notebook.place import Place, find_place
 from rcilab.notebook.preview import Preview, aim_camera
-from rcilab.posing.planning import Plan
+from rcilab.notebook.style import block, soft, write
 from rcilab.views.arm_view import ArmView
 from rcilab.views.scene import Color
 from rcilab.views.scene import Scene as Canvas
@@ -38,7 +38,7 @@ class Scene(Part):
     Args:
         subject: A model, a session, or another part to look at the same arm as.
         view: "meshcat" or "viser", served on loopback; "static", a film inside the notebook; "auto" takes meshcat
-            where the browser can reach the kernel (see `rcilab.notebook.place`), else the film.
+            where the browser can reach the kernel (see `rcilab.notebook.kernel_reachability`), else the film.
         height: [px]
         language: "en" or "zh"; when absent that of a part that is given, else that of the notebook.
         place: Where the browser is; found out when absent.

@@ -7,18 +7,18 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from rcilab.client.commands import SIGNALS
-from rcilab.client.control_settings import ControlSettings, give_control
-from rcilab.client.setup import RobotSetup
-from rcilab.errors import ConnectionLostError, RcilabError, UsageError
-from rcilab.notebook.page_watch import LEFT_ALONE
+from rcilab.control_process import SupervisorStatus
+from rcilab.core.errors import ConnectionLostError, RcilabError, UsageError
+from rcilab.makers.rokae.driver.commands import SIGNALS
+from rcilab.makers.rokae.driver.configuration import RobotSetup
+from rcilab.makers.rokae.driver.controller_parameters import ControlSettings, give_control
+from rcilab.notebook.browser_watchdog import LEFT_ALONE
 from rcilab.notebook.robot_side import BusyError, Outcome
-from rcilab.supervisor import SupervisorStatus
 
 if TYPE_CHECKING:
-    from rcilab.client.session import RobotSession
-    from rcilab.client.under_way import UnderWay
-    from rcilab.posing.planning import Plan
+    from rcilab.app.planning import Plan
+    from rcilab.execution.motion_progress import UnderWay
+    from rcilab.execution.session import RobotSession
     from rcilab.recording.run import Run
 
 _FRESH = 0.04  # [s] A state that is younger is not asked for again.

@@ -7,12 +7,12 @@ from typing import Any
 
 import ipywidgets
 
-from rcilab.client.commands import SIGNALS
-from rcilab.notebook.lean import lean
-from rcilab.notebook.look import block, esc, head, soft, verdict, write
+from rcilab.control_process import SupervisorStatus
+from rcilab.i18n.translator import Text
+from rcilab.makers.rokae.driver.commands import SIGNALS
 from rcilab.notebook.robot_side import RobotSide
-from rcilab.supervisor import SupervisorStatus
-from rcilab.words.text import Text
+from rcilab.notebook.style import block, esc, head, soft, verdict, write
+from rcilab.notebook.widget_sharing import lean
 
 _NAMES = ("0_0", "0_1", "0_2", "0_3", "1_0", "1_1")  # Of the manual, 3.1.13 and 3.1.14, after DO or DI.
 

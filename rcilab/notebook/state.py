@@ -15,26 +15,26 @@ from typing import TYPE_CHECKING, Literal, TypeGuard
 
 from numpy.typing import ArrayLike
 
-from rcilab.arrays import JointVector, as_vector, frozen
-from rcilab.background import Tell
-from rcilab.errors import InvalidValueError, KinematicsError, RcilabError
-from rcilab.model import RobotModel, require_model
-from rcilab.posing.planning import Plan, PlannableLaw, make_plan, picture
-from rcilab.posing.reach import Reach, judge_joints, judge_pose
-from rcilab.spatial import Pose
-from rcilab.state import Mode, require_mode
-from rcilab.words.errors import tell
-from rcilab.words.text import Message, message
+from rcilab.app.planning import Plan, PlannableLaw, make_plan, picture
+from rcilab.app.reach import Reach, judge_joints, judge_pose
+from rcilab.core.arrays import JointVector, as_vector, frozen
+from rcilab.core.background_job import Tell
+from rcilab.core.errors import InvalidValueError, KinematicsError, RcilabError
+from rcilab.core.spatial import Pose
+from rcilab.core.state import Mode, require_mode
+from rcilab.i18n.error_messages import tell
+from rcilab.i18n.translator import Message, message
+from rcilab.model.robot_model import RobotModel, require_model
 
 if TYPE_CHECKING:
-    from rcilab.client.control_settings import ControlSettings
-    from rcilab.client.session import RobotSession
-    from rcilab.gallery.exhibition import Exhibition
+    from rcilab.app.fault_lab.demo_motion import Exhibition
+    from rcilab.control_process import SupervisorStatus
+    from rcilab.execution.session import RobotSession
+    from rcilab.makers.rokae.driver.controller_parameters import ControlSettings
     from rcilab.motion.motion import Motion
     from rcilab.notebook.cell_run import CellRun
     from rcilab.notebook.robot_side import RobotSide
     from rcilab.recording.run import Run
-    from rcilab.supervisor import SupervisorStatus
 
 Topic = Literal["goal", "plan", "moment", "robot", "run"]
 """goal: where the arm is wanted; plan: a motion and its judgement; moment: what time of it is looked at; robot: its
@@ -220,7 +220,7 @@ class LabState:
         """Chooses how motions are commanded; the plan is judged by the conditions of that mode.
 
         Args:
-            mode: One of `rcilab.state.MODES`.
+            mode: One of `rcilab.core.state.MODES`.
         """
         with self.lock:
             self.mode = require_mode(mode)
@@ -350,5 +350,5 @@ def state_of(subject: object) -> LabState:
 
 def _is_session(subject: object) -> TypeGuard[RobotSession]:
     """Returns whether it is a session, without loading what one is made of: then nobody can have made it."""
-    module = sys.modules.get("rcilab.client.session")
+    module = sys.modules.get("rcilab.execution.session")
     return module is not None and isinstance(subject, module.RobotSession)

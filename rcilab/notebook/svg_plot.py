@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rcilab.arrays import Array
-from rcilab.notebook.look import esc
+from rcilab.core.arrays import Array
 from rcilab.notebook.palette import JOINT_COLORS
+from rcilab.notebook.style import esc
 from rcilab.views.plots import Frame
 
 _WIDTH, _HEIGHT = 420.0, 168.0  # Units of a panel; the browser scales it to its place.

@@ -8,16 +8,16 @@ from typing import Any
 import ipywidgets
 import numpy as np
 
-from rcilab.errors import KinematicsError
-from rcilab.kinematics.solutions import Solutions
+from rcilab.app.reach import margin, telling_joints
+from rcilab.core.errors import KinematicsError
+from rcilab.core.spatial import Pose
+from rcilab.model.kinematics.solutions import Solutions
 from rcilab.notebook.arc_circle import draw_circle
-from rcilab.notebook.lean import lean
-from rcilab.notebook.look import block, head, soft, verdict, write
 from rcilab.notebook.number_field import NumberField
 from rcilab.notebook.part import Part
 from rcilab.notebook.slider_echo import SliderEcho
-from rcilab.posing.reach import margin, telling_joints
-from rcilab.spatial import Pose
+from rcilab.notebook.style import block, head, soft, verdict, write
+from rcilab.notebook.widget_sharing import lean
 
 _NAMES = ("x", "y", "z", "roll", "pitch", "yaw")
 _FURTHEST = 3000.0  # [mm] A choice: no arm of ours reaches half as far.

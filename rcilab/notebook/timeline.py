@@ -6,9 +6,9 @@ from typing import Any
 
 import ipywidgets
 
-from rcilab.notebook.lean import lean
-from rcilab.notebook.look import block, write
 from rcilab.notebook.part import Part
+from rcilab.notebook.style import block, write
+from rcilab.notebook.widget_sharing import lean
 
 _INTERVAL = 50  # [ms] between two pictures; more than a software-rendered scene shows.
 _RATES = (1.0, 0.5, 0.25, 0.1)

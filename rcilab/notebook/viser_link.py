@@ -5,17 +5,17 @@ from __future__ import annotations
 import math
 import threading
 
-from rcilab.closing import Closing
-from rcilab.errors import UsageError
-from rcilab.model import RobotModel, require_model
+from rcilab.core.closeable import Closing
+from rcilab.core.errors import UsageError
+from rcilab.i18n.localized_text import chosen_language
+from rcilab.i18n.translator import Text
+from rcilab.model.robot_model import RobotModel, require_model
 from rcilab.motion.motion import Motion, require_motion
-from rcilab.spoken import chosen_language
+from rcilab.views.access_control import Gate
 from rcilab.views.arm_view import ArmView
-from rcilab.views.gate import Gate
-from rcilab.views.guarded_server import GuardedServer, listen
 from rcilab.views.viser_scene import ViserScene
+from rcilab.views.viser_server import GuardedServer, listen
 from rcilab.views.viser_stage import furnish, place_camera
-from rcilab.words.text import Text
 
 LOOPBACK = "127.0.0.1"
 _TICK = 1.0 / 30.0  # [s] As often as a slider sends, and more than software rendering shows.

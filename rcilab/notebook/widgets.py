@@ -10,14 +10,14 @@ import ipywidgets
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.arrays import JointVector, as_vector, frozen
-from rcilab.errors import InvalidValueError, KinematicsError
-from rcilab.model import RobotModel, require_model
+from rcilab.core.arrays import JointVector, as_vector, frozen
+from rcilab.core.errors import InvalidValueError, KinematicsError
+from rcilab.i18n.localized_text import chosen_language
+from rcilab.i18n.rounding import fixed
+from rcilab.i18n.translator import Text
+from rcilab.model.robot_model import RobotModel, require_model
 from rcilab.notebook.cells import kernel_cells
 from rcilab.notebook.slider_echo import SliderEcho
-from rcilab.spoken import chosen_language
-from rcilab.words.rounding import fixed
-from rcilab.words.text import Text
 
 _STEP_DEG = 0.5
 

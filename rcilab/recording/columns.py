@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any
 
-from rcilab.cycle_file import Column, cycle_columns, split_columns
+from rcilab.core.cycle_log import Column, cycle_columns, split_columns
 from rcilab.recording.run_file import report_facts
 
 if TYPE_CHECKING:

@@ -8,12 +8,12 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, TypeAlias
 
-from rcilab.arrays import described
-from rcilab.cycle_file import write_csv, write_npz
-from rcilab.errors import InvalidValueError
-from rcilab.whole_file import replacing
-from rcilab.words.text import Text
-from rcilab.words.units import USUAL, Units
+from rcilab.core.arrays import described
+from rcilab.core.atomic_file import replacing
+from rcilab.core.cycle_log import write_csv, write_npz
+from rcilab.core.errors import InvalidValueError
+from rcilab.i18n.translator import Text
+from rcilab.i18n.units import USUAL, Units
 
 if TYPE_CHECKING:
     from rcilab.recording.run import Run

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 
-from rcilab.errors import InvalidValueError
+from rcilab.core.errors import InvalidValueError
 from rcilab.recording.run_file import ENDING
 
 

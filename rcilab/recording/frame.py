@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import IO, TYPE_CHECKING, Any
 
 from rcilab.recording.columns import facts_text, run_columns, run_facts
-from rcilab.recording.extra import require_library
+from rcilab.recording.optional_deps import require_library
 
 if TYPE_CHECKING:
     from rcilab.recording.run import Run

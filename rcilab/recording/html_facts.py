@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rcilab.faults import name_faults
+from rcilab.core.faults import name_faults
 
 if TYPE_CHECKING:
+    from rcilab.i18n.translator import Text
     from rcilab.recording.run import Run
-    from rcilab.words.text import Text
 
 
 def fact_rows(run: Run, text: Text) -> list[list[str]]:

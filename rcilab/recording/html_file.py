@@ -20,20 +20,20 @@ from typing import IO, TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rcilab.clock import CYCLE_TIME
-from rcilab.language import load_words
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.i18n.locale import load_words
+from rcilab.i18n.plot_scale import ERRORS, PlotScale, plot_scale
+from rcilab.i18n.units import plain_number
 from rcilab.recording.html_facts import fact_rows
 from rcilab.recording.tracking_words import error_rows, tracking_notes
 from rcilab.robots.shapes import ROLE_COLORS, build_shapes
 from rcilab.robots.upright import upright_flange, upright_joints
-from rcilab.words.plot_scale import ERRORS, PlotScale, plot_scale
-from rcilab.words.units import plain_number
 
 if TYPE_CHECKING:
-    from rcilab.model import RobotModel
+    from rcilab.i18n.translator import Text
+    from rcilab.model.robot_model import RobotModel
     from rcilab.recording.run import Run
     from rcilab.recording.tracking import Tracking
-    from rcilab.words.text import Text
 
 _PATH_POINTS = 1200  # Of the drawn tool path; a choice.
 _PLOTS = ("q", "dq", "tau", *ERRORS)

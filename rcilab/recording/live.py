@@ -12,7 +12,7 @@ from rcilab.recording.run import Run, build_run, find_delay
 from rcilab.recording.setup import Setup
 
 if TYPE_CHECKING:
-    from rcilab.model import RobotModel
+    from rcilab.model.robot_model import RobotModel
     from rcilab.motion import Motion
     from rcilab.recording.run_file import RunFile
 

@@ -14,13 +14,13 @@ from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 
-from rcilab.cycle_file import OTHER_STATE_FIELDS
+from rcilab.core.cycle_log import OTHER_STATE_FIELDS
+from rcilab.core.spatial import Pose
 from rcilab.recording.columns import run_facts
-from rcilab.recording.extra import require_library
-from rcilab.spatial import Pose
+from rcilab.recording.optional_deps import require_library
 
 if TYPE_CHECKING:
-    from rcilab.arrays import Array
+    from rcilab.core.arrays import Array
     from rcilab.recording.run import Run
 
 _TOLD = 2000  # Messages between two reports of progress.

@@ -11,17 +11,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rcilab.arrays import Array, JointPath
-from rcilab.clock import CYCLE_TIME
-from rcilab.errors import UsageError, plain_text
-from rcilab.faults import FAULT_COUNT, Fault, name_faults
+from rcilab.core.arrays import Array, JointPath
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.errors import UsageError, plain_text
+from rcilab.core.faults import FAULT_COUNT, Fault, name_faults
+from rcilab.i18n.units import USUAL, Units
 from rcilab.recording.setup import Setup
 from rcilab.recording.tracking import Tracking, compute_tracking, find_stop, last_compared
-from rcilab.words.units import USUAL, Units
 
 if TYPE_CHECKING:
     from rcilab.conformance import Report
-    from rcilab.model import RobotModel
+    from rcilab.model.robot_model import RobotModel
     from rcilab.motion import Motion
 
 _LONGEST_DELAY = 64  # [cycles] between a command and the state that shows it; more is no play-out buffer any more.
@@ -345,8 +345,8 @@ class Run:
         return f"<Run {', '.join(facts)}>"
 
     def _repr_html_(self) -> str:
+        from rcilab.i18n.localized_text import language
         from rcilab.recording.run_html import run_html
-        from rcilab.spoken import language
 
         return run_html(self, language())
 

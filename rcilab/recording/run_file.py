@@ -33,21 +33,21 @@ from typing import IO, TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rcilab.arrays import described
-from rcilab.cycle_file import OTHER_STATE_FIELDS, STATE_FIELDS, cycle_dtype
-from rcilab.errors import InvalidValueError, RcilabError
-from rcilab.file_bounds import MOST_ROWS, require_max_rows, require_rows
-from rcilab.model import load_model
+from rcilab.core.arrays import described
+from rcilab.core.atomic_file import read_whole
+from rcilab.core.cycle_log import OTHER_STATE_FIELDS, STATE_FIELDS, cycle_dtype
+from rcilab.core.errors import InvalidValueError, RcilabError
+from rcilab.core.file_bounds import MOST_ROWS, require_max_rows, require_rows
+from rcilab.core.spatial import Pose
+from rcilab.model.robot_model import load_model
 from rcilab.motion.motion import Motion
-from rcilab.recording.blocks import Block, decode_blocks, encode_block, encode_header
+from rcilab.recording.chunks import Block, decode_blocks, encode_block, encode_header
 from rcilab.recording.run import Run
 from rcilab.recording.setup import Setup
-from rcilab.spatial import Pose
-from rcilab.whole_file import read_whole
 
 if TYPE_CHECKING:
     from rcilab.conformance import Report
-    from rcilab.model import RobotModel
+    from rcilab.model.robot_model import RobotModel
 
 ENDING = ".rcirun"
 BLOCK_CYCLES = 256  # A choice: what a crash may cost at most, about a quarter of a second.
@@ -355,7 +355,7 @@ def _arm_facts(model: RobotModel) -> dict[str, Any]:
 
 
 def _build_arm(facts: dict[str, Any]) -> RobotModel:
-    from rcilab.dynamics.payload import Payload
+    from rcilab.model.dynamics.payload import Payload
 
     mass, center, inertia = facts["load"]
     load = Payload(mass=mass, center_of_mass=np.array(center), inertia=np.array(inertia))

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from html import escape
 from typing import TYPE_CHECKING
 
-from rcilab.faults import name_faults
-from rcilab.language import load_words, require_language
+from rcilab.core.faults import name_faults
+from rcilab.i18n.locale import load_words, require_language
 
 if TYPE_CHECKING:
     from rcilab.recording.run import Run

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rcilab.arrays import Array, JointPath
-from rcilab.clock import CYCLE_TIME
+from rcilab.core.arrays import Array, JointPath
+from rcilab.core.clock import CYCLE_TIME
 
 if TYPE_CHECKING:
-    from rcilab.model import RobotModel
+    from rcilab.model.robot_model import RobotModel
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from rcilab.i18n.translator import Text
     from rcilab.recording.run import Run
     from rcilab.recording.tracking import Tracking
-    from rcilab.words.text import Text
 
 _EXACT = 1e-6  # [rad] Less is rounding.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from importlib import import_module
 
-from rcilab.errors import ModelError, plain_text
+from rcilab.core.errors import ModelError, plain_text
 from rcilab.robots.description import DhRow, Link, RobotDescription
 
 __all__ = ["RCI_ROBOT_NAMES", "ROBOT_NAMES", "DhRow", "Link", "RobotDescription", "describe_robot"]

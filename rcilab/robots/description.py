@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal, TypeAlias
 
-from rcilab.arrays import JointVector, Matrix, Vector3, frozen
-from rcilab.limits import Limits
+from rcilab.core.arrays import JointVector, Matrix, Vector3, frozen
+from rcilab.core.limits import Limits
 
 Interface: TypeAlias = Literal["RCI", "FCI"]
 """Which real-time interface an arm is driven by, and so whose conditions and error names its motions are judged by."""

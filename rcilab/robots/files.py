@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rcilab.errors import ModelError
+from rcilab.core.atomic_file import replacing
+from rcilab.core.errors import ModelError
 from rcilab.robots.description import RobotDescription
 from rcilab.robots.urdf import build_meshes
-from rcilab.whole_file import replacing
 
 
 def write_model(directory: Path, file_name: str, text: str, description: RobotDescription) -> Path:

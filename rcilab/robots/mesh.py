@@ -9,7 +9,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rcilab.arrays import Array
+from rcilab.core.arrays import Array
 
 Faces: TypeAlias = NDArray[np.int32]
 

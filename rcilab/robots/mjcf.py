@@ -11,12 +11,12 @@ from typing import Protocol
 
 import numpy as np
 
-from rcilab.arrays import Matrix, Vector3
+from rcilab.core.arrays import Matrix, Vector3
+from rcilab.core.spatial import IDENTITY, Pose
 from rcilab.robots.description import Link, RobotDescription
 from rcilab.robots.shapes import ROLE_COLORS, Capsule, LinkShape, build_shapes
 from rcilab.robots.upright import upright_flange, upright_joints
 from rcilab.robots.urdf import mesh_file, number_text, vector_text
-from rcilab.spatial import IDENTITY, Pose
 
 TIMESTEP = 0.001  # [s] one cycle of the controller
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rcilab.arrays import Array
+from rcilab.core.arrays import Array
 from rcilab.robots.description import Rod
 from rcilab.robots.mesh import Mesh, revolve
 from rcilab.robots.surface import join, mesh_surface, rod

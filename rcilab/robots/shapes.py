@@ -18,7 +18,7 @@ from typing import Literal
 
 import numpy as np
 
-from rcilab.arrays import Array, Vector3, frozen
+from rcilab.core.arrays import Array, Vector3, frozen
 from rcilab.robots.description import RobotDescription, Rod
 from rcilab.robots.mesh import Mesh, merge_meshes, mirror_y, revolve
 from rcilab.robots.rod_shapes import cast, flange_plate, foot_plate

@@ -11,7 +11,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from rcilab.arrays import Array
+from rcilab.core.arrays import Array
 from rcilab.robots.mesh import Mesh
 
 Body: TypeAlias = Callable[[Array], Array]

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rcilab.arrays import Vector3, frozen
-from rcilab.errors import ModelError
+from rcilab.core.arrays import Vector3, frozen
+from rcilab.core.errors import ModelError
+from rcilab.core.spatial import Pose
 from rcilab.robots.description import RobotDescription
-from rcilab.spatial import Pose
 
 _TOLERANCE = 1e-12  # [m] and axis components: the tables put axes and origins on the base z axis exactly.
 

@@ -10,11 +10,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 
+from rcilab.core.spatial import IDENTITY, Pose
 from rcilab.robots.description import Link, RobotDescription
 from rcilab.robots.mesh import encode_stl
 from rcilab.robots.shapes import ROLE_COLORS, Capsule, LinkShape, build_shapes
 from rcilab.robots.upright import upright_flange, upright_joints
-from rcilab.spatial import IDENTITY, Pose
 
 
 def build_urdf(description: RobotDescription, *, mesh_dir: str | None = None, T_flange_tool: Pose = IDENTITY) -> str:

@@ -19,13 +19,13 @@ from typing import Literal, Protocol
 
 from numpy.typing import ArrayLike
 
-from rcilab.arrays import as_vector
-from rcilab.errors import UsageError
+from rcilab.core.arrays import as_vector
+from rcilab.core.errors import UsageError
+from rcilab.core.spatial import Pose
 from rcilab.robots.description import RobotDescription
 from rcilab.robots.mesh import shrink
 from rcilab.robots.shapes import ROLE_COLORS, ColorRole, LinkShape, build_shapes
 from rcilab.robots.upright import upright_flange, upright_joints
-from rcilab.spatial import Pose
 from rcilab.views.scene import Color, Scene
 
 ArmStyle = Literal["live", "commanded", "plan", "candidate", "refused"]

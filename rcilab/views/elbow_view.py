@@ -14,8 +14,8 @@ from typing import Protocol
 
 import numpy as np
 
-from rcilab.arrays import Array
-from rcilab.kinematics.elbow_circle import ElbowCircle
+from rcilab.core.arrays import Array
+from rcilab.model.kinematics.elbow_circle import ElbowCircle
 from rcilab.views.scene import Color, Scene
 
 OUTWARD = 0.105

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.spatial import Pose
+from rcilab.core.spatial import Pose
 from rcilab.views.meshcat_server import MeshcatServer, import_meshcat
 from rcilab.views.scene import NO_TURN, ORIGIN, Color, line_points, segment_ends, unknown_node
 

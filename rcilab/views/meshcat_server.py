@@ -16,7 +16,7 @@ from concurrent.futures import Future
 from pathlib import Path
 from typing import Any
 
-from rcilab.errors import ConnectionLostError, DeadlineError
+from rcilab.core.errors import ConnectionLostError, DeadlineError
 
 _HOST = "127.0.0.1"
 _CONNECT = "viewer.connect();"

@@ -10,8 +10,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.arrays import Array, as_vector, frozen
-from rcilab.spatial import IDENTITY, Pose
+from rcilab.core.arrays import Array, as_vector, frozen
+from rcilab.core.spatial import IDENTITY, Pose
 from rcilab.views.scene import NO_TURN, ORIGIN, Color, line_points, segment_ends, unknown_node
 
 

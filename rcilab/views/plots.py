@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from rcilab.arrays import Array, JointPath
-from rcilab.clock import CYCLE_TIME
 from rcilab.conformance.signals import HOLD_SAMPLES
+from rcilab.core.arrays import Array, JointPath
+from rcilab.core.clock import CYCLE_TIME
 from rcilab.motion.range import RECOVERY_RANGE, range_from
 
 if TYPE_CHECKING:
-    from rcilab.limits import JointLimits
-    from rcilab.model import RobotModel
+    from rcilab.core.limits import JointLimits
+    from rcilab.model.robot_model import RobotModel
     from rcilab.motion import Motion
 
 Quantity = Literal["q", "dq", "ddq", "jerk", "tau"]
@@ -199,7 +199,7 @@ def build_error_frame(t: Array, errors: Array, last: float, least: float, bucket
         t: Times of the errors, [s], shape (N,).
         errors: One column a curve, in the unit to be shown, shape (N, k).
         last: Where the other plots end, [s], so that this one fits below them.
-        least: Smallest range of the axis to each side, in the unit to be shown; see `rcilab.words.plot_scale`.
+        least: Smallest range of the axis to each side, in the unit to be shown; see `rcilab.i18n.plot_scale`.
         buckets: Number of buckets the time is cut into.
     """
     edges = np.linspace(0.0, last, buckets + 1)

@@ -14,7 +14,7 @@ from typing import Protocol, TypeAlias, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.errors import UsageError
+from rcilab.core.errors import UsageError
 
 Color: TypeAlias = tuple[int, int, int]
 """Red, green, blue, 0-255."""

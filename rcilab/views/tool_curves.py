@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from rcilab.arrays import Array, JointPath
-from rcilab.kinematics.closed_form import build_closed_form
+from rcilab.core.arrays import Array, JointPath
+from rcilab.model.kinematics.closed_form import build_closed_form
 from rcilab.views.plots import Curves, backward_differences
 
 if TYPE_CHECKING:
-    from rcilab.limits import Limits
-    from rcilab.model import RobotModel
+    from rcilab.core.limits import Limits
+    from rcilab.model.robot_model import RobotModel
 
 ToolQuantity = Literal["speed", "acceleration", "psi"]
 TOOL_QUANTITIES: tuple[ToolQuantity, ...] = ("speed", "acceleration", "psi")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rcilab.arrays import Array
+from rcilab.core.arrays import Array
 
 
 def usage_colors(usage: Array) -> Array:

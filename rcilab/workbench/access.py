@@ -13,8 +13,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from tempfile import NamedTemporaryFile
 
-from rcilab.errors import UsageError
-from rcilab.views.gate import is_loopback
+from rcilab.core.errors import UsageError
+from rcilab.views.access_control import is_loopback
 
 VARIABLE = "RCILAB_TOKEN"
 SHORTEST = 16  # Characters. A choice: 16 random letters are more than anybody can try.

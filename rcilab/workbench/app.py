@@ -10,20 +10,20 @@ from types import TracebackType
 from typing import IO, TYPE_CHECKING
 from urllib.parse import quote
 
-from rcilab.views.gate import Gate
-from rcilab.views.guarded_server import GuardedServer
+from rcilab.views.access_control import Gate
+from rcilab.views.viser_server import GuardedServer
 from rcilab.views.viser_stage import HomeView
 from rcilab.workbench import requests, security
-from rcilab.workbench.conductor import Conductor
+from rcilab.workbench.autosave import Keepsake, keepsake_file
+from rcilab.workbench.control_lock import Presence
+from rcilab.workbench.dispatcher import Conductor
 from rcilab.workbench.goal.actions import initial_goal
-from rcilab.workbench.keepsake import Keepsake, keepsake_file
-from rcilab.workbench.lease import Presence
 from rcilab.workbench.live import LIVE_PATH, Heard, LiveChannel
 from rcilab.workbench.page import decorate, introduce, send_file
 from rcilab.workbench.run.replay import replayed, require_replayable
 from rcilab.workbench.session import Session
+from rcilab.workbench.status_text import tell_error
 from rcilab.workbench.store import Store, UiState
-from rcilab.workbench.telling import tell_error
 
 if TYPE_CHECKING:
     import viser
@@ -107,7 +107,7 @@ class Workbench:
 
     def start(self) -> None:
         """Serves the page, then connects to the robot in the background."""
-        from rcilab.workbench.presenter import Presenter, tab_name
+        from rcilab.workbench.renderer import Presenter, tab_name
 
         ask = self.conductor.ask
         self.live = live = LiveChannel(

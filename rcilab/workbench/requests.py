@@ -206,7 +206,7 @@ class SetDrive(Request):
     """How to drive the arm; what is None stays."""
 
     mode: str | None = None
-    """One of `rcilab.state.MODES`."""
+    """One of `rcilab.core.state.MODES`."""
     pace: float | None = None
     """Part of the planned speed, 0.1 to 1."""
 

@@ -1,6 +1,6 @@
 """The front door of the workbench: which address it may be opened on, and what to say when that does not work.
 
-Who may come in through it is decided by `rcilab.views.gate`.
+Who may come in through it is decided by `rcilab.views.access_control`.
 """
 
 from __future__ import annotations
@@ -9,8 +9,8 @@ import errno
 import resource
 import socket
 
-from rcilab.errors import UsageError
-from rcilab.model import RobotModel, load_model, require_rci
+from rcilab.core.errors import UsageError
+from rcilab.model.robot_model import RobotModel, load_model, require_rci
 from rcilab.workbench.access import is_local, require_token
 
 DEFAULT_PORT = 8080
@@ -44,7 +44,7 @@ def require_openable(host: str, token: str | None, target: str, model: str) -> R
     check_host(host, token)
     _require_files()
     if target != "virtual":
-        from rcilab.client.address import parse_address
+        from rcilab.makers.rokae.driver.address import parse_address
 
         parse_address(target)
     return require_rci(load_model(model))
@@ -67,7 +67,7 @@ def bind(host: str, port: int, token: str | None = None) -> socket.socket:
     Raises:
         UsageError: The port is taken, or the address is not ours or needs a token; the message says what to change.
     """
-    from rcilab.views.guarded_server import listen
+    from rcilab.views.viser_server import listen
 
     try:
         bound = listen(host, port)

@@ -7,13 +7,13 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
-from rcilab.errors import RcilabError
-from rcilab.workbench.telling import StartingError
+from rcilab.core.errors import RcilabError
+from rcilab.workbench.status_text import StartingError
 
 if TYPE_CHECKING:
-    from rcilab.client.setup import RobotSetup
-    from rcilab.model import RobotModel
-    from rcilab.supervisor import Supervisor, SupervisorStatus
+    from rcilab.control_process import Supervisor, SupervisorStatus
+    from rcilab.makers.rokae.driver.configuration import RobotSetup
+    from rcilab.model.robot_model import RobotModel
 
 
 class Session:
@@ -75,7 +75,7 @@ class Session:
         shown = self._shown
         if shown is not None:
             return shown.status()
-        from rcilab.supervisor import SupervisorStatus
+        from rcilab.control_process import SupervisorStatus
 
         if self._worker is None or self._is_apart:
             return SupervisorStatus()  # Nobody has asked for a connection.
@@ -146,7 +146,7 @@ class Session:
             if generation != self._generation:
                 return
         try:
-            from rcilab.supervisor import Supervisor
+            from rcilab.control_process import Supervisor
 
             supervisor = Supervisor(model, target, plant, setup=setup)
             self._current = self._shown = supervisor

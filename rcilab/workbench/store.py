@@ -11,26 +11,26 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from rcilab.arrays import JointVector
-from rcilab.model import RobotModel
-from rcilab.posing.planning import PathKind, Plan, PlannableLaw
-from rcilab.posing.reach import Reach, Tone
-from rcilab.spatial import Pose
-from rcilab.words.units import USUAL, Units
+from rcilab.app.planning import PathKind, Plan, PlannableLaw
+from rcilab.app.reach import Reach, Tone
+from rcilab.core.arrays import JointVector
+from rcilab.core.spatial import Pose
+from rcilab.i18n.units import USUAL, Units
+from rcilab.model.robot_model import RobotModel
 from rcilab.workbench.check.state import CheckState
+from rcilab.workbench.control_lock import Lease
 from rcilab.workbench.jog.jogging import JogState
 from rcilab.workbench.learn.state import LearnState
-from rcilab.workbench.lease import Lease
 from rcilab.workbench.program.draft import ProgramState
+from rcilab.workbench.run.active_force import Plant, PushState
 from rcilab.workbench.run.driving import DriveState
-from rcilab.workbench.run.pushing import Plant, PushState
 from rcilab.workbench.scene.extras import SceneState
-from rcilab.workbench.setup.wanted import SetupState
+from rcilab.workbench.setup.configuration_state import SetupState
 from rcilab.workbench.text import Message
 
 if TYPE_CHECKING:
     from rcilab.motion import Motion
-    from rcilab.motion.pacing import PacedMotion
+    from rcilab.motion.speed_scaling import PacedMotion
     from rcilab.recording.run import Run
     from rcilab.recording.tracking import Tracking
     from rcilab.workbench.run.export_actions import Export

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from rcilab.language import LANGUAGES, Language
-from rcilab.words import text
-from rcilab.words.text import Explains, Message, load_face, message
-from rcilab.words.units import USUAL, Unit, Units
+from rcilab.i18n import translator as text
+from rcilab.i18n.locale import LANGUAGES, Language
+from rcilab.i18n.translator import Explains, Message, load_face, message
+from rcilab.i18n.units import USUAL, Unit, Units
 
 __all__ = ["LANGUAGES", "Message", "Text", "load_catalogue", "message"]
 

@@ -8,14 +8,14 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from rcilab.words.units import ANGLES, LENGTHS
+from rcilab.i18n.units import ANGLES, LENGTHS
 from rcilab.workbench import requests
 from rcilab.workbench.learn.state import exhibited
 from rcilab.workbench.store import Store
 from rcilab.workbench.text import LANGUAGES, message
 
 if TYPE_CHECKING:
-    from rcilab.model import RobotModel
+    from rcilab.model.robot_model import RobotModel
 
 QUALITIES = ("full", "light")
 THEMES = ("light", "dark")

@@ -10,10 +10,10 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from rcilab.spatial import Pose
-from rcilab.words.rounding import fixed
-from rcilab.words.units import Unit
-from rcilab.workbench.lease import Lease
+from rcilab.core.spatial import Pose
+from rcilab.i18n.rounding import fixed
+from rcilab.i18n.units import Unit
+from rcilab.workbench.control_lock import Lease
 from rcilab.workbench.requests import Request, TypeField
 from rcilab.workbench.text import Message
 

@@ -9,7 +9,7 @@ import time
 import numpy as np
 
 from browser.page import BenchPage, close_toasts
-from rcilab.words.units import USUAL
+from rcilab.i18n.units import USUAL
 from rcilab.workbench import requests
 
 

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from rcilab.cli import main
-from rcilab.doctor.finding import Finding, summary
+from rcilab.diagnostics.doctor.finding import Finding, summary
 
 KEYS = {"name", "verdict", "value", "advice", "figures"}
 QUESTIONS = {

@@ -9,7 +9,7 @@ import pytest
 
 import rcilab
 from rcilab.cli import COMMANDS, main
-from rcilab.errors import UsageError
+from rcilab.core.errors import UsageError
 
 
 def test_the_version_is_the_packages_own(capsys: pytest.CaptureFixture[str]) -> None:

@@ -9,9 +9,9 @@ import sys
 import pytest
 
 from rcilab.cli import main
-from rcilab.model import load_model
+from rcilab.core.spatial import Pose
+from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, Program, Waypoint, plan_joint, plan_program
-from rcilab.spatial import Pose
 
 MODEL = load_model("xMatePro7")
 HOME = MODEL.forward(MODEL.home)

@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 
 from rcilab.cli import main
-from rcilab.client import connect
-from rcilab.command import JointPosition
-from rcilab.errors import ControlError
-from rcilab.model import load_model
+from rcilab.control_process.launch import start_controller
+from rcilab.core.command import JointPosition
+from rcilab.core.errors import ControlError
+from rcilab.execution import connect
+from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, Program, Waypoint, plan_joint
-from rcilab.supervisor.launch import start_controller
 
 MODEL = load_model("xMatePro7")
 GOAL = np.array([0.2, 0.5, 0.1, 1.1, 0.0, 1.4, 0.1])

@@ -9,9 +9,9 @@ import pytest
 
 from rcilab import JointPosition, load_model, plan_joint
 from rcilab.cli import main
-from rcilab.client import connect
-from rcilab.errors import ControlError
-from rcilab.supervisor.launch import start_controller
+from rcilab.control_process.launch import start_controller
+from rcilab.core.errors import ControlError
+from rcilab.execution import connect
 
 MODEL = load_model("xMate3")
 

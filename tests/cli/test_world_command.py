@@ -7,7 +7,7 @@ import json
 import pytest
 
 from rcilab.cli import main
-from rcilab.supervisor.launch import start_controller
+from rcilab.control_process.launch import start_controller
 
 
 @pytest.fixture(scope="module")

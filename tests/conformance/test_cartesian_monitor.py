@@ -5,13 +5,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rcilab.clock import CYCLE_TIME
 from rcilab.conformance import BoxMonitor, CartesianMonitor
-from rcilab.faults import Fault
-from rcilab.model import load_model
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.faults import Fault
+from rcilab.core.safety_box import SafetyBox
+from rcilab.core.spatial import Pose
+from rcilab.model.robot_model import load_model
 from rcilab.motion import plan_joint
-from rcilab.safety_box import SafetyBox
-from rcilab.spatial import Pose
 
 MODEL = load_model("xMatePro7")
 LIMITS = MODEL.limits

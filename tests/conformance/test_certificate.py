@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from rcilab.conformance import StartState, check, verify_certificate
-from rcilab.dynamics.payload import Payload
-from rcilab.errors import CertificateError, InvalidValueError
-from rcilab.model import load_model
+from rcilab.core.clearance import STANDARD_DISTANCE, SafetyDistance
+from rcilab.core.errors import CertificateError, InvalidValueError
+from rcilab.core.safety_box import SafetyBox
+from rcilab.core.spatial import Pose
+from rcilab.model.dynamics.payload import Payload
+from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, plan_joint
-from rcilab.safety_box import SafetyBox
-from rcilab.safety_distance import STANDARD_DISTANCE, SafetyDistance
-from rcilab.spatial import Pose
 
 MODEL = load_model("xMatePro7")
 START = MODEL.home

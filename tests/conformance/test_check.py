@@ -5,11 +5,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rcilab.clock import CYCLE_TIME
 from rcilab.conformance import StartState, check
-from rcilab.errors import ConformanceError, InvalidValueError
-from rcilab.faults import Fault
-from rcilab.model import RobotModel, load_model
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.errors import ConformanceError, InvalidValueError
+from rcilab.core.faults import Fault
+from rcilab.model.robot_model import RobotModel, load_model
 from rcilab.motion import Motion, differences_from_derivatives, plan_joint
 
 MODEL = load_model("xMatePro7")

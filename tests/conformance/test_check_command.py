@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from rcilab.cli import check as command
-from rcilab.errors import InvalidValueError, ModelError
-from rcilab.model import load_model
+from rcilab.core.errors import InvalidValueError, ModelError
+from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, plan_joint
 
 MODEL = load_model("xMate3")

@@ -9,17 +9,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rcilab.clock import CYCLE_TIME
 from rcilab.conformance import ClearanceMonitor, JointMonitor, check, clearance_conditions
 from rcilab.conformance.check import HOLD_SAMPLES
 from rcilab.conformance.clearance_path import LONGEST_STEP, MOST_TRAVEL, clearance_path, in_between
-from rcilab.errors import InvalidValueError
-from rcilab.kinematics.collision import FLOOR, ClearanceQuery, LinkPair
-from rcilab.model import load_model
+from rcilab.core.clearance import SafetyDistance
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.errors import InvalidValueError
+from rcilab.core.spatial import Pose
+from rcilab.model.kinematics.collision import FLOOR, ClearanceQuery, LinkPair
+from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, plan_joint
 from rcilab.robots import ROBOT_NAMES
-from rcilab.safety_distance import SafetyDistance
-from rcilab.spatial import Pose
 
 MODELS = [load_model(name, tool=Pose((0.0, 0.02, 0.1))) for name in ROBOT_NAMES]
 MODEL = MODELS[ROBOT_NAMES.index("xMatePro7")]

@@ -2,9 +2,9 @@ import pytest
 
 from rcilab.conformance import CONDITIONS, CYCLE_CONDITIONS, explain_fault, find_condition
 from rcilab.conformance.conditions import MOTION_CONDITIONS
-from rcilab.errors import InvalidValueError
-from rcilab.faults import Fault
-from rcilab.model import load_model
+from rcilab.core.errors import InvalidValueError
+from rcilab.core.faults import Fault
+from rcilab.model.robot_model import load_model
 
 ARM = load_model("xMatePro3").limits
 LIMITS = ARM.joint

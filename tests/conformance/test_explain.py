@@ -12,20 +12,20 @@ import numpy as np
 import pytest
 
 from rcilab.conformance import CONDITION_TABLES, CONDITIONS, Violation, check
+from rcilab.conformance.advice import advise
 from rcilab.conformance.catalogue import Language, Phrase, load_catalogue, say
 from rcilab.conformance.condition import Condition
 from rcilab.conformance.explain import explain_formula, explain_source, explain_violation
 from rcilab.conformance.html import report_html
-from rcilab.conformance.wording import advise
-from rcilab.errors import InvalidValueError
-from rcilab.faults import Fault
-from rcilab.franka_errors import FrankaError
-from rcilab.kinematics.collision import LinkPair
-from rcilab.model import RobotModel, load_model
+from rcilab.core.errors import InvalidValueError
+from rcilab.core.faults import Fault
+from rcilab.core.franka_errors import FrankaError
+from rcilab.core.safety_box import SafetyBox
+from rcilab.core.spatial import Pose
+from rcilab.i18n.units import Units
+from rcilab.model.kinematics.collision import LinkPair
+from rcilab.model.robot_model import RobotModel, load_model
 from rcilab.motion import Motion, plan_joint
-from rcilab.safety_box import SafetyBox
-from rcilab.spatial import Pose
-from rcilab.words.units import Units
 from tests.catalogues import require_equal
 
 MODEL = load_model("xMatePro7")

@@ -10,14 +10,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rcilab.clock import CYCLE_TIME
 from rcilab.conformance import CONDITION_TABLES, check, condition_table
-from rcilab.errors import InvalidValueError
-from rcilab.faults import Fault
-from rcilab.franka_errors import FrankaError
-from rcilab.model import load_model
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.errors import InvalidValueError
+from rcilab.core.faults import Fault
+from rcilab.core.franka_errors import FrankaError
+from rcilab.core.safety_box import SafetyBox
+from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, plan_joint
-from rcilab.safety_box import SafetyBox
 
 PANDA = load_model("Panda")
 FCI, RCI = CONDITION_TABLES["FCI"], CONDITION_TABLES["RCI"]

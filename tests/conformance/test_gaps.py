@@ -8,11 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rcilab.conformance import CartesianMonitor, JointMonitor, TorqueMonitor
-from rcilab.conformance.spans import spans
-from rcilab.faults import Fault
-from rcilab.model import load_model
+from rcilab.conformance.divided_differences import spans
+from rcilab.core.faults import Fault
+from rcilab.core.spatial import Pose
+from rcilab.model.robot_model import load_model
 from rcilab.motion import plan_joint, plan_line
-from rcilab.spatial import Pose
 
 MODEL = load_model("xMatePro7")
 HOME = MODEL.home

@@ -1,10 +1,10 @@
 import pytest
 
 from rcilab.conformance import CartesianMonitor, cartesian_limits
-from rcilab.errors import InvalidValueError
-from rcilab.faults import Fault
-from rcilab.model import load_model
-from rcilab.spatial import Pose
+from rcilab.core.errors import InvalidValueError
+from rcilab.core.faults import Fault
+from rcilab.core.spatial import Pose
+from rcilab.model.robot_model import load_model
 
 LIMITS = load_model("xMatePro7").limits
 

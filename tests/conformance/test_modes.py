@@ -9,20 +9,20 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rcilab.arrays import Array
-from rcilab.clock import CYCLE_TIME
-from rcilab.command import CartesianPosition, Command, JointPosition, JointTorque
 from rcilab.conformance import Monitor, Report, StartState, check, condition_table
 from rcilab.conformance.signals import HOLD_SAMPLES, MotionSignals
-from rcilab.errors import CertificateError, InvalidValueError, PlanningError
-from rcilab.faults import Fault
-from rcilab.franka_errors import FrankaError
-from rcilab.model import RobotModel, load_model
+from rcilab.core.arrays import Array
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.command import CartesianPosition, Command, JointPosition, JointTorque
+from rcilab.core.errors import CertificateError, InvalidValueError, PlanningError
+from rcilab.core.faults import Fault
+from rcilab.core.franka_errors import FrankaError
+from rcilab.core.safety_box import SafetyBox
+from rcilab.core.spatial import Pose
+from rcilab.core.state import MODES, Mode
+from rcilab.model.robot_model import RobotModel, load_model
 from rcilab.motion import Motion, plan_arc, plan_circle, plan_joint, plan_line
 from rcilab.robots import ROBOT_NAMES
-from rcilab.safety_box import SafetyBox
-from rcilab.spatial import Pose
-from rcilab.state import MODES, Mode
 
 MODELS = {name: load_model(name) for name in ROBOT_NAMES}
 MODEL, PANDA = MODELS["xMatePro7"], MODELS["Panda"]

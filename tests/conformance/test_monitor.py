@@ -5,9 +5,9 @@ from hypothesis import strategies as st
 
 from rcilab.conformance import CYCLE_CONDITIONS, JointMonitor, StartState, check
 from rcilab.conformance.check import HOLD_SAMPLES
-from rcilab.errors import InvalidValueError
-from rcilab.faults import Fault
-from rcilab.model import load_model
+from rcilab.core.errors import InvalidValueError
+from rcilab.core.faults import Fault
+from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, plan_joint
 
 MODELS = [load_model("xMatePro7"), load_model("xMate3")]

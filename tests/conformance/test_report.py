@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from rcilab.conformance import Report, check
+from rcilab.conformance.advice import amount
 from rcilab.conformance.html import COLORS
-from rcilab.conformance.wording import amount
-from rcilab.model import load_model
+from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, plan_joint
 
 MODEL = load_model("xMatePro7")

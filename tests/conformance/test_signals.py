@@ -5,16 +5,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rcilab.clock import CYCLE_TIME
 from rcilab.conformance import BoxMonitor, StartState, check, find_condition
 from rcilab.conformance.signals import HOLD_SAMPLES, MotionSignals
-from rcilab.dynamics.payload import Payload
-from rcilab.errors import InvalidValueError
-from rcilab.faults import Fault
-from rcilab.model import load_model
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.errors import InvalidValueError
+from rcilab.core.faults import Fault
+from rcilab.core.safety_box import SafetyBox, box_from
+from rcilab.core.spatial import Pose
+from rcilab.model.dynamics.payload import Payload
+from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, plan_joint
-from rcilab.safety_box import SafetyBox, box_from
-from rcilab.spatial import Pose
 
 MODELS = [load_model("xMatePro7"), load_model("xMate3").with_tool(Pose((0.05, 0.0, 0.12)))]
 MODEL = MODELS[0]

@@ -5,11 +5,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rcilab.clock import CYCLE_TIME
 from rcilab.conformance import TorqueMonitor
-from rcilab.errors import InvalidValueError
-from rcilab.faults import Fault
-from rcilab.model import load_model
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.errors import InvalidValueError
+from rcilab.core.faults import Fault
+from rcilab.model.robot_model import load_model
 
 LIMITS = load_model("xMatePro7").limits.joint
 RATE, RANGE = Fault.COMMAND_TORQUE_DISCONTINUITY, Fault.COMMAND_TORQUE_RANGE_VIOLATION

@@ -9,15 +9,15 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rcilab.arrays import Array
-from rcilab.clock import CYCLE_TIME
 from rcilab.conformance import BoxMonitor, CartesianMonitor, Condition, TorqueMonitor, check
 from rcilab.conformance.check import HOLD_SAMPLES
 from rcilab.conformance.tool_conditions import CARTESIAN_POSITION, TOOL_CONDITIONS, TORQUE_CONDITIONS
-from rcilab.model import load_model
+from rcilab.core.arrays import Array
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.safety_box import SafetyBox, box_from
+from rcilab.core.spatial import Pose
+from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, plan_joint
-from rcilab.safety_box import SafetyBox, box_from
-from rcilab.spatial import Pose
 
 MODEL = load_model("xMatePro7")
 LIMITS = MODEL.limits

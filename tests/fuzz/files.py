@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 import rcilab
-from rcilab.errors import RcilabError
+from rcilab.core.errors import RcilabError
 from rcilab.motion import Motion, Program, Waypoint
 from rcilab.motion.program_file import read_program
 from rcilab.recording.export import export_run

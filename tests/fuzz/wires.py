@@ -16,8 +16,8 @@ from websockets.sync.client import ClientConnection, connect
 
 from rcilab.workbench import requests
 from rcilab.workbench.app import Workbench
-from tests.controller.test_server import running
 from tests.fuzz.noise import spoilt
+from tests.makers.rokae.controller.test_server import running
 from tests.workbench.opened import opened, wait
 
 _REQUESTS: tuple[dict[str, Any], ...] = (

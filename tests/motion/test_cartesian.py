@@ -9,11 +9,11 @@ import pytest
 
 import rcilab
 from rcilab.conformance import check
-from rcilab.errors import InvalidValueError, PlanningError
-from rcilab.model import load_model
+from rcilab.core.errors import InvalidValueError, PlanningError
+from rcilab.core.spatial import Pose
+from rcilab.model.robot_model import load_model
 from rcilab.motion import plan_arc, plan_circle, plan_line, plan_nullspace
 from rcilab.robots import ROBOT_NAMES
-from rcilab.spatial import Pose
 
 SEVEN, SIX = load_model("xMatePro7"), load_model("xMate3")
 ALL = pytest.mark.parametrize("name", ROBOT_NAMES)

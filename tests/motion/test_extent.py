@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rcilab.model import load_model
+from rcilab.model.robot_model import load_model
 from rcilab.motion import Program, Waypoint, plan_program
 from rcilab.motion.extent import measure_extent
 

@@ -7,11 +7,11 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from rcilab.errors import SingularError, UnreachableError
-from rcilab.model import load_model
+from rcilab.core.errors import SingularError, UnreachableError
+from rcilab.core.spatial import Pose
+from rcilab.model.robot_model import load_model
 from rcilab.motion.inverse_path import inverse_path
 from rcilab.robots import ROBOT_NAMES
-from rcilab.spatial import Pose
 
 ALL = pytest.mark.parametrize("name", ROBOT_NAMES)
 TOOL = Pose.from_rpy((0.02, -0.01, 0.1), (0.1, 0.2, 0.3))

@@ -3,10 +3,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rcilab.bench.fastest import fastest_straight
-from rcilab.clock import CYCLE_TIME
-from rcilab.errors import InvalidValueError, PlanningError
-from rcilab.model import load_model
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.errors import InvalidValueError, PlanningError
+from rcilab.diagnostics.bench.fastest import fastest_straight
+from rcilab.model.robot_model import load_model
 from rcilab.motion import LIMIT_MARGIN, _ruckig, plan_joint
 from rcilab.motion.joint import MIN_SPEED
 

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rcilab.clock import CYCLE_TIME
-from rcilab.errors import InvalidValueError
-from rcilab.model import load_model
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.errors import InvalidValueError
+from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, PiecewisePolynomial, plan_joint
 from rcilab.motion.motion import standing
 

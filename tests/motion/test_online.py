@@ -3,16 +3,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rcilab.clock import CYCLE_TIME
 from rcilab.conformance.check import check
-from rcilab.dynamics.symmetric_solver import SymmetricSolver
-from rcilab.errors import InvalidValueError, PlanningError
-from rcilab.model import load_model
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.errors import InvalidValueError, PlanningError
+from rcilab.core.spatial import Pose
+from rcilab.model.dynamics.symmetric_solver import SymmetricSolver
+from rcilab.model.robot_model import load_model
 from rcilab.motion import Jog, Motion, plan_joint, plan_stop
 from rcilab.motion.online import POSITION_MARGIN
 from rcilab.motion.twist import DAMPED_BELOW, damped_inverse
 from rcilab.robots import ROBOT_NAMES
-from rcilab.spatial import Pose
 
 MODELS = {name: load_model(name) for name in ROBOT_NAMES}
 MODEL = MODELS["xMatePro7"]

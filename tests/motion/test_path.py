@@ -9,10 +9,10 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from rcilab.errors import InvalidValueError, PlanningError
+from rcilab.core.errors import InvalidValueError, PlanningError
+from rcilab.core.spatial import IDENTITY, Pose, turn_between
 from rcilab.motion.cartesian import schedule
 from rcilab.motion.path import build_arc, build_line, slerp
-from rcilab.spatial import IDENTITY, Pose, turn_between
 
 # Sampled from the vendor's client library with its filter off: (cycle, rotation and position row by row, arm angle).
 DOWN = (1.0, 0.0, 0.0, 0.5, 0.0, -0.9899924966004454, -0.1411200080598672, 0.0,

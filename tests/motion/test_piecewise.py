@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from rcilab.errors import InvalidValueError
+from rcilab.core.errors import InvalidValueError
 from rcilab.motion import PiecewisePolynomial
 from rcilab.motion.piecewise import join_pieces
 

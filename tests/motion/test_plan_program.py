@@ -13,13 +13,13 @@ from hypothesis import strategies as st
 import rcilab
 from rcilab.conformance import check
 from rcilab.conformance.cartesian_monitor import CartesianMonitor
-from rcilab.errors import InvalidValueError, PlanningError
-from rcilab.model import load_model
+from rcilab.core.errors import InvalidValueError, PlanningError
+from rcilab.core.spatial import Pose
+from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, Program, Waypoint, plan_joint, plan_line, plan_program
 from rcilab.motion.blend import build_blend
-from rcilab.motion.chain import build_chain
 from rcilab.motion.segment import build_segments
-from rcilab.spatial import Pose
+from rcilab.motion.segment_spline import build_chain
 
 TOOL = Pose((0.0, 0.02, 0.1))
 MODELS = {name: load_model(name, tool=TOOL) for name in ("xMatePro3", "xMatePro7", "xMate3", "xMate7", "Panda")}

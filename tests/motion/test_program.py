@@ -17,12 +17,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import rcilab
-from rcilab.errors import InvalidValueError, ModelError, VersionMismatchError
-from rcilab.model import load_model
+from rcilab.core.errors import InvalidValueError, ModelError, VersionMismatchError
+from rcilab.core.spatial import Pose
+from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, Program, Waypoint, lined_json, plan_program, program_file
 from rcilab.motion.program_file import SCHEMA
 from rcilab.motion.waypoint import ALLOWED, ALWAYS, WORDS
-from rcilab.spatial import Pose
 
 MODEL = load_model("xMatePro7")
 HOME = MODEL.forward(MODEL.home)

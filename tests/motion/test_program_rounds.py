@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rcilab.bench.compute import close_program_of
-from rcilab.errors import InvalidValueError, PlanningError
-from rcilab.model import load_model
+from rcilab.core.errors import InvalidValueError, PlanningError
+from rcilab.core.spatial import Pose
+from rcilab.diagnostics.bench.compute import close_program_of
+from rcilab.model.robot_model import load_model
 from rcilab.motion import Program, Waypoint, plan_joint, plan_program
-from rcilab.spatial import Pose
 
 MODEL = load_model("xMatePro7")
 HOME = MODEL.forward(MODEL.home)

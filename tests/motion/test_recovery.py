@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from rcilab import SafetyBox, check, load_model, plan_recovery
-from rcilab.errors import PlanningError
+from rcilab.core.clearance import SafetyDistance
+from rcilab.core.errors import PlanningError
+from rcilab.core.spatial import Pose
 from rcilab.motion import Motion, plan_joint, plan_line
-from rcilab.safety_distance import SafetyDistance
-from rcilab.spatial import Pose
 
 MODELS = ["xMate3", "xMatePro7", "Panda"]
 

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from rcilab.errors import InvalidValueError, PlanningError
-from rcilab.model import load_model
+from rcilab.core.errors import InvalidValueError, PlanningError
+from rcilab.model.robot_model import load_model
 from rcilab.motion import plan_joint
 from rcilab.motion.joint import S_PROFILE_VELOCITY
 from rcilab.motion.s_curve import plan_s_curve, synchronize

@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rcilab.clock import CYCLE_TIME
 from rcilab.conformance.check import check
-from rcilab.errors import InvalidValueError
-from rcilab.model import load_model
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.errors import InvalidValueError
+from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, motion_through, plan_joint
 from tests.recording.runs import some_run
 

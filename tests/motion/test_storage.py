@@ -4,8 +4,8 @@ import warnings
 import numpy as np
 import pytest
 
-from rcilab.errors import InvalidValueError, RcilabError, VersionMismatchError
-from rcilab.model import load_model
+from rcilab.core.errors import InvalidValueError, RcilabError, VersionMismatchError
+from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, plan_joint
 from rcilab.motion.storage import KIND, VERSION
 

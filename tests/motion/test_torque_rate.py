@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from rcilab import Pose, check, load_model, plan_joint, plan_line, plan_program
-from rcilab.bench.compute import program_of
-from rcilab.errors import InvalidValueError, PlanningError
+from rcilab.core.errors import InvalidValueError, PlanningError
+from rcilab.diagnostics.bench.compute import program_of
 from rcilab.motion import Program, Waypoint
 
 MODEL = load_model("xMatePro7")

@@ -12,11 +12,11 @@ import pytest
 
 import rcilab
 from rcilab import notebook
-from rcilab.errors import ControlError
+from rcilab.core.errors import ControlError
 from tests.waiting import wait_for
 
 if TYPE_CHECKING:
-    from rcilab.client.session import RobotSession
+    from rcilab.execution.session import RobotSession
     from rcilab.notebook import RunPanel
 
 PRO7 = rcilab.load_model("xMatePro7")

@@ -14,7 +14,7 @@ import rcilab
 from rcilab import notebook
 from rcilab.notebook import cells
 from rcilab.notebook.cells import Cells
-from rcilab.notebook.place import Place
+from rcilab.notebook.kernel_reachability import Place
 from tests.late import Late
 from tests.processes import processes
 

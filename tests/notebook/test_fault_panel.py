@@ -13,11 +13,11 @@ import pytest
 
 import rcilab
 from rcilab import notebook
-from rcilab.faults import Fault
-from rcilab.gallery import Exhibit
-from rcilab.language import LANGUAGES
-from rcilab.notebook.place import Place
-from rcilab.words.text import load_face
+from rcilab.app.fault_lab import Exhibit
+from rcilab.core.faults import Fault
+from rcilab.i18n.locale import LANGUAGES
+from rcilab.i18n.translator import load_face
+from rcilab.notebook.kernel_reachability import Place
 from tests.processes import processes
 from tests.waiting import wait_for
 

@@ -70,7 +70,7 @@ until(lambda: robot.is_moving)
 """
 PAGE = """
 from rcilab.notebook import heart
-from rcilab.notebook.at_once import hear_at_once
+from rcilab.notebook.subshell_routing import hear_at_once
 from ipywidgets import Button
 heart.INTERVAL = 0.2  # A second of silence is enough.
 kernel_heart = heart.kernel_heart()

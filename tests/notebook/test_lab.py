@@ -6,7 +6,7 @@ from types import ModuleType
 
 import pytest
 
-from rcilab.errors import UsageError
+from rcilab.core.errors import UsageError
 from rcilab.notebook import quick_lab
 from rcilab.notebook.lab import lab_command
 

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 import rcilab
-from rcilab.notebook.page_watch import LEFT_ALONE
+from rcilab.notebook.browser_watchdog import LEFT_ALONE
 from tests.notebook.jupyter_servers import serving
 
 FLAGS = (

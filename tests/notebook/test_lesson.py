@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from rcilab.conformance import check
-from rcilab.cycle_file import cycle_dtype
-from rcilab.model import load_model
+from rcilab.core.cycle_log import cycle_dtype
+from rcilab.model.robot_model import load_model
 from rcilab.motion import plan_joint
+from rcilab.notebook.browser_watchdog import LEFT_ALONE
 from rcilab.notebook.lesson import answer, language
-from rcilab.notebook.page_watch import LEFT_ALONE
 from rcilab.recording.run import build_run
 
 SESSION = "JPY_SESSION_NAME"

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from rcilab.cli import main
-from rcilab.errors import UsageError
+from rcilab.core.errors import UsageError
 from rcilab.notebook.lessons import INDEX, copy_lessons, find_lessons
 
 LESSON = "01_first.zh.ipynb"

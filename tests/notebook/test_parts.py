@@ -17,10 +17,10 @@ import pytest
 import rcilab
 import rcilab.notebook
 from rcilab import notebook
-from rcilab.errors import InvalidValueError, UsageError
-from rcilab.language import LANGUAGES, load_words
-from rcilab.notebook.place import Place
-from rcilab.words.text import load_face
+from rcilab.core.errors import InvalidValueError, UsageError
+from rcilab.i18n.locale import LANGUAGES, load_words
+from rcilab.i18n.translator import load_face
+from rcilab.notebook.kernel_reachability import Place
 from tests.catalogues import require_equal
 from tests.late import Late
 
@@ -61,7 +61,7 @@ def text_of(widget: Any) -> str:
 def test_both_languages_say_the_same_things() -> None:
     require_equal(lambda language: load_words("rcilab.notebook", language), LANGUAGES)
     for language in LANGUAGES:
-        own, shared = (load_words(package, language).keys() for package in ("rcilab.notebook", "rcilab.words"))
+        own, shared = (load_words(package, language).keys() for package in ("rcilab.notebook", "rcilab.i18n"))
         assert not own & shared
 
 
@@ -278,7 +278,7 @@ def test_what_takes_longer_shows_how_far_it_is_and_can_be_given_up(fresh: Lab, m
     before = fresh.state.plan
     assert before is not None
     monkeypatch.setattr(
-        "rcilab.notebook.long_work.kernel_cells", lambda: SimpleNamespace(is_calling=False)
+        "rcilab.notebook.long_task.kernel_cells", lambda: SimpleNamespace(is_calling=False)
     )  # A hand's.
     monkeypatch.setattr("rcilab.notebook.state.make_plan", lambda *_: go_on.wait(20.0) and before)
     panel.plan.click()

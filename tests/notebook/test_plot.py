@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import rcilab
-from rcilab.errors import InvalidValueError
+from rcilab.core.errors import InvalidValueError
 from rcilab.notebook.plot import JOINT_COLORS, VIOLATION_COLOR, plot
 from rcilab.notebook.preview import preview
 from tests.late import Late
@@ -51,9 +51,9 @@ def test_it_is_written_in_chinese_where_there_is_a_font_for_it(monkeypatch: pyte
 
     assert "hatched" in words()
     monkeypatch.setenv("JPY_SESSION_NAME", "01_first_motion.zh.ipynb")
-    monkeypatch.setattr("rcilab.notebook.writing.chinese_font", lambda: None)
+    monkeypatch.setattr("rcilab.notebook.fonts.chinese_font", lambda: None)
     assert "hatched" in words()
-    monkeypatch.setattr("rcilab.notebook.writing.chinese_font", lambda: "A Font")
+    monkeypatch.setattr("rcilab.notebook.fonts.chinese_font", lambda: "A Font")
     assert re.search(r"以斜线标出.*时间.*关节 1", words())
     assert "hatched" in words("en")
     family = plot(MOTION, PRO7)._suptitle.get_fontfamily()  # type: ignore[attr-defined]

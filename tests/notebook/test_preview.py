@@ -12,7 +12,7 @@ import pytest
 import umsgpack
 
 import rcilab
-from rcilab.errors import InvalidValueError, UsageError
+from rcilab.core.errors import InvalidValueError, UsageError
 from rcilab.notebook.preview import Preview, preview
 from rcilab.robots.upright import upright_joints
 
@@ -95,9 +95,9 @@ def test_static_it_is_whole_and_needs_nobody(tmp_path: Path) -> None:
 
 def test_on_a_hub_it_is_static_unless_a_proxy_leads_to_the_kernel(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("JUPYTERHUB_SERVICE_PREFIX", "/user/somebody/")
-    monkeypatch.setattr("rcilab.notebook.place.find_spec", lambda name: None)
+    monkeypatch.setattr("rcilab.notebook.kernel_reachability.find_spec", lambda name: None)
     assert preview(PRO7.home, PRO7).url is None
-    monkeypatch.setattr("rcilab.notebook.place.find_spec", lambda name: object())
+    monkeypatch.setattr("rcilab.notebook.kernel_reachability.find_spec", lambda name: object())
     with preview(PRO7.home, PRO7) as scene:
         assert scene.url is not None
         assert scene.url.startswith("/user/somebody/proxy/")

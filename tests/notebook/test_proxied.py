@@ -15,7 +15,7 @@ import pytest
 
 import rcilab
 from rcilab import notebook
-from rcilab.notebook.place import find_place
+from rcilab.notebook.kernel_reachability import find_place
 from tests.late import Late
 from tests.notebook.jupyter_servers import serving
 

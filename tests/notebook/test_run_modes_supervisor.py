@@ -10,13 +10,13 @@ import pytest
 
 import rcilab
 from rcilab import notebook
-from rcilab.client.control_settings import ControlSettings, standard_control
-from rcilab.language import LANGUAGES
+from rcilab.app.mode_parameters import PARTS_OF_MODE
+from rcilab.control_process import SupervisorStatus
+from rcilab.core.state import MODES
+from rcilab.i18n.locale import LANGUAGES
+from rcilab.i18n.translator import Text
+from rcilab.makers.rokae.driver.controller_parameters import ControlSettings, standard_control
 from rcilab.notebook.robot_side import BusyError, Outcome
-from rcilab.posing.driving import PARTS_OF_MODE
-from rcilab.state import MODES
-from rcilab.supervisor import SupervisorStatus
-from rcilab.words.text import Text
 from tests.late import Late
 from tests.waiting import wait_for
 
@@ -138,8 +138,8 @@ def test_a_robot_is_told_parameters_after_a_second_press_only(language: str) -> 
 
 
 def test_refusals_are_told_in_the_language_of_the_panel() -> None:
-    from rcilab.errors import CommandRejectedError, InvalidValueError
-    from rcilab.protocols import rci
+    from rcilab.core.errors import CommandRejectedError, InvalidValueError
+    from rcilab.makers.rokae import wire as rci
 
     kinds = (rci.SettingStatus, rci.StartStatus, rci.StopStatus, rci.RecoveryStatus, rci.GuideStatus)
     statuses = [status for kind in kinds for status in kind if status.name not in ("SUCCESS", "MOTION_STARTED")]

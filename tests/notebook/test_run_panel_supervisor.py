@@ -14,11 +14,11 @@ import pytest
 
 import rcilab
 from rcilab import notebook
-from rcilab.errors import PlanningError, RcilabError
-from rcilab.notebook.heart import PATIENCE, Heart
-from rcilab.notebook.page_watch import LEFT_ALONE
+from rcilab.control_process import SupervisorStatus
+from rcilab.core.errors import PlanningError, RcilabError
+from rcilab.notebook.browser_heartbeat import PATIENCE, Heart
+from rcilab.notebook.browser_watchdog import LEFT_ALONE
 from rcilab.notebook.robot_side import Outcome
-from rcilab.supervisor import SupervisorStatus
 
 if TYPE_CHECKING:
     from rcilab.notebook import RunPanel

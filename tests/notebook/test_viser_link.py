@@ -12,7 +12,7 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 import rcilab
-from rcilab.errors import UsageError
+from rcilab.core.errors import UsageError
 from rcilab.notebook.viser_link import PreviewPage, serve_preview
 
 PRO7 = rcilab.load_model("xMatePro7")

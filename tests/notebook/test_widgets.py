@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import rcilab
-from rcilab.errors import InvalidValueError
+from rcilab.core.errors import InvalidValueError
 from tests.late import Late
 
 widgets = Late("rcilab.notebook.widgets")

@@ -12,12 +12,12 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from rcilab.controller.config import ControllerConfig
-from rcilab.controller.cycle import ControlCycle
-from rcilab.controller.plants import build_plant
-from rcilab.controller.server import ControllerServer
-from rcilab.model import load_model
-from rcilab.one_core import one_core
+from rcilab.makers.rokae.controller.config import ControllerConfig
+from rcilab.makers.rokae.controller.cycle import ControlCycle
+from rcilab.makers.rokae.controller.server import ControllerServer
+from rcilab.model.robot_model import load_model
+from rcilab.realtime.cpu_affinity import one_core
+from rcilab.sim.plants import build_plant
 from tests.peers.robot import PATIENCE, Robot
 
 PLANTS = ("ideal", "mujoco")

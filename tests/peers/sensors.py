@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rcilab.arrays import frozen
+from rcilab.core.arrays import frozen
 from tests.peers import faults
 from tests.peers.faults import H
 from tests.peers.kinematics import Matrix

@@ -7,13 +7,13 @@ from functools import lru_cache
 
 import numpy as np
 
-from rcilab.client.recorder import Recorder
-from rcilab.dynamics.payload import Payload
-from rcilab.model import load_model
+from rcilab.core.spatial import Pose
+from rcilab.execution.recorder import Recorder
+from rcilab.model.dynamics.payload import Payload
+from rcilab.model.robot_model import load_model
 from rcilab.motion import plan_joint, plan_stop
 from rcilab.recording.run import Run, build_run
 from rcilab.recording.setup import Setup
-from rcilab.spatial import Pose
 
 MODEL = load_model("xMatePro7", tool=Pose((0.0, 0.01, 0.12), (0.9, 0.1, 0.2, 0.3)), load=Payload(mass=1.5))
 PLAN = plan_joint(MODEL, MODEL.home, MODEL.home + 0.2, speed=0.3)

@@ -11,9 +11,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rcilab.i18n.units import Units
 from rcilab.recording.columns import run_facts
 from rcilab.recording.export import export_run
-from rcilab.words.units import Units
 from tests.recording.runs import OFFSET, SETUP, some_ideal_run, some_run, some_stopped_run
 
 RUN = some_run()

@@ -6,9 +6,9 @@ import os
 
 import pytest
 
-from rcilab.cycle_file import cycle_dtype
-from rcilab.errors import InvalidValueError
-from rcilab.model import load_model
+from rcilab.core.cycle_log import cycle_dtype
+from rcilab.core.errors import InvalidValueError
+from rcilab.model.robot_model import load_model
 from rcilab.recording.folder import Stored, keep_newest, stored_runs
 from rcilab.recording.live import LiveRecording, RunFacts
 from rcilab.recording.run_file import RunFile

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 import rcilab
-from rcilab.cycle_file import cycle_dtype
-from rcilab.errors import InvalidValueError, UsageError, VersionMismatchError
-from rcilab.faults import Fault
-from rcilab.recording.blocks import MAGIC, encode_block, encode_header
+from rcilab.core.cycle_log import cycle_dtype
+from rcilab.core.errors import InvalidValueError, UsageError, VersionMismatchError
+from rcilab.core.faults import Fault
+from rcilab.recording.chunks import MAGIC, encode_block, encode_header
 from rcilab.recording.export import export_run
 from rcilab.recording.live import LiveRecording, RunFacts
 from rcilab.recording.run import Run, build_run

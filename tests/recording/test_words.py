@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rcilab.language import LANGUAGES, load_words
+from rcilab.i18n.locale import LANGUAGES, load_words
 from tests.catalogues import require_equal
 
 

@@ -9,7 +9,7 @@ from types import ModuleType
 import pytest
 
 from rcilab.cli import mjcf, urdf
-from rcilab.errors import ModelError
+from rcilab.core.errors import ModelError
 from rcilab.robots import describe_robot
 from rcilab.robots.mjcf import build_mjcf
 from rcilab.robots.urdf import build_urdf

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rcilab.dynamics.payload import Payload
-from rcilab.model import load_model
+from rcilab.core.spatial import Pose
+from rcilab.model.dynamics.payload import Payload
+from rcilab.model.robot_model import load_model
 from rcilab.robots import ROBOT_NAMES
 from rcilab.robots.files import write_model
 from rcilab.robots.mjcf import build_mjcf
-from rcilab.spatial import Pose
 from tests.late import Late
 
 mujoco = Late("mujoco")

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rcilab.arrays import Array
+from rcilab.core.arrays import Array
+from rcilab.core.spatial import Pose
 from rcilab.robots import RCI_ROBOT_NAMES, ROBOT_NAMES, describe_robot
 from rcilab.robots.mesh import Mesh
 from rcilab.robots.shapes import LinkShape, build_shapes
 from rcilab.robots.upright import upright_joints
-from rcilab.spatial import Pose
 
 arms = pytest.mark.parametrize("name", ROBOT_NAMES)
 xmates = pytest.mark.parametrize("name", RCI_ROBOT_NAMES)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rcilab.arrays import Array
+from rcilab.core.arrays import Array
 from rcilab.robots.surface import box, cut, cylinder, join, mesh_surface, rod, vase
 
 

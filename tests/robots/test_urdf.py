@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rcilab.model import RobotModel, load_model
+from rcilab.core.spatial import Pose
+from rcilab.model.robot_model import RobotModel, load_model
 from rcilab.robots import ROBOT_NAMES
 from rcilab.robots.urdf import build_meshes, build_urdf
-from rcilab.spatial import Pose
 
 FOLDER = Path(__file__).parents[2] / "urdf"
 AGREEMENT = 1e-9  # [m] and matrix elements; measured 1e-15

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rcilab.errors import InvalidValueError, UsageError
-from rcilab.model import load_model
+from rcilab.core.errors import InvalidValueError, UsageError
+from rcilab.core.spatial import Pose
+from rcilab.model.robot_model import load_model
 from rcilab.robots import ROBOT_NAMES
 from rcilab.robots.shapes import ROLE_COLORS
-from rcilab.spatial import Pose
 from rcilab.views.arm_view import ArmView
 from rcilab.views.null_scene import NullScene
 

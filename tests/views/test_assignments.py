@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rcilab.views import assignments
+from rcilab.views.viser_ext import assignments
 
 
 @pytest.fixture

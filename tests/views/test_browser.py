@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rcilab.model import load_model
+from rcilab.model.robot_model import load_model
 from rcilab.views.arm_view import ArmView
 from rcilab.views.viser_scene import ViserScene
 from rcilab.views.viser_stage import furnish

@@ -7,10 +7,10 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from rcilab.model import load_model
+from rcilab.model.robot_model import load_model
 from rcilab.views.elbow_view import ARC_COLORS, OUTWARD, ElbowView, free_colors
 from rcilab.views.null_scene import NullScene
-from rcilab.views.swept import swept_mesh
+from rcilab.views.swept_volume import swept_mesh
 
 MODEL = load_model("xMatePro7")
 

@@ -8,7 +8,7 @@ from zipfile import ZipFile
 
 import pytest
 
-from rcilab.views import icons
+from rcilab.views.viser_ext import icons
 
 
 @pytest.mark.parametrize("name", ["player-play", "x", "arrow-back-up", "hand-finger"])

@@ -7,7 +7,7 @@ import threading
 
 import pytest
 
-from rcilab.views import loop_event
+from rcilab.views.viser_ext import loop_event
 
 
 class CountingLoop(asyncio.SelectorEventLoop):

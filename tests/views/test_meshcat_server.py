@@ -12,8 +12,8 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from rcilab.errors import ConnectionLostError
-from rcilab.model import load_model
+from rcilab.core.errors import ConnectionLostError
+from rcilab.model.robot_model import load_model
 from rcilab.views.arm_view import ArmView
 from rcilab.views.meshcat_scene import MeshcatScene
 

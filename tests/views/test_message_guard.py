@@ -15,9 +15,9 @@ import zstandard
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
-from rcilab.views.gate import Gate
-from rcilab.views.guarded_server import GuardedServer, listen
+from rcilab.views.access_control import Gate
 from rcilab.views.message_guard import LARGEST_MESSAGE, LARGEST_UPLOAD, LONGEST_TEXT, for_anyone
+from rcilab.views.viser_server import GuardedServer, listen
 
 NAN, INF = float("nan"), float("inf")
 

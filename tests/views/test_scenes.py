@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from rcilab.errors import UsageError
-from rcilab.model import load_model
+from rcilab.core.errors import UsageError
+from rcilab.model.robot_model import load_model
 from rcilab.views.arm_view import ArmView
 from rcilab.views.meshcat_scene import MeshcatScene
 from rcilab.views.null_scene import NullScene

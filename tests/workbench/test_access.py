@@ -13,7 +13,7 @@ from urllib.request import url2pathname
 
 import pytest
 
-from rcilab.errors import UsageError
+from rcilab.core.errors import UsageError
 from rcilab.workbench.access import find_token, private_address
 
 GOOD = "sixteen letters!"

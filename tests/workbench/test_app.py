@@ -9,13 +9,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rcilab.errors import InvalidValueError, ModelError, UsageError
-from rcilab.model import load_model
-from rcilab.posing.planning import make_plan
-from rcilab.words.units import Units
-from rcilab.workbench import conductor, requests
+from rcilab.app.planning import make_plan
+from rcilab.core.errors import InvalidValueError, ModelError, UsageError
+from rcilab.i18n.units import Units
+from rcilab.model.robot_model import load_model
+from rcilab.workbench import dispatcher as conductor
+from rcilab.workbench import requests
 from rcilab.workbench.app import Workbench, WorkbenchConfig
-from rcilab.workbench.panels.arm_now import arm_html
+from rcilab.workbench.panels.arm_state import arm_html
 from rcilab.workbench.panels.target import planned_html
 from rcilab.workbench.panels.timeline import TimelinePanel
 from rcilab.workbench.run.readiness import obstacle, time_shown

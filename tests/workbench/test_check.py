@@ -10,13 +10,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from rcilab.app.planning import Plan
 from rcilab.conformance import CONDITIONS
-from rcilab.model import load_model
+from rcilab.core.safety_box import SafetyBox
+from rcilab.core.spatial import Pose
+from rcilab.i18n.units import Units
+from rcilab.model.robot_model import load_model
 from rcilab.motion import Program, Waypoint
-from rcilab.posing.planning import Plan
-from rcilab.safety_box import SafetyBox
-from rcilab.spatial import Pose
-from rcilab.words.units import Units
 from rcilab.workbench import requests
 from rcilab.workbench.check.actions import CheckActions, plot_of
 from rcilab.workbench.check.slowing import scaled, slow_to_goal

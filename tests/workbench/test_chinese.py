@@ -11,39 +11,39 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import pytest
 
-from rcilab.client.address import RobotAddress
-from rcilab.client.identify import dh_lengths, require_same_arm
-from rcilab.client.start_check import describe_start_mismatch
-from rcilab.client.transport import SocketTransport
 from rcilab.conformance import check
-from rcilab.conformance.breach import Breach, describe_breaches
 from rcilab.conformance.conditions import find_condition
 from rcilab.conformance.explain import explain_limit
-from rcilab.controller.ideal_plant import IdealPlant
-from rcilab.controller.modes.generator import lost_motion
-from rcilab.cycle_file import cycle_dtype
-from rcilab.dynamics.payload import Payload
-from rcilab.errors import CertificateError, CommandRejectedError, RcilabError, UsageError
-from rcilab.model import load_model
+from rcilab.conformance.limit_violation import Breach, describe_breaches
+from rcilab.control_process import SupervisorStatus
+from rcilab.control_process.motion_preconditions import require_ready
+from rcilab.core.cycle_log import cycle_dtype
+from rcilab.core.errors import CertificateError, CommandRejectedError, RcilabError, UsageError
+from rcilab.core.spatial import Pose
+from rcilab.execution.start_pose_check import describe_start_mismatch
+from rcilab.i18n.error_messages import tell_note
+from rcilab.i18n.number_parsing import parse_number, parse_quaternion
+from rcilab.i18n.translator import Remark
+from rcilab.i18n.units import Units
+from rcilab.makers.rokae.controller.modes.generator import lost_motion
+from rcilab.makers.rokae.driver.address import RobotAddress
+from rcilab.makers.rokae.driver.identify import dh_lengths, require_same_arm
+from rcilab.makers.rokae.driver.transport import SocketTransport
+from rcilab.makers.rokae.wire import RecoveryStatus, StartStatus
+from rcilab.model.dynamics.payload import Payload
+from rcilab.model.robot_model import load_model
 from rcilab.motion import Program, Waypoint, plan_joint, plan_line, plan_program
-from rcilab.motion.pose_book import PoseBook
+from rcilab.motion.named_poses import PoseBook
 from rcilab.motion.program_file import read_program
 from rcilab.motion.samples import load_samples
-from rcilab.protocols.rci import RecoveryStatus, StartStatus
-from rcilab.protocols.world import Refused, WorldStatus
-from rcilab.protocols.world.lines import decode_world_answer, encode_world_answer
-from rcilab.recording.blocks import MAGIC
-from rcilab.recording.extra import MissingExtraError
+from rcilab.recording.chunks import MAGIC
+from rcilab.recording.optional_deps import MissingExtraError
 from rcilab.recording.run_file import RunFile, decode_run, load_run
 from rcilab.robots import ROBOT_NAMES
-from rcilab.spatial import Pose
-from rcilab.supervisor import SupervisorStatus
-from rcilab.supervisor.admission import require_ready
-from rcilab.words.errors import tell_note
-from rcilab.words.number import parse_number, parse_quaternion
-from rcilab.words.text import Remark
-from rcilab.words.units import Units
-from rcilab.workbench.telling import tell_error
+from rcilab.sim.api import Refused, WorldStatus
+from rcilab.sim.api.lines import decode_world_answer, encode_world_answer
+from rcilab.sim.ideal_plant import IdealPlant
+from rcilab.workbench.status_text import tell_error
 from rcilab.workbench.text import Text, message
 
 MODEL = load_model("xMatePro7")

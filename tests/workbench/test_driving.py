@@ -8,12 +8,12 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from rcilab.client.control_settings import control_ranges, standard_control
-from rcilab.controller.settings import default_settings
-from rcilab.model import load_model
-from rcilab.posing.driving import PARTS_OF_MODE, said_ranges
-from rcilab.state import MODES
-from rcilab.supervisor.lateness import LatenessHistogram, summarise
+from rcilab.app.mode_parameters import PARTS_OF_MODE, said_ranges
+from rcilab.control_process.jitter_histogram import LatenessHistogram, summarise
+from rcilab.core.state import MODES
+from rcilab.makers.rokae.controller.settings import default_settings
+from rcilab.makers.rokae.driver.controller_parameters import control_ranges, standard_control
+from rcilab.model.robot_model import load_model
 from rcilab.workbench import requests
 from rcilab.workbench.app import Workbench
 from rcilab.workbench.panels.health import histogram_html

@@ -10,13 +10,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rcilab.client.setup import RobotSetup
-from rcilab.errors import ControlError, UsageError
-from rcilab.model import load_model
-from rcilab.safety_box import SafetyBox
-from rcilab.spatial import Pose
-from rcilab.supervisor import SupervisorStatus
+from rcilab.control_process import SupervisorStatus
+from rcilab.core.errors import ControlError, UsageError
+from rcilab.core.safety_box import SafetyBox
+from rcilab.core.spatial import Pose
+from rcilab.makers.rokae.driver.configuration import RobotSetup
+from rcilab.model.robot_model import load_model
 from rcilab.workbench import requests
+from rcilab.workbench.control_lock import Lease
 from rcilab.workbench.goal.actions import GoalActions, initial_goal
 from rcilab.workbench.jog import actions as jog_actions
 from rcilab.workbench.jog.actions import JogActions
@@ -31,7 +32,6 @@ from rcilab.workbench.jog.jogging import (
     safe_share,
 )
 from rcilab.workbench.jog.step import step_pose, take_step
-from rcilab.workbench.lease import Lease
 from rcilab.workbench.store import Store, UiState
 from tests.workbench.opened import opened, wait
 

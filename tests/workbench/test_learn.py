@@ -9,12 +9,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rcilab.faults import Fault
-from rcilab.gallery import FAULTS
-from rcilab.gallery.shown import body_html, head_html
-from rcilab.model import load_model
+from rcilab.app.fault_lab import FAULTS
+from rcilab.app.fault_lab.demo_view import body_html, head_html
+from rcilab.core.faults import Fault
+from rcilab.i18n.units import Units
+from rcilab.model.robot_model import load_model
 from rcilab.views.plots import build_frame, mark_moment, plan_curves
-from rcilab.words.units import Units
 from rcilab.workbench import requests
 from rcilab.workbench.goal.actions import GoalActions, initial_goal
 from rcilab.workbench.learn.actions import LearnActions

@@ -7,9 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rcilab.errors import CertificateError
-from rcilab.model import load_model
-from rcilab.posing.planning import Plan, make_plan
+from rcilab.app.planning import Plan, make_plan
+from rcilab.core.errors import CertificateError
+from rcilab.model.robot_model import load_model
 from rcilab.workbench import requests
 from rcilab.workbench.goal import actions as goal_actions
 from rcilab.workbench.goal.actions import GoalActions, initial_goal

@@ -7,20 +7,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rcilab.clock import CYCLE_TIME
-from rcilab.conformance.pacing import plan_pace
-from rcilab.motion.pacing import as_planned
-from rcilab.posing.planning import Plan, make_plan
+from rcilab.app.planning import Plan, make_plan
+from rcilab.conformance.speed_scaling_check import plan_pace
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.motion.speed_scaling import as_planned
 from rcilab.views.plots import build_frame, plan_curves, recorded_curves, streamed_curves
 from rcilab.workbench.panels.plot_contents import legend_html
 from rcilab.workbench.panels.status import status_values
-from rcilab.workbench.run.keeper import as_recording
 from rcilab.workbench.run.played import moment_played, paced_of, played_at, played_path, streamed_rows
 from rcilab.workbench.run.replay import replayed
+from rcilab.workbench.run.run_recorder import as_recording
 from rcilab.workbench.store import UiState
 from rcilab.workbench.text import Text
 from tests.recording.runs import some_cycles, some_run
-from tests.workbench.test_telling import initial_state, status
+from tests.workbench.test_status_text import initial_state, status
 
 CHANGED = 200  # [cycles] At which the motion is slowed.
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from rcilab.conformance import check
 from rcilab.conformance.conditions import CYCLE_CONDITIONS
-from rcilab.model import load_model
+from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, plan_joint, plan_recovery
 from rcilab.views.plots import (
     ORDERS,

@@ -11,10 +11,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rcilab.client.setup import RobotSetup
-from rcilab.model import load_model
+from rcilab.core.spatial import Pose
+from rcilab.makers.rokae.driver.configuration import RobotSetup
+from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, Program, Waypoint
-from rcilab.spatial import Pose
 from rcilab.workbench import requests
 from rcilab.workbench.check.freshness import outdated
 from rcilab.workbench.check.state import CheckState, Slowed
@@ -26,7 +26,7 @@ from rcilab.workbench.program import actions as program_actions
 from rcilab.workbench.program import planning as program_planning
 from rcilab.workbench.program.actions import ProgramActions
 from rcilab.workbench.program.draft import draft_of, number_at, tell_place, time_at
-from rcilab.workbench.program.marks import label_of, labels_of
+from rcilab.workbench.program.waypoint_markers import label_of, labels_of
 from rcilab.workbench.run.readiness import may_go_back, may_plan_again, obstacle
 from rcilab.workbench.store import Store, UiState
 from rcilab.workbench.text import Text

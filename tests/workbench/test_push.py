@@ -11,17 +11,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rcilab.errors import UsageError
-from rcilab.model import load_model
-from rcilab.supervisor import SupervisorStatus
+from rcilab.control_process import SupervisorStatus
+from rcilab.core.errors import UsageError
+from rcilab.model.robot_model import load_model
 from rcilab.workbench import requests
 from rcilab.workbench.app import Workbench
+from rcilab.workbench.control_lock import Lease
 from rcilab.workbench.goal.actions import initial_goal
-from rcilab.workbench.lease import Lease
 from rcilab.workbench.run import push_actions
 from rcilab.workbench.run.actions import RobotActions
+from rcilab.workbench.run.active_force import SPRING, STRONGEST, TOOL, place_of, spring_force
 from rcilab.workbench.run.push_actions import PushActions
-from rcilab.workbench.run.pushing import SPRING, STRONGEST, TOOL, place_of, spring_force
 from rcilab.workbench.store import Store, UiState
 from tests.workbench.opened import opened, told, wait
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import pytest
 
 from rcilab import connect
-from rcilab.supervisor.launch import start_controller
+from rcilab.control_process.launch import start_controller
 from rcilab.workbench import requests
 from rcilab.workbench.app import Workbench, WorkbenchConfig
 from rcilab.workbench.run.readiness import may_lead_inside

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rcilab.model import load_model
+from rcilab.model.robot_model import load_model
 from rcilab.workbench import requests
 from rcilab.workbench.goal.actions import initial_goal
 from rcilab.workbench.run.folder_actions import FolderActions, megabytes

@@ -11,9 +11,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rcilab.model import load_model
-from rcilab.safety_box import SafetyBox
-from rcilab.spatial import Pose
+from rcilab.core.safety_box import SafetyBox
+from rcilab.core.spatial import Pose
+from rcilab.model.robot_model import load_model
 from rcilab.workbench import requests
 from rcilab.workbench.goal.actions import SETTLED, GoalActions, initial_goal
 from rcilab.workbench.goal.elbow import look_at_elbow, nearest_free
@@ -23,7 +23,7 @@ from rcilab.workbench.panels.elbow import ring_html
 from rcilab.workbench.panels.target import planned_html
 from rcilab.workbench.panels.timeline import TimelinePanel
 from rcilab.workbench.scene.actions import SceneActions
-from rcilab.workbench.scene.ribbon_stage import bead_words
+from rcilab.workbench.scene.path_strip_view import bead_words
 from rcilab.workbench.store import Store, UiState
 from rcilab.workbench.text import LANGUAGES, Text
 

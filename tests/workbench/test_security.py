@@ -13,9 +13,9 @@ import pytest
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
-from rcilab.errors import UsageError
-from rcilab.views.gate import Gate
-from rcilab.views.guarded_server import GuardedServer, listen
+from rcilab.core.errors import UsageError
+from rcilab.views.access_control import Gate
+from rcilab.views.viser_server import GuardedServer, listen
 from rcilab.workbench import security
 from rcilab.workbench.live import LIVE_PATH, Heard, LiveChannel
 from rcilab.workbench.page import decorate
@@ -52,7 +52,7 @@ def test_a_name_that_leads_nowhere_is_refused():
 
 def test_what_counts_is_where_the_socket_is(monkeypatch):
     """A name may lead elsewhere by the time that it is listened on."""
-    monkeypatch.setattr("rcilab.views.guarded_server.listen", lambda host, port: listen("0.0.0.0", 0))
+    monkeypatch.setattr("rcilab.views.viser_server.listen", lambda host, port: listen("0.0.0.0", 0))
     with pytest.raises(UsageError, match="opens the workbench to the network"):
         bind("127.0.0.1", 0)
     bind("127.0.0.1", 0, "sixteen letters!").close()

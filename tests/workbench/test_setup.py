@@ -9,12 +9,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rcilab.client.setup import SETUP_PARTS, RobotSetup
-from rcilab.errors import CommandRejectedError
-from rcilab.protocols import rci
-from rcilab.spatial import Pose
-from rcilab.supervisor import SupervisorStatus
-from rcilab.supervisor.launch import start_controller
+from rcilab.control_process import SupervisorStatus
+from rcilab.control_process.launch import start_controller
+from rcilab.core.errors import CommandRejectedError
+from rcilab.core.spatial import Pose
+from rcilab.makers.rokae import wire as rci
+from rcilab.makers.rokae.driver.configuration import SETUP_PARTS, RobotSetup
 from rcilab.workbench import requests
 from rcilab.workbench.app import Workbench
 from rcilab.workbench.check.freshness import outdated
@@ -24,9 +24,15 @@ from rcilab.workbench.panels.setup import SetupPanel
 from rcilab.workbench.panels.target import TargetPanel, planned_html
 from rcilab.workbench.program.draft import target_of
 from rcilab.workbench.run.readiness import obstacle
-from rcilab.workbench.scene.setup_stage import hides_target
+from rcilab.workbench.scene.configuration_view import hides_target
+from rcilab.workbench.setup.configuration_state import (
+    SetupState,
+    describe_held,
+    describe_part,
+    pending_parts,
+    setup_obstacle,
+)
 from rcilab.workbench.setup.fields import FACE_NAMES, FIELD_NAMES, faces, read_field, with_field
-from rcilab.workbench.setup.wanted import SetupState, describe_held, describe_part, pending_parts, setup_obstacle
 from rcilab.workbench.text import Message, Text
 from tests.workbench.opened import opened, told, wait
 

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from rcilab.recording.folder import keep_newest, stored_runs
-from rcilab.workbench.keepsake import Keepsake
+from rcilab.workbench.autosave import Keepsake
 from tests.workbench import starved
-from tests.workbench.test_keepsake import MODEL, state_with_all
+from tests.workbench.test_autosave import MODEL, state_with_all
 
 PLANTS = ("ideal", "mujoco")
 

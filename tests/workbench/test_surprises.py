@@ -14,11 +14,11 @@ import numpy as np
 import pytest
 from websockets.sync.client import connect
 
-from rcilab.supervisor.launch import start_controller
+from rcilab.control_process.launch import start_controller
 from rcilab.workbench import requests
 from rcilab.workbench.app import Workbench, WorkbenchConfig
 from rcilab.workbench.run.readiness import describe_move, obstacle
-from rcilab.workbench.telling import tell_status
+from rcilab.workbench.status_text import tell_status
 from rcilab.workbench.text import Text
 from tests.workbench.opened import told, wait
 

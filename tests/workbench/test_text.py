@@ -10,13 +10,13 @@ from pathlib import Path
 import pytest
 
 import rcilab.workbench
+from rcilab.app.planning import LAWS
 from rcilab.conformance import CONDITIONS
-from rcilab.errors import InvalidValueError
-from rcilab.faults import Fault
-from rcilab.language import load_words
-from rcilab.posing.planning import LAWS
-from rcilab.state import ControllerMode, RobotMode
-from rcilab.supervisor.status import PHASES
+from rcilab.control_process.status import PHASES
+from rcilab.core.errors import InvalidValueError
+from rcilab.core.faults import Fault
+from rcilab.core.state import ControllerMode, RobotMode
+from rcilab.i18n.locale import load_words
 from rcilab.workbench.text import LANGUAGES, Text, load_catalogue, message
 from rcilab.workbench.view_actions import QUALITIES
 from tests.catalogues import require_equal
@@ -33,7 +33,7 @@ def test_no_key_stands_twice_in_a_catalogue():
         text = (files("rcilab.workbench") / "catalogues" / f"{language}.json").read_text(encoding="utf-8")
         pairs = json.loads(text, object_pairs_hook=list)
         assert len(pairs) == len(dict(pairs)), language
-        assert not dict(pairs).keys() & load_words("rcilab.words", language).keys(), "said twice: page and shared"
+        assert not dict(pairs).keys() & load_words("rcilab.i18n", language).keys(), "said twice: page and shared"
 
 
 def test_every_key_written_in_the_code_exists():

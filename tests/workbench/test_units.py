@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rcilab.words.number import parse_number
-from rcilab.words.units import Unit, Units
+from rcilab.i18n.number_parsing import parse_number
+from rcilab.i18n.units import Unit, Units
 from rcilab.workbench.text import LANGUAGES, Text, load_catalogue, message
 
 SI = Units(angle="rad", length="m")

@@ -6,8 +6,8 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from rcilab.background import Background
-from rcilab.errors import RcilabError
+from rcilab.core.background_job import Background
+from rcilab.core.errors import RcilabError
 from rcilab.workbench import requests
 from rcilab.workbench.check.slowing import Slower, slow_program, slow_to_goal
 from rcilab.workbench.check.state import CheckState, Explained, Slowed
@@ -15,13 +15,13 @@ from rcilab.workbench.goal.actions import GoalActions
 from rcilab.workbench.program.actions import ProgramActions
 from rcilab.workbench.run.readiness import is_moving
 from rcilab.workbench.session import Session
+from rcilab.workbench.status_text import tell_error
 from rcilab.workbench.store import Store
-from rcilab.workbench.telling import tell_error
 from rcilab.workbench.text import message
 
 if TYPE_CHECKING:
+    from rcilab.app.planning import Plan
     from rcilab.conformance import Condition, Report
-    from rcilab.posing.planning import Plan
 
 
 class CheckActions:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rcilab.workbench.setup.wanted import name_parts
+from rcilab.workbench.setup.configuration_state import name_parts
 from rcilab.workbench.text import Message, message
 
 if TYPE_CHECKING:

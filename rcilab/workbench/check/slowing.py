@@ -6,14 +6,14 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from rcilab.background import Tell
-from rcilab.posing.planning import Plan, make_plan, picture
+from rcilab.app.planning import Plan, make_plan, picture
+from rcilab.core.background_job import Tell
 from rcilab.workbench.program.draft import Draft
 from rcilab.workbench.program.planning import PROGRAM_LAW
 
 if TYPE_CHECKING:
+    from rcilab.app.planning import PlannableLaw
     from rcilab.conformance import SlowDown
-    from rcilab.posing.planning import PlannableLaw
 
 _TRIES = 2
 _FURTHER = 0.9

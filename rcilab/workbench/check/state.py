@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 from rcilab.workbench.text import Message
 
 if TYPE_CHECKING:
+    from rcilab.app.planning import Plan
     from rcilab.conformance import Report, SlowDown
-    from rcilab.posing.planning import Plan
     from rcilab.workbench.program.draft import Draft
 
 Explained: TypeAlias = "tuple[Report, SlowDown | None]"

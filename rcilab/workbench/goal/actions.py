@@ -8,13 +8,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from rcilab.arrays import JointVector, frozen
-from rcilab.errors import KinematicsError
-from rcilab.posing.planning import LAWS, PATH_KINDS, Plan, make_plan, make_recovery
-from rcilab.posing.reach import judge_joints, judge_pose
-from rcilab.posing.readiness import is_done
-from rcilab.spatial import Pose
-from rcilab.words.number import parse_number, parse_quaternion
+from rcilab.app.planning import LAWS, PATH_KINDS, Plan, make_plan, make_recovery
+from rcilab.app.reach import judge_joints, judge_pose
+from rcilab.app.readiness import is_done
+from rcilab.core.arrays import JointVector, frozen
+from rcilab.core.errors import KinematicsError
+from rcilab.core.spatial import Pose
+from rcilab.i18n.number_parsing import parse_number, parse_quaternion
 from rcilab.workbench import requests
 from rcilab.workbench.goal.elbow import nearest_free
 from rcilab.workbench.run.readiness import is_moving

@@ -8,13 +8,13 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from rcilab.arrays import Array
-from rcilab.errors import KinematicsError
-from rcilab.kinematics.elbow_circle import ElbowCircle
-from rcilab.kinematics.feasible_arcs import Arc, FeasibleArcs
-from rcilab.model import RobotModel
-from rcilab.safety_box import SafetyBox
-from rcilab.spatial import Pose
+from rcilab.core.arrays import Array
+from rcilab.core.errors import KinematicsError
+from rcilab.core.safety_box import SafetyBox
+from rcilab.core.spatial import Pose
+from rcilab.model.kinematics.elbow_circle import ElbowCircle
+from rcilab.model.kinematics.elbow_ranges import Arc, FeasibleArcs
+from rcilab.model.robot_model import RobotModel
 from rcilab.workbench.text import Message, message
 
 ArcKind: TypeAlias = Literal["free", "other", "limits", "singular", "box", "reach"]

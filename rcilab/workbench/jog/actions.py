@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rcilab.clock import CYCLE_TIME
+from rcilab.control_process.jog_command import HOLD_TIMEOUT
+from rcilab.core.clock import CYCLE_TIME
 from rcilab.motion import Jog
-from rcilab.supervisor.jog_command import HOLD_TIMEOUT
 from rcilab.workbench import requests
 from rcilab.workbench.goal.actions import GoalActions
 from rcilab.workbench.jog.jogging import FRAMES, SLOWEST, STEPS, STILL, Axis, at_limit, change_jog, inside, jog_velocity

@@ -8,20 +8,20 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from rcilab.arrays import Array, JointVector, frozen
+from rcilab.core.arrays import Array, JointVector, frozen
+from rcilab.core.clearance import ADVISED_DISTANCE
+from rcilab.core.safety_box import SafetyBox, active_box
 from rcilab.motion.online import POSITION_MARGIN
 from rcilab.motion.twist import DAMPED_BELOW
-from rcilab.safety_box import SafetyBox, active_box
-from rcilab.safety_distance import ADVISED_DISTANCE
-from rcilab.workbench.setup.wanted import setup_obstacle
-from rcilab.workbench.telling import tell_status
+from rcilab.workbench.setup.configuration_state import setup_obstacle
+from rcilab.workbench.status_text import tell_status
 from rcilab.workbench.text import Message, message
 
 if TYPE_CHECKING:
-    from rcilab.model import RobotModel
-    from rcilab.posing.planning import Plan
-    from rcilab.supervisor import SupervisorStatus
-    from rcilab.supervisor.jog_command import JogKind
+    from rcilab.app.planning import Plan
+    from rcilab.control_process import SupervisorStatus
+    from rcilab.control_process.jog_command import JogKind
+    from rcilab.model.robot_model import RobotModel
     from rcilab.workbench.store import Store, UiState
 
 Frame = Literal["base", "tool"]

@@ -6,10 +6,10 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from rcilab.errors import InvalidValueError, RcilabError
-from rcilab.motion.pose_book import LONGEST_NAME, PoseBook
-from rcilab.words.errors import tell
-from rcilab.words.text import Finished
+from rcilab.core.errors import InvalidValueError, RcilabError
+from rcilab.i18n.error_messages import tell
+from rcilab.i18n.translator import Finished
+from rcilab.motion.named_poses import LONGEST_NAME, PoseBook
 from rcilab.workbench import requests
 from rcilab.workbench.goal.actions import GoalActions
 from rcilab.workbench.store import Store

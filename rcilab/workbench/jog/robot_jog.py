@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rcilab.errors import RcilabError
-from rcilab.kinematics.collision import link_name
-from rcilab.posing.planning import Plan, make_plan
-from rcilab.safety_distance import ADVISED_DISTANCE
+from rcilab.app.planning import Plan, make_plan
+from rcilab.core.clearance import ADVISED_DISTANCE
+from rcilab.core.errors import RcilabError
+from rcilab.model.kinematics.collision import link_name
 from rcilab.workbench.goal.actions import GoalActions
 from rcilab.workbench.jog.jogging import (
     FASTEST_JOINT,
@@ -32,13 +32,13 @@ from rcilab.workbench.jog.jogging import (
 from rcilab.workbench.jog.step import take_step
 from rcilab.workbench.run.readiness import is_moving
 from rcilab.workbench.session import Session
+from rcilab.workbench.status_text import tell_error
 from rcilab.workbench.store import Goal, Store
-from rcilab.workbench.telling import tell_error
 from rcilab.workbench.text import message
 
 if TYPE_CHECKING:
-    from rcilab.arrays import JointVector
-    from rcilab.supervisor import SupervisorStatus, Ticket
+    from rcilab.control_process import SupervisorStatus, Ticket
+    from rcilab.core.arrays import JointVector
 
 
 class RobotJog:

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rcilab.arrays import JointVector, frozen
+from rcilab.app.reach import judge_pose
+from rcilab.core.arrays import JointVector, frozen
+from rcilab.core.spatial import Pose
 from rcilab.motion.online import POSITION_MARGIN
-from rcilab.posing.reach import judge_pose
-from rcilab.spatial import Pose
 from rcilab.workbench.jog.jogging import AXES, Axis, Frame, JogState, at_limit
 from rcilab.workbench.text import Message, message
 
 if TYPE_CHECKING:
-    from rcilab.model import RobotModel
+    from rcilab.model.robot_model import RobotModel
 
 _NOWHERE = 1e-9  # [rad] Less than that is no step.
 _FARTHEST = math.radians(20.0)  # A choice: a joint that turns more for a step of the tool swings the arm elsewhere.

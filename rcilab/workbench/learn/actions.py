@@ -6,18 +6,18 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from rcilab.background import Background
-from rcilab.errors import RcilabError
-from rcilab.faults import Fault
-from rcilab.gallery import FAULTS, Exhibit
-from rcilab.gallery.private_arm import PrivateArm
+from rcilab.app.fault_lab import FAULTS, Exhibit
+from rcilab.app.fault_lab.private_arm import PrivateArm
+from rcilab.core.background_job import Background
+from rcilab.core.errors import RcilabError
+from rcilab.core.faults import Fault
 from rcilab.workbench import requests
 from rcilab.workbench.learn.lessons import LESSONS, Watcher
 from rcilab.workbench.learn.state import LearnState, LessonState, make_show
 from rcilab.workbench.run.readiness import is_moving
 from rcilab.workbench.session import Session
+from rcilab.workbench.status_text import tell_error
 from rcilab.workbench.store import Store
-from rcilab.workbench.telling import tell_error
 from rcilab.workbench.text import message
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from rcilab.workbench.run.readiness import is_moving
 
 if TYPE_CHECKING:
-    from rcilab.supervisor import SupervisorStatus
+    from rcilab.control_process import SupervisorStatus
     from rcilab.workbench.store import UiState
 
 Look: TypeAlias = "Callable[[UiState, UiState, SupervisorStatus], bool]"

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rcilab.clock import CYCLE_TIME
-from rcilab.faults import Fault
-from rcilab.gallery import Exhibit
-from rcilab.gallery.exhibition import Exhibition, exhibition_of
+from rcilab.app.fault_lab import Exhibit
+from rcilab.app.fault_lab.demo_motion import Exhibition, exhibition_of
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.faults import Fault
 from rcilab.workbench.text import Message
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Protocol
 
 if TYPE_CHECKING:
-    from rcilab.supervisor import SupervisorStatus
+    from rcilab.control_process import SupervisorStatus
     from rcilab.workbench.store import UiState
 
 

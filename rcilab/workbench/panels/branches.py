@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rcilab.posing.reach import NEAR_LIMIT, margin, telling_joints
+from rcilab.app.reach import NEAR_LIMIT, margin, telling_joints
 from rcilab.workbench import requests
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, Html, esc
 
 if TYPE_CHECKING:
-    from rcilab.supervisor import SupervisorStatus
+    from rcilab.control_process import SupervisorStatus
     from rcilab.workbench.store import UiState
 
 _MOST = 16

@@ -14,8 +14,8 @@ from rcilab.workbench.text import Message, Text
 from rcilab.workbench.widgets import Ask, Html, esc, on_press
 
 if TYPE_CHECKING:
-    from rcilab.posing.planning import Plan
-    from rcilab.supervisor import SupervisorStatus
+    from rcilab.app.planning import Plan
+    from rcilab.control_process import SupervisorStatus
     from rcilab.workbench.store import UiState
 
 _MOMENT = 0.5  # [s] A choice: what takes longer gets a bar and a way to end it.

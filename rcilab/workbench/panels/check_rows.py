@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from rcilab.conformance.explain import explain_formula, explain_place, explain_source
-from rcilab.words.shown import value_against_bound
+from rcilab.i18n.shown import value_against_bound
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import esc
 
 if TYPE_CHECKING:
     from rcilab.conformance import ConditionResult, Report
-    from rcilab.model import RobotModel
+    from rcilab.model.robot_model import RobotModel
 
 TIGHT = 0.95  # A choice: from this share of a bound on, a row is amber.
 _MANY = 10.0  # A choice: from here on a share of the bound is told as a factor.

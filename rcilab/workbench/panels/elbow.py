@@ -15,7 +15,7 @@ from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, Html, Linked, NumberField, esc, shown
 
 if TYPE_CHECKING:
-    from rcilab.supervisor import SupervisorStatus
+    from rcilab.control_process import SupervisorStatus
     from rcilab.workbench.store import UiState
 
 _NARROW = math.radians(5.0)  # [rad] A tuning value: in less the elbow hardly moves aside.

@@ -10,7 +10,7 @@ from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, Linked
 
 if TYPE_CHECKING:
-    from rcilab.supervisor import SupervisorStatus
+    from rcilab.control_process import SupervisorStatus
     from rcilab.workbench.store import UiState
 
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.gallery import FAULTS, GROUPS
+from rcilab.app.fault_lab import FAULTS, GROUPS
 from rcilab.workbench import requests
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, Html, esc, on_press
 
 if TYPE_CHECKING:
-    from rcilab.faults import Fault
-    from rcilab.supervisor import SupervisorStatus
+    from rcilab.control_process import SupervisorStatus
+    from rcilab.core.faults import Fault
     from rcilab.workbench.store import UiState
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rcilab.gallery.shown import body_html, head_html
+from rcilab.app.fault_lab.demo_view import body_html, head_html
 from rcilab.workbench import requests
 from rcilab.workbench.panels.learn_plot import exhibit_contents
 from rcilab.workbench.panels.plot_contents import plot_axes
@@ -14,8 +14,8 @@ from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, Html, esc, on_press
 
 if TYPE_CHECKING:
-    from rcilab.gallery import Exhibit
-    from rcilab.supervisor import SupervisorStatus
+    from rcilab.app.fault_lab import Exhibit
+    from rcilab.control_process import SupervisorStatus
     from rcilab.workbench.store import Theme, UiState
 
 _HEIGHT = 150  # [px]

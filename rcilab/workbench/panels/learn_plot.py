@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rcilab.arrays import Array
-from rcilab.gallery.shown import seen_lower
+from rcilab.app.fault_lab.demo_view import seen_lower
+from rcilab.core.arrays import Array
 from rcilab.workbench.panels.plot_contents import joint_color
 
 if TYPE_CHECKING:

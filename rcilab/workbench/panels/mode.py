@@ -4,9 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.client.control_settings import ControlPart, ControlSettings, control_ranges, standard_control
-from rcilab.posing.driving import PARTS_OF_MODE, held_rows, name_number, name_part
-from rcilab.state import MODES, Mode
+from rcilab.app.mode_parameters import PARTS_OF_MODE, held_rows, name_number, name_part
+from rcilab.core.state import MODES, Mode
+from rcilab.makers.rokae.driver.controller_parameters import (
+    ControlPart,
+    ControlSettings,
+    control_ranges,
+    standard_control,
+)
 from rcilab.workbench import requests
 from rcilab.workbench.panels.jog import problems_html
 from rcilab.workbench.run.driving import is_pending
@@ -15,7 +20,7 @@ from rcilab.workbench.text import Text, message
 from rcilab.workbench.widgets import Ask, Html, Linked, NumberField, esc, on_press
 
 if TYPE_CHECKING:
-    from rcilab.supervisor import SupervisorStatus
+    from rcilab.control_process import SupervisorStatus
     from rcilab.workbench.store import UiState
 
 

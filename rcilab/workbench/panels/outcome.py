@@ -5,15 +5,15 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
-from rcilab.faults import name_faults
-from rcilab.words.text import Finished
+from rcilab.core.faults import name_faults
+from rcilab.i18n.translator import Finished
 from rcilab.workbench.run.driving import destination
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import esc
 
 if TYPE_CHECKING:
+    from rcilab.control_process import SupervisorStatus
     from rcilab.recording.run import Run
-    from rcilab.supervisor import SupervisorStatus
     from rcilab.workbench.store import Recording, UiState
 
 

@@ -6,7 +6,8 @@ import math
 import time
 from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
-from rcilab.clock import CYCLE_TIME
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.i18n.plot_scale import ERRORS, PlotScale, plot_scale
 from rcilab.views.plot_ticks import axis_ticks
 from rcilab.views.plots import (
     Curves,
@@ -22,7 +23,6 @@ from rcilab.views.plots import (
     streamed_curves,
 )
 from rcilab.views.tool_curves import TOOL_QUANTITIES, ToolQuantity, tool_curves, tool_limit
-from rcilab.words.plot_scale import ERRORS, PlotScale, plot_scale
 from rcilab.workbench.panels.plot_contents import legend_html, plot_axes, plot_contents
 from rcilab.workbench.run.played import played_path, streamed_rows
 from rcilab.workbench.text import Text
@@ -30,7 +30,7 @@ from rcilab.workbench.view_actions import PLOTS, has_plot
 from rcilab.workbench.widgets import Html, esc
 
 if TYPE_CHECKING:
-    from rcilab.arrays import JointPath
+    from rcilab.core.arrays import JointPath
     from rcilab.workbench.store import Recording, UiState
 
 _REDRAW_TIME = 0.25  # [s] A choice: plots are redrawn at most so often while something is dragged or moves.

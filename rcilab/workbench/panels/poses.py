@@ -9,7 +9,7 @@ from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, Linked, PageText
 
 if TYPE_CHECKING:
-    from rcilab.supervisor import SupervisorStatus
+    from rcilab.control_process import SupervisorStatus
     from rcilab.workbench.store import UiState
 
 _Name = Literal["zero", "home", "here", "undo"]

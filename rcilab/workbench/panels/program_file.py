@@ -13,8 +13,8 @@ from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, Html, NumberField, esc, on_press
 
 if TYPE_CHECKING:
-    from rcilab.model import RobotModel
-    from rcilab.supervisor import SupervisorStatus
+    from rcilab.control_process import SupervisorStatus
+    from rcilab.model.robot_model import RobotModel
     from rcilab.workbench.program.draft import Draft
     from rcilab.workbench.store import UiState
 

@@ -6,16 +6,16 @@ import math
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
-from rcilab.errors import RcilabError
+from rcilab.core.errors import RcilabError
+from rcilab.i18n.error_messages import tell_note
 from rcilab.motion.waypoint import Waypoint
-from rcilab.words.errors import tell_note
 from rcilab.workbench.program.draft import Draft, Note, target_of
 from rcilab.workbench.program.fields import arm_angle_of
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import esc
 
 if TYPE_CHECKING:
-    from rcilab.model import RobotModel
+    from rcilab.model.robot_model import RobotModel
     from rcilab.workbench.store import UiState
 
 _NOTED = "*"

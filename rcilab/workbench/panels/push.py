@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.words.rounding import fixed
+from rcilab.i18n.rounding import fixed
 from rcilab.workbench import requests
-from rcilab.workbench.run.pushing import (
+from rcilab.workbench.run.active_force import (
     DIRECTIONS,
     SPRING,
     STRONGEST,
@@ -22,7 +22,7 @@ from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, Html, Linked, esc, on_press
 
 if TYPE_CHECKING:
-    from rcilab.supervisor import SupervisorStatus
+    from rcilab.control_process import SupervisorStatus
     from rcilab.workbench.store import UiState
 
 _HOLD_RATE = 10.0  # [1/s] A held button says so this often.

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.faults import name_faults
-from rcilab.motion.pacing import SLOWEST_PACE
+from rcilab.core.faults import name_faults
+from rcilab.motion.speed_scaling import SLOWEST_PACE
 from rcilab.workbench import requests
 from rcilab.workbench.check.freshness import outdated
 from rcilab.workbench.panels.outcome import outcome_html, way_html
@@ -23,7 +23,7 @@ from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, Html, Linked, esc, on_press
 
 if TYPE_CHECKING:
-    from rcilab.supervisor import SupervisorStatus
+    from rcilab.control_process import SupervisorStatus
     from rcilab.workbench.store import UiState
 
 

@@ -6,16 +6,16 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from rcilab.conformance.explain import explain_limit
+from rcilab.i18n.units import ANGLES, LENGTHS
 from rcilab.robots import RCI_ROBOT_NAMES
 from rcilab.views.message_guard import for_anyone
-from rcilab.words.units import ANGLES, LENGTHS
 from rcilab.workbench import requests
 from rcilab.workbench.text import LANGUAGES, Text
 from rcilab.workbench.view_actions import QUALITIES, THEMES
 from rcilab.workbench.widgets import Ask, Html, Linked, esc, on_press
 
 if TYPE_CHECKING:
-    from rcilab.supervisor import SupervisorStatus
+    from rcilab.control_process import SupervisorStatus
     from rcilab.workbench.store import UiState
 
 _CHOICES: tuple[tuple[Any, tuple[str, ...], str, Callable[[UiState], str]], ...] = (

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.client.setup import SETUP_PARTS
+from rcilab.makers.rokae.driver.configuration import SETUP_PARTS
 from rcilab.workbench import requests
 from rcilab.workbench.check.freshness import outdated
 from rcilab.workbench.panels.target import planned_html
-from rcilab.workbench.setup.wanted import (
+from rcilab.workbench.setup.configuration_state import (
     LISTED,
     describe_held,
     describe_part,
@@ -21,7 +21,7 @@ from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, Html, Linked, esc, on_press
 
 if TYPE_CHECKING:
-    from rcilab.supervisor import SupervisorStatus
+    from rcilab.control_process import SupervisorStatus
     from rcilab.workbench.store import UiState
 
 

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.client.setup import SETUP_PARTS
+from rcilab.makers.rokae.driver.configuration import SETUP_PARTS
 from rcilab.workbench import requests
 from rcilab.workbench.panels.jog import problems_html
+from rcilab.workbench.setup.configuration_state import FORCE_AXES
 from rcilab.workbench.setup.fields import FIELD_NAMES, INERTIA_NAMES, POSE_NAMES, read_field
-from rcilab.workbench.setup.wanted import FORCE_AXES
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, Html, Linked, NumberField, esc, shown
 
 if TYPE_CHECKING:
-    from rcilab.supervisor import SupervisorStatus
+    from rcilab.control_process import SupervisorStatus
     from rcilab.workbench.store import UiState
 
 _ROWS: dict[str, tuple[tuple[str, tuple[str, ...]], ...]] = {

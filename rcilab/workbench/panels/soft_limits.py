@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 from rcilab.workbench import requests
 from rcilab.workbench.panels.jog import problems_html
 from rcilab.workbench.run.driving import is_ours
+from rcilab.workbench.setup.configuration_state import own_limits, soft_limits
 from rcilab.workbench.setup.fields import JOINT_ENDS
-from rcilab.workbench.setup.wanted import own_limits, soft_limits
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, Html, Linked, NumberField, esc, on_press, shown
 
 if TYPE_CHECKING:
-    from rcilab.supervisor import SupervisorStatus
+    from rcilab.control_process import SupervisorStatus
     from rcilab.workbench.store import UiState
 
 

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.faults import name_faults
-from rcilab.workbench.lease import PATIENCE, Lease
+from rcilab.core.faults import name_faults
+from rcilab.workbench.control_lock import PATIENCE, Lease
 from rcilab.workbench.run.driving import destination
 from rcilab.workbench.run.played import played_at
 from rcilab.workbench.run.readiness import is_moving, time_shown
-from rcilab.workbench.telling import phase_code, tell_status
+from rcilab.workbench.status_text import phase_code, tell_status
 from rcilab.workbench.text import Text
 
 if TYPE_CHECKING:
-    from rcilab.supervisor import SupervisorStatus
+    from rcilab.control_process import SupervisorStatus
     from rcilab.workbench.store import UiState
 
 _TONES = {

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rcilab.words.rounding import fixed
+from rcilab.i18n.rounding import fixed
 from rcilab.workbench.check.freshness import beside_program, outdated
 from rcilab.workbench.goal.actions import POSE_FIELDS, QUATERNION
 from rcilab.workbench.panels.check_rows import count_unheeded
@@ -15,7 +15,7 @@ from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, Html, NumberField, esc, shown_pose
 
 if TYPE_CHECKING:
-    from rcilab.supervisor import SupervisorStatus
+    from rcilab.control_process import SupervisorStatus
     from rcilab.workbench.store import UiState
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.clock import CYCLE_TIME
+from rcilab.core.clock import CYCLE_TIME
 from rcilab.workbench import requests
 from rcilab.workbench.check.freshness import outdated
 from rcilab.workbench.panels.outcome import replay_html
@@ -17,7 +17,7 @@ from rcilab.workbench.view_actions import PLOTS, RATES, has_plot
 from rcilab.workbench.widgets import Ask, Html, Linked, esc, on_press
 
 if TYPE_CHECKING:
-    from rcilab.supervisor import SupervisorStatus
+    from rcilab.control_process import SupervisorStatus
     from rcilab.workbench.store import UiState
 
 _BANNER = 72  # [px] What the line about a recorded run takes.

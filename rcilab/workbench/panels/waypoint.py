@@ -15,8 +15,8 @@ from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, Html, Linked, NumberField, esc, on_press, shown, shown_pose
 
 if TYPE_CHECKING:
-    from rcilab.model import RobotModel
-    from rcilab.supervisor import SupervisorStatus
+    from rcilab.control_process import SupervisorStatus
+    from rcilab.model.robot_model import RobotModel
     from rcilab.workbench.store import UiState
 
 _PLAIN = ("speed", "blend", "dwell")

@@ -6,20 +6,20 @@ from functools import partial, reduce
 
 import numpy as np
 
-from rcilab.arrays import frozen
-from rcilab.background import Background
-from rcilab.errors import InvalidValueError, PlanningError, RcilabError, VersionMismatchError
-from rcilab.model import load_model
+from rcilab.app.planning import Plan
+from rcilab.core.arrays import frozen
+from rcilab.core.background_job import Background
+from rcilab.core.errors import InvalidValueError, PlanningError, RcilabError, VersionMismatchError
+from rcilab.i18n.error_messages import tell
+from rcilab.model.robot_model import load_model
 from rcilab.motion.program import Program
 from rcilab.motion.program_file import read_program
-from rcilab.posing.planning import Plan
-from rcilab.words.errors import tell
 from rcilab.workbench import requests
 from rcilab.workbench.goal.actions import GoalActions
 from rcilab.workbench.program.draft import FILE_FIELD, Draft, draft_of, is_led_in, notes_of, number_at
 from rcilab.workbench.program.edit_actions import LONGEST_NAME, EditActions
+from rcilab.workbench.program.history import Shelves
 from rcilab.workbench.program.planning import Job, plan_job
-from rcilab.workbench.program.shelves import Shelves
 from rcilab.workbench.run.readiness import is_moving
 from rcilab.workbench.session import Session
 from rcilab.workbench.store import Store

@@ -7,13 +7,13 @@ from itertools import count
 
 import numpy as np
 
-from rcilab.model import RobotModel
+from rcilab.app.planning import Plan
+from rcilab.app.reach import Tone
+from rcilab.core.spatial import Pose
+from rcilab.i18n.translator import Remark
+from rcilab.model.robot_model import RobotModel
 from rcilab.motion.program import Program
 from rcilab.motion.waypoint import Floats, Waypoint, WaypointType
-from rcilab.posing.planning import Plan
-from rcilab.posing.reach import Tone
-from rcilab.spatial import Pose
-from rcilab.words.text import Remark
 from rcilab.workbench.text import Message, message
 
 TYPES: tuple[WaypointType, ...] = ("joint", "line", "arc")

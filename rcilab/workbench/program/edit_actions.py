@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from rcilab.arrays import JointVector, frozen
+from rcilab.core.arrays import JointVector, frozen
+from rcilab.i18n.number_parsing import parse_number
 from rcilab.motion.waypoint import Waypoint
-from rcilab.words.number import parse_number
 from rcilab.workbench import requests
 from rcilab.workbench.goal.actions import GoalActions
 from rcilab.workbench.program.draft import MOST_ROUNDS, TYPES, Draft, target_of, time_at
 from rcilab.workbench.program.fields import default_via, proposed
-from rcilab.workbench.program.shelves import Shelves
+from rcilab.workbench.program.history import Shelves
 from rcilab.workbench.session import Session
 from rcilab.workbench.store import Store
 from rcilab.workbench.text import Message, message

@@ -8,13 +8,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from rcilab.arrays import Array
-from rcilab.errors import KinematicsError
-from rcilab.model import RobotModel
+from rcilab.core.arrays import Array
+from rcilab.core.errors import KinematicsError
+from rcilab.core.spatial import Pose
+from rcilab.i18n.number_parsing import parse_number
+from rcilab.model.robot_model import RobotModel
 from rcilab.motion.joint import MIN_SPEED
 from rcilab.motion.waypoint import LARGEST_BLEND, LONGEST_DWELL, Waypoint
-from rcilab.spatial import Pose
-from rcilab.words.number import parse_number
 from rcilab.workbench.goal.actions import FURTHEST, POSE_FIELDS
 from rcilab.workbench.program.draft import Draft, target_of
 from rcilab.workbench.text import Message

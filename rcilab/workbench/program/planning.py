@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from rcilab.arrays import JointVector
-from rcilab.background import Tell
-from rcilab.model import RobotModel
+from rcilab.app.planning import Plan, picture
+from rcilab.control_process.layout import MOTION_ROWS
+from rcilab.core.arrays import JointVector
+from rcilab.core.background_job import Tell
+from rcilab.core.safety_box import SafetyBox
+from rcilab.model.robot_model import RobotModel
 from rcilab.motion.joint import JointLaw
 from rcilab.motion.program import Program
-from rcilab.posing.planning import Plan, picture
-from rcilab.safety_box import SafetyBox
-from rcilab.supervisor.layout import MOTION_ROWS
 from rcilab.workbench.program.draft import Draft
 
 PROGRAM_LAW: JointLaw = "torque_rate_limited"

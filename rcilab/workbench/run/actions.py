@@ -9,25 +9,32 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
-from rcilab.clock import CYCLE_TIME
-from rcilab.errors import CertificateError, ConnectionLostError, ControlError, PlanningError, RcilabError, UsageError
-from rcilab.model import load_model
-from rcilab.posing.reach import Tone
+from rcilab.app.reach import Tone
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.errors import (
+    CertificateError,
+    ConnectionLostError,
+    ControlError,
+    PlanningError,
+    RcilabError,
+    UsageError,
+)
+from rcilab.model.robot_model import load_model
 from rcilab.workbench import requests
 from rcilab.workbench.goal.actions import initial_goal
-from rcilab.workbench.run.keeper import RunKeeper
-from rcilab.workbench.run.pushing import PLANTS, TOOL, is_guided
+from rcilab.workbench.run.active_force import PLANTS, TOOL, is_guided
 from rcilab.workbench.run.readiness import is_moving, obstacle
+from rcilab.workbench.run.run_recorder import RunKeeper
 from rcilab.workbench.session import Session
-from rcilab.workbench.setup.wanted import SetupState, name_parts, setup_obstacle
+from rcilab.workbench.setup.configuration_state import SetupState, name_parts, setup_obstacle
+from rcilab.workbench.status_text import StartingError, tell_error, tell_incident
 from rcilab.workbench.store import Goal, Store, UiState
-from rcilab.workbench.telling import StartingError, tell_error, tell_incident
 from rcilab.workbench.text import Message, message
 
 if TYPE_CHECKING:
-    from rcilab.client.setup import RobotSetup, SetupPart
-    from rcilab.motion.pacing import PacedMotion
-    from rcilab.supervisor import SupervisorStatus, Ticket
+    from rcilab.control_process import SupervisorStatus, Ticket
+    from rcilab.makers.rokae.driver.configuration import RobotSetup, SetupPart
+    from rcilab.motion.speed_scaling import PacedMotion
 
 _SECOND_THOUGHT = 10.0  # [s] A choice: a second press that comes later asks anew.
 TROUBLE = "robot"
@@ -122,7 +129,7 @@ class RobotActions:
         model = state.model if request.model is None else load_model(request.model)
         target = state.target if request.target is None else request.target.strip()
         if target != "virtual":
-            from rcilab.client.address import parse_address
+            from rcilab.makers.rokae.driver.address import parse_address
 
             parse_address(target)
         if model.name == state.model.name and target == state.target and request.target is None:

@@ -5,15 +5,20 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal
 
-from rcilab.client.control_settings import ControlPart, ControlSettings, control_ranges, standard_control
-from rcilab.posing.driving import control_obstacle, is_control_pending, with_number
-from rcilab.protocols.world import Direction, NetworkFaults, WorldStatus
-from rcilab.state import Mode
+from rcilab.app.mode_parameters import control_obstacle, is_control_pending, with_number
+from rcilab.core.state import Mode
+from rcilab.makers.rokae.driver.controller_parameters import (
+    ControlPart,
+    ControlSettings,
+    control_ranges,
+    standard_control,
+)
+from rcilab.sim.api import Direction, NetworkFaults, WorldStatus
 from rcilab.workbench.text import Message
 
 if TYPE_CHECKING:
-    from rcilab.model import RobotModel
-    from rcilab.supervisor import SupervisorStatus
+    from rcilab.control_process import SupervisorStatus
+    from rcilab.model.robot_model import RobotModel
     from rcilab.workbench.store import UiState
 
 Destination = Literal["preview", "ideal", "mujoco", "address"]

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from tempfile import TemporaryFile
 from typing import IO, TYPE_CHECKING, TypeAlias
 
-from rcilab.errors import RcilabError
-from rcilab.recording.extra import MissingExtraError
+from rcilab.core.errors import RcilabError
+from rcilab.recording.optional_deps import MissingExtraError
 from rcilab.workbench import requests
-from rcilab.workbench.telling import tell_error
+from rcilab.workbench.status_text import tell_error
 from rcilab.workbench.text import message
 
 if TYPE_CHECKING:

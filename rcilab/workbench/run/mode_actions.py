@@ -7,24 +7,24 @@ import time
 from dataclasses import replace
 from typing import TYPE_CHECKING, cast
 
-from rcilab.client.control_settings import control_ranges, standard_control
-from rcilab.client.setup import RobotSetup
-from rcilab.errors import RcilabError
-from rcilab.motion.pacing import SLOWEST_PACE
-from rcilab.posing.driving import SECOND_THOUGHT, ask_to_send
-from rcilab.state import MODES, Mode
-from rcilab.supervisor.pace_wish import PaceWish, is_running, tell_pace_refusal
-from rcilab.words.number import parse_number
+from rcilab.app.mode_parameters import SECOND_THOUGHT, ask_to_send
+from rcilab.control_process.requested_speed import PaceWish, is_running, tell_pace_refusal
+from rcilab.core.errors import RcilabError
+from rcilab.core.state import MODES, Mode
+from rcilab.i18n.number_parsing import parse_number
+from rcilab.makers.rokae.driver.configuration import RobotSetup
+from rcilab.makers.rokae.driver.controller_parameters import control_ranges, standard_control
+from rcilab.motion.speed_scaling import SLOWEST_PACE
 from rcilab.workbench import requests
 from rcilab.workbench.run.driving import control_field, is_pending
 from rcilab.workbench.run.readiness import is_moving
 from rcilab.workbench.session import Session
-from rcilab.workbench.setup.post import SetupPost
+from rcilab.workbench.setup.configuration_sender import SetupPost
 from rcilab.workbench.store import Store
 from rcilab.workbench.text import Message, message
 
 if TYPE_CHECKING:
-    from rcilab.supervisor import SupervisorStatus, Ticket
+    from rcilab.control_process import SupervisorStatus, Ticket
 
 
 class ModeActions:

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rcilab.clock import CYCLE_TIME
+from rcilab.core.clock import CYCLE_TIME
 
 if TYPE_CHECKING:
-    from rcilab.arrays import Array, JointPath
-    from rcilab.motion.pacing import PacedMotion
+    from rcilab.core.arrays import Array, JointPath
+    from rcilab.motion.speed_scaling import PacedMotion
     from rcilab.workbench.store import UiState
 
 

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rcilab.arrays import JointVector, Vector3
-from rcilab.client.held_push import HOLD_TIMEOUT, HeldPush
-from rcilab.client.world import World
+from rcilab.core.arrays import JointVector, Vector3
+from rcilab.execution.external_force_hold import HOLD_TIMEOUT, HeldPush
+from rcilab.execution.simulation_control import World
 from rcilab.workbench import requests
-from rcilab.workbench.run.pushing import (
+from rcilab.workbench.run.active_force import (
     DIRECTIONS,
     STRONGEST,
     TOOL,
@@ -25,11 +25,11 @@ from rcilab.workbench.run.pushing import (
     spring_force,
 )
 from rcilab.workbench.session import Session
+from rcilab.workbench.status_text import tell_error
 from rcilab.workbench.store import Store
-from rcilab.workbench.telling import tell_error
 
 if TYPE_CHECKING:
-    from rcilab.supervisor import SupervisorStatus
+    from rcilab.control_process import SupervisorStatus
 
 _NO_MOMENT = (0.0, 0.0, 0.0)
 

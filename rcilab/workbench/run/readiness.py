@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rcilab.posing.planning import find_outside
-from rcilab.posing.readiness import arm_obstacle, ask_to_move, plan_obstacle
+from rcilab.app.planning import find_outside
+from rcilab.app.readiness import arm_obstacle, ask_to_move, plan_obstacle
 from rcilab.workbench.check.freshness import outdated
 from rcilab.workbench.run.driving import parameter_obstacle
-from rcilab.workbench.setup.wanted import setup_obstacle, tool_outside
+from rcilab.workbench.setup.configuration_state import setup_obstacle, tool_outside
+from rcilab.workbench.status_text import tell_status
 from rcilab.workbench.store import UiState
-from rcilab.workbench.telling import tell_status
 from rcilab.workbench.text import Message, message
 
 if TYPE_CHECKING:
-    from rcilab.supervisor import SupervisorStatus
+    from rcilab.control_process import SupervisorStatus
 
 _OF_PROGRAMS = {"ready.done": "ready.done_program", "ready.elsewhere": "ready.elsewhere_program"}
 

@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rcilab.client.setup import RobotSetup
-from rcilab.clock import CYCLE_TIME
+from rcilab.app.planning import picture
 from rcilab.conformance import check
-from rcilab.errors import UsageError
-from rcilab.posing.planning import picture
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.errors import UsageError
+from rcilab.makers.rokae.driver.configuration import RobotSetup
 from rcilab.workbench.goal.actions import initial_goal
-from rcilab.workbench.run.keeper import whole_recording
+from rcilab.workbench.run.run_recorder import whole_recording
 
 if TYPE_CHECKING:
-    from rcilab.arrays import JointVector
-    from rcilab.model import RobotModel
+    from rcilab.core.arrays import JointVector
+    from rcilab.model.robot_model import RobotModel
     from rcilab.recording.run import Run
     from rcilab.workbench.store import UiState
 

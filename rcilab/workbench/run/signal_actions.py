@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 from rcilab.workbench import requests
 from rcilab.workbench.session import Session
+from rcilab.workbench.status_text import tell_error
 from rcilab.workbench.store import Store
-from rcilab.workbench.telling import tell_error
 from rcilab.workbench.text import message
 
 if TYPE_CHECKING:
-    from rcilab.supervisor import SupervisorStatus, Ticket
+    from rcilab.control_process import SupervisorStatus, Ticket
 
 
 class SignalActions:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import cast
 
-from rcilab.client.address import parse_address
+from rcilab.makers.rokae.driver.address import parse_address
 from rcilab.workbench import requests
 from rcilab.workbench.run.actions import RobotActions
+from rcilab.workbench.run.active_force import Plant
 from rcilab.workbench.run.driving import DESTINATIONS
-from rcilab.workbench.run.pushing import Plant
 from rcilab.workbench.run.readiness import is_moving
 from rcilab.workbench.session import Session
 from rcilab.workbench.store import Store

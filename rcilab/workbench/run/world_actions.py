@@ -6,19 +6,19 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from rcilab.client.world import World
-from rcilab.client.world_watch import WorldWatch
-from rcilab.protocols.world import DIRECTIONS, AutoLimit, Direction, LoopBack, Network, NetworkFaults, Press
+from rcilab.execution.simulation_control import World
+from rcilab.execution.simulation_status_poller import WorldWatch
+from rcilab.sim.api import DIRECTIONS, AutoLimit, Direction, LoopBack, Network, NetworkFaults, Press
 from rcilab.workbench import requests
+from rcilab.workbench.run.active_force import no_push
 from rcilab.workbench.run.driving import CABLE_PULLED, NETWORK_LAB
-from rcilab.workbench.run.pushing import no_push
 from rcilab.workbench.session import Session
+from rcilab.workbench.status_text import tell_error
 from rcilab.workbench.store import Store
-from rcilab.workbench.telling import tell_error
 from rcilab.workbench.text import message
 
 if TYPE_CHECKING:
-    from rcilab.supervisor import SupervisorStatus
+    from rcilab.control_process import SupervisorStatus
 
 
 _WIRING = {"loop_back": LoopBack, "auto_limit": AutoLimit}

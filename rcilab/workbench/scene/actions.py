@@ -16,7 +16,7 @@ from rcilab.workbench import requests
 from rcilab.workbench.goal.actions import GoalActions
 from rcilab.workbench.goal.elbow import look_at_elbow
 from rcilab.workbench.scene.extras import EXTRAS, look_at_dexterity, look_at_reach, look_at_sweep
-from rcilab.workbench.scene.ribbon import look_at_path
+from rcilab.workbench.scene.path_strip import look_at_path
 from rcilab.workbench.store import Store
 from rcilab.workbench.text import message
 

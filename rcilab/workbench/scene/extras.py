@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
 
-from rcilab.arrays import Array
-from rcilab.kinematics.workspace import Workspace
-from rcilab.model import RobotModel
-from rcilab.views.swept import swept_mesh
+from rcilab.core.arrays import Array
+from rcilab.model.kinematics.workspace import Workspace
+from rcilab.model.robot_model import RobotModel
+from rcilab.views.swept_volume import swept_mesh
 from rcilab.workbench.goal.elbow import Elbow
-from rcilab.workbench.scene.ribbon import Ribbon
+from rcilab.workbench.scene.path_strip import Ribbon
 
 if TYPE_CHECKING:
     from rcilab.motion import Motion

@@ -6,18 +6,18 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from rcilab.arrays import JointVector
+from rcilab.core.arrays import JointVector
 from rcilab.views.arm_view import ArmView
 from rcilab.views.viser_scene import ViserScene
 from rcilab.views.viser_stage import furnish, place_camera
 from rcilab.workbench.run.readiness import is_connected, is_moving
 from rcilab.workbench.run.replay import replayed_pose
-from rcilab.workbench.scene.elbow_stage import ElbowStage
-from rcilab.workbench.scene.extras_stage import ExtrasStage
-from rcilab.workbench.scene.goal_stage import GoalStage
-from rcilab.workbench.scene.grip import Grip
-from rcilab.workbench.scene.ribbon_stage import RibbonStage
-from rcilab.workbench.scene.setup_stage import SetupStage
+from rcilab.workbench.scene.configuration_view import SetupStage
+from rcilab.workbench.scene.drag_handle import Grip
+from rcilab.workbench.scene.elbow_view import ElbowStage
+from rcilab.workbench.scene.extras_view import ExtrasStage
+from rcilab.workbench.scene.goal_view import GoalStage
+from rcilab.workbench.scene.path_strip_view import RibbonStage
 from rcilab.workbench.scene.watchers import Watchers
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask
@@ -25,7 +25,7 @@ from rcilab.workbench.widgets import Ask
 if TYPE_CHECKING:
     import viser
 
-    from rcilab.supervisor import SupervisorStatus
+    from rcilab.control_process import SupervisorStatus
     from rcilab.workbench.store import UiState
 
 _Ghost = Literal["commanded", "candidate", "plan"]

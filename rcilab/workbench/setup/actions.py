@@ -9,15 +9,25 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from rcilab.client.setup import SETUP_PARTS, RobotSetup, SetupPart, SoftJointLimits
-from rcilab.posing.planning import Plan, tool_path
-from rcilab.posing.reach import judge_joints, judge_pose
+from rcilab.app.planning import Plan, tool_path
+from rcilab.app.reach import judge_joints, judge_pose
+from rcilab.core.safety_box import SafetyBox
+from rcilab.core.spatial import Pose
+from rcilab.i18n.number_parsing import parse_number
+from rcilab.makers.rokae.driver.configuration import SETUP_PARTS, RobotSetup, SetupPart, SoftJointLimits
 from rcilab.robots import describe_robot
-from rcilab.safety_box import SafetyBox
-from rcilab.spatial import Pose
-from rcilab.words.number import parse_number
 from rcilab.workbench import requests
 from rcilab.workbench.session import Session
+from rcilab.workbench.setup.configuration_sender import SetupPost
+from rcilab.workbench.setup.configuration_state import (
+    FORCE_AXES,
+    LISTED,
+    SetupState,
+    name_parts,
+    own_limits,
+    pending_parts,
+    soft_limits,
+)
 from rcilab.workbench.setup.fields import (
     FARTHEST_FACE,
     FIELD_NAMES,
@@ -31,21 +41,11 @@ from rcilab.workbench.setup.fields import (
     with_inertia,
     with_pose,
 )
-from rcilab.workbench.setup.post import SetupPost
-from rcilab.workbench.setup.wanted import (
-    FORCE_AXES,
-    LISTED,
-    SetupState,
-    name_parts,
-    own_limits,
-    pending_parts,
-    soft_limits,
-)
 from rcilab.workbench.store import Goal, Store, UiState
 from rcilab.workbench.text import Message, message
 
 if TYPE_CHECKING:
-    from rcilab.supervisor import SupervisorStatus
+    from rcilab.control_process import SupervisorStatus
 
 _UNDO_DEPTH = 100
 _ROUNDED = 1e-5  # [rad] Closer than what the page shows of an angle: the arm's own bound is meant.

@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rcilab.client.setup import RobotSetup
-from rcilab.dynamics.payload import Payload
-from rcilab.errors import InvalidValueError
-from rcilab.protocols.rci.bounds import LONGEST_TOOL
-from rcilab.safety_box import SafetyBox
-from rcilab.spatial import Pose
-from rcilab.workbench.setup.wanted import SetupState
+from rcilab.core.errors import InvalidValueError
+from rcilab.core.safety_box import SafetyBox
+from rcilab.core.spatial import Pose
+from rcilab.makers.rokae.driver.configuration import RobotSetup
+from rcilab.makers.rokae.wire.bounds import LONGEST_TOOL
+from rcilab.model.dynamics.payload import Payload
+from rcilab.workbench.setup.configuration_state import SetupState
 from rcilab.workbench.text import Message, message
 
 POSE_NAMES = ("x", "y", "z", "roll", "pitch", "yaw")

@@ -1,0 +1,21 @@
+"""Words of the gallery: one catalogue a language."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from rcilab.i18n.locale import Language, load_words, require_language
+
+
+def load_catalogue(language: Language) -> Mapping[str, str]:
+    """Returns all sentences of one language, by key."""
+    return load_words("rcilab.app.fault_lab", language)
+
+
+def say(language: Language, key: str, **values: str) -> str:
+    """Returns a sentence in a language, filled with values.
+
+    Raises:
+        InvalidValueError: There is no catalogue for this language.
+    """
+    return load_catalogue(require_language(language))[key].format(**values)

@@ -1,0 +1,241 @@
+"""Wrong commands: each fault of a command, and the shortest stream of commands that breaks its condition.
+
+Paths are built from their second differences, cycle by cycle, so that nothing else breaks before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from math import radians
+
+import numpy as np
+
+from rcilab.app.fault_lab.scenario import Recipe, Scene
+from rcilab.core.arrays import Array, frozen
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.command import CartesianPosition, Command, JointPosition, JointTorque
+from rcilab.core.faults import Fault
+from rcilab.core.safety_box import SafetyBox
+from rcilab.core.spatial import Pose
+from rcilab.core.state import RobotState
+from rcilab.execution.control_loop import Callback
+
+LIVELY_ELBOW = tuple(radians(angle) for angle in (0.0, -28.6, 58.8, 56.4, -5.8, 113.8, 0.0))  # [rad]
+"""Where the elbow may turn fastest for what the joints may do, so that the arm angle passes its bound before them."""
+
+_PAUSE = 20  # [cycles] of standing still before, so that the plot shows where it began; a choice.
+_SOFT_LIMIT = 0.05  # [rad] from where the joint stands; a choice.
+_HELD_LINK = 2
+_HOLD = 0.8  # Part of the collision threshold that something holds against at most; a choice.
+_TOLD = 4  # [cycles] How often that is told to the world; a choice.
+_HALF_BOX = 0.03  # [m] A choice.
+_PAST = 1.006  # Times the bound: past it by more than rounding.
+
+
+def path(second: Array) -> Array:
+    """Returns the path whose second differences are given, [unit/s^2], from rest at 0."""
+    return np.cumsum(np.cumsum(second)) * CYCLE_TIME**2
+
+
+def rise(slope: float, top: float, count: int) -> Array:
+    """Returns accelerations that stand still for a moment, rise by `slope` a cycle up to `top`, and stay there."""
+    return np.minimum(slope * np.maximum(np.arange(count) - _PAUSE, 0), top)
+
+
+def joint_stream(start: Array, joint: int, way: Array) -> Callback:
+    """Returns a callback that moves one joint, counted from 0, along a way; at its end it stands still."""
+
+    def callback(state: RobotState, t: float) -> JointPosition:
+        cycle = round(t / CYCLE_TIME)
+        q = np.array(start)
+        q[joint] += way[min(cycle, len(way) - 1)]
+        return JointPosition(frozen(q), finished=cycle >= len(way))
+
+    return callback
+
+
+def tool_stream(start: Pose, offset: Callable[[float], tuple[Array, Array]], way: Array, psi: float) -> Callback:
+    """Returns a callback that moves and turns the tool along a way: `offset` gives translation and rotation vector."""
+    held = None if np.isnan(psi) else psi
+
+    def callback(state: RobotState, t: float) -> CartesianPosition:
+        cycle = round(t / CYCLE_TIME)
+        shift, turn = offset(float(way[min(cycle, len(way) - 1)]))
+        T = start.matrix
+        T[:3, 3] += shift
+        T[:3, :3] = T[:3, :3] @ _rotation(turn)
+        return CartesianPosition(frozen(T), psi=held, finished=cycle >= len(way))
+
+    return callback
+
+
+def torque_stream(n: int, joint: int, tau: Array) -> Callback:
+    """Returns a callback that puts torques on one joint, counted from 0, [N m]."""
+
+    def callback(state: RobotState, t: float) -> JointTorque:
+        cycle = round(t / CYCLE_TIME)
+        wanted = np.zeros(n)
+        wanted[joint] = tau[min(cycle, len(tau) - 1)]
+        return JointTorque(frozen(wanted), finished=cycle >= len(tau))
+
+    return callback
+
+
+def soften_joint_1(scene: Scene) -> Scene:
+    """Sets a soft limit of joint 1 just beside where it stands."""
+    upper = np.array(scene.limits.joint.upper)
+    upper[0] = scene.start.q_c[0] + _SOFT_LIMIT
+    scene.robot.set_joint_limit(scene.limits.joint.lower, upper)
+    return scene.narrowed(upper)
+
+
+def box_around_tool(scene: Scene) -> Scene:
+    """Sets a small safety box around the tool."""
+    edge = 2.0 * _HALF_BOX
+    box = SafetyBox(size=(edge, edge, edge), T_base_box=Pose(scene.start.T_base_tool_c.position), active=True)
+    scene.robot.set_cartesian_limit(box)
+    return replace(scene, box=box)
+
+
+def _soft_limit(scene: Scene) -> Callback:
+    return joint_stream(scene.start.q_c, 0, path(rise(1.0, 8.0, 400)))
+
+
+def _box(scene: Scene) -> Callback:
+    return tool_stream(scene.start.T_base_tool_c, _lift, path(rise(0.1, 1.5, 400)), scene.start.psi_c)
+
+
+def _elbow(scene: Scene) -> Callback:
+    way = path(rise(0.4, 20.0, 120))
+    T, psi = scene.start.T_base_tool_c, scene.start.psi_c
+
+    def callback(state: RobotState, t: float) -> CartesianPosition:
+        cycle = round(t / CYCLE_TIME)
+        return CartesianPosition(T, psi=psi + float(way[min(cycle, len(way) - 1)]), finished=cycle >= len(way))
+
+    return callback
+
+
+def _joint_velocity(scene: Scene) -> Callback:
+    return joint_stream(scene.start.q_c, 0, path(rise(1.2, 14.0, 400)))
+
+
+def _tool_velocity(scene: Scene) -> Callback:
+    return tool_stream(scene.start.T_base_tool_c, _spin, path(rise(0.9, 9.5, 400)), scene.start.psi_c)
+
+
+def _joint_acceleration(scene: Scene) -> Callback:
+    bound = scene.limits.joint.acceleration[3 if scene.robot.n == 7 else 2]
+    return joint_stream(scene.start.q_c, scene.robot.n - 4, path(rise(0.97, 2.0 * bound, 80)))
+
+
+def _tool_acceleration(scene: Scene) -> Callback:
+    bound = scene.limits.cartesian.rotation_acceleration
+    return tool_stream(scene.start.T_base_tool_c, _spin, path(rise(0.97, 2.0 * bound, 80)), scene.start.psi_c)
+
+
+def _joint_jerk(scene: Scene) -> Callback:
+    step = _PAST * 1.2 * scene.limits.joint.jerk[0] * CYCLE_TIME
+    return joint_stream(scene.start.q_c, 0, path(np.where(np.arange(60) < _PAUSE, 0.0, step)))
+
+
+def _singular(scene: Scene) -> Callback:
+    """Leads the tool straight away from the shoulder: so slowly that no joint is too fast before the arm is stretched.
+
+    Cartesian motions cannot go through a stretched arm, whatever their speed.
+    """
+    T, arm = scene.start.T_base_tool_c, scene.robot.model.description.dh
+    flange = T @ scene.robot.model.T_flange_tool.inverse()
+    wrist = flange.position - arm[-1].d * flange.rotation[:, 2]
+    outwards = wrist - np.array([0.0, 0.0, arm[0].d])
+    outwards /= np.linalg.norm(outwards)
+    way = np.cumsum(np.minimum(np.maximum(np.arange(3000) - _PAUSE, 0) * 1e-8, 1.5e-6))
+    return tool_stream(T, lambda value: (outwards * value, np.zeros(3)), way, scene.start.psi_c)
+
+
+def _torque_rate(scene: Scene) -> Callback:
+    step = _PAST * 2.0 * scene.limits.joint.torque_rate[0] * CYCLE_TIME
+    return torque_stream(scene.robot.n, 0, np.where(np.arange(40) < _PAUSE, 0.0, step))
+
+
+def _torque_range(scene: Scene) -> Callback:
+    """Something holds link 2 meanwhile: left alone it would be too fast before the bound is passed."""
+    limits, robot = scene.limits.joint, scene.robot
+    tau = 0.95 * limits.torque_rate[1] * CYCLE_TIME * np.maximum(np.arange(200) - _PAUSE, 0)
+    axis = robot.model.rigid_body.link_jacobian(scene.start.q, _HELD_LINK, np.zeros(3))[3:, 1]
+    stream = torque_stream(robot.n, 1, tau)
+    strongest = _HOLD * limits.collision_threshold[1]
+
+    def callback(state: RobotState, t: float) -> Command:
+        cycle = round(t / CYCLE_TIME)
+        if cycle % _TOLD == 0 and tau[cycle] <= strongest:
+            robot.world.push((0.0, 0.0, 0.0, *(-tau[cycle] * axis).tolist()), link=_HELD_LINK)
+        return stream(state, t)
+
+    return callback
+
+
+def _spin(value: float) -> tuple[Array, Array]:
+    """About the tool's own axis: the last joint alone, so that the tool's bounds are passed before any joint's."""
+    return np.zeros(3), np.array([0.0, 0.0, value])
+
+
+def _lift(value: float) -> tuple[Array, Array]:
+    return np.array([0.0, 0.0, value]), np.zeros(3)
+
+
+def _rotation(turn: Array) -> Array:
+    angle = float(np.linalg.norm(turn))
+    if angle < 1e-12:
+        return np.eye(3)
+    half = turn / angle * np.sin(angle / 2.0)
+    return Pose((0.0, 0.0, 0.0), (np.cos(angle / 2.0), *half)).rotation
+
+
+COMMAND_RECIPES = (
+    Recipe(
+        fault=Fault.COMMAND_JOINT_POSITION_LIMITS_VIOLATION, group="position", mode="joint_position",
+        prepare=soften_joint_1, act=_soft_limit,
+    ),
+    Recipe(
+        fault=Fault.COMMAND_CARTESIAN_POSITION_LIMITS_VIOLATION, group="position", mode="cartesian_position",
+        prepare=box_around_tool, act=_box,
+    ),
+    Recipe(
+        fault=Fault.COMMAND_CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION, group="position",
+        mode="cartesian_position", act=_elbow, needs_elbow=True,
+        pose=LIVELY_ELBOW,
+    ),
+    Recipe(
+        fault=Fault.COMMAND_JOINT_VELOCITY_LIMITS_VIOLATION, group="velocity", mode="joint_position",
+        act=_joint_velocity,
+    ),
+    Recipe(
+        fault=Fault.COMMAND_CARTESIAN_VELOCITY_LIMITS_VIOLATION, group="velocity", mode="cartesian_position",
+        act=_tool_velocity,
+    ),
+    Recipe(
+        fault=Fault.COMMAND_JOINT_ACCELERATION_LIMITS_VIOLATION, group="acceleration", mode="joint_position",
+        act=_joint_acceleration,
+    ),
+    Recipe(
+        fault=Fault.COMMAND_CARTESIAN_ACCELERATION_LIMITS_VIOLATION, group="acceleration", mode="cartesian_position",
+        act=_tool_acceleration,
+    ),
+    Recipe(
+        fault=Fault.COMMAND_JOINT_ACCELERATION_DISCONTINUITY, group="acceleration", mode="joint_position",
+        act=_joint_jerk,
+    ),
+    Recipe(
+        fault=Fault.CARTESIAN_POSITION_MOTION_GENERATOR_INVALID_FRAME, group="command", mode="cartesian_position",
+        act=_singular, pose=(0.1, 0.5, 0.0, 0.05, 0.0, 1.0, 0.0),
+    ),
+    Recipe(
+        fault=Fault.COMMAND_TORQUE_DISCONTINUITY, group="command", mode="torque", act=_torque_rate,
+    ),
+    Recipe(
+        fault=Fault.COMMAND_TORQUE_RANGE_VIOLATION, group="command", mode="torque", act=_torque_range,
+    ),
+)  # fmt: skip
+"""Every fault of a command."""

@@ -1,0 +1,51 @@
+"""A provoked fault as scene, timeline and curves draw it: what was commanded, where the arm was, what it did."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from rcilab.app.planning import Plan, picture
+from rcilab.core.clock import CYCLE_TIME
+
+if TYPE_CHECKING:
+    from rcilab.app.fault_lab.fault_demo import Exhibit
+    from rcilab.motion import Motion
+    from rcilab.recording.run import Run
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Exhibition:
+    """What is seen in place of the plan while a fault is on show. It is never one to execute."""
+
+    exhibit: Exhibit
+    plan: Plan
+    """What was commanded, the wrong command too, and the controller's way to rest."""
+    scene: Plan
+    """Where the arm is to be seen."""
+    run: Run
+    """What the arm did."""
+
+    @property
+    def moment(self) -> float:
+        """When the fault was reported, on the clock of `plan`, [s]."""
+        return self.exhibit.sample * CYCLE_TIME
+
+
+def exhibition_of(exhibit: Exhibit) -> Exhibition:
+    """Returns a fault as scene, timeline and curves draw it."""
+    from rcilab.conformance.check import check
+    from rcilab.motion import Motion
+    from rcilab.recording.run import Run
+
+    def draw(motion: Motion) -> Plan:
+        judged = Motion.from_cycles(motion.q[: exhibit.sample + 1])  # From there on the way is the controller's.
+        return picture(exhibit.model, motion, check(judged, exhibit.model, distance=None))
+
+    commanded = exhibit.commanded
+    return Exhibition(
+        exhibit=exhibit,
+        plan=draw(commanded),
+        scene=draw(exhibit.moved),
+        run=Run(plan=commanded, cycles=exhibit.whole, model=exhibit.model),
+    )

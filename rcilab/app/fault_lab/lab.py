@@ -1,0 +1,225 @@
+"""A private virtual controller in lock-step on which faults are provoked, one after the other."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rcilab.app.fault_lab.fault_demo import Exhibit, Step
+from rcilab.app.fault_lab.scenario import Recipe, Scene
+from rcilab.app.fault_lab.signals import Signals
+from rcilab.app.fault_lab.table import FAULTS
+from rcilab.control_process.simulate import simulate
+from rcilab.core.arrays import Array
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.closeable import Closing
+from rcilab.core.command import Command
+from rcilab.core.errors import CommandRejectedError, ControlError, RcilabError, UsageError
+from rcilab.core.faults import Fault, find_fault
+from rcilab.core.safety_box import SafetyBox
+from rcilab.core.spatial import IDENTITY
+from rcilab.core.state import RobotState
+from rcilab.execution.control_loop import Callback
+from rcilab.execution.motion_callback import follow
+from rcilab.execution.recorder import CycleLog, Recorder
+from rcilab.execution.session import RobotSession
+from rcilab.model.robot_model import RobotModel, load_model
+from rcilab.motion import plan_joint
+
+_CAPACITY = 4096  # [cycles] More than any recipe takes.
+_OPEN = SafetyBox(size=(20.0, 20.0, 20.0), T_base_box=IDENTITY, active=False)
+_CALM = 1.0  # [N, N m] A choice: far below any threshold that a recipe sets.
+_CALM_STATES = 500
+_GAP = 5  # [cycles] A choice: so many states may be missing between two that are shown, as on any network.
+_AFTER = 200  # [cycles] How long the controlled stop is watched; a choice: the arm stands still by then.
+_NUDGE = 0.02  # [rad] How far the arm moves to show that it does again; a choice.
+_THERE = 1e-6  # [rad] What counts as standing where a recipe begins.
+_OPENED, _PLACED, _SHOWN = 0.4, 0.5, 0.8
+"""Parts of the work: the controller is up, the arm stands where it begins, the fault has come. About what was seen."""
+
+Tell = Callable[[float], None]
+"""Told how much is done, 0 to 1. What it raises ends the provocation: the arm is brought to rest, nothing is kept."""
+
+
+class Booth(Closing):
+    """Provokes faults on a private virtual arm that nobody else sees. Owned by one thread; opens when first used.
+
+    Args:
+        model: The arm, without tool and load: what is shown is the bare arm's.
+    """
+
+    def __init__(self, model: RobotModel | str = "xMatePro7") -> None:
+        self.model = load_model(model if isinstance(model, str) else model.name)
+        self._robot: RobotSession | None = None
+
+    def provoke(self, fault: Fault | str, progress: Tell = lambda share: None) -> Exhibit:
+        """Provokes a fault and returns what the controller reported; afterwards the arm stands ready for the next one.
+
+        Args:
+            fault: A fault, or its name as the manual prints it.
+            progress: Told how much is done.
+
+        Raises:
+            InvalidValueError: There is no such fault.
+            UsageError: This arm cannot have this fault: it has no elbow.
+            RcilabError: The controller did not report it.
+        """
+        recipe = FAULTS[find_fault(fault)]
+        if recipe.needs_elbow and self.model.n != 7:
+            said = f"{recipe.fault.manual_name} takes an arm of 7 axes; {self.model.name} has no elbow angle"
+            raise UsageError(said).coded("no_psi")
+        try:
+            return self._provoke(recipe, progress)
+        except BaseException:
+            self.close()  # Whatever state it is in: the next one gets a fresh controller.
+            raise
+
+    def close(self) -> None:
+        """Ends the private controller. A later `provoke` starts another one."""
+        robot, self._robot = self._robot, None
+        if robot is not None:
+            robot.close()
+
+    def __repr__(self) -> str:
+        return f"<Booth with a private {self.model.name}{'' if self._robot else ', not opened yet'}>"
+
+    def _provoke(self, recipe: Recipe, progress: Tell) -> Exhibit:
+        progress(0.02)
+        if self._robot is None:
+            self._robot = simulate(self.model)
+            self._robot.power_on()
+        robot = self._robot
+        progress(_OPENED)
+        start = recipe.start(self.model.home)
+        if np.abs(robot.receive_state().q_c - start).max() > _THERE:
+            self._go(robot, start)
+        scene = recipe.prepare(Scene(robot=robot, start=robot.receive_state(), limits=self.model.limits))
+        progress(_PLACED)
+        log = CycleLog(Recorder(self.model.n, _CAPACITY))
+        try:
+            robot.control(_logged(recipe.act(scene), log, progress), recipe.mode)
+        except ControlError as error:
+            if recipe.fault not in error.faults:
+                raise
+            fault = error
+        else:
+            error = RcilabError(f"{self.model.name}: {recipe.fault.manual_name} did not come")
+            raise error.coded("no_fault", fault=recipe.fault.manual_name)
+        assert fault.record is not None
+        rows = log.recorder.rows()
+        rows = np.concatenate((rows, fault.record[fault.record["message_id"] > rows["message_id"][-1]]))
+        after = _watch_stop(robot, rows[-1], fault.stop)  # First: its states are coming in already.
+        status = robot.world.status()
+        progress(_SHOWN)
+        signal = Signals(rows, self.model, scene.limits, scene.box, status.lost).find(recipe.fault)
+        if signal is None:
+            raise RcilabError(
+                f"{recipe.fault.manual_name}: the record does not show what the controller saw: {status.reason}"
+            ).coded("no_fault", fault=recipe.fault.manual_name)
+        return Exhibit(
+            fault=recipe.fault,
+            recipe=recipe,
+            model=self.model,
+            limits=scene.limits,
+            reported=tuple(bit for bit in fault.faults if isinstance(bit, Fault)),
+            said=status.reason,
+            cycles=rows,
+            after=after,
+            signal=signal,
+            way_out=tuple(self._leave(robot, recipe)),
+        )
+
+    def _leave(self, robot: RobotSession, recipe: Recipe) -> list[Step]:
+        """Leads out of a fault and returns what it took."""
+        done: list[Step] = []
+        if recipe.fault is Fault.INSTABILITY_DETECTION:
+            robot.world.set_network(None)
+            done.append("network")
+        if robot.world.status().pushed:
+            robot.world.release()
+            done.append("release")
+            self._wait_for_calm(robot)
+        done += self._recover(robot)
+        self._widen(robot)
+        robot.set_collision_behavior(self.model.limits.joint.collision_threshold)
+        nudged = np.array(robot.receive_state().q_c)
+        nudged[-1] -= np.copysign(_NUDGE, nudged[-1])
+        self._go(robot, nudged)
+        return [*done, "move"]
+
+    def _go(self, robot: RobotSession, goal: Array) -> None:
+        """Moves the private arm: inside every limit, and unchecked for collisions, as nothing can be hurt."""
+        motion = plan_joint(self.model, robot.receive_state().q_c, goal)
+        robot.control(follow(motion.q))
+
+    def _widen(self, robot: RobotSession) -> None:
+        limits = self.model.limits.joint
+        robot.set_joint_limit(limits.lower, limits.upper)
+        robot.set_cartesian_limit(_OPEN)
+
+    def _wait_for_calm(self, robot: RobotSession) -> None:
+        """Returns once the controller feels nothing any more: its estimate takes a moment to forget a push."""
+        for _ in range(_CALM_STATES):
+            if np.abs(robot.receive_state().tau_ext_in_base).max() < _CALM:
+                return
+
+    def _recover(self, robot: RobotSession) -> list[Step]:
+        try:
+            robot.recover()
+        except CommandRejectedError as error:
+            if not _is_far_outside(error):
+                raise
+            robot.power_off()
+            self._widen(robot)
+            robot.power_on()
+            return ["refused", "power_off", "widen", "power_on"]
+        if robot.motor_state():
+            return ["recover"]
+        robot.power_on()  # A joint limit and an emergency stop take the motor power.
+        return ["recover", "power_on"]
+
+
+def _is_far_outside(error: CommandRejectedError) -> bool:
+    from rcilab.makers.rokae.wire import RecoveryStatus
+
+    return error.status == RecoveryStatus.MANUAL_RECOVERY_NEEDED
+
+
+def _watch_stop(robot: RobotSession, last: np.void, stop: NDArray[np.void]) -> NDArray[np.void]:
+    """Returns the cycles after the one with the fault: the controller brings the arm to rest, and it stands there.
+
+    Args:
+        robot: Sends the states behind `stop`.
+        last: The cycle with the fault.
+        stop: What was seen of the stop already.
+    """
+    log = CycleLog(Recorder(robot.model.n, _CAPACITY))
+    begun, t = int(last["message_id"]), float(last["t"])
+    seen = int(stop["message_id"][-1]) - begun if len(stop) else 0
+    while seen < _AFTER:
+        for state in robot.receive_states():
+            since = state.message_id - begun
+            log.write(state, time.monotonic_ns(), t + since * CYCLE_TIME)
+            seen = max(seen, since)
+    rows = np.concatenate((stop, log.recorder.rows()))
+    steps = np.diff(rows["message_id"].astype(np.int64), prepend=begun)
+    missed = np.flatnonzero(steps > _GAP)  # What was missed is not made up: there the record ends.
+    rows = rows[: missed[0]] if missed.size else rows
+    return rows[rows["message_id"] <= begun + _AFTER]
+
+
+def _logged(callback: Callback, log: CycleLog, progress: Tell) -> Callback:
+    """Returns a callback that also records every cycle."""
+
+    def recorded(state: RobotState, t: float) -> Command:
+        command = callback(state, t)
+        now = time.monotonic_ns()
+        log.write(state, now, t, now, command)
+        if state.message_id % 64 == 0:
+            progress(_PLACED)
+        return command
+
+    return recorded

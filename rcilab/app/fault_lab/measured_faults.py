@@ -1,0 +1,173 @@
+"""The arm itself goes wrong, the commands do not: it is pushed, thrown by torques, hit, or not heard of any more."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from rcilab.app.fault_lab.command_faults import LIVELY_ELBOW, box_around_tool, soften_joint_1, torque_stream
+from rcilab.app.fault_lab.scenario import Recipe, Scene
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.command import CartesianPosition, JointPosition
+from rcilab.core.faults import Fault
+from rcilab.core.state import RobotState
+from rcilab.execution.control_loop import Callback
+from rcilab.sim.api import NetworkFaults
+
+_PAUSE = 20  # [cycles] of standing still before; a choice.
+_LONGEST = 3000  # [cycles] in which a fault has to come; a choice.
+_STEP = 5  # [cycles] How often a growing push is told to the world; a choice.
+_ELBOW_LINK = 4
+_CUT = 40  # [cycles] after which the network goes; a choice.
+
+Push = Callable[[int], tuple[float, ...]]
+"""Wrench on the tool by the cycle since the push began: force and moment, base axes, [N, N m]."""
+
+
+def held(scene: Scene, act: Callable[[int], None], *, tool: bool) -> Callback:
+    """Returns a callback that commands the arm to stay where it is, and tells `act` the cycle before each answer."""
+    q, T, psi = scene.start.q_c, scene.start.T_base_tool_c, scene.start.psi_c
+    angle = None if np.isnan(psi) else psi
+
+    def callback(state: RobotState, t: float) -> JointPosition | CartesianPosition:
+        cycle = round(t / CYCLE_TIME)
+        act(cycle)
+        finished = cycle >= _LONGEST
+        return CartesianPosition(T, psi=angle, finished=finished) if tool else JointPosition(q, finished=finished)
+
+    return callback
+
+
+def pushed(scene: Scene, push: Push, *, link: int | None = None, tool: bool) -> Callback:
+    """Returns a callback that stays where it is while something presses harder and harder."""
+
+    def act(cycle: int) -> None:
+        since = cycle - _PAUSE
+        if since >= 0 and since % _STEP == 0:
+            scene.robot.world.push(push(since), link=link)
+
+    return held(scene, act, tool=tool)
+
+
+def _soft_joints(scene: Scene) -> Scene:
+    n = scene.robot.n
+    scene.robot.set_joint_impedance([100.0] * (n - 3) + [20.0] * 3)
+    return scene.yielding()
+
+
+def _loose_tool(scene: Scene) -> Scene:
+    """The tool keeps its place and turns freely."""
+    scene.robot.set_cartesian_impedance([1000.0] * 3 + [0.0] * 3)
+    return scene.yielding()
+
+
+def _firm_tool(scene: Scene) -> Scene:
+    scene.robot.set_cartesian_impedance([3000.0] * 3 + [300.0] * 3)
+    return scene.yielding()
+
+
+def _touchy(scene: Scene) -> Scene:
+    thresholds = np.full(scene.robot.n, 10.0)
+    scene.robot.set_collision_behavior(thresholds)
+    return scene.guarded(thresholds)
+
+
+def _ramp(direction: tuple[float, ...], slope: float, top: float) -> Push:
+    """A push that grows by `slope` a second up to `top` times `direction`."""
+    return lambda since: tuple(min(since * CYCLE_TIME * slope, top) * part for part in direction)
+
+
+def _sideways(scene: Scene) -> Callback:
+    return pushed(scene, _ramp((0.0, 1.0, 0.0, 0.0, 0.0, 0.0), 300.0, 40.0), tool=False)
+
+
+def _down(scene: Scene) -> Callback:
+    return pushed(scene, _ramp((0.0, 0.0, -1.0, 0.0, 0.0, 0.0), 300.0, 40.0), tool=False)
+
+
+def _elbow(scene: Scene) -> Callback:
+    """Along the one way that the elbow has while the tool stays."""
+    model, q = scene.robot.model, scene.start.q
+    still = np.linalg.svd(model.jacobian(q))[2][-1]
+    way = model.rigid_body.link_jacobian(q, _ELBOW_LINK, np.zeros(3))[:3] @ still
+    force = way / np.linalg.norm(way)
+    return pushed(scene, _ramp((*force.tolist(), 0.0, 0.0, 0.0), 500.0, 90.0), link=_ELBOW_LINK, tool=True)
+
+
+def _swing(scene: Scene) -> Callback:
+    ramp = np.minimum(0.01 * np.maximum(np.arange(_LONGEST) - _PAUSE, 0), 0.1)
+    return torque_stream(scene.robot.n, scene.robot.n - 1, ramp)
+
+
+def _turn(scene: Scene) -> Callback:
+    axis = scene.start.T_base_tool.rotation[:, 2]
+    return pushed(scene, _ramp((0.0, 0.0, 0.0, *axis.tolist()), 5.0, 0.12), tool=True)
+
+
+def _throw(scene: Scene) -> Callback:
+    ramp = np.minimum(0.9 * np.maximum(np.arange(_LONGEST) - _PAUSE, 0), 30.0)
+    return torque_stream(scene.robot.n, scene.robot.n - 3, ramp)
+
+
+def _twist(scene: Scene) -> Callback:
+    axis = scene.start.T_base_tool.rotation[:, 2]
+    return pushed(scene, lambda since: (0.0, 0.0, 0.0, *(1.8 * axis).tolist()), tool=True)
+
+
+def _hit(scene: Scene) -> Callback:
+    return pushed(scene, lambda since: (0.0, 0.0, -60.0, 0.0, 0.0, 0.0), tool=False)
+
+
+def _cut_off(scene: Scene) -> Callback:
+    def act(cycle: int) -> None:
+        if cycle == _CUT - 1:  # From now on lock-step waits for commands that may be lost for a moment only.
+            scene.robot.world.set_network(NetworkFaults(jitter=1e-6), "commands")
+        elif cycle == _CUT:
+            scene.robot.world.set_network(NetworkFaults(loss=1.0), "commands")
+
+    return held(scene, act, tool=False)
+
+
+def _both(first: Callable[[Scene], Scene], second: Callable[[Scene], Scene]) -> Callable[[Scene], Scene]:
+    return lambda scene: second(first(scene))
+
+
+ARM_RECIPES = (
+    Recipe(
+        fault=Fault.ACTUAL_JOINT_POSITION_LIMITS_VIOLATION, group="position", mode="joint_impedance",
+        prepare=_both(_soft_joints, soften_joint_1), act=_sideways,
+    ),
+    Recipe(
+        fault=Fault.ACTUAL_CARTESIAN_POSITION_LIMITS_VIOLATION, group="position", mode="joint_impedance",
+        prepare=_both(_soft_joints, box_around_tool), act=_down,
+    ),
+    Recipe(
+        fault=Fault.ACTUAL_CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION, group="position",
+        mode="cartesian_impedance", prepare=_firm_tool, act=_elbow, needs_elbow=True,
+        pose=LIVELY_ELBOW,
+    ),
+    Recipe(
+        fault=Fault.ACTUAL_JOINT_VELOCITY_LIMITS_VIOLATION, group="velocity", mode="torque", prepare=Scene.yielding,
+        act=_swing,
+    ),
+    Recipe(
+        fault=Fault.ACTUAL_CARTESIAN_VELOCITY_LIMITS_VIOLATION, group="velocity", mode="cartesian_impedance",
+        prepare=_loose_tool, act=_turn,
+    ),
+    Recipe(
+        fault=Fault.ACTUAL_JOINT_ACCELERATION_LIMITS_VIOLATION, group="acceleration", mode="torque",
+        prepare=Scene.yielding, act=_throw,
+    ),
+    Recipe(
+        fault=Fault.ACTUAL_CARTESIAN_ACCELERATION_LIMITS_VIOLATION, group="acceleration", mode="cartesian_impedance",
+        prepare=_loose_tool, act=_twist,
+    ),
+    Recipe(
+        fault=Fault.COLLISION, group="contact", mode="joint_position", prepare=_touchy, act=_hit,
+    ),
+    Recipe(
+        fault=Fault.INSTABILITY_DETECTION, group="contact", mode="joint_position", act=_cut_off,
+    ),
+)  # fmt: skip
+"""Every fault of the arm itself."""

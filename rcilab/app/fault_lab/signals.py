@@ -1,0 +1,203 @@
+"""The signal that broke a condition, cycle by cycle, computed from the recorded cycles as the controller does it.
+
+A value stands in the row of the state that shows it: the command that answered one state is judged in the next cycle.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rcilab.conformance.condition import Condition
+from rcilab.conformance.conditions import explain_fault
+from rcilab.conformance.measured_conditions import ACCELERATION_CUTOFF
+from rcilab.conformance.tool_signals import turns
+from rcilab.core.arrays import Array
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.faults import Fault
+from rcilab.core.limits import Limits
+from rcilab.core.safety_box import SafetyBox
+from rcilab.model.kinematics.closed_form import build_closed_form
+from rcilab.model.robot_model import RobotModel
+from rcilab.sim.momentum_observer import Observer
+from rcilab.sim.plant import Measurement
+
+_BEFORE = 3  # Rows that a third difference looks back to.
+_SHARE = CYCLE_TIME / (CYCLE_TIME + 1.0 / (2.0 * math.pi * ACCELERATION_CUTOFF))
+_UNREACHABLE = 2.0  # What a pose counts as that no joint angles give: 1 is the bound. A choice, for the plot.
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Signal:
+    """What a condition judges over the recorded cycles."""
+
+    condition: Condition
+    axis: int
+    """The joint, from 1; 0 for anything else."""
+    values: Array
+    """Shape (N,), in the condition's unit."""
+    lower: float
+    """Bound below, -inf where there is none."""
+    upper: float
+
+    @property
+    def value(self) -> float:
+        """The last one: that of the cycle with the fault."""
+        return float(self.values[-1])
+
+    @property
+    def bound(self) -> float:
+        """The bound on the side of the value."""
+        if not math.isfinite(self.lower):
+            return self.upper
+        return self.upper if self.value >= 0.5 * (self.lower + self.upper) else self.lower
+
+    @property
+    def is_broken(self) -> bool:
+        """Whether the last value is outside its bounds."""
+        return not self.lower < self.value < self.upper
+
+    @property
+    def excess(self) -> float:
+        """How far the last value is past its bound, as a share of it."""
+        width = self.upper - max(self.lower, -self.upper)
+        return (abs(self.value - self.bound) if self.is_broken else -math.inf) / max(width, 1e-9)
+
+
+class Signals:
+    """Computes signals of one stream of cycles.
+
+    Args:
+        rows: Recorded cycles, see `cycle_dtype`; the last one carries the fault.
+        model: The arm.
+        limits: What it was judged by.
+        box: Where its tool was to stay.
+        lost: Commands in a row that the controller counted as lost.
+    """
+
+    def __init__(
+        self, rows: NDArray[np.void], model: RobotModel, limits: Limits, box: SafetyBox | None, lost: int
+    ) -> None:
+        self._rows, self._model, self._limits, self._box, self._lost = rows, model, limits, box, lost
+        self._closed_form = build_closed_form(model.description)
+
+    def find(self, fault: Fault) -> Signal | None:
+        """Returns the signal that raised a fault: the one farthest past its bound in the last row."""
+        found = [signal for row in explain_fault(fault) for signal in self._signals(row) if signal.is_broken]
+        return max(found, key=lambda signal: signal.excess, default=None)
+
+    def _signals(self, condition: Condition) -> list[Signal]:
+        values = self._values(condition)
+        if values is None:
+            return []
+        lower, upper = condition.bounds(self._limits)
+        return [
+            Signal(
+                condition=condition,
+                axis=column + 1 if condition.is_per_joint else 0,
+                values=values[:, column],
+                lower=float(lower[column]),
+                upper=float(upper[column]),
+            )
+            for column in range(values.shape[1])
+        ]
+
+    def _values(self, condition: Condition) -> Array | None:
+        """Returns one column an axis, shape (N, k); None where nothing of the kind was commanded."""
+        if condition.is_measured:
+            return self._measured(condition)
+        match condition.signal:
+            case "external_torque":
+                return self._external()
+            case "lost_commands":
+                last = len(self._rows) - 1
+                return np.maximum(self._lost - last + np.arange(last + 1), 0.0)[:, None]
+            case "joint":
+                commands = self._sent("command", self._rows["q_c"][0])
+                return None if commands is None else _differences(commands, condition.order)
+            case "torque":
+                torques = self._sent("command_tau", np.zeros(self._model.n))
+                return None if torques is None else _differences(torques, condition.order)
+            case _:
+                return self._commanded_tool(condition)
+
+    def _commanded_tool(self, condition: Condition) -> Array | None:
+        joints = self._sent("command", self._rows["q_c"][0])
+        poses = self._sent("command_pose", self._model.forward(self._rows["q_c"][0]).matrix)
+        if condition.signal == "position" and self._box is not None:
+            path = self._model.forward_path(joints) if joints is not None else poses
+            return None if path is None else self._box.excess_path(path[_BEFORE:, :3, 3])[:, None]
+        if poses is None:
+            return None
+        if condition.signal == "frame":
+            return self._singularity(poses)
+        if condition.signal == "arm_angle":
+            psi = self._sent("command_psi", self._psi(self._rows["q_c"][:1])[0])
+            return None if psi is None else _differences(np.unwrap(psi)[:, None], condition.order)
+        if condition.signal not in ("translation", "rotation") or condition.order == 0:
+            return None
+        is_turn = condition.signal == "rotation"
+        steps = turns(poses[:, :3, :3]) if is_turn else np.diff(poses[:, :3, 3], axis=0)
+        rates = np.diff(steps / CYCLE_TIME, condition.order - 1, axis=0) / CYCLE_TIME ** (condition.order - 1)
+        return np.linalg.norm(rates, axis=1)[_BEFORE - condition.order :, None]
+
+    def _measured(self, condition: Condition) -> Array | None:
+        q, dq = self._rows["q"], self._rows["dq"]
+        match condition.signal, condition.order:
+            case "joint", 0:
+                return q
+            case "joint", 1:
+                return dq
+            case "joint", _:
+                return _low_passed(dq)
+            case "position", _:
+                place = self._model.forward_path(q)[:, :3, 3]
+                return None if self._box is None else self._box.excess_path(place)[:, None]
+            case "arm_angle", _:
+                return np.diff(np.unwrap(self._psi(q)), prepend=self._psi(q[:1])[0])[:, None] / CYCLE_TIME
+            case signal, order:
+                half = slice(0, 3) if signal == "translation" else slice(3, 6)
+                twist = np.array([self._model.jacobian(a) @ b for a, b in zip(q, dq, strict=True)])
+                rates = twist if order == 1 else _low_passed(twist)
+                return np.linalg.norm(rates[:, half], axis=1)[:, None]
+
+    def _external(self) -> Array:
+        """Returns outside joint torques, as the controller estimates them."""
+        observer = Observer(self._model)
+        found: list[Array] = []
+        for index, row in enumerate(self._rows):
+            measured = Measurement(row["q"], row["dq"], row["tau"])
+            if index == 0:
+                observer.reset(measured)
+            found.append(observer.step(measured)[0])
+        return np.array(found)
+
+    def _singularity(self, poses: Array) -> Array:
+        """Returns how near the followed arm is to a singularity; the pose that was not followed is beyond the bound."""
+        near = self._closed_form.singularity_path(self._rows["q_c"])
+        near[-1] = max(2.0 * near[-2] - near[-3], _UNREACHABLE)
+        return near[:, None]
+
+    def _psi(self, q: Array) -> Array:
+        return self._closed_form.arm_angle_path(q)
+
+    def _sent(self, name: str, before: Array | float) -> Array | None:
+        """Returns what was judged in each row, with `_BEFORE` rows of standing still in front; None: none was sent."""
+        sent = self._rows[name][:-1]
+        if not len(sent) or not np.isfinite(sent.reshape(len(sent), -1)).all():
+            return None
+        return np.concatenate((np.repeat(np.asarray(before)[None], _BEFORE + 1, axis=0), sent))
+
+
+def _differences(values: Array, order: int) -> Array:
+    return np.diff(values, order, axis=0)[_BEFORE - order :] / CYCLE_TIME**order
+
+
+def _low_passed(rates: Array) -> Array:
+    steps, found = np.diff(rates, axis=0, prepend=rates[:1]) / CYCLE_TIME, np.zeros_like(rates)
+    for row in range(1, len(rates)):
+        found[row] = found[row - 1] + _SHARE * (steps[row] - found[row - 1])
+    return found

@@ -1,0 +1,184 @@
+"""From a goal to a judged motion: what every change of the goal runs, many times a second during a drag."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rcilab.core.arrays import Array, JointVector
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.errors import RcilabError
+from rcilab.core.safety_box import SafetyBox, active_box
+from rcilab.core.spatial import Pose
+from rcilab.core.state import Mode
+from rcilab.i18n.error_messages import tell
+from rcilab.i18n.translator import Message, message
+from rcilab.model.robot_model import RobotModel
+
+if TYPE_CHECKING:
+    from rcilab.conformance import Report
+    from rcilab.motion import Motion, Program
+
+PathKind = Literal["joint", "line", "arc"]
+PATH_KINDS: tuple[PathKind, ...] = ("joint", "line", "arc")
+PlannableLaw = Literal["torque_rate_limited", "jerk_limited", "s_profile"]
+LAWS: tuple[PlannableLaw, ...] = ("torque_rate_limited", "jerk_limited", "s_profile")
+
+SMALLEST_MOTION = 1e-4  # [rad] A choice: a goal closer than this to the arm is where the arm is.
+SAME_WAY = 1e-3  # [rad] A choice: beyond it a line ends in another way of standing than the one that was wanted.
+PATH_POINTS = 120
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Plan:
+    """A motion, its judgement, and what views draw of it."""
+
+    motion: Motion
+    report: Report
+    model: RobotModel
+    """The arm it was judged for, with its tool and load."""
+    box: SafetyBox | None = None
+    """The safety box it was judged with."""
+    path: Array = field(repr=False)
+    """Positions of the tool, shape (N, 3), [m]."""
+    effort: Array = field(repr=False)
+    """How much of its velocity limit the busiest joint uses at each of these positions, 0 to 1, shape (N,)."""
+    short: Message | None = None
+    """How far short of the target it ends, in words; None when it leads there."""
+    program: Program | None = None
+    """The program that the motion goes through; None where it leads to the goal."""
+    mode: Mode = "joint_position"
+    """How it was judged to be commanded."""
+    kind: PathKind = "joint"
+    """How the tool goes, where it is no program."""
+    note: Message | None = None
+    """What else is to be said about where it ends."""
+    complete: bool = False
+    """Whether collisions were looked for, too. While somebody drags they are not: it would halve the rate."""
+
+    @property
+    def starts_at(self) -> JointVector:
+        """Joint angles it must be executed from, [rad]."""
+        return self.motion.start
+
+    def completed(self, mode: Mode = "joint_position") -> Plan:
+        """Returns this plan with a report on all conditions of a mode, collisions too: what may be executed."""
+        from rcilab.conformance import check
+
+        if self.complete and self.mode == mode:
+            return self
+        report = check(self.motion, self.model, box=self.box, mode=mode)
+        return replace(self, report=report, mode=mode, complete=True)
+
+    def stale_parts(self, model: RobotModel, box: SafetyBox | None) -> tuple[str, ...]:
+        """Returns what has changed since the plan was judged, as certificates name it: tool, load, safety box.
+
+        Args:
+            model: The arm as it is now.
+            box: The safety box that is in force now; without one, a plan that was kept inside a box is as good.
+        """
+        then, now = self.model.fingerprint, model.fingerprint
+        changed = [part for part in ("tool", "load") if then[part] != now[part]]
+        bound, judged = active_box(box), active_box(self.box)
+        if bound is None:
+            is_changed = judged is not None and any(v.condition.signal == "position" for v in self.report.violations)
+        else:
+            is_changed = judged is None or not _is_same_box(bound, judged)
+        if is_changed:
+            changed.append("box")
+        return tuple(changed)
+
+
+def tool_path(model: RobotModel, motion: Motion) -> Array:
+    """Returns where the tool is at `PATH_POINTS` moments of a motion, shape (N, 3), [m]."""
+    return model.position_path(motion.q[sampled_rows(motion)])
+
+
+def make_plan(
+    model: RobotModel,
+    start: JointVector,
+    goal: JointVector,
+    speed: float,
+    law: PlannableLaw,
+    box: SafetyBox | None = None,
+    kind: PathKind = "joint",
+    via: Pose | None = None,
+) -> Plan | Message:
+    """Returns a motion from start to goal that is judged but for collisions, or why there is none."""
+    from rcilab.conformance import check
+
+    for name, q in (("plan.start_limit", start), ("plan.at_limit", goal)):
+        joint = find_outside(model, q)
+        if joint is not None:
+            return message(name, joint=joint)
+    if float(np.abs(goal - start).max()) < SMALLEST_MOTION:
+        return message("plan.here")
+    if kind == "arc" and via is None:
+        return message("plan.no_via")
+    try:
+        motion = _go(model, start, goal, speed, law, kind, via)
+        report = check(motion, model, start=start, box=box, distance=None)
+    except RcilabError as error:
+        return message("plan.failed", error=tell(error))
+    away = int(np.abs(motion.goal - goal).argmax())
+    note = None
+    if abs(float(motion.goal[away] - goal[away])) > SAME_WAY:
+        note = message("plan.other_way", joint=away + 1)
+    return replace(picture(model, motion, report, box), kind=kind, note=note)
+
+
+def make_recovery(model: RobotModel, start: JointVector, box: SafetyBox | None = None) -> Plan | Message:
+    """Returns the motion that leads joints and tool back inside, checked but for collisions, or why none does."""
+    from rcilab.conformance import check
+    from rcilab.motion import plan_recovery
+
+    try:
+        motion = plan_recovery(model, start, box)
+        report = check(motion, model, start=start, box=box, distance=None)
+    except RcilabError as error:
+        return message("plan.failed", error=tell(error))
+    return picture(model, motion, report, box)
+
+
+def find_outside(model: RobotModel, q: JointVector) -> int | None:
+    """Returns the first joint, counted from 1, that is not strictly inside its range; None when all are."""
+    outside = np.flatnonzero(~((model.limits.joint.lower < q) & (q < model.limits.joint.upper)))
+    return int(outside[0]) + 1 if outside.size else None
+
+
+def _go(
+    model: RobotModel,
+    start: JointVector,
+    goal: JointVector,
+    speed: float,
+    law: PlannableLaw,
+    kind: PathKind,
+    via: Pose | None,
+) -> Motion:
+    from rcilab.motion import plan_arc, plan_joint, plan_line
+
+    if kind == "joint":
+        return plan_joint(model, start, goal, speed=speed, law=law)
+    target, psi = model.forward(goal), model.arm_angle(goal) if model.n == 7 else None
+    if kind == "line" or via is None:
+        return plan_line(model, start, target, speed=speed, psi=psi, law=law)
+    return plan_arc(model, start, via, target, speed=speed, psi=psi, law=law)
+
+
+def picture(model: RobotModel, motion: Motion, report: Report, box: SafetyBox | None = None) -> Plan:
+    """Returns a judged motion with what views draw of it."""
+    effort = np.abs(motion.dq[sampled_rows(motion)] / model.limits.joint.velocity).max(axis=1)
+    return Plan(motion=motion, report=report, path=tool_path(model, motion), effort=effort, model=model, box=box)
+
+
+def sampled_rows(motion: Motion) -> NDArray[np.intp]:
+    """Returns the rows of a motion at `PATH_POINTS` moments, the first and the last among them."""
+    times = np.linspace(0.0, motion.duration, PATH_POINTS)
+    return np.minimum((times / CYCLE_TIME).astype(np.intp), len(motion.times) - 1)
+
+
+def _is_same_box(a: SafetyBox, b: SafetyBox) -> bool:
+    return a.size == b.size and a.T_base_box.is_close(b.T_base_box, 0.0)

@@ -1,0 +1,73 @@
+"""What stands in the way of executing a plan, as far as arm and plan tell; and what a robot is about to do."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rcilab.app.planning import Plan
+from rcilab.core.arrays import JointVector
+from rcilab.i18n.translator import Finished, Message, message
+from rcilab.motion.extent import measure_extent
+
+_SAME_PLACE = 1e-9  # [rad] What the checker allows between the arm and the start of a motion.
+_NOT_IDLE = {
+    "starting": "ready.starting",
+    "connecting": "ready.starting",
+    "moving": "ready.moving",
+    "stopping": "ready.moving",
+    "fault": "ready.fault",
+    "lost": "ready.lost",
+    "crashed": "ready.lost",
+    "closed": "ready.closed",
+}
+
+
+def arm_obstacle(phase: str, powered: bool | None, *, is_pressed: bool = False) -> Message | None:
+    """Returns why an arm cannot set out in this phase of its control process, or None.
+
+    Args:
+        phase: Of the control process.
+        powered: Motor power; None while unknown.
+        is_pressed: Whether an emergency stop or the safety gate holds the arm.
+    """
+    if is_pressed and phase in ("idle", "fault"):
+        return message("ready.pressed")
+    if phase in _NOT_IDLE:
+        return message(_NOT_IDLE[phase])
+    return None if powered else message("ready.power")
+
+
+def plan_obstacle(plan: Plan | None, q_c: JointVector | None) -> Message | None:
+    """Returns why a plan cannot be executed from where the arm was commanded to be, [rad], or None."""
+    if plan is None:
+        return message("ready.no_plan")
+    if not plan.report.ok:
+        return message("ready.violations", conditions=plan.report.broken_conditions, count=len(plan.report.violations))
+    if q_c is None or not _is_at(q_c, plan.starts_at):
+        return message("ready.done" if q_c is not None and is_done(plan, q_c) else "ready.elsewhere")
+    return None
+
+
+def is_done(plan: Plan, q_c: JointVector) -> bool:
+    """Returns whether the arm, commanded to be at q_c, [rad], stands where a plan ends."""
+    return _is_at(q_c, plan.motion.goal)
+
+
+def ask_to_move(plan: Plan, address: str) -> Message:
+    """Returns what the robot at an address is about to do, as the question before it does."""
+    extent = measure_extent(plan.motion, plan.model)
+    return message(
+        "run.ask",
+        model=plan.model.name,
+        address=address,
+        duration=f"{extent.duration:.2f}",
+        ranges=Finished(extent.describe_joints().replace(" to ", " … ")),
+        mm=f"{1e3 * extent.tool_distance:.0f}",
+        joint=extent.fastest_joint,
+        angle=f"{np.degrees(extent.joint_speed):.1f}",
+        speed=f"{1e3 * extent.tool_speed:.0f}",
+    )
+
+
+def _is_at(q: JointVector, place: JointVector) -> bool:
+    return float(np.abs(q - place).max()) <= _SAME_PLACE

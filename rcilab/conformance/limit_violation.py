@@ -1,0 +1,66 @@
+"""One broken condition in one cycle, with its numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, NamedTuple
+
+from rcilab.conformance.condition import Condition
+from rcilab.core.faults import Fault
+from rcilab.i18n.translator import Remark
+
+if TYPE_CHECKING:
+    from rcilab.model.kinematics.collision import LinkPair
+
+
+class Breach(NamedTuple):
+    """What a monitor's last step broke."""
+
+    condition: Condition
+    axis: int
+    """The joint, from 1; 0 for a norm, an arm angle or anything else that has no axis."""
+    value: float
+    """In the condition's unit."""
+    bound: float
+    """The bound that it passed."""
+    links: LinkPair | None = None
+    """Between whom, for a distance."""
+
+    @property
+    def text(self) -> str:
+        """The fact in words: "joint 2: commanded velocity 2.3 rad/s passes 2.175 rad/s"."""
+        row = self.condition
+        if row.is_clearance:
+            return f"{self.links}: {row.quantity} {self.value:.4g} m is not above {self.bound:g} m"
+        if row.signal == "position":
+            return f"{row.place(0)}: {row.quantity} is {self.value:.4g} m outside the safety box"
+        if row.signal == "frame":
+            return f"{row.place(0)}: {row.quantity} is improper, out of reach or singular"
+        if row.signal == "elbow_sign":
+            return f"{row.place(0)}: it is flipped to the other side than at the start"
+        return f"{row.place(self.axis)}: {row.quantity} {self.value:.6g} {row.unit} passes {self.bound:.6g} {row.unit}"
+
+    @property
+    def remark(self) -> Remark:
+        """The same for faces, which have words of their own for it."""
+        row = self.condition
+        if row.is_clearance:
+            return Remark(self.text)
+        if row.signal == "position":
+            return Remark(self.text, "outside_box", condition=row.id, away=f"{1e3 * self.value:.4g}")
+        if row.signal in ("frame", "elbow_sign"):
+            return Remark(self.text, "broken", condition=row.id)
+        amounts = {"value": f"{self.value:.6g} {row.unit}", "bound": f"{self.bound:.6g} {row.unit}"}
+        if self.axis and row.is_per_joint:
+            return Remark(self.text, "joint_passes", condition=row.id, joint=self.axis, **amounts)
+        return Remark(self.text, "passes", condition=row.id, **amounts)
+
+
+def describe_breaches(breaches: Iterable[Breach]) -> Remark:
+    """Returns all of them in one line."""
+    return Remark.all(breach.remark for breach in breaches)
+
+
+def faults_of(breaches: Iterable[Breach]) -> tuple[Fault, ...]:
+    """Returns the faults of the RCI that they raise, in wire order and once each."""
+    return tuple(sorted({fault for row, *_ in breaches if isinstance(fault := row.fault, Fault)}))

@@ -1,0 +1,88 @@
+"""The judgement of another pace: the rows that will be commanded, by the conditions of the mode they run in."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rcilab.conformance.check import check
+from rcilab.conformance.report import Violation
+from rcilab.conformance.start import StartState
+from rcilab.core.arrays import Array
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.errors import PlanningError
+from rcilab.core.state import Mode
+from rcilab.model.robot_model import RobotModel
+from rcilab.motion.motion import Motion
+from rcilab.motion.speed_scaling import PacedMotion, begun_at, changed_pace, require_pace
+
+_ATTEMPTS = 12  # Candidates that are judged in full; a choice.
+_PAST = 3  # Rows that the differences of a row reach back to.
+
+
+def plan_start(motion: Motion, pace: float, model: RobotModel, mode: Mode) -> PacedMotion:
+    """Returns a motion that runs at a pace from its first row on, judged by the conditions of its mode.
+
+    The way is the one that was judged, so safety box and distances need no other look; at 1 nothing does.
+
+    Args:
+        motion: The motion, judged as planned.
+        pace: `SLOWEST_PACE` to 1.
+        model: The arm, with its tool and load.
+        mode: How it is commanded.
+
+    Raises:
+        InvalidValueError: The pace is out of range.
+        PlanningError: At this pace it breaks a condition that it keeps as planned, as torques may that hold the arm.
+    """
+    paced = begun_at(motion, require_pace(pace))
+    if not paced.changed:
+        return paced
+    broken = _breaches(paced, model, mode)
+    if broken:
+        raise PlanningError(
+            f"at {100 * pace:.0f} % of its speed this motion would break a condition ({broken[0].condition.id} at "
+            f"t = {broken[0].time:.3f} s) that it keeps as planned; choose another pace"
+        ).coded("pace_breaks", pace=f"{100 * pace:.0f}", id=broken[0].condition.id, time=f"{broken[0].time:.3f}")
+    return paced
+
+
+def plan_pace(paced: PacedMotion, cycle: int, pace: float, model: RobotModel, mode: Mode) -> PacedMotion:
+    """Returns the motion that goes on with another pace from a cycle on, as soon as all conditions allow it.
+
+    The way stays what was judged before, so safety box and distances need no other look. Where the same pace is asked
+    for that it has, nothing changes.
+
+    Args:
+        paced: How it is run through so far.
+        cycle: The first row that may differ.
+        pace: From 0, to be held, to 1.
+        model: The arm, with its tool and load.
+        mode: How it is commanded.
+
+    Raises:
+        PlanningError: There is no such change from there: the motion arrives before, or uses all of a limit until then.
+    """
+    for _, candidate in zip(range(_ATTEMPTS), changed_pace(paced, cycle, pace, model.limits.joint), strict=False):
+        if not _breaches(candidate, model, mode):
+            return candidate
+    raise PlanningError(
+        f"at t = {paced.place_at(cycle):.2f} s of {paced.motion.duration:.2f} s of the plan there is no way within the "
+        f"limits to go on with {100 * pace:.0f} % of its speed; the motion goes on as it is, stop() always works"
+    ).coded("no_way_to_pace", pace=f"{100 * pace:.0f}")
+
+
+def _breaches(candidate: PacedMotion, model: RobotModel, mode: Mode) -> list[Violation]:
+    """Returns what the rows from the change on would break."""
+    first = candidate.changed - 1
+    rows = candidate.q[first:]
+    if first < _PAST:
+        rows, start = candidate.q, None
+    else:
+        start = _state(candidate.q[first - _PAST : first + 1])
+    report = check(Motion.from_cycles(rows), model, start=start, distance=None, mode=mode)
+    return list(report.violations)
+
+
+def _state(q: Array) -> StartState:
+    h = CYCLE_TIME
+    return StartState(q[-1], (q[-1] - q[-2]) / h, np.diff(q, n=2, axis=0)[-1] / h**2)

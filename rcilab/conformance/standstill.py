@@ -1,0 +1,43 @@
+"""What counts as rest at the ends of a motion: what one cycle cannot tell from it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rcilab.conformance.condition import AnyLimits, Condition, all_limits, joint_limits
+from rcilab.core.arrays import Array
+from rcilab.core.clock import CYCLE_TIME
+
+
+def unresolved(condition: Condition, limits: AnyLimits, cycles: int = 1) -> Array:
+    """Returns how large a difference of commands can be in the first cycle out of rest, within the jerk limit.
+
+    A motion that leaves rest as fast as it may has moved by the time of its second command. So the controller, who sees
+    commands alone, cannot tell less than this from rest, and neither row of the table asks for more.
+
+    Args:
+        condition: A row on the velocity or acceleration at the start or the end.
+        limits: Of the arm.
+        cycles: Over how many cycles the difference is taken, 1 or more.
+
+    Returns:
+        Shape (n,), or (1,) for a row on the tool, in the condition's unit.
+    """
+    jerk = (
+        joint_limits(limits).jerk
+        if condition.is_per_joint
+        else np.array([getattr(all_limits(limits).cartesian, f"{condition.signal}_jerk")])
+    )
+    return jerk * (cycles * CYCLE_TIME) ** (3 - condition.order)
+
+
+def beyond_a_cycle(value: Array, condition: Condition, limits: AnyLimits, cycles: int = 1) -> Array:
+    """Returns what is left of velocities or accelerations without what one cycle cannot tell from rest.
+
+    Args:
+        value: Differences of commands, shape (..., n), or (..., 1) for norms of the tool's.
+        condition: The row that judges them.
+        limits: Of the arm.
+        cycles: Over how many cycles the differences are taken.
+    """
+    return np.sign(value) * np.maximum(np.abs(value) - unresolved(condition, limits, cycles), 0.0)

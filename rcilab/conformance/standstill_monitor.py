@@ -1,0 +1,59 @@
+"""Rest at both ends of a motion, cycle by cycle: the recommended rows that `check` judges of a whole motion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from rcilab.conformance.condition import Condition
+from rcilab.conformance.limit_violation import Breach
+from rcilab.conformance.standstill import beyond_a_cycle
+from rcilab.core.limits import Limits
+
+
+class RestMonitor:
+    """Judges whether a motion leaves rest and comes to rest, from the differences that other monitors took.
+
+    Owned by the thread that runs the cycle. A velocity needs two commands, an acceleration three, so those at the start
+    are judged with the second and the third command, and those at the end with the one that says it is the last.
+
+    Args:
+        limits: Bounds of the arm.
+        rows: The rows on velocity and acceleration at the start and the end.
+    """
+
+    def __init__(self, limits: Limits, rows: Sequence[Condition]) -> None:
+        self._limits = limits
+        self._rows = [(row, *row.bounds(limits)) for row in rows]
+        self.reset(False)
+
+    def reset(self, is_moving: bool) -> None:
+        """Forgets the past.
+
+        Args:
+            is_moving: Whether the arm comes along: then it has already had its first command.
+        """
+        self._passed = 0 if is_moving else -1
+
+    def step(self, differences: Callable[[Condition], Sequence[float]], cycles: int, *, is_last: bool) -> list[Breach]:
+        """Takes the differences of this cycle and returns what they break at an end of the motion.
+
+        Args:
+            differences: Gives the velocities or accelerations that a row judges, one a joint, or a norm of the tool's.
+            cycles: Cycles since the last command, 1 or more.
+            is_last: Whether this command ends the motion.
+        """
+        before = self._passed
+        self._passed = before + cycles if before >= 0 else 0
+        found: list[Breach] = []
+        for row, lower, upper in self._rows:
+            if not (is_last if row.stage == "end" else before < row.order <= self._passed):
+                continue
+            values = beyond_a_cycle(np.array(differences(row)), row, self._limits, cycles)
+            for axis, (value, low, high) in enumerate(
+                zip(values.tolist(), lower.tolist(), upper.tolist(), strict=True), 1
+            ):
+                if not low < value < high:
+                    found.append(Breach(row, axis if row.is_per_joint else 0, value, low if value <= low else high))
+        return found

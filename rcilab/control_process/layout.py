@@ -1,0 +1,208 @@
+"""The block of memory that supervisor and control process share.
+
+    header      magic, version and sizes: two builds of rcilab must not misread each other
+    words       counters and heartbeats, 8 bytes each, each written by one side only
+    settings    what the control process needs to know at its start, as JSON; written once
+    snapshot    phase, message and motion, guarded by a sequence number
+    histogram   lateness of cycles
+    requests    mailbox to the control process
+    replies     mailbox back
+    jog         how somebody moves the arm by hand, guarded by a sequence number
+    felt        the controller's newest estimate of the force and moment from outside, and the tool that it has
+    cycles      ring of every cycle
+    motion      rows of the motion to stream
+
+The block is an unnamed file in memory, handed to the control process as an open descriptor: when both are gone, killed
+or not, nothing is left of it. Words are aligned and stored with one instruction; data is written before the counter
+that announces it. (That order is what x86 guarantees; on other processors the interpreter's own locks between two
+statements have the same effect in practice.)
+"""
+
+from __future__ import annotations
+
+import json
+import mmap
+import os
+import struct
+import tempfile
+from enum import IntEnum
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rcilab.control_process.jitter_histogram import SIZE as HISTOGRAM_WORDS
+from rcilab.core.arrays import Array
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.cycle_log import cycle_dtype
+from rcilab.core.errors import UsageError, VersionMismatchError
+
+MAGIC = b"RCILABCP"
+VERSION = 7  # Count up with every change of this file, of the snapshot or of `cycle_dtype`.
+
+RING_CYCLES = 32768  # 33 s of cycles: how long a reader may sleep.
+MOTION_TIME = 300.0  # [s] Longest motion that can be handed over.
+MOTION_ROWS = round(MOTION_TIME / CYCLE_TIME) + 1
+OPERATOR_TIMEOUT = 2.0  # [s] Nobody at the controls for that long ends a motion (workbench: operator lease).
+MAIL_SLOTS = 16
+MAIL_SIZE = 4096  # [bytes] of one letter.
+
+_HEADER = struct.Struct("<8sIIIIQ")  # magic, version, n, size of a cycle, ring capacity, total size
+_PAGE = 4096
+_SETTINGS_SIZE = 4 * _PAGE
+_SNAPSHOT_SIZE = _PAGE
+_MEMORY = Path("/dev/shm")  # Linux: files there live in memory. Elsewhere, or when it is full: the temp directory.
+
+
+class Word(IntEnum):
+    """Place of each counter among the words, and who writes it."""
+
+    SUPERVISOR_BEAT = 0
+    """Supervisor: monotonic time of its last sign of life, [ns]."""
+    OPERATOR_BEAT = 1
+    """Supervisor: when somebody was last at the controls, [ns]; 0 as long as nobody is expected."""
+    STOPS_ASKED = 2
+    """Supervisor: how often a stop was asked for."""
+    REQUESTS_POSTED = 3
+    """Supervisor."""
+    REPLIES_TAKEN = 4
+    """Supervisor."""
+    WORKER_BEAT = 5
+    """Control process: monotonic time of its last sign of life, [ns]."""
+    REQUESTS_TAKEN = 6
+    """Control process."""
+    REPLIES_POSTED = 7
+    """Control process."""
+    CYCLES = 8
+    """Control process: rows written to the ring since the beginning."""
+    SNAPSHOT = 9
+    """Control process: odd while the snapshot is being written."""
+    LOST = 10
+    """Control process: controller cycles of which no state came, since the connection was made."""
+    JOG = 11
+    """Supervisor: odd while the jog is being written."""
+    JOG_BEAT = 12
+    """Supervisor: when a jog was last held, [ns]; 0 when it was let go."""
+
+
+class ControlBlock:
+    """The mapped block. Both sides hold one.
+
+    Args:
+        descriptor: An open file of the block; owned by this object from now on.
+    """
+
+    def __init__(self, descriptor: int) -> None:
+        self.descriptor = descriptor
+        try:
+            size = os.fstat(descriptor).st_size
+            if size < _HEADER.size:
+                raise VersionMismatchError("shared memory of the control process", f"of {size} bytes", VERSION)
+            self._map = mmap.mmap(descriptor, size)
+        except BaseException:
+            os.close(descriptor)
+            raise
+        self._memory = memoryview(self._map)
+        try:
+            self.n = self._check_header(size)
+            self._place_regions()
+        except BaseException:
+            self.close()
+            raise
+
+    @classmethod
+    def create(cls, n: int, settings: dict[str, Any]) -> ControlBlock:
+        """Returns a new block for an arm with n joints.
+
+        Args:
+            n: Number of joints.
+            settings: What the control process needs to know at its start; goes through JSON.
+        """
+        text = json.dumps(settings).encode()
+        if len(text) > _SETTINGS_SIZE - 4:
+            raise UsageError(f"settings of the control process take {len(text)} bytes, {_SETTINGS_SIZE - 4} fit")
+        size = _total_size(n)
+        descriptor = _open_memory(size)
+        os.pwrite(descriptor, _HEADER.pack(MAGIC, VERSION, n, cycle_dtype(n).itemsize, RING_CYCLES, size), 0)
+        os.pwrite(descriptor, struct.pack("<I", len(text)) + text, 2 * _PAGE)
+        return cls(descriptor)
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """What the block was created with."""
+        (length,) = struct.unpack_from("<I", self._memory, 2 * _PAGE)
+        return json.loads(bytes(self._memory[2 * _PAGE + 4 : 2 * _PAGE + 4 + length]))
+
+    def close(self) -> None:
+        """Lets go of the memory, as far as nobody looks at it any more, and of the descriptor. May be called twice."""
+        if self.descriptor >= 0:
+            os.close(self.descriptor)
+            self.descriptor = -1
+
+    def _check_header(self, size: int) -> int:
+        magic, version, n, cycle_size, ring, total = _HEADER.unpack_from(self._memory, 0)
+        if magic != MAGIC or version != VERSION:
+            found = version if magic == MAGIC else f"unknown (magic {magic!r})"
+            raise VersionMismatchError("shared memory of the control process", found, VERSION)
+        layout = (n, cycle_size, ring, total)
+        expected = (n, cycle_dtype(n).itemsize, RING_CYCLES, _total_size(n))
+        if layout != expected or size != total:
+            raise VersionMismatchError(
+                "layout of the shared memory (joints, bytes a cycle, cycles, bytes)", (*layout[:3], size), expected
+            )
+        return n
+
+    def _place_regions(self) -> None:
+        place = _PAGE
+        regions: list[memoryview] = []
+        for size in _region_sizes(self.n):
+            regions.append(self._memory[place : place + size])
+            place += size
+        words, _, self.snapshot, histogram, self.requests, self.replies, self.jog, felt, self.cycles, motion = regions
+        self.words = words.cast("Q")
+        self.felt = felt[: 8 * 6].cast("d")
+        self.tool = felt[8 * 6 : 8 * (6 + 16)].cast("d")
+        self.histogram = histogram[: 8 * HISTOGRAM_WORDS].cast("Q")
+        self.motion: Array = np.frombuffer(motion, "<f8", MOTION_ROWS * self.n).reshape(MOTION_ROWS, self.n)
+
+
+def _region_sizes(n: int) -> tuple[int, ...]:
+    """Returns the sizes of all regions but the header, in the order of the list above, [bytes]."""
+    mail = MAIL_SLOTS * MAIL_SIZE
+    return (
+        _PAGE,
+        _SETTINGS_SIZE,
+        _SNAPSHOT_SIZE,
+        _whole_pages(8 * HISTOGRAM_WORDS),
+        mail,
+        mail,
+        _PAGE,
+        _PAGE,
+        _whole_pages(RING_CYCLES * cycle_dtype(n).itemsize),
+        _whole_pages(MOTION_ROWS * n * 8),
+    )
+
+
+def _total_size(n: int) -> int:
+    return _PAGE + sum(_region_sizes(n))
+
+
+def _whole_pages(size: int) -> int:
+    return -(-size // _PAGE) * _PAGE
+
+
+def _open_memory(size: int) -> int:
+    """Returns the descriptor of a file without a name, all of whose bytes exist: no write can fail later."""
+    for directory in (_MEMORY, Path(tempfile.gettempdir())):
+        if not directory.is_dir():
+            continue
+        try:
+            with tempfile.TemporaryFile(dir=directory) as file:
+                os.posix_fallocate(file.fileno(), 0, size)
+                return os.dup(file.fileno())
+        except OSError:  # Full, or not ours to write in: containers often grant /dev/shm only 64 MB.
+            continue
+    raise UsageError(
+        f"the control process needs {size / 1e6:.0f} MB of memory to share, and neither {_MEMORY} nor "
+        f"{tempfile.gettempdir()} has room; free some"
+    ).coded("no_memory", size=f"{size / 1e6:.0f}")

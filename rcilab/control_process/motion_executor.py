@@ -1,0 +1,180 @@
+"""What the control process does while the arm moves by its commands: rows that were planned, or a jog that is held."""
+
+from __future__ import annotations
+
+import gc
+
+from rcilab.control_process.jogging import HeldJog
+from rcilab.control_process.layout import OPERATOR_TIMEOUT, ControlBlock
+from rcilab.control_process.request_channel import Letter, Letters
+from rcilab.control_process.status_writer import Publisher
+from rcilab.control_process.stop_conditions import Oversight
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.errors import ControlError, UsageError
+from rcilab.core.limits import Limits
+from rcilab.core.state import ControllerMode, Mode
+from rcilab.execution.control_loop import Callback, ControlLoop
+from rcilab.execution.filters import RateLimiter
+from rcilab.execution.recorder import CycleLog
+from rcilab.execution.start_pose_check import describe_start_mismatch
+from rcilab.execution.streaming import MotionStream
+from rcilab.makers.rokae.driver.commands import RciCommands
+from rcilab.makers.rokae.driver.connection import Link
+from rcilab.model.robot_model import RobotModel
+from rcilab.realtime.cpu_latency import awake_cores
+
+LONGEST_PAUSE = 120_000  # Cycles that a motion is held for before it is given up; a choice: every cycle is recorded.
+
+
+class StoppedError(ControlError):
+    """A motion was brought to rest before its end, because somebody wanted it so."""
+
+
+class Mover:
+    """One motion after the other. Owned by the control process's one thread.
+
+    Args:
+        block: The shared block, where rows and jogs are read from.
+        limits: Bounds that every command keeps.
+        publisher: Shows how a motion goes.
+        log: Takes every cycle.
+        letters: Requests that come while the arm moves.
+        oversight: Whether a motion is to end.
+    """
+
+    def __init__(
+        self,
+        block: ControlBlock,
+        limits: Limits,
+        publisher: Publisher,
+        log: CycleLog,
+        letters: Letters,
+        oversight: Oversight,
+    ) -> None:
+        self._block, self._limits = block, limits
+        self._publisher, self._log = publisher, log
+        self._letters, self._oversight = letters, oversight
+        self._jog: HeldJog | None = None
+        self._stream: MotionStream | None = None
+        self._mode: Mode = "joint_position"
+        self._softly: str | None = None  # Why a motion in torques is being brought to rest.
+
+    def execute(self, link: Link, commands: RciCommands, model: RobotModel, request: Letter) -> None:
+        """Streams the rows that lie in the block; returns once the arm stands at their end.
+
+        Raises:
+            UsageError: The arm is not where they begin.
+            StoppedError: Somebody wanted it to end before.
+            ControlError: The controller stopped the arm.
+        """
+        rows = self._block.motion[: request["rows"]]
+        mode: Mode = request["mode"]
+        if link.latest is not None:
+            mismatch = describe_start_mismatch(rows[0], link.latest.q_c)
+            if mismatch is not None:
+                raise UsageError(mismatch).coded("elsewhere")
+            model.rigid_body.motion_torque(link.latest.q, link.latest.dq, link.latest.dq)  # Builds it now.
+        self._publisher.begin_motion(request["duration"])
+        self._publisher.say("moving", "moving")
+        self._stream, self._softly = MotionStream(rows, mode, model, self._publisher.on_cycle), None
+        try:
+            self._move(link, commands, model, self._stream, "idle.arrived", mode)
+        finally:
+            self._stream = None
+
+    def jog(self, link: Link, commands: RciCommands, model: RobotModel) -> None:
+        """Moves the arm as long as somebody holds it, and returns once it stands.
+
+        Raises:
+            StoppedError: Somebody wanted it to end before.
+            ControlError: The controller stopped the arm.
+        """
+        assert link.latest is not None  # A connection begins with a state.
+        self._jog = HeldJog(self._block, model, link.latest.q_c)
+        self._publisher.begin_motion(None)
+        self._publisher.say("moving", "moving.jog")
+        try:
+            self._move(link, commands, model, self._jog, "idle.jogged")
+        finally:
+            self._jog = None
+
+    def _move(
+        self,
+        link: Link,
+        commands: RciCommands,
+        model: RobotModel,
+        callback: Callback,
+        arrived: str,
+        mode: Mode = "joint_position",
+    ) -> None:
+        """Runs a motion; what it says at its end tells why it ended."""
+        self._mode = mode
+        loop = ControlLoop(
+            link,
+            commands,
+            self._limits,
+            ControllerMode[mode.upper()],
+            self._log,
+            watch=self._watch,
+            model=model,
+            filters=[RateLimiter(self._limits)] if mode == "torque" else [],
+        )
+        try:
+            with awake_cores():
+                reason = loop.run(callback) or self._softly
+        finally:
+            self._publisher.end_motion()  # Before it is said to be over: whoever looks then sees where it ended.
+            gc.collect()
+        say = self._publisher.say
+        if reason is None:
+            say("idle", arrived)
+        elif reason == "idle.operator":
+            say("idle", reason, seconds=OPERATOR_TIMEOUT)
+        elif reason == "idle.held":
+            say("idle", reason, seconds=LONGEST_PAUSE * CYCLE_TIME)
+        else:
+            say("idle", "idle.stopped")
+        if reason is not None:
+            raise StoppedError(self._publisher.snapshot.message)
+
+    def _watch(self, t: float) -> str | None:
+        """Looked at in every cycle of a motion: does anybody or anything want it to end?"""
+        reason = self._oversight.reason_to_stop()
+        if reason is None and self._letters.has_new:
+            reason = self._answer()
+        elif reason is None and self._stream is not None and self._stream.held > LONGEST_PAUSE:
+            reason = "idle.held"
+        if reason is not None and self._softly is None:
+            self._publisher.say("stopping", "stopping.operator" if reason == "idle.operator" else "stopping")
+            if self._stream is not None and self._mode == "torque":
+                self._softly = reason
+                self._stream.stop()
+                self._log.braking = True
+        return None if self._softly else reason
+
+    def _answer(self) -> str | None:
+        """Looks at a request that has come while the arm moves; returns why the motion is to end for it, or None."""
+        request = self._letters.take_new()
+        if request is None:
+            return None
+        if request["kind"] in ("stop", "end"):
+            self._letters.put_off(request)
+            return "idle.stopped"
+        if request["kind"] == "pace" and self._stream is not None and self._softly is None:
+            self._change_pace(request, self._stream)
+        elif self._jog is not None:  # It comes to rest at once, and then has no reason to go on.
+            self._letters.put_off(request)
+            self._jog.is_wanted = False
+        else:
+            self._letters.answer(request, UsageError("the arm is moving; stop it first, or wait until it has arrived"))
+        return None
+
+    def _change_pace(self, request: Letter, stream: MotionStream) -> None:
+        """Goes on with rows that lie ready in the block."""
+        rows = self._block.motion[request["place"] : request["place"] + request["rows"]]
+        if stream.switch(request["first"], rows, holds=request["holds"]):
+            self._publisher.update(motion_duration=request["duration"])
+            self._publisher.say("moving", "moving.held" if request["holds"] else "moving")
+            self._letters.answer(request)
+        else:
+            self._letters.answer(request, UsageError("the change of pace came too late; ask again"))

@@ -1,0 +1,80 @@
+"""Whether a motion may begin: every reason to refuse one before the control process hears of it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rcilab.control_process.layout import MOTION_ROWS, MOTION_TIME, OPERATOR_TIMEOUT
+from rcilab.control_process.status import SupervisorStatus
+from rcilab.core.arrays import JointVector
+from rcilab.core.errors import CertificateError, UsageError
+from rcilab.core.state import Mode, require_mode
+from rcilab.execution.start_pose_check import describe_start_mismatch, require_motion
+
+if TYPE_CHECKING:
+    from rcilab.conformance import Certificate
+    from rcilab.core.safety_box import SafetyBox
+    from rcilab.model.robot_model import RobotModel
+    from rcilab.motion import Motion
+
+
+def require_admissible(
+    motion: Motion,
+    certificate: Certificate | None,
+    model: RobotModel,
+    status: SupervisorStatus,
+    *,
+    is_operator_overdue: bool,
+    box: SafetyBox | None = None,
+    mode: Mode = "joint_position",
+) -> None:
+    """Returns if the motion may begin now.
+
+    Args:
+        motion: The motion.
+        certificate: What `check` gave for it.
+        model: The arm.
+        status: Where the arm is and what it does.
+        is_operator_overdue: Whether somebody ought to be at the controls and is not.
+        box: The safety box that the controller was told.
+        mode: How the arm is to be commanded.
+
+    Raises:
+        InvalidValueError: It is no motion, or the certificate is something else, such as a report.
+        CertificateError: The certificate is missing, or does not fit the motion, the model, or where the arm is.
+        UsageError: The arm is moving, no controller is connected, nobody is at the controls, or the motion is too long.
+    """
+    require_motion(motion, certificate)
+    require_mode(mode)
+    q_c = require_ready(status, is_operator_overdue=is_operator_overdue)
+    if certificate is None:
+        raise CertificateError("the motion has not been checked: check(motion, model) first", ["certificate"])
+    mismatch = describe_start_mismatch(motion.q[0], q_c)
+    if mismatch is not None:
+        raise CertificateError(mismatch, ["start state"])
+    certificate.verify(motion, model, q_c, box, mode=mode)
+    if len(motion.q) > MOTION_ROWS:
+        raise UsageError(
+            f"the motion takes {motion.duration:.1f} s, {MOTION_TIME:g} s at most can be handed over; split it"
+        ).coded("long_motion", duration=f"{motion.duration:.1f}", most=f"{MOTION_TIME:g}")
+
+
+def require_ready(status: SupervisorStatus, *, is_operator_overdue: bool) -> JointVector:
+    """Returns the commanded joint angles, shape (n,), [rad], if the arm may be moved now.
+
+    Args:
+        status: Where the arm is and what it does.
+        is_operator_overdue: Whether somebody ought to be at the controls and is not.
+
+    Raises:
+        UsageError: The arm is moving, no controller is connected, or nobody is at the controls.
+    """
+    if status.phase in ("moving", "stopping"):
+        raise UsageError("the arm is moving; stop it first, or wait until it has arrived").coded("moving")
+    if status.q_c is None or status.phase not in ("idle", "fault"):
+        raise UsageError(f"nothing can move now: {status.message}").coded("not_ready")
+    if is_operator_overdue:
+        raise UsageError(
+            f"nobody is at the controls: the page that holds them has not been heard of for {OPERATOR_TIMEOUT:g} s"
+        ).coded("nobody", seconds=f"{OPERATOR_TIMEOUT:g}")
+    return status.q_c

@@ -1,0 +1,206 @@
+"""The keeper of our processes, control process and virtual controller: launch, deaths, restarts, end."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+from rcilab.control_process.launch import START_TIMEOUT, Child, VirtualController, parent_pid
+from rcilab.control_process.layout import ControlBlock, Word
+from rcilab.control_process.snapshot import read_snapshot
+from rcilab.control_process.status import MESSAGES
+from rcilab.core.errors import ConnectionLostError
+
+ANSWER_TIMEOUT = 3.0  # [s] for the connection and for every answer of the controller.
+LOAD_TIMEOUT = START_TIMEOUT  # [s] for the control process to load; as long as the virtual controller may take.
+FROZEN_AFTER = 1.0  # [s] without a sign of life of the control process; a choice above every wait of its own.
+END_TIMEOUT = 3.0  # [s] for the control process to bring the arm to rest and go; the longest stop takes 0.4 s.
+MODE_DELAY = 0.2  # [s] Of our own controller: our client wants none of it.
+PREFILL = 40  # [cycles] Play-out of our own controller: beside a browser pauses of tens of ms are common. A choice.
+_RESTARTS, _RESTART_WINDOW = 3, 60.0  # Restarts by itself, in so many seconds.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Death:
+    """A process of ours ended, or froze and was ended, without anybody having wanted that."""
+
+    code: str
+    """Key of `MESSAGES`."""
+    message: str
+    """One English sentence: what died, how, and what happens next."""
+    is_worker: bool
+    """Whether it was the control process: every request under way is lost with it."""
+
+
+class ProcessKeeper:
+    """Owns the control process and, where the controller is ours, the virtual controller.
+
+    It has no thread and no lock: `look()` is called often, and every call is guarded by the lock of whoever owns it.
+    Nothing here waits, except `end()`.
+
+    Args:
+        block: What the control process is handed.
+        model_name: Name of the arm, for the virtual controller.
+        plant: What the virtual controller moves: "ideal" or "mujoco".
+        address: Where a controller is that is not ours; None to start a virtual one.
+        auto_restart: Whether what died is started again by itself (at most 3 times a minute).
+    """
+
+    def __init__(
+        self, block: ControlBlock, model_name: str, plant: str, address: str | None, *, auto_restart: bool
+    ) -> None:
+        self._block = block
+        self._model_name = model_name
+        self._plant = plant
+        self._foreign_address = address
+        self._auto_restart = auto_restart
+        self._worker: Child | None = None
+        self._worker_started = 0.0
+        self._controller: VirtualController | None = None
+        self._restarts: deque[float] = deque(maxlen=_RESTARTS)
+        self.address: str | None = None
+        """Where the controller listens; None as long as the virtual one does not."""
+
+    @property
+    def worker_pid(self) -> int | None:
+        """Process id of the control process; None when it does not run."""
+        return self._worker.pid if self._worker is not None and self._worker.is_alive else None
+
+    @property
+    def controller_pid(self) -> int | None:
+        """Process id of the virtual controller; None when there is none of ours or it does not run."""
+        return self._controller.pid if self._controller is not None and self._controller.is_alive else None
+
+    @property
+    def world_address(self) -> str | None:
+        """Where the world port of our virtual controller is, as HOST:PORT; None when there is none."""
+        return self._controller.world_address if self._controller is not None and self.address is not None else None
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether the control process listens and there is a controller to send it to."""
+        return self.address is not None and self._block.words[Word.WORKER_BEAT] != 0 and self.worker_pid is not None
+
+    def launch(self) -> None:
+        """Starts what belongs to us and returns at once; earlier restarts are forgiven.
+
+        Raises:
+            ConnectionLostError: A process could not be started.
+        """
+        self._restarts.clear()
+        self.address = self._foreign_address
+        if self._foreign_address is None:
+            self._start_controller()
+        self._start_worker()
+
+    def look(self) -> list[Death]:
+        """Buries what has died or frozen since the last look and starts it again where that is wanted."""
+        return [death for death in (self._look_after_controller(), self._look_after_worker()) if death is not None]
+
+    def end(self) -> None:
+        """Ends both processes; the control process has `END_TIMEOUT` to go by itself if it was asked to."""
+        worker, self._worker = self._worker, None
+        if worker is not None:
+            worker.wait(END_TIMEOUT)
+            worker.end()
+        self._end_controller()
+        self.address = None
+
+    def _start_controller(self) -> None:
+        self._controller = VirtualController(
+            self._model_name, self._plant, options=["--prefill", str(PREFILL), "--mode-delay", str(MODE_DELAY)]
+        )
+
+    def _start_worker(self) -> None:
+        words = self._block.words
+        # Whatever lay in the mailboxes was for a process that is no more.
+        for word in (Word.REQUESTS_POSTED, Word.REQUESTS_TAKEN, Word.REPLIES_POSTED, Word.REPLIES_TAKEN):
+            words[word] = 0
+        words[Word.WORKER_BEAT] = 0
+        self._worker_started = time.monotonic()
+        words[Word.SUPERVISOR_BEAT] = time.monotonic_ns()
+        self._worker = Child(
+            "rcilab.control_process.worker",
+            ["--block", str(self._block.descriptor), "--parent", str(parent_pid())],
+            "the control process",
+            [self._block.descriptor],
+        )
+
+    def _look_after_controller(self) -> Death | None:
+        controller = self._controller
+        if controller is None:
+            return None
+        was_ready = self.address is not None
+        try:
+            self.address = controller.address
+        except ConnectionLostError as error:  # It has never been ready: another attempt would end the same way.
+            self._end_controller()
+            return Death(code="crashed.controller", message=str(error), is_worker=False)
+        if controller.is_alive:
+            return None
+        how = controller.how_it_ended
+        self._end_controller()
+        return self._succeed("crashed.controller", self._start_controller if was_ready else None, how=how)
+
+    def _look_after_worker(self) -> Death | None:
+        worker = self._worker
+        if worker is None:
+            return None
+        if worker.is_alive:
+            silence = self._silence_of_worker()
+            if silence < FROZEN_AFTER:
+                return None
+            worker.kill()
+            code, facts = "crashed.frozen", {"seconds": silence}
+        else:
+            words = worker.last_words
+            how = f"{worker.how_it_ended}; {words.splitlines()[-1]}" if words else worker.how_it_ended
+            code, facts = "crashed.worker", {"how": how}
+        worker.end()
+        self._worker = None
+        return self._succeed(code, self._start_worker, **facts)
+
+    def _silence_of_worker(self) -> float:
+        """Returns how long the control process has given no sign of life, [s]; 0 while that is to be expected."""
+        beat = self._block.words[Word.WORKER_BEAT]
+        if beat == 0:  # It is still loading.
+            loading = time.monotonic() - self._worker_started
+            return loading if loading > LOAD_TIMEOUT else 0.0
+        silence = (time.monotonic_ns() - beat) * 1e-9
+        # While it waits for a TCP connection it cannot do anything else.
+        is_connecting = read_snapshot(self._block.snapshot, self._block.words).phase == "connecting"
+        return 0.0 if is_connecting and silence < 3.0 * ANSWER_TIMEOUT else silence
+
+    def _succeed(self, code: str, start: Callable[[], None] | None, **facts: Any) -> Death:
+        """Starts a successor of what died, if that is wanted, and returns the death in words.
+
+        Args:
+            code: Key of `MESSAGES`.
+            start: Starts the successor; None when there shall be none.
+            **facts: What the message tells.
+        """
+        now = time.monotonic()
+        is_often = len(self._restarts) == _RESTARTS and now - self._restarts[0] < _RESTART_WINDOW
+        again = self._auto_restart and not is_often and start is not None
+        following = "it is being started again" if again else "restart starts it again"
+        if is_often:
+            following = f"that was {_RESTARTS} times in a minute; restart"
+        death = Death(
+            code=code, message=MESSAGES[code].format(**facts, next=following), is_worker=code != "crashed.controller"
+        )
+        if again and start is not None:
+            self._restarts.append(now)
+            try:
+                start()
+            except ConnectionLostError as error:
+                return replace(death, message=str(error))
+        return death
+
+    def _end_controller(self) -> None:
+        controller, self._controller = self._controller, None
+        self.address = self._foreign_address
+        if controller is not None:
+            controller.end()

@@ -1,0 +1,79 @@
+"""`simulate`: the same session as `connect`, with a private virtual controller at the other end."""
+
+from __future__ import annotations
+
+import weakref
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rcilab.control_process.launch import require_plant, start_controller
+from rcilab.core.spatial import IDENTITY
+from rcilab.execution.session import RobotSession, open_session
+from rcilab.execution.simulation_control import World
+
+if TYPE_CHECKING:
+    from rcilab.model.robot_model import RobotModel
+
+ANSWER_TIMEOUT = 10.0  # [s] The other end is on this machine: if it is slow, the machine is busy.
+SILENCE_IN_LOCKSTEP = 5.0  # [s] A busy machine may pause a controller that has no deadlines to keep for long.
+
+
+def simulate(
+    model: RobotModel, *, plant: str = "ideal", lockstep: bool = True, record_all: bool = False
+) -> RobotSession:
+    """Returns a session with a simulated arm; closing the session, or dropping it, ends the simulation.
+
+    Args:
+        model: The arm, with its tool, load and soft limits; the virtual controller is told of all three.
+        plant: "ideal" (the arm is where it is told to be) or "mujoco".
+        lockstep: True: each simulated millisecond waits for its command, so that a run comes out the same to the last
+            bit on any machine. False: the controller runs free at 1 kHz, as a real one does.
+        record_all: Whether runs hold everything that the state has, three times as much; see `Run.cycles`.
+
+    Raises:
+        InvalidValueError: The model is none, or the plant is unknown.
+        ModelError: The arm does not speak the RCI.
+        ConnectionLostError: The virtual controller did not start; the message carries what it said.
+    """
+    from rcilab.model.robot_model import load_model, require_model, require_rci
+
+    require_rci(require_model(model))
+    require_plant(plant)
+    controller = start_controller(model.name, plant, lockstep)
+    try:
+        assert controller.address is not None  # start_controller waits for it.
+        session = open_session(
+            controller.address,
+            model.with_tool(IDENTITY),  # As the controller wakes up; it is told of the tool below.
+            ANSWER_TIMEOUT,
+            record_all=record_all,
+            realtime=not lockstep,
+            silence=SILENCE_IN_LOCKSTEP if lockstep else None,
+            on_close=controller.end,
+            world=_world(controller.world_address),
+            partner=controller.pid if lockstep else None,
+        )
+    except BaseException:
+        controller.end()
+        raise
+    try:
+        if not model.T_flange_tool.is_close(IDENTITY, 0.0):
+            session.set_coor(model.T_flange_tool)
+        own, joint = load_model(model.name).limits.joint, model.limits.joint
+        if not (np.array_equal(joint.lower, own.lower) and np.array_equal(joint.upper, own.upper)):
+            session.set_joint_limit(joint.lower, joint.upper)
+        if model.load.mass > 0.0:
+            session.set_load(model.load.mass, model.load.center_of_mass, model.load.inertia)
+    except BaseException:
+        session.close()
+        raise
+    weakref.finalize(session, controller.end)  # A cell that runs again drops the session of its last run.
+    return session
+
+
+def _world(address: str | None) -> World | None:
+    if address is None:
+        return None
+    host, _, port = address.partition(":")
+    return World(host, int(port))

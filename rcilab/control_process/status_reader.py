@@ -1,0 +1,100 @@
+"""Reading the part of the status that is in the shared block: arm, motion and timing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from rcilab.control_process.jitter_histogram import late_cycles, summarise
+from rcilab.control_process.layout import ControlBlock, Word
+from rcilab.control_process.ring import RingReader
+from rcilab.control_process.snapshot import Snapshot, read_snapshot
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.errors import InvalidValueError
+from rcilab.core.faults import faults_from_bits
+from rcilab.core.spatial import Pose
+from rcilab.core.state import ControllerMode, RobotMode
+from rcilab.makers.rokae.driver.commands import SIGNALS
+
+
+class StatusReader:
+    """Looks at what the control process shows of itself; changes nothing.
+
+    Args:
+        block: The shared block.
+    """
+
+    def __init__(self, block: ControlBlock) -> None:
+        self._block = block
+        self._ring = RingReader(block)
+        self._tool: tuple[bytes, Pose | None] = b"", None
+
+    def read_snapshot(self) -> Snapshot:
+        """Returns what the control process last said about itself."""
+        return read_snapshot(self._block.snapshot, self._block.words)
+
+    def read_fields(self, shown: Snapshot) -> dict[str, Any]:
+        """Returns the fields of `SupervisorStatus` that the block knows; those of the arm only once states came.
+
+        Args:
+            shown: The snapshot to take motion and scheduling from.
+        """
+        return {
+            "powered": shown.powered,
+            "inputs": None if shown.inputs < 0 else tuple(bool(shown.inputs >> bit & 1) for bit in SIGNALS),
+            "outputs": tuple(
+                bool(shown.outputs >> bit & 1) if shown.outputs_known >> bit & 1 else None for bit in SIGNALS
+            ),
+            "rate_hz": shown.rate_hz,
+            "scheduling": "SCHED_FIFO" if shown.is_fifo else "normal",
+            "memory_locked": shown.memory_locked,
+            "late_cycles": late_cycles(self._block.histogram),
+            "lost_cycles": self._block.words[Word.LOST],
+            "lateness": summarise(self._block.histogram),
+            "motion_time": shown.motion_time,
+            "motion_duration": shown.motion_duration,
+            **self._read_arm(),
+        }
+
+    def read_cycle(self) -> int:
+        """Returns the newest cycle of the motion under way; 0 as long as it has not begun."""
+        row = self._ring.newest()
+        t = 0.0 if row is None else float(row["t"][0])
+        return round(t / CYCLE_TIME) if t == t else 0  # NaN outside of a motion.
+
+    def _read_arm(self) -> dict[str, Any]:
+        row = self._ring.newest()
+        if row is None:
+            return {}
+        last = row[0]
+        bits = int(last["faults"])
+        return {
+            "q": last["q"],
+            "q_c": last["q_c"],
+            "dq": last["dq"],
+            "robot_mode": RobotMode(last["robot_mode"]),
+            "controller_mode": ControllerMode(last["controller_mode"]),
+            "faults": faults_from_bits(bits >> place & 1 for place in range(32)) if bits else (),
+            "tau_ext": np.array(self._block.felt),
+            "T_flange_tool": self._read_tool(),
+            "success_rate": float(last["success_rate"]),
+            "message_id": int(last["message_id"]),
+        }
+
+    def _read_tool(self) -> Pose | None:
+        """Returns the tool; the same pose for as long as the same numbers stand there."""
+        raw = self._block.tool.tobytes()
+        if raw != self._tool[0]:
+            self._tool = raw, _pose(self._block.tool.tolist())
+        return self._tool[1]
+
+
+def _pose(numbers: Sequence[float]) -> Pose | None:
+    if numbers[15] != 1.0:
+        return None
+    try:
+        return Pose.from_row_major(numbers)
+    except InvalidValueError:  # It is being written at this moment.
+        return None

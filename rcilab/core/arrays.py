@@ -1,0 +1,165 @@
+"""Arrays at the border: aliases by role, and the one check that makes a value fit to be trusted inside."""
+
+from __future__ import annotations
+
+import math
+from typing import TypeAlias, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rcilab.core.errors import InvalidValueError
+
+Array: TypeAlias = NDArray[np.float64]
+
+JointVector: TypeAlias = Array
+"""One number a joint, shape (n,)."""
+
+JointPath: TypeAlias = Array
+"""One row a sample, shape (N, n)."""
+
+Vector3: TypeAlias = Array
+"""Shape (3,)."""
+
+Matrix: TypeAlias = Array
+"""Two-dimensional."""
+
+
+def scalar(value: float) -> Array:
+    """Returns a number as a read-only array of shape (): a constant that numpy need not convert in every product."""
+    return frozen(value)
+
+
+def frozen(value: ArrayLike) -> Array:
+    """Returns a read-only float64 copy of `value`, or itself where it is such a copy already."""
+    if isinstance(value, np.ndarray):
+        array = cast("Array", value)
+        if array.base is None and array.dtype == np.float64 and not array.flags.writeable:
+            return array
+    return sealed(np.array(value, dtype=np.float64))
+
+
+def sealed(array: Array) -> Array:
+    """Makes an array read-only that nobody else writes to, and returns it: `frozen` needs no copy of it."""
+    # By its place, which the stubs do not know of: by its name it takes twice as long.
+    array.setflags(False)  # pyright: ignore[reportCallIssue]
+    return array
+
+
+class Words(str):
+    """Text that an error shows as it is, without quotes, where a value would stand."""
+
+    __slots__ = ()
+
+    __repr__ = str.__str__
+
+
+def described(value: object) -> object:
+    """Returns what an error should show of a value, in one line: of a table its shape, anything else as it is."""
+    if getattr(value, "ndim", 0) > 1:
+        return Words(f"an array of shape {getattr(value, 'shape', '')}")
+    return value.tolist() if isinstance(value, np.ndarray) else value
+
+
+def as_number(value: object, name: str, unit: str = "") -> float:
+    """Returns a number as a plain float; NaN and infinities are numbers too.
+
+    Args:
+        value: Anything that is one number; text is not.
+        name: What to call it in an error.
+        unit: Unit to name in an error, such as "rad".
+
+    Raises:
+        InvalidValueError: It is not a number.
+    """
+    if isinstance(value, float):
+        return float(value)
+    if not isinstance(value, str | bytes) and getattr(value, "ndim", 0) == 0:
+        try:
+            return float(value)  # type: ignore[arg-type]  # Whatever has no float is refused below.
+        except (TypeError, ValueError, OverflowError):
+            pass
+    raise InvalidValueError(name, described(value), f"is not a number{_in(unit)}").coded("no_number")
+
+
+def as_vector(value: ArrayLike, size: int, name: str, unit: str = "") -> Array:
+    """Returns a checked, read-only copy of a vector.
+
+    Args:
+        value: Anything array-like.
+        size: Number of elements it must have.
+        name: What to call it in an error.
+        unit: Unit to name in an error, such as "rad".
+
+    Raises:
+        InvalidValueError: It is not a vector of `size` finite numbers.
+    """
+    try:
+        array = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InvalidValueError(name, value, f"is not {size} numbers{_in(unit)}").coded(
+            "numbers", count=size
+        ) from error
+    if array.shape != (size,):
+        problem = f"has shape {array.shape}, needs ({size},){_in(unit)}"
+        raise InvalidValueError(name, value, problem).coded("numbers", count=size)
+    if not all(map(math.isfinite, array.tolist())):  # Faster than numpy for a few numbers, most of all the first time.
+        raise InvalidValueError(name, value, f"must be finite in every element{_in(unit)}").coded("not_finite")
+    array.flags.writeable = False
+    return array
+
+
+def as_path(value: ArrayLike, columns: int | None, name: str, unit: str = "") -> Array:
+    """Returns a checked, read-only copy of a table with one row a sample and one column a joint.
+
+    Args:
+        value: Anything array-like.
+        columns: Number of columns it must have; None takes any but zero.
+        name: What to call it in an error.
+        unit: Unit to name in an error, such as "rad".
+
+    Raises:
+        InvalidValueError: It is not a finite table of at least one row and exactly `columns` columns.
+    """
+    try:
+        array = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InvalidValueError(name, described(value), f"is not a table of numbers{_in(unit)}") from error
+    if array.ndim != 2 or 0 in array.shape or columns not in (None, array.shape[1]):
+        needed = f"needs shape (N, {'n' if columns is None else columns}){_in(unit)}"
+        shown = described(array) if array.ndim else value
+        raise InvalidValueError(name, shown, needed)
+    if not np.isfinite(array).all():
+        row, column = (int(i) for i in np.argwhere(~np.isfinite(array))[0])
+        where = f"{name} at row {row} (from 0), joint {column + 1}"
+        raise InvalidValueError(where, float(array[row, column]), f"must be finite{_in(unit)}").coded("not_finite")
+    array.flags.writeable = False
+    return array
+
+
+def as_rows(value: ArrayLike, columns: int, name: str, unit: str = "", like: Array | None = None) -> Array:
+    """Returns a checked, read-only copy of one vector, or of a table with one row a sample.
+
+    Args:
+        value: Anything array-like, shape (columns,) or (N, columns).
+        columns: Number of columns it must have.
+        name: What to call it in an error.
+        unit: Unit to name in an error, such as "rad".
+        like: What it must have the same number of rows as.
+
+    Raises:
+        InvalidValueError: It is neither, has another number of rows, or is not finite.
+    """
+    try:
+        is_table = np.ndim(value) > 1
+    except ValueError:  # Rows of different lengths; the error for a vector says what is wrong.
+        is_table = False
+    array = as_path(value, columns, name, unit) if is_table else as_vector(value, columns, name, unit)
+    if like is not None and array.shape[:-1] != like.shape[:-1]:
+        needed = f"needs one row for each of the {len(like)}" if like.ndim > 1 else "needs a single row"
+        raise InvalidValueError(name, Words(f"an array of shape {array.shape}"), needed + _in(unit))
+    return array
+
+
+def _in(unit: str) -> str:
+    return f" [{unit}]" if unit else ""

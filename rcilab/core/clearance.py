@@ -1,0 +1,53 @@
+"""How far the links shall stay from each other and from the floor: rcilab's own demand, no controller knows of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isfinite
+
+from rcilab.core.arrays import as_number
+from rcilab.core.errors import InvalidValueError
+
+ADVISED_DISTANCE = 0.02  # [m]
+"""What is left to what the capsules do not cover: a link's rim (at most 12 mm), cables, a brake's way. A choice."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SafetyDistance:
+    """How far the capsules around the links shall stay from each other and from the floor.
+
+    A motion that comes as near as `links` or `floor` is refused; one that comes as near as `advised` is advised
+    against. The floor is a horizontal plane under the whole arm; the base stands on it and is not judged against it.
+
+    Raises:
+        InvalidValueError: A number is not finite, or a distance or radius is below 0.
+    """
+
+    links: float = 0.0
+    """Between any two links that are not neighbours, [m]; at 0 they must not touch."""
+    floor: float = 0.0
+    """Between a link that moves up or down and the floor, [m]."""
+    advised: float = ADVISED_DISTANCE
+    """What is recommended for both, [m]."""
+    floor_height: float | None = 0.0
+    """Height of the floor in the base frame, [m]; None where there is none, as under a ceiling."""
+    tool_radius: float | None = None
+    """Radius of a capsule from the flange to the origin of the tool that counts as a link, [m]; None: the tool has no
+    body."""
+
+    def __post_init__(self) -> None:
+        """Checks the values."""
+        for name in ("links", "floor", "advised", "floor_height", "tool_radius"):
+            value = getattr(self, name)
+            if value is None and name in ("floor_height", "tool_radius"):
+                continue
+            number = as_number(value, name, "m")
+            if not isfinite(number):
+                raise InvalidValueError(name, number, "must be finite [m]")
+            if number < 0.0 and name != "floor_height":
+                raise InvalidValueError(name, number, "m must not be below 0")
+            object.__setattr__(self, name, number)
+
+
+STANDARD_DISTANCE = SafetyDistance()
+"""Links that do not touch each other nor a floor at height 0, with 20 mm recommended."""

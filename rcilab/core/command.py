@@ -1,0 +1,50 @@
+"""What a control callback answers with: one immutable command a cycle."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from rcilab.core.arrays import JointVector, Matrix
+from rcilab.core.spatial import Pose
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JointPosition:
+    """Commanded joint angles."""
+
+    q: JointVector
+    """Joint angles, shape (n,), [rad]."""
+    finished: bool = False
+    """True on the last command of a motion."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, init=False)
+class CartesianPosition:
+    """Commanded pose of the tool in the base frame; made from a `Pose` or a homogeneous transform."""
+
+    T_base_tool: Matrix
+    """Homogeneous transform, shape (4, 4), [m]."""
+    psi: float | None = None
+    """Arm angle, [rad]; None leaves it to the controller."""
+    finished: bool = False
+    """True on the last command of a motion."""
+
+    def __init__(self, T_base_tool: Pose | Matrix, psi: float | None = None, finished: bool = False) -> None:
+        T = T_base_tool.matrix if isinstance(T_base_tool, Pose) else T_base_tool
+        object.__setattr__(self, "T_base_tool", T)
+        object.__setattr__(self, "psi", psi)
+        object.__setattr__(self, "finished", finished)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JointTorque:
+    """Commanded joint torques, on top of the gravity and friction that the controller compensates."""
+
+    tau: JointVector
+    """Joint torques, shape (n,), [N m]."""
+    finished: bool = False
+    """True on the last command of a motion."""
+
+
+Command: TypeAlias = JointPosition | CartesianPosition | JointTorque

@@ -1,0 +1,252 @@
+"""Recorded cycles: what a row holds, and files of them: CSV for people and spreadsheets, NPZ for numpy."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from io import TextIOWrapper
+from os import PathLike, fspath
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rcilab.core.atomic_file import replacing
+from rcilab.core.errors import InvalidValueError
+
+STATE_FIELDS = ("tau_ext_in_base", "tau_ext_in_stiff", "T_base_tool", "theta")
+"""What else of a state a row holds, by the names that `RobotState` has for it, in the order of the row."""
+OTHER_STATE_FIELDS = (
+    "dq_c", "ddq_c", "T_base_tool_c", "tool_velocity_c", "tool_acceleration_c", "tau_filtered", "tau_c", "dtau_c",
+    "dtheta", "motor_tau", "motor_tau_filtered", "psi", "psi_c", "dpsi_c", "ddpsi_c",
+)  # fmt: skip
+"""What a complete row holds behind those: all that is left of the state, plain numbers at its end."""
+
+_POSES = ("command_pose", "T_base_tool", "T_base_tool_c")
+_SCALARS = ("psi", "psi_c", "dpsi_c", "ddpsi_c")
+_SCREWS = {
+    "tau_ext_in_base": ("N", "N m"),
+    "tau_ext_in_stiff": ("N", "N m"),
+    "tool_velocity_c": ("m/s", "rad/s"),
+    "tool_acceleration_c": ("m/s^2", "rad/s^2"),
+}
+"""Units of what has a linear and an angular half of three each."""
+
+
+def cycle_dtype(n: int, *, complete: bool = False) -> np.dtype[np.void]:
+    """Returns the layout of one recorded cycle of an arm with n joints.
+
+    ======================  ==================================================================================
+    message_id              number of the controller cycle
+    t                       time since the first command of the motion, in controller cycles, [s]; NaN outside
+    received_ns, sent_ns    monotonic stamps of the state's arrival and of the answer (0: not answered), [ns]
+    lateness                how late it was handled, by the robot's own 1 ms grid, [s]; NaN: nobody waited for it
+    success_rate            share of commands that arrived in time, as the controller reports it, 0 to 1
+    q, q_c, dq              measured and commanded joint angles [rad], measured velocities [rad/s], shape (n,)
+    command                 joint angles sent in answer, [rad], shape (n,); NaN when none were sent
+    faults                  the error bits as one number, bit k = `Fault(k)`
+    lost                    controller cycles between the previous row and this one that never reached us
+    robot_mode, controller_mode, motion_generator_mode    as on the wire
+    braking                 1: what was sent in answer brings the arm to rest, whatever was planned
+    tau                     measured joint torques, [N m], shape (n,)
+    command_pose            pose of the tool in base sent in answer, [m], shape (4, 4); NaN when none was sent
+    command_psi             arm angle sent with it, [rad]; NaN when none was sent
+    command_tau             joint torques sent in answer, [N m], shape (n,); NaN when none were sent
+    tau_ext_in_base         external force and moment in the base frame, shape (6,), [N, N m]
+    tau_ext_in_stiff        external force and moment in the force-control frame, shape (6,), [N, N m]
+    T_base_tool             measured pose of the tool in base, shape (4, 4), [m]
+    theta                   motor positions, motor side of the gear, [rad], shape (n,)
+    ======================  ==================================================================================
+
+    A complete one goes on with the rest of the state, by the names of `RobotState`: `OTHER_STATE_FIELDS`. What a file
+    of an earlier version does not have is NaN.
+
+    Args:
+        n: Number of joints.
+        complete: Whether a row holds everything that the state has.
+    """
+    vector = ("<f8", (n,))
+    return np.dtype(
+        [
+            ("message_id", "<u8"),
+            ("t", "<f8"),
+            ("received_ns", "<i8"),
+            ("sent_ns", "<i8"),
+            ("lateness", "<f8"),
+            ("success_rate", "<f8"),
+            ("q", *vector),
+            ("q_c", *vector),
+            ("dq", *vector),
+            ("command", *vector),
+            ("faults", "<u4"),
+            ("lost", "<u4"),
+            ("robot_mode", "u1"),
+            ("controller_mode", "u1"),
+            ("motion_generator_mode", "u1"),
+            ("braking", "u1"),
+            ("reserved", "u1", (4,)),
+            ("tau", *vector),
+            ("command_pose", "<f8", (4, 4)),
+            ("command_psi", "<f8"),
+            ("command_tau", *vector),
+            *((name, "<f8", _shape(name, n)) for name in STATE_FIELDS + (OTHER_STATE_FIELDS if complete else ())),
+        ]
+    )
+
+
+def _shape(name: str, n: int) -> tuple[int, ...]:
+    if name in _POSES:
+        return (4, 4)
+    if name in _SCALARS:
+        return ()
+    return (6,) if name in _SCREWS else (n,)
+
+
+UNITS = {
+    "t": "s",
+    "received_ns": "ns",
+    "sent_ns": "ns",
+    "lateness": "s",
+    "q": "rad",
+    "q_c": "rad",
+    "dq": "rad/s",
+    "command": "rad",
+    "tau": "N m",
+    "command_psi": "rad",
+    "command_tau": "N m",
+    "theta": "rad",
+    "dq_c": "rad/s",
+    "ddq_c": "rad/s^2",
+    "psi": "rad",
+    "psi_c": "rad",
+    "dpsi_c": "rad/s",
+    "ddpsi_c": "rad/s^2",
+    "tau_filtered": "N m",
+    "tau_c": "N m",
+    "dtau_c": "N m/s",
+    "dtheta": "rad/s",
+    "motor_tau": "N m",
+    "motor_tau_filtered": "N m",
+}
+"""Unit of each field that has one and only one; see `_unit` for the others."""
+
+_HIDDEN = ("reserved",)
+_CHUNK = 2000  # Rows of a CSV between two reports of progress.
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Column:
+    """One number a cycle."""
+
+    name: str
+    """Such as q[1], command_pose[1,4] or t."""
+    unit: str
+    """"" for a number without one."""
+    values: NDArray[Any]
+    """Shape (N,)."""
+
+    @property
+    def title(self) -> str:
+        """Name and unit, such as "q[1] [rad]"."""
+        return f"{self.name} [{self.unit}]" if self.unit else self.name
+
+
+def split_columns(name: str, unit: str | Callable[[tuple[int, ...]], str], values: NDArray[Any]) -> list[Column]:
+    """Returns the columns of an array with one entry a cycle: name[1], name[2], ... or name[1,1], ..., from 1.
+
+    Args:
+        name: Of the array.
+        unit: Of its numbers, or what tells that of each by its place in an entry, counted from 0.
+        values: The array, shape (N, ...).
+    """
+    columns: list[Column] = []
+    for place in np.ndindex(values.shape[1:]):
+        index = ",".join(str(i + 1) for i in place)
+        its = unit if isinstance(unit, str) else unit(place)
+        columns.append(Column(f"{name}[{index}]" if place else name, its, values[(slice(None), *place)]))
+    return columns
+
+
+def cycle_columns(cycles: NDArray[np.void]) -> list[Column]:
+    """Returns every number of recorded cycles, each as a column with its unit."""
+    columns: list[Column] = []
+    for name in _fields(cycles):
+        columns += split_columns(name, partial(_unit, name), cycles[name])
+    return columns
+
+
+def _unit(name: str, place: tuple[int, ...]) -> str:
+    """Returns the unit of one number of a field; the last column of a pose is the position."""
+    if name in _POSES:
+        return "m" if place[0] < 3 and place[1] == 3 else ""
+    if name in _SCREWS:
+        return _SCREWS[name][place[0] // 3]
+    return UNITS.get(name, "")
+
+
+def write_csv(columns: Sequence[Column], stream: IO[str], progress: Callable[[float], None] | None = None) -> None:
+    """Writes columns as CSV: a header line with names and units, then plain numbers; nan where there is nothing.
+
+    Args:
+        columns: All of the same length.
+        stream: Where to; opened with newline="".
+        progress: Told the share that is done, now and then.
+    """
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow([column.title for column in columns])
+    count = len(columns[0].values) if columns else 0
+    for start in range(0, count, _CHUNK):
+        rows: Iterable[tuple[object, ...]] = zip(
+            *(column.values[start : start + _CHUNK].tolist() for column in columns), strict=True
+        )
+        writer.writerows(rows)
+        if progress is not None:
+            progress(min(1.0, (start + _CHUNK) / count))
+
+
+def save_cycles(cycles: NDArray[np.void], file: str | PathLike[str]) -> None:
+    """Writes recorded cycles, one row each, in SI units; the ending of the name chooses the format.
+
+    .csv: a header line with units, then plain numbers; an array of a cycle becomes columns `q[1] [rad]`,
+    `q[2] [rad]`, ..., a matrix `command_pose[1,1]`, ...; nan where there was nothing. .npz: one array a field,
+    `numpy.load(file)["q"]` of shape (N, n).
+
+    Args:
+        cycles: The rows, a structured array of shape (N,).
+        file: Where to; an existing file is replaced.
+
+    Raises:
+        InvalidValueError: The ending is unknown, or the file cannot be written.
+    """
+    path = Path(fspath(file))
+    if path.suffix not in _WRITERS:
+        raise InvalidValueError("file", fspath(file), f"must end in {' or '.join(_WRITERS)}, which chooses the format")
+    try:
+        with replacing(path) as stream:
+            _WRITERS[path.suffix](cycles, stream)
+    except OSError as error:
+        raise InvalidValueError("file", fspath(file), f"cannot be written: {error.strerror}").coded(
+            "file_unwritable", file=fspath(file)
+        ) from error
+
+
+def write_npz(cycles: NDArray[np.void], stream: IO[bytes]) -> None:
+    """Writes recorded cycles as one array a field."""
+    arrays: dict[str, Any] = {name: np.ascontiguousarray(cycles[name]) for name in _fields(cycles)}
+    np.savez_compressed(stream, **arrays)
+
+
+def _write_csv(cycles: NDArray[np.void], stream: IO[bytes]) -> None:
+    lines = TextIOWrapper(stream, encoding="utf-8", newline="")
+    write_csv(cycle_columns(cycles), lines)
+    lines.detach()
+
+
+def _fields(cycles: NDArray[np.void]) -> list[str]:
+    return [name for name in cycles.dtype.names or () if name not in _HIDDEN]
+
+
+_WRITERS = {".csv": _write_csv, ".npz": write_npz}

@@ -1,0 +1,187 @@
+"""The twenty faults of the RCI, each with one name everywhere.
+
+A fault is a bit on the wire, a member here, a row in a report, a label in a plot and a lesson. Numbers, names,
+causes and remedies: RCI manual V1.3.1, section 4.6.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from enum import IntEnum
+
+from rcilab.core.errors import InvalidValueError
+
+
+class Fault(IntEnum):
+    """One error bit of the robot state; the value is the bit's place on the wire."""
+
+    ACTUAL_JOINT_POSITION_LIMITS_VIOLATION = 0
+    ACTUAL_CARTESIAN_POSITION_LIMITS_VIOLATION = 1
+    ACTUAL_CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION = 2
+    ACTUAL_JOINT_VELOCITY_LIMITS_VIOLATION = 3
+    ACTUAL_CARTESIAN_VELOCITY_LIMITS_VIOLATION = 4
+    ACTUAL_JOINT_ACCELERATION_LIMITS_VIOLATION = 5
+    ACTUAL_CARTESIAN_ACCELERATION_LIMITS_VIOLATION = 6
+    COMMAND_JOINT_POSITION_LIMITS_VIOLATION = 7
+    COMMAND_CARTESIAN_POSITION_LIMITS_VIOLATION = 8
+    COMMAND_CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION = 9
+    COMMAND_JOINT_VELOCITY_LIMITS_VIOLATION = 10
+    COMMAND_CARTESIAN_VELOCITY_LIMITS_VIOLATION = 11
+    COMMAND_JOINT_ACCELERATION_LIMITS_VIOLATION = 12
+    COMMAND_CARTESIAN_ACCELERATION_LIMITS_VIOLATION = 13
+    COMMAND_JOINT_ACCELERATION_DISCONTINUITY = 14
+    COLLISION = 15
+    CARTESIAN_POSITION_MOTION_GENERATOR_INVALID_FRAME = 16
+    COMMAND_TORQUE_DISCONTINUITY = 17
+    COMMAND_TORQUE_RANGE_VIOLATION = 18
+    INSTABILITY_DETECTION = 19
+
+    @property
+    def manual_name(self) -> str:
+        """The name as the manual prints it, such as `kCollision`."""
+        return "k" + "".join(word.capitalize() for word in self.name.split("_"))
+
+    @property
+    def cause(self) -> str:
+        """What the robot saw, in a few words (manual 4.6, second column)."""
+        return _CAUSES[self]
+
+    @property
+    def remedy(self) -> str:
+        """What to do about it, in one sentence (manual 4.6, third column)."""
+        return _REMEDIES.get(self, _SMOOTHNESS)
+
+    @property
+    def torque_remedy(self) -> str:
+        """The same for a motion that commands torques, where no planner's advice helps."""
+        return _REMEDIES.get(self, _GAINS)
+
+    @property
+    def impedance_remedy(self) -> str:
+        """The same for a motion under impedance, where forces move the arm, and not its commands alone."""
+        return _YIELDED if self in _MEASURED_RATES else self.remedy
+
+    @property
+    def outside_remedy(self) -> str:
+        """The same for a motion whose commands kept their limits."""
+        return _PUSHED if self in _MEASURED_RATES else self.remedy
+
+
+FAULT_COUNT = len(Fault)
+
+
+def find_fault(name: Fault | str) -> Fault:
+    """Returns a fault by its name, as the manual prints it or as the member is called, in any case.
+
+    Raises:
+        InvalidValueError: There is no such fault; the message lists those that exist.
+    """
+    if isinstance(name, Fault):
+        return name
+    wanted = name.replace("_", "").lower()
+    for fault in Fault:
+        if wanted in (fault.manual_name.lower(), fault.manual_name[1:].lower()):
+            return fault
+    known = ", ".join(fault.manual_name for fault in Fault)
+    raise InvalidValueError("fault", name, f"is unknown; known: {known}")
+
+
+def name_faults(faults: Iterable[object]) -> str:
+    """Returns faults as the manual prints them: their one name everywhere."""
+    return ", ".join(fault.manual_name for fault in faults if isinstance(fault, Fault))
+
+
+def faults_from_bits(bits: Iterable[int]) -> tuple[Fault, ...]:
+    """Returns the faults whose error byte is set, in wire order."""
+    return tuple(Fault(place) for place, bit in enumerate(bits) if bit)
+
+
+_CAUSES = {
+    Fault.ACTUAL_JOINT_POSITION_LIMITS_VIOLATION: "a measured joint angle left its range",
+    Fault.ACTUAL_CARTESIAN_POSITION_LIMITS_VIOLATION: "the measured tool pose left the safety box",
+    Fault.ACTUAL_CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION: "the measured arm angle turned too fast",
+    Fault.ACTUAL_JOINT_VELOCITY_LIMITS_VIOLATION: "a measured joint velocity was too high",
+    Fault.ACTUAL_CARTESIAN_VELOCITY_LIMITS_VIOLATION: "the measured tool velocity was too high",
+    Fault.ACTUAL_JOINT_ACCELERATION_LIMITS_VIOLATION: "a measured joint acceleration was too high",
+    Fault.ACTUAL_CARTESIAN_ACCELERATION_LIMITS_VIOLATION: "the measured tool acceleration was too high",
+    Fault.COMMAND_JOINT_POSITION_LIMITS_VIOLATION: "a commanded joint angle is outside its range",
+    Fault.COMMAND_CARTESIAN_POSITION_LIMITS_VIOLATION: "the commanded tool pose is outside the safety box",
+    Fault.COMMAND_CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION: (
+        "the commanded arm angle broke one of its bounds (angle, velocity, acceleration or jerk)"
+    ),
+    Fault.COMMAND_JOINT_VELOCITY_LIMITS_VIOLATION: "a commanded joint velocity is too high",
+    Fault.COMMAND_CARTESIAN_VELOCITY_LIMITS_VIOLATION: "the commanded tool velocity is too high",
+    Fault.COMMAND_JOINT_ACCELERATION_LIMITS_VIOLATION: "a commanded joint acceleration is too high",
+    Fault.COMMAND_CARTESIAN_ACCELERATION_LIMITS_VIOLATION: "the commanded tool acceleration is too high",
+    Fault.COMMAND_JOINT_ACCELERATION_DISCONTINUITY: "a commanded joint acceleration jumps (jerk too high)",
+    Fault.COLLISION: "an external torque passed its collision threshold",
+    Fault.CARTESIAN_POSITION_MOTION_GENERATOR_INVALID_FRAME: "the arm is at a singularity or the pose is no pose",
+    Fault.COMMAND_TORQUE_DISCONTINUITY: "a commanded torque jumps (torque rate too high)",
+    Fault.COMMAND_TORQUE_RANGE_VIOLATION: "a commanded torque is too high",
+    Fault.INSTABILITY_DETECTION: (
+        "too many commands in a row were lost, or those that were could not be bridged smoothly"
+    ),
+}
+
+_SMOOTHNESS = (
+    "check that the planned motion is continuous up to its acceleration and inside the limits of section 4.4; "
+    "lower the speed or filter it where it is not"
+)
+
+_GAINS = (
+    "let torques grow gradually and keep them inside the limits of section 4.4; where a control law of yours rings, "
+    "lower its damping first: above the inertia that a joint feels while the others are free, divided by the delay of "
+    "the loop, it is unstable, and the wrist is light"
+)
+
+_YIELDED = (
+    "forces moved the arm faster than it may be, whatever was commanded: look for a push, let a desired wrench grow "
+    "gradually and keep it below what holds the arm (set_cart_imp_desired_tau), or raise the stiffness"
+)
+
+_PUSHED = (
+    "the last commands kept their limits, so look for what else moves the arm: contact, a push, or a load that the "
+    "controller does not know of (set_load)"
+)
+
+_MEASURED_RATES = frozenset(
+    {
+        Fault.ACTUAL_CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION,
+        Fault.ACTUAL_JOINT_VELOCITY_LIMITS_VIOLATION,
+        Fault.ACTUAL_CARTESIAN_VELOCITY_LIMITS_VIOLATION,
+        Fault.ACTUAL_JOINT_ACCELERATION_LIMITS_VIOLATION,
+        Fault.ACTUAL_CARTESIAN_ACCELERATION_LIMITS_VIOLATION,
+    }
+)
+
+_BOX = (
+    "keep the tool inside the safety box; a motion that starts outside it may only lead into it: after recover(), or "
+    "power_off() and power_on() where that is refused, execute(plan_recovery(robot.model, robot.state.q_c, "
+    "robot.safety_box)) does"
+)
+
+_RANGE = (
+    "the joint is beyond its range or its soft limit, and without auto_limit the motors are off: power_off() and "
+    "power_on(), then execute(plan_recovery(robot.model, robot.state.q_c)) leads it back inside"
+)
+RANGE_FAULTS = frozenset({Fault.ACTUAL_JOINT_POSITION_LIMITS_VIOLATION, Fault.COMMAND_JOINT_POSITION_LIMITS_VIOLATION})
+"""After which `recover()` may not do: the arm can be farther out than it recovers from by itself."""
+BOX_FAULTS = frozenset(
+    {Fault.ACTUAL_CARTESIAN_POSITION_LIMITS_VIOLATION, Fault.COMMAND_CARTESIAN_POSITION_LIMITS_VIOLATION}
+)
+"""The same for the safety box."""
+
+_REMEDIES = {
+    Fault.ACTUAL_JOINT_POSITION_LIMITS_VIOLATION: _RANGE,
+    Fault.COMMAND_JOINT_POSITION_LIMITS_VIOLATION: _RANGE,
+    Fault.ACTUAL_CARTESIAN_POSITION_LIMITS_VIOLATION: _BOX,
+    Fault.COMMAND_CARTESIAN_POSITION_LIMITS_VIOLATION: _BOX,
+    Fault.COLLISION: "look for contact; if it fires without contact, raise the collision thresholds "
+    "(an emergency stop can also raise this bit)",
+    Fault.CARTESIAN_POSITION_MOTION_GENERATOR_INVALID_FRAME: "keep Cartesian motions away from singular poses",
+    Fault.COMMAND_TORQUE_DISCONTINUITY: _GAINS,
+    Fault.COMMAND_TORQUE_RANGE_VIOLATION: _GAINS,
+    Fault.INSTABILITY_DETECTION: "look at the network and the real-time set-up, and let the controller play "
+    "commands later (a virtual one: --prefill 50); only where ever so many in a row were lost does a higher "
+    "packet-loss threshold help (usually 10 to 20); an emergency stop can also raise this bit",
+}

@@ -1,0 +1,105 @@
+"""The bounds of an arm, every one with the place it was taken from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+from rcilab.core.arrays import JointVector
+from rcilab.core.errors import InvalidValueError
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class JointLimits:
+    """Bounds of the joints, each of shape (n,)."""
+
+    lower: JointVector
+    """Smallest joint angle, [rad]."""
+    upper: JointVector
+    """Largest joint angle, [rad]."""
+    velocity: JointVector
+    """Largest speed, [rad/s]."""
+    acceleration: JointVector
+    """Largest acceleration, [rad/s^2]."""
+    jerk: JointVector
+    """Largest jerk, [rad/s^3]."""
+    torque: JointVector
+    """Largest commanded torque, [N m]."""
+    torque_rate: JointVector
+    """Largest rate of the commanded torque, [N m/s]."""
+    collision_threshold: JointVector
+    """Largest threshold that `setCollisionBehavior` takes, [N m]."""
+    stiffness: JointVector
+    """Largest stiffness that `setJointImpedance` takes, [N m/rad]."""
+
+    def __repr__(self) -> str:
+        return f"<JointLimits of {len(self.velocity)} joints: {', '.join(self.__slots__)}>"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CartesianLimits:
+    """Bounds of the tool's motion."""
+
+    translation_velocity: float
+    """[m/s]."""
+    translation_acceleration: float
+    """[m/s^2]."""
+    translation_jerk: float
+    """[m/s^3]."""
+    rotation_velocity: float
+    """[rad/s]."""
+    rotation_acceleration: float
+    """[rad/s^2]."""
+    rotation_jerk: float
+    """[rad/s^3]."""
+    translation_stiffness: float
+    """Largest stiffness that `setCartesianImpedance` takes, [N/m]."""
+    rotation_stiffness: float
+    """[N m/rad]."""
+    force: float
+    """Largest desired force of the Cartesian impedance, [N]."""
+    moment: float
+    """[N m]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ArmAngleLimits:
+    """Bounds of the arm angle of a 7-axis arm."""
+
+    velocity: float
+    """[rad/s]."""
+    acceleration: float
+    """[rad/s^2]."""
+    jerk: float
+    """[rad/s^3]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Limits:
+    """All bounds of one arm."""
+
+    joint: JointLimits
+    cartesian: CartesianLimits
+    arm_angle: ArmAngleLimits | None
+    """None for an arm without a redundant joint."""
+    sources: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+    """Where each bound was taken from, by dotted name."""
+
+    def __repr__(self) -> str:
+        arm_angle = "" if self.arm_angle is None else ", .arm_angle"
+        return f"<Limits of {len(self.joint.velocity)} joints: .joint, .cartesian{arm_angle}, .source(name)>"
+
+    def source(self, name: str) -> str:
+        """Returns where a bound was taken from.
+
+        Args:
+            name: Dotted name of the bound, such as "joint.velocity".
+
+        Raises:
+            InvalidValueError: There is no such bound; the message lists those that exist.
+        """
+        try:
+            return self.sources[name]
+        except (KeyError, TypeError):
+            raise InvalidValueError("limit", name, f"is unknown; known: {', '.join(self.sources)}") from None

@@ -1,0 +1,46 @@
+"""A pose as a robot reports it: 16 numbers of a datagram, read only when somebody asks."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import DTypeLike
+
+from rcilab.core.arrays import Array, Matrix
+from rcilab.core.spatial import Pose
+
+
+class ReportedPose(Pose):
+    """A `Pose` that costs its reader nothing until it is used: a state with two of them comes every millisecond.
+
+    Args:
+        numbers: A homogeneous transform, shape (4, 4) or (16,) row-major, [m]. Not checked, and never written to.
+    """
+
+    __slots__ = ("_numbers",)
+
+    def __init__(self, numbers: Array) -> None:
+        self._numbers = numbers
+
+    if not TYPE_CHECKING:  # A type checker would take every name for one that a pose has.
+
+        def __getattr__(self, name: str) -> object:
+            """Reads rotation and position when the first of them is asked for; then they are attributes."""
+            if name not in ("_r", "_p"):
+                raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+            a, b, c, x, d, e, f, y, g, h, i, z = self._numbers.ravel()[:12].tolist()
+            self._r = a, b, c, d, e, f, g, h, i
+            self._p = x, y, z
+            return getattr(self, name)
+
+    def as_row_major(self) -> tuple[float, ...]:
+        """Returns the 16 numbers as they were reported."""
+        return tuple(self._numbers.ravel().tolist())
+
+    def tobytes(self) -> bytes:
+        """Returns those numbers as 16 little-endian doubles."""
+        return self._numbers.tobytes()
+
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> Matrix:
+        return np.array(self._numbers, dtype=dtype).reshape(4, 4)

@@ -1,0 +1,163 @@
+"""The box that the tool shall stay in: `setCartesianLimit`, RCI manual V1.3.1, section 3.1.4."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+from math import hypot
+
+import numpy as np
+
+from rcilab.core.arrays import Array, as_vector, described
+from rcilab.core.errors import InvalidValueError
+from rcilab.core.spatial import Pose, as_pose
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SafetyBox:
+    """A box in the base frame. It bounds the origin of the tool frame, not the links.
+
+    Raises:
+        InvalidValueError: An edge is not a positive, finite length, or the pose is none.
+    """
+
+    size: tuple[float, ...]
+    """Edges along x, y and z of its frame, three numbers, [m]."""
+    T_base_box: Pose
+    """Its centre and directions."""
+    active: bool = True
+    """Whether it bounds anything; one that is not active is kept and does nothing."""
+
+    def __post_init__(self) -> None:
+        """Checks the values."""
+        try:
+            size = tuple(as_vector(self.size, 3, "safety box size", "m").tolist())
+        except InvalidValueError as error:
+            raise InvalidValueError(error.name, error.value, "must be three lengths above 0 [m]") from error
+        if not all(edge > 0.0 for edge in size):
+            raise InvalidValueError("safety box size", size, "must be three lengths above 0 [m]")
+        object.__setattr__(self, "T_base_box", as_pose(self.T_base_box, "safety box pose"))
+        object.__setattr__(self, "size", size)
+
+    def excess(self, position: Sequence[float]) -> float:
+        """Returns how far a point lies outside, [m]: its distance from the box, or minus its depth inside.
+
+        Args:
+            position: The point in the base frame, three numbers, [m].
+        """
+        r, (cx, cy, cz) = self.T_base_box.parts
+        x, y, z = position[0] - cx, position[1] - cy, position[2] - cz
+        length, width, height = self.size
+        dx = abs(r[0] * x + r[3] * y + r[6] * z) - 0.5 * length
+        dy = abs(r[1] * x + r[4] * y + r[7] * z) - 0.5 * width
+        dz = abs(r[2] * x + r[5] * y + r[8] * z) - 0.5 * height
+        if dx <= 0.0 and dy <= 0.0 and dz <= 0.0:
+            return max(dx, dy, dz)
+        return hypot(dx if dx > 0.0 else 0.0, dy if dy > 0.0 else 0.0, dz if dz > 0.0 else 0.0)
+
+    def passed_face(self, position: Sequence[float] | Array) -> tuple[str, float]:
+        """Returns the face that a point lies farthest past, such as "+x", and how far, [m]; minus inside.
+
+        Args:
+            position: The point in the base frame, three numbers, [m].
+        """
+        local = self.T_base_box.rotation.T @ (np.asarray(position) - self.T_base_box.position)
+        beyond = np.abs(local) - 0.5 * np.array(self.size)
+        axis = int(beyond.argmax())
+        return ("+" if local[axis] >= 0.0 else "−") + "xyz"[axis], float(beyond[axis])
+
+    def excess_path(self, positions: Array) -> Array:
+        """Returns `excess` of many points.
+
+        Args:
+            positions: Points in the base frame, shape (N, 3), [m].
+
+        Returns:
+            Shape (N,), [m].
+        """
+        local = (positions - self.T_base_box.position) @ self.T_base_box.rotation
+        beyond = np.abs(local) - 0.5 * np.array(self.size)
+        outside = np.sqrt(np.square(np.maximum(beyond, 0.0)).sum(axis=1))
+        return np.where(outside > 0.0, outside, beyond.max(axis=1))
+
+    def corners(self) -> Array:
+        """Returns its corners in the base frame, shape (8, 3), [m]."""
+        signs = np.array(list(product((-0.5, 0.5), repeat=3)))
+        return signs * np.array(self.size) @ self.T_base_box.rotation.T + self.T_base_box.position
+
+
+class EntryBox:
+    """A safety box for a tool that starts outside it: the faces that it starts beyond may be passed inwards only.
+
+    Such a face is where the tool is now, until the tool is inside it; the other faces are those of the box. Owned by
+    one monitor, which asks once a cycle.
+
+    Args:
+        box: Where the tool belongs.
+        positions: Where the tool starts, in the base frame, three numbers each, [m]: the farthest one opens a face.
+    """
+
+    _ROUNDING = 1e-6  # [m] How far outwards rounding may move a tool that is commanded to stay.
+
+    def __init__(self, box: SafetyBox, *positions: Sequence[float]) -> None:
+        self._box = box
+        self._half = [0.5 * edge for edge in box.size]
+        self._faces = [
+            (min(-half, min(x) - self._ROUNDING), max(half, max(x) + self._ROUNDING))
+            for half, *x in zip(self._half, *map(self._local, positions), strict=True)
+        ]
+
+    def excess(self, position: Sequence[float]) -> float:
+        """Returns how far a point lies outside of what is open to the tool, [m]; see `SafetyBox.excess`.
+
+        Args:
+            position: The point in the base frame, three numbers, [m].
+        """
+        local = self._local(position)
+        beyond = [max(low - x, x - high) for x, (low, high) in zip(local, self._faces, strict=True)]
+        self._faces = [
+            (min(-half, max(low, x - self._ROUNDING)), max(half, min(high, x + self._ROUNDING)))
+            for x, half, (low, high) in zip(local, self._half, self._faces, strict=True)
+        ]
+        deepest = max(beyond)
+        return deepest if deepest <= 0.0 else hypot(*(max(0.0, distance) for distance in beyond))
+
+    def _local(self, position: Sequence[float]) -> tuple[float, float, float]:
+        r, (cx, cy, cz) = self._box.T_base_box.parts
+        x, y, z = position[0] - cx, position[1] - cy, position[2] - cz
+        return r[0] * x + r[3] * y + r[6] * z, r[1] * x + r[4] * y + r[7] * z, r[2] * x + r[5] * y + r[8] * z
+
+
+def box_from(box: SafetyBox | None, *positions: Sequence[float]) -> SafetyBox | EntryBox | None:
+    """Returns what bounds a tool that starts at a position: its box, or the way into it; None when nothing does.
+
+    Args:
+        box: Where the tool belongs; None, or one that is not active, bounds nothing.
+        positions: Where the tool starts, as measured and as commanded, in the base frame, three numbers each, [m].
+    """
+    box = active_box(box)
+    return box if box is None or max(map(box.excess, positions)) <= 0.0 else EntryBox(box, *positions)
+
+
+def require_box(box: object) -> SafetyBox:
+    """Returns `box` if it is a safety box, active or not.
+
+    Raises:
+        InvalidValueError: It is something else; the message says what makes one.
+    """
+    if isinstance(box, SafetyBox):
+        return box
+    raise InvalidValueError("box", described(box), "is no SafetyBox; SafetyBox(size=..., T_base_box=...) makes one")
+
+
+def active_box(box: object) -> SafetyBox | None:
+    """Returns the safety box if it bounds anything; None when there is none, or when it is not active.
+
+    Raises:
+        InvalidValueError: It is something else.
+    """
+    if box is None:
+        return None
+    bound = require_box(box)
+    return bound if bound.active else None

@@ -1,0 +1,149 @@
+"""The state an RCI robot reports every millisecond, and the vocabulary of its modes.
+
+Names follow RCI manual V1.3.1, section 3.2.2; a frame in a name reads `T_base_tool`, the pose of the tool in the
+base. Vectors have one element a joint of the arm; the wire's unused seventh element of a 6-axis arm is gone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, fields, make_dataclass
+from enum import IntEnum
+from math import degrees
+from typing import Any, Literal, TypeAlias, get_args
+
+from rcilab.core.arrays import Array, JointVector, described
+from rcilab.core.errors import InvalidValueError
+from rcilab.core.faults import Fault, name_faults
+from rcilab.core.spatial import Pose
+
+Mode: TypeAlias = Literal["joint_position", "joint_impedance", "cartesian_position", "cartesian_impedance", "torque"]
+"""How a motion is commanded: the members of `ControllerMode` that move the arm, in small letters."""
+MODES: tuple[Mode, ...] = get_args(Mode)
+
+
+class ControllerMode(IntEnum):
+    """How the controller follows commands (manual 3.1.1)."""
+
+    JOINT_POSITION = 0
+    CARTESIAN_POSITION = 1
+    JOINT_IMPEDANCE = 2
+    CARTESIAN_IMPEDANCE = 3
+    TORQUE = 4
+    OTHER = 5
+
+
+class MotionGeneratorMode(IntEnum):
+    """What the commands of a motion are, as the state numbers it (a StartMove request numbers it otherwise)."""
+
+    IDLE = 0
+    JOINT_POSITION = 1
+    JOINT_VELOCITY = 2
+    CARTESIAN_POSITION = 3
+    CARTESIAN_VELOCITY = 4
+
+
+class RobotMode(IntEnum):
+    """What the robot as a whole is doing."""
+
+    OTHER = 0
+    IDLE = 1
+    MOVE = 2
+    GUIDING = 3
+    REFLEX = 4
+    USER_STOPPED = 5
+    AUTOMATIC_ERROR_RECOVERY = 6
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class RobotState:
+    """Everything the robot reports in one cycle. Measured values plain, commanded ones end in `_c`."""
+
+    message_id: int
+    """Number of the controller cycle; the command that answers this state carries it back."""
+    q: JointVector
+    """Joint angles, [rad]."""
+    q_c: JointVector
+    """Commanded joint angles, [rad]."""
+    dq: JointVector
+    """Joint velocities, [rad/s] (manual: dq_m)."""
+    dq_c: JointVector
+    """Commanded joint velocities, [rad/s]."""
+    ddq_c: JointVector
+    """Commanded joint accelerations, [rad/s^2]."""
+    T_base_tool: Pose
+    """Pose of the tool in base, [m] (manual: toolTobase_pos_m)."""
+    T_base_tool_c: Pose
+    """Commanded pose of the tool in base, [m]."""
+    tool_velocity_c: Array
+    """Commanded twist of the tool in base axes, linear first, (6,), [m/s, rad/s]."""
+    tool_acceleration_c: Array
+    """Commanded acceleration of the tool in base axes, linear first, (6,), [m/s^2, rad/s^2]."""
+    psi: float
+    """Arm angle, [rad]."""
+    psi_c: float
+    """Commanded arm angle, [rad]."""
+    dpsi_c: float
+    """Commanded arm-angle velocity, [rad/s]."""
+    ddpsi_c: float
+    """Commanded arm-angle acceleration, [rad/s^2]."""
+    tau: JointVector
+    """Joint torques, [N m]."""
+    tau_filtered: JointVector
+    """Filtered joint torques, [N m]."""
+    tau_c: JointVector
+    """Commanded joint torques, [N m]."""
+    dtau_c: JointVector
+    """Rate of the commanded joint torques, [N m/s] (manual: tau_vel_c)."""
+    tau_ext_in_base: Array
+    """External force and moment in the base frame, (6,), [N, N m]."""
+    tau_ext_in_stiff: Array
+    """External force and moment in the force-control frame, (6,), [N, N m]."""
+    theta: JointVector
+    """Motor positions, motor side of the gear, [rad] (manual: theta_m). The virtual controller takes 101 motor turns
+    for one of the joint, a figure of ours: the manual gives none."""
+    dtheta: JointVector
+    """Motor velocities, motor side of the gear, [rad/s] (manual: theta_vel_m)."""
+    motor_tau: JointVector
+    """Motor torques, motor side of the gear, [N m]."""
+    motor_tau_filtered: JointVector
+    """Filtered motor torques, [N m]."""
+    faults: tuple[Fault, ...]
+    """The error bits that are set, in wire order."""
+    success_rate: float
+    """Share of the last commands that arrived in time, 0 to 1."""
+    motion_generator_mode: MotionGeneratorMode
+    controller_mode: ControllerMode
+    robot_mode: RobotMode
+
+    def __repr__(self) -> str:
+        angles = " ".join(f"{degrees(angle):.2f}" for angle in self.q)
+        faults = name_faults(self.faults) or "none"
+        modes = f"{self.robot_mode.name}, {self.controller_mode.name}"
+        return f"<RobotState {self.message_id}: q = {angles} deg; {modes}; faults: {faults}>"
+
+
+_Open: Any = make_dataclass("_Open", [field.name for field in fields(RobotState)], eq=False, repr=False, slots=True)
+"""A state that is not frozen yet: of the same fields, so that it can become one."""
+
+
+def build_state(values: Iterable[object]) -> RobotState:
+    """Returns the state with these values, in the order of the fields, as many.
+
+    For those who build one each millisecond: the constructor of a frozen dataclass takes six times as long.
+    """
+    state = _Open(*values)
+    state.__class__ = RobotState
+    return state
+
+
+def require_mode(mode: object) -> Mode:
+    """Returns `mode` if it is one to move in.
+
+    Raises:
+        InvalidValueError: It is not; the message lists those that exist.
+    """
+    for known in MODES:
+        if isinstance(mode, str) and mode == known:
+            return known
+    raise InvalidValueError("mode", described(mode), f"is unknown; known: {', '.join(MODES)}")

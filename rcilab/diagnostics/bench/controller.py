@@ -1,0 +1,203 @@
+"""What a millisecond costs the virtual controller, and how even its milliseconds are."""
+
+from __future__ import annotations
+
+import math
+import socket
+import struct
+import time
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from rcilab.control_process.launch import start_controller
+from rcilab.core.arrays import Array
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.errors import DeadlineError
+from rcilab.core.spatial import Pose
+from rcilab.core.state import ControllerMode, MotionGeneratorMode, RobotState
+from rcilab.diagnostics.bench.compute import motion_of
+from rcilab.diagnostics.bench.cpu_stall_monitor import CoreWatch
+from rcilab.diagnostics.bench.machine import ask_realtime
+from rcilab.diagnostics.bench.measure import Measurement, summarise
+from rcilab.makers.rokae import wire as rci
+from rcilab.makers.rokae.controller.config import PLANT_KINDS, PlantKind
+from rcilab.makers.rokae.controller.cycle import ControlCycle
+from rcilab.makers.rokae.driver.address import parse_address
+from rcilab.model.robot_model import RobotModel, load_model
+from rcilab.sim.plants import build_plant
+
+_ROBOT = "xMatePro7"
+_DURATION = 5.0  # [s] of simulated motion.
+_DEPTH = 0.05  # [m] that the tool goes down and up.
+_TARGETS: dict[PlantKind, float] = {"ideal": 150.0, "mujoco": 250.0}  # [us]
+_EVENNESS = 100.0  # [us] What 99.9 % of the periods may be off.
+_PATIENCE = 10.0  # [s]
+_MEMORY = 0.005  # [s] How long after a core stood still a period may still suffer from it.
+_SO_TIMESTAMPNS = 35  # Linux, socket(7): the kernel stamps every datagram's arrival.
+
+Command = Callable[[int, int], bytes]
+"""`(message id, cycle) -> datagram`."""
+
+
+def bench_controller_ideal() -> Measurement:
+    """A cycle while every joint moves: command in, judged, plant moved, state out."""
+    return _bench_plant("ideal")
+
+
+def bench_controller_mujoco() -> Measurement:
+    """The same with an arm that has mass."""
+    return _bench_plant("mujoco")
+
+
+def _bench_plant(plant: PlantKind) -> Measurement:
+    model = load_model(_ROBOT)
+    return _measure(f"controller_{plant}", model, plant, rci.StartMove(0, 1), joint_commands(model, _DURATION))
+
+
+def bench_controller_cartesian() -> Measurement:
+    """The same while the tool is commanded, inverse kinematics included; with MuJoCo in the note."""
+    model = load_model(_ROBOT)
+    return _in_both_plants("controller_cartesian", model, rci.StartMove(1, 2), _line_commands(model, _DURATION))
+
+
+def bench_controller_impedance() -> Measurement:
+    """The same with springs at the tool, the mode that computes most; joint impedance and torque in the note."""
+    model = load_model(_ROBOT)
+    found = _in_both_plants("controller_impedance", model, rci.StartMove(3, 2), _line_commands(model, _DURATION))
+    others: list[str] = []
+    for start, commands in (
+        (rci.StartMove(2, 1), joint_commands(model, _DURATION)),
+        (rci.StartMove(4, 0), lambda message_id, cycle: rci.encode_command(rci.CommandPacket(message_id))),
+    ):
+        ideal, mujoco = (_measure("controller_impedance", model, plant, start, commands) for plant in PLANT_KINDS)
+        others.append(f"{_mode_name(start)} {ideal.median:.0f} us, in MuJoCo {mujoco.median:.0f} us")
+    return replace(found, note="; ".join((found.note, *others)))
+
+
+def _in_both_plants(name: str, model: RobotModel, start: rci.StartMove, commands: Command) -> Measurement:
+    found, other = (_measure(name, model, plant, start, commands) for plant in PLANT_KINDS)
+    note = f"{found.note}; in MuJoCo {other.median:.0f} us, p99 {other.p99:.0f} us"
+    return replace(found, note=note, ok=bool(found.ok and other.ok))
+
+
+def bench_state_period(seconds: float = 10.0) -> Measurement:
+    """How far the time between two states is from 1 ms, free-running and moving, by the kernel's own stamps.
+
+    The promise is about 99.9 % of the periods, and only where the controller gets SCHED_FIFO.
+    """
+    model = load_model(_ROBOT)
+    commands = joint_commands(model, seconds)
+    controller = start_controller(_ROBOT)
+    try:
+        assert controller.address is not None
+        place = parse_address(controller.address)
+        with CoreWatch() as watch:
+            stamps, is_faulty = _stream(place.host, place.port, commands, round(seconds / CYCLE_TIME))
+    finally:
+        controller.end()
+    off = np.abs(np.diff(stamps) - CYCLE_TIME)
+    found = summarise("state_period", off, "us", _EVENNESS)
+    p999, largest = 1e6 * float(np.quantile(off, 0.999)), 1e6 * float(off.max())
+    has_fifo = ask_realtime()[0]
+    uneven = stamps[1:][1e6 * off > _EVENNESS]
+    note = (
+        f"|period - 1 ms| of {len(stamps)} states while moving; p99.9 {p999:.0f}, max {largest:.0f} us; "
+        f"{len(uneven)} off by more than {_EVENNESS:g} us, {int(watch.explains(uneven, _MEMORY).sum())} of them when a "
+        f"core of this machine had stood still, as one did {len(watch.pauses)} times; beside it an empty loop of the "
+        f"highest priority woke up late by p99.9 {1e6 * float(np.quantile(watch.lateness, 0.999)):.0f} us"
+    )
+    if not has_fifo:
+        note += "; SCHED_FIFO NOT PERMITTED, so nothing is promised"
+    if is_faulty:
+        note += "; THE MOTION WAS STOPPED BY A FAULT"
+    return replace(found, note=note, ok=p999 <= _EVENNESS and not is_faulty if has_fifo else None)
+
+
+def joint_commands(model: RobotModel, duration: float) -> Command:
+    """Returns the commands of a motion of every joint from the home pose; it stands at its end afterwards."""
+    rows = [(*row, *[0.0] * (7 - model.n)) for row in motion_of(model, duration, model.home).q.tolist()]
+
+    def command(message_id: int, cycle: int) -> bytes:
+        return rci.encode_command(rci.CommandPacket(message_id, rows[min(cycle, len(rows) - 1)]))
+
+    return command
+
+
+def _line_commands(model: RobotModel, duration: float) -> Command:
+    home, psi = model.forward(model.home), model.arm_angle(model.home)
+    numbers: list[tuple[float, ...]] = []
+    for cycle in range(round(duration / CYCLE_TIME)):
+        depth = _DEPTH / 2.0 * (1.0 - math.cos(math.tau * cycle * CYCLE_TIME / 2.5))
+        numbers.append(Pose(position=home.position - (0.0, 0.0, depth), wxyz=home.wxyz).as_row_major())
+
+    def command(message_id: int, cycle: int) -> bytes:
+        pose = numbers[min(cycle, len(numbers) - 1)]
+        return rci.encode_command(rci.CommandPacket(message_id, T_base_tool_c=pose, psi_valid=True, psi_c=psi))
+
+    return command
+
+
+def _measure(name: str, model: RobotModel, plant: PlantKind, start: rci.StartMove, command: Command) -> Measurement:
+    cycle = ControlCycle(model, build_plant(plant, model), mode_delay=0, prefill=0)
+    cycle.handle(rci.SetMotorPower(1))
+    resting = _times(cycle, lambda message_id, k: None, 1000)
+    cycle.handle(start)
+    while cycle.state.controller_mode is ControllerMode.OTHER and cycle.state.message_id < 2000:
+        cycle.step()
+    moving = _times(cycle, command, round(_DURATION / CYCLE_TIME))
+    note = f"{_ROBOT}, {_mode_name(start)}, {_DURATION:g} s of motion; at rest {1e6 * np.median(resting):.0f} us"
+    found = summarise(name, moving, "us", _TARGETS[plant], note)
+    if cycle.state.controller_mode is ControllerMode.OTHER:
+        return replace(found, ok=False, note=f"{note}; THE MOTION DID NOT RUN: {cycle.reason or 'refused'}")
+    return found
+
+
+def _mode_name(start: rci.StartMove) -> str:
+    return ControllerMode(start.controller_mode).name.lower().replace("_", " ")
+
+
+def _times(cycle: ControlCycle, command: Callable[[int, int], bytes | None], count: int) -> Array:
+    """Returns what each cycle took, from the command's bytes to the state's, shape (count,), [s]."""
+    times = np.empty(count)
+    for k in range(count):
+        datagram = command(cycle.state.message_id, k)
+        start = time.perf_counter_ns()
+        if datagram is not None:
+            cycle.receive(rci.decode_command(datagram, cycle.model.n))
+        rci.encode_state(cycle.step())
+        times[k] = 1e-9 * (time.perf_counter_ns() - start)
+    return times
+
+
+def _stream(host: str, port: int, command: Command, count: int) -> tuple[Array, bool]:
+    """Runs a motion as the smallest client can; returns the states' arrival, monotonic, [s], and if one was faulty."""
+    with (
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp,
+        socket.create_connection((host, port), timeout=_PATIENCE) as tcp,
+    ):
+        udp.bind(("127.0.0.1", 0))
+        udp.setsockopt(socket.SOL_SOCKET, _SO_TIMESTAMPNS, 1)
+        udp.settimeout(_PATIENCE)
+        requests = rci.Connect(udp.getsockname()[1]), rci.SetMotorPower(1), rci.StartMove(0, 1)
+        for number, request in enumerate(requests):
+            tcp.sendall(rci.encode_request(request, number))
+            tcp.recv(rci.HEADER.size + 1)
+        state, _ = _receive(udp)
+        deadline = time.monotonic() + _PATIENCE
+        while state.motion_generator_mode is MotionGeneratorMode.IDLE:
+            if time.monotonic() > deadline:
+                raise DeadlineError(f"bench: the controller at {host}:{port} did not begin to move; try again")
+            state, _ = _receive(udp)
+        stamps, offset = np.empty(count), time.monotonic() - time.time()
+        for k in range(count):
+            udp.sendto(command(state.message_id, k), (host, port))
+            state, stamps[k] = _receive(udp)
+        return stamps + offset, bool(state.faults)
+
+
+def _receive(udp: socket.socket) -> tuple[RobotState, float]:
+    data, ancillary, _, _ = udp.recvmsg(2048, 64)
+    seconds, nanoseconds = struct.unpack("qq", ancillary[0][2])
+    return rci.decode_state(data, 7), seconds + 1e-9 * nanoseconds

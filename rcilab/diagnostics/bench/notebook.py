@@ -1,0 +1,91 @@
+"""What a notebook makes a person wait for: the lab in its cell, and the arm behind a slider."""
+
+from __future__ import annotations
+
+import ast
+import queue
+import statistics
+import subprocess
+from typing import Any
+
+from rcilab.core.errors import DeadlineError, RcilabError
+from rcilab.diagnostics.bench.measure import Measurement, summarise
+
+_KERNELS = 3
+_SLIDES = 200
+_PATIENCE = 60.0  # [s]
+_MAKE = """
+import time, rcilab
+model = rcilab.load_model("xMatePro7")
+"""
+_SHOW = """
+begin = time.perf_counter()
+from rcilab.notebook import Lab
+from IPython.display import display
+lab = Lab(model)
+display(lab)
+lab.scene.flush()
+time.perf_counter() - begin
+"""
+_OPEN = """
+begin = time.perf_counter()
+for tab in range(len(lab.tabs.children)):
+    lab.tabs.selected_index = tab
+time.perf_counter() - begin
+"""
+_SLIDE = f"""
+def slide(angle):
+    begin = time.perf_counter()
+    lab.jog.sliders[3].set_state({{"value": angle}})
+    lab.scene.flush()
+    return time.perf_counter() - begin
+[slide(0.25 * step) for step in range({_SLIDES})]
+"""
+
+
+def bench_lab_shown() -> Measurement:
+    """`Lab(model)` in a fresh kernel, from its import to all that is seen of it sent to the browser."""
+    shown, opened = zip(*(_ask_kernel(_SHOW, _OPEN) for _ in range(_KERNELS)), strict=True)
+    note = (
+        f"{_KERNELS} fresh kernels, the model loaded; imports included; the other tabs are made when they are "
+        f"opened, {statistics.median(opened):.2f} s for all of them"
+    )
+    return summarise("lab_shown", shown, "s", 2.0, note)
+
+
+def bench_lab_slider() -> Measurement:
+    """From a slider's message in the kernel to the new pose on its way to the inline scene, with all of `Lab` open."""
+    *_, times = _ask_kernel(_SHOW, _OPEN, _SLIDE)
+    note = f"{_SLIDES} messages of a joint slider; scene, target, arm-angle circle and tables follow each"
+    return summarise("lab_slider", times, "ms", 50.0, note)
+
+
+def _ask_kernel(*cells: str) -> list[Any]:
+    """Returns the value of each cell, run one after the other in a kernel of its own."""
+    from jupyter_client.manager import start_new_kernel
+
+    manager, client = start_new_kernel(startup_timeout=_PATIENCE, stderr=subprocess.DEVNULL)
+    try:
+        _run(client, _MAKE)
+        return [_run(client, cell) for cell in cells]
+    finally:
+        client.stop_channels()
+        manager.shutdown_kernel(now=True)
+
+
+def _run(client: Any, code: str) -> Any:
+    request, value = client.execute(code), None
+    while True:
+        try:
+            said = client.get_iopub_msg(timeout=_PATIENCE)
+        except queue.Empty as error:
+            raise DeadlineError(f"bench: the kernel was silent for {_PATIENCE:g} s") from error
+        if said["parent_header"].get("msg_id") != request:
+            continue
+        content = said["content"]
+        if said["msg_type"] == "error":
+            raise RcilabError(f"bench: the notebook failed with {content['ename']}: {content['evalue']}")
+        if said["msg_type"] == "execute_result":
+            value = ast.literal_eval(content["data"]["text/plain"])
+        if said["msg_type"] == "status" and content["execution_state"] == "idle":
+            return value

@@ -1,0 +1,76 @@
+"""What the workbench makes a person or a robot wait for: a drag of the target, and the 1 kHz loop beside the page."""
+
+from __future__ import annotations
+
+import math
+import time
+from contextlib import nullcontext
+
+import numpy as np
+
+from rcilab.diagnostics.bench.browser import find_chromium, open_page
+from rcilab.diagnostics.bench.loop import Streamed, stream, wait_for
+from rcilab.diagnostics.bench.measure import Measurement, summarise
+from rcilab.workbench import requests
+from rcilab.workbench.app import Workbench, WorkbenchConfig
+
+_DRAGS = 200
+_LOOK = 5e-5  # [s] How often the state is looked at; it is part of what is measured.
+_RADIUS = 0.05  # [m] of the circle on which the target is dragged
+
+
+def bench_drag() -> Measurement:
+    """From a drag of the target to the new arm pose, through the page's own mailbox and consumer thread."""
+    poses: list[float] = []
+    plans: list[float] = []
+    with Workbench(WorkbenchConfig(port=0)) as bench:
+        wait_for("the control process", lambda: bench.session.status().phase == "idle")
+        wait_for("the goal to stand where the arm is", lambda: bench.store.state.no_plan is not None)
+        centre = bench.store.state.goal.target
+        for step in range(_DRAGS):
+            angle = math.tau * step / 50
+            offset = (0.0, _RADIUS * math.cos(angle), _RADIUS * math.sin(angle))
+            before = bench.store.state
+            request = requests.MoveTarget(
+                position=tuple((centre.position + offset).tolist()), wxyz=tuple(centre.wxyz.tolist())
+            )
+            start = time.perf_counter()
+            bench.conductor.ask(request)
+            wait_for("the new pose", lambda before=before: bench.store.state.goal is not before.goal, look=_LOOK)
+            poses.append(time.perf_counter() - start)
+            wait_for("the new plan", lambda before=before: bench.store.state.plan is not before.plan, look=_LOOK)
+            plans.append(time.perf_counter() - start)
+    planned = f"{1e3 * np.median(plans):.1f} ms, p99 {1e3 * np.percentile(plans, 99):.1f} ms"
+    return summarise("drag", poses, "ms", 10.0, f"{_DRAGS} drags on a circle; until planned and checked too: {planned}")
+
+
+def bench_control_loop(seconds: float = 30.0) -> Measurement:
+    """Streaming at 1 kHz for a while with the page open in a real browser: how late, how many lost.
+
+    The number is the lateness of a cycle. The promise: no cycle later than 1 ms, none lost, success rate 1.
+    """
+    browser = find_chromium()
+    with Workbench(WorkbenchConfig(port=0)) as bench:
+        wait_for("the control process", lambda: bench.session.status().phase == "idle")
+        with open_page(bench.url, browser) if browser else nullcontext():
+            if browser:
+                wait_for("the page to open", lambda: bool(bench.server.get_clients()))
+                time.sleep(min(10.0, seconds))  # The browser compiles shaders and uploads meshes: let it draw.
+            return _judge(stream(bench, bench.session.supervisor(), seconds), browser)
+
+
+def _judge(found: Streamed, browser: str | None) -> Measurement:
+    lateness, after = found.after.lateness, found.after
+    locked = ", memory locked" if after.memory_locked else ""
+    if browser is None:
+        page = "NO BROWSER FOUND, so no page was open and nothing is promised"
+    else:
+        page = f"page open in {browser}" + ("" if found.pages else "; THE PAGE WENT AWAY")
+    note = (
+        f"{found.duration:.1f} s, {lateness.cycles} cycles, {after.scheduling}{locked}; {found.tell_loop()}; {page}; "
+        f"{found.tell_machine()}"
+    )
+    return Measurement(
+        name="control_loop", median=lateness.p50, p99=lateness.p99, unit="us", target=1000.0,
+        ok=None if browser is None else found.is_clean and found.pages > 0, note=note,
+    )  # fmt: skip

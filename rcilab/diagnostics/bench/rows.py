@@ -1,0 +1,90 @@
+"""The rows of `rcilab bench`, by name, and the process that measures one of them.
+
+Every row has a process of its own, so that what one loads, starts or breaks is no part of what the next one measures.
+`python -m rcilab.diagnostics.bench.rows NAME SECONDS FILE` is that process; it leaves its finding in the file.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Sequence
+from importlib import import_module
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+from rcilab.core.errors import RcilabError
+
+if TYPE_CHECKING:
+    from rcilab.diagnostics.bench.measure import Absent, Measurement
+
+ROWS = MappingProxyType(
+    {
+        "forward": "compute",
+        "inverse": "compute",
+        "inverse_batch": "compute",
+        "feasible_arcs": "compute",
+        "plan_joint": "compute",
+        "program": "compute",
+        "program_close": "compute",
+        "check": "compute",
+        "check_full": "compute",
+        "check_joint_rows": "compute",
+        "controller_ideal": "controller",
+        "controller_mujoco": "controller",
+        "controller_cartesian": "controller",
+        "controller_impedance": "controller",
+        "client_answer": "client",
+        "jog": "compute",
+        "plan_line": "paths",
+        "plan_arc": "paths",
+        "replan": "paths",
+        "drag": "page",
+        "mirror": "mirror",
+        "scrub": "scrub",
+        "page_ready": "page_ready",
+        "page_drag": "page_drag",
+        "page_scrub": "scrub",
+        "lab_slider": "notebook",
+        "lab_shown": "notebook",
+        "import": "start",
+        "start": "start",
+        "state_period": "controller",
+        "control_loop": "page",
+        "spectators": "spectators",
+    }
+)
+"""Name of each row and the module of its function, in the order they run; the slow ones last."""
+
+_STREAMING = frozenset({"control_loop", "spectators"})
+"""They are told for how long to stream."""
+
+
+def measure(name: str, seconds: float) -> Measurement | Absent:
+    """Measures a row in this process.
+
+    Args:
+        name: One of `ROWS`.
+        seconds: How long a row that streams is to do so, [s].
+    """
+    bench: Callable[..., Measurement | Absent] = getattr(
+        import_module(f"rcilab.diagnostics.bench.{ROWS[name]}"), f"bench_{name}"
+    )
+    return bench(seconds) if name in _STREAMING else bench()
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Measures a row and writes it down; its last word is the reason where that fails."""
+    name, seconds, file = arguments
+    try:
+        found = measure(name, float(seconds))
+    except RcilabError as error:
+        print(error, file=sys.stderr)
+        return 1
+    Path(file).write_text(json.dumps(found.as_json()), encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,136 @@
+"""How late a 1 kHz loop is on this machine, measured: `python -m rcilab.diagnostics.doctor.jitter SECONDS` is that loop.
+
+It does nothing but wake up, with the priority of the control process and on cores that do not sleep; whatever it is
+late by is the machine's. Once a second it prints the lateness of that second's cycles, [ns], as one JSON list.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from rcilab.core.arrays import Array, frozen
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.errors import DeadlineError
+from rcilab.diagnostics.doctor.finding import Finding
+from rcilab.diagnostics.doctor.processor import read_ticks
+from rcilab.diagnostics.doctor.system import System
+from rcilab.realtime.cpu_latency import awake_cores
+from rcilab.realtime.punctual import PRIORITY
+from rcilab.realtime.scheduling import enter_realtime
+
+_STOPPING_PAUSE = 0.010  # [s] Ten cycles: the shortest run of lost commands that a controller may stop a motion for.
+_CYCLES_A_LINE = 1000
+
+
+def check_jitter(
+    seconds: float, system: System, progress: Callable[[float, float], None], *, is_for_real: bool = False
+) -> Finding:
+    """Does a loop that does nothing wake up in time?
+
+    Args:
+        seconds: How long to measure, [s].
+        system: Says how much of the time the hypervisor took.
+        is_for_real: Whether a real arm is to be driven from here, which does not wait for a machine that pauses.
+        progress: Called about once a second with the time spent so far and the largest lateness so far, [s].
+    """
+    before = read_ticks(system)
+    try:
+        late = measure_jitter(seconds, progress)
+    except DeadlineError as error:
+        return Finding("jitter", "bad", str(error), "python -m rcilab.diagnostics.doctor.jitter 2 shows why")
+    after = read_ticks(system)
+    stolen = (after[0] - before[0]) / 100.0 if before and after else None
+    return judge_jitter(late, stolen, is_for_real=is_for_real)
+
+
+def measure_jitter(seconds: float, progress: Callable[[float, float], None]) -> Array:
+    """Returns how late each cycle of an empty 1 kHz loop in a process of its own woke up, shape (cycles,), [s].
+
+    Raises:
+        DeadlineError: The loop ended before its time.
+    """
+    rows: list[Array] = []
+    worst = 0.0
+    loop = subprocess.Popen(
+        [sys.executable, "-m", "rcilab.diagnostics.doctor.jitter", repr(seconds)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+        start_new_session=True,  # Ctrl-C is for us; we end the loop.
+    )
+    with loop:
+        assert loop.stdout is not None
+        try:
+            for line in loop.stdout:
+                rows.append(1e-9 * np.array(json.loads(line), dtype=np.float64))
+                worst = max(worst, float(rows[-1].max()))
+                progress(CYCLE_TIME * sum(map(len, rows)), worst)
+        finally:
+            loop.kill()
+    late = np.concatenate([np.empty(0), *rows])
+    expected = _cycles(seconds)
+    if len(late) < expected:
+        raise DeadlineError(f"the measuring loop ended after {len(late)} of {expected} cycles")
+    return frozen(late)
+
+
+def judge_jitter(late: Array, stolen: float | None, *, is_for_real: bool = False) -> Finding:
+    """Returns what the lateness of cycles means for a control loop.
+
+    Args:
+        late: One number a cycle, shape (cycles,), [s].
+        stolen: How long the hypervisor held the cores meanwhile, all together, [s]; None when unknown.
+        is_for_real: Whether a real arm is to be driven from here.
+    """
+    median, p99, p999, worst = (1e6 * float(np.percentile(late, part)) for part in (50, 99, 99.9, 100))
+    missed = int((late > CYCLE_TIME).sum())
+    figures = {
+        "seconds": CYCLE_TIME * len(late), "median_us": median, "p99_us": p99, "p99.9_us": p999, "max_us": worst,
+        "late_cycles": float(missed), **({} if stolen is None else {"stolen_s": stolen}),
+    }  # fmt: skip
+    found = (
+        f"over {CYCLE_TIME * len(late):g} s median {median:.0f} us, p99 {p99:.0f} us, p99.9 {p999:.0f} us, longest "
+        f"{worst:.0f} us; {missed} of {len(late)} cycles late by more than 1 ms"
+    )
+    if stolen:
+        found += f"; the hypervisor took {stolen:.2f} s"
+    if not missed:
+        return Finding("jitter", "ok", found, figures=figures)
+    advice = "close what else runs here, and mend what is noted above"
+    if stolen:
+        advice += "; what a hypervisor takes, only its owner can give back: use a machine of its own"
+    if worst * 1e-6 >= _STOPPING_PAUSE:
+        advice = f"a pause of {1e3 * _STOPPING_PAUSE:g} ms can stop a real arm's motion: {advice}"
+        return Finding("jitter", "bad" if is_for_real else "note", found, advice, figures)
+    return Finding("jitter", "note", found, advice, figures)
+
+
+def _cycles(seconds: float) -> int:
+    return max(1, round(seconds / CYCLE_TIME))
+
+
+def _run(seconds: float) -> None:
+    left = _cycles(seconds)
+    enter_realtime(PRIORITY)
+    deadline = time.monotonic_ns()
+    while left:
+        late = [0] * min(left, _CYCLES_A_LINE)
+        for cycle in range(len(late)):
+            deadline += round(1e9 * CYCLE_TIME)
+            remaining = deadline - time.monotonic_ns()
+            if remaining > 0:
+                time.sleep(1e-9 * remaining)
+            late[cycle] = time.monotonic_ns() - deadline
+        left -= len(late)
+        print(json.dumps(late), flush=True)
+
+
+if __name__ == "__main__":
+    with awake_cores():
+        _run(float(sys.argv[1]))

@@ -1,0 +1,118 @@
+"""Do states reach us in time: socket buffers, the kernel's network threads, the way to the robot."""
+
+from __future__ import annotations
+
+import ipaddress
+from dataclasses import dataclass
+
+from rcilab.core.errors import ConnectionLostError
+from rcilab.diagnostics.doctor.finding import Finding
+from rcilab.diagnostics.doctor.system import System
+from rcilab.makers.rokae.driver.address import RobotAddress, Route, choose_route
+from rcilab.makers.rokae.driver.transport import RECEIVE_BUFFER
+from rcilab.realtime.punctual import PRIORITY
+
+_POLICIES = {"0": "SCHED_OTHER", "1": "SCHED_FIFO", "2": "SCHED_RR", "3": "SCHED_BATCH", "5": "SCHED_IDLE"}
+_REALTIME_POLICIES = ("1", "2")
+_POLICY_FIELD = 38  # proc_pid_stat(5): field 41, counted from 0 after pid and (comm).
+_FASTER = PRIORITY + 1  # A choice: packets for the control process arrive before it goes on computing.
+_OWN_ADDRESS = "192.168.0.22/24"  # RCI manual 2.5, its example for a computer wired to the robot directly.
+
+
+@dataclass(frozen=True, slots=True)
+class Way:
+    """The interface that leads to an address, and the gateway in between, if any."""
+
+    interface: str
+    gateway: str | None
+
+
+def check_buffers(system: System) -> Finding:
+    """May a socket hold as many states as our client wants to be able to sleep over?"""
+    name, most = "socket buffers", system.read("/proc/sys/net/core/rmem_max")
+    if most.text is None or not most.text.isdecimal():
+        return Finding(name, "note", f"unknown: {most.problem or f'rmem_max says {most.text!r}'}")
+    found = f"up to {most.text} bytes to receive into"
+    if int(most.text) >= RECEIVE_BUFFER:
+        return Finding(name, "ok", found)
+    advice = (
+        f"echo net.core.rmem_max={RECEIVE_BUFFER} | sudo tee /etc/sysctl.d/60-rcilab.conf, then sudo sysctl --system"
+    )
+    return Finding(name, "note", f"{found}, {RECEIVE_BUFFER} wanted: states are lost in a shorter pause", advice)
+
+
+def check_softirq(system: System) -> Finding:
+    """Do the kernel's network threads run ahead of a control loop, or do packets wait behind it on a busy core?"""
+    name, policies = "ksoftirqd", set[str]()
+    for path in system.find("/proc", "[0-9]*/stat"):
+        process, closed, rest = (system.read(path).text or "").rpartition(")")  # None when it has ended meanwhile.
+        fields = rest.split()
+        if closed and "(ksoftirqd/" in process and len(fields) > _POLICY_FIELD:
+            policies.add(fields[_POLICY_FIELD])
+    if not policies:
+        return Finding(name, "note", "cannot be seen from here, as in a container", "look at it on the host itself")
+    found = " and ".join(sorted(_POLICIES.get(policy, f"policy {policy}") for policy in policies))
+    if policies <= set(_REALTIME_POLICIES):
+        return Finding(name, "ok", found)
+    advice = f"for a real arm, after every boot: for p in $(pgrep ksoftirqd/); do sudo chrt -f -p {_FASTER} $p; done"
+    return Finding(name, "note", f"{found}: packets can wait behind SCHED_FIFO loops", advice)
+
+
+def check_route(address: RobotAddress, system: System) -> tuple[Finding, Route | None]:
+    """Does a cable lead from here to the robot, without anything in between? The route goes with the answer."""
+    name = "route"
+    try:
+        route = choose_route(address)
+    except ConnectionLostError as error:
+        advice = f"give this computer an address in its network: sudo ip addr add {_OWN_ADDRESS} dev INTERFACE"
+        return Finding(name, "bad", str(error), f"{advice} (RCI manual 2.5)"), None
+    host, local = route.robot_tcp[0], route.local_tcp[0]
+    if is_here(route):
+        return Finding(name, "ok", f"{local} to {host}, on this machine"), route
+    way = find_way(host, system)
+    if way is None:
+        return Finding(name, "note", f"{local} to {host} by an interface that /proc/net/route does not name"), route
+    found = f"{local} to {host} by {way.interface}"
+    if system.has(f"/sys/class/net/{way.interface}/wireless"):
+        advice = "plug a cable into the robot's direct port (RCI manual 2.5)"
+        return Finding(name, "bad", f"{found}, which is wireless: packets are late and lost", advice), route
+    if way.gateway is not None:
+        advice = (
+            f"wire this computer to the robot's direct port, and give it an address in the robot's network, such as "
+            f"sudo ip addr add {_OWN_ADDRESS} dev {way.interface} (RCI manual 2.5)"
+        )
+        return Finding(name, "note", f"{found} and gateway {way.gateway}", advice), route
+    speed = system.read(f"/sys/class/net/{way.interface}/speed").text or ""
+    return Finding(name, "ok", found + (f", {speed} Mbit/s" if speed.isdecimal() else "")), route
+
+
+def is_here(route: Route) -> bool:
+    """Returns whether the robot is a virtual one on this machine."""
+    host = route.robot_tcp[0]
+    return ipaddress.ip_address(host).is_loopback or host == route.local_tcp[0]
+
+
+def find_way(host: str, system: System) -> Way | None:
+    """Returns where the kernel's table of routes sends packets for an IPv4 address; None when it does not say."""
+    target = int(ipaddress.IPv4Address(host))
+    best: tuple[int, int] | None = None
+    way: Way | None = None
+    for line in (system.read("/proc/net/route").text or "").splitlines()[1:]:
+        words = line.split()
+        try:
+            interface, metric = words[0], int(words[6])
+            destination, gateway, mask = (_address(words[column]) for column in (1, 2, 7))
+        except (IndexError, ValueError):
+            continue
+        rank = (mask, -metric)  # The longest mask wins, then the lowest metric.
+        if target & mask == destination and (best is None or rank > best):
+            best, way = rank, Way(interface, str(ipaddress.IPv4Address(gateway)) if gateway else None)
+    return way
+
+
+def _address(text: str) -> int:
+    """Returns an IPv4 address as a number. The table prints the bytes of the network's order as the host reads them.
+
+    All machines that Python's wheels of ours exist for are little-endian.
+    """
+    return int.from_bytes(bytes.fromhex(text), "little")

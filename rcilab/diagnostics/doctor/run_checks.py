@@ -1,0 +1,64 @@
+"""Every question in its order, the most basic first, answered one after the other."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Iterator
+
+from rcilab.diagnostics.bench.browser import BROWSERS
+from rcilab.diagnostics.bench.machine import ask_realtime
+from rcilab.diagnostics.doctor import kernel, network, processor, software
+from rcilab.diagnostics.doctor.finding import Finding
+from rcilab.diagnostics.doctor.jitter import check_jitter
+from rcilab.diagnostics.doctor.round_trip import check_controller, check_round_trip
+from rcilab.diagnostics.doctor.system import System
+from rcilab.makers.rokae.driver.address import RobotAddress
+
+
+def examine(
+    system: System,
+    *,
+    robot: RobotAddress | None = None,
+    seconds: float = 0.0,
+    progress: Callable[[float, float], None] = lambda spent, worst: None,
+) -> Iterator[Finding]:
+    """Yields the findings about this machine as they are found.
+
+    Args:
+        system: Where to read what the kernel tells about itself.
+        robot: Whom to look for; None: for nobody.
+        seconds: How long to measure jitter, [s]; 0 does not.
+        progress: Called about once a second with the time spent so far and the largest lateness so far, [s].
+    """
+    cores = len(os.sched_getaffinity(0))
+    yield software.check_python(sys.version_info[:3])
+    yield from software.check_packages("rcilab")
+    yield software.check_browser(BROWSERS)
+    yield software.check_address(software.CONTROLLER_ADDRESS)
+    yield software.check_port(software.CONTROLLER_ADDRESS, software.CONTROLLER_PORT)
+    yield kernel.check_kernel(system)
+    yield kernel.check_preemption(system)
+    fifo, locked = ask_realtime()
+    yield kernel.check_fifo(fifo, system)
+    yield kernel.check_memory_lock(locked, system)
+    yield kernel.check_throttling(system)
+    yield kernel.check_vendor_library(fifo, system)
+    yield processor.check_cores(cores)
+    yield processor.check_isolation(cores, system)
+    yield processor.check_governor(system)
+    yield processor.check_sleep(system)
+    yield processor.check_clock(system)
+    yield processor.check_hypervisor(system)
+    yield network.check_buffers(system)
+    yield network.check_softirq(system)
+    is_for_real = False
+    if robot is not None:
+        finding, route = network.check_route(robot, system)
+        yield finding
+        if route is not None:
+            is_for_real = not network.is_here(route)
+            yield check_controller(route.robot_tcp, is_here=not is_for_real)
+            yield check_round_trip(route.robot_tcp[0])
+    if seconds > 0.0:
+        yield check_jitter(seconds, system, progress, is_for_real=is_for_real)

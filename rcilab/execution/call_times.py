@@ -1,0 +1,46 @@
+"""How long a callback takes, call by call, and the sentence about one that is too slow for a cycle of 1 ms."""
+
+from __future__ import annotations
+
+from rcilab.core.clock import CYCLE_TIME
+
+_LATE_CYCLES = 5  # A delay that the play-out of a controller does not always absorb; shorter ones are not worth words.
+_OFTEN = 10  # Slow calls from which on slowness is a habit.
+_FASTER = "return within 1 ms: compute beforehand or in another thread, and do not sleep, print or read files in it"
+
+
+class CallTimes:
+    """The times that the calls of one motion took."""
+
+    def __init__(self) -> None:
+        self._slowest, self._slowest_t = 0.0, 0.0
+        self._calls, self._slow, self._sum = 0, 0, 0.0
+
+    def add(self, duration: float, t: float) -> None:
+        """Takes a call.
+
+        Args:
+            duration: What it took, [s].
+            t: Its motion time, [s].
+        """
+        self._calls += 1
+        self._sum += duration
+        self._slow += duration > CYCLE_TIME
+        if duration > self._slowest:
+            self._slowest, self._slowest_t = duration, t
+
+    def describe(self) -> str:
+        """Returns what a callback that held up the loop did and what helps; "" for one that was in time."""
+        missed = int(self._slowest / CYCLE_TIME)
+        if self._slow >= _OFTEN and 2 * self._slow > self._calls:
+            mean = self._sum / self._calls
+            return (
+                f"{self._slow} of {self._calls} calls of the callback took more than 1 ms, {1e3 * mean:.1f} ms on "
+                f"average, so that its commands came ever later; {_FASTER}"
+            )
+        if missed < _LATE_CYCLES:
+            return ""
+        return (
+            f"the callback took {1e3 * self._slowest:.1f} ms at t = {self._slowest_t:.3f} s, so that {missed} cycles "
+            f"had no command in time; {_FASTER}"
+        )

@@ -1,0 +1,505 @@
+"""The 1 kHz loop: the robot's state is the clock, every state gets one answer, every surprise takes one way out."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+
+from rcilab.core.arrays import JointVector
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.command import CartesianPosition, Command, JointPosition, JointTorque
+from rcilab.core.errors import (
+    CommandRejectedError,
+    ConnectionLostError,
+    ControlError,
+    DeadlineError,
+    InvalidValueError,
+    PlanningError,
+    RcilabError,
+)
+from rcilab.core.faults import Fault
+from rcilab.core.limits import Limits
+from rcilab.core.state import ControllerMode, RobotMode, RobotState
+from rcilab.execution.call_times import CallTimes
+from rcilab.execution.command_validation import check_command, describe_distance, distance_to, require_first
+from rcilab.execution.fault_report import describe_faults
+from rcilab.execution.filters import CommandFilter, is_near
+from rcilab.execution.recorder import CycleLog
+from rcilab.execution.stop_planner import Brake, CartesianBrake, JointBrake, TorqueBrake
+from rcilab.makers.rokae.driver.commands import RciCommands
+from rcilab.makers.rokae.driver.connection import Link
+from rcilab.makers.rokae.driver.refusal import Refusal
+from rcilab.makers.rokae.wire import SafetyStop, StartMotionMode, build_command
+
+if TYPE_CHECKING:
+    from rcilab.core.safety_box import SafetyBox
+    from rcilab.model.robot_model import RobotModel
+
+SILENCE = 0.1  # [s] without a state while moving means that the connection is lost; a choice.
+SILENCE_HERE = 1.0  # [s] The same of a controller on this machine, which pauses both ends when it is busy.
+CATCH_UP = 20  # Cycles: as many lost commands as a controller bridges at most (manual 4.6: 10 to 20).
+MODE_TIMEOUT = 3.0  # [s] for the controller to show the requested modes; virtual ones take 0.2 to 1.05 s.
+STOP_TIMEOUT = 1.0  # [s] for the answer to StopMove when something has gone wrong already.
+FILTER_CYCLES = 5000  # Cycles that filters get at most to arrive at the last command.
+SETTLE_CYCLES = 200  # Cycles that the last command is repeated for at most while the controller comes no nearer to it.
+ARRIVAL_TOLERANCE = 1e-6  # [rad], [m] What a motion may end off its last command: far below what an arm resolves.
+_NEARER = 0.95  # What is left of a distance after SETTLE_CYCLES where a low pass approaches, at 0.1 Hz 0.88.
+REST_TIMEOUT = 1.0  # [s] for the controller's own stop after a fault; the slowest joint needs 0.3 s from full speed.
+_FELT = 1e-3  # [N m] Torques below it are no different from none; a tuning value.
+_NEAR_CYCLES = 2  # Cycles in a row that a filter is at its command until it counts as standing there.
+RECORD_CYCLES = 50  # Cycles that a ControlError carries, as many as the vendor's client writes.
+
+Callback: TypeAlias = Callable[[RobotState, float], Command]
+"""`(state, t) -> command`; t counts controller cycles since the first call, [s]."""
+Watch: TypeAlias = Callable[[float], str | None]
+"""Asked in every cycle, with t; anything but None brings the motion to rest and is the reason."""
+
+_MOTION_MODES = {
+    ControllerMode.JOINT_POSITION: StartMotionMode.JOINT,
+    ControllerMode.JOINT_IMPEDANCE: StartMotionMode.JOINT,
+    ControllerMode.CARTESIAN_POSITION: StartMotionMode.CARTESIAN,
+    ControllerMode.CARTESIAN_IMPEDANCE: StartMotionMode.CARTESIAN,
+    ControllerMode.TORQUE: StartMotionMode.IDLE,
+}
+_COMMANDS = {
+    StartMotionMode.JOINT: JointPosition,
+    StartMotionMode.CARTESIAN: CartesianPosition,
+    StartMotionMode.IDLE: JointTorque,
+}
+
+
+class ControlLoop:
+    """One motion from StartMove to StopMove. Owned by the thread that calls `run`.
+
+    Args:
+        link: The connection.
+        commands: The commands on it.
+        limits: Bounds of the arm, for coming to rest.
+        mode: How the controller shall follow.
+        log: Where every cycle is written.
+        watch: Asked in every cycle whether to stop.
+        model: The arm, for stopping a tool within what its joints allow.
+        filters: What every command of a callback passes before it is sent, in this order.
+        box: The safety box that the controller has, as far as it is known, for what is said of faults.
+        collision_thresholds: Those of the controller, shape (n,), [N m], as far as they are known, for the same.
+        silence: Time without a state that counts as a lost connection, [s].
+    """
+
+    def __init__(
+        self,
+        link: Link,
+        commands: RciCommands,
+        limits: Limits,
+        mode: ControllerMode,
+        log: CycleLog,
+        *,
+        watch: Watch,
+        model: RobotModel,
+        filters: Sequence[CommandFilter],
+        box: SafetyBox | None = None,
+        collision_thresholds: JointVector | None = None,
+        silence: float = SILENCE,
+    ) -> None:
+        if mode not in _MOTION_MODES:
+            raise InvalidValueError("mode", mode, f"is no mode to move in; there are {[m.name for m in _MOTION_MODES]}")
+        self._link = link
+        self._commands = commands
+        self._model = model
+        self._limits = limits
+        self._mode = mode
+        self._motion_mode = _MOTION_MODES[mode]
+        self._kind = _COMMANDS[self._motion_mode]
+        self._log = log
+        self._watch = watch
+        self._silence = silence
+        self._filters = tuple(filters)
+        self._box = box
+        self._thresholds = collision_thresholds
+        self._first_id = 0
+        self._first_q_c = self._first_tau_c = np.zeros(0)
+        self._answered_id = -1
+        self._t = math.nan
+        self._calls = CallTimes()
+        self._command: Command | None = None
+        self._pending: deque[RobotState] = deque()
+        self._brake: Brake = {
+            StartMotionMode.JOINT: lambda: JointBrake(limits.joint),
+            StartMotionMode.CARTESIAN: lambda: CartesianBrake(limits, model),
+            StartMotionMode.IDLE: lambda: TorqueBrake(limits.joint),
+        }[self._motion_mode]()
+
+    def run(self, callback: Callback) -> str | None:
+        """Runs a motion to its end.
+
+        Args:
+            callback: Gives the command for each state; the one with `finished=True` is the last.
+
+        Returns:
+            None when the motion ran to its end, or what `watch` said when it was brought to rest before.
+
+        Raises:
+            ControlError: The controller set error bits or ended the motion by itself.
+            ConnectionLostError: States stopped coming, or the TCP connection broke.
+            CommandRejectedError: The controller refused to begin.
+            DeadlineError: It agreed to begin and then did not.
+            InvalidValueError: The callback returned no usable command; the motion was brought to rest.
+            Exception: Whatever the callback raised, after the motion was brought to rest.
+        """
+        self._commands.start_move(self._mode, self._motion_mode)
+        try:
+            state = self._await_modes()
+            reason = self._stream(state, callback) if isinstance(state, RobotState) else state
+        except BaseException as error:
+            if isinstance(error, ConnectionLostError) and error.record is None:
+                error.record = self._log.recorder.last(RECORD_CYCLES)
+            self._end(error)
+            raise
+        self._end(None, brake=reason is not None)
+        return reason
+
+    def _await_modes(self) -> RobotState | str:
+        """Returns the newest state that shows the requested modes, or what `watch` said when it wants an end first."""
+        deadline = time.monotonic() + MODE_TIMEOUT
+        shown = self._motion_mode.shown_as
+        while time.monotonic() < deadline:
+            states = self._link.poll(self._silence)
+            if not states:
+                raise self._lost()
+            for state in states[:-1]:
+                self._log.write(state, self._link.received_ns)
+            state = states[-1]
+            if state.faults:
+                raise self._fault(state)
+            if state.controller_mode == self._mode and state.motion_generator_mode == shown:
+                self._first_id, self._first_q_c, self._first_tau_c = state.message_id, state.q_c, state.tau_c
+                self._brake.begin(state)
+                return state
+            self._log.write(state, self._link.received_ns)
+            if state.robot_mode is RobotMode.USER_STOPPED:
+                raise ControlError(
+                    f"{self._link.name}: an emergency stop or the safety gate has stopped the arm before the motion "
+                    "began; release it and switch the power on",
+                    (),
+                    self._log.recorder.last(RECORD_CYCLES),
+                ).coded("user_stopped_start")
+            reason = self._watch(0.0)
+            if reason is not None:
+                return reason
+        if not self._has_power():
+            raise self._cut_off()
+        raise DeadlineError(
+            f"{self._link.name} accepted StartMove and then did not show {self._mode.name} within {MODE_TIMEOUT:g} s; "
+            "try again, and look at the teach pendant if it goes on"
+        ).coded("not_started", seconds=f"{MODE_TIMEOUT:g}")
+
+    def _stream(self, state: RobotState, callback: Callback) -> str | None:
+        while True:
+            t = (state.message_id - self._first_id) * CYCLE_TIME
+            reason = self._watch(t)
+            if reason is not None:
+                self._pending.appendleft(state)  # Still without an answer: the way to rest begins with it.
+                return reason
+            try:
+                begun_ns = time.monotonic_ns()
+                answer = callback(state, t)
+                self._calls.add(1e-9 * (time.monotonic_ns() - begun_ns), t)
+                wanted = self._checked(answer, state)
+                command = self._filtered(wanted, state)
+            except BaseException:
+                self._pending.appendleft(state)
+                raise
+            self._answer(state, command)
+            if wanted.finished:
+                return self._finish(wanted, command)
+            state = self._next()
+
+    def _finish(self, wanted: Command, sent: Command) -> str | None:
+        """Lets the filters arrive at the last command, then the controller; returns what `watch` said, as `run`."""
+        near = 0
+        for _ in range(FILTER_CYCLES if self._filters else 0):
+            near = near + 1 if is_near(sent, wanted) else 0
+            if near > _NEAR_CYCLES:
+                break
+            state = self._next()
+            reason = self._watch(self._time(state))
+            if reason is not None:
+                self._pending.appendleft(state)
+                return reason
+            sent = self._filtered(wanted, state)
+            self._answer(state, sent)
+        last = wanted if near else sent
+        breach = self._brake.find_motion()
+        if breach is not None:
+            raise InvalidValueError(
+                f"last command at t = {self._t:.3f} s",
+                round(breach.value, 3),
+                f"{breach.condition.unit} is what standing still from there would take ({breach.text}), so the arm was "
+                "brought to rest within the limits, farther on; let the commands come to rest before finished=True",
+            )
+        state = self._hold(last)
+        if distance_to(state, last) > ARRIVAL_TOLERANCE or self._is_unplayed(state, last):
+            raise self._not_arrived(state, last)
+        return None
+
+    def _is_unplayed(self, state: RobotState, command: Command) -> bool:
+        """Returns whether torques were sent and the controller commands what it did before the first of them."""
+        if not isinstance(command, JointTorque) or np.abs(command.tau).max() < _FELT:
+            return False
+        return np.array_equal(state.tau_c, self._first_tau_c)
+
+    def _next(self) -> RobotState:
+        """Returns the next state that has not been answered yet, oldest first.
+
+        After a hiccup of ours several wait. Each gets its answer in turn, because the controller's play-out buffer
+        still has use for those that are only a little late; what is older than `CATCH_UP` cycles is let go.
+        """
+        deadline = time.monotonic() + self._silence
+        while True:
+            while self._pending:
+                state = self._pending.popleft()
+                if state.faults:
+                    raise self._fault(state)
+                # A lock-step controller repeats a state whose answer it has not seen yet: it was answered, wait on.
+                if state.message_id > self._answered_id:
+                    if state.motion_generator_mode != self._motion_mode.shown_as:
+                        raise self._ended_by_controller(state)
+                    return state
+            states = self._link.poll(deadline - time.monotonic())
+            if not states and time.monotonic() >= deadline:
+                raise self._lost()
+            for state in states[:-CATCH_UP]:
+                if state.message_id > self._answered_id:
+                    self._log.write(state, self._link.received_ns, self._time(state))
+            # A fault anywhere in the burst ends the motion: nothing before it is worth an answer any more.
+            faulty = [state for state in states if state.faults]
+            self._pending.extend(faulty[:1] or states[-CATCH_UP:])
+
+    def _answer(self, state: RobotState, command: Command) -> None:
+        # The end is announced by StopMove alone: a set `finished` byte has never been seen from the vendor's client.
+        self._link.send(build_command(state.message_id, command, state)._replace(finished=False))
+        sent_ns = time.monotonic_ns()
+        self._answered_id = state.message_id
+        self._command = command
+        self._t = self._time(state)
+        self._brake.remember(command, state.message_id - self._first_id, state)
+        self._log.write(state, self._link.received_ns, self._t, sent_ns, command)
+
+    def _hold(self, command: Command) -> RobotState:
+        """Repeats the last command until the controller has played it: StopMove may overtake a queued one.
+
+        A low pass of the controller's delays it: as long as the commanded state comes nearer, it is waited for.
+
+        Returns:
+            The last state, there or as near as it came.
+        """
+        before, cycle = math.inf, 0
+        while True:
+            state = self._next()
+            self._answer(state, command)
+            off, cycle = distance_to(state, command), cycle + 1
+            if off == 0.0:
+                return state
+            if cycle % SETTLE_CYCLES == 0:
+                if off <= ARRIVAL_TOLERANCE or off > _NEARER * before or self._watch(self._time(state)) is not None:
+                    return state
+                before = off
+
+    def _end(self, error: BaseException | None, *, brake: bool = True) -> None:
+        """The one stop path: every end of a motion comes through here, the planned one too.
+
+        Brings the commands to rest within the limits where anything can still be commanded, then ends the motion over
+        TCP. After `ControlError` and `ConnectionLostError` nothing can be: the controller stops by itself.
+        """
+        surprise = error
+        if brake and self._command is not None and not isinstance(error, ControlError | ConnectionLostError):
+            try:
+                self._come_to_rest()
+            except BaseException as worse:
+                surprise = worse
+        first = self._log.recorder.count
+        if surprise is None:
+            surprise = self._end_well()
+        else:
+            self._end_badly(surprise)
+        if isinstance(surprise, ControlError):
+            self._watch_standstill()
+            surprise.stop = self._log.recorder.rows(first)
+        if surprise is not None and surprise is not error:
+            raise surprise from error
+
+    def _come_to_rest(self) -> None:
+        try:
+            way = self._brake.plan()
+        except PlanningError:  # The commands were beyond every bound: StopMove alone ends this.
+            return
+        self._log.braking = True
+        last_id = self._answered_id
+        step = 0
+        while step < len(way):
+            state = self._next()
+            step = min(state.message_id - last_id, len(way))
+            self._answer(state, way[step - 1])
+        self._hold(way[-1])
+
+    def _end_well(self) -> ControlError | None:
+        """Ends a motion that went well so far; returns what the controller found wrong with the last that it played."""
+        states: list[RobotState] = []
+
+        def take(arrived: list[RobotState]) -> None:
+            others(arrived)
+            states.extend(arrived)
+
+        others, self._link.on_states = self._link.on_states, take
+        try:
+            self._commands.stop_move()
+            deadline = time.monotonic() + REST_TIMEOUT
+            while self._is_running(states) and time.monotonic() < deadline:
+                take(self._link.poll(min(self._silence, REST_TIMEOUT)))
+        finally:
+            self._link.on_states, self._log.braking = others, False
+        faulty = next((state for state in states if state.faults), None)
+        return None if faulty is None else self._fault(faulty)
+
+    def _is_running(self, states: list[RobotState]) -> bool:
+        """Returns whether the newest of these states still shows the motion without a fault, or there is none."""
+        shown = (self._mode, self._motion_mode.shown_as)
+        return not states or (
+            not any(state.faults for state in states)
+            and (states[-1].controller_mode, states[-1].motion_generator_mode) == shown
+        )
+
+    def _end_badly(self, error: BaseException) -> None:
+        others = self._link.on_states
+        if isinstance(error, ControlError) and not self._link.is_heard:
+            self._link.on_states = self._record  # The controller's own stop has begun.
+        try:
+            self._commands.stop_move(STOP_TIMEOUT)
+        except (CommandRejectedError, ConnectionLostError, DeadlineError) as refusal:
+            error.add_note(f"StopMove did not go well either: {refusal}")
+        finally:
+            self._link.on_states, self._log.braking = others, False
+
+    def _watch_standstill(self) -> None:
+        """Records the controller's own stop, so that the record shows it and the next motion starts from rest."""
+        deadline = time.monotonic() + REST_TIMEOUT
+        before: RobotState | None = None
+        while time.monotonic() < deadline:
+            states = self._link.poll(self._silence)
+            self._record(states)
+            if not states or (before is not None and _stands(before, states[-1])):
+                return
+            before = states[-1]
+
+    def _record(self, states: list[RobotState]) -> None:
+        for state in states:
+            self._log.write(state, self._link.received_ns, self._time(state))
+
+    def _checked(self, command: Any, state: RobotState) -> Command:
+        """Returns the callback's command once it is found good."""
+        return check_command(command, self._kind, self._link.n, self._time(state))
+
+    def _filtered(self, command: Command, state: RobotState) -> Command:
+        """Returns what is to be sent for a command; the first one starts the filters, and must be where the arm is."""
+        is_first = self._command is None
+        for link in self._filters:
+            if is_first:
+                link.begin(command)
+            command = link.step(command)
+        if is_first:
+            require_first(command, state, self._limits)
+        return command
+
+    def _time(self, state: RobotState) -> float:
+        return (state.message_id - self._first_id) * CYCLE_TIME
+
+    def _fault(self, state: RobotState) -> ControlError:
+        t = self._time(state) if self._command is not None else math.nan
+        self._log.write(state, self._link.received_ns, t)
+        pressed = self._find_safety_stop(state)
+        if pressed is None and state.faults == (Fault.INSTABILITY_DETECTION,) and not self._has_power():
+            return self._cut_off()
+        record = self._log.recorder.last(RECORD_CYCLES)
+        late = ""
+        if Fault.INSTABILITY_DETECTION in state.faults:
+            late = self._calls.describe()
+        message = describe_faults(
+            state.faults,
+            record,
+            t,
+            self._model,
+            self._limits,
+            self._mode,
+            late=late,
+            pressed="" if pressed is None else pressed.sentence,
+            box=self._box,
+            collision_thresholds=self._thresholds,
+        )
+        error = ControlError(message, state.faults, record)
+        return error if pressed is None else error.coded("safety_stop", status=pressed.word)
+
+    def _find_safety_stop(self, state: RobotState) -> Refusal | None:
+        """Returns which safety stop ended the motion; None: a fault of the motion did."""
+        if state.robot_mode is not RobotMode.USER_STOPPED:
+            return None
+        try:
+            is_gate = self._commands.safety_stop() is SafetyStop.GSTOP
+        except RcilabError:  # The state says that there is one.
+            is_gate = False
+        return Refusal.GSTOP if is_gate else Refusal.ESTOP
+
+    def _not_arrived(self, state: RobotState, command: Command) -> ControlError:
+        if isinstance(command, JointTorque) or np.array_equal(state.q_c, self._first_q_c):
+            cause = "the controller has played none of the commands: they are lost on their way, look at the network"
+        elif state.success_rate < 1.0:
+            cause = (
+                f"{100.0 * state.success_rate:.1f} % of the last second's commands arrived in time: look at the network"
+            )
+        else:
+            cause = "something in the controller holds it back: look at the filters (set_filters) and soft limits"
+        record = self._log.recorder.last(RECORD_CYCLES)
+        off = "" if isinstance(command, JointTorque) else f": {describe_distance(state, command)} from its end"
+        return ControlError(f"the motion was executed and did not arrive{off}; {cause}", (), record)
+
+    def _has_power(self) -> bool:
+        try:
+            return self._commands.motor_state()
+        except RcilabError:  # Whoever is gone has another error.
+            return True
+
+    def _cut_off(self) -> ControlError:
+        record = self._log.recorder.last(RECORD_CYCLES)
+        said = "the motors were switched off while the motion ran, and the brakes hold the arm; power_on() leads on"
+        return ControlError(f"{self._link.name}: {said}", (), record)
+
+    def _ended_by_controller(self, state: RobotState) -> ControlError:
+        self._log.write(state, self._link.received_ns, self._time(state))
+        if not self._has_power():
+            return self._cut_off()
+        record = self._log.recorder.last(RECORD_CYCLES)
+        mode = state.robot_mode.name.lower().replace("_", " ")
+        return ControlError(
+            f"the controller ended the motion by itself at t = {self._time(state):.3f} s without naming a fault "
+            f"(robot mode: {mode}); look at the teach pendant and the emergency stop",
+            (),
+            record,
+        )
+
+    def _lost(self) -> ConnectionLostError:
+        when = "before the first command" if math.isnan(self._t) else f"after t = {self._t:.3f} s"
+        return ConnectionLostError(
+            f"{self._link.name}: no state for {self._silence:g} s, {when}; look whether the controller runs and the "
+            "cable is in, then connect again. The controller stops an arm that gets no commands by itself"
+        )
+
+
+def _stands(before: RobotState, after: RobotState) -> bool:
+    return (
+        after.message_id > before.message_id
+        and bool(np.array_equal(before.q_c, after.q_c))
+        and float(np.abs(after.dq).max()) < 1e-3
+    )

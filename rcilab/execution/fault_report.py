@@ -1,0 +1,199 @@
+"""One sentence for a motion that the controller stopped: which fault, which joint, which number, what to do."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rcilab.conformance import Breach, CartesianMonitor, JointMonitor, TorqueMonitor
+from rcilab.core.arrays import Array, JointVector
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.faults import BOX_FAULTS, RANGE_FAULTS, Fault, name_faults
+from rcilab.core.limits import Limits
+from rcilab.core.safety_box import SafetyBox
+from rcilab.core.spatial import Pose
+from rcilab.core.state import ControllerMode
+from rcilab.execution.measured_report import YIELDING_MODES, describe_measured, describe_passed_face
+from rcilab.execution.rotation import nine
+
+if TYPE_CHECKING:
+    from rcilab.model.robot_model import RobotModel
+
+_OF_JOINTS = (
+    "poses inside the tool's limits are not enough: the joints that they lead to have limits of their own "
+    "(check(motion, model, mode='cartesian_position') computes them); move the tool more slowly or with less "
+    "acceleration there, and stay away from singular poses"
+)
+_FOLLOWED = 10  # Cycles before the fault that are looked at for the joint that came nearest to a bound.
+_HISTORY = 3  # Commands that a third difference looks back to.
+
+
+def describe_faults(
+    faults: Iterable[Fault],
+    record: NDArray[np.void],
+    t: float,
+    model: RobotModel,
+    limits: Limits,
+    mode: ControllerMode,
+    *,
+    late: str = "",
+    pressed: str = "",
+    box: SafetyBox | None = None,
+    collision_thresholds: JointVector | None = None,
+) -> str:
+    """Returns the message of the error that a motion ends with.
+
+    Args:
+        faults: What the controller reported, in wire order.
+        record: The last cycles, see `cycle_dtype`.
+        t: Motion time of the state that carried the faults, [s]; NaN before the first command.
+        model: The arm with its tool and load.
+        limits: Its bounds.
+        mode: How it was commanded.
+        late: What `CallTimes.describe` returned, for a motion that a slow callback may have ended.
+        pressed: Which safety stop ended the motion, in a sentence with what to do; "" for none. The RCI has no error
+            bit for it, so that the bits which a controller sets meanwhile say something else.
+        box: The safety box that the controller has, as far as it is known.
+        collision_thresholds: Its collision thresholds, shape (n,), [N m], as far as they are known.
+    """
+    faults = tuple(faults)
+    when = "before the first command" if math.isnan(t) else f"at t = {t:.3f} s"
+    if pressed:
+        bits = name_faults(faults)
+        return (
+            f"the controller stopped the motion {when}: {pressed} (reported as {bits}); .record holds the last cycles"
+        )
+    names = ", ".join(f"{fault.manual_name} ({fault.cause})" for fault in faults)
+    parts = [f"the controller stopped the motion {when}: {names}"]
+    commanded, is_broken = _describe_commanded(faults, record, limits)
+    measured = describe_measured(faults, record, model, limits, mode, collision_thresholds)
+    followed = _describe_followed(faults, record, limits) if np.isfinite(record["command_pose"]).any() else ""
+    passed = describe_passed_face(faults, record, box)
+    parts += [said for said in (commanded, followed, *measured, passed) if said]
+    if faults:
+        parts.append(late or (_OF_JOINTS if followed else _remedy(faults[0], mode, is_broken=is_broken)))
+    clears = "" if (RANGE_FAULTS | BOX_FAULTS) & set(faults) else "recover() clears the fault; "
+    parts.append(f"{clears}.record holds the last cycles")
+    return "; ".join(parts)
+
+
+def _remedy(fault: Fault, mode: ControllerMode, *, is_broken: bool) -> str:
+    """Returns what to do about a fault; where the commands kept their limits, it is not the plan's."""
+    if mode is ControllerMode.TORQUE:
+        return fault.torque_remedy
+    if mode in YIELDING_MODES:
+        return fault.impedance_remedy
+    return fault.remedy if is_broken else fault.outside_remedy
+
+
+def _describe_followed(faults: tuple[Fault, ...], record: NDArray[np.void], limits: Limits) -> str:
+    """Returns which joint was nearest to a bound of the faults, where joints follow from poses; "" for other faults.
+
+    The joint angles that broke it are the controller's; the state shows those before, that were still followed.
+    """
+    q, joint = record["q_c"][-_FOLLOWED:], limits.joint
+    for order, (fault, bounds, name, unit) in enumerate(
+        (
+            (Fault.COMMAND_JOINT_VELOCITY_LIMITS_VIOLATION, joint.velocity, "velocity", "rad/s"),
+            (Fault.COMMAND_JOINT_ACCELERATION_LIMITS_VIOLATION, joint.acceleration, "acceleration", "rad/s^2"),
+            (Fault.COMMAND_JOINT_ACCELERATION_DISCONTINUITY, joint.jerk, "jerk", "rad/s^3"),
+        ),
+        1,
+    ):
+        if fault in faults and len(q) > order:
+            values = np.diff(q, order, axis=0) / CYCLE_TIME**order
+            place = np.unravel_index((np.abs(values) / bounds).argmax(), values.shape)
+            number, bound = place[1] + 1, bounds[place[1]]
+            return (
+                f"of the joints that follow from the poses joint {number} came nearest, with a commanded {name} of "
+                f"{values[place]:.4g} {unit} before the pose that broke its bound ({bound:g} {unit})"
+            )
+    return ""
+
+
+def _describe_commanded(faults: tuple[Fault, ...], record: NDArray[np.void], limits: Limits) -> tuple[str, bool]:
+    """Returns the first command in the record that breaks a condition, and whether one does; else the last command.
+
+    What the controller measured, and the torques it computed, are not judged here. A condition of one of the faults is
+    what is looked for; another that is broken only counts for the second answer.
+    """
+    sent = record[record["sent_ns"] != 0]
+    is_broken = False
+    if not len(sent):
+        return "", is_broken
+    for field, judge, describe in (
+        ("command", _judge_joints, _describe_joints),
+        ("command_pose", _judge_poses, _describe_pose),
+        ("command_tau", _judge_torques, _describe_torques),
+    ):
+        rows = sent[np.isfinite(sent[field].reshape(len(sent), -1)).all(axis=1)]
+        if not len(rows):
+            continue
+        values = rows[field]
+        if rows["t"][0] <= 0.0:  # The first command of the motion: before it the arm stood.
+            stood = {"command": rows["q_c"][0], "command_pose": values[0], "command_tau": np.zeros_like(values[0])}
+            values = np.concatenate((np.repeat(stood[field][np.newaxis], _HISTORY, axis=0), values))
+        first = len(values) - len(rows)
+        for place, breaches in judge(values, np.pad(rows["command_psi"], (first, 0), "edge"), limits):
+            is_broken = is_broken or bool(breaches)
+            for breach in breaches:
+                if breach.condition.fault in faults:
+                    return f"{breach.text} in the command at t = {rows['t'][place - first]:.3f} s", True
+        return f"last command at t = {rows['t'][-1]:.3f} s, {describe(values)}", is_broken
+    return "", is_broken
+
+
+def _judge_joints(q: Array, psi: Array, limits: Limits) -> Iterator[tuple[int, list[Breach]]]:
+    if len(q) <= _HISTORY:
+        return
+    dq = np.diff(q[:_HISTORY], axis=0) / CYCLE_TIME
+    monitor = JointMonitor(limits.joint)
+    monitor.reset(q[2].tolist(), dq[1].tolist(), ((dq[1] - dq[0]) / CYCLE_TIME).tolist())
+    for place in range(_HISTORY, len(q)):
+        monitor.step(q[place].tolist())
+        yield place, monitor.broken()
+
+
+def _judge_poses(T: Array, psi: Array, limits: Limits) -> Iterator[tuple[int, list[Breach]]]:
+    monitor = CartesianMonitor(limits)
+    poses = [_pose(matrix) for matrix in T]
+    angles = [angle if math.isfinite(angle) else None for angle in psi.tolist()]
+    monitor.reset(poses[0], angles[0])
+    for place in range(1, len(poses)):
+        monitor.step(poses[place], angles[place])
+        if place >= _HISTORY:  # The first differences only fill the monitor's memory.
+            yield place, monitor.broken()
+
+
+def _judge_torques(tau: Array, psi: Array, limits: Limits) -> Iterator[tuple[int, list[Breach]]]:
+    monitor = TorqueMonitor(limits.joint)
+    monitor.reset(tau[0].tolist())
+    for place in range(1, len(tau)):
+        monitor.step(tau[place].tolist())
+        yield place, monitor.broken()
+
+
+def _describe_joints(q: Array) -> str:
+    velocity = np.abs(np.diff(q[-2:], axis=0)).sum(axis=0) / CYCLE_TIME
+    joint = int(velocity.argmax())
+    return f"joint {joint + 1} the fastest with {velocity[joint]:.3g} rad/s at {math.degrees(q[-1][joint]):.2f} deg"
+
+
+def _describe_pose(T: Array) -> str:
+    speed = float(np.linalg.norm(np.diff(T[-2:, :3, 3], axis=0))) / CYCLE_TIME
+    x, y, z = T[-1, :3, 3].tolist()
+    return f"tool at {x:.3f}, {y:.3f}, {z:.3f} m with {speed:.3g} m/s"
+
+
+def _describe_torques(tau: Array) -> str:
+    joint = int(np.abs(tau[-1]).argmax())
+    return f"largest torque {tau[-1][joint]:.3g} N m at joint {joint + 1}"
+
+
+def _pose(T: Array) -> Pose:
+    x, y, z = T[:3, 3].tolist()
+    return Pose.from_parts(nine(T[:3, :3]), (x, y, z))

@@ -1,0 +1,310 @@
+"""What may stand between a callback and the wire: a low-pass filter, and a limiter of velocity, acceleration and jerk.
+
+The vendor's client filters every command at 100 Hz whether one wants it or not, and ends a motion where the filter is;
+here both are options of `RobotSession.control`, and a motion ends when what is sent has arrived at the last command.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from rcilab.core.arrays import Array, as_number
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.command import CartesianPosition, Command, JointPosition, JointTorque
+from rcilab.core.errors import InvalidValueError
+from rcilab.core.limits import Limits
+from rcilab.execution.rotation import nine, rotation_matrix, rotation_vector
+from rcilab.makers.rokae.wire.bounds import FILTER_OFF
+from rcilab.motion import LIMIT_MARGIN
+from rcilab.motion.path import slerp
+
+_CATCH_UP = 300.0  # [1/s] What is behind is caught up with at most so much of itself a second; a choice.
+_BRAKING = (
+    0.7  # Part of the acceleration that braking counts on: the rest is for the delay of a limited jerk. A choice.
+)
+_HALVINGS = 16  # Steps of a search: 1/65536 of the acceleration.
+_ROUNDING = 1.0 + 1e-6
+_NEAR = 1e-7  # [rad, m or N m] In one cycle that is a jerk of 100 units/s^3.
+_ARRIVED = 1e-12  # [rad or m] Rounding.
+
+
+def smoothing(cut_off: float) -> float:
+    """Returns k of the first-order filter x += k (u - x) at 1 kHz: dt / (dt + 1 / (2 pi f)); 1 at 1000 Hz and above.
+
+    Args:
+        cut_off: f, [Hz].
+
+    Raises:
+        InvalidValueError: It is not above 0.
+    """
+    frequency = as_number(cut_off, "cut_off", "Hz")
+    if not frequency > 0.0:
+        raise InvalidValueError("cut_off", cut_off, f"must be above 0 [Hz]; {FILTER_OFF:g} switches the filter off")
+    return 1.0 if frequency >= FILTER_OFF else CYCLE_TIME / (CYCLE_TIME + 1.0 / (math.tau * frequency))
+
+
+def low_pass(u: Array, x: Array, k: float) -> Array:
+    """Returns the filter's next value from the command u and its last value x."""
+    return x + k * (u - x)
+
+
+def low_pass_pose(u: Array, x: Array, k: float) -> Array:
+    """Returns the next pose from the commanded pose u and the last one x, (4, 4): the turn in the same proportion."""
+    T = u.copy()
+    T[:3, 3] = low_pass(u[:3, 3], x[:3, 3], k)
+    T[:3, :3] = np.array(slerp(nine(x[:3, :3]), nine(u[:3, :3]), k)).reshape(3, 3)
+    return T
+
+
+class Bounds(NamedTuple):
+    """What a rate limiter keeps: numbers for a vector's length, or arrays, one element a coordinate."""
+
+    velocity: float | Array
+    acceleration: float | Array
+    jerk: float | Array
+
+
+class Rate(NamedTuple):
+    """Where a limited signal is, by backward differences at 1 ms."""
+
+    velocity: Array
+    acceleration: Array
+
+
+def limit_rate(behind: Array, wanted: Array, last: Rate, bounds: Bounds) -> Rate:
+    """Returns the next step of coordinates that each keep their own bounds.
+
+    A stream inside the bounds passes unchanged. After a jump they run towards it as fast as the bounds allow and brake
+    in time (a jump of a few mrad is passed by part of it), which the vendor's law, that of libfranka's `limitRate`,
+    does not: it clips velocity, acceleration and jerk and runs past.
+
+    Args:
+        behind: How far the command is from the last value, shape (n,).
+        wanted: The command's own step over this cycle as a velocity, shape (n,).
+        last: The last step.
+        bounds: Each a number or of shape (n,).
+    """
+    feed = np.clip(wanted, -bounds.velocity, bounds.velocity)
+    rest = behind - feed * CYCLE_TIME
+    velocity = np.clip(feed + np.sign(rest) * _closing_speed(np.abs(rest), bounds), -bounds.velocity, bounds.velocity)
+    acceleration = (velocity - last.velocity) / CYCLE_TIME
+    highest = np.minimum(_rising(bounds.velocity - last.velocity, bounds.jerk), bounds.acceleration)
+    lowest = -np.minimum(_rising(bounds.velocity + last.velocity, bounds.jerk), bounds.acceleration)
+    acceleration = np.minimum(np.maximum(acceleration, lowest), highest)
+    step = bounds.jerk * CYCLE_TIME
+    acceleration = np.clip(acceleration, last.acceleration - step, last.acceleration + step)
+    return Rate(last.velocity + acceleration * CYCLE_TIME, acceleration)
+
+
+def limit_vector_rate(behind: Array, wanted: Array, last: Rate, bounds: Bounds) -> Rate:
+    """Returns the next step of a vector whose length keeps the bounds: the tool's translation, or its rotation.
+
+    As `limit_rate`, shapes (3,), bounds as numbers.
+    """
+    feed = _shortened(wanted, bounds.velocity)
+    rest = behind - feed * CYCLE_TIME
+    length = float(np.linalg.norm(rest))
+    closing = rest * (float(_closing_speed(length, bounds)) / length) if length > 0.0 else rest
+    velocity = _shortened(feed + closing, bounds.velocity)
+    goal = _shortened((velocity - last.velocity) / CYCLE_TIME, bounds.acceleration)
+    # Letting go of the acceleration is always allowed; from there we go towards the goal as far as all bounds permit.
+    size = float(np.linalg.norm(last.acceleration))
+    ease = last.acceleration * max(0.0, 1.0 - float(bounds.jerk) * CYCLE_TIME / size) if size > 0.0 else np.zeros(3)
+    low, high = 0.0, 1.0
+    if _is_allowed(goal, last, bounds):
+        low = 1.0
+    else:
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (low + high)
+            if _is_allowed(ease + middle * (goal - ease), last, bounds):
+                low = middle
+            else:
+                high = middle
+    acceleration = ease + low * (goal - ease)
+    return Rate(last.velocity + acceleration * CYCLE_TIME, acceleration)
+
+
+class CommandFilter(Protocol):
+    """Stands between a callback and the wire. Owned by the control loop."""
+
+    def begin(self, command: Command) -> None:
+        """Starts at rest at the first command of a motion."""
+        ...
+
+    def step(self, command: Command) -> Command:
+        """Returns what to send for a command, one a cycle."""
+        ...
+
+
+class LowPass:
+    """The first-order filter of the vendor's client, for every kind of command.
+
+    Args:
+        cut_off: Cut-off frequency, [Hz]; the vendor's client uses 100 unless told otherwise.
+
+    Raises:
+        InvalidValueError: The frequency is not above 0.
+    """
+
+    def __init__(self, cut_off: float) -> None:
+        self._k = smoothing(cut_off)
+        self._last: Command | None = None
+
+    def begin(self, command: Command) -> None:
+        """Starts at rest at the first command of a motion."""
+        self._last = command
+
+    def step(self, command: Command) -> Command:
+        """Returns the filtered command."""
+        last, k = self._last, self._k
+        if isinstance(command, JointPosition) and isinstance(last, JointPosition):
+            command = JointPosition(low_pass(command.q, last.q, k), command.finished)
+        elif isinstance(command, JointTorque) and isinstance(last, JointTorque):
+            command = JointTorque(low_pass(command.tau, last.tau, k), command.finished)
+        elif isinstance(command, CartesianPosition) and isinstance(last, CartesianPosition):
+            psi = command.psi
+            if psi is not None and last.psi is not None:
+                psi = last.psi + k * (psi - last.psi)
+            command = CartesianPosition(low_pass_pose(command.T_base_tool, last.T_base_tool, k), psi, command.finished)
+        self._last = command
+        return command
+
+
+class RateLimiter:
+    """Keeps every command inside the arm's limits of velocity, acceleration and jerk, or of torque rate.
+
+    Poses are kept inside the tool's limits, as the vendor's client does it; what a jump of the tool asks of the joints
+    can still be too much.
+
+    Args:
+        limits: Bounds of the arm, from the manual's table or the vendor's (`cartesian_limits`); `LIMIT_MARGIN` is kept.
+    """
+
+    def __init__(self, limits: Limits) -> None:
+        joint, c, psi = limits.joint, limits.cartesian, limits.arm_angle
+        self._joint = _bounds(joint.velocity, joint.acceleration, joint.jerk)
+        self._translation = _bounds(c.translation_velocity, c.translation_acceleration, c.translation_jerk)
+        self._rotation = _bounds(c.rotation_velocity, c.rotation_acceleration, c.rotation_jerk)
+        self._psi = None if psi is None else _bounds(psi.velocity, psi.acceleration, psi.jerk)
+        self._torque_step = LIMIT_MARGIN * joint.torque_rate * CYCLE_TIME
+        self._command: Command | None = None  # As it was asked for.
+        self._sent: Command | None = None
+        self._rates: list[Rate] = []
+
+    def begin(self, command: Command) -> None:
+        """Starts at rest at the first command of a motion; torques start at zero."""
+        self._command = self._sent = command
+        if isinstance(command, JointPosition):
+            self._rates = [_rest(len(command.q))]
+        elif isinstance(command, JointTorque):
+            self._sent = JointTorque(np.zeros_like(command.tau))
+        else:
+            self._rates = [_rest(3), _rest(3), _rest(1)]
+
+    def step(self, command: Command) -> Command:
+        """Returns the command, or as much of it as the limits allow in this cycle."""
+        before, sent = self._command, self._sent
+        self._command = command
+        if isinstance(command, JointTorque) and isinstance(sent, JointTorque):
+            change = np.clip(command.tau - sent.tau, -self._torque_step, self._torque_step)
+            self._sent = JointTorque(_snapped(sent.tau + change, command.tau), command.finished)
+        elif (
+            isinstance(command, JointPosition) and isinstance(before, JointPosition) and isinstance(sent, JointPosition)
+        ):
+            wanted = (command.q - before.q) / CYCLE_TIME
+            self._rates[0] = limit_rate(command.q - sent.q, wanted, self._rates[0], self._joint)
+            q = sent.q + self._rates[0].velocity * CYCLE_TIME
+            self._sent = JointPosition(_snapped(q, command.q), command.finished)
+        elif isinstance(before, CartesianPosition) and isinstance(sent, CartesianPosition):
+            assert isinstance(command, CartesianPosition)  # A motion has commands of one kind.
+            self._sent = CartesianPosition(
+                self._pose(command.T_base_tool, before.T_base_tool, sent.T_base_tool),
+                self._arm_angle(command.psi, before.psi, sent.psi),
+                command.finished,
+            )
+        assert self._sent is not None
+        return self._sent
+
+    def _pose(self, T: Array, T_before: Array, T_sent: Array) -> Array:
+        p, p_sent = T[:3, 3], T_sent[:3, 3]
+        R, R_sent = T[:3, :3], T_sent[:3, :3]
+        wanted = (p - T_before[:3, 3]) / CYCLE_TIME
+        self._rates[0] = limit_vector_rate(p - p_sent, wanted, self._rates[0], self._translation)
+        wanted = rotation_vector(T_before[:3, :3], R) / CYCLE_TIME
+        self._rates[1] = limit_vector_rate(rotation_vector(R_sent, R), wanted, self._rates[1], self._rotation)
+        T = np.eye(4)
+        T[:3, 3] = _snapped(p_sent + self._rates[0].velocity * CYCLE_TIME, p)
+        T[:3, :3] = _snapped(rotation_matrix(self._rates[1].velocity * CYCLE_TIME) @ R_sent, R)
+        return T
+
+    def _arm_angle(self, psi: float | None, before: float | None, sent: float | None) -> float | None:
+        if psi is None or before is None or sent is None or self._psi is None:
+            return psi
+        wanted = np.array([(psi - before) / CYCLE_TIME])
+        self._rates[2] = limit_rate(np.array([psi - sent]), wanted, self._rates[2], self._psi)
+        limited = sent + float(self._rates[2].velocity[0]) * CYCLE_TIME
+        return psi if abs(limited - psi) <= _ARRIVED else limited
+
+
+def is_near(sent: Command, wanted: Command) -> bool:
+    """Returns whether what is sent is as good as what was wanted: the rest, in one cycle, is no jerk to speak of."""
+    if isinstance(sent, CartesianPosition) and isinstance(wanted, CartesianPosition):
+        off = float(np.abs(sent.T_base_tool - wanted.T_base_tool).max())
+        return max(off, abs((sent.psi or 0.0) - (wanted.psi or 0.0))) <= _NEAR
+    if isinstance(sent, JointTorque) and isinstance(wanted, JointTorque):
+        return float(np.abs(sent.tau - wanted.tau).max()) <= _NEAR
+    if isinstance(sent, JointPosition) and isinstance(wanted, JointPosition):
+        return float(np.abs(sent.q - wanted.q).max()) <= _NEAR
+    return True
+
+
+def _closing_speed(distance: Array | float, bounds: Bounds) -> Array | float:
+    """Returns the largest speed from which there is time to brake within a distance, acceleration and jerk limited.
+
+    From speed v, standing takes v^2 / (2 a) + v a / (2 j), with the jerk's ramps (exact from v = a^2 / j up).
+    """
+    a = _BRAKING * bounds.acceleration
+    ramp = a * a / (2.0 * bounds.jerk)
+    return np.minimum(_CATCH_UP * distance, np.sqrt(ramp * ramp + 2.0 * a * distance) - ramp)
+
+
+def _rising(room: Array, jerk: float | Array) -> Array:
+    """Returns the largest acceleration from which a velocity does not pass its bound, `room` away, when it eases off.
+
+    With an acceleration a for a cycle, then less by the jerk in each, a velocity still grows by a h / 2 + a^2 / (2 j).
+    """
+    half = 0.5 * CYCLE_TIME
+    return jerk * (np.sqrt(half * half + 2.0 * np.maximum(room, 0.0) / jerk) - half)
+
+
+def _is_allowed(acceleration: Array, last: Rate, bounds: Bounds) -> bool:
+    """Returns whether a vector's acceleration keeps the bounds, now and when it eases off from here."""
+    size = float(np.linalg.norm(acceleration))
+    change = float(np.linalg.norm(acceleration - last.acceleration))
+    reached = last.velocity + acceleration * (0.5 * CYCLE_TIME + 0.5 * size / float(bounds.jerk))
+    return (
+        size <= float(bounds.acceleration) * _ROUNDING
+        and change <= float(bounds.jerk) * CYCLE_TIME * _ROUNDING
+        and float(np.linalg.norm(reached)) <= float(bounds.velocity) * _ROUNDING
+    )
+
+
+def _bounds(velocity: float | Array, acceleration: float | Array, jerk: float | Array) -> Bounds:
+    return Bounds(LIMIT_MARGIN * velocity, LIMIT_MARGIN * acceleration, LIMIT_MARGIN * jerk)
+
+
+def _rest(size: int) -> Rate:
+    return Rate(np.zeros(size), np.zeros(size))
+
+
+def _shortened(vector: Array, longest: float | Array) -> Array:
+    length = float(np.linalg.norm(vector))
+    return vector if length <= longest else vector * (float(longest) / length)
+
+
+def _snapped(x: Array, u: Array) -> Array:
+    """Returns the command itself where what is sent differs from it by rounding only."""
+    return u if float(np.abs(x - u).max()) <= _ARRIVED else x

@@ -1,0 +1,143 @@
+"""What was measured in the last cycles of a motion that the controller stopped: the joint, its value and its bound."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rcilab.conformance import Breach, MeasuredMonitor
+from rcilab.conformance.measured_conditions import yielding_limits
+from rcilab.core.arrays import Array, JointVector
+from rcilab.core.errors import KinematicsError
+from rcilab.core.faults import BOX_FAULTS, RANGE_FAULTS, Fault
+from rcilab.core.limits import Limits
+from rcilab.core.safety_box import SafetyBox
+from rcilab.core.state import ControllerMode
+
+if TYPE_CHECKING:
+    from rcilab.model.robot_model import RobotModel
+
+_CLOSE = math.radians(1.0)  # A joint farther inside than this has not come near the limits that we know of.
+_LEAST = 1e-3  # [N m] So that a threshold of zero divides nothing by zero.
+_CARTESIAN = (ControllerMode.CARTESIAN_POSITION, ControllerMode.CARTESIAN_IMPEDANCE)
+YIELDING_MODES = (ControllerMode.JOINT_IMPEDANCE, ControllerMode.CARTESIAN_IMPEDANCE, ControllerMode.TORQUE)
+"""In which forces move the arm, and not its commands alone."""
+
+
+class _Measured(NamedTuple):
+    """The last cycles judged as our virtual controller does; a real one may allow less."""
+
+    breaches: list[Breach]
+    ddq: Array
+    """Low-passed joint accelerations, shape (N, n), [rad/s^2]."""
+
+
+def describe_measured(
+    faults: Iterable[Fault],
+    record: NDArray[np.void],
+    model: RobotModel,
+    limits: Limits,
+    mode: ControllerMode,
+    collision_thresholds: JointVector | None = None,
+) -> Iterator[str]:
+    """Yields what was measured in the last cycles of what the faults name.
+
+    Args:
+        faults: What the controller reported.
+        record: The last cycles, see `cycle_dtype`.
+        model: The arm with its tool and load.
+        limits: Its bounds.
+        mode: How it was commanded.
+        collision_thresholds: Those of the controller, shape (n,), [N m]; None: not known.
+    """
+    faults = set(faults)
+    if not len(record):
+        return
+    measured = _judge(record, model, limits, mode)
+    said = {breach.condition.fault: breach.text for breach in measured.breaches}
+    joint = limits.joint
+    for fault, values, bounds, unit in (
+        (Fault.ACTUAL_JOINT_VELOCITY_LIMITS_VIOLATION, record["dq"], joint.velocity, "rad/s"),
+        (Fault.ACTUAL_JOINT_ACCELERATION_LIMITS_VIOLATION, measured.ddq, joint.acceleration, "rad/s^2"),
+    ):
+        if fault in faults and fault not in said:
+            place = np.unravel_index((np.abs(values) / bounds).argmax(), values.shape)
+            number, bound = place[1] + 1, bounds[place[1]]
+            said[fault] = f"joint {number} was measured at {values[place]:.3g} {unit} (commands: {bound:g} {unit})"
+    yield from (text for fault, text in said.items() if fault in faults and fault not in RANGE_FAULTS)
+    if RANGE_FAULTS & faults:
+        yield _describe_range(faults, record, limits)
+    if Fault.COLLISION in faults and np.isfinite(record["tau_ext_in_base"][-1]).all():
+        yield _describe_collision(record, model, limits, collision_thresholds)
+    rate = float(record["success_rate"][-1])
+    if Fault.INSTABILITY_DETECTION in faults and rate < 1.0:
+        yield f"{100.0 * (1.0 - rate):.2g} % of the last second's commands did not arrive in time"
+
+
+def describe_passed_face(faults: Iterable[Fault], record: NDArray[np.void], box: SafetyBox | None) -> str:
+    """Returns which face of the safety box the tool passed, and how far; "" where that is not known."""
+    if box is None or not BOX_FAULTS & set(faults) or not len(record):
+        return ""
+    measured = record["T_base_tool"][:, :3, 3]
+    sent = record["command_pose"][:, :3, 3]
+    places = [place for place in (*sent, *measured) if np.isfinite(place).all()]
+    if not places:
+        return ""
+    face, beyond = max((box.passed_face(place) for place in places), key=lambda passed: passed[1])
+    return f"the tool came {1e3 * max(beyond, 0.0):.1f} mm past the {face} face of the safety box"
+
+
+def _judge(record: NDArray[np.void], model: RobotModel, limits: Limits, mode: ControllerMode) -> _Measured:
+    monitor = MeasuredMonitor(yielding_limits(limits) if mode in YIELDING_MODES else limits)
+    monitor.reset(record["q"][0].tolist())
+    ddq, breaches = np.zeros((len(record), model.n)), []
+    for place, (q, dq) in enumerate(zip(record["q"], record["dq"], strict=True)):
+        twist, psi = None, None
+        if mode in _CARTESIAN:
+            twist, psi = (model.jacobian(q) @ dq).tolist(), _arm_angle(model, q)
+        if monitor.step(q.tolist(), dq.tolist(), (0.0, 0.0, 0.0), twist, psi):
+            breaches += monitor.broken()
+        ddq[place] = monitor.acceleration
+    return _Measured(breaches, ddq)
+
+
+def _arm_angle(model: RobotModel, q: Array) -> float | None:
+    if model.n != 7:
+        return None
+    try:
+        return model.arm_angle(q)
+    except KinematicsError:
+        return None
+
+
+def _describe_range(faults: set[Fault], record: NDArray[np.void], limits: Limits) -> str:
+    joint, is_measured = limits.joint, Fault.ACTUAL_JOINT_POSITION_LIMITS_VIOLATION in faults
+    q = record["q"] if is_measured else record["q_c"]
+    beyond = np.maximum(joint.lower - q, q - joint.upper)
+    place = np.unravel_index(beyond.argmax(), q.shape)
+    if beyond[place] < -_CLOSE:
+        return "every joint was inside the limits of this model: the controller has narrower ones (set_joint_limit)"
+    low, high = math.degrees(joint.lower[place[1]]), math.degrees(joint.upper[place[1]])
+    was = "measured" if is_measured else "commanded"
+    return f"joint {place[1] + 1} was {was} at {math.degrees(q[place]):.2f} deg (from {low:.2f} to {high:.2f} deg)"
+
+
+def _describe_collision(
+    record: NDArray[np.void], model: RobotModel, limits: Limits, thresholds: JointVector | None
+) -> str:
+    """Says what presses on which joint, from the wrench that the controller estimates at the tool."""
+    last, known = record[-1], limits.joint.collision_threshold if thresholds is None else thresholds
+    wrench = last["tau_ext_in_base"]
+    outside = np.abs(model.jacobian(last["q"]).T @ wrench)
+    joint = int((outside / np.maximum(known, _LEAST)).argmax())
+    bound = f"its threshold is {known[joint]:g} N m"
+    if thresholds is None:
+        bound = f"its threshold is at most {known[joint]:g} N m, set_collision_behavior sets it"
+    return (
+        f"{np.linalg.norm(wrench[:3]):.3g} N were felt at the tool, which is {outside[joint]:.3g} N m on joint "
+        f"{joint + 1} ({bound})"
+    )

@@ -1,0 +1,268 @@
+"""The flight recorder: one fixed-size row for every cycle, in memory that was allocated beforehand."""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections import deque
+from collections.abc import Callable, Sequence
+from operator import attrgetter
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.command import CartesianPosition, Command, JointPosition, JointTorque
+from rcilab.core.cycle_log import OTHER_STATE_FIELDS, STATE_FIELDS, cycle_dtype
+from rcilab.core.faults import Fault
+from rcilab.core.state import RobotState
+
+RECORD_TIME = 60.0  # [s] of cycles that a recorder keeps unless told otherwise; a choice.
+_CYCLE_NS = round(CYCLE_TIME * 1e9)
+_NO_POSE = (math.nan,) * 16
+_NUMBERS = struct.Struct("<4d")
+_GRID_CYCLES = 8  # A controller that slips counts as late for so many cycles, a hiccup of ours for as many at most.
+
+
+class Recorder:
+    """A ring of cycles. Owned by the thread that runs the loop; others read copies.
+
+    Args:
+        n: Number of joints.
+        capacity: Number of rows; when it is full the oldest row is overwritten.
+        buffer: Writable memory to use, such as a piece of a shared block; None allocates it.
+        complete: Whether rows hold everything that the state has.
+    """
+
+    def __init__(
+        self,
+        n: int,
+        capacity: int = round(RECORD_TIME / CYCLE_TIME),
+        buffer: memoryview | bytearray | None = None,
+        *,
+        complete: bool = False,
+    ) -> None:
+        dtype = cycle_dtype(n, complete=complete)
+        self.n = n
+        self.complete = complete
+        self.capacity = capacity
+        self.count = 0
+        """Rows written since the beginning; the newest is number `count - 1`."""
+        self._size = dtype.itemsize
+        memory = bytearray(capacity * self._size) if buffer is None else buffer
+        self._memory = memory
+        self._rows: NDArray[np.void] = np.frombuffer(memory, dtype=dtype, count=capacity)
+        start = f"<Qdqqdd{4 * n}dIIBBBB4x{2 * n + 17}d"
+        rest = self._size - struct.calcsize(start)
+        self._unknown = np.full(rest // 8, math.nan).tobytes()
+        self._pack = struct.Struct(f"{start}{rest}s").pack_into
+        self._pack_start = struct.Struct("<Qdqqd").pack_into
+        self._pack_lost = struct.Struct("<I").pack_into
+        self._lost_offset = struct.calcsize(f"<Qdqqdd{4 * n}dI")
+        self._nothing = (math.nan,) * n
+
+    def write(
+        self,
+        message_id: int,
+        t: float,
+        received_ns: int,
+        sent_ns: int,
+        lateness: float,
+        success_rate: float,
+        q: Sequence[float],
+        q_c: Sequence[float],
+        dq: Sequence[float],
+        command: Sequence[float],
+        faults: int,
+        lost: int,
+        modes: Sequence[int],
+        tau: Sequence[float] | None = None,
+        pose: Sequence[float] = _NO_POSE,
+        psi: float = math.nan,
+        command_tau: Sequence[float] | None = None,
+        *,
+        braking: bool = False,
+        rest: bytes = b"",
+    ) -> None:
+        """Writes one row; see `cycle_dtype` for the meaning.
+
+        `modes`: robot, controller, motion generator. `pose`: 16 numbers, row-major, sent in answer like `psi`. `rest`:
+        the fields from `STATE_FIELDS` on, as bytes.
+        """
+        self._pack(
+            self._memory,
+            self.count % self.capacity * self._size,
+            message_id, t, received_ns, sent_ns, lateness, success_rate,
+            *q, *q_c, *dq, *command,
+            faults, lost, *modes, braking,
+            *(tau or self._nothing), *pose, psi, *(command_tau or self._nothing), rest or self._unknown,
+        )  # fmt: skip
+        self.count += 1
+
+    def repeat(self, message_id: int, received_ns: int, lateness: float, lost: int) -> None:
+        """Writes the newest row once more, for a cycle of which only this is another; it was not answered."""
+        memory, size = self._memory, self._size
+        newest, place = (self.count - 1) % self.capacity * size, self.count % self.capacity * size
+        memory[place : place + size] = memory[newest : newest + size]
+        self._pack_start(memory, place, message_id, math.nan, received_ns, 0, lateness)
+        self._pack_lost(memory, place + self._lost_offset, lost)
+        self.count += 1
+
+    @property
+    def truncated(self) -> bool:
+        """Whether the oldest rows have been overwritten."""
+        return self.count > self.capacity
+
+    def rows(self, start: int = 0) -> NDArray[np.void]:
+        """Returns a copy of the rows that are still there, oldest first.
+
+        Args:
+            start: Number of the first row wanted; older ones are left out.
+        """
+        first = max(start, self.count - self.capacity, 0)
+        return self._rows[np.arange(first, self.count) % self.capacity]
+
+    def last(self, count: int) -> NDArray[np.void]:
+        """Returns a copy of the newest `count` rows (fewer when there are fewer), oldest first."""
+        return self.rows(self.count - count)
+
+
+class CycleLog:
+    """Writes states and answers as rows of a recorder, and judges how late each was. Owned by the loop's thread.
+
+    Lateness is counted from the robot's own 1 ms grid, as the most punctual of the last `_GRID_CYCLES` states shows it.
+    So short a memory follows another computer's clock, and a controller that left a cycle out.
+
+    Args:
+        recorder: Where rows go.
+        on_row: Called after every row; must be quick.
+    """
+
+    def __init__(self, recorder: Recorder, on_row: Callable[[CycleLog], None] | None = None) -> None:
+        self.recorder = recorder
+        self._on_row = on_row
+        self.lateness = 0.0
+        """Of the newest row, [s]; NaN when nobody waited for it."""
+        self.lost_total = 0
+        """Controller cycles whose state never arrived."""
+        self.state: RobotState | None = None
+        """The state of the newest row."""
+        self.braking = False
+        """Whether what is sent just now brings the arm to rest; the control loop says so."""
+        self._last_id: int | None = None
+        self._origins: deque[int] = deque(maxlen=_GRID_CYCLES)
+        self._nothing = (math.nan,) * recorder.n
+        self._arrays_of = attrgetter(*STATE_FIELDS, *(OTHER_STATE_FIELDS[:-4] if recorder.complete else ()))
+        self._numbers_of = attrgetter(*OTHER_STATE_FIELDS[-4:]) if recorder.complete else None
+        self._idle_count = -1  # What the recorder counted when the newest row was one of no motion, and ours.
+
+    def restart(self) -> None:
+        """Forgets the grid and the last number: another connection begins."""
+        self._last_id = None
+        self.lost_total = 0
+
+    def write(
+        self,
+        state: RobotState,
+        received_ns: int,
+        t: float = math.nan,
+        sent_ns: int = 0,
+        command: Command | None = None,
+        *,
+        is_awaited: bool = True,
+    ) -> None:
+        """Records one state and, where there was one, the answer to it.
+
+        Args:
+            state: The state.
+            received_ns: When it arrived, monotonic, [ns].
+            t: Motion time, [s].
+            sent_ns: When it was answered, monotonic, [ns]; 0 when it was not.
+            command: What was sent in answer.
+            is_awaited: Whether somebody waited for it; of one that was found waiting nothing tells how late it is.
+        """
+        before, self.state = self.state, state
+        number = state.message_id
+        lost = 0
+        if self._last_id is None or number < self._last_id:
+            self._origins.clear()
+        elif number > self._last_id:
+            lost = number - self._last_id - 1
+            self.lost_total += lost
+        self._last_id = number
+        if is_awaited:
+            self._origins.append(received_ns - number * _CYCLE_NS)
+            self.lateness = ((sent_ns or received_ns) - number * _CYCLE_NS - min(self._origins)) * 1e-9
+        else:
+            self.lateness = math.nan
+        is_idle = command is None and sent_ns == 0 and math.isnan(t)
+        if is_idle and self._idle_count == self.recorder.count and before is not None and _is_alike(state, before):
+            self.recorder.repeat(number, received_ns, self.lateness, lost)
+        else:
+            self._write(state, received_ns, t, sent_ns, command, lost)
+        if is_idle:
+            self._idle_count = self.recorder.count
+        if self._on_row is not None:
+            self._on_row(self)
+
+    def _write(
+        self, state: RobotState, received_ns: int, t: float, sent_ns: int, command: Command | None, lost: int
+    ) -> None:
+        q, pose, psi, tau = self._nothing, _NO_POSE, math.nan, self._nothing
+        if isinstance(command, JointPosition):
+            q = command.q.tolist()
+        elif isinstance(command, CartesianPosition):
+            pose = command.T_base_tool.ravel().tolist()
+            psi = math.nan if command.psi is None else command.psi
+        elif isinstance(command, JointTorque):
+            tau = command.tau.tolist()
+        self.recorder.write(
+            state.message_id,
+            t,
+            received_ns,
+            sent_ns,
+            self.lateness,
+            state.success_rate,
+            state.q.tolist(),
+            state.q_c.tolist(),
+            state.dq.tolist(),
+            q,
+            _bits(state.faults) if state.faults else 0,
+            lost,
+            (state.robot_mode, state.controller_mode, state.motion_generator_mode),
+            state.tau.tolist(),
+            pose,
+            psi,
+            tau,
+            braking=self.braking,
+            rest=self._pack_rest(state),
+        )
+
+    def _pack_rest(self, state: RobotState) -> bytes:
+        arrays = b"".join([values.tobytes() for values in self._arrays_of(state)])
+        return arrays if self._numbers_of is None else arrays + _NUMBERS.pack(*self._numbers_of(state))
+
+
+def _is_alike(state: RobotState, other: RobotState) -> bool:
+    """Returns whether a row shows the same of both: by identity, which is how a decoder gives what repeats."""
+    return (
+        state.q is other.q
+        and state.q_c is other.q_c
+        and state.dq is other.dq
+        and state.tau is other.tau
+        and state.tau_ext_in_base is other.tau_ext_in_base
+        and state.T_base_tool is other.T_base_tool
+        and state.theta is other.theta
+        and state.faults == other.faults
+        and state.success_rate == other.success_rate
+        and state.robot_mode is other.robot_mode
+        and state.controller_mode is other.controller_mode
+        and state.motion_generator_mode is other.motion_generator_mode
+    )
+
+
+def _bits(faults: tuple[Fault, ...]) -> int:
+    bits = 0
+    for fault in faults:
+        bits |= 1 << fault
+    return bits

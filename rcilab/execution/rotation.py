@@ -1,0 +1,38 @@
+"""Rotations between numpy's matrices and vectors, axis times angle: what brakes and rate limiters compute with."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from rcilab.core.arrays import Array, Matrix
+from rcilab.core.spatial import Rotation9, turn_between
+
+_TINY = 1e-12  # [rad] Below it a rotation has no axis to speak of.
+
+
+def rotation_vector(R_old: Matrix, R_new: Matrix) -> Array:
+    """Returns the turn from one orientation to another, axis times angle in their common axes, shape (3,), [rad].
+
+    Args:
+        R_old: Shape (3, 3).
+        R_new: Shape (3, 3).
+    """
+    return np.array(turn_between(nine(R_old), nine(R_new)))
+
+
+def rotation_matrix(vector: Array) -> Matrix:
+    """Returns the rotation, shape (3, 3), about an axis by an angle, given as their product (Rodrigues)."""
+    angle = float(np.linalg.norm(vector))
+    x, y, z = vector if angle < _TINY else vector / angle
+    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    if angle < _TINY:
+        return np.eye(3) + K
+    return np.eye(3) + math.sin(angle) * K + (1.0 - math.cos(angle)) * (K @ K)
+
+
+def nine(R: Matrix) -> Rotation9:
+    """Returns a rotation matrix, shape (3, 3), as nine floats, row-major."""
+    a, b, c, d, e, f, g, h, i = R.ravel().tolist()
+    return a, b, c, d, e, f, g, h, i

@@ -1,0 +1,241 @@
+"""The world of a virtual robot: push it, put a box in its way, press its emergency stop, spoil its network.
+
+    with rcilab.simulate(model, plant="mujoco") as robot:
+        robot.world.push([0, 0, -20, 0, 0, 0], link=4, duration=0.5)
+
+Nothing of it goes over the RCI: a virtual controller has a port of its own for it, a real one has none. Every method
+may be called from any thread, while a motion runs and from inside a callback, and returns once it is done.
+"""
+
+from __future__ import annotations
+
+import select
+import socket
+import threading
+import time
+
+from numpy.typing import ArrayLike
+
+from rcilab.core.arrays import as_vector
+from rcilab.core.closeable import Closing
+from rcilab.core.errors import ConnectionLostError, DecodeError, ProtocolError, UsageError, plain_text
+from rcilab.core.spatial import Pose, as_pose
+from rcilab.model.dynamics.payload import Payload
+from rcilab.sim.api import (
+    LONGEST_STALL,
+    AutoLimit,
+    Direction,
+    Floor,
+    GetStatus,
+    Limits,
+    LimitTable,
+    LineReader,
+    LoopBack,
+    Mount,
+    Network,
+    NetworkFaults,
+    PlaceBox,
+    Press,
+    Push,
+    Refused,
+    Release,
+    RemoveBox,
+    SafetyButton,
+    SetInput,
+    StallClock,
+    Walls,
+    WorldAnswer,
+    WorldRequest,
+    WorldStatus,
+    decode_world_answer,
+    encode_world_request,
+)
+
+TIMEOUT = LONGEST_STALL + 5.0  # [s] A controller that stalls on request answers afterwards; on a busy machine later.
+
+
+class World(Closing):
+    """What surrounds one virtual robot. Connects when it is first used; `close` ends that.
+
+    Args:
+        host: Where the world port is.
+        port: Its number.
+        timeout: How long to wait for the connection and for every answer, [s].
+    """
+
+    def __init__(self, host: str, port: int, timeout: float = TIMEOUT) -> None:
+        self._address = host, port
+        self._timeout = timeout
+        self._lock = threading.Lock()
+        self._socket: socket.socket | None = None
+        self._reader = LineReader()
+        self._last_id = 0
+
+    def push(
+        self,
+        wrench: ArrayLike,
+        link: int | None = None,
+        point: ArrayLike | None = None,
+        duration: float | None = None,
+    ) -> None:
+        """Lets something press on the arm; it replaces what pressed before.
+
+        Args:
+            wrench: Force and moment, base axes, shape (6,), [N, N m].
+            link: Number of the link, from 1; None: the tool.
+            point: Where the force acts, in the frame of the link (or the tool), shape (3,), [m]; None: at its origin.
+            duration: For how long, in the robot's own time, [s]; None: until `release`.
+        """
+        place = None if point is None else _numbers(point, 3, "point", "m")
+        self.ask(Push(_numbers(wrench, 6, "wrench", "N, N m"), link, place, duration))
+
+    def release(self) -> None:
+        """Takes away whatever presses on the arm."""
+        self.ask(Release())
+
+    def press(self, button: SafetyButton) -> None:
+        """Presses the emergency stop ("estop") or opens the safety gate ("gstop"); "none" puts both right again."""
+        self.ask(Press(button))
+
+    def set_input(self, signal: int, level: bool) -> None:
+        """Sets a digital input: 0 to 3 are DI0_0 to DI0_3, 4 and 5 are DI1_0 and DI1_1."""
+        self.ask(SetInput(signal, level))
+
+    def set_loop_back(self, on: bool = True) -> None:
+        """Wires every digital output to the input of the same number, or cuts these wires."""
+        self.ask(LoopBack(on))
+
+    def set_auto_limit(self, on: bool = True) -> None:
+        """Has commands led to rest inside the soft joint limits instead of raising a fault beyond them, or not."""
+        self.ask(AutoLimit(on))
+
+    def set_limits(self, table: LimitTable) -> None:
+        """Chooses the Cartesian limits that commands are judged by: "manual", or "sdk" for the vendor's SDK."""
+        self.ask(Limits(table))
+
+    def set_network(self, faults: NetworkFaults | None = None, direction: Direction = "both") -> None:
+        """Makes the network bad.
+
+        Args:
+            faults: What is wrong with it; None: nothing.
+            direction: "commands", "states" (and answers over TCP), or "both".
+        """
+        self.ask(Network(NetworkFaults() if faults is None else faults, direction))
+
+    def stall(self, duration: float, after: float = 0.0, period: float | None = None) -> None:
+        """Has the controller's clock stand still; a new call replaces what was asked for before.
+
+        Args:
+            duration: For how long, [s]; 0 takes back what is still to come.
+            after: When, [s] from now.
+            period: And again so long after, [s]; None: once.
+        """
+        self.ask(StallClock(duration, after, period))
+
+    def place_box(self, name: str, size: ArrayLike, pose: Pose) -> None:
+        """Puts a box that cannot move beside the arm, or moves the one of that name; MuJoCo only.
+
+        Args:
+            name: Its name.
+            size: Edges along its own axes, shape (3,), [m].
+            pose: Its centre and orientation in base.
+        """
+        pose = as_pose(pose)
+        position, wxyz = tuple(pose.position.tolist()), tuple(pose.wxyz.tolist())
+        self.ask(PlaceBox(name, _numbers(size, 3, "size", "m"), position, wxyz))
+
+    def remove_box(self, name: str) -> None:
+        """Takes a box away."""
+        self.ask(RemoveBox(name))
+
+    def set_floor(self, on: bool = True) -> None:
+        """Puts a floor under the base that the arm can hit, or takes it away; MuJoCo only."""
+        self.ask(Floor(on))
+
+    def set_walls(self, on: bool = True) -> None:
+        """Makes the faces of the active safety box solid for the links, wherever it is set, or not; MuJoCo only."""
+        self.ask(Walls(on))
+
+    def mount(self, load: Payload | None) -> None:
+        """Fixes a real load to the flange, whatever set_load says of it; None: again the one of set_load."""
+        if load is None:
+            self.ask(Mount())
+            return
+        inertia = tuple(load.inertia.ravel().tolist())
+        self.ask(Mount(load.mass, tuple(load.center_of_mass.tolist()), inertia))
+
+    def status(self) -> WorldStatus:
+        """Returns how the controller is: what its state does not say."""
+        answer = self.ask(GetStatus())
+        if not isinstance(answer, WorldStatus):
+            raise ProtocolError(f"{self}: asked for the status, it answered {answer}")
+        return answer
+
+    def close(self) -> None:
+        """Ends the connection; a later call makes a new one. May be called twice."""
+        with self._lock:
+            self._disconnect()
+
+    def __repr__(self) -> str:
+        return "<World at {}:{}>".format(*self._address)
+
+    def ask(self, request: WorldRequest) -> WorldAnswer:
+        """Returns the answer to a request.
+
+        Raises:
+            InvalidValueError: A value cannot be used; raised before anything is sent.
+            UsageError: The controller refuses; the message says why.
+            ConnectionLostError: There is no world port, or it does not answer.
+        """
+        with self._lock:
+            self._last_id += 1
+            try:
+                connection = self._connect()
+                connection.sendall(encode_world_request(request, self._last_id))
+                answer = self._receive(connection)
+            except (OSError, DecodeError) as error:
+                self._disconnect()
+                raise ConnectionLostError(
+                    f"{self} does not answer {request.name} ({error}); look whether the virtual controller still runs"
+                ).coded("world_silent") from error
+        if isinstance(answer, Refused):
+            raise UsageError(plain_text(answer.reason)).coded(answer.code, **answer.facts)
+        return answer
+
+    def _connect(self) -> socket.socket:
+        if self._socket is not None and _is_over(self._socket):
+            self._disconnect()  # We have said nothing for long, and somebody else wanted the place.
+        if self._socket is None:
+            self._socket = socket.create_connection(self._address, self._timeout)
+            self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            self._reader = LineReader()
+        return self._socket
+
+    def _receive(self, connection: socket.socket) -> WorldAnswer:
+        deadline = time.monotonic() + self._timeout
+        while True:
+            if time.monotonic() > deadline:
+                raise TimeoutError("it answers other requests")
+            data = connection.recv(65536)
+            if not data:
+                raise ConnectionResetError("it closed the connection")
+            for line in self._reader.feed(data):
+                number, answer = decode_world_answer(line)
+                if number == self._last_id:
+                    return answer
+
+    def _disconnect(self) -> None:
+        if self._socket is not None:
+            self._socket.close()
+            self._socket = None
+
+
+def _is_over(connection: socket.socket) -> bool:
+    """Returns whether the other side has closed a connection on which no answer is awaited."""
+    look = select.poll()
+    look.register(connection, select.POLLIN)
+    return bool(look.poll(0))
+
+
+def _numbers(value: ArrayLike, count: int, name: str, unit: str) -> tuple[float, ...]:
+    return tuple(as_vector(value, count, name, unit).tolist())

@@ -1,0 +1,266 @@
+"""How a stream of commands comes to rest from wherever it is, one brake for each kind of command."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from rcilab.conformance import Breach, CartesianMonitor, JointMonitor
+from rcilab.core.arrays import Array, JointVector
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.command import CartesianPosition, Command, JointPosition, JointTorque
+from rcilab.core.errors import SingularError
+from rcilab.core.faults import Fault
+from rcilab.core.limits import JointLimits, Limits
+from rcilab.core.spatial import Pose
+from rcilab.core.state import RobotState
+from rcilab.execution.rotation import rotation_matrix, rotation_vector
+from rcilab.motion import LIMIT_MARGIN, plan_stop
+
+if TYPE_CHECKING:
+    from rcilab.model.robot_model import RobotModel
+
+_JOINT_SHARE = 0.6  # Part of the joints' acceleration and jerk that a stop of the tool uses; a choice.
+_STEP = 1e-6  # [rad] Of a difference.
+_SINGULAR = 1e-3  # Part of the largest singular value below which a direction counts as lost.
+_FLOOR = 1e-9  # So that a joint with nothing to do asks for no division by zero.
+_HISTORY = 3  # Commands that a third difference looks back to.
+_FAR = 1e3  # Position bounds that a Cartesian brake never meets: [m], [rad].
+
+
+class Brake(Protocol):
+    """Remembers what was commanded and knows how to end it. Owned by the control loop."""
+
+    def begin(self, state: RobotState) -> None:
+        """Starts from the arm standing at its commanded state."""
+        ...
+
+    def remember(self, command: Any, cycle: int, state: RobotState) -> None:
+        """Takes note of a command that was sent in answer to a controller cycle's state."""
+        ...
+
+    def plan(self) -> Sequence[Command]:
+        """Returns the commands that lead to rest within the limits, one a cycle after the last; at least one."""
+        ...
+
+    def find_motion(self) -> Breach | None:
+        """Returns what the last command breaks when it is repeated, because it still moved; None: it may stand."""
+        ...
+
+
+class StreamBrake:
+    """Brings sampled coordinates to rest, whatever they are.
+
+    The past is taken as the parabola through the last three samples: its continuation by a curve that keeps the
+    limits keeps them in backward differences too, because those are means of that curve's derivatives.
+
+    Args:
+        limits: Bounds of the coordinates.
+    """
+
+    def __init__(self, limits: JointLimits) -> None:
+        self._limits = limits
+        self._past: list[tuple[int, Array]] = []
+
+    def begin(self, *past: tuple[int, Array]) -> None:
+        """Starts from three samples, each with the number of its cycle, oldest first."""
+        self._past = list(past)
+
+    def remember(self, x: Array, cycle: int) -> None:
+        """Appends a sample."""
+        if cycle > self._past[-1][0]:
+            self._past = [*self._past[-2:], (cycle, x)]
+
+    def rows(self) -> Array:
+        """Returns the samples from the one after the last to rest, shape (N, n)."""
+        near, ddq = self.differences()
+        dq = near + ddq * ((self._past[-1][0] - self._past[-2][0]) * CYCLE_TIME / 2.0)
+        rows = plan_stop(self._limits, self.last, dq, ddq).q
+        return rows[1:] if len(rows) > 1 else rows
+
+    def differences(self) -> tuple[Array, Array]:
+        """Returns the first and second divided difference of the last samples, shape (n,) each, per s and s^2."""
+        (t0, x0), (t1, x1), (t2, x2) = self._past
+        near, far = (x2 - x1) / ((t2 - t1) * CYCLE_TIME), (x1 - x0) / ((t1 - t0) * CYCLE_TIME)
+        return near, 2.0 * (near - far) / ((t2 - t0) * CYCLE_TIME)
+
+    @property
+    def last(self) -> Array:
+        """The last sample."""
+        return self._past[-1][1]
+
+
+class JointBrake:
+    """Brings commanded joint angles to rest.
+
+    Args:
+        limits: Bounds of the joints.
+    """
+
+    def __init__(self, limits: JointLimits) -> None:
+        self._limits = limits
+        self._stream = StreamBrake(limits)
+
+    def begin(self, state: RobotState) -> None:
+        """Starts from the arm standing at its commanded angles."""
+        self._stream.begin(*((cycle, state.q_c) for cycle in (-3, -2, -1)))
+
+    def remember(self, command: JointPosition, cycle: int, state: RobotState) -> None:
+        """Takes note of a command."""
+        self._stream.remember(command.q, cycle)
+
+    def plan(self) -> Sequence[Command]:
+        """Returns the angles that lead to rest."""
+        return [JointPosition(row) for row in self._stream.rows()]
+
+    def find_motion(self) -> Breach | None:
+        """Returns what the last command breaks when it is repeated; None: it may stand."""
+        q = self._stream.last.tolist()
+        monitor = JointMonitor(self._limits)
+        monitor.reset(q, *(difference.tolist() for difference in self._stream.differences()))
+        return _first_breach(monitor, lambda: monitor.step(q))
+
+
+class CartesianBrake:
+    """Brings a commanded pose to rest: position, rotation about the last orientation, and arm angle each by itself.
+
+    The controller judges the joints that it computes, too, and they are often the narrower bound: a tool stopped with
+    10 m/s^2 asks more of an elbow than it may give. So acceleration and jerk are taken down to what the joints allow
+    where the arm is.
+
+    Args:
+        limits: Bounds of the arm.
+        model: The arm, for what the joints allow.
+    """
+
+    def __init__(self, limits: Limits, model: RobotModel) -> None:
+        self._limits = limits
+        self._model = model
+        self._poses: list[tuple[int, CartesianPosition]] = []
+        self._q = model.home
+
+    def begin(self, state: RobotState) -> None:
+        """Starts from the arm standing at its commanded pose."""
+        still = CartesianPosition(state.T_base_tool_c)
+        self._poses = [(cycle, still) for cycle in (-3, -2, -1)]
+        self._q = state.q_c
+
+    def remember(self, command: CartesianPosition, cycle: int, state: RobotState) -> None:
+        """Takes note of a command."""
+        self._q = state.q_c
+        if cycle > self._poses[-1][0]:
+            self._poses = [*self._poses[-2:], (cycle, command)]
+
+    def plan(self) -> Sequence[Command]:
+        """Returns the poses that lead to rest."""
+        last = self._poses[-1][1]
+        R = last.T_base_tool[:3, :3]
+        past: list[tuple[int, Array]] = []
+        for cycle, pose in self._poses:
+            turn = rotation_vector(R, pose.T_base_tool[:3, :3])
+            psi = 0.0 if pose.psi is None or last.psi is None else pose.psi - last.psi
+            past.append((cycle, np.concatenate((pose.T_base_tool[:3, 3], turn, [psi]))))
+        stream = StreamBrake(self._bounds())
+        stream.begin(*past)
+        way: list[Command] = []
+        for row in stream.rows():
+            T = np.eye(4)
+            T[:3, :3] = rotation_matrix(row[3:6]) @ R
+            T[:3, 3] = row[:3]
+            way.append(CartesianPosition(T, None if last.psi is None else last.psi + float(row[6])))
+        return way
+
+    def find_motion(self) -> Breach | None:
+        """Returns what the last command breaks when it is repeated; None: it may stand. Joints are not computed."""
+        monitor = CartesianMonitor(self._limits)
+        (before, first), *later = self._poses
+        monitor.reset(Pose.from_matrix(first.T_base_tool), first.psi)
+        for cycle, command in later:
+            monitor.step(Pose.from_matrix(command.T_base_tool), command.psi, cycle - before)
+            before = cycle
+        last = self._poses[-1][1]
+        pose = Pose.from_matrix(last.T_base_tool)
+        return _first_breach(monitor, lambda: monitor.step(pose, last.psi))
+
+    def _bounds(self) -> JointLimits:
+        """Returns bounds of position, rotation and arm angle, seven coordinates, as if they were joints."""
+        c, psi = self._limits.cartesian, self._limits.arm_angle
+        velocity = np.array([c.translation_velocity] * 3 + [c.rotation_velocity] * 3 + [1.0])
+        acceleration = np.array([c.translation_acceleration] * 3 + [c.rotation_acceleration] * 3 + [1.0])
+        jerk = np.array([c.translation_jerk] * 3 + [c.rotation_jerk] * 3 + [1.0])
+        if psi is not None:  # Without one the seventh coordinate stays at 0, where any bound will do.
+            velocity[6], acceleration[6], jerk[6] = psi.velocity, psi.acceleration, psi.jerk
+        # The tool's bounds hold for the length of a vector, these here for each of its three coordinates.
+        acceleration[:6] /= math.sqrt(3.0)
+        jerk[:6] /= math.sqrt(3.0)
+        needed, joint = _joint_shares(self._model, self._q), self._limits.joint
+        acceleration *= min(1.0, _JOINT_SHARE * float((joint.acceleration / (needed @ acceleration)).min()))
+        jerk *= min(1.0, _JOINT_SHARE * float((joint.jerk / (needed @ jerk)).min()))
+        unused, far = np.zeros(7), np.full(7, _FAR)
+        return JointLimits(
+            lower=-far, upper=far, velocity=velocity, acceleration=acceleration, jerk=jerk, torque=unused,
+            torque_rate=unused, collision_threshold=unused, stiffness=unused,
+        )  # fmt: skip
+
+
+class TorqueBrake:
+    """Takes commanded torques back to zero at the allowed rate; what is left is the controller's own compensation.
+
+    Args:
+        limits: Bounds of the joints.
+    """
+
+    def __init__(self, limits: JointLimits) -> None:
+        self._step = LIMIT_MARGIN * limits.torque_rate * CYCLE_TIME
+        self._tau: JointVector = np.zeros_like(limits.torque_rate)
+
+    def begin(self, state: RobotState) -> None:
+        """Starts without torque."""
+        self._tau = np.zeros_like(self._step)
+
+    def remember(self, command: JointTorque, cycle: int, state: RobotState) -> None:
+        """Takes note of a command."""
+        self._tau = command.tau
+
+    def plan(self) -> Sequence[Command]:
+        """Returns the torques that lead to zero."""
+        way = [JointTorque(self._tau)]
+        while way[-1].tau.any():
+            tau = way[-1].tau
+            way.append(JointTorque(np.sign(tau) * np.maximum(np.abs(tau) - self._step, 0.0)))
+        return way
+
+    def find_motion(self) -> Breach | None:
+        """Returns None: torques may be repeated."""
+        return None
+
+
+def _first_breach(monitor: JointMonitor | CartesianMonitor, repeat: Callable[[], tuple[Fault, ...]]) -> Breach | None:
+    """Returns what the first broken cycle of as many repetitions breaks as a third difference looks back to."""
+    for _ in range(_HISTORY):
+        breaches = [breach for breach in monitor.broken() if breach.condition.order > 0] if repeat() else []
+        if breaches:  # Where a joint or the tool is, is no motion.
+            return breaches[0]
+    return None
+
+
+def _joint_shares(model: RobotModel, q: JointVector) -> Array:
+    """Returns how much of each joint's motion each coordinate of the tool asks for at most, shape (n, 7).
+
+    The absolute values of the inverse Jacobian, with the arm angle as seventh row where there is one; at a singularity
+    those of the least-squares inverse.
+    """
+    J = np.zeros((7, model.n))
+    J[:6] = model.jacobian(q)
+    if model.n == 7:
+        try:
+            for i, unit in enumerate(np.eye(7) * _STEP):
+                J[6, i] = math.remainder(model.arm_angle(q + unit) - model.arm_angle(q - unit), math.tau) / (
+                    2.0 * _STEP
+                )
+        except SingularError:
+            J[6] = 0.0
+    return np.abs(np.linalg.pinv(J, rcond=_SINGULAR)) + _FLOOR

@@ -1,0 +1,98 @@
+"""The stream of a motion whose rows may be exchanged while it runs: for another pace, a pause, a stop along the way."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rcilab.core.arrays import JointPath
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.command import Command
+from rcilab.core.state import Mode, RobotState
+from rcilab.execution.command_builder import build_commander
+from rcilab.motion import plan_stop
+
+if TYPE_CHECKING:
+    from rcilab.model.robot_model import RobotModel
+
+SETTLING = 300  # Cycles that torque mode stays at its end, for the soft arm to come there; a choice.
+
+
+class MotionStream:
+    """The callback of a prepared motion: row k in controller cycle k. Owned by the control loop's thread.
+
+    Args:
+        rows: Joint angles, shape (N, n), [rad].
+        mode: How the arm is commanded.
+        model: The arm, with its tool and load.
+        on_cycle: Told the number of every cycle.
+    """
+
+    def __init__(
+        self, rows: JointPath, mode: Mode, model: RobotModel, on_cycle: Callable[[int], None] | None = None
+    ) -> None:
+        self._rows = rows
+        self._first = 0  # Cycle of row 0.
+        self._holds = False
+        self._next: tuple[int, JointPath, bool] | None = None
+        self._model = model
+        self._command = build_commander(mode, model)
+        self._settling = SETTLING if mode == "torque" else 0
+        self._on_cycle = on_cycle
+        self.cycle = 0
+        """Of the newest command."""
+        self.held = 0
+        """Cycles that the arm has been held for; 0: it is on its way."""
+
+    def __call__(self, state: RobotState, t: float) -> Command:
+        """Returns the command that answers a state."""
+        cycle = self.cycle = round(t / CYCLE_TIME)
+        if self._next is not None and cycle >= self._next[0]:
+            self._first, self._rows, self._holds = self._next
+            self._next = None
+        if self._on_cycle is not None:
+            self._on_cycle(cycle)
+        rows, last = self._rows, len(self._rows) - 1
+        row = cycle - self._first
+        # Rows that are still to come continue these: a held arm waits for them.
+        self.held = row - last if row > last and (self._holds or self._next is not None) else 0
+        is_over = not self._holds and self._next is None and row >= last + self._settling
+        command = self._command(rows, min(row, last), state)
+        return replace(command, finished=True) if is_over else command
+
+    def switch(self, first: int, rows: JointPath, *, holds: bool) -> bool:
+        """Goes on with other rows, whatever was to come; returns False, and does not, when they do not fit on.
+
+        Args:
+            first: Cycle of their first row, which must be ahead; they continue what is streamed until then.
+            rows: Shape (N, n), [rad].
+            holds: Whether the last one is no goal but a place to wait at.
+        """
+        if first <= self.cycle + 1 or not self._fits(first, rows):
+            return False
+        self._next = (first, rows, holds)
+        return True
+
+    def _fits(self, first: int, rows: JointPath) -> bool:
+        """Returns whether no joint would have to jump: whoever sends rows may be wrong about what is streamed."""
+        begun, before, _ = self._next if self._next is not None else (math.inf, self._rows, False)
+        if first <= begun:
+            begun, before = self._first, self._rows
+        step = rows[0] - before[min(first - 1 - int(begun), len(before) - 1)]
+        return bool((np.abs(step) <= CYCLE_TIME * self._model.limits.joint.velocity).all())
+
+    def stop(self) -> None:
+        """Comes to rest from here, every joint as fast as its limits allow, and ends there.
+
+        For torque mode, where there is no commanded place to brake: the reference is brought to rest, and the torques
+        bring the arm after it.
+        """
+        rows, k = self._rows, min(self.cycle - self._first, len(self._rows) - 1)
+        before, far = rows[max(k - 1, 0)], rows[max(k - 2, 0)]
+        dq, ddq = (rows[k] - before) / CYCLE_TIME, (rows[k] - 2.0 * before + far) / CYCLE_TIME**2
+        way = plan_stop(self._model.limits.joint, rows[k], dq, ddq).q
+        self._rows, self._first, self._holds, self._next = way, self.cycle, False, None

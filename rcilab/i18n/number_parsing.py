@@ -1,0 +1,108 @@
+"""Numbers as people type them. Every answer is a value or a sentence, never an exception.
+
+Why not viser's own number boxes: they turn a typed "-0.25" into "+0.25" and send every key.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+
+from rcilab.i18n.translator import Message, message
+
+_TWO_WAYS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
+"""A comma that is a decimal comma to some and groups thousands for others, such as 1,000."""
+_UNITS: dict[str, dict[str, float]] = {
+    "deg": {"deg": 1.0, "°": 1.0, "rad": math.degrees(1.0)},
+    "mm": {"mm": 1.0, "m": 1000.0},
+}
+"""What may stand behind a number, and how many of the field's own unit it is; longer names first."""
+_LONGEST = 40  # Characters; nobody types a longer number on purpose.
+
+
+@dataclass(frozen=True)
+class Parsed:
+    """A number, or why there is none."""
+
+    value: float | None
+    problem: Message | None = None
+
+
+def parse_number(typed: str, low: float, high: float, unit: str) -> Parsed:
+    """Returns the number that somebody typed.
+
+    Accepts a decimal comma, a typographic minus and a unit behind the number, in which it then counts; where a
+    comma may as well group thousands, the answer asks which is meant.
+
+    Args:
+        typed: As it stands in the field.
+        low: Smallest number allowed, in the unit of the field.
+        high: Largest number allowed.
+        unit: The unit of the field, such as "deg".
+    """
+    shown = typed.strip()
+    shown = shown if len(shown) <= _LONGEST else shown[: _LONGEST - 1] + "…"
+    plain = typed.strip()[: 10 * _LONGEST].replace("−", "-").replace("–", "-")
+    behind = next((name for name in _UNITS.get(unit, {unit: 1.0}) if name and plain.endswith(name)), "")
+    plain = plain.removesuffix(behind).strip()
+    if not plain:
+        return Parsed(None, message("parse.empty", bounds=_bounds(low, high, unit)))
+    if _TWO_WAYS.fullmatch(plain):
+        return Parsed(
+            None, message("parse.two_ways", typed=shown, point=plain.replace(",", "."), whole=plain.replace(",", ""))
+        )
+    if plain.count(",") == 1 and "." not in plain:
+        plain = plain.replace(",", ".")
+    try:
+        if "_" in plain:
+            raise ValueError
+        value = float(plain)
+    except ValueError:
+        return Parsed(None, message("parse.garbage", typed=shown, unit=unit))
+    if not math.isfinite(value):
+        return Parsed(None, message("parse.not_finite", typed=shown, unit=unit))
+    value *= _UNITS.get(unit, {}).get(behind, 1.0)
+    if not low <= value <= high:
+        return Parsed(None, message("parse.range", typed=shown, bounds=_bounds(low, high, unit)))
+    return Parsed(value)
+
+
+def _bounds(low: float, high: float, unit: str) -> Message:
+    code = f"parse.bounds.{unit}" if unit in _UNITS else "parse.bounds"
+    return message(code, low=_short(low), high=_short(high), unit=unit)
+
+
+@dataclass(frozen=True)
+class ParsedQuaternion:
+    """A unit quaternion, wxyz, or why there is none."""
+
+    value: tuple[float, ...] | None
+    problem: Message | None = None
+
+
+def parse_quaternion(typed: str) -> ParsedQuaternion:
+    """Returns the orientation that somebody typed as four numbers w x y z, brought to length 1.
+
+    Between the numbers stand blanks, semicolons or commas; decimal commas only where blanks or semicolons part them.
+    """
+    plain = typed.strip()[: 8 * _LONGEST].strip("()[]{} ")
+    parts = [part.rstrip(",") for part in re.split(r"[\s;]+", plain) if part.strip(",")]
+    if len(parts) == 1:
+        parts = [part for part in plain.split(",") if part]
+    if len(parts) != 4:
+        return ParsedQuaternion(None, message("parse.quaternion", count=len(parts)))
+    numbers: list[float] = []
+    for part in parts:
+        parsed = parse_number(part, -1e6, 1e6, "")
+        if parsed.value is None:
+            return ParsedQuaternion(None, parsed.problem)
+        numbers.append(parsed.value)
+    length = math.hypot(*numbers)
+    if length < 1e-6:
+        return ParsedQuaternion(None, message("parse.no_turn"))
+    return ParsedQuaternion(tuple(number / length for number in numbers))
+
+
+def _short(number: float) -> str:
+    return f"{number:.3f}".rstrip("0").rstrip(".")

@@ -1,0 +1,165 @@
+"""Words of a face of the program: one catalogue a language, found by key, filled with values."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+from types import MappingProxyType
+from typing import Any, Protocol, runtime_checkable
+
+from rcilab.i18n.locale import Language, load_words, require_language
+from rcilab.i18n.units import USUAL, Units
+
+_STOPS = (".", "。")
+SHARED = "rcilab.i18n"
+"""Whose catalogue every face has."""
+
+
+@runtime_checkable
+class Explains(Protocol):
+    """What can be among the values of a message and has words of its own: a violation, an exhibit's line."""
+
+    def explain(self, language: Language, units: Units | None = None) -> str:
+        """Returns itself in words."""
+        ...
+
+
+@dataclass(frozen=True)
+class Finished:
+    """A sentence that came finished: it stays in its language, and its numbers are said in the units of the face."""
+
+    sentence: str
+    """Angles and lengths in it with their units, in SI or not."""
+
+    def explain(self, language: Language, units: Units | None = None) -> str:
+        """Returns the sentence."""
+        return self.sentence if units is None else units.restate(self.sentence)
+
+
+class Remark(str):
+    """An English sentence that faces can also say in their own words.
+
+    Args:
+        sentence: In English.
+        code: Names what it says; its words are `remark.CODE` of the catalogues.
+        facts: What fills them: numbers as text, angles in degrees and lengths in millimetres; "value" and "bound" in
+            any unit, which stands behind; or remarks.
+    """
+
+    code: str
+    facts: Mapping[str, object]
+
+    @classmethod
+    def all(cls, remarks: Iterable[str]) -> Remark:
+        """Returns several in one line."""
+        told: list[Remark] = []
+        for remark in remarks:
+            told += remark.parts if isinstance(remark, Remark) else (cls(remark),)
+        if len(told) < 2:
+            return told[0] if told else cls("")
+        return cls("; ".join(told), "all", **{str(number): remark for number, remark in enumerate(told, 1)})
+
+    @property
+    def parts(self) -> tuple[Remark, ...]:
+        """Those that stand in one line here; itself when it is a single one."""
+        if self.code != "all":
+            return (self,)
+        return tuple(fact for fact in self.facts.values() if isinstance(fact, Remark))
+
+    def as_dict(self) -> dict[str, object]:
+        """Returns it as JSON has it; `from_dict` makes it anew."""
+        facts = {name: fact.as_dict() if isinstance(fact, Remark) else fact for name, fact in self.facts.items()}
+        return {"said": str(self), "code": self.code, "facts": facts}
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> Remark:
+        """Returns what `as_dict` has written.
+
+        Raises:
+            LookupError: It is something else.
+            TypeError: It is something else.
+        """
+        facts = {
+            name: cls.from_dict(fact) if isinstance(fact, dict) else fact for name, fact in content["facts"].items()
+        }
+        return cls(str(content["said"]), str(content["code"]), **facts)
+
+    def __new__(cls, sentence: str, code: str = "", **facts: object) -> Remark:  # noqa: D102  # The class says it.
+        remark = super().__new__(cls, sentence)
+        remark.code, remark.facts = code, facts
+        return remark
+
+
+@dataclass(frozen=True)
+class Message:
+    """Something to say, before it is known in which language."""
+
+    code: str
+    """Key in the catalogues."""
+    values: Mapping[str, object] = field(default_factory=dict)
+    """What the sentence is filled with."""
+
+
+def message(code: str, **values: object) -> Message:
+    """Returns a message by its key and the values that fill it."""
+    return Message(code, MappingProxyType(values))
+
+
+class Text:
+    """The catalogue of one language, called with a key.
+
+    Attributes:
+        language: Which.
+        units: What angles and lengths are shown in.
+
+    Args:
+        language: "en" or "zh".
+        package: Whose own words there are beside the shared ones, such as rcilab.workbench.
+
+    Raises:
+        InvalidValueError: There is no catalogue for this language.
+    """
+
+    def __init__(self, language: str, package: str) -> None:
+        self.language: Language = require_language(language)
+        self.units: Units = USUAL
+        self._entries = load_face(package, self.language)
+
+    def __call__(self, code: str, **values: object) -> str:
+        """Returns the words for a key; the key itself when the catalogue lacks it (a test keeps it complete)."""
+        entry = self._entries.get(code)
+        return code if entry is None else entry.format(**self._embedded(entry, values)) if values else entry
+
+    def has(self, code: str) -> bool:
+        """Returns whether the catalogue knows a key."""
+        return code in self._entries
+
+    def say(self, said: Message) -> str:
+        """Returns a message in this language; what has words of its own among its values is translated first."""
+        return self(said.code, **{name: self._put(value) for name, value in said.values.items()})
+
+    def tell(self, said: Message | Explains) -> str:
+        """Returns what `rcilab.i18n.error_messages` makes of an error or a remark, in this language."""
+        return self.say(said) if isinstance(said, Message) else self._explain(said)
+
+    @staticmethod
+    def _embedded(entry: str, values: Mapping[str, object]) -> Mapping[str, object]:
+        """Returns values as an entry takes them: a finished sentence gives up its full stop where another follows."""
+        ends = {name: value for name, value in values.items() if isinstance(value, str) and value[-1:] in _STOPS}
+        followed = {name: value for name, value in ends.items() if any(f"{{{name}}}{stop}" in entry for stop in _STOPS)}
+        return {**values, **{name: value[:-1] for name, value in followed.items()}} if followed else values
+
+    def _put(self, value: object) -> object:
+        if isinstance(value, Message):
+            return self.say(value)
+        return self._explain(value) if isinstance(value, Explains) else value
+
+    def _explain(self, said: Explains) -> str:
+        return said.explain(self.language)
+
+
+@lru_cache
+def load_face(package: str, language: Language) -> Mapping[str, str]:
+    """Returns all entries of one language that a face of the program has: the shared ones and its own."""
+    return MappingProxyType({**load_words(SHARED, language), **load_words(package, language)})

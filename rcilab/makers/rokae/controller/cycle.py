@@ -1,0 +1,366 @@
+"""One millisecond of the controller: requests and commands in, one state out. No sockets, no clock.
+
+Each `step` plays one command (or goes on coming to rest), judges it, moves the plant, looks at its sensors and reports.
+
+What a position controller does on a fault, and every other one here: the offending command is never given to the arm;
+the fault's bit is in the state of that very cycle, and stays; queued commands are forgotten; the arm comes to rest on
+one path, `CommandedMotion.come_to_rest`, inside its acceleration and jerk limits, under the position servo; then the
+brakes close. Where the arm followed its angles the stop begins from the last good command; where it yielded
+(impedance, torque, hand guiding), from where it is and how it moves. `fault_stop` lists it fault by fault.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from rcilab.conformance import LimitTable
+from rcilab.core.arrays import JointVector
+from rcilab.core.errors import InvalidValueError
+from rcilab.core.faults import Fault
+from rcilab.core.state import ControllerMode, MotionGeneratorMode, RobotState
+from rcilab.i18n.translator import Remark
+from rcilab.makers.rokae import wire as rci
+from rcilab.makers.rokae.controller.actuator import Law
+from rcilab.makers.rokae.controller.arm import Arm
+from rcilab.makers.rokae.controller.client_motion import LOST_LIMIT, PREFILL, ClientMotion
+from rcilab.makers.rokae.controller.model_download import model_response
+from rcilab.makers.rokae.controller.modes import MODES
+from rcilab.makers.rokae.controller.reporter import StateReporter
+from rcilab.makers.rokae.controller.request_handlers import (
+    Reply,
+    answer_query,
+    conclude,
+    describe_refusal,
+    judge_request,
+)
+from rcilab.makers.rokae.controller.settings import apply_request, default_settings
+from rcilab.makers.rokae.controller.state_machine import Action, Event, Phase, Transition, transition
+from rcilab.model.robot_model import RobotModel
+from rcilab.sim.plant import Plant
+
+MODE_DELAY = 200  # [cycles] After StartMove; by then the vendor client's buffer is full of idle states, which it skips.
+RECOVERY_TIME = 50  # [cycles] How long an error recovery takes at least; a choice.
+_PRESSED = {
+    rci.SafetyStop.ESTOP: Remark("an emergency stop was pressed", "estop"),
+    rci.SafetyStop.GSTOP: Remark("the safety gate was opened", "gstop"),
+}
+_POWER_OFF = Remark("the client switched motor power off in mid-motion", "power_off")
+_JOINT_RANGE = frozenset((Fault.ACTUAL_JOINT_POSITION_LIMITS_VIOLATION, Fault.COMMAND_JOINT_POSITION_LIMITS_VIOLATION))
+_WAITING = (Phase.STARTING, Phase.RECOVERING)
+_MOVING = (Phase.MOVING, Phase.STOPPING)
+_STILL = (Phase.OFF, Phase.IDLE, Phase.REFLEX, Phase.CUT_OFF, Phase.USER_STOPPED)
+_BRAKED = (Phase.OFF, Phase.REFLEX, Phase.CUT_OFF, Phase.USER_STOPPED, Phase.RECOVERING)
+_IDLE_MODES = (ControllerMode.OTHER, MotionGeneratorMode.IDLE)
+_REPORTED = (
+    rci.CommandCode.SET_COOR,
+    rci.CommandCode.SET_LOAD,
+    rci.CommandCode.SET_FC_COOR,
+    rci.CommandCode.SET_TORQUE_FILTER_CUT_OFF_FREQUENCY,
+)
+"""Setters that change how states are reported."""
+
+
+class ControlCycle:
+    """The controller without its sockets. Owned by the loop that calls `step`, once a millisecond.
+
+    Attributes:
+        settings: Everything that was set.
+        phase: What the robot is doing.
+        faults: The error bits that are set, in wire order.
+        reason: Why the last fault was raised, in words and numbers.
+        state: The last reported state.
+        playout: The queue of commands, with its counts.
+        ignored: Commands that came while none was wanted.
+        safety_stop: Which emergency stop is pressed.
+        limit_table: Whose bounds of the tool's motion commands are judged by; counts from the next motion on.
+
+    Args:
+        model: The arm.
+        plant: What moves.
+        mode_delay: Cycles from StartMove to the requested modes in the state.
+        prefill: Cycles between the first command of a motion and its play-out.
+        torque_prefill: The same for torques; what is older is skipped. None: `prefill`, `TORQUE_PREFILL` at most.
+        lost_limit: Lost cycles in a row that raise INSTABILITY_DETECTION; None never does.
+        recovery_time: Cycles that an error recovery takes at least.
+    """
+
+    def __init__(
+        self,
+        model: RobotModel,
+        plant: Plant,
+        *,
+        mode_delay: int = MODE_DELAY,
+        prefill: int = PREFILL,
+        torque_prefill: int | None = None,
+        lost_limit: int | None = LOST_LIMIT,
+        recovery_time: int = RECOVERY_TIME,
+    ) -> None:
+        self.limit_table: LimitTable = "manual"
+        self.settings = default_settings(model.description)
+        self.safety_stop: rci.SafetyStop = rci.SafetyStop.NONE
+        self.phase = Phase.OFF
+        self.faults: tuple[Fault, ...] = ()
+        self.reason = Remark("")
+        self.ignored = 0
+        self._mode_delay = mode_delay
+        self._recovery_time = recovery_time
+        self._model_response = model_response(model.description)  # Now: it takes longer than a cycle.
+        self._arm = Arm(model, plant, self.settings)
+        self._reporter = StateReporter(model, self.settings)
+        self._motion = ClientMotion(self._arm, prefill, torque_prefill, lost_limit)
+        self.playout = self._motion.playout
+        self._requested = self._shown = _IDLE_MODES
+        self._countdown = 0
+        self._is_still = False
+        self._message_id = 0
+        self._datagram: bytes | None = None
+        self.state = self._report()
+
+    @property
+    def model(self) -> RobotModel:
+        """The arm with the tool and load that were set."""
+        return self._arm.model
+
+    @property
+    def plant(self) -> Plant:
+        """What moves."""
+        return self._arm.plant
+
+    @property
+    def datagram(self) -> bytes:
+        """The last reported state as it goes over the wire."""
+        if self._datagram is None:
+            self._datagram = rci.encode_state(self.state)
+        return self._datagram
+
+    @property
+    def is_settled(self) -> bool:
+        """Whether the arm rests and no phase is under way that ends by itself: deferred replies are due."""
+        return self._arm.stands and self.phase not in (Phase.STOPPING, Phase.RECOVERING)
+
+    @property
+    def is_moving(self) -> bool:
+        """Whether the arm moves, or listens for commands that would make it."""
+        return self.phase in _MOVING or not self._arm.commanded.is_at_rest
+
+    @property
+    def wants_commands(self) -> bool:
+        """Whether a client's motion is under way."""
+        return self.phase is Phase.MOVING and not self.playout.is_finished
+
+    @property
+    def is_starved(self) -> bool:
+        """Whether a motion runs whose next command is not there."""
+        return self.phase is Phase.MOVING and self.playout.is_starved
+
+    @property
+    def loop_back(self) -> bool:
+        """Whether every digital output is wired to the input of the same number."""
+        return self.settings.loop_back
+
+    @loop_back.setter
+    def loop_back(self, on: bool) -> None:
+        self.settings = self.settings.with_loop_back(on)
+
+    @property
+    def auto_limit(self) -> bool:
+        """Whether joints are led to rest inside their soft limits instead of a fault, from the next motion on."""
+        return self.settings.auto_limit
+
+    @auto_limit.setter
+    def auto_limit(self, on: bool) -> None:
+        self.settings = replace(self.settings, auto_limit=on)
+
+    def set_input(self, signal: int, level: bool) -> None:
+        """Sets the level of a digital input, 0 to 5; with loop-back on, until the outputs are set again.
+
+        Raises:
+            InvalidValueError: There is no such input.
+        """
+        self.settings = self.settings.with_input(signal, level)
+
+    def reset(self, q: JointVector) -> None:
+        """Puts the resting arm somewhere else: what a virtual robot can do and a real one cannot."""
+        self._is_still = False
+        self._arm.reset(q)
+
+    def receive(self, packet: rci.CommandPacket) -> None:
+        """Takes a command that came from the network; it is kept while a motion is under way."""
+        if self._motion.is_followed:
+            self.playout.push(packet)
+        else:
+            self.ignored += 1
+
+    def handle(self, request: rci.Request) -> Reply:
+        """Takes a request and returns the answer to it."""
+        content = answer_query(request, self.phase, self.safety_stop, self.settings, self._model_response)
+        if content is not None:
+            return Reply(content)
+        cell = judge_request(request, self.phase, self.settings, self._arm)
+        if not isinstance(cell, Transition):
+            return self._refuse(request, cell)
+        if Action.APPLY in cell.actions and not self._apply(request):
+            return self._refuse(request, rci.SettingStatus.INVALID_ARGUMENT)
+        if Action.SET_FAULTS in cell.actions:
+            self.reason = _POWER_OFF
+        self._enter(cell, request=request, faults=(Fault.INSTABILITY_DETECTION,))
+        assert cell.status is not None
+        if cell.status:  # Zero is success, in every answer.
+            return self._refuse(request, cell.status)
+        return Reply(rci.StatusResponse(cell.status), cell.when, Action.REBOOT in cell.actions)
+
+    def _refuse(self, request: rci.Request, status: rci.Status) -> Reply:
+        why = describe_refusal(request, status, self.phase, self.settings, self._arm)
+        return Reply(rci.StatusResponse(status), refusal=why)
+
+    def conclude(self, reply: Reply) -> rci.Response:
+        """Returns what to answer now that a reply is due: meanwhile a recovery may have been overtaken."""
+        return conclude(reply, self.phase)
+
+    def happen(self, event: Event, *faults: Fault) -> None:
+        """Takes an event that is not a client's request; `faults` are the bits that it may set."""
+        self._enter(transition(self.phase, event), faults=faults)
+
+    def press_safety_stop(self, kind: rci.SafetyStop) -> None:
+        """Presses an emergency stop or opens the safety gate, or ends either with NONE.
+
+        Both stop the arm and hold it stopped; from StartMove to the end of a motion they also set an error bit, or the
+        client would not notice.
+        """
+        if kind is not self.safety_stop:
+            self.safety_stop = kind
+            if kind is not rci.SafetyStop.NONE:
+                self.reason = _PRESSED[kind]
+            event = Event.SAFETY_RELEASE if kind is rci.SafetyStop.NONE else Event.SAFETY_STOP
+            self.happen(event, Fault.INSTABILITY_DETECTION)
+
+    def step(self, *, is_seen: bool = True) -> RobotState:
+        """Lives through one millisecond and returns the state at its end.
+
+        Args:
+            is_seen: Whether anybody will see that state. One that nobody sees has no number of its own: for the client,
+                which takes numbers for cycles, nothing is missing.
+        """
+        self._message_id += is_seen
+        if not self._is_still:
+            self._live()
+        elif self._arm.stay():
+            return self._repeat()
+        self.state, self._datagram = self._report(), None
+        self._is_still = self._reporter.has_repeated and self._may_stay_still()
+        return self.state
+
+    def _live(self) -> None:
+        motion = self._motion
+        self._count_down()
+        step = motion.follow() if motion.is_followed else None
+        has_moved = step is not None and not step.faults
+        if step is not None and step.faults:
+            self._raise(step.faults, step.reason, is_number=step.is_number)
+        law = self._current_law()
+        if law is not Law.TORQUE:
+            motion.tau = None
+        self._arm.move(law, motion.tau, has_moved=has_moved)
+        if self.phase in _MOVING:
+            # Our own stop is one of the joints: how the tool turns meanwhile is nobody's command.
+            faults, reason = self._arm.watch.judge(is_commanded=motion.is_followed)
+            if faults:
+                self._raise(faults, reason)
+        if self.phase is Phase.STOPPING and self._arm.stands and not motion.is_followed:
+            self.happen(Event.AT_REST)
+
+    def _may_stay_still(self) -> bool:
+        """Returns whether the next cycle will be like this one, unless somebody asks for something or moves the arm."""
+        return self.phase in _STILL and self._countdown == 0 and self._arm.has_settled(self._current_law())
+
+    def _repeat(self) -> RobotState:
+        self.state = self._reporter.repeat(self._message_id)
+        if self._datagram is not None:
+            self._datagram = rci.renumber_state(self._datagram, self._message_id)
+        return self.state
+
+    def _count_down(self) -> None:
+        if self._countdown > 0:
+            self._countdown -= 1
+        if self._countdown > 0 or self.phase not in _WAITING:
+            return
+        if self.phase is Phase.STARTING:
+            self.happen(Event.MODES_SHOWN)
+        elif self._arm.commanded.is_at_rest:
+            self.happen(Event.RECOVERED)
+
+    def _raise(self, faults: tuple[Fault, ...], reason: Remark, *, is_number: bool = True) -> None:
+        self.reason = reason
+        is_limit = is_number and not self.settings.auto_limit and not _JOINT_RANGE.isdisjoint(faults)
+        self.happen(Event.JOINT_LIMIT if is_limit else Event.FAULT, *faults)
+
+    def _current_law(self) -> Law:
+        if self._motion.is_followed:
+            return self._motion.law
+        if self.phase is Phase.GUIDING:
+            return Law.GUIDE
+        return Law.BRAKED if self.phase in _BRAKED and self._arm.may_be_braked else Law.POSITION
+
+    def _report(self) -> RobotState:
+        controller_mode, motion_mode = self._shown
+        return self._reporter.report(
+            self._message_id,
+            self._arm.read(self._motion.tau),
+            faults=self.faults,
+            success_rate=self.playout.success_rate,
+            motion_generator_mode=motion_mode,
+            controller_mode=controller_mode,
+            robot_mode=self.phase.robot_mode,
+        )
+
+    def _enter(self, cell: Transition, *, request: rci.Request | None = None, faults: tuple[Fault, ...] = ()) -> None:
+        self._is_still = False
+        for action in cell.actions:
+            self._act(action, request, faults)
+        if cell.phase is Phase.RECOVERING and self.phase is not Phase.RECOVERING:
+            self._countdown = self._recovery_time
+        self.phase = cell.phase
+
+    def _act(self, action: Action, request: rci.Request | None, faults: tuple[Fault, ...]) -> None:
+        match action:
+            case Action.BEGIN:
+                assert isinstance(request, rci.StartMove)
+                modes = ControllerMode(request.controller_mode), rci.StartMotionMode(request.motion_mode)
+                self._requested, self._countdown = (modes[0], modes[1].shown_as), self._mode_delay
+                self._motion.prepare(MODES[modes])
+            case Action.SHOW_MODES:
+                self._shown = self._requested
+                self._motion.begin(self.settings, self.limit_table)
+            case Action.REVEAL_MODES:
+                self._shown = self._requested
+            case Action.HIDE_MODES:
+                self._shown = _IDLE_MODES
+            case Action.DRAIN:
+                self._motion.drain()
+            case Action.DISCARD:
+                self._motion.discard()
+            case Action.SET_FAULTS:
+                self.faults = tuple(sorted({*self.faults, *faults}))
+            case Action.CLEAR_FAULTS:
+                self.faults = ()
+            case Action.GUIDE:
+                assert isinstance(request, rci.StartDrag)
+                space, kind = rci.DragSpace(request.space), rci.DragType(request.type)
+                self._arm.actuator.begin_guiding(space, kind, self._arm.watch.measured)
+            case Action.REBOOT:
+                self.settings = self.settings.rebooted(self.model.description)
+                self._arm.configure(self.settings)
+                self._reporter.configure(self.model, self.settings)
+            case Action.APPLY:
+                pass  # Done before, because it may fail.
+
+    def _apply(self, request: rci.Request) -> bool:
+        try:
+            settings = apply_request(self.settings, request, self.model.description)
+        except InvalidValueError:
+            return False
+        self.settings = settings
+        self._arm.configure(settings)
+        if request.code in _REPORTED:
+            self._reporter.configure(self.model, settings)
+        return True

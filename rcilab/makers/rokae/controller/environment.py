@@ -1,0 +1,187 @@
+"""What surrounds a virtual robot: hands, boxes, buttons, wires, the network and the clock; and requests to change it.
+
+Everything is done in the thread of the controller between two cycles, so a request takes effect at the next cycle, and
+in lock-step every run with the same requests at the same cycles comes out the same.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from rcilab.core.clock import CYCLE_TIME, Clock
+from rcilab.core.errors import RcilabError, UsageError
+from rcilab.core.safety_box import SafetyBox, active_box
+from rcilab.core.spatial import Pose
+from rcilab.makers.rokae.controller.cycle import ControlCycle
+from rcilab.makers.rokae.controller.faulty_network import FaultyNetwork
+from rcilab.makers.rokae.wire import SafetyStop
+from rcilab.model.dynamics.payload import Payload
+from rcilab.sim.api import (
+    AutoLimit,
+    Done,
+    Floor,
+    GetStatus,
+    Limits,
+    LoopBack,
+    Mount,
+    Network,
+    PlaceBox,
+    Press,
+    Push,
+    Refused,
+    Release,
+    RemoveBox,
+    SetInput,
+    StallClock,
+    Walls,
+    WorldAnswer,
+    WorldRequest,
+    WorldStatus,
+)
+from rcilab.sim.clock_stalls import StallPlan
+
+_NOTHING = Push((0.0,) * 6)
+
+
+@dataclass(frozen=True, slots=True)
+class Mishaps:
+    """What the server counts: cycles left out, datagrams of a wrong size, and those of somebody else."""
+
+    missed: int
+    misfits: int
+    strangers: int
+
+
+class Surroundings:
+    """Carries out world requests. Owned by the thread that runs the controller.
+
+    Args:
+        cycle: The controller.
+        network: Its network.
+        stalls: Pauses of its clock.
+        clock: What these pauses are measured with.
+        mishaps: What the server has counted so far.
+    """
+
+    def __init__(
+        self,
+        cycle: ControlCycle,
+        network: FaultyNetwork,
+        stalls: StallPlan,
+        clock: Clock,
+        mishaps: Callable[[], Mishaps],
+    ) -> None:
+        self._cycle = cycle
+        self._plant = cycle.plant
+        self._network = network
+        self._stalls = stalls
+        self._clock = clock
+        self._mishaps = mishaps
+        self._is_pushed = False
+        self._has_walls = False
+        self._walls: SafetyBox | None = None
+        self._end_of_push = math.inf  # Number of the cycle that ends it.
+
+    def handle(self, request: WorldRequest) -> WorldAnswer:
+        """Carries a request out, or says why not."""
+        if isinstance(request, GetStatus):
+            return self._status()
+        try:
+            self._change(request)
+        except RcilabError as error:
+            facts = {name: fact if isinstance(fact, int | float) else str(fact) for name, fact in error.facts.items()}
+            return Refused(str(error), error.code, facts)
+        return Done()
+
+    def step(self) -> None:
+        """Takes away what has pressed on the arm for long enough, and moves walls; called after every cycle."""
+        if self._cycle.state.message_id >= self._end_of_push:
+            self._push(_NOTHING)
+        if self._has_walls and self._active_box() is not self._walls:
+            self._walls = self._active_box()
+            self._plant.set_walls(self._walls)
+
+    def _active_box(self) -> SafetyBox | None:
+        return active_box(self._cycle.settings.safety_box)
+
+    def _change(self, request: WorldRequest) -> None:
+        match request:
+            case Push():
+                self._push(request)
+            case Release():
+                if self._cycle.safety_stop is not SafetyStop.NONE and not self._is_pushed:
+                    raise UsageError("nothing pushes the arm; press button=none ends an emergency stop")
+                self._push(_NOTHING)
+            case Press(button):
+                self._cycle.press_safety_stop(SafetyStop[button.upper()])
+            case SetInput(signal, level):
+                self._cycle.set_input(signal, level)
+            case LoopBack(on):
+                self._cycle.loop_back = on
+            case AutoLimit(on):
+                self._cycle.auto_limit = on
+            case Limits(table):
+                self._cycle.limit_table = table
+            case Network(faults, direction):
+                self._network.replace(faults, direction)
+            case StallClock():
+                self._stalls.replace([] if request.stall is None else [request.stall], self._clock.now())
+            case PlaceBox(box, size, position, wxyz):
+                self._plant.place_box(box, size, Pose(position, wxyz))
+            case RemoveBox(box):
+                self._plant.remove_box(box)
+            case Floor(on):
+                self._plant.set_floor(on)
+            case Walls(on):
+                self._plant.set_walls(self._active_box() if on else None)
+                self._has_walls, self._walls = on, self._active_box()
+            case Mount():
+                self._plant.mount(_payload(request))
+            case GetStatus():
+                pass  # Answered before; it changes nothing.
+
+    def _push(self, push: Push) -> None:
+        self._plant.push(push.wrench, push.link, push.point)
+        self._is_pushed = any(push.wrench)
+        self._end_of_push = math.inf
+        if push.duration is not None and self._is_pushed:
+            self._end_of_push = self._cycle.state.message_id + round(push.duration / CYCLE_TIME)
+
+    def _status(self) -> WorldStatus:
+        cycle, mishaps = self._cycle, self._mishaps()
+        commands, states = self._network.faults
+        return WorldStatus(
+            model=cycle.model.name,
+            plant=self._plant.kind,
+            cycle=cycle.state.message_id,
+            phase=cycle.phase.name.lower(),
+            faults=tuple(fault.manual_name for fault in cycle.faults),
+            reason=cycle.reason,
+            button=cycle.safety_stop.name.lower(),
+            q=tuple(cycle.state.q.tolist()),
+            lost=cycle.playout.lost,
+            lost_in_row=cycle.playout.most_in_row,
+            success_rate=cycle.playout.success_rate,
+            missed=mishaps.missed,
+            misfits=mishaps.misfits,
+            strangers=mishaps.strangers,
+            ignored=cycle.ignored,
+            pushed=self._is_pushed,
+            stalls=self._stalls.count,
+            commands=commands,
+            states=states,
+        )
+
+
+def _payload(request: Mount) -> Payload | None:
+    if request.mass is None:
+        return None
+    return Payload(
+        mass=request.mass,
+        center_of_mass=np.array(request.center_of_mass),
+        inertia=np.array(request.inertia).reshape(3, 3),
+    )

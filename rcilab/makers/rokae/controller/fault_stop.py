@@ -1,0 +1,95 @@
+"""What the controller does on each fault, as a table one can print.
+
+    print(fault_stop.as_text())
+
+Where one command or one measurement breaks several conditions, all their bits are set in that cycle. A state, a report
+and an error list them in the order of the error bytes on the wire, that of this table, which says nothing about what
+came first. Commands are judged before the measurement: after a broken command no measurement is judged in that cycle.
+
+What is the same for all: the bit is set in the state of the cycle in which the condition is violated and stays set
+until the error recovery; queued commands are forgotten; the arm comes to rest inside its acceleration and jerk limits
+under the position servo, then the brakes close; StopMove is answered with success. What differs is whose value broke
+the condition, and where the stop begins. A joint limit without auto_limit also switches the motors off (manual 3.1.15).
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import Final, NamedTuple
+
+from rcilab.core.faults import Fault
+
+
+class Offender(Enum):
+    """What broke the condition, and what becomes of it."""
+
+    COMMAND = "the command of this cycle is not given to the arm"
+    MEASUREMENT = "the command of this cycle has been followed; the arm, not the command, broke the condition"
+    ABSENCE = "there was no command, and none is made up any more"
+
+
+class FaultStop(NamedTuple):
+    """One row of the table."""
+
+    offender: Offender
+    modes: str
+    """In which controller modes it is judged."""
+    recovery: str
+    """What the error recovery asks for."""
+
+
+_ANYTIME = "none: recover, then start the next motion"
+_BACK = (
+    "up to 1 deg outside: recover, then power on, which the limit has taken unless auto_limit is on. "
+    "Farther: refused (manual recovery needed), power off and on, then lead back"
+)
+_BACK_BOX = "up to 1 cm outside: as below. Farther: refused (manual recovery needed), power off and on, then lead back"
+_CLEAR = "refused (reflex) while something still presses harder than the thresholds"
+
+_ALL, _JOINTS, _TOOL, _TORQUES = "all", "all but torque", "both Cartesian modes", "torque"
+_COMMAND, _MEASUREMENT = Offender.COMMAND, Offender.MEASUREMENT
+
+FAULT_STOP: Final = {
+    Fault.ACTUAL_JOINT_POSITION_LIMITS_VIOLATION: FaultStop(_MEASUREMENT, _ALL, _BACK),
+    Fault.ACTUAL_CARTESIAN_POSITION_LIMITS_VIOLATION: FaultStop(
+        _MEASUREMENT,
+        "all but hand guiding, which leads it back; not with the virtual guide in an impedance mode",
+        _BACK_BOX,
+    ),
+    Fault.ACTUAL_CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION: FaultStop(_MEASUREMENT, _TOOL, _ANYTIME),
+    Fault.ACTUAL_JOINT_VELOCITY_LIMITS_VIOLATION: FaultStop(_MEASUREMENT, _ALL, _ANYTIME),
+    Fault.ACTUAL_CARTESIAN_VELOCITY_LIMITS_VIOLATION: FaultStop(_MEASUREMENT, _TOOL, _ANYTIME),
+    Fault.ACTUAL_JOINT_ACCELERATION_LIMITS_VIOLATION: FaultStop(
+        _MEASUREMENT, "all; eight times the bound in impedance and torque modes", _ANYTIME
+    ),
+    Fault.ACTUAL_CARTESIAN_ACCELERATION_LIMITS_VIOLATION: FaultStop(
+        _MEASUREMENT, "both Cartesian modes; eight times the bound in Cartesian impedance", _ANYTIME
+    ),
+    Fault.COMMAND_JOINT_POSITION_LIMITS_VIOLATION: FaultStop(
+        _COMMAND, "all but torque; with auto_limit joints are led to rest inside instead", _BACK
+    ),
+    Fault.COMMAND_CARTESIAN_POSITION_LIMITS_VIOLATION: FaultStop(
+        _COMMAND, "all but torque; not with the virtual guide in an impedance mode", _BACK_BOX
+    ),
+    Fault.COMMAND_CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION: FaultStop(_COMMAND, _TOOL, _ANYTIME),
+    Fault.COMMAND_JOINT_VELOCITY_LIMITS_VIOLATION: FaultStop(_COMMAND, _JOINTS, _ANYTIME),
+    Fault.COMMAND_CARTESIAN_VELOCITY_LIMITS_VIOLATION: FaultStop(_COMMAND, _TOOL, _ANYTIME),
+    Fault.COMMAND_JOINT_ACCELERATION_LIMITS_VIOLATION: FaultStop(_COMMAND, _JOINTS, _ANYTIME),
+    Fault.COMMAND_CARTESIAN_ACCELERATION_LIMITS_VIOLATION: FaultStop(_COMMAND, _TOOL, _ANYTIME),
+    Fault.COMMAND_JOINT_ACCELERATION_DISCONTINUITY: FaultStop(_COMMAND, _JOINTS, _ANYTIME),
+    Fault.COLLISION: FaultStop(_MEASUREMENT, _ALL, _CLEAR),
+    Fault.CARTESIAN_POSITION_MOTION_GENERATOR_INVALID_FRAME: FaultStop(_COMMAND, _TOOL, _ANYTIME),
+    Fault.COMMAND_TORQUE_DISCONTINUITY: FaultStop(_COMMAND, _TORQUES, _ANYTIME),
+    Fault.COMMAND_TORQUE_RANGE_VIOLATION: FaultStop(_COMMAND, _TORQUES, _ANYTIME),
+    Fault.INSTABILITY_DETECTION: FaultStop(Offender.ABSENCE, _ALL, "none; after an emergency stop, its release"),
+}
+"""Every fault. While a person guides the arm by hand nothing is judged."""
+
+
+def as_text() -> str:
+    """Returns the table as text, three lines a fault."""
+    return "\n".join(
+        f"{fault.value:2} {fault.manual_name}: {fault.cause}; judged in: {row.modes}\n"
+        f"   {row.offender.value}\n   recovery: {row.recovery}"
+        for fault, row in FAULT_STOP.items()
+    )

@@ -1,0 +1,75 @@
+"""First-order low passes on what a client commands, and on torques that are reported.
+
+    x += k (u - x),   k = dt / (dt + 1 / (2 pi f))
+
+The same filter that the vendor's client applies before it sends. At 1000 Hz, the largest frequency that can be set, a
+filter is off.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import pi, remainder, tau
+
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.spatial import Pose
+from rcilab.makers.rokae.wire.bounds import FILTER_OFF
+from rcilab.model.kinematics.closest_pose import interpolate
+
+
+def low_pass_gain(frequency: float) -> float:
+    """Returns the share of the difference that a low pass takes up in one cycle, 0 to 1.
+
+    Args:
+        frequency: Cut-off frequency, 0.1 to 1000 Hz.
+    """
+    if frequency >= FILTER_OFF:
+        return 1.0
+    return CYCLE_TIME / (CYCLE_TIME + 1.0 / (2.0 * pi * frequency))
+
+
+class LowPass:
+    """A low pass on several numbers. Owned by the controller's cycle.
+
+    Args:
+        frequency: Cut-off frequency, [Hz].
+        start: The numbers that it starts from.
+    """
+
+    def __init__(self, frequency: float, start: Sequence[float]) -> None:
+        self._gain = low_pass_gain(frequency)
+        self._values = list(start)
+
+    def step(self, values: Sequence[float]) -> list[float]:
+        """Takes the numbers of this cycle and returns the filtered ones."""
+        gain = self._gain
+        if gain == 1.0:
+            return list(values)
+        self._values = [x + gain * (u - x) for x, u in zip(self._values, values, strict=True)]
+        return self._values
+
+
+class PoseLowPass:
+    """A low pass on a pose and an arm angle: the position on the line, the orientation by slerp, psi the short way.
+
+    Owned by the controller's cycle.
+
+    Args:
+        frequency: Cut-off frequency, [Hz].
+        pose: The pose that it starts from.
+        psi: The arm angle that it starts from, [rad].
+    """
+
+    def __init__(self, frequency: float, pose: Pose, psi: float) -> None:
+        self._gain = low_pass_gain(frequency)
+        self._pose = pose
+        self._psi = psi
+
+    def step(self, pose: Pose, psi: float) -> tuple[Pose, float]:
+        """Takes pose and arm angle of this cycle and returns the filtered ones."""
+        gain = self._gain
+        if gain == 1.0:
+            return pose, psi
+        self._pose = interpolate(self._pose, pose, gain)
+        self._psi = remainder(self._psi + gain * remainder(psi - self._psi, tau), tau)
+        return self._pose, self._psi

@@ -1,0 +1,99 @@
+"""Hand guiding and the walls of the safety box: torques that let a person lead the arm, and where they end.
+
+A guided arm is weightless (`Drive.TORQUE` compensates gravity and friction) and lightly damped. Cartesian drags hold
+what the person shall not change with the stiffest springs of the Cartesian impedance: TRANSLATION the orientation of
+the tool, ROTATION its position. Before a joint limit a spring pushes back with the joint's torque limit.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rcilab.core.arrays import Array, JointVector
+from rcilab.core.limits import JointLimits
+from rcilab.core.safety_box import SafetyBox
+from rcilab.core.spatial import Pose, turn_between
+from rcilab.makers.rokae import wire as rci
+from rcilab.model.dynamics.rigid_body import ToolTerms
+from rcilab.model.robot_model import RobotModel
+from rcilab.sim.compliance import design_damping
+from rcilab.sim.plant import Measurement
+
+GUIDE_DAMPING = 1.5  # [rad/s] slowest mode that damping is computed with: a guided arm loses speed in some 0.5 s
+JOINT_DAMPING = 0.02  # [N m s/rad per N m of torque limit] in addition: light links must not race; a choice
+STOP_ZONE = 0.05  # [rad] before a joint limit in which its spring grows from nothing to the torque limit; a choice
+_DAMPED_OUTWARD = 1e-6  # [rad/s] walls damp nothing along themselves
+
+
+def guide_torque(
+    model: RobotModel,
+    measured: Measurement,
+    space: rci.DragSpace,
+    kind: rci.DragType,
+    T_held: Pose,
+    limits: JointLimits | None = None,
+) -> JointVector:
+    """Returns the torque on a guided arm, without gravity, shape (n,), [N m].
+
+    Args:
+        model: The arm as the controller knows it.
+        measured: Where the arm is.
+        space: In joint space every joint is free, and `kind` has no effect, as with the vendor's client.
+        kind: What a Cartesian drag leaves free.
+        T_held: Pose of the tool in base at the start of the drag.
+        limits: Where the joints end; the arm's own limits when absent.
+    """
+    terms = model.rigid_body.tool_terms(measured.q, measured.dq)
+    stiffness, spring = _limit_springs(measured.q, model.limits.joint if limits is None else limits)
+    if space is rci.DragSpace.CARTESIAN and kind is not rci.DragType.FREE:
+        held = slice(3, 6) if kind is rci.DragType.TRANSLATION else slice(0, 3)
+        J = terms.jacobian[held]
+        hold, error = _held(model, terms, kind, T_held)
+        stiffness = stiffness + hold * (J.T @ J)
+        spring = spring + J.T @ (hold * error)
+    spring = spring - JOINT_DAMPING * model.limits.joint.torque * measured.dq
+    coriolis = model.rigid_body.motion_torque(measured.q, measured.dq, np.zeros(model.n))
+    return design_damping(terms.mass_inverse, stiffness, GUIDE_DAMPING).torque(spring, -measured.dq) + coriolis
+
+
+def wall_torque(model: RobotModel, measured: Measurement, box: SafetyBox, stiffness6: tuple[float, ...]) -> JointVector:
+    """Returns the torque that pushes the tool back into an active box, shape (n,), [N m]; zeros inside it.
+
+    Args:
+        model: The arm as the controller knows it, with its tool.
+        measured: Where the arm is.
+        box: The box that the tool shall stay in.
+        stiffness6: Cartesian stiffness; the first three act along the axes of the box, [N/m].
+    """
+    terms = model.rigid_body.tool_terms(measured.q, measured.dq)
+    r, centre = box.T_base_box.parts
+    x, y, z = (a - b for a, b in zip(terms.pose.parts[1], centre, strict=True))
+    outside = [0.0, 0.0, 0.0]
+    for axis, half in enumerate(edge / 2.0 for edge in box.size):
+        along = r[axis] * x + r[3 + axis] * y + r[6 + axis] * z
+        outside[axis] = along - min(max(along, -half), half)
+    if not box.active or not any(outside):
+        return np.zeros(model.n)
+    faces = [axis for axis in range(3) if outside[axis]]
+    directions = np.array(r).reshape(3, 3)[:, faces]
+    J = directions.T @ terms.jacobian[:3]
+    stiffness = np.array([stiffness6[axis] for axis in faces])
+    spring = J.T @ (stiffness * [-outside[axis] for axis in faces])
+    return design_damping(terms.mass_inverse, J.T * stiffness @ J, _DAMPED_OUTWARD).torque(spring, -measured.dq)
+
+
+def _held(model: RobotModel, terms: ToolTerms, kind: rci.DragType, T_held: Pose) -> tuple[float, Array]:
+    """Returns stiffness and error of what a Cartesian drag holds, the error of shape (3,) in base axes."""
+    cartesian = model.limits.cartesian
+    if kind is rci.DragType.ROTATION:
+        return cartesian.translation_stiffness, T_held.position - terms.pose.position
+    return cartesian.rotation_stiffness, np.array(turn_between(terms.pose.parts[0], T_held.parts[0]))
+
+
+def _limit_springs(q: JointVector, limits: JointLimits) -> tuple[Array, JointVector]:
+    """Returns stiffness, shape (n, n), and torque of the springs before the joint limits."""
+    excess = q - np.clip(q, limits.lower + STOP_ZONE, limits.upper - STOP_ZONE)
+    if not excess.any():
+        return np.zeros((len(q), len(q))), np.zeros(len(q))
+    stiffness = np.where(excess, limits.torque / STOP_ZONE, 0.0)
+    return np.diag(stiffness), -stiffness * excess

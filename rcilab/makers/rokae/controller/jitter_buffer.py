@@ -1,0 +1,262 @@
+"""The play-out buffer: commands arrive as the network likes, one is played per controller cycle.
+
+    waiting --first command, then `prefill` cycles--> playing --empty queue--> losing cycles --next command--> playing
+
+* The first command starts a countdown of `prefill` cycles; as many commands are then in stock and absorb the jitter of
+  client and network. A burst (the vendor's client may answer 90 old states at once after StartMove) simply fills the
+  queue; its old message ids do not matter.
+* Where ids advance one by one, they are cycle numbers. An empty queue is a lost cycle, and the command for it, when
+  it comes after all, is dropped as it comes: the arm has passed that place already.
+* Without a first command within `FIRST_COMMAND_TIMEOUT`, the cycles from then on are lost: the commands go elsewhere.
+* A repeated id is the next command: the vendor's client answers the last state again when none came in time. A
+  datagram that is the same in every number is the network's copy and dropped; it only shows that the client lives.
+* A short gap in the ids is either a lost command, or a lost state whose cycle the client never saw; only the command
+  itself can tell, so the caller is asked whether it continues the motion by one step or by the whole gap. A repeated
+  id right before the gap speaks for the lost state.
+* A command that was overtaken on its way fills the gap. Where states overtake each other, it is the ids of their
+  answers that are out of order: then the command behind the gap continues the motion, and those with the ids of the
+  gap come after it, in the order of their arrival.
+* Clearly more commands than the prefill in stock for a long time mean a client that made more of them than there are
+  cycles; the loop is told to live through some more, or their delay would only ever grow.
+* Commands that close a control loop (torques) must be fresh: more than the prefill in stock are skipped, oldest first.
+* A long gap, or ids that start again far behind, mean another numbering: the command is simply the next one.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+from rcilab.makers.rokae.wire import CommandPacket
+
+CAPACITY = 256  # Commands in the queue; then the oldest gives way. 2.5 of the vendor client's worst bursts (about 92).
+WINDOW = 1000  # Cycles that the success rate looks back over, 1 s; a choice.
+STOCK_WINDOW = 100  # Cycles in which the lowest stock is looked for; longer than any jitter, a choice.
+SLACK = 5  # Cycles of delay more than wanted that are left alone: a client may be late with its first answer; a choice.
+FIRST_COMMAND_TIMEOUT = 5000  # Cycles. A vendor client begins 1 s after StartMove; a first callback loads libraries.
+LONGEST_GAP = 20  # Ids. The largest loss that the controller bridges at all (manual 4.6: 10 to 20).
+
+
+class Playback(NamedTuple):
+    """What one cycle gets from the buffer."""
+
+    packet: CommandPacket | None
+    """The command to play; with `steps` > 1 the next one known, that many cycles ahead; None when there is none."""
+    steps: int
+    """Cycles from now to when `packet` is due, 1 for now."""
+    is_lost: bool
+    """The motion runs and this cycle has no command."""
+    skipped: int = 0
+    """Commands before this one that were skipped for being too old."""
+
+
+_WAITING = Playback(None, 1, False)
+_EMPTY = Playback(None, 1, True)
+
+
+class Playout:
+    """The queue between network and cycle. Owned by the controller's loop.
+
+    Attributes:
+        lost: Lost cycles of this motion.
+        lost_in_row: Lost cycles since the last command.
+        most_in_row: The most that were lost in a row in this motion.
+        late: Commands dropped because their cycle had passed.
+        dropped: Commands dropped, oldest first, because the queue was full.
+        copies: Datagrams dropped because they were the same as the one before.
+
+    Args:
+        prefill: Cycles between the first command's arrival and its play-out.
+    """
+
+    def __init__(self, prefill: int) -> None:
+        self._prefill = prefill
+        self._queue: deque[CommandPacket] = deque()
+        self.begin()
+
+    def begin(self, *, most: int | None = None) -> None:
+        """Forgets everything, ready for the first command of a motion.
+
+        Args:
+            most: Commands that may be in stock beside the one that is played: another prefill, and what is older is
+                skipped. None is as many as fit.
+        """
+        self._queue.clear()
+        self._stock = most
+        self._countdown = self._prefill if self._stock is None else self._stock
+        self._newest: CommandPacket | None = None
+        self._lives = False
+        self._lowest, self._looked, self._excess = CAPACITY, 0, 0
+        self._outcomes: deque[bool] = deque(maxlen=WINDOW)
+        self._played_in_window = 0
+        self._last_id = 0
+        self._was_lost = False  # The cycle `_last_id` had no command.
+        self._surplus = 0  # Commands that had an id again, right before the next one in the queue.
+        self._passed_over: set[int] = set()  # Ids of a gap that was none: their commands may come yet.
+        self._waited = 0
+        self.is_playing = False
+        self.is_finished = False
+        self.lost = self.lost_in_row = self.most_in_row = self.late = self.dropped = self.copies = 0
+
+    def clear(self) -> None:
+        """Drops what is queued; what was counted stays."""
+        self._queue.clear()
+
+    def __len__(self) -> int:
+        return len(self._queue)
+
+    @property
+    def is_starved(self) -> bool:
+        """Whether the next cycle would lose its command, for all that is known now."""
+        return self.is_playing and not (self.is_finished or self._queue or self._lives)
+
+    @property
+    def success_rate(self) -> float:
+        """Share of the last cycles that had their command, 0 to 1; 1 before the first one."""
+        return self._played_in_window / len(self._outcomes) if self._outcomes else 1.0
+
+    def push(self, packet: CommandPacket) -> None:
+        """Takes a command from the network."""
+        queue, newest = self._queue, self._newest
+        if packet == newest:
+            self.copies += 1
+            self._lives = True
+            return
+        is_overtaken = newest is not None and 0 < newest.message_id - packet.message_id <= LONGEST_GAP
+        if not is_overtaken:
+            self._newest = packet
+        if self._is_late(packet):
+            self.late += 1
+        elif is_overtaken and packet in queue:
+            self.copies += 1
+        else:
+            if len(queue) >= CAPACITY:
+                queue.popleft()
+                self.dropped += 1
+            queue.append(packet)
+
+    def work_off(self) -> bool:
+        """Returns whether a cycle more is due now: many more commands than the prefill waited through the last window.
+
+        That is no jitter; the client has made more commands than there were cycles.
+        """
+        if self._excess == 0:
+            return False
+        self._excess -= 1
+        return True
+
+    def take(self, is_next: Callable[[CommandPacket, int, bool], bool]) -> Playback:
+        """Returns what this cycle plays.
+
+        Args:
+            is_next: Asked about a command whose id is a few cycles ahead, `(packet, steps, in_doubt)`: does it continue
+                the motion by one step (true) or by that many (false)? `in_doubt` is the answer where neither is clear.
+        """
+        if self.is_finished:
+            return _WAITING
+        if not self.is_playing:
+            if not self._queue:
+                self._waited += 1
+                return _WAITING if self._waited <= FIRST_COMMAND_TIMEOUT else self._lose(_EMPTY)
+            if self._countdown > 0:
+                self._countdown -= 1
+                return _WAITING
+            self.is_playing = True
+            self._skip_old()
+            first = self._queue[0].message_id
+            self._last_id = min(i for i in self._ids() if 0 <= first - i <= LONGEST_GAP) - 1
+        self._look_for_excess()
+        skipped = self._skip_old()
+        lives, self._lives = self._lives, False
+        if not self._queue:
+            return self._wait_alive() if lives else self._lose(_EMPTY)
+        packet = self._queue[0]
+        steps = self._steps_to(packet, is_next)
+        if steps > 1:  # Unless a command that was overtaken fills the gap, its cycles are lost.
+            between = (other for other in self._queue if self._last_id < other.message_id < packet.message_id)
+            packet = min(between, key=lambda other: other.message_id, default=packet)
+            steps = self._steps_to(packet, is_next)
+            if steps > 1:
+                return self._lose(Playback(packet, steps, True))
+        return self._play(packet, skipped)
+
+    def _ids(self) -> Iterator[int]:
+        return (packet.message_id for packet in self._queue)
+
+    def _steps_to(self, packet: CommandPacket, is_next: Callable[[CommandPacket, int, bool], bool]) -> int:
+        """Returns how many cycles from now a command is due, 1 for now."""
+        ahead = packet.message_id - self._last_id
+        if not 1 < ahead <= LONGEST_GAP:
+            return 1
+        unexplained = max(ahead - self._surplus, 1)
+        if unexplained == 1:
+            return 1 if is_next(packet, ahead, True) else ahead
+        return 1 if is_next(packet, unexplained, False) else unexplained
+
+    def _is_late(self, packet: CommandPacket) -> bool:
+        """Returns whether the cycle that a command is for has passed already."""
+        behind = self._last_id - packet.message_id
+        if packet.message_id in self._passed_over:
+            return False
+        return 0 <= behind <= LONGEST_GAP and (behind > 0 or self._was_lost) and self.is_playing
+
+    def _look_for_excess(self) -> None:
+        self._lowest = min(self._lowest, len(self._queue) - 1)
+        self._looked += 1
+        if self._looked >= STOCK_WINDOW:
+            excess = self._lowest - self._prefill
+            self._excess = excess if excess > SLACK else 0
+            self._looked, self._lowest = 0, CAPACITY
+
+    def _skip_old(self) -> int:
+        """Skips commands beyond the stock that is wanted; returns how many."""
+        if self._stock is None:
+            return 0
+        skipped = max(0, len(self._queue) - self._stock - 1)
+        for _ in range(skipped):
+            self._advance_to(self._queue.popleft().message_id)
+        return skipped
+
+    def _wait_alive(self) -> Playback:
+        """Bridges a cycle in which the client had nothing new to say: it answered a state again, word by word."""
+        self._surplus += 1
+        self.lost_in_row = 0
+        self._count(True)
+        return _EMPTY
+
+    def _play(self, packet: CommandPacket, skipped: int) -> Playback:
+        self._queue.remove(packet)
+        self._advance_to(packet.message_id)
+        self.lost_in_row = 0
+        self.is_finished = packet.finished
+        self._count(True)
+        return Playback(packet, 1, False, skipped)
+
+    def _advance_to(self, played: int) -> None:
+        """Takes note of the id that is played now."""
+        last, self._was_lost = self._last_id, False
+        if played in self._passed_over:
+            self._passed_over.remove(played)
+            return
+        ahead = played - last
+        self._surplus = self._surplus + 1 if ahead == 0 else 0
+        self._passed_over = {i for i in self._passed_over if 0 < played - i <= LONGEST_GAP}
+        if 1 < ahead <= LONGEST_GAP:
+            self._passed_over.update(range(last + 1, played))
+        self._last_id = played
+
+    def _lose(self, playback: Playback) -> Playback:
+        self._last_id, self._was_lost = self._last_id + 1, True
+        self.lost += 1
+        self.lost_in_row += 1
+        self.most_in_row = max(self.most_in_row, self.lost_in_row)
+        self._count(False)
+        return playback
+
+    def _count(self, played: bool) -> None:
+        outcomes = self._outcomes
+        if len(outcomes) == WINDOW:
+            self._played_in_window -= outcomes[0]
+        outcomes.append(played)
+        self._played_in_window += played

@@ -1,0 +1,65 @@
+"""Joint angles commanded one by one: joint position and joint impedance.
+
+The commanded angles pass the low pass of setFilters, then the fence of auto_limit if it is up, and then the conditions
+of the manual's section 4.1. A lost cycle goes on with the acceleration of the last commands; when a later command is
+known already, on the cubic that leads there. The conditions judge the commands that came, over the cycles between.
+"""
+
+from __future__ import annotations
+
+from math import isfinite
+
+from rcilab.core.faults import Fault
+from rcilab.i18n.translator import Remark
+from rcilab.makers.rokae.controller.filters import LowPass
+from rcilab.makers.rokae.controller.jitter_buffer import Playback
+from rcilab.makers.rokae.controller.modes.generator import Gap, JointReference, Step, Terms
+from rcilab.makers.rokae.wire import CommandPacket
+from rcilab.sim.command_extrapolator import Stream
+
+
+class JointGenerator:
+    """Follows commanded joint angles.
+
+    Args:
+        terms: Of the motion.
+        q: Where the arm stands, n plain floats, [rad].
+    """
+
+    def __init__(self, terms: Terms, q: list[float]) -> None:
+        self._n = terms.model.n
+        self._terms = terms
+        self._has_begun = False
+        self._stream = Stream(q)
+        self._filter = LowPass(terms.settings.joint_filter, q)
+        self._gap = Gap()
+        self._reference = JointReference(terms, q, judges_box=True)
+
+    def is_next(self, packet: CommandPacket, steps: int, in_doubt: bool) -> bool:
+        """Returns whether a command continues the motion by one cycle rather than by `steps`; see `Stream.is_next`."""
+        return self._stream.is_next(packet.q_c[: self._n], steps, in_doubt)
+
+    def step(self, playback: Playback) -> Step:
+        """Takes this cycle's angles, or bridges a cycle that has none."""
+        packet = playback.packet
+        cycles = self._gap.step(playback)
+        if packet is None:
+            q = self._stream.predict(1)
+        else:
+            q = list(packet.q_c[: self._n])
+            if playback.is_lost:
+                q = self._stream.predict(1, q, playback.steps)
+        if not isfinite(sum(q)):  # Not a number is in no range; the derivatives say nothing then.
+            reason = Remark(f"commanded positions {q} rad are not all finite numbers", "no_numbers")
+            return Step(faults=(Fault.COMMAND_JOINT_POSITION_LIMITS_VIOLATION,), reason=reason, is_number=False)
+        if not self._has_begun:
+            self._begin(q)
+        self._stream.take(q)
+        return self._reference.step(self._filter.step(q), cycles)
+
+    def _begin(self, q: list[float]) -> None:
+        """Takes the first command, which filter and prediction start from when the motion begins there."""
+        self._has_begun = True
+        if self._reference.begin(q, self._terms.tolerance):
+            self._stream = Stream(q)
+            self._filter = LowPass(self._terms.settings.joint_filter, q)

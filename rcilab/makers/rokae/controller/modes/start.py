@@ -1,0 +1,230 @@
+"""How far from the controller's reference a motion may begin, and how that offset is absorbed.
+
+The manual's 4.2 recommends that a motion begins at T = T_c; it does not require it. A client begins at what the state
+shows, measured or commanded, or at its own last command. For an arm on its servos these agree up to rounding and the
+servo's error. After a motion in which the arm yields they differ by as much as a few newtons bend its springs.
+
+An offset inside the tolerance is no motion of the client's: it is not differentiated. The reference begins where the
+arm is and approaches the client's commands on a quintic that uses `SHARE` of the joints' limits. Beyond the tolerance
+the first command is a jump, with the fault that the manual has for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import degrees, sqrt
+from typing import Any, Generic, Protocol, TypeVar
+
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.faults import Fault
+from rcilab.core.limits import JointLimits
+from rcilab.i18n.translator import Remark
+from rcilab.makers.rokae.controller.actuator import Law
+from rcilab.makers.rokae.controller.settings import Settings
+
+SERVO_ERROR = 1e-3  # [rad] Static error of a joint on its servo, and rounding; the MuJoCo plant's stays below 0.2 mrad.
+SERVO_LENGTH = 1e-3  # [m] The same at the tool, at a lever of 1 m.
+FORCE = 5.0  # [N] At the tool; with it, what friction and an imperfect load model leave in a yielding arm.
+LEVER = 0.5  # [m] From a joint to the tool, about half of the arms' reach: FORCE becomes a torque of 2.5 N m.
+TURNING_LEVER = 0.1  # [m] From the tool's axes to where FORCE acts: 0.5 N m that turn the tool.
+WIDEST_ANGLE = (
+    0.05  # [rad] However soft the spring: an arm that is farther off has been moved, and is not where it was.
+)
+WIDEST_LENGTH = 0.02  # [m] The same for the tool.
+SHARE = 0.1  # Of the joints' acceleration and jerk limits, for absorbing an offset: what remains is for the motion.
+
+
+@dataclass(frozen=True, slots=True)
+class StartTolerance:
+    """How far the first command of a motion may be off the controller's reference."""
+
+    joint: tuple[float, ...]
+    """Of each joint, n numbers, [rad]."""
+    translation: float = SERVO_LENGTH
+    """Of the tool's position, [m]."""
+    rotation: float = SERVO_ERROR
+    """Of the tool's orientation, [rad]."""
+    arm_angle: float = 2.0 * SERVO_ERROR
+    """Of the arm angle, [rad]: shoulder and wrist both contribute."""
+
+    def widened(self, other: StartTolerance) -> StartTolerance:
+        """Returns the larger of two tolerances, each number for itself."""
+        return StartTolerance(
+            tuple(map(max, self.joint, other.joint)),
+            max(self.translation, other.translation),
+            max(self.rotation, other.rotation),
+            max(self.arm_angle, other.arm_angle),
+        )
+
+
+def start_tolerance(law: Law, settings: Settings) -> StartTolerance:
+    """Returns what a control law makes of an arm's position: what a motion in it, or right after it, may be off.
+
+    Args:
+        law: Of the motion.
+        settings: With the stiffness of both impedances.
+    """
+    n = len(settings.joint_lower)
+    if not law.yields:
+        return StartTolerance((SERVO_ERROR,) * n)
+    if law is Law.JOINT_IMPEDANCE:
+        joint = tuple(_deflection(FORCE * LEVER, k, SERVO_ERROR, WIDEST_ANGLE) for k in settings.joint_stiffness)
+        widest = max(joint)
+        return StartTolerance(joint, min(widest * LEVER, WIDEST_LENGTH), widest, widest)
+    if law is Law.CARTESIAN_IMPEDANCE:
+        *translations, a, b, c = settings.cartesian_stiffness
+        translation = max(_deflection(FORCE, k, SERVO_LENGTH, WIDEST_LENGTH) for k in translations)
+        rotation = max(_deflection(FORCE * TURNING_LEVER, k, SERVO_ERROR, WIDEST_ANGLE) for k in (a, b, c))
+        return StartTolerance((WIDEST_ANGLE,) * n, translation, rotation, WIDEST_ANGLE)
+    return StartTolerance((WIDEST_ANGLE,) * n, WIDEST_LENGTH, WIDEST_ANGLE, WIDEST_ANGLE)
+
+
+def _deflection(load: float, stiffness: float, least: float, most: float) -> float:
+    return most if stiffness * most <= load else max(least, load / stiffness)
+
+
+def find_joint_jump(q: Sequence[float], reference: Sequence[float], tolerance: StartTolerance) -> Remark | None:
+    """Returns which joint a motion would begin too far off at, in words and numbers, or None.
+
+    Args:
+        q: First commanded angles, n numbers, [rad].
+        reference: The controller's, [rad].
+        tolerance: How far they may be apart.
+    """
+    for number, (angle, here, bound) in enumerate(zip(q, reference, tolerance.joint, strict=True), 1):
+        if not abs(angle - here) <= bound:
+            return _jump("start_joint", f"{degrees(angle):.4f}°", f"{degrees(here):.4f}°", angle - here, bound, number)
+    return None
+
+
+def find_tool_jump(translation: float, rotation: float, arm_angle: float, tolerance: StartTolerance) -> Remark | None:
+    """Returns what of the tool a motion would begin too far off at, in words and numbers, or None.
+
+    Args:
+        translation: From the controller's reference to the first commanded position, [m].
+        rotation: To the first commanded orientation, [rad].
+        arm_angle: To the first commanded arm angle, [rad].
+        tolerance: How far they may be apart.
+    """
+    if not translation <= tolerance.translation:
+        return _tool_jump(
+            "start_position", "position", f"{1e3 * translation:.4g} mm", f"{1e3 * tolerance.translation:.3g} mm"
+        )
+    if not rotation <= tolerance.rotation:
+        return _tool_jump(
+            "start_orientation", "orientation", f"{degrees(rotation):.4g}°", f"{degrees(tolerance.rotation):.3g}°"
+        )
+    if not abs(arm_angle) <= tolerance.arm_angle:
+        return _tool_jump(
+            "start_arm_angle", "arm angle", f"{degrees(arm_angle):.4g}°", f"{degrees(tolerance.arm_angle):.3g}°"
+        )
+    return None
+
+
+def _jump(code: str, begins: str, stands: str, off: float, bound: float, joint: int) -> Remark:
+    said = (
+        f"joint {joint}: the first command of the motion is {begins} and the arm's reference is {stands}, "
+        f"{degrees(abs(off)):.3g}° apart, more than {degrees(bound):.3g}°; begin at q_c of the state"
+    )
+    amounts = {
+        "begins": begins,
+        "stands": stands,
+        "off": f"{degrees(abs(off)):.3g}°",
+        "bound": f"{degrees(bound):.3g}°",
+    }
+    return Remark(said, code, joint=joint, **amounts)
+
+
+def _tool_jump(code: str, what: str, off: str, bound: str) -> Remark:
+    said = (
+        f"the first commanded {what} of the motion is {off} from the arm's reference, more than {bound}; begin at "
+        "toolTobase_pos_c and psi_c of the state"
+    )
+    return Remark(said, code, off=off, bound=bound)
+
+
+class Stepping(Protocol):
+    """A per-cycle monitor."""
+
+    @property
+    def step(self) -> Callable[..., tuple[Fault, ...]]:
+        """Takes the commands of this cycle and returns the faults they raise."""
+        ...
+
+
+_M = TypeVar("_M", bound=Stepping)
+_AMBIGUOUS = 4  # Commands after which a third difference no longer reaches the reference that the motion began from.
+
+
+class StartMonitor(Generic[_M]):
+    """Evaluates commands, the first few of which may be read in two ways; a fault is what breaks both.
+
+    A first command that is off the reference by no more than one cycle's jerk is the first step of a motion from there,
+    or the place where another motion begins. Owned by a motion generator.
+
+    Attributes:
+        monitor: The reading that holds.
+
+    Args:
+        monitor: Of commands that continue from the reference.
+        alternative: Of commands that begin at the first one.
+    """
+
+    def __init__(self, monitor: _M, alternative: _M) -> None:
+        self.monitor = monitor
+        self._alternative: _M | None = alternative
+        self._left = _AMBIGUOUS
+
+    @property
+    def is_decided(self) -> bool:
+        """Whether only one reading is left: `monitor` alone goes on."""
+        return self._alternative is None
+
+    def step(self, *signals: Any) -> tuple[Fault, ...]:
+        """Takes the commands of this cycle and returns the faults they raise, in wire order."""
+        faults = self.monitor.step(*signals)
+        if self._alternative is not None:
+            other = self._alternative.step(*signals)
+            if faults and not other:
+                self.monitor, faults = self._alternative, ()
+            self._left -= 1
+            if self._left == 0 or other or self.monitor is self._alternative:
+                self._alternative = None
+        return faults
+
+
+class StartOffset:
+    """What the reference is off the client's commands, from the start of a motion until it is absorbed.
+
+    Owned by a motion generator.
+
+    Args:
+        limits: Of the joints.
+        offset: Reference minus first command, n numbers, [rad].
+    """
+
+    def __init__(self, limits: JointLimits, offset: Sequence[float]) -> None:
+        self._offset = list(offset)
+        # A quintic over a distance d in a time T has the largest acceleration 10/sqrt(3) d/T^2 and jerk 60 d/T^3.
+        times = [
+            max(
+                sqrt(10.0 / sqrt(3.0) * abs(d) / (SHARE * acceleration)),
+                (60.0 * abs(d) / (SHARE * jerk)) ** (1.0 / 3.0),
+            )
+            for d, acceleration, jerk in zip(offset, limits.acceleration.tolist(), limits.jerk.tolist(), strict=True)
+        ]
+        self._cycles = max(times) / CYCLE_TIME
+        self._cycle = 0
+
+    @property
+    def is_absorbed(self) -> bool:
+        """Whether nothing is left of it."""
+        return self._cycle >= self._cycles
+
+    def step(self, q: Sequence[float]) -> list[float]:
+        """Returns the reference for the commanded angles of this cycle, [rad]; the first call is the first command."""
+        u = min(1.0, self._cycle / self._cycles)
+        left = 1.0 - u * u * u * (10.0 + u * (6.0 * u - 15.0))
+        self._cycle += 1
+        return [angle + left * d for angle, d in zip(q, self._offset, strict=True)]

@@ -1,0 +1,62 @@
+"""Joint torques commanded one by one, on top of gravity and friction, which the controller compensates.
+
+The commanded torques pass the low pass of setFilters, then the conditions of the manual's section 4.3. Nothing is
+commanded before the first one, so it may be one cycle's torque rate away from zero at most. A lost cycle keeps the last
+torque; when a later command is known already, it goes there on a straight line. The conditions judge the commands that
+came, over the cycles between.
+"""
+
+from __future__ import annotations
+
+from math import isfinite
+
+from rcilab.conformance.limit_violation import describe_breaches
+from rcilab.conformance.torque_monitor import TorqueMonitor
+from rcilab.core.faults import Fault
+from rcilab.i18n.translator import Remark
+from rcilab.makers.rokae.controller.filters import LowPass
+from rcilab.makers.rokae.controller.jitter_buffer import Playback
+from rcilab.makers.rokae.controller.modes.generator import Gap, Step, Terms
+from rcilab.makers.rokae.wire import CommandPacket
+from rcilab.sim.command_extrapolator import Stream
+
+
+class TorqueGenerator:
+    """Follows commanded joint torques.
+
+    Args:
+        terms: Of the motion.
+    """
+
+    def __init__(self, terms: Terms) -> None:
+        nothing = [0.0] * terms.model.n
+        self._n = terms.model.n
+        self._tau = nothing
+        self._gap = Gap()
+        self._stream = Stream(nothing)
+        self._filter = LowPass(terms.settings.torque_filter, nothing)
+        self._monitor = TorqueMonitor(terms.limits.joint)
+        self._monitor.reset(nothing)
+
+    def is_next(self, packet: CommandPacket, steps: int, in_doubt: bool) -> bool:
+        """Returns whether a command continues the motion by one cycle rather than by `steps`; see `Stream.is_next`."""
+        return self._stream.is_next(packet.tau_c[: self._n], steps, in_doubt)
+
+    def step(self, playback: Playback) -> Step:
+        """Takes this cycle's torques, or bridges a cycle that has none."""
+        packet, steps, is_lost, _ = playback
+        cycles = self._gap.step(playback)
+        tau = self._tau
+        if packet is not None:
+            tau = list(packet.tau_c[: self._n])
+            if not isfinite(sum(tau)):
+                reason = Remark(f"commanded torques {tau} N m are not all finite numbers", "no_numbers")
+                return Step(faults=(Fault.COMMAND_TORQUE_RANGE_VIOLATION,), reason=reason)
+            if is_lost:
+                tau = [last + (goal - last) / steps for last, goal in zip(self._tau, tau, strict=True)]
+        self._tau = tau
+        self._stream.take(tau)
+        tau = self._filter.step(tau)
+        if cycles > 0 and (faults := self._monitor.step(tau, cycles)):
+            return Step(faults=faults, reason=describe_breaches(self._monitor.broken()))
+        return Step(tau=tau)

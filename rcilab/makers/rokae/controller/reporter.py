@@ -1,0 +1,193 @@
+"""The state as the controller reports it: everything that follows from where the arm is told to be and where it is.
+
+What this virtual arm knows and how (each documented here because a state must not lie):
+
+* Commanded velocities and accelerations are backward differences of the commanded angles over one cycle, the tool's
+  twist is the Jacobian times them, the tool's acceleration the twist's backward difference; so for the arm angle.
+* While the arm goes where forces take it (torque commands, hand guiding), the commanded angles are the measured ones.
+* The arm angle is undefined where shoulder and wrist are one above the other or the arm is stretched: there its last
+  value stays, and at first 0. On 6-axis arms it is 0.
+* `tau_c` is what the client commands while it commands torques (without gravity), otherwise what the rigid-body model
+  says the commanded motion takes (with gravity). Where the one gives way to the other its rate is said to be zero.
+* Outside torques are the observer's estimates of what the surroundings exert on the arm. `tau_ext_in_base` is the
+  wrench on the tool, base axes, at the tool's origin. `tau_ext_in_stiff` is the same wrench at the origin of the force
+  frame of setFcCoor, in axes that its type names: WORLD those of the base, TOOL those of the force frame, PATH x along
+  the commanded velocity of the tool (where it stands still, its last direction), z as near to the force frame's z as
+  that allows; where a path turns sharply its axes turn within 0.5 s. The sign is that of what acts on the arm: a hand
+  that presses down shows as a negative z in base axes. The manual leaves it open; the opposite is what the arm exerts.
+* Motor angles, velocities and torques come from the drive model. Filtered torques pass a first-order low pass at the
+  frequency of SetTorqueFilterCutOffFrequency.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rcilab.core.arrays import Array, JointVector, frozen, scalar, sealed
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.faults import Fault
+from rcilab.core.reported_pose import ReportedPose
+from rcilab.core.spatial import Rotation9
+from rcilab.core.state import ControllerMode, MotionGeneratorMode, RobotMode, RobotState, build_state
+from rcilab.makers.rokae.controller.force_frame import ForceAxes
+from rcilab.makers.rokae.controller.settings import Settings
+from rcilab.model.robot_model import RobotModel
+from rcilab.sim.drive_report import DriveReport
+from rcilab.sim.plant import Measurement
+from rcilab.sim.reference_trajectory import CommandedMotion
+from rcilab.sim.tool_kinematics import ToolMotion
+
+_CYCLE = scalar(CYCLE_TIME)  # [s]
+
+
+class Readings(NamedTuple):
+    """What one cycle came to, inside the controller."""
+
+    commanded: CommandedMotion
+    tool_c: ToolMotion
+    """The tool of the commanded motion."""
+    measured: Measurement
+    tool: ToolMotion
+    """The tool as measured."""
+    tau_c: list[float] | None
+    """Commanded torques, [N m]; None while none are commanded."""
+    tau_ext: JointVector
+    """Outside joint torques, [N m]."""
+    wrench: Array
+    """Outside wrench on the tool, base axes, [N, N m]."""
+
+
+class StateReporter:
+    """Builds the state of each cycle; while nothing moves it repeats the last one. Owned by the controller's cycle.
+
+    Attributes:
+        has_repeated: Whether the last state had the arm as the one before it, and the next will if the arm stays.
+
+    Args:
+        model: The arm with its tool and load.
+        settings: What the client has set.
+    """
+
+    def __init__(self, model: RobotModel, settings: Settings) -> None:
+        self._zeros = frozen(np.zeros(model.n))
+        self._axes = ForceAxes(model, settings)
+        self.configure(model, settings)
+
+    def configure(self, model: RobotModel, settings: Settings) -> None:
+        """Takes a new tool, load, force frame or filter; only while the arm is at rest."""
+        self._model = model
+        self._axes.configure(model, settings)
+        self._is_wrench_at_tool = self._axes.is_world and not any(self._axes.T_tool_force.parts[1])
+        self._drives = DriveReport(model, settings.torque_report_filter)
+        self._body: tuple[Any, ...] | None = None
+        self._tau_c = self._zeros
+        self._readings: Readings | None = None
+        self._version = -1
+        self._is_settled = False
+        self.has_repeated = False
+        self._rest: tuple[Any, ...] = ()
+
+    def report(
+        self,
+        message_id: int,
+        readings: Readings,
+        *,
+        faults: tuple[Fault, ...],
+        success_rate: float,
+        motion_generator_mode: MotionGeneratorMode,
+        controller_mode: ControllerMode,
+        robot_mode: RobotMode,
+    ) -> RobotState:
+        """Returns the state of this cycle."""
+        body = self._body
+        is_settled = self._is_settled and self._axes.is_settled
+        self.has_repeated = body is not None and is_settled and self._is_same(readings)
+        if body is None or not self.has_repeated:
+            body = self._body = self._compute(readings)
+            self._readings, self._version = readings, readings.commanded.version
+        self._rest = (*body, faults, success_rate, motion_generator_mode, controller_mode, robot_mode)
+        return self.repeat(message_id)
+
+    def repeat(self, message_id: int) -> RobotState:
+        """Returns the state of a cycle that differs from the last one in its number only."""
+        return build_state((message_id, *self._rest))
+
+    def _is_same(self, readings: Readings) -> bool:
+        last = self._readings
+        return (
+            last is not None
+            and readings.measured is last.measured
+            and readings.tau_ext is last.tau_ext
+            and readings.tau_c == last.tau_c
+            and readings.commanded.version == self._version
+        )
+
+    def _compute(self, readings: Readings) -> tuple[Any, ...]:
+        """Returns the fields of a state between its number and its faults, in their order."""
+        commanded, tool_c, measured, tool, tau_commanded, _, wrench = readings
+        before = self._readings
+        q_c, dq_c, ddq_c = commanded.arrays
+        if tau_commanded is not None:
+            tau_c = frozen(tau_commanded)
+        else:
+            tau_c = self._model.rigid_body.shared_torque(q_c, dq_c, ddq_c)
+        dtau_c = self._zeros
+        if before is not None and (tau_commanded is None) == (before.tau_c is None):
+            dtau_c = (tau_c - self._tau_c) / _CYCLE
+        self._tau_c = tau_c
+        is_new = before is None or measured is not before.measured
+        drives = self._drives
+        theta, dtheta, motor_tau, tau_filtered, motor_tau_filtered = drives.step(measured, commanded.is_at_rest)
+        self._is_settled = (
+            commanded.is_at_rest and tool_c.is_at_rest and drives.is_settled and not is_new and not dtau_c.any()
+        )
+        tool_rates_c = sealed(np.array([*tool_c.twist, *tool_c.acceleration]))
+        return (
+            measured.q,
+            q_c,
+            measured.dq,
+            dq_c,
+            ddq_c,
+            ReportedPose(tool.matrix),
+            ReportedPose(tool_c.matrix),
+            tool_rates_c[:6],
+            tool_rates_c[6:],
+            tool.psi,
+            tool_c.psi,
+            tool_c.dpsi,
+            tool_c.ddpsi,
+            measured.tau,
+            tau_filtered,
+            tau_c,
+            dtau_c,
+            wrench,
+            self._in_force_frame(wrench, tool, tool_c.twist[:3]),
+            theta,
+            dtheta,
+            motor_tau,
+            motor_tau_filtered,
+        )
+
+    def _in_force_frame(self, wrench: Array, tool: ToolMotion, velocity: Sequence[float]) -> Array:
+        """Returns a wrench on the tool (base axes, tool's origin) at the force frame's origin, in its type's axes."""
+        self._axes.follow(velocity, tool.pose)
+        fx, fy, fz, mx, my, mz = wrench.tolist()
+        if self._is_wrench_at_tool or not (fx or fy or fz or mx or my or mz):
+            return wrench
+        T_base_tool = tool.pose
+        x, y, z = (T_base_tool @ self._axes.T_tool_force).parts[1]
+        tx, ty, tz = T_base_tool.parts[1]
+        ax, ay, az = tx - x, ty - y, tz - z
+        mx, my, mz = mx + ay * fz - az * fy, my + az * fx - ax * fz, mz + ax * fy - ay * fx
+        if self._axes.is_world:
+            return frozen((fx, fy, fz, mx, my, mz))
+        r = self._axes.rotation(T_base_tool)
+        return frozen((*_inwards(r, fx, fy, fz), *_inwards(r, mx, my, mz)))
+
+
+def _inwards(r: Rotation9, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """Returns a vector of the base in axes that are the columns of a rotation."""
+    return r[0] * x + r[3] * y + r[6] * z, r[1] * x + r[4] * y + r[7] * z, r[2] * x + r[5] * y + r[8] * z

@@ -1,0 +1,166 @@
+"""What the controller answers to a request beyond its table of phases: contents, and arguments that cannot be."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from rcilab.conformance.measured_conditions import ANGLE_ALLOWANCE, BOX_ALLOWANCE
+from rcilab.core.errors import InvalidValueError
+from rcilab.core.safety_box import active_box
+from rcilab.core.state import ControllerMode
+from rcilab.makers.rokae import wire as rci
+from rcilab.makers.rokae.controller.actuator import guiding_box
+from rcilab.makers.rokae.controller.arm import Arm
+from rcilab.makers.rokae.controller.measured_state import Watch
+from rcilab.makers.rokae.controller.modes import MODES
+from rcilab.makers.rokae.controller.settings import SIGNAL_COUNT, Settings, apply_request
+from rcilab.makers.rokae.controller.state_machine import (
+    GROUNDED,
+    POWER_OFF,
+    Action,
+    Phase,
+    Transition,
+    When,
+    transition,
+)
+from rcilab.makers.rokae.wire.bounds import LOWEST_CLIENT_PORT
+from rcilab.model.kinematics.inverse import build_geometry
+from rcilab.model.kinematics.singularity import find_singularity
+from rcilab.model.robot_model import RobotModel
+from rcilab.sim.reference_trajectory import CommandedMotion
+
+
+class Reply(NamedTuple):
+    """What to answer, and when."""
+
+    response: rci.Response
+    when: When = When.NOW
+    ends_connection: bool = False
+    refusal: str = ""
+    """Why it refuses, in words; "" for what was granted."""
+
+
+def answer_query(
+    request: rci.Request,
+    phase: Phase,
+    safety_stop: rci.SafetyStop,
+    settings: Settings,
+    model_response: rci.Response,
+) -> rci.Response | None:
+    """Returns the content that a query asks for, or None when the request is no query."""
+    match request:
+        case rci.GetMotorState():
+            return rci.MotorStateResponse(int(phase not in (Phase.OFF, Phase.CUT_OFF, Phase.USER_STOPPED)))
+        case rci.GetSafetyStopState():
+            return rci.SafetyStopResponse(safety_stop)
+        case rci.GetDIState(signal=signal):
+            if signal >= SIGNAL_COUNT:
+                return rci.DigitalInputResponse(rci.SettingStatus.INVALID_ARGUMENT, False)
+            return rci.DigitalInputResponse(rci.SettingStatus.SUCCESS, settings.inputs[signal])
+        case rci.LoadRobotModel():
+            return model_response
+        case _:
+            return None
+
+
+def judge_request(request: rci.Request, phase: Phase, settings: Settings, arm: Arm) -> Transition | rci.Status:
+    """Returns what a request does, or the status that refuses it whatever its values do to the settings."""
+    cell = transition(phase, request.code)
+    refusal: rci.Status | None = None
+    match request:
+        case rci.SetMotorPower(power=0):
+            return POWER_OFF[phase]
+        case rci.Connect(udp_port=port):
+            refusal = None if port >= LOWEST_CLIENT_PORT else rci.SettingStatus.INVALID_ARGUMENT
+        case rci.SetMotorPower(power=power):
+            refusal = None if power == 1 else rci.SettingStatus.INVALID_ARGUMENT
+            if refusal is None and phase is Phase.OFF and not arm.stands:  # The brakes have not stopped it yet.
+                return cell._replace(when=When.AT_REST)
+        case rci.StartMove() if cell.status is rci.StartStatus.SUCCESS:  # What the phase says comes first.
+            refusal = _judge_start(request, arm.model, arm.commanded)
+        case rci.StartDrag(space=space, type=kind):
+            is_known = space in tuple(rci.DragSpace) and kind in tuple(rci.DragType)
+            refusal = None if is_known else rci.SettingStatus.INVALID_ARGUMENT
+        case rci.AutomaticErrorRecovery() if phase in (Phase.REFLEX, Phase.CUT_OFF):
+            refusal = judge_recovery(settings, arm.watch)
+        case _ if request.code in GROUNDED and Action.APPLY in cell.actions and not arm.commanded.is_at_rest:
+            refusal = rci.SettingStatus.NOT_POSSIBLE
+        case _:
+            pass
+    return cell if refusal is None else refusal
+
+
+def _judge_start(request: rci.StartMove, model: RobotModel, commanded: CommandedMotion) -> rci.StartStatus | None:
+    controller_mode, motion_mode = request.controller_mode, request.motion_mode
+    if controller_mode >= ControllerMode.OTHER or motion_mode not in tuple(rci.StartMotionMode):
+        return rci.StartStatus.INVALID_ARGUMENT
+    mode = MODES.get((ControllerMode(controller_mode), rci.StartMotionMode(motion_mode)))
+    if mode is None or not commanded.is_at_rest:
+        return rci.StartStatus.NOT_POSSIBLE
+    if mode.is_cartesian and find_singularity(build_geometry(model.description), commanded.q) is not None:
+        return rci.StartStatus.SINGULAR_START_POSE
+    return None
+
+
+def judge_recovery(settings: Settings, watch: Watch) -> rci.RecoveryStatus | None:
+    """Returns why a stopped arm cannot recover by itself, or None when it can.
+
+    Beyond a soft limit or the safety box by more than a measurement may be, a person has to bring it back (power off
+    and on, then hand guiding, or a motion that leads back): MANUAL_RECOVERY_NEEDED. While something still presses on
+    it harder than the collision thresholds: REFLEX.
+
+    Args:
+        settings: With soft limits, box and thresholds.
+        watch: Where the arm is, and what presses on it.
+    """
+    for q, lower, upper in zip(watch.measured.q.tolist(), settings.joint_lower, settings.joint_upper, strict=True):
+        if not lower - ANGLE_ALLOWANCE < q < upper + ANGLE_ALLOWANCE:
+            return rci.RecoveryStatus.MANUAL_RECOVERY_NEEDED
+    box = active_box(settings.safety_box)
+    if box is not None and guiding_box(settings) is None:
+        if box.excess(watch.tool.position) > BOX_ALLOWANCE:
+            return rci.RecoveryStatus.MANUAL_RECOVERY_NEEDED
+    return None if watch.find_collision(settings.collision_thresholds) is None else rci.RecoveryStatus.REFLEX
+
+
+def describe_refusal(request: rci.Request, status: rci.Status, phase: Phase, settings: Settings, arm: Arm) -> str:
+    """Returns why a request was refused, for whoever looks at the controller and not at its answers."""
+    name, mode = type(request).__name__, phase.name.lower().replace("_", " ")
+    why: object = f"the robot is {mode}"
+    if isinstance(request, rci.StartMove) and phase is Phase.IDLE and status is rci.StartStatus.NOT_POSSIBLE:
+        pair = f"controller mode {request.controller_mode} with motion mode {request.motion_mode}"
+        why = f"there is no {pair}" if arm.commanded.is_at_rest else "the arm still moves"
+    elif status is rci.StartStatus.SINGULAR_START_POSE:
+        why = find_singularity(build_geometry(arm.model.description), arm.commanded.q)
+    elif status is rci.RecoveryStatus.REFLEX:
+        why = arm.watch.find_collision(settings.collision_thresholds)
+    elif status is rci.RecoveryStatus.MANUAL_RECOVERY_NEEDED:
+        why = "the arm is beyond a joint's range or the safety box: power off and on, then lead it back"
+    elif status.name == "INVALID_ARGUMENT":
+        why = _describe_argument(request, settings, arm)
+    return f"refused {name} ({status.name.lower().replace('_', ' ')}): {why}"
+
+
+def _describe_argument(request: rci.Request, settings: Settings, arm: Arm) -> str:
+    """Returns which value of a request is out of its bounds."""
+    try:
+        apply_request(settings, request, arm.model.description)
+    except InvalidValueError as error:
+        return str(error)
+    return f"a value does not exist: {request}"
+
+
+def conclude(reply: Reply, phase: Phase) -> rci.Response:
+    """Returns what to answer once a reply is due: a recovery that was overtaken by something says by what."""
+    status = getattr(reply.response, "status", None)
+    if reply.when is When.AT_REST and isinstance(status, rci.RecoveryStatus):
+        return rci.StatusResponse(_OVERTAKEN.get(phase, rci.RecoveryStatus.ABORTED))
+    return reply.response
+
+
+_OVERTAKEN = {
+    Phase.IDLE: rci.RecoveryStatus.SUCCESS,
+    Phase.OFF: rci.RecoveryStatus.SUCCESS,
+    Phase.USER_STOPPED: rci.RecoveryStatus.USER_STOP,
+    Phase.REFLEX: rci.RecoveryStatus.REFLEX,
+}

@@ -1,0 +1,408 @@
+"""The running controller: the cycle at 1 kHz or in lock-step, and its sockets. One thread; everything happens in it.
+
+Free-running, a state is due every millisecond on a fixed grid; its cycle is lived through a little before, so that it
+leaves in time however long that took. A cycle that this process itself missed is left out
+and counted: the simulated time slips, rather than the client being blamed for commands it had no state to answer (see
+`pace`).
+A client that went on meanwhile, as the vendor's does on its old state, has then sent more commands than cycles; such
+cycles are made up for, one in each millisecond and unseen, or its commands would be played later and later.
+In lock-step a motion's next cycle is due when its command has come, however long or short that takes. When several
+commands wait, as after the vendor client's sleep, they are lived through without a word, and the state after the last
+one is the one to answer.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+from collections.abc import Callable
+
+from rcilab.core.clock import CYCLE_TIME, SystemClock
+from rcilab.core.errors import UsageError
+from rcilab.core.faults import Fault, name_faults
+from rcilab.i18n.translator import Remark
+from rcilab.makers.rokae.controller.config import ControllerConfig
+from rcilab.makers.rokae.controller.cycle import ControlCycle
+from rcilab.makers.rokae.controller.endpoint import (
+    Arrival,
+    ClientJoined,
+    ClientLeft,
+    ClientRefused,
+    DatagramArrived,
+    Endpoint,
+    FrameArrived,
+    GuestsReady,
+    StrangerHeard,
+)
+from rcilab.makers.rokae.controller.environment import Mishaps, Surroundings
+from rcilab.makers.rokae.controller.faulty_network import FaultyNetwork
+from rcilab.makers.rokae.controller.request_queue import RequestDesk
+from rcilab.makers.rokae.controller.state_machine import Event, Phase
+from rcilab.makers.rokae.wire import COMMAND_SIZE, decode_command
+from rcilab.model.robot_model import load_model, require_rci
+from rcilab.realtime.cpu_latency import AwakeCores
+from rcilab.realtime.scheduling import enter_realtime, leave_realtime
+from rcilab.sim.clock_stalls import StallPlan
+from rcilab.sim.cycle_timer import Pace
+from rcilab.sim.log_lines import LineHandler, LogLines, SeldomLines
+from rcilab.sim.plant import Plant
+from rcilab.sim.plants import build_plant
+from rcilab.sim.simulation_port import WorldPort
+
+PRIORITY = 80  # Under SCHED_FIFO; above the client's process, whose clock this is.
+LEAD_TIME = 0.0005  # [s] Before its state is due a cycle begins: longer than nearly all of them take; a choice.
+RESEND_TIME = 0.02  # [s] In lock-step a state is sent again after this time until the first command has come.
+PATIENCE = 60.0  # [s] In lock-step, for the next command; then its cycle is lost, and each following one at 1 kHz.
+SPOILED_PATIENCE = 0.05  # [s] The same where the network spoils datagrams on purpose: below any client's own.
+FAREWELL = 20  # [cycles] In which a client learns of the end from the error bit of its states.
+SLIP = 20  # [cycles] A motion that took so much longer than it should is worth a line.
+GRACE = 2.0  # [s] For the arm to come to rest when the controller shall end.
+_parts_log = logging.getLogger("rcilab.makers.rokae.controller")
+_STDERR = 2
+_QUIET = (Phase.OFF, Phase.IDLE)
+_LOOK = 0.1  # [s] Between looks at whether the parent process still lives, or a stalled controller shall end.
+
+
+class ControllerServer:
+    """A virtual controller on its sockets. `run` in one thread; `request_stop` from anywhere, signal handlers too.
+
+    Attributes:
+        cycle: The controller itself; owned by the thread that runs.
+        misfits: Datagrams that had not the size of a command.
+
+    Args:
+        config: How it is set up.
+        plant: What moves; None: what the configuration says.
+        log: Takes one line about everything unusual, and must not wait; None: a thread writes them to stderr.
+
+    Raises:
+        ModelError: The configuration names no known arm, or one that does not speak the RCI.
+        UsageError: An address or port cannot be used.
+    """
+
+    def __init__(
+        self,
+        config: ControllerConfig,
+        *,
+        plant: Plant | None = None,
+        log: Callable[[str], None] | None = None,
+    ) -> None:
+        self.config = config
+        model = require_rci(load_model(config.model))
+        self._plant = plant if plant is not None else build_plant(config.plant, model)
+        self.cycle = ControlCycle(
+            model,
+            self._plant,
+            mode_delay=config.mode_delay_cycles,
+            prefill=config.prefill_cycles,
+            torque_prefill=config.prefill,
+            lost_limit=config.lost_limit,
+        )
+        self.cycle.auto_limit = config.auto_limit
+        self.cycle.loop_back = config.loop_back
+        self.cycle.limit_table = config.limit_table
+        self.misfits = 0
+        self._is_out_of_patience = False
+        self._lines: LogLines | None = None
+        if log is None:
+            self._lines = LogLines(_STDERR)
+            log = self._lines.write
+        self._log = log
+        self._clock = SystemClock()
+        self._pace = Pace(self._clock.now())
+        self._is_ending = False
+        self._next_look = 0.0
+        self._cores = AwakeCores()
+        self._missed_before = 0
+        self._told: tuple[Fault, ...] = ()
+        self._seldom = SeldomLines(log, self._clock.now)
+        self._endpoint = Endpoint(config)
+        states_network = config.network if config.states_network is None else config.states_network
+        self._network = FaultyNetwork(self._endpoint, self._clock, config.network, states_network)
+        self._desk = RequestDesk(self.cycle, self._endpoint, self._network, log)
+        self._stalls = StallPlan()
+        self._surroundings = Surroundings(
+            self.cycle,
+            self._network,
+            self._stalls,
+            self._clock,
+            lambda: Mishaps(self.missed, self.misfits, self._endpoint.strangers),
+        )
+        self._world = self._open_world()
+
+    @property
+    def missed(self) -> int:
+        """Cycles that were left out because this process was not there for them, or put off; see `pace`."""
+        return self._pace.missed
+
+    @property
+    def url(self) -> str:
+        """Where clients connect to."""
+        host, port, udp_port = self._endpoint.host, self._endpoint.port, self._endpoint.udp_port
+        return f"rci://{host}:{port}" + ("" if udp_port == port else f"?udp_port={udp_port}")
+
+    @property
+    def description(self) -> str:
+        """The line that says the controller is ready."""
+        return f"listening {self.url} model={self.cycle.model.name} plant={self._plant.kind}"
+
+    @property
+    def world_address(self) -> str | None:
+        """Where the world port is, as ADDR:PORT; None: there is none."""
+        return None if self._world is None else "{}:{}".format(*self._world.address)
+
+    def run(self, on_ready: Callable[[], None] = lambda: None) -> None:
+        """Runs until `request_stop`, then brings the arm to rest and closes every socket.
+
+        Args:
+            on_ready: Called once, when the first state is out.
+        """
+        use_realtime = self.config.realtime and not self.config.lockstep
+        if use_realtime:
+            warning = enter_realtime(PRIORITY).warning
+            if warning is not None:
+                self._log(warning)
+        parts = LineHandler(self._log)
+        _parts_log.addHandler(parts)
+        try:
+            self._loop(on_ready)
+        finally:
+            _parts_log.removeHandler(parts)
+            self._cores.switch(False)
+            if use_realtime:
+                leave_realtime()
+            self.close()
+            if self._lines is not None:
+                self._lines.close()
+
+    def request_stop(self) -> None:
+        """Asks for the end: one controlled stop if the arm moves, then `run` returns."""
+        self._is_ending = True
+
+    def close(self) -> None:
+        """Closes the sockets of a server that does not run."""
+        self._endpoint.close()
+        if self._world is not None:
+            self._world.close()
+
+    def _open_world(self) -> WorldPort | None:
+        if self.config.world_port is None:
+            return None
+        try:
+            return WorldPort(self._endpoint.host, self.config.world_port, self._surroundings.handle)
+        except UsageError:
+            self._endpoint.close()
+            raise
+
+    def _loop(self, on_ready: Callable[[], None]) -> None:
+        self._pace.restart(self._clock.now())
+        self._stalls.replace(self.config.stalls, self._pace.deadline)
+        last_moment: float | None = None
+        farewell = 0
+        is_ready = has_served = False
+        while True:
+            stall = self._stalls.take(self._clock.now())
+            if stall > 0.0:
+                self._stand_still(stall)
+            if self._is_ending and last_moment is None:
+                last_moment = self._clock.now() + GRACE
+                farewell = self._say_farewell()
+            if last_moment is not None:
+                farewell -= 1
+                if (not self.cycle.is_moving and farewell < 0) or self._clock.now() > last_moment:
+                    return
+            if self.config.lockstep and self.cycle.wants_commands:
+                self._await_command()
+                self._pace.restart(self._clock.now())
+            else:
+                due = self._pace.next(self._clock.now())
+                if not (self._is_idle and has_served):
+                    self._await(due - (CYCLE_TIME if self._is_idle else LEAD_TIME))
+                if self._pace.puts_off(self.cycle.is_starved):
+                    continue
+            has_served = self._step(self._pace.deadline)
+            if not is_ready:
+                is_ready = True
+                on_ready()
+
+    def _say_farewell(self) -> int:
+        """Ends what is under way; returns for how many cycles states shall still tell a client that moved of it."""
+        if self.cycle.phase is not Phase.MOVING:
+            self.cycle.happen(Event.CLIENT_LOST)
+            return 0
+        self.cycle.reason = Remark("the controller was told to end in mid-motion", "told_to_end")
+        self.cycle.happen(Event.FAULT, Fault.INSTABILITY_DETECTION)
+        return FAREWELL
+
+    def _stand_still(self, duration: float) -> None:
+        """Does nothing at all for so long, [s], as a controller whose clock stalls; an end asked for goes before."""
+        until = self._clock.now() + duration
+        while self._clock.now() < until and not self._is_ending:
+            self._clock.sleep_until(min(until, self._clock.now() + _LOOK))
+
+    def _poll(self, timeout: float) -> None:
+        """Serves the sockets once; waits up to `timeout`, [s], for something to serve."""
+        self._take(self._network.poll(timeout, () if self._world is None else self._world.sockets))
+
+    def _await(self, deadline: float) -> None:
+        """Serves the sockets until the deadline, and at least once."""
+        while True:
+            self._poll(deadline - self._clock.now())
+            if self._clock.now() >= deadline:
+                return
+
+    def _await_command(self) -> None:
+        """Serves the sockets until a command is there or lost on its way, the motion is over or patience is.
+
+        One that comes too late for its own cycle is not waited for any more, but tells that the client is back: whoever
+        is patient with it again lets it catch up.
+        """
+        cycle = self.cycle
+        is_first = not cycle.playout.is_playing
+        late = cycle.playout.late
+        deadline = self._clock.now() + self._patience
+        while True:
+            remaining = min(deadline - self._clock.now(), _LOOK)
+            self._poll(0.0 if len(cycle.playout) else RESEND_TIME if is_first else remaining)
+            self._look_for_parent()
+            if len(cycle.playout) or not cycle.wants_commands or self._is_ending:
+                self._is_out_of_patience = False
+                return
+            if self._network.has_lost:
+                return
+            if self._is_out_of_patience and cycle.playout.late > late:
+                self._is_out_of_patience = False
+                deadline = self._clock.now() + self._patience
+            if is_first:
+                self._send_state()
+            elif self._clock.now() >= deadline:
+                self._is_out_of_patience = True
+                return
+
+    @property
+    def _patience(self) -> float:
+        """How long lock-step waits for the next command, [s]."""
+        if self._is_out_of_patience:
+            return CYCLE_TIME
+        if self.config.patience is not None:
+            return self.config.patience
+        return SPOILED_PATIENCE if any(faults.corrupt for faults in self._network.faults) else PATIENCE
+
+    @property
+    def _is_idle(self) -> bool:
+        """Whether a cycle may be lived through early and sockets be served until its state is due: one wait, not two.
+
+        A request may then show one state later, which matters to no arm at rest.
+        """
+        cycle = self.cycle
+        is_quiet = cycle.phase in _QUIET and not self._desk.is_waiting and self._endpoint.has_client
+        return is_quiet and not (cycle.is_moving or self.config.lockstep)
+
+    def _step(self, due: float) -> bool:
+        """Lives through a cycle and sends its state when it is due, or at once when that is over.
+
+        Returns whether the sockets were served until then.
+        """
+        was_moving = self.cycle.is_moving
+        is_idle = self._is_idle
+        self._catch_up()
+        self._live()
+        if is_idle:
+            self._await(due)
+        else:
+            self._clock.sleep_until(due)
+        self._send_state()
+        if self.cycle.is_moving is not was_moving and not self.config.lockstep:
+            self._tell_slip()
+        self._desk.settle()
+        self._look_for_parent()
+        return is_idle
+
+    def _look_for_parent(self) -> None:
+        if self.config.parent_pid is not None and self._clock.now() >= self._next_look:
+            self._next_look = self._clock.now() + _LOOK
+            if os.getppid() != self.config.parent_pid:
+                self.request_stop()
+
+    def _catch_up(self) -> None:
+        """Lives through cycles that nobody sees, when more commands wait than should."""
+        if not self.cycle.wants_commands:
+            return
+        playout = self.cycle.playout
+        extra = len(playout) - 1 - self.config.prefill_cycles if self.config.lockstep else int(playout.work_off())
+        for _ in range(extra):
+            if self.cycle.wants_commands:
+                self._live(is_seen=False)
+
+    def _tell_slip(self) -> None:
+        """Says how much longer than it should a motion took, when one has ended."""
+        if not self.cycle.is_moving and self.missed - self._missed_before >= SLIP:
+            slipped = 1e3 * CYCLE_TIME * (self.missed - self._missed_before)
+            self._log(f"that motion took {slipped:.0f} ms longer than it should: this machine, or a stall, held us up")
+        self._missed_before = self.missed
+
+    def _live(self, *, is_seen: bool = True) -> None:
+        """Lives through one millisecond."""
+        if self.config.realtime and not self.config.lockstep:
+            self._cores.switch(self.cycle.is_moving)
+        state = self.cycle.step(is_seen=is_seen)
+        self._surroundings.step()
+        if state.faults != self._told:
+            self._tell_faults(state.faults)
+
+    def _tell_faults(self, faults: tuple[Fault, ...]) -> None:
+        """Says why error bits were set, whoever set them: a condition, somebody at the world port, a request."""
+        self._told = faults
+        if faults:
+            self._log(f"{name_faults(faults)}: {self.cycle.reason}; the arm comes to rest")
+            if Fault.INSTABILITY_DETECTION in faults and self.cycle.playout.lost:
+                self._log(
+                    "a client that pauses needs a deeper play-out (--prefill 50), SCHED_FIFO for itself, or --lockstep"
+                )
+
+    def _send_state(self) -> None:
+        self._network.send_state(self.cycle.datagram)
+
+    def _take(self, arrivals: list[Arrival]) -> None:
+        for arrival in arrivals:
+            match arrival:
+                case DatagramArrived(datagram):
+                    if len(datagram) == COMMAND_SIZE:
+                        self.cycle.receive(decode_command(datagram, self.cycle.model.n))
+                    else:
+                        self.misfits += 1
+                case FrameArrived(frame):
+                    self._desk.take(frame)
+                case ClientJoined(address):
+                    self._warn_of_other_target(address)
+                    self._send_state()  # Before anything else: the vendor's client waits for it a few milliseconds.
+                case ClientLeft(reason):
+                    self._lose_client(reason)
+                case GuestsReady(sockets):
+                    if self._world is not None:
+                        self._world.serve(sockets)
+                case StrangerHeard(address, client):
+                    whose = f"the client is at {client}" if client else "no client is connected"
+                    line = f"left out a UDP datagram from {address}, and will all others: {whose}"
+                    self._seldom.write("stranger", line, "were left out")
+                case ClientRefused(address, holder):
+                    line = f"refused a second client from {address}: {holder} is connected; one at a time"
+                    self._seldom.write("refused", line, "were refused")
+
+    def _warn_of_other_target(self, address: str) -> None:
+        target = self._endpoint.fixed_host
+        if target not in (None, address):
+            line = (
+                f"{address} connected, but states go to {target}, as --client says: it will not see any; start with "
+                f"--client {address}, or without"
+            )
+            self._seldom.write("elsewhere", line, "connected")
+
+    def _lose_client(self, reason: str) -> None:
+        was_moving = self.cycle.phase in (Phase.MOVING, Phase.STOPPING, Phase.GUIDING)
+        self._desk.clear()
+        self.cycle.happen(Event.CLIENT_LOST)
+        if was_moving:
+            self._log(f"the client {reason} in mid-motion: the arm comes to rest")
+        elif reason != "closed the connection":
+            self._seldom.write("left", f"the client {reason}", "clients were lost")

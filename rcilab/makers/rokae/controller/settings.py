@@ -1,0 +1,242 @@
+"""Everything a client can set over TCP, judged again on our side.
+
+The vendor's client checks some values before it sends them and lets NaN through nearly every check, so here every
+value is judged: finite, inside its range, a proper pose where one is due. What fails is answered with "invalid
+argument" and changes nothing. On 6-axis arms the seventh elements are not even looked at.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from math import hypot
+
+import numpy as np
+
+from rcilab.core.arrays import frozen
+from rcilab.core.errors import InvalidValueError
+from rcilab.core.limits import JointLimits
+from rcilab.core.safety_box import SafetyBox
+from rcilab.core.spatial import IDENTITY, Pose
+from rcilab.makers.rokae import wire as rci
+from rcilab.makers.rokae.wire.bounds import (
+    FARTHEST_BOX,
+    FILTER_OFF,
+    LARGEST_BOX,
+    LIMIT_TOLERANCE,
+    LONGEST_TOOL,
+    LOWEST_FREQUENCY,
+)
+from rcilab.model.dynamics.payload import NO_LOAD, Payload
+from rcilab.robots import RobotDescription
+
+SIGNAL_COUNT = 6  # Digital inputs, and outputs: DI0_0 to DI0_3, DI1_0, DI1_1 (manual 3.1.13 and 3.1.14).
+
+Floats = tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Settings:
+    """All values that commands set; vectors have n plain floats."""
+
+    joint_lower: Floats
+    """Soft limits, [rad]."""
+    joint_upper: Floats
+    """[rad]."""
+    collision_thresholds: Floats
+    """[N m]."""
+    joint_stiffness: Floats
+    """[N m/rad]."""
+    cartesian_stiffness: Floats
+    """Three translations [N/m], three rotations [N m/rad]."""
+    desired_wrench: Floats = (0.0,) * 6
+    """What Cartesian impedance presses with, [N, N m]."""
+    T_flange_tool: Pose = IDENTITY
+    load: Payload = NO_LOAD
+    joint_filter: float = FILTER_OFF
+    """Cut-off frequency of the low pass on commanded joint angles, [Hz]. It wakes up switched off, a choice: the
+    vendor's client filters before it sends, and whoever does not is followed exactly."""
+    cartesian_filter: float = FILTER_OFF
+    """The same for commanded poses, [Hz]."""
+    torque_filter: float = FILTER_OFF
+    """The same for commanded torques, [Hz]."""
+    torque_report_filter: float = 100.0
+    """Cut-off frequency of the filtered torques in the state, [Hz]."""
+    safety_box: SafetyBox | None = None
+    T_flange_force: Pose = IDENTITY
+    """Force-control frame."""
+    force_frame: rci.ForceFrame = rci.ForceFrame.WORLD
+    virtual_guide: bool = False
+    outputs: tuple[bool, ...] = (False,) * SIGNAL_COUNT
+    inputs: tuple[bool, ...] = (False,) * SIGNAL_COUNT
+    """Levels of the digital inputs; nothing is wired to a virtual controller, they are set from outside."""
+    loop_back: bool = False
+    """Whether every digital output is wired to the input of the same number."""
+    auto_limit: bool = False
+    """Whether commanded joint angles are led to rest inside the soft limits instead of raising a fault beyond them.
+    `auto_limit` of setJointLimit is not on the wire: it is set from outside."""
+
+    def soft_limits(self, joint: JointLimits) -> JointLimits:
+        """Returns the limits of an arm's joints with the soft limits as position bounds."""
+        return replace(joint, lower=frozen(self.joint_lower), upper=frozen(self.joint_upper))
+
+    def with_input(self, signal: int, level: bool) -> Settings:
+        """Returns the settings with another level at a digital input.
+
+        Raises:
+            InvalidValueError: There is no such input.
+        """
+        if not 0 <= signal < SIGNAL_COUNT:
+            raise InvalidValueError("digital input", signal, f"does not exist; needs 0 to {SIGNAL_COUNT - 1}")
+        return replace(self, inputs=(*self.inputs[:signal], bool(level), *self.inputs[signal + 1 :]))
+
+    def with_loop_back(self, on: bool) -> Settings:
+        """Returns the settings with every digital output wired to its input, or none."""
+        return replace(self, loop_back=on, inputs=self.outputs if on else self.inputs)
+
+    def rebooted(self, arm: RobotDescription) -> Settings:
+        """Returns what is left after a reboot: the defaults, and what is wired or chosen outside of the controller."""
+        kept = replace(default_settings(arm), inputs=self.inputs, auto_limit=self.auto_limit)
+        return kept.with_loop_back(self.loop_back)
+
+
+def default_settings(arm: RobotDescription) -> Settings:
+    """Returns the settings a controller wakes up with: the widest limits, the highest thresholds and stiffness."""
+    joint, cartesian = arm.limits.joint, arm.limits.cartesian
+    return Settings(
+        joint_lower=tuple(joint.lower.tolist()),
+        joint_upper=tuple(joint.upper.tolist()),
+        collision_thresholds=tuple(joint.collision_threshold.tolist()),
+        joint_stiffness=tuple(joint.stiffness.tolist()),
+        cartesian_stiffness=(cartesian.translation_stiffness,) * 3 + (cartesian.rotation_stiffness,) * 3,
+    )
+
+
+def apply_request(settings: Settings, request: rci.Request, arm: RobotDescription) -> Settings:
+    """Returns the settings with a request's values in them.
+
+    Args:
+        settings: The settings so far.
+        request: A setter; anything else leaves them as they are.
+        arm: Whose ranges count.
+
+    Raises:
+        InvalidValueError: A value is out of its bounds, or values do not fit each other; it names the first.
+    """
+    return replace(settings, **_changes(request, arm, settings))
+
+
+def _changes(request: rci.Request, arm: RobotDescription, settings: Settings) -> dict[str, object]:
+    """Returns the fields to change."""
+    n, joint, cartesian = arm.n, arm.limits.joint, arm.limits.cartesian
+    match request:
+        case rci.SetCollisionBehavior(thresholds=values):
+            _require_joints("threshold", values[:n], joint.collision_threshold.tolist(), "N m")
+            return {"collision_thresholds": values[:n]}
+        case rci.SetJointImpedance(stiffness=values):
+            _require_joints("stiffness", values[:n], joint.stiffness.tolist(), "N m/rad")
+            return {"joint_stiffness": values[:n]}
+        case rci.SetCartesianImpedance(stiffness=values):
+            for name, value, largest, unit in (
+                *_along("stiffness", values, cartesian.translation_stiffness, "N/m"),
+                *_about("stiffness", values, cartesian.rotation_stiffness, "N m/rad"),
+            ):
+                _require(name, value, 0.0, largest, unit)
+            return {"cartesian_stiffness": values}
+        case rci.SetCartImpDesiredTau(wrench=values):
+            for name, value, largest, unit in (
+                *_along("force", values, cartesian.force, "N"),
+                *_about("moment", values, cartesian.moment, "N m"),
+            ):
+                _require(name, value, -largest, largest, unit)
+            return {"desired_wrench": values}
+        case rci.SetTorqueFilterCutOffFrequency(frequency=value):
+            return {"torque_report_filter": _frequency("frequency", value)}
+        case rci.SetFilters():
+            return {
+                "joint_filter": _frequency("joint frequency", request.joint_frequency),
+                "cartesian_filter": _frequency("Cartesian frequency", request.cartesian_frequency),
+                "torque_filter": _frequency("torque frequency", request.torque_frequency),
+            }
+        case rci.SetJointLimit():
+            return _soft_limits(request, arm)
+        case rci.SetCartesianLimit():
+            pose = Pose.from_row_major(request.frame)
+            for axis, x, edge in zip("xyz", pose.parts[1], request.size, strict=True):
+                _require(f"{axis} of the box's centre", x, -FARTHEST_BOX, FARTHEST_BOX, "m")
+                _require(f"{axis} of the box's size", edge, 0.0, LARGEST_BOX, "m")
+            return {"safety_box": SafetyBox(size=request.size, T_base_box=pose, active=request.active)}
+        case rci.SetCoor(T_flange_tool=numbers):
+            return {"T_flange_tool": _pose_at_flange("tool", numbers)}
+        case rci.SetFcCoor(frame=numbers, type=kind):
+            if kind not in tuple(rci.ForceFrame):
+                raise InvalidValueError("type", kind, "is no force-control frame; there are 0 to 2")
+            return {"T_flange_force": _pose_at_flange("frame", numbers), "force_frame": rci.ForceFrame(kind)}
+        case rci.SetLoad():
+            return {"load": _load(request, arm)}
+        case rci.EnableVirtualGuide(enable=enable):
+            return {"virtual_guide": enable}
+        case rci.SetDO(signal=signal, level=level):
+            if signal >= SIGNAL_COUNT:
+                raise InvalidValueError("signal", signal, f"does not exist; there are 0 to {SIGNAL_COUNT - 1}")
+            outputs = (*settings.outputs[:signal], level, *settings.outputs[signal + 1 :])
+            return {"outputs": outputs, "inputs": outputs if settings.loop_back else settings.inputs}
+        case _:
+            return {}
+
+
+def _require(name: str, value: float, lowest: float, largest: float, unit: str) -> None:
+    if not lowest <= value <= largest:  # Nor is NaN, which is in no range.
+        raise InvalidValueError(name, _round(value), f"{unit} is outside {lowest:g} to {largest:g} {unit}")
+
+
+def _round(value: float) -> float:
+    return float(f"{value:.9g}")
+
+
+def _require_joints(name: str, values: Floats, largest: Sequence[float], unit: str) -> None:
+    for number, (value, bound) in enumerate(zip(values, largest, strict=True), 1):
+        _require(f"{name} of joint {number}", value, 0.0, bound, unit)
+
+
+def _along(name: str, values: Floats, largest: float, unit: str) -> Iterator[tuple[str, float, float, str]]:
+    return ((f"{name} along {axis}", value, largest, unit) for axis, value in zip("xyz", values[:3], strict=True))
+
+
+def _about(name: str, values: Floats, largest: float, unit: str) -> Iterator[tuple[str, float, float, str]]:
+    return ((f"{name} about {axis}", value, largest, unit) for axis, value in zip("xyz", values[3:], strict=True))
+
+
+def _frequency(name: str, value: float) -> float:
+    _require(name, value, LOWEST_FREQUENCY, FILTER_OFF, "Hz")
+    return value
+
+
+def _soft_limits(request: rci.SetJointLimit, arm: RobotDescription) -> dict[str, object]:
+    upper, lower = request.upper[: arm.n], request.lower[: arm.n]
+    bounds = zip(lower, upper, arm.limits.joint.lower.tolist(), arm.limits.joint.upper.tolist(), strict=True)
+    for number, (low, high, lowest, highest) in enumerate(bounds, 1):
+        _require(f"lower limit of joint {number}", low, lowest - LIMIT_TOLERANCE, highest, "rad")
+        _require(f"upper limit of joint {number}", high, lowest, highest + LIMIT_TOLERANCE, "rad")
+        if not low < high:
+            raise InvalidValueError(
+                f"lower limit of joint {number}", _round(low), f"rad is not below the upper, {high:g} rad"
+            )
+    return {"joint_lower": lower, "joint_upper": upper}
+
+
+def _load(request: rci.SetLoad, arm: RobotDescription) -> Payload:
+    _require("mass", request.mass, 0.0, arm.rated_payload, "kg")
+    load = Payload(
+        mass=request.mass,
+        center_of_mass=np.array(request.center_of_mass),
+        inertia=np.array(request.inertia).reshape(3, 3),
+    )
+    _require("distance of the centre of mass from the flange", hypot(*request.center_of_mass), 0.0, LONGEST_TOOL, "m")
+    return load
+
+
+def _pose_at_flange(name: str, numbers: Floats) -> Pose:
+    pose = Pose.from_row_major(numbers)
+    _require(f"distance of the {name} from the flange", hypot(*pose.parts[1]), 0.0, LONGEST_TOOL, "m")
+    return pose

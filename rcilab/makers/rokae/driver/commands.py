@@ -1,0 +1,113 @@
+"""Every other command of the RCI as a method: power, motion, drag, inputs and outputs; refusals turned into errors."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from rcilab.core.arrays import described
+from rcilab.core.errors import CommandRejectedError, InvalidValueError
+from rcilab.core.state import ControllerMode
+from rcilab.makers.rokae import wire as rci
+from rcilab.makers.rokae.driver.settings import RciSettings, flag, member
+
+SIGNALS = range(6)  # RCI manual 3.1.13: DO0_0 to DO0_3, DO1_0, DO1_1; and 3.1.14 the same for inputs.
+
+
+class RciCommands(RciSettings):
+    """The commands of the RCI manual, section 3.1.
+
+    Refusals raise `CommandRejectedError`, a missing answer `DeadlineError`, a broken connection
+    `ConnectionLostError`; arguments of the wrong shape, not finite or out of range raise `InvalidValueError` and are
+    not sent.
+    """
+
+    def connect(self) -> None:
+        """Names our UDP port to the controller. Nobody needs it: the vendor's client never sends this command."""
+        self._ask(rci.Connect(self._link.local_address[1]))
+
+    def power_on(self) -> None:
+        """Switches the motors on."""
+        self._ask(rci.SetMotorPower(1))
+
+    def power_off(self) -> None:
+        """Switches the motors off."""
+        self._ask(rci.SetMotorPower(0))
+
+    def set_motor_power(self, power: bool) -> None:
+        """Switches the motors on or off."""
+        self._ask(rci.SetMotorPower(int(flag("power", power))))
+
+    def motor_state(self) -> bool:
+        """Returns whether the motors are on."""
+        return bool(self._request(rci.GetMotorState()).power)
+
+    def start_move(self, controller_mode: ControllerMode, motion_mode: rci.StartMotionMode) -> None:
+        """Begins a motion; commands must follow at once. `execute` and `control` do all of it by themselves."""
+        self._ask(rci.StartMove(controller_mode, motion_mode), rci.StartStatus.MOTION_STARTED)
+
+    def stop_move(self, timeout: float | None = None) -> None:
+        """Ends a motion.
+
+        Args:
+            timeout: How long to wait for the answer, [s]; None: as for every request.
+        """
+        self._ask(rci.StopMove(), timeout=timeout)
+
+    def automatic_error_recovery(self) -> None:
+        """Asks the controller to clear its faults; a refusal says which of the manual's reasons it has."""
+        self._ask(rci.AutomaticErrorRecovery())
+
+    def load_model(self) -> rci.ModelResponse:
+        """Returns the figures of the arm as the controller knows them: DH rows and base dynamic parameters.
+
+        Raises:
+            CommandRejectedError: The controller has none.
+        """
+        response: rci.ModelResponse = self._request(rci.LoadRobotModel())
+        if response.status != rci.GuideStatus.SUCCESS:
+            raise CommandRejectedError("LoadRobotModel", response.status)
+        return response
+
+    def set_do(self, signal: int, level: bool) -> None:
+        """Sets a digital output, 0 to 5."""
+        self._ask(rci.SetDO(require_signal(signal), flag("level", level)))
+
+    def get_di(self, signal: int) -> bool:
+        """Returns the level of a digital input, 0 to 5."""
+        return bool(self._request(rci.GetDIState(require_signal(signal))).level)
+
+    def start_drag(
+        self,
+        space: rci.DragSpace | Literal["joint", "cartesian"] = rci.DragSpace.JOINT,
+        type: rci.DragType | Literal["translation", "rotation", "free"] = rci.DragType.FREE,
+    ) -> None:
+        """Lets a person guide the arm by hand, until `stop_drag`.
+
+        Args:
+            space: Where constraints hold: in joint space there are none, the type has no effect.
+            type: What stays free in Cartesian space.
+        """
+        self._ask(rci.StartDrag(member(rci.DragSpace, "space", space), member(rci.DragType, "type", type)))
+
+    def stop_drag(self) -> None:
+        """Ends hand guiding; returns once the arm is at rest."""
+        self._ask(rci.StopDrag())
+
+    def safety_stop(self) -> rci.SafetyStop:
+        """Returns which safety stop is active: none, the emergency stop (ESTOP), or the safety gate (GSTOP)."""
+        return self._request(rci.GetSafetyStopState()).state
+
+    def reboot(self) -> None:
+        """Restarts the controller; the connection ends with it, `rcilab.connect` makes the next one."""
+        self._ask(rci.RebootRobot())
+
+
+def require_signal(signal: object) -> int:
+    """Returns the number of a digital signal, 0 to 5.
+
+    Raises:
+        InvalidValueError: There is no such signal.
+    """
+    if isinstance(signal, bool) or not isinstance(signal, int) or signal not in SIGNALS:
+        raise InvalidValueError("signal", described(signal), "does not exist; there are 0 to 5")
+    return signal

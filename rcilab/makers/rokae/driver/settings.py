@@ -1,0 +1,286 @@
+"""Every setter of the RCI as a method: arguments checked before they are sent, in the words of the axis they are for.
+
+Most are settable while nothing moves; a refusal says what the controller is doing instead.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from enum import IntEnum
+from typing import Any, Literal, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rcilab.core.arrays import Array, as_number, described
+from rcilab.core.errors import CommandRejectedError, InvalidValueError
+from rcilab.core.limits import Limits
+from rcilab.core.safety_box import SafetyBox, require_box
+from rcilab.core.spatial import Pose, as_pose
+from rcilab.makers.rokae import wire as rci
+from rcilab.makers.rokae.driver.connection import Link
+from rcilab.makers.rokae.driver.refusal import Refusal, find_refusal
+from rcilab.makers.rokae.wire.bounds import (
+    FARTHEST_BOX,
+    FILTER_OFF,
+    LARGEST_BOX,
+    LIMIT_TOLERANCE,
+    LONGEST_TOOL,
+    LOWEST_FREQUENCY,
+)
+from rcilab.model.dynamics.payload import Payload
+
+_AXES = ("x", "y", "z", "about x", "about y", "about z")
+_ADVICE: dict[tuple[type[rci.Request], IntEnum], str] = {
+    (
+        rci.StartMove,
+        rci.StartStatus.NOT_POSSIBLE,
+    ): "the controller has no such pair of modes, or still moves",
+    (rci.StartMove, rci.StartStatus.SINGULAR_START_POSE): "move away from the singularity in joint space first",
+    (rci.StartMove, rci.StartStatus.REFLEX): Refusal.FAULT.sentence,
+    (rci.StartMove, rci.StartStatus.USER_STOP): Refusal.ESTOP.sentence,
+    (rci.AutomaticErrorRecovery, rci.RecoveryStatus.NOT_POSSIBLE): "the arm still moves: try again at standstill",
+    (rci.AutomaticErrorRecovery, rci.RecoveryStatus.MANUAL_RECOVERY_NEEDED): (
+        "the arm is too far outside its soft limits or its safety box: power_off() clears the fault; then power_on(), "
+        "and execute(plan_recovery(robot.model, robot.state.q_c, robot.safety_box)) leads joints and tool back inside "
+        "what this session has set (set_joint_limit() and set_cartesian_limit() replace what another client has left); "
+        "a hand can, too (start_drag())"
+    ),
+    (rci.AutomaticErrorRecovery, rci.RecoveryStatus.REFLEX): (
+        "the cause is still there: look what touches or loads the arm and remove it, set the load (set_load()) or "
+        "higher thresholds (set_collision_behavior()), and try again"
+    ),
+    (rci.AutomaticErrorRecovery, rci.RecoveryStatus.USER_STOP): Refusal.ESTOP.sentence,
+    (rci.AutomaticErrorRecovery, rci.RecoveryStatus.ABORTED): "something ended it half-way: try again",
+}
+"""What to do where the controller's state does not tell the reason either."""
+_TEMPORARY = frozenset({"NOT_POSSIBLE", "USER_STOP", "FAILED"})
+"""Names of statuses that refuse a request because of what the controller is doing, whatever its values."""
+
+_COUNTED_FROM_1 = (rci.ForceFrame, rci.DragSpace, rci.DragType)
+"""What the manual counts from 1 (3.1.16, 3.1.17) and the wire from 0."""
+
+_Member = TypeVar("_Member", bound=IntEnum)
+
+
+class RciSettings:
+    """The setters of the RCI manual, section 3.1, and how a command is sent.
+
+    Args:
+        link: The connection.
+        limits: Bounds of the arm, to check arguments with; None leaves that to the controller.
+    """
+
+    def __init__(self, link: Link, limits: Limits | None = None) -> None:
+        self._link = link
+        self._limits = limits
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return self._link.n
+
+    def set_collision_behavior(self, thresholds: ArrayLike) -> None:
+        """Sets the external torques that count as a collision, shape (n,), [N m]; see `limits.joint`."""
+        largest = None if self._limits is None else self._limits.joint.collision_threshold
+        values = _vector("thresholds", thresholds, self._joints(), "N m", 0.0, largest)
+        self._ask(rci.SetCollisionBehavior(_floats(values)))
+
+    def set_cartesian_limit(self, box: SafetyBox) -> None:
+        """Sets the safety box that the origin of the tool must stay in, and whether it is watched."""
+        require_box(box)
+        _vector("safety box size", box.size, _AXES[:3], "m", 0.0, LARGEST_BOX)
+        _vector("safety box centre", box.T_base_box.position, _AXES[:3], "m", -FARTHEST_BOX, FARTHEST_BOX)
+        self._ask(rci.SetCartesianLimit(box.size, box.T_base_box.as_row_major(), box.active))
+
+    def set_joint_limit(self, lower: ArrayLike, upper: ArrayLike) -> None:
+        """Sets soft limits of the joint angles, each of shape (n,), [rad], inside the arm's own limits.
+
+        What happens there is the controller's choice: the manual's `auto_limit` never goes over the wire.
+        """
+        joint = None if self._limits is None else self._limits.joint
+        least = largest = None
+        if joint is not None:
+            least, largest = joint.lower - LIMIT_TOLERANCE, joint.upper + LIMIT_TOLERANCE
+        low = _vector("lower", lower, self._joints(), "rad", least, largest)
+        high = _vector("upper", upper, self._joints(), "rad", least, largest)
+        for i in range(self.n):
+            if low[i] >= high[i]:
+                raise InvalidValueError(f"lower, joint {i + 1}", float(low[i]), f"rad must be below upper {high[i]:g}")
+        self._ask(rci.SetJointLimit(_floats(high), _floats(low)))
+
+    def set_joint_impedance(self, stiffness: ArrayLike) -> None:
+        """Sets the stiffness of joint impedance, shape (n,), [N m/rad]."""
+        largest = None if self._limits is None else self._limits.joint.stiffness
+        values = _vector("stiffness", stiffness, self._joints(), "N m/rad", 0.0, largest)
+        self._ask(rci.SetJointImpedance(_floats(values)))
+
+    def set_cartesian_impedance(self, stiffness: ArrayLike) -> None:
+        """Sets the stiffness of Cartesian impedance, shape (6,): three [N/m], three [N m/rad]."""
+        largest = None
+        if self._limits is not None:
+            c = self._limits.cartesian
+            largest = np.repeat((c.translation_stiffness, c.rotation_stiffness), 3)
+        self._ask(
+            rci.SetCartesianImpedance(_floats(_vector("stiffness", stiffness, _AXES, "N/m, N m/rad", 0.0, largest)))
+        )
+
+    def set_cart_imp_desired_tau(self, wrench: ArrayLike) -> None:
+        """Sets the force and moment that Cartesian impedance presses with, shape (6,), [N, N m]."""
+        largest = None
+        if self._limits is not None:
+            largest = np.repeat((self._limits.cartesian.force, self._limits.cartesian.moment), 3)
+        least = None if largest is None else -largest
+        self._ask(rci.SetCartImpDesiredTau(_floats(_vector("wrench", wrench, _AXES, "N, N m", least, largest))))
+
+    def set_coor(self, T_flange_tool: Pose) -> None:
+        """Sets the tool by its pose in the flange frame, at most 2 m long."""
+        self._ask(rci.SetCoor(_pose_at_flange("T_flange_tool", T_flange_tool).as_row_major()))
+
+    def set_load(self, mass: float, center_of_mass: ArrayLike, inertia: ArrayLike) -> None:
+        """Sets the load at the flange.
+
+        Args:
+            mass: [kg], up to the arm's payload.
+            center_of_mass: In the flange frame, shape (3,), [m].
+            inertia: About the centre of mass, shape (3, 3), [kg m^2].
+        """
+        kilograms = float(_vector("mass", [mass], ("",), "kg", 0.0)[0])
+        center = load_center(center_of_mass)
+        try:
+            flat = np.asarray(inertia, dtype=np.float64).ravel()
+        except (TypeError, ValueError, OverflowError) as error:
+            raise InvalidValueError("inertia", described(inertia), "is not 3 x 3 numbers [kg m^2]") from error
+        names = [f"row {row}, column {column}" for row in (1, 2, 3) for column in (1, 2, 3)]
+        values = _vector("inertia", flat, names, "kg m^2")
+        # A body that cannot exist is refused here.
+        Payload(mass=kilograms, center_of_mass=center, inertia=values.reshape(3, 3))
+        self._ask(rci.SetLoad(kilograms, _floats(center), _floats(values)))
+
+    def set_filters(self, joint: float, cartesian: float, torque: float) -> None:
+        """Sets the cut-off frequencies of the controller's filters of commands, 0.1 to 1000 [Hz]; 1000 is off."""
+        names = ("joint", "cartesian", "torque")
+        values = _vector("cut-off frequency", [joint, cartesian, torque], names, "Hz", LOWEST_FREQUENCY, FILTER_OFF)
+        self._ask(rci.SetFilters(*_floats(values)))
+
+    def set_torque_filter_cut_off_frequency(self, frequency: float) -> None:
+        """Sets the cut-off frequency of the reported torques' filter, 0.1 to 1000 [Hz]; 1000 switches it off."""
+        values = _vector("frequency", [frequency], ("",), "Hz", LOWEST_FREQUENCY, FILTER_OFF)
+        self._ask(rci.SetTorqueFilterCutOffFrequency(float(values[0])))
+
+    def set_fc_coor(
+        self, T_flange_force: Pose, type: rci.ForceFrame | Literal["world", "tool", "path"] = rci.ForceFrame.WORLD
+    ) -> None:
+        """Sets the force-control frame: the axes of desired force, stiffness and `state.tau_ext_in_stiff`.
+
+        Args:
+            T_flange_force: Its pose in the flange frame.
+            type: What its axes follow: the base ("world"), the tool, or the path.
+        """
+        kind = member(rci.ForceFrame, "type", type)
+        self._ask(rci.SetFcCoor(_pose_at_flange("T_flange_force", T_flange_force).as_row_major(), kind))
+
+    def enable_virtual_guide(self, enable: bool) -> None:
+        """Switches the virtual guide: walls at the faces of the safety box while a person or a force moves the arm."""
+        self._ask(rci.EnableVirtualGuide(flag("enable", enable)))
+
+    def _joints(self) -> list[str]:
+        return [f"joint {i + 1}" for i in range(self.n)]
+
+    def _ask(self, request: rci.Request, also_good: IntEnum | None = None, timeout: float | None = None) -> None:
+        status = self._request(request, timeout).status
+        if status == 0 or status == also_good:
+            return
+        reason = None
+        if getattr(status, "name", "") in _TEMPORARY or status is rci.StartStatus.REFLEX:
+            reason = find_refusal(self._request, lambda: self._link.latest)
+        advice = _ADVICE.get((type(request), status), "") if reason is None else reason.sentence
+        word = "" if reason is None else reason.word
+        raise CommandRejectedError(type(request).__name__, status, advice, reason=word)
+
+    def _request(self, request: rci.Request, timeout: float | None = None) -> Any:
+        """Sends a request and returns the answer; every command comes through here."""
+        return self._link.request(request, timeout)
+
+
+def member(kind: type[_Member], name: str, value: object) -> _Member:
+    """Returns the member of an enumeration that a value means: the member itself, or its name in any case.
+
+    Raises:
+        InvalidValueError: It means none; the message lists those that exist.
+    """
+    if isinstance(value, kind):
+        return value
+    if isinstance(value, str) and value.upper() in kind.__members__:
+        return kind[value.upper()]
+    known = ", ".join(repr(name.lower()) for name in kind.__members__)
+    hint = ""
+    if kind in _COUNTED_FROM_1 and isinstance(value, int) and 1 <= value <= len(kind):
+        hint = f"; the manual's {value} is {list(kind)[value - 1].name.lower()!r}"
+    raise InvalidValueError(name, described(value), f"is unknown; known: {known}{hint}")
+
+
+def flag(name: str, value: object) -> bool:
+    """Returns a switch as a bool; 0 and 1 will do.
+
+    Raises:
+        InvalidValueError: It is anything else, such as the text "off", which Python takes for true.
+    """
+    if isinstance(value, bool | np.bool_) or (isinstance(value, int) and value in (0, 1)):
+        return bool(value)
+    raise InvalidValueError(name, described(value), "must be True or False")
+
+
+def _vector(
+    name: str, values: ArrayLike, axes: Sequence[str], unit: str, least: ArrayLike | None = None,
+    largest: ArrayLike | None = None,
+) -> Array:  # fmt: skip
+    """Returns a vector, one number an axis, each finite and inside its bounds; None is no bound."""
+    try:
+        array = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError) as error:
+        if len(axes) == 1:
+            as_number(values[0], name, unit)  # type: ignore[index]  # A single number was put in a list.
+        raise InvalidValueError(name, described(values), f"is not {len(axes)} numbers [{unit}]") from error
+    if array.shape != (len(axes),):
+        raise InvalidValueError(name, described(values), f"has shape {array.shape}, needs ({len(axes)},) [{unit}]")
+    low = np.broadcast_to(-np.inf if least is None else least, array.shape)
+    high = np.broadcast_to(np.inf if largest is None else largest, array.shape)
+    for axis, value, lowest, highest in zip(axes, array.tolist(), low.tolist(), high.tolist(), strict=True):
+        place = f"{name}, {axis}" if axis else name
+        if not math.isfinite(value):
+            raise InvalidValueError(place, value, f"must be finite [{unit}]")
+        if not lowest <= value <= highest:
+            span = f"is outside {lowest:.9g} to {highest:.9g}"
+            bounds = f"must not be below {lowest:g}" if highest == math.inf else span
+            raise InvalidValueError(place, value, f"{bounds} [{unit}]")
+    return array
+
+
+def load_center(center_of_mass: ArrayLike) -> Array:
+    """Returns a load's centre of mass in the flange frame, as far from the flange as the controller takes it, [m].
+
+    Raises:
+        InvalidValueError: It is not three finite numbers, or farther away.
+    """
+    center = _vector("center_of_mass", center_of_mass, _AXES[:3], "m")
+    _require_near("center_of_mass", center.tolist())
+    return center
+
+
+def _pose_at_flange(name: str, value: object) -> Pose:
+    pose = as_pose(value, name)
+    _require_near(name, pose.parts[1])
+    return pose
+
+
+def _require_near(name: str, position: Sequence[float]) -> None:
+    length = math.hypot(*position)
+    if not length <= LONGEST_TOOL:
+        problem = f"m from the flange is farther than {LONGEST_TOOL:g} m; give metres"
+        raise InvalidValueError(name, round(length, 6), problem)
+
+
+def _floats(values: Array) -> tuple[float, ...]:
+    return tuple(values.tolist())

@@ -1,0 +1,233 @@
+"""The two channels to a controller: requests over TCP, states and commands over UDP. Bytes only."""
+
+from __future__ import annotations
+
+import errno
+import select
+import socket
+import time
+from typing import Protocol
+
+from rcilab.core.errors import ConnectionLostError, DecodeError
+from rcilab.makers.rokae.driver.address import RobotAddress, Route, choose_route
+from rcilab.makers.rokae.wire import FrameReader
+
+RECEIVE_BUFFER = 1 << 20  # [bytes] Room for about 0.4 s of states; the kernel may grant less.
+_LARGEST = 2048  # [bytes] More than any datagram of the RCI.
+_MS = 1000.0
+
+
+class Transport(Protocol):
+    """What a client needs of the wire. Owned by one thread."""
+
+    @property
+    def local_address(self) -> tuple[str, int]:
+        """Where states come to: our address and UDP port."""
+        ...
+
+    def send_request(self, frame: bytes) -> None:
+        """Sends one TCP frame."""
+        ...
+
+    def receive_frame(self) -> bytes | None:
+        """Returns the next complete TCP frame that has arrived, or None; does not wait."""
+        ...
+
+    def receive_states(self) -> list[bytes]:
+        """Returns every state datagram that has arrived, oldest first; does not wait."""
+        ...
+
+    def send_command(self, datagram: bytes) -> None:
+        """Sends one command datagram."""
+        ...
+
+    def wait(self, timeout: float, *, frames: bool = False) -> bool:
+        """Returns once a state (or with `frames` a piece of a TCP frame) is there, or False after `timeout`, [s]."""
+        ...
+
+    def wait_for_frame(self, timeout: float) -> bool:
+        """Returns once a piece of a TCP frame is there, or False after `timeout`, [s]; leaves states alone."""
+        ...
+
+    def close(self) -> None:
+        """Ends both channels. May be called twice."""
+        ...
+
+
+class SocketTransport:
+    """The real wire.
+
+    Args:
+        address: Where the robot is.
+        state_size: Bytes of a state datagram; others are counted in `foreign` and dropped.
+        timeout: How long to wait for the TCP connection, [s].
+
+    Raises:
+        ConnectionLostError: The robot cannot be reached, or the port that states come to is taken.
+    """
+
+    def __init__(self, address: RobotAddress, state_size: int, timeout: float) -> None:
+        self.address = address
+        self.foreign = 0
+        """Datagrams dropped because of their size or sender."""
+        self._state_size = state_size
+        route = choose_route(address)
+        self._robot_host = route.robot_udp[0]
+        self._command_address = route.robot_udp
+        self._frames: list[bytes] = []
+        self._was_answered = False
+        self._reader = FrameReader()
+        self._udp = _bind_udp(address, route)
+        try:
+            self._tcp = _connect_tcp(address, route, timeout)
+        except BaseException:
+            self._udp.close()
+            raise
+        self._udp_number = self._udp.fileno()
+        self._states_ready = select.poll()
+        self._states_ready.register(self._udp, select.POLLIN)
+        self._states_ready.register(self._tcp, select.POLLRDHUP)
+        self._frames_ready = select.poll()
+        self._frames_ready.register(self._tcp, select.POLLIN)
+        self._anything_ready = select.poll()
+        self._anything_ready.register(self._udp, select.POLLIN)
+        self._anything_ready.register(self._tcp, select.POLLIN)
+
+    @property
+    def local_address(self) -> tuple[str, int]:
+        """Where states come to: our address and UDP port."""
+        host, port = self._udp.getsockname()
+        return host, port
+
+    def send_request(self, frame: bytes) -> None:
+        """Sends one TCP frame."""
+        try:
+            self._tcp.sendall(frame)
+        except OSError as error:
+            raise self._lost(error) from error
+
+    def receive_frame(self) -> bytes | None:
+        """Returns the next complete TCP frame that has arrived, or None; does not wait."""
+        while not self._frames:
+            try:
+                piece = self._tcp.recv(4096)
+            except (BlockingIOError, InterruptedError):
+                return None
+            except OSError as error:
+                raise self._lost(error) from error
+            if not piece:
+                raise self._lost(None)
+            self._was_answered = True
+            try:
+                self._frames += self._reader.feed(piece)
+            except DecodeError as error:
+                raise ConnectionLostError(f"{self.address}: what answers there does not speak RCI: {error}").coded(
+                    "no_rci", address=str(self.address)
+                ) from error
+        return self._frames.pop(0)
+
+    def receive_states(self) -> list[bytes]:
+        """Returns every state datagram that has arrived, oldest first; does not wait."""
+        states: list[bytes] = []
+        while True:
+            try:
+                datagram, sender = self._udp.recvfrom(_LARGEST)
+            except (BlockingIOError, InterruptedError):
+                return states
+            except ConnectionError:  # An earlier command met a closed port; its ICMP answer says nothing new.
+                continue
+            if len(datagram) == self._state_size and sender[0] == self._robot_host:
+                states.append(datagram)
+            else:
+                self.foreign += 1
+            if not self._states_ready.poll(0):  # A third of what an exception takes, and there is mostly just one.
+                return states
+
+    def send_command(self, datagram: bytes) -> None:
+        """Sends one command datagram; a full or refusing network drops it, as the network may at any time."""
+        try:
+            self._udp.sendto(datagram, self._command_address)
+        except (BlockingIOError, InterruptedError, ConnectionError):
+            pass
+        except OSError as error:
+            raise self._lost(error) from error
+
+    def wait(self, timeout: float, *, frames: bool = False) -> bool:
+        """Returns once a state (or with `frames` a piece of a TCP frame) is there, or False after `timeout`, [s].
+
+        Raises:
+            ConnectionLostError: No state is there, and the other side has closed the connection.
+        """
+        if frames and self._frames:
+            return True
+        if frames:
+            return bool(self._anything_ready.poll(max(0.0, timeout) * _MS))
+        events = self._states_ready.poll(max(0.0, timeout) * _MS)
+        if len(events) == 1 and events[0][0] != self._udp_number:
+            raise self._lost(None)
+        return bool(events)
+
+    def wait_for_frame(self, timeout: float) -> bool:
+        """Returns once a piece of a TCP frame is there, or False after `timeout`, [s]; leaves states alone."""
+        return bool(self._frames) or bool(self._frames_ready.poll(max(0.0, timeout) * _MS))
+
+    def close(self) -> None:
+        """Ends both channels. May be called twice."""
+        self._tcp.close()
+        self._udp.close()
+
+    def _lost(self, error: OSError | None) -> ConnectionLostError:
+        reason = "it closed the connection" if error is None else (error.strerror or str(error))
+        if not self._was_answered:
+            return ConnectionLostError(
+                f"{self.address}: the controller ended the connection before its first answer ({reason}), probably "
+                "because another client is connected: it takes one at a time; close that one and connect again"
+            )
+        return ConnectionLostError(
+            f"{self.address}: the connection is lost ({reason}); look whether the controller runs, and connect again"
+        )
+
+
+def _bind_udp(address: RobotAddress, route: Route) -> socket.socket:
+    udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    try:
+        udp.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
+        udp.setblocking(False)
+        udp.bind(route.local_udp)
+    except OSError as error:
+        udp.close()
+        host, port = route.local_udp
+        if error.errno == errno.EADDRINUSE:
+            raise ConnectionLostError(
+                f"{address}: states would come to UDP port {port} of {host}, and a program here already listens "
+                "there, probably another client of this robot; close it and connect again"
+            ).coded("port_taken", address=str(address), port=port) from error
+        raise ConnectionLostError(f"{address}: cannot receive at {host}:{port}: {error.strerror or error}").coded(
+            "no_port", address=str(address), port=port
+        ) from error
+    return udp
+
+
+def _connect_tcp(address: RobotAddress, route: Route, timeout: float) -> socket.socket:
+    tcp = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    start = time.monotonic()
+    try:
+        tcp.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        tcp.settimeout(timeout)
+        tcp.bind(route.local_tcp)
+        tcp.connect(route.robot_tcp)
+        tcp.setblocking(False)
+    except OSError as error:
+        tcp.close()
+        spent = time.monotonic() - start
+        reason = (
+            f"did not answer within {timeout:g} s"
+            if isinstance(error, TimeoutError)
+            else f"{error.strerror or error} after {spent:.1f} s of {timeout:g} s"
+        )
+        raise ConnectionLostError(
+            f"no robot at {address} ({reason}); check that it is switched on, that its IP address and port are those "
+            "of the teach pendant's RCI page with RCI enabled there, and that the cable and no firewall is in between; "
+            "a virtual one is started with, for example: rcilab controller --model xMatePro7"
+        ).coded("no_robot", address=str(address)) from error
+    return tcp

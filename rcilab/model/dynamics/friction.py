@@ -1,0 +1,64 @@
+"""Friction of the joints: as the simulated arm has it, or with figures that were identified on a real one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rcilab.core.arrays import Array, JointVector, as_vector
+from rcilab.core.errors import InvalidValueError
+from rcilab.core.limits import JointLimits
+from rcilab.robots.mjcf import DAMPING_PER_TORQUE
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class JointFriction:
+    """What n joints lose: viscous * dq + coulomb * sign(dq) + offset, the law of the vendor's model library.
+
+    Raises:
+        InvalidValueError: The vectors are not all of one length, not finite, or a joint would gain by moving.
+    """
+
+    viscous: JointVector
+    """Shape (n,), [N m s/rad], not negative."""
+    coulomb: JointVector
+    """Shape (n,), [N m], not negative; nothing at rest."""
+    offset: JointVector
+    """At rest, too, shape (n,), [N m]."""
+
+    def __post_init__(self) -> None:
+        """Checks the values and makes them read-only."""
+        n = np.size(self.viscous)
+        for name, unit in (("viscous", "N m s/rad"), ("coulomb", "N m"), ("offset", "N m")):
+            values = as_vector(getattr(self, name), n, f"{name} friction", unit)
+            if name != "offset" and (values < 0.0).any():
+                raise InvalidValueError(f"{name} friction", values.tolist(), f"must not be negative [{unit}]")
+            object.__setattr__(self, name, values)
+
+    def torque(self, dq: Array) -> Array:
+        """Returns what a motor needs on top of the torques of the rigid arm, [N m], for dq of shape (..., n), [rad/s].
+
+        Raises:
+            InvalidValueError: It is the friction of another number of joints.
+        """
+        n = len(self.viscous)
+        if dq.shape[-1] != n:
+            raise InvalidValueError("friction", repr(self), f"is that of {n} joints, the arm has {dq.shape[-1]}")
+        return self.viscous * dq + self.coulomb * np.sign(dq) + self.offset
+
+    def __repr__(self) -> str:
+        return f"<JointFriction of {len(self.viscous)} joints: .viscous, .coulomb, .offset>"
+
+
+def simulated_friction(limits: JointLimits) -> JointFriction:
+    """Returns the friction of the MuJoCo plant: viscous, in proportion to the size of the drive.
+
+    No table gives figures for the real arms; these are a choice. Those of a real arm are in its answer to
+    LoadRobotModel.
+
+    Args:
+        limits: Of the arm; its torque limits stand for the size of the drives.
+    """
+    none = np.zeros(len(limits.torque))
+    return JointFriction(viscous=DAMPING_PER_TORQUE * limits.torque, coulomb=none, offset=none)

@@ -1,0 +1,80 @@
+"""A load at the flange."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from rcilab.core.arrays import Matrix, Vector3, as_number, as_vector, frozen
+from rcilab.core.errors import InvalidValueError
+
+_HEAVIEST = 100.0  # [kg] A choice: more than ten times what an xMate can carry. Grams are above it.
+_FARTHEST = 5.0  # [m] A choice: from the flange; millimetres are above it.
+_LARGEST = 100.0  # [kg m^2] A choice: a hundred times that of anything an xMate can carry.
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Payload:
+    """A rigid body fixed to the flange.
+
+    Raises:
+        InvalidValueError: The mass is negative, the inertia is no body's, or something is not finite.
+    """
+
+    mass: float = 0.0
+    """[kg]."""
+    center_of_mass: Vector3 = field(default_factory=lambda: np.zeros(3))
+    """In the flange frame, shape (3,), [m]."""
+    inertia: Matrix = field(default_factory=lambda: np.zeros((3, 3)))
+    """About the centre of mass, flange axes, shape (3, 3), [kg m^2]."""
+
+    def __post_init__(self) -> None:
+        """Checks the values and makes them read-only."""
+        mass = as_number(self.mass, "load mass", "kg")
+        if not 0.0 <= mass <= _HEAVIEST:
+            raise InvalidValueError("load mass", mass, f"must be from 0 to {_HEAVIEST:g} [kg]")
+        inertia = as_vector(np.ravel(self.inertia), 9, "load inertia", "kg m^2").reshape(3, 3)
+        if mass == 0.0 and np.any(inertia):
+            raise InvalidValueError("load inertia", inertia.tolist(), "must be zero: a load without mass has none")
+        if np.abs(inertia - inertia.T).max() > 1e-9 * max(1.0, float(np.abs(inertia).max())):
+            raise InvalidValueError("load inertia", inertia.tolist(), "must be symmetric")
+        inertia = _nearest_possible(0.5 * inertia + 0.5 * inertia.T)
+        object.__setattr__(self, "mass", mass)
+        center = as_vector(self.center_of_mass, 3, "load centre of mass", "m")
+        if np.abs(center).max() > _FARTHEST:
+            raise InvalidValueError(
+                "load centre of mass", center.tolist(), f"is farther than {_FARTHEST:g} m; give metres"
+            )
+        object.__setattr__(self, "center_of_mass", center)
+        object.__setattr__(self, "inertia", frozen(inertia))
+
+    def __repr__(self) -> str:
+        centre = " ".join(f"{x:.4g}" for x in self.center_of_mass.tolist())
+        moments = " ".join(f"{x:.4g}" for x in np.diagonal(self.inertia).tolist())
+        return f"<Payload of {self.mass:.4g} kg, centre of mass at {centre} m, moments of inertia {moments} kg m^2>"
+
+
+def _nearest_possible(inertia: Matrix) -> Matrix:
+    """Returns an inertia without the moments below zero that rounding made.
+
+    Every body's principal moments are positive or zero, and none exceeds the sum of the other two.
+    """
+    is_small = bool(np.abs(inertia).max() <= _LARGEST)
+    moments, axes = np.linalg.eigh(inertia) if is_small else (np.array((-1.0, 0.0, 0.0)), np.eye(3))
+    smallest, middle, largest = moments.tolist()
+    tolerance = 1e-9 * max(1.0, largest)
+    if smallest < -tolerance or largest > smallest + middle + tolerance:
+        raise InvalidValueError(
+            "load inertia",
+            inertia.tolist(),
+            f"is no body's: its principal moments must be from 0 to {_LARGEST:g} kg m^2, "
+            "and none larger than the sum of the other two",
+        )
+    if smallest >= 0.0:
+        return inertia
+    possible = axes * np.maximum(moments, 0.0) @ axes.T
+    return (possible + possible.T) / 2.0
+
+
+NO_LOAD = Payload()

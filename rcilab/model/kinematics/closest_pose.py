@@ -1,0 +1,119 @@
+"""The pose closest to a wish: what an arm can do of a target it cannot fully reach, and why not all of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import acos, sin
+
+from rcilab.core.arrays import JointVector
+from rcilab.core.errors import UnreachableError
+from rcilab.core.spatial import Pose, wxyz_from_rotation
+from rcilab.model.kinematics.inverse import ArmGeometry
+from rcilab.model.kinematics.solutions import Solutions
+
+_KEEP_BENT = 0.999  # Share of the full reach a projected target is put at: a stretched arm is singular.
+_HALVINGS = 12  # Steps of the search along the way to the target: 1/4096 of it, well below a pixel.
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Reach:
+    """The answer to "go there, or as close as you can"."""
+
+    q: JointVector
+    """Joint angles, shape (n,), [rad]."""
+    pose: Pose
+    """Pose of the tool at q in base: the target itself, or the closest pose found."""
+    solutions: Solutions | None
+    """All branches at that pose; None when the arm is best left where it is."""
+    refusal: UnreachableError | None
+    """Why the target itself cannot be reached; None when it can."""
+
+
+def closest_reachable(
+    solve: Callable[[Pose, bool], Solutions],
+    arm: ArmGeometry,
+    T_flange_tool: Pose,
+    here: Pose,
+    q: JointVector,
+    target: Pose,
+) -> Reach:
+    """Returns joint angles for a target, or for the closest pose to it that the arm can take.
+
+    A target beyond the reach is pulled straight back towards the shoulder, keeping its orientation. One that a joint
+    limit forbids is approached along the straight way from the present pose, as far as there is a solution.
+
+    Args:
+        solve: Inverse kinematics from a tool pose; raises UnreachableError. Its second argument tells whether it may
+            look for another arm angle than the present one: a search is too slow for every step of a search.
+        arm: Lengths of the arm.
+        T_flange_tool: Pose of the tool in the flange frame.
+        here: Present pose of the tool in base, reached at q.
+        q: Present joint angles, shape (n,), [rad].
+        target: Wanted pose of the tool in base.
+    """
+    try:
+        found = solve(target, True)
+        return Reach(q=found.nearest(q), pose=target, solutions=found, refusal=None)
+    except UnreachableError as error:
+        refusal = error
+    goal = _pull_in(arm, T_flange_tool, target)
+    if goal is not target:
+        try:
+            found = solve(goal, True)
+            return Reach(q=found.nearest(q), pose=goal, solutions=found, refusal=refusal)
+        except UnreachableError:
+            pass
+    return _approach(solve, here, q, goal, refusal)
+
+
+def _approach(
+    solve: Callable[[Pose, bool], Solutions], here: Pose, q: JointVector, goal: Pose, refusal: UnreachableError
+) -> Reach:
+    """Returns the last reachable pose found on the straight way from here to an unreachable goal, by bisection."""
+    best = Reach(q=q, pose=here, solutions=None, refusal=refusal)
+    low, high = 0.0, 1.0
+    for _ in range(_HALVINGS):
+        middle = (low + high) / 2.0
+        pose = interpolate(here, goal, middle)
+        try:
+            found = solve(pose, False)
+        except UnreachableError:
+            high = middle
+        else:
+            low = middle
+            best = Reach(q=found.nearest(best.q), pose=pose, solutions=found, refusal=refusal)
+    return best
+
+
+def interpolate(a: Pose, b: Pose, share: float) -> Pose:
+    """Returns the pose a share (0 to 1) of the way from a to b: position on the line, orientation by slerp."""
+    (ra, pa), (rb, pb) = a.parts, b.parts
+    qa, qb = wxyz_from_rotation(ra), wxyz_from_rotation(rb)
+    dot = sum(x * y for x, y in zip(qa, qb, strict=True))
+    if dot < 0.0:
+        qb, dot = tuple(-x for x in qb), -dot
+    angle = acos(min(1.0, dot))
+    if angle < 1e-9:
+        wa, wb = 1.0 - share, share
+    else:
+        wa, wb = sin((1.0 - share) * angle) / sin(angle), sin(share * angle) / sin(angle)
+    return Pose(
+        [(1.0 - share) * x + share * y for x, y in zip(pa, pb, strict=True)],
+        [wa * x + wb * y for x, y in zip(qa, qb, strict=True)],
+    )
+
+
+def _pull_in(arm: ArmGeometry, T_flange_tool: Pose, target: Pose) -> Pose:
+    """Returns the target moved so that its wrist centre is inside the reachable shell."""
+    r, (x, y, z) = (target @ T_flange_tool.inverse()).parts
+    wx, wy, wz = x - arm.hand * r[2], y - arm.hand * r[5], z - arm.hand * r[8] - arm.shoulder
+    length = (wx * wx + wy * wy + wz * wz) ** 0.5
+    longest = _KEEP_BENT * (arm.upper + arm.fore)
+    shortest = abs(arm.upper - arm.fore) / _KEEP_BENT
+    wanted = min(max(length, shortest), longest)
+    if length == 0.0 or wanted == length:
+        return target
+    scale = wanted / length - 1.0
+    rotation, (px, py, pz) = target.parts
+    return Pose.from_parts(rotation, (px + scale * wx, py + scale * wy, pz + scale * wz))

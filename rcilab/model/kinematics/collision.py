@@ -1,0 +1,223 @@
+"""How near the links come to each other and to the floor: coal's distances between the capsules that the URDF has too.
+
+Neighbours are not compared: their housings share a joint and always touch. Every other two links are; none of them
+touch wherever the joints are (a test shows it). The floor is compared with every link that can move up or down.
+"""
+
+# pyright: reportAttributeAccessIssue=false, reportMissingImports=false
+# The names of pinocchio and coal are put into their modules by compiled code when they are loaded.
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import combinations
+from math import hypot
+from typing import Any, NamedTuple
+
+import coal
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from rcilab.core.arrays import Array, JointPath, JointVector, Vector3, frozen
+from rcilab.robots.description import RobotDescription
+from rcilab.robots.shapes import Capsule, build_shapes
+from rcilab.robots.upright import upright_flange, upright_joints
+
+FLOOR = -1
+"""Stands for the floor where a link's number is expected."""
+TOOL = -2
+"""Stands for the tool where a link's number is expected."""
+
+_SLANT = 0.5  # Axes are along y or z; this is between.
+
+
+class LinkPair(NamedTuple):
+    """Who is near whom: 0 is the base, n the last link; or `TOOL`, or `FLOOR`."""
+
+    first: int
+    second: int
+
+    def __str__(self) -> str:
+        return f"{link_name(self.first)} and {link_name(self.second)}"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Clearance:
+    """The smallest distance between any two, and between whom."""
+
+    distance: Array
+    """Below 0 where capsules overlap, shape () or (N,), [m]; infinite where nothing is compared."""
+    links: NDArray[np.intp]
+    """Numbers of the two, shape (2,) or (N, 2): 0 the base, n the last link, -1 the floor, -2 the tool."""
+
+    def __repr__(self) -> str:
+        if self.distance.ndim:
+            worst = int(self.distance.argmin())
+            return f"<Clearance of {len(self.distance)} rows: smallest {self._text(worst)} in row {worst}>"
+        return f"<Clearance: {self._text(())}>"
+
+    def _text(self, row: int | tuple[()]) -> str:
+        return f"{self.distance[row]:.4g} m between {LinkPair(*self.links[row].tolist())}"
+
+
+def link_name(number: int) -> str:
+    """Returns a link's name in words by its number; see `Clearance.links`."""
+    return {FLOOR: "floor", TOOL: "tool", 0: "base"}.get(number, f"link {number}")
+
+
+class CollisionGeometry:
+    """The capsules of an arm, what is compared with what, and how far a joint can move them. Immutable.
+
+    Args:
+        description: The arm.
+        tool: Capsule around the tool in the frame of the last link, or None.
+        floor_height: Of the floor in the base frame, [m]; None where there is none.
+    """
+
+    def __init__(self, description: RobotDescription, tool: Capsule | None, floor_height: float | None) -> None:
+        shape = build_shapes(description, "coarse")
+        self.bodies = [link.capsules for link in (shape.base, *shape.links)]
+        if tool is not None:
+            self.bodies.append((tool,))
+        self.tree = _tree(description)
+        n = description.n
+        # The tool is fixed to the last link: neither of the two is compared with what the other one touches.
+        names = [*range(n + 1), TOOL][: len(self.bodies)]
+        apart = [LinkPair(a, b) for a, b in combinations(names, 2) if (b - a > 1 if b != TOOL else a < n - 1)]
+        self.links, self.link_pairs = self._compare(apart, None)
+        rising = names[_first_rising(description) :] if floor_height is not None else []
+        self.floor, self.floor_pairs = self._compare([LinkPair(name, FLOOR) for name in rising], floor_height)
+        self.levers = frozen(_levers(description, self.bodies))
+        """How far any point of the arm is from each joint's axis at most, shape (n,), [m]."""
+
+    def _compare(self, pairs: list[LinkPair], floor_height: float | None) -> tuple[Any, list[LinkPair]]:
+        """Returns pinocchio's geometry for some pairs, and which pair each of its comparisons belongs to."""
+        geometry = pin.GeometryModel()
+        last = self.tree.njoints - 1
+        solids = {
+            number if number <= last else TOOL: [
+                geometry.addGeometryObject(_solid(capsule, min(number, last))) for capsule in capsules
+            ]
+            for number, capsules in enumerate(self.bodies)
+        }
+        if floor_height is not None:
+            plane = coal.Halfspace(np.array([0.0, 0.0, 1.0]), floor_height)
+            solids[FLOOR] = [geometry.addGeometryObject(pin.GeometryObject("floor", 0, pin.SE3.Identity(), plane))]
+        owners: list[LinkPair] = []
+        for pair in pairs:
+            for a in solids[pair.first]:
+                for b in solids[pair.second]:
+                    geometry.addCollisionPair(pin.CollisionPair(a, b))
+                    owners.append(pair)
+        return geometry, owners
+
+
+class ClearanceQuery:
+    """Asks for distances, configuration by configuration. Owned by one thread.
+
+    Args:
+        geometry: What is compared.
+    """
+
+    def __init__(self, geometry: CollisionGeometry) -> None:
+        self._geometry = geometry
+        self._data = geometry.tree.createData()
+        self._links, self._floor = geometry.links.createData(), geometry.floor.createData()
+
+    def links(self, q: JointVector) -> tuple[float, LinkPair]:
+        """Returns the smallest distance between two links, [m], and which; q of shape (n,), [rad]."""
+        return self._nearest(self._geometry.links, self._links, self._geometry.link_pairs, q)
+
+    def floor(self, q: JointVector) -> tuple[float, LinkPair]:
+        """Returns the smallest distance of a link from the floor, [m], and which; infinite where there is none."""
+        if not self._geometry.floor_pairs:
+            return float("inf"), LinkPair(self._geometry.tree.njoints - 1, FLOOR)
+        return self._nearest(self._geometry.floor, self._floor, self._geometry.floor_pairs, q)
+
+    def path(self, q: JointPath) -> Clearance:
+        """Returns the smaller one of the two in every row of q, shape (N, n), [rad]."""
+        distance, links = np.empty(len(q)), np.empty((len(q), 2), dtype=np.intp)
+        for row, angles in enumerate(q):
+            distance[row], links[row] = min(self.links(angles), self.floor(angles))
+        return Clearance(distance, links)
+
+    def _nearest(self, geometry: Any, data: Any, pairs: list[LinkPair], q: JointVector) -> tuple[float, LinkPair]:
+        index = pin.computeDistances(self._geometry.tree, self._data, geometry, data, q)
+        return data.distanceResults[index].min_distance, pairs[index]
+
+
+@lru_cache(maxsize=32)
+def collision_geometry(
+    description: RobotDescription,
+    tool: tuple[float, float, float],
+    floor_height: float | None,
+    tool_radius: float | None,
+) -> CollisionGeometry:
+    """Returns the geometry of an arm with a tool, built once.
+
+    Args:
+        description: The arm.
+        tool: Origin of the tool in the flange, [m].
+        floor_height: Of the floor in the base frame, [m]; None where there is none.
+        tool_radius: Of a capsule from the flange to the tool's origin, [m]; None where there is none.
+    """
+    capsule = None
+    if tool_radius is not None and any(tool):
+        end = upright_flange(description).rotation @ np.array(tool)
+        capsule = Capsule(frozen([0.0, 0.0, 0.0]), frozen(end), tool_radius)
+    return CollisionGeometry(description, capsule, floor_height)
+
+
+def _tree(description: RobotDescription) -> pin.Model:
+    """Returns the joints between the upright link frames, as pinocchio walks them."""
+    tree = pin.Model()
+    for number, joint in enumerate(upright_joints(description), start=1):
+        tree.addJoint(number - 1, _kind(joint.axis), pin.SE3(np.eye(3), joint.origin.copy()), f"joint{number}")
+    return tree
+
+
+def _kind(axis: Vector3) -> Any:
+    """Returns the fastest kind of joint about an axis."""
+    if axis[2] > _SLANT:
+        return pin.JointModelRZ()
+    return pin.JointModelRY() if axis[1] > _SLANT else pin.JointModelRevoluteUnaligned(axis.copy())
+
+
+def _solid(capsule: Capsule, link: int) -> Any:
+    """Returns a capsule for pinocchio, fixed to a link; the tool is part of the last one."""
+    line = capsule.end - capsule.start
+    length = float(np.linalg.norm(line))
+    turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), line) if length else pin.Quaternion.Identity()
+    place = pin.SE3(turn.matrix(), (capsule.start + capsule.end) / 2.0)
+    return pin.GeometryObject("capsule", link, place, coal.Capsule(capsule.radius, length))
+
+
+def _first_rising(description: RobotDescription) -> int:
+    """Returns the first link that a joint can move up or down: those below only turn about the vertical."""
+    axes = [joint.axis for joint in upright_joints(description)]
+    return next(number for number, axis in enumerate(axes, start=1) if abs(axis[2]) < _SLANT)
+
+
+def _levers(description: RobotDescription, bodies: Sequence[Sequence[Capsule]]) -> list[float]:
+    """Returns how far from each joint's axis the arm beyond it reaches at most, wherever the later joints are, [m].
+
+    Link by link from the flange. What follows is kept as level rings: centre in the link's frame, radius, and thickness
+    all around. A z joint turns a ring about its axis; any other sweeps it into a ball, which is all thickness.
+    """
+    levers: list[float] = []
+    rings: list[tuple[float, float, float, float, float]] = []
+    for number, joint in reversed(list(enumerate(upright_joints(description), start=1))):
+        own = bodies[number] if number < description.n else [c for body in bodies[number:] for c in body]
+        rings += [(*point.tolist(), 0.0, c.radius) for c in own for point in (c.start, c.end)]
+        if abs(joint.axis[2]) > _SLANT:
+            rings = [(0.0, 0.0, z, hypot(x, y) + ring, radius) for x, y, z, ring, radius in rings]
+            levers.append(max(ring + radius for *_, ring, radius in rings))
+        else:
+            levers.append(max(hypot(abs(x) + ring, z) + radius for x, _, z, ring, radius in rings))
+            rings = [(0.0, 0.0, 0.0, 0.0, max(hypot(hypot(x, y) + ring, z) + r for x, y, z, ring, r in rings))]
+        dx, dy, dz = joint.origin.tolist()
+        rings = [(x + dx, y + dy, z + dz, ring, radius) for x, y, z, ring, radius in rings]
+    return levers[::-1]

@@ -1,0 +1,94 @@
+"""The circle that the elbow of a 7-axis arm goes round while its tool stays, as a thing in space."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import pi, remainder, tau
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rcilab.core.arrays import Array, frozen
+from rcilab.core.errors import SingularError
+from rcilab.model.kinematics.arm_angle import reference_frame
+
+_LOOKS = 720  # Arm angles at which a ray is compared with the circle: half a degree; a parabola does the rest.
+_PULL = 1e-3  # [m] per rad: what decides between the near and the far side where a ray passes both. A choice.
+_LEAST = 1e-6  # [m] Below it the arm is as good as stretched, and its elbow has no circle.
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class ElbowCircle:
+    """Where the elbow can be at one pose of the tool."""
+
+    center: Array
+    """On the shoulder-wrist line, in base, shape (3,), [m]."""
+    radius: float
+    """[m]."""
+    axis: Array
+    """Direction from shoulder to wrist, shape (3,): the arm angle turns about it, right-handed."""
+    upward: Array
+    """Direction from the centre to the elbow at arm angle 0, shape (3,)."""
+    across: Array
+    """The same at 90 degrees."""
+
+    def points(self, psi: ArrayLike, outward: float = 0.0) -> Array:
+        """Returns the elbow at arm angles, shape (N, 3), [m].
+
+        Args:
+            psi: Arm angles, shape (N,), [rad].
+            outward: How far outside the circle the points shall be, [m].
+        """
+        angles = np.atleast_1d(np.asarray(psi, dtype=np.float64))[:, None]
+        return self.center + (self.radius + outward) * (np.cos(angles) * self.upward + np.sin(angles) * self.across)
+
+    def angle_along(self, eye: ArrayLike, through: ArrayLike, near: float, outward: float = 0.0) -> float:
+        """Returns the arm angle, [rad], at which the circle comes closest to a line of sight.
+
+        Args:
+            eye: Where the line begins, shape (3,), [m].
+            through: Another point on it, shape (3,), [m].
+            near: Which arm angle to prefer, [rad], where the line passes two sides of the circle.
+            outward: As in `points`.
+        """
+        origin = np.asarray(eye, dtype=np.float64)
+        way = np.asarray(through, dtype=np.float64) - origin
+        way = way / max(float(np.linalg.norm(way)), 1e-12)
+        psi = np.linspace(-pi, pi, _LOOKS, endpoint=False)
+        beside = np.linalg.norm(np.cross(self.points(psi, outward) - origin, way), axis=1)
+        turned = np.abs((psi - near + pi) % tau - pi)
+        best = int((beside + _PULL * turned).argmin())
+        before, here, after = (float(beside[(best + step) % _LOOKS]) for step in (-1, 0, 1))
+        bend = before - 2.0 * here + after
+        step = 0.5 * (before - after) / bend if bend > 1e-12 else 0.0
+        return remainder(float(psi[best]) + min(max(step, -0.5), 0.5) * tau / _LOOKS, tau)
+
+
+def elbow_circle(shoulder: Array, elbow: Array, wrist: Array) -> ElbowCircle:
+    """Returns the circle of an elbow.
+
+    Args:
+        shoulder: In base, shape (3,), [m].
+        elbow: In base, shape (3,), [m].
+        wrist: Centre of the wrist in base, shape (3,), [m].
+
+    Raises:
+        SingularError: The arm is stretched, or shoulder and wrist are above each other.
+    """
+    line = wrist - shoulder
+    length = float(np.linalg.norm(line))
+    if length < _LEAST:
+        raise SingularError("elbow circle: the wrist is on the shoulder, so there is no shoulder-wrist line").coded(
+            "no_arm_angle"
+        )
+    axis = line / length
+    upward, across = reference_frame((float(axis[0]), float(axis[1]), float(axis[2])))
+    center = shoulder + axis * float(axis @ (elbow - shoulder))
+    radius = float(np.linalg.norm(elbow - center))
+    if radius < _LEAST:
+        raise SingularError("elbow circle: the arm is stretched, the elbow is on the shoulder-wrist line").coded(
+            "stretched"
+        )
+    return ElbowCircle(
+        center=frozen(center), radius=radius, axis=frozen(axis), upward=frozen(upward), across=frozen(across)
+    )

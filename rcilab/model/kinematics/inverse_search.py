@@ -1,0 +1,94 @@
+"""Which joint angles put the flange of one arm at a pose: at the arm angle asked for, else at the closest that has any.
+
+What cannot be reached is refused in words: by which distance, or by which joint and how far.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+from rcilab.core.errors import SingularError
+from rcilab.core.spatial import Pose
+from rcilab.model.kinematics.closed_form import build_closed_form
+from rcilab.model.kinematics.elbow_ranges import FeasibleArcs
+from rcilab.model.kinematics.solutions import Solutions
+from rcilab.robots.description import RobotDescription
+
+_LOOKS = tuple(math.radians(sign * step) for step in range(10, 181, 10) for sign in (1, -1))
+"""Offsets looked at, nearest first, to say what is in the way of a pose that no arm angle reaches, [rad]."""
+
+
+class InverseSearch:
+    """The inverse of one arm from its flange, inside its joint limits. Immutable.
+
+    Args:
+        description: The arm.
+
+    Raises:
+        ModelError: There is no closed form for its Denavit-Hartenberg table.
+    """
+
+    def __init__(self, description: RobotDescription) -> None:
+        self.form = build_closed_form(description)
+        self._joint = description.limits.joint
+        self._lower: list[float] = self._joint.lower.tolist()
+        self._upper: list[float] = self._joint.upper.tolist()
+        self._has_arm_angle = len(description.dh) == 7
+
+    def solve(self, T_base_flange: Pose, psi: float | None, near: Sequence[float] | None) -> Solutions:
+        """Returns the solutions at an arm angle; at that of `near` when none is asked for, or else at the closest.
+
+        Args:
+            T_base_flange: Pose of the flange in base.
+            psi: Arm angle, [rad]; None leaves it open, and is all that 6 axes know.
+            near: Joint angles, [rad], that decide what a singular pose leaves open.
+
+        Raises:
+            UnreachableError: There is none; the message says what is in the way.
+        """
+        start = psi
+        if start is None and self._has_arm_angle:
+            start = self.natural_psi(near)
+        pose = self.form.at(T_base_flange, near)
+        solutions = Solutions(pose.branches(start or 0.0), self._lower, self._upper, start)
+        if len(solutions):
+            return solutions
+        if psi is not None or start is None:
+            raise solutions.refusal()
+        best = solutions
+        for angle in self._other_arm_angles(T_base_flange, start):
+            solutions = Solutions(pose.branches(angle), self._lower, self._upper, angle)
+            if len(solutions):
+                return solutions
+            best = min(best, solutions, key=_least_excess)
+        raise best.refusal(everywhere=True)
+
+    def arcs(self, T_base_flange: Pose, outside_box: bool = False) -> FeasibleArcs:
+        """Returns which arm angles a pose of the flange leaves, and what forbids the others.
+
+        Raises:
+            UnreachableError: The pose is out of reach at every arm angle.
+            KinematicsError: The arm has 6 axes.
+        """
+        return self.form.arcs(T_base_flange, self._joint.lower, self._joint.upper, outside_box)
+
+    def natural_psi(self, near: Sequence[float] | None) -> float:
+        """Returns the arm angle of joint angles, [rad]; 0 where it has no meaning, or where there are none."""
+        if near is None:
+            return 0.0
+        try:
+            return self.form.arm_angle(near)
+        except SingularError:
+            return 0.0
+
+    def _other_arm_angles(self, T_base_flange: Pose, start: float) -> Iterator[float]:
+        """Yields the closest arm angle that has a solution if one has; then steps all round, to see what is missing."""
+        closest = self.arcs(T_base_flange).nearest(start)
+        if closest is not None:
+            yield closest
+        yield from (math.remainder(start + offset, math.tau) for offset in _LOOKS)
+
+
+def _least_excess(solutions: Solutions) -> float:
+    return min((branch.excess for branch in solutions.all), default=math.inf)

@@ -1,0 +1,52 @@
+"""The inverse of a Jacobian: the smallest joint motion for a wanted motion of the tool, tame at singularities."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rcilab.core.arrays import Array
+
+NEAR_SINGULAR = 0.03  # Smallest singular value of the Jacobian that is inverted as it is; a choice, metres and radians.
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class JointRates:
+    """The joint motion that comes closest to a wanted motion of a frame. With a leading N where N were asked for."""
+
+    rates: Array
+    """Joint velocities, [rad/s], or accelerations, [rad/s^2], shape (n,)."""
+    damped: NDArray[np.bool_]
+    """Whether the arm is so close to a singularity that the answer was damped, shape ()."""
+    missed: Array
+    """What is missing of the wanted motion, base axes, shape (6,), linear part first: wanted minus J @ rates."""
+
+    def __repr__(self) -> str:
+        if self.rates.ndim > 1:
+            return f"<JointRates of {len(self.rates)} rows, {int(self.damped.sum())} damped: .rates, .damped, .missed>"
+        rates = " ".join(f"{x:.4g}" for x in self.rates.tolist())
+        note = f"damped, misses {float(np.abs(self.missed).max()):.3g}" if self.damped else "exact"
+        return f"<JointRates {rates}, {note}>"
+
+
+def least_norm(J: Array, wanted: Array, weights: Array) -> JointRates:
+    """Returns the joint rates of least weighted norm, sum(weights * rates^2), with J @ rates = wanted.
+
+    From the singular values s of J W^(-1/2) (Siciliano et al., Robotics, 2009, section 3.5). A direction whose s is
+    below `NEAR_SINGULAR` gets s / NEAR_SINGULAR^2 in place of 1 / s: damped least squares with the damping chosen
+    for each direction (section 3.5.2), so that rates stay bounded and all other directions stay exact.
+
+    Args:
+        J: Jacobians, shape (..., 6, n).
+        wanted: Motions of the frame, shape (..., 6).
+        weights: What a joint's motion costs, shape (n,), positive; only their ratios matter.
+    """
+    scale = np.sqrt(weights.mean() / weights)
+    U, s, Vt = np.linalg.svd(J * scale, full_matrices=False)
+    gain = s / np.square(np.maximum(s, NEAR_SINGULAR))
+    along = np.einsum("...ij,...i->...j", U, wanted)
+    rates = scale * np.einsum("...ji,...j->...i", Vt, gain * along)
+    missed = wanted - np.einsum("...ij,...j->...i", J, rates)
+    return JointRates(rates=rates, damped=np.asarray(s[..., -1] < NEAR_SINGULAR), missed=missed)

@@ -1,0 +1,179 @@
+"""Which joint angles bring the tool of an arm to a pose, and what is in the way of a pose that none brings it to."""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rcilab.core.arrays import as_number, as_vector, described
+from rcilab.core.errors import InvalidValueError, KinematicsError
+from rcilab.core.safety_box import SafetyBox, active_box
+from rcilab.core.spatial import Pose
+from rcilab.model.kinematics.closest_pose import Reach, closest_reachable
+from rcilab.model.kinematics.elbow_circle import ElbowCircle, elbow_circle
+from rcilab.model.kinematics.elbow_ranges import FeasibleArcs
+from rcilab.model.kinematics.inverse_batch import SolutionBatch, as_pose_batch
+from rcilab.model.kinematics.inverse_search import InverseSearch
+from rcilab.model.kinematics.moving_arm import MOST_ANGLE, MovingArm
+from rcilab.model.kinematics.solutions import Solutions
+from rcilab.robots.description import RobotDescription
+
+"""No arm angle is as large, [rad]: whoever gives more means degrees."""
+
+
+class ReachingArm(MovingArm):
+    """The geometry and the joint limits of an arm with its tool. Immutable.
+
+    Args:
+        description: The arm.
+        T_flange_tool: Pose of the tool in the flange frame.
+        T_tool_stiffness: Pose of the stiffness frame in the tool frame.
+
+    Raises:
+        InvalidValueError: A pose is none.
+    """
+
+    def __init__(self, description: RobotDescription, T_flange_tool: Pose, T_tool_stiffness: Pose) -> None:
+        super().__init__(description.dh, T_flange_tool, T_tool_stiffness)
+        self.description = description
+        self._T_tool_flange = self.T_flange_tool.inverse()
+
+    def inverse(self, T: Pose | ArrayLike, psi: float | None = None, near: ArrayLike | None = None) -> Solutions:
+        """Returns every analytic solution inside the joint limits (GetJointPos); `.nearest(q)` is the vendor's answer.
+
+        The xMates have 8 solutions at an arm angle. The Panda has offsets, and up to 16 or none: the roots of a
+        polynomial, which takes a millisecond or two. Where two of them are about to meet, one may be taken for both;
+        the one next to `near` is always found.
+
+        Args:
+            T: Pose of the tool in base: a `Pose` or a homogeneous matrix, shape (4, 4).
+            psi: Arm angle of a 7-axis arm, [rad]; of the Panda the angle of joint 3. When absent: that of `near`, or 0;
+                and if nothing is inside the limits there, the closest arm angle that has a solution, a little inside
+                its range.
+            near: Joint angles, [rad], that decide what a singular pose leaves open.
+
+        Raises:
+            UnreachableError: The pose is out of reach, or every branch breaks a joint limit; the message says by how
+                much, and `.distance`, `.joint` and `.excess` hold the numbers.
+            InvalidValueError: T, psi or near is not usable, or psi was given for a 6-axis arm.
+        """
+        pose = T if isinstance(T, Pose) else Pose.from_matrix(T)
+        r, p = pose.parts
+        if not math.isfinite(sum(r) + sum(p)):
+            raise InvalidValueError("pose", repr(pose), "must be finite in every element")
+        guess = None if near is None else self._floats(near)
+        if psi is not None and not math.isfinite(psi := as_number(psi, "psi", "rad")):
+            raise InvalidValueError("psi", psi, "must be finite [rad]")
+        if psi is not None and abs(psi) > MOST_ANGLE:
+            raise InvalidValueError("psi", psi, "is more than two turns; it is wanted in rad")
+        if psi is not None and self.n != 7:
+            name = self.description.name
+            problem = f"has no meaning for {name}: a 6-axis arm has no arm angle"
+            raise InvalidValueError("psi", psi, problem).coded("six_axes", model=name)
+        return self._search.solve(self._flange(pose), psi, guess)
+
+    def closest(self, T: Pose | ArrayLike, near: ArrayLike, psi: float | None = None) -> Reach:
+        """Returns joint angles for a target, or for the closest pose to it that the arm can take.
+
+        Args:
+            T: Wanted pose of the tool in base: a `Pose` or a homogeneous matrix, shape (4, 4).
+            near: Present joint angles, shape (n,), [rad]: where to start from, and which branch to stay on.
+            psi: Arm angle of a 7-axis arm, [rad]; that of `near` when absent.
+
+        Raises:
+            InvalidValueError: T, near or psi is not usable, or psi was given for a 6-axis arm.
+        """
+        q = as_vector(near, self.n, "near", "rad")
+        target = T if isinstance(T, Pose) else Pose.from_matrix(T)
+        held = self._search.natural_psi(q.tolist()) if psi is None and self.n == 7 else psi
+
+        def solve(pose: Pose, may_search: bool) -> Solutions:
+            return self.inverse(pose, psi if may_search else held, q)
+
+        return closest_reachable(solve, self._search.form.envelope, self.T_flange_tool, self.forward(q), q, target)
+
+    def inverse_batch(self, T: ArrayLike, psi: ArrayLike = 0.0) -> SolutionBatch:
+        """Returns every analytic solution of many poses at once (GetJointPos), at one arm angle each.
+
+        Args:
+            T: Poses of the tool in base, shape (N, 4, 4), such as `forward_path` gives.
+            psi: Arm angle of a 7-axis arm, [rad], one number or shape (N,); of no meaning for 6 axes.
+
+        Returns:
+            `.q`, shape (N, 8, n), not a number where a pose is out of reach; `.inside`; `.nearest(q)`.
+
+        Raises:
+            InvalidValueError: T or psi has another shape, is not finite, or holds what is no pose.
+        """
+        poses = as_pose_batch(T)
+        angles = np.asarray(psi, dtype=np.float64)
+        if angles.shape not in ((), (len(poses),)) or not np.isfinite(angles).all():
+            raise InvalidValueError(
+                "psi", described(angles), f"needs one number or shape ({len(poses)},), finite [rad]"
+            )
+        flange = poses @ self._T_tool_flange.matrix if self._has_tool else poses
+        joint = self.description.limits.joint
+        return SolutionBatch(self._search.form.batch(flange, angles), joint.lower, joint.upper)
+
+    def feasible_arcs(self, T: Pose | ArrayLike, box: SafetyBox | None = None) -> FeasibleArcs:
+        """Returns which arm angles a pose leaves to a 7-axis arm, and what forbids the others.
+
+        Args:
+            T: Pose of the tool in base: a `Pose` or a homogeneous matrix, shape (4, 4).
+            box: What the tool shall stay in; nothing when absent.
+
+        Returns:
+            `.feasible`: ranges of arm angles, [rad]; `.arcs`: the whole circle, each part with its reasons.
+
+        Raises:
+            UnreachableError: The pose is out of reach at every arm angle.
+            InvalidValueError: T or the box is not usable.
+            KinematicsError: The arm has 6 axes.
+        """
+        self._require_arm_angle()
+        pose = T if isinstance(T, Pose) else Pose.from_matrix(T)
+        bound = active_box(box)
+        is_outside = bound is not None and bound.excess(pose.parts[1]) > 0.0
+        return self._search.arcs(self._flange(pose), is_outside)
+
+    def arm_angle(self, q: ArrayLike) -> float:
+        """Returns the arm angle psi of a 7-axis arm, [rad] in (-pi, pi]; of the Panda the angle of joint 3.
+
+        Raises:
+            SingularError: The shoulder-wrist line is vertical or the arm is stretched; psi has no meaning there.
+            KinematicsError: The arm has 6 axes.
+        """
+        self._require_arm_angle()
+        return self._search.form.arm_angle(self._floats(q))
+
+    def elbow_circle(self, q: ArrayLike) -> ElbowCircle:
+        """Returns the circle on which the elbow can go round while the tool stays, for a 7-axis xMate.
+
+        Args:
+            q: Joint angles, shape (7,), [rad].
+
+        Raises:
+            SingularError: The arm is stretched, or shoulder and wrist are above each other.
+            KinematicsError: The arm has 6 axes, or offsets: then its elbow goes round on no circle.
+        """
+        self._require_arm_angle()
+        if any(row.a for row in self.description.dh):
+            raise KinematicsError(f"{self.description.name} has offsets: its elbow does not go round on a circle")
+        frames = self.joint_frames(q)
+        return elbow_circle(*(frames[joint].position for joint in (0, 2, 4)))
+
+    @cached_property
+    def _search(self) -> InverseSearch:
+        return InverseSearch(self.description)
+
+    def _flange(self, T_base_tool: Pose) -> Pose:
+        return T_base_tool @ self._T_tool_flange if self._has_tool else T_base_tool
+
+    def _require_arm_angle(self) -> None:
+        if self.n != 7:
+            raise KinematicsError(f"{self.description.name} has 6 axes: only a 7-axis arm has an arm angle").coded(
+                "no_psi"
+            )

@@ -1,0 +1,137 @@
+"""What the inverse answers with: every analytic branch, and which of them the arm can stand in."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import degrees, tau
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rcilab.core.arrays import JointVector, as_vector, frozen
+from rcilab.core.errors import UnreachableError
+
+_AT_LIMIT = 1e-3  # [rad] An excess of less than 0.1 deg is not worth a number.
+
+
+@dataclass(frozen=True, slots=True)
+class Branch:
+    """One analytic solution, inside the joint limits or not."""
+
+    q: tuple[float, ...]
+    """Joint angles, [rad]."""
+    joint: int | None
+    """Number (from 1) of the joint that is furthest beyond its limit; None inside all limits."""
+    excess: float
+    """How far that joint is beyond its limit, [rad]; 0 inside all limits."""
+
+    @property
+    def ok(self) -> bool:
+        """Whether every joint is inside its limits."""
+        return self.joint is None
+
+
+class Solutions(Sequence[JointVector]):
+    """The joint configurations that put the tool at a pose, those inside the joint limits.
+
+    Iterating gives arrays of shape (n,), [rad]. `all` also holds the branches that a limit forbids.
+    """
+
+    __slots__ = ("_all", "_branches", "_feasible", "_lower", "_upper", "psi")
+
+    def __init__(
+        self, branches: Sequence[tuple[float, ...]], lower: list[float], upper: list[float], psi: float | None
+    ) -> None:
+        self.psi = psi
+        self._branches, self._lower, self._upper = branches, lower, upper
+        self._all: tuple[Branch, ...] | None = None
+        inside = [q for q in branches if _is_inside(q, lower, upper)]
+        self._feasible = frozen(inside) if inside else frozen(np.empty((0, len(lower))))
+
+    @property
+    def all(self) -> tuple[Branch, ...]:
+        """Every analytic branch, with what forbids it; judged at the first look."""
+        if self._all is None:
+            self._all = tuple(_judge(q, self._lower, self._upper) for q in self._branches)
+        return self._all
+
+    def __len__(self) -> int:
+        return len(self._feasible)
+
+    def __getitem__(self, index):  # type: ignore[no-untyped-def]  # Sequence's overloads add nothing here.
+        return self._feasible[index]
+
+    def __iter__(self) -> Iterator[JointVector]:
+        return iter(self._feasible)
+
+    def nearest(self, q: ArrayLike) -> JointVector:
+        """Returns the solution closest to q, [rad], shape (n,).
+
+        A joint whose range is longer than a full turn may be moved by full turns to come closer.
+
+        Raises:
+            UnreachableError: No branch is inside the joint limits.
+        """
+        if not len(self._feasible):
+            raise self.refusal()
+        here = as_vector(q, len(self._lower), "q", "rad")
+        turns = np.round((here - self._feasible) / tau) * tau
+        turned = self._feasible + turns
+        inside = (turned > self._lower) & (turned < self._upper)
+        candidates = np.where(inside, turned, self._feasible)
+        return frozen(candidates[np.argmin(((candidates - here) ** 2).sum(axis=1))])
+
+    def refusal(self, *, everywhere: bool = False) -> UnreachableError:
+        """Returns the error that says which joint limit is in the way, for the branch that comes closest.
+
+        Args:
+            everywhere: Whether no other arm angle does better either.
+        """
+        if not self.all:
+            where = "" if self.psi is None else f" at arm angle {degrees(self.psi):.1f} deg"
+            error = UnreachableError(f"no joint angles put the tool there{where}; give another arm angle")
+            return error.coded("no_angles")
+        best = min(self.all, key=lambda branch: branch.excess)
+        joint = best.joint or 1
+        angle, lower, upper = best.q[joint - 1], self._lower[joint - 1], self._upper[joint - 1]
+        place, advice = f"in the best of {len(self.all)} branches", "move the target"
+        if everywhere:
+            place += " at the best arm angle"
+        elif self.psi is not None:
+            place += f" at arm angle {degrees(self.psi):.1f} deg"
+            advice += " or change the arm angle"
+        beyond = f"{degrees(best.excess):.1f} deg beyond its limit"
+        if best.excess < _AT_LIMIT:
+            beyond = "right at its limit, and has to stay inside"
+        return UnreachableError(
+            f"joint {joint} would have to be at {degrees(angle):.1f} deg, {beyond} "
+            f"({degrees(lower):.0f} to {degrees(upper):.0f} deg), {place}; {advice}",
+            joint=joint,
+            excess=best.excess,
+        ).coded(
+            "joint_beyond", joint=joint, angle=f"{degrees(angle):.1f}", low=f"{degrees(lower):.0f}",
+            high=f"{degrees(upper):.0f}",
+        )  # fmt: skip
+
+    def __repr__(self) -> str:
+        rows = "\n".join("  " + " ".join(f"{degrees(angle):8.2f}" for angle in q) for q in self._feasible)
+        psi = "" if self.psi is None else f" at arm angle {degrees(self.psi):.2f} deg"
+        return f"{len(self)} of {len(self._branches)} branches inside the limits{psi}, [deg]:\n{rows}"
+
+
+def _is_inside(q: tuple[float, ...], lower: list[float], upper: list[float]) -> bool:
+    for low, angle, high in zip(lower, q, upper, strict=True):
+        if not low < angle < high:
+            return False
+    return True
+
+
+def _judge(q: tuple[float, ...], lower: list[float], upper: list[float]) -> Branch:
+    joint, worst = None, 0.0
+    for number, (angle, low, high) in enumerate(zip(q, lower, upper, strict=True), start=1):
+        if not low < angle < high:
+            excess = max(low - angle, angle - high)
+            if joint is None or excess > worst:
+                joint, worst = number, excess
+    return Branch(q, joint, worst)

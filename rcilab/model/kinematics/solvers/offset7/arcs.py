@@ -1,0 +1,139 @@
+"""Which arm angles a pose leaves to an arm with offsets: read off its self-motion, piece by piece.
+
+There is no closed form for where a joint passes its limit here. Pieces of the self-motion in which that happens, and
+those between two branches, are cut into shorter ones until the place is known well enough.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import pi, tau
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rcilab.core.arrays import Array
+from rcilab.core.spatial import Pose
+from rcilab.model.kinematics.elbow_ranges import Arc, FeasibleArcs, Reason
+from rcilab.model.kinematics.solvers.offset7.arm import ELBOW, OffsetGeometry, SelfMotion, wrapped
+from rcilab.model.kinematics.solvers.offset7.settle import settle
+from rcilab.model.kinematics.solvers.offset7.singularity import held_singularity_path
+
+_CUTS = 8  # Into how many a piece is cut at once; a choice.
+_ROUNDS = 4  # How often: a piece of 0.1 rad then is 2e-5 rad long.
+_LONG = 0.1  # [rad] Between two branches a piece is not straight: cut it once in any case.
+_SLIVER = 1e-4  # [rad] What is not worth an arc of its own.
+_GRID = 1e-9  # [rad] Ends of pieces that differ by less meet.
+_SINGULAR = 1 << 7
+"""What stands for a singularity beside the bits of the joints."""
+_NOWHERE = 1 << 8
+"""In place of a set of joints: no branch is there."""
+
+
+def feasible_offset_arcs(
+    arm: OffsetGeometry, T_base_flange: Pose, lower: Array, upper: Array, outside_box: bool = False
+) -> FeasibleArcs:
+    """Returns the feasible arm angles of a pose; the ends of its arcs are known to about 1e-4 rad, on the safe side.
+
+    Args:
+        arm: From `build_offset_geometry`.
+        T_base_flange: Pose of the flange in base.
+        lower: Smallest joint angles, shape (7,), [rad].
+        upper: Largest joint angles, shape (7,), [rad].
+        outside_box: Whether the tool is outside the safety box. It is so at every arm angle or at none.
+
+    Raises:
+        UnreachableError: The pose is out of reach at every arm angle.
+    """
+    starts, ends, codes = _pieces(arm, T_base_flange, lower, upper)
+    low = np.round(np.minimum(starts, ends) / _GRID) * _GRID
+    high = np.round(np.maximum(starts, ends) / _GRID) * _GRID
+    turns = tau * np.floor((low + pi) / tau)
+    low, high = low - turns, high - turns
+    over = high > pi  # Across pi: the rest begins at -pi.
+    low = np.concatenate((low, np.full(int(over.sum()), -pi)))
+    high, codes = np.concatenate((np.minimum(high, pi), high[over] - tau)), np.concatenate((codes, codes[over]))
+    breaks = np.unique(np.concatenate((low, high, (-pi, pi))))
+    best = np.full(len(breaks) - 1, _NOWHERE)
+    # What is wrong in the branch in which least is; of two alike a singularity, as that one has joint angles.
+    for code in sorted(set(codes.tolist()), key=lambda code: (-code.bit_count(), code & _SINGULAR, -code)):
+        change = np.zeros(len(breaks))
+        chosen = codes == code
+        np.add.at(change, np.searchsorted(breaks, low[chosen]), 1.0)
+        np.add.at(change, np.searchsorted(breaks, high[chosen]), -1.0)
+        best[np.cumsum(change)[:-1] > 0.5] = code
+    first = np.flatnonzero(np.concatenate(([True], best[1:] != best[:-1])))
+    begins = breaks[first].tolist()
+    arcs: list[Arc] = []
+    for start, end, i in zip(begins, [*begins[1:], pi], first.tolist(), strict=True):
+        if arcs and end - start < _SLIVER and best[i] and not arcs[-1].ok:  # What cutting left between two reasons.
+            arcs[-1] = replace(arcs[-1], end=end)
+        else:
+            arcs.append(_arc(start, end, int(best[i]), outside_box))
+    return FeasibleArcs(arcs=tuple(arcs))
+
+
+def _pieces(
+    arm: OffsetGeometry, T_base_flange: Pose, lower: Array, upper: Array
+) -> tuple[Array, Array, NDArray[np.int64]]:
+    """Returns arm angles at both ends of pieces, and what is wrong in each: joints beyond their limits, singular."""
+    motion = SelfMotion(arm, T_base_flange)
+    middles = np.array(arm.middles)
+    bits = 1 << np.arange(7)
+
+    def broken(q: Array, nearness: Array) -> NDArray[np.int64]:
+        angle = wrapped(q - middles) + middles
+        beyond = np.asarray(((angle <= lower) | (angle >= upper)) @ bits, dtype=np.int64)
+        return beyond + _SINGULAR * (nearness >= 1.0)
+
+    starts, ends, branches = motion.starts, motion.ends, motion.branches
+    half = len(starts) // 2  # The others are their twins, whose determinants are the same.
+    nearness = held_singularity_path(arm, np.concatenate((starts[:half], ends[:half]))).reshape(2, half)
+    before, after = (broken(q, np.tile(near, 2)) for q, near in zip((starts, ends), nearness, strict=True))
+    cut = (before != after) | ((branches < 0) & (np.abs(ends - starts).max(axis=1) > _LONG))
+    done: list[tuple[Array, Array, NDArray[np.int64]]] = []
+    shares = np.linspace(0.0, 1.0, _CUTS + 1)[:, None, None]
+    for _ in range(_ROUNDS):
+        done.append((starts[~cut, ELBOW], ends[~cut, ELBOW], before[~cut]))
+        between = starts[cut] + shares * (ends - starts)[cut]
+        whole = _placed(arm, motion, T_base_flange, between.reshape(-1, 7), np.tile(branches[cut], _CUTS + 1))
+        whole = whole.reshape(between.shape)
+        q = whole.reshape(-1, 7)
+        codes = broken(q, held_singularity_path(arm, q)).reshape(_CUTS + 1, -1)
+        good = np.abs(whole - between).max(axis=2) < 2.0 * _LONG  # Not so where there is no number.
+        both = good[:-1] & good[1:]
+        starts, ends, before, after = whole[:-1][both], whole[1:][both], codes[:-1][both], codes[1:][both]
+        branches = np.broadcast_to(branches[cut], (_CUTS, int(cut.sum())))[both]
+        cut = before != after
+    done.append((starts[:, ELBOW], ends[:, ELBOW], before | after))
+    first, last, found = zip(*done, strict=True)
+    return np.concatenate(first), np.concatenate(last), np.concatenate(found)
+
+
+def _placed(
+    arm: OffsetGeometry, motion: SelfMotion, T_base_flange: Pose, guesses: Array, branches: NDArray[np.intp]
+) -> Array:
+    """Returns the points of the self-motion next to guesses, shape (m, 7), [rad], or not a number."""
+    whole = np.full_like(guesses, np.nan)
+    on = branches >= 0
+    whole[on] = motion.on_branches(guesses[on], branches[on])
+    count = int((~on).sum())
+    rotations = np.broadcast_to(T_base_flange.rotation, (count, 3, 3))
+    found, settled = settle(arm, rotations, np.broadcast_to(T_base_flange.position, (count, 3)), guesses[~on])
+    found[~settled] = np.nan
+    whole[~on] = found
+    return whole
+
+
+def _arc(start: float, end: float, code: int, outside: bool) -> Arc:
+    reasons: list[Reason] = []
+    joints = () if code == _NOWHERE else tuple(joint + 1 for joint in range(7) if code >> joint & 1)
+    if code == _NOWHERE:
+        reasons.append("reach")
+    if joints:
+        reasons.append("joint limits")
+    if code != _NOWHERE and code & _SINGULAR:
+        reasons.append("singularity")
+    if outside:
+        reasons.append("safety box")
+    return Arc(start=start, end=end, reasons=tuple(reasons), joints=joints, branches=())

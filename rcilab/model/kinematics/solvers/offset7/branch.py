@@ -1,0 +1,115 @@
+"""The inverse of an arm with offsets along a whole path: one branch, followed without a jump.
+
+What `branch.py` does for the arms without offsets. A few rows are settled one after the other, each from the one
+before; between them the joint angles are guessed by straight lines, and Newton's method settles all rows at once.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rcilab.core.arrays import Array, JointPath, JointVector
+from rcilab.core.errors import KinematicsError, SingularError, UnreachableError
+from rcilab.core.spatial import Pose
+from rcilab.model.kinematics.branch import Loss
+from rcilab.model.kinematics.ik_fixed_elbow import inverse_held
+from rcilab.model.kinematics.solvers.offset7.arm import ELBOW, OffsetGeometry, no_solution
+from rcilab.model.kinematics.solvers.offset7.settle import settle, settle_beside
+
+_KNOTS = 48  # Rows that are settled one by one; a choice: a few ms, and guesses good to a hundredth of a radian.
+_TURN = 0.15  # [rad] Of a joint from knot to knot, beyond which rows between them are settled first.
+_JUMP = 0.6  # [rad] From row to row: beyond it the arm does not follow but changes branches.
+
+
+def follow_offset_branch(
+    arm: OffsetGeometry, rotations: Array, positions: Array, psi: Array, start: JointVector
+) -> tuple[JointPath, Loss | None]:
+    """Returns the joint angles along a path of the flange, each row next to the one before; limits are not looked at.
+
+    Args:
+        arm: From `build_offset_geometry`.
+        rotations: Flange in base, shape (N, 3, 3).
+        positions: Flange in base, shape (N, 3), [m].
+        psi: Arm angles, shape (N,), [rad].
+        start: Joint angles at row 0, shape (7,), [rad]: they choose the branch.
+
+    Returns:
+        Joint angles, shape (N, 7), [rad], and the first row that has none, or None. From that row on they mean nothing.
+    """
+    march = _March(arm, rotations, positions, psi)
+    known = march.run(start)
+    rows = np.arange(len(psi))
+    places = sorted(known)
+    table = np.array([known[place] for place in places])
+    guess = np.stack([np.interp(rows, places, column) for column in table.T], axis=1)
+    guess[:, ELBOW] = psi
+    q, settled = settle(arm, rotations, positions, guess)
+    q[places] = table
+    settled[places] = True
+    lost = ~settled
+    lost[1:] |= (np.abs(np.diff(q, axis=0)) > _JUMP).any(axis=1)
+    if march.lost is not None:
+        lost[march.lost] = True
+    if not lost.any():
+        return q, None
+    row = int(lost.argmax())
+    return q, Loss(row, _reason(arm, rotations[row], positions[row], float(psi[row])))
+
+
+class _March:
+    """Settles a few rows of a path one after the other."""
+
+    def __init__(self, arm: OffsetGeometry, rotations: Array, positions: Array, psi: Array) -> None:
+        self._arm, self._rotations, self._positions, self._psi = arm, rotations, positions, psi
+        self.lost: int | None = None
+
+    def run(self, start: JointVector) -> dict[int, list[float]]:
+        """Returns joint angles of some rows, by row; where the branch ends, `lost` is the row."""
+        first = self._settled(0, start.tolist())
+        known: dict[int, list[float]] = {0: start.tolist() if first is None else first}
+        if first is None:
+            self.lost = 0
+            return known
+        last = len(self._psi) - 1
+        row, stride = 0, max(1, last // _KNOTS)
+        before: tuple[int, list[float]] | None = None
+        longest = stride
+        while row < last:
+            after = min(row + stride, last)
+            here = known[row]
+            guess = here
+            if before is not None:
+                part = (after - row) / (row - before[0])
+                guess = [a + part * (a - b) for a, b in zip(here, before[1], strict=True)]
+            found = self._settled(after, guess)
+            small = _TURN if stride > 1 else _JUMP
+            if found is None or max(abs(a - b) for a, b in zip(found, here, strict=True)) > small:
+                if stride == 1:
+                    self.lost = after
+                    return known
+                stride = max(1, stride // 4)
+                continue
+            before, row = (row, here), after
+            known[after] = found
+            stride = min(2 * stride, longest)
+        return known
+
+    def _settled(self, row: int, guess: list[float]) -> list[float] | None:
+        """Returns the solution at a row next to a guess, or None, in plain floats."""
+        psi = float(self._psi[row])
+        return settle_beside(self._arm, self._rotations[row], self._positions[row], psi, guess)
+
+
+def _reason(arm: OffsetGeometry, rotation: Array, position: Array, psi: float) -> KinematicsError:
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = rotation, position
+    try:
+        found = inverse_held(arm, Pose.from_matrix(T), psi, None)
+    except UnreachableError as error:
+        return error
+    if not found:
+        return UnreachableError(f"{no_solution(psi)}; give another arm angle").coded("no_angles")
+    return SingularError(
+        "the arm would have to jump, because a singularity is in the way; lead the tool around it, give another arm "
+        "angle, or go there in joint space"
+    ).coded("jump")

@@ -1,0 +1,66 @@
+"""Where an arm can bring its tool at all, as a cloud of samples."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rcilab.core.arrays import Array, JointPath, JointVector, described, frozen
+from rcilab.core.errors import InvalidValueError
+from rcilab.core.safety_box import SafetyBox, active_box
+from rcilab.model.kinematics.moving_arm import MovingArm
+from rcilab.model.kinematics.singularity import DexterityPath, dexterity_path
+
+_MOST = 1_000_000  # Samples; a choice: some 200 MB while they are made.
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Workspace:
+    """Configurations spread over the joint ranges, and where they put the tool. N of them."""
+
+    q: JointPath
+    """Joint angles, shape (N, n), [rad]."""
+    position: Array
+    """Origin of the tool in base, shape (N, 3), [m]."""
+    dexterity: DexterityPath
+    """How well the tool can be moved there."""
+
+    def __len__(self) -> int:
+        return len(self.q)
+
+    def __repr__(self) -> str:
+        if not len(self):
+            return "<Workspace of 0 samples>"
+        lows, highs = self.position.min(axis=0).tolist(), self.position.max(axis=0).tolist()
+        spans = ", ".join(f"{a} {x:.2f} to {y:.2f}" for a, x, y in zip("xyz", lows, highs, strict=True))
+        return f"<Workspace of {len(self)} samples, {spans} m: .q, .position, .dexterity>"
+
+
+def sample_workspace(
+    arm: MovingArm, lower: JointVector, upper: JointVector, count: int, seed: int, box: SafetyBox | None
+) -> Workspace:
+    """Returns samples at joint angles that are uniformly random inside the limits, the same for the same seed.
+
+    Args:
+        arm: The arm with its tool.
+        lower: Smallest joint angles, shape (n,), [rad].
+        upper: Largest joint angles, shape (n,), [rad].
+        count: How many configurations to try.
+        seed: Of the random numbers.
+        box: Only samples with the tool in it are kept; all when absent or not active.
+
+    Raises:
+        InvalidValueError: `count` is no whole number from 1 to 1 000 000, `seed` none from 0 on, or the box is none.
+    """
+    if not isinstance(count, int | np.integer) or not 1 <= count <= _MOST:
+        raise InvalidValueError("count", described(count), f"must be a whole number from 1 to {_MOST}")
+    if not isinstance(seed, int | np.integer) or seed < 0:
+        raise InvalidValueError("seed", described(seed), "must be a whole number, 0 or more")
+    q = np.random.default_rng(seed).uniform(lower, upper, (count, arm.n))
+    position = arm.position_path(q)
+    if (bound := active_box(box)) is not None:
+        inside = bound.excess_path(position) <= 0.0
+        q, position = q[inside], position[inside]
+    J = arm.jacobian(q) if len(q) else np.empty((0, 6, arm.n))
+    return Workspace(q=frozen(q), position=frozen(position), dexterity=dexterity_path(J))

@@ -1,0 +1,321 @@
+"""RobotModel: one arm with its tool and its load, as a read-only face of geometry, kinematics and dynamics."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cached_property
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rcilab.core.arrays import JointVector, as_path, as_rows, as_vector, described
+from rcilab.core.clearance import STANDARD_DISTANCE, SafetyDistance
+from rcilab.core.errors import InvalidValueError, KinematicsError, ModelError
+from rcilab.core.limits import Limits
+from rcilab.core.safety_box import SafetyBox
+from rcilab.core.spatial import IDENTITY, Pose
+from rcilab.model.dynamics.payload import NO_LOAD, Payload
+from rcilab.model.kinematics.frames import Frame
+from rcilab.model.kinematics.reaching_arm import ReachingArm
+from rcilab.model.kinematics.singularity import Dexterity, DexterityPath, dexterity, dexterity_path
+from rcilab.model.kinematics.workspace import Workspace, sample_workspace
+from rcilab.robots import RCI_ROBOT_NAMES, RobotDescription, describe_robot
+
+if TYPE_CHECKING:
+    from rcilab.model.dynamics.friction import JointFriction
+    from rcilab.model.dynamics.rigid_body import RigidBody, TorqueTerms
+    from rcilab.model.kinematics.collision import Clearance, CollisionGeometry
+
+_SOFT_LIMIT = "soft limit that was set (SetJointLimit, RCI manual 3.1.15)"
+
+__all__ = ["RobotModel", "load_model", "require_model", "require_rci"]
+
+
+def load_model(name: str, *, tool: Pose | None = None, load: Payload | None = None) -> RobotModel:
+    """Returns the model of a robot by name, in any case: xMatePro3, xMatePro7, xMate3, xMate7 or Panda.
+
+    Args:
+        name: Name of the robot.
+        tool: Pose of the tool in the flange frame (RCI setCoor); the flange itself when absent.
+        load: What is fixed to the flange (RCI setLoad); nothing when absent.
+
+    Raises:
+        ModelError: No robot has this name; the message lists those that exist.
+        InvalidValueError: The tool is no `Pose`, the load no `Payload`, or it is heavier than the arm is rated for.
+    """
+    return RobotModel(describe_robot(name), IDENTITY if tool is None else tool, NO_LOAD if load is None else load)
+
+
+def require_model(model: object) -> RobotModel:
+    """Returns `model` if it is a robot model: for borders where its name is an easy slip.
+
+    Raises:
+        InvalidValueError: It is a name, or something else that is no model; the message says what to write.
+    """
+    if isinstance(model, RobotModel):
+        return model
+    if isinstance(model, str):
+        raise InvalidValueError("model", model, f"is a name; use load_model({model!r})")
+    raise InvalidValueError("model", described(model), "is no robot model; load_model makes one")
+
+
+def require_rci(model: RobotModel) -> RobotModel:
+    """Returns `model` if the arm speaks the RCI: for borders behind which it is driven or simulated.
+
+    Raises:
+        ModelError: It speaks another interface; the message says what can be done with it.
+    """
+    if model.description.interface == "RCI":
+        return model
+    raise ModelError(
+        f"{model.name} is driven by Franka's own interface, not by the RCI: plan for it, check and draw its motions, "
+        f"but simulate and drive one of {', '.join(RCI_ROBOT_NAMES)}"
+    )
+
+
+class RobotModel(ReachingArm):
+    """An arm with a tool and a load. Immutable: `with_tool` and `with_load` return another one.
+
+    All joint vectors have shape (n,) and are in [rad]; all poses are in the base frame, of the tool unless a frame is
+    named. Where its frames are and how they move is in `MovingArm`, the inverse and the arm angle in `ReachingArm`.
+    """
+
+    def __init__(
+        self,
+        description: RobotDescription,
+        tool: Pose = IDENTITY,
+        load: Payload = NO_LOAD,
+        stiffness_frame: Pose = IDENTITY,
+    ) -> None:
+        super().__init__(description, tool, stiffness_frame)
+        if not isinstance(load, Payload):
+            raise InvalidValueError(
+                "load", described(load), "is no Payload; Payload(mass=...) makes one, Payload() is no load"
+            )
+        if load.mass > description.rated_payload:
+            bound = f"{description.rated_payload:g} kg for {description.name}"
+            problem = f"kg is above {bound}, the payload it is rated for"
+            raise InvalidValueError("load mass", load.mass, problem).coded(
+                "load_heavy", mass=f"{load.mass:g}", most=f"{description.rated_payload:g}", model=description.name
+            )
+        self.load = load
+
+    @property
+    def name(self) -> str:
+        """Name as the manual spells it."""
+        return self.description.name
+
+    @property
+    def tool(self) -> Pose:
+        """Pose of the tool in the flange frame (SetCoor), as given to `load_model`; also `T_flange_tool`."""
+        return self.T_flange_tool
+
+    @property
+    def limits(self) -> Limits:
+        """Every bound, each with its source."""
+        return self.description.limits
+
+    @property
+    def home(self) -> JointVector:
+        """A comfortable pose away from limits and singularities, shape (n,), [rad]."""
+        return self.description.home
+
+    def with_tool(self, tool: Pose) -> RobotModel:
+        """Returns this arm with another tool, given by its pose in the flange frame (SetCoor).
+
+        Raises:
+            InvalidValueError: It is no `Pose`.
+        """
+        return RobotModel(self.description, tool, self.load, self.T_tool_stiffness)
+
+    def with_load(self, load: Payload) -> RobotModel:
+        """Returns this arm with another load (SetLoad).
+
+        Raises:
+            InvalidValueError: It is no `Payload`, or heavier than the arm is rated for.
+        """
+        return RobotModel(self.description, self.T_flange_tool, load, self.T_tool_stiffness)
+
+    def with_joint_limits(self, lower: ArrayLike, upper: ArrayLike) -> RobotModel:
+        """Returns this arm with other bounds of its joint angles, such as soft limits (SetJointLimit).
+
+        Planners, solvers and `check` keep inside them, and a certificate is for them.
+
+        Args:
+            lower: Shape (n,), [rad].
+            upper: Above `lower`, shape (n,), [rad].
+
+        Raises:
+            InvalidValueError: Not n finite numbers, or a bound is not below its upper one.
+        """
+        low, high = as_vector(lower, self.n, "lower", "rad"), as_vector(upper, self.n, "upper", "rad")
+        for joint in np.flatnonzero(low >= high).tolist():
+            raise InvalidValueError(
+                f"lower, joint {joint + 1}", float(low[joint]), f"rad must be below {high[joint]:g}"
+            )
+        limits = self.limits
+        sources = {**limits.sources, "joint.lower": _SOFT_LIMIT, "joint.upper": _SOFT_LIMIT}
+        joint = replace(limits.joint, lower=low, upper=high)
+        limits = replace(limits, joint=joint, sources=MappingProxyType(sources))
+        description = replace(self.description, limits=limits)
+        return RobotModel(description, self.T_flange_tool, self.load, self.T_tool_stiffness)
+
+    def with_stiffness_frame(self, T_tool_stiffness: Pose) -> RobotModel:
+        """Returns this arm with another stiffness frame, given by its pose in the tool frame (SetCoor).
+
+        No limit and no plan depends on it: it is one more frame to ask about, by the name "stiffness".
+
+        Raises:
+            InvalidValueError: It is no `Pose`.
+        """
+        return RobotModel(self.description, self.T_flange_tool, self.load, T_tool_stiffness)
+
+    def elbow(self, q: ArrayLike) -> tuple[float, int]:
+        """Returns the elbow as Franka counts it: the angle of joint 3, [rad], and on which side of its flip joint 4 is.
+
+        The side is +1 above the angle at which the arm is stretched, and -1 below.
+
+        Raises:
+            KinematicsError: The maker of this arm knows no such flip.
+        """
+        flip = self.description.elbow_flip
+        if flip is None:
+            raise KinematicsError(f"{self.name} has no elbow that flips; arm_angle(q) tells where its elbow is")
+        angles = self._floats(q)
+        return angles[2], 1 if angles[3] > flip else -1
+
+    def dexterity(self, q: ArrayLike) -> Dexterity:
+        """Returns how well the tool can be moved here: manipulability, smallest singular value, condition."""
+        return dexterity(self.jacobian(q))
+
+    def dexterity_path(self, q: ArrayLike, frame: Frame = "tool") -> DexterityPath:
+        """Returns the measures of `dexterity` along a path, each of shape (N,), for q of shape (N, n), [rad]."""
+        return dexterity_path(self.jacobian(as_path(q, self.n, "q", "rad"), frame))
+
+    def sample_workspace(self, count: int = 10_000, *, seed: int = 0, box: SafetyBox | None = None) -> Workspace:
+        """Returns where the tool is at joint angles that are uniformly random inside the limits.
+
+        Args:
+            count: How many configurations to try, up to 1 000 000.
+            seed: The same seed gives the same samples.
+            box: Only samples with the tool in it are kept; all when absent.
+
+        Returns:
+            `.q`, shape (N, n); `.position`, shape (N, 3), [m] in base; `.dexterity` there.
+
+        Raises:
+            InvalidValueError: `count` is out of range, or the box is none.
+        """
+        joint = self.limits.joint
+        return sample_workspace(self, joint.lower, joint.upper, count, seed, box)
+
+    def manipulability(self, q: ArrayLike) -> float:
+        """Returns sqrt(det(J J^T)) at the tool; 0 at a singularity."""
+        return self.dexterity(q).manipulability
+
+    def torque(
+        self,
+        q: ArrayLike,
+        dq: ArrayLike | None = None,
+        ddq: ArrayLike | None = None,
+        *,
+        friction: bool | JointFriction = False,
+    ) -> TorqueTerms:
+        """Returns the joint torques of the rigid arm with its load, and their terms (GetTau, GetTauNoFriction).
+
+        The rotors of the drives are not in them: with these torques the arm behind the gears moves as wanted.
+
+        Args:
+            q: Joint angles, shape (n,) or (N, n), [rad].
+            dq: Joint velocities, of q's shape, [rad/s]; at rest when absent.
+            ddq: Joint accelerations, of q's shape, [rad/s^2]; none when absent.
+            friction: Whether `.full` holds the joints' friction, too. True takes that of the MuJoCo plant; figures
+                identified on a real arm go into a `rcilab.model.dynamics.friction.JointFriction`.
+
+        Returns:
+            Terms of q's shape, [N m].
+
+        Raises:
+            InvalidValueError: q, dq or ddq has another shape or is not finite, or the friction is none of this arm.
+        """
+        angles = as_rows(q, self.n, "q", "rad")
+        zeros = np.zeros(angles.shape)
+        speeds = zeros if dq is None else as_rows(dq, self.n, "dq", "rad/s", angles)
+        rates = zeros if ddq is None else as_rows(ddq, self.n, "ddq", "rad/s^2", angles)
+        terms = (self.rigid_body.torque if angles.ndim == 1 else self.rigid_body.torque_path)(angles, speeds, rates)
+        if friction is False:
+            return terms
+        from rcilab.model.dynamics.friction import JointFriction, simulated_friction
+
+        law = simulated_friction(self.limits.joint) if friction is True else friction
+        if not isinstance(law, JointFriction):
+            raise InvalidValueError("friction", described(friction), "is neither True nor False nor a JointFriction")
+        return terms.with_friction(law.torque(speeds))
+
+    def clearance(self, q: ArrayLike, distance: SafetyDistance = STANDARD_DISTANCE) -> Clearance:
+        """Returns how near the links come to each other and to the floor, and which: distances between their capsules.
+
+        Neighbouring links always touch and are not compared, nor is the tool with the last two links. The capsules are
+        those of the URDF; rims of caps and collars stand out of them by 12 mm at most.
+
+        Args:
+            q: Joint angles, shape (n,) or (N, n), [rad]; limits are not looked at.
+            distance: Where the floor is, and whether the tool has a body; what it asks for is not looked at.
+
+        Returns:
+            `.distance`, shape () or (N,), [m], below 0 where they overlap; `.links`, the numbers of the two.
+
+        Raises:
+            InvalidValueError: q has another shape or is not finite.
+        """
+        from rcilab.model.kinematics.collision import Clearance, ClearanceQuery
+
+        angles = as_rows(q, self.n, "q", "rad")
+        found = ClearanceQuery(self.collision_geometry(distance)).path(np.atleast_2d(angles))
+        return found if angles.ndim > 1 else Clearance(found.distance[0], found.links[0])
+
+    def collision_geometry(self, distance: SafetyDistance = STANDARD_DISTANCE) -> CollisionGeometry:
+        """Returns what `clearance` compares, for a floor and a tool with or without a body."""
+        from rcilab.model.kinematics.collision import collision_geometry
+
+        tool = self.T_flange_tool.parts[1]
+        return collision_geometry(self.description, tool, distance.floor_height, distance.tool_radius)
+
+    @cached_property
+    def rigid_body(self) -> RigidBody:
+        """The rigid-body model behind `torque`."""
+        from rcilab.model.dynamics.rigid_body import RigidBody
+
+        return RigidBody(self.description, self.load, self.T_flange_tool)
+
+    @cached_property
+    def fingerprint(self) -> Mapping[str, str]:
+        """Hashes of what a judgement depends on: model, limits, tool and load, each a SHA-256 in hex."""
+        d = self.description
+        joint, cartesian = d.limits.joint, d.limits.cartesian
+        geometry = [(row.a, row.alpha, row.d, row.theta_offset) for row in d.dh]
+        masses = [(link.mass, *link.center_of_mass, *link.inertia.flat, link.origin_height) for link in d.links]
+        bounds = [getattr(joint, name).tolist() for name in joint.__slots__]
+        paths = [getattr(cartesian, name) for name in cartesian.__slots__]
+        load = (self.load.mass, *self.load.center_of_mass, *self.load.inertia.flat)
+        return MappingProxyType(
+            {
+                "model": _digest(d.name, geometry, [tuple(map(float, row)) for row in masses]),
+                "limits": _digest(bounds, paths),
+                "tool": _digest(self.T_flange_tool.as_row_major()),
+                "load": _digest(tuple(map(float, load))),
+            }
+        )
+
+    def __repr__(self) -> str:
+        tool = f", tool={self.T_flange_tool!r}" if self._has_tool else ""
+        load = f", load={self.load.mass:g} kg" if self.load.mass else ""
+        return f"RobotModel({self.name}, {self.n} axes{tool}{load})"
+
+
+def _digest(*parts: object) -> str:
+    return hashlib.sha256(repr(parts).encode()).hexdigest()

@@ -1,0 +1,66 @@
+"""Whoever moves an arm from a cell is in the notebook: when its page is gone, the arm is brought to rest.
+
+The page is asked from the first part, or the first sliders, that a notebook makes. Before, or where the kernel hears
+no page while a cell runs (ipykernel before 7; before 7.4 VS Code, too), nothing is known and nothing is stopped.
+Nor is it while a button of somebody's own runs the motion in the very thread that hears the page.
+"""
+
+from __future__ import annotations
+
+import sys
+import threading
+from typing import TYPE_CHECKING
+
+from rcilab.notebook.browser_heartbeat import kernel_heart
+
+if TYPE_CHECKING:
+    from rcilab.execution.session import RobotSession
+
+LEFT_ALONE = "the notebook's page is gone"
+"""What a run says that was stopped for it."""
+_INTERRUPTED = "the kernel was interrupted"
+_LOOK = 0.1  # [s] Between two looks for a motion.
+
+
+class PageWatch:
+    """Looks after every session of the kernel. One thread; it sends nothing while nothing moves.
+
+    It imports nothing either: two threads that load the same libraries can find them half loaded.
+    """
+
+    def __init__(self) -> None:
+        self._ending = threading.Event()
+        self._thread = threading.Thread(target=self._watch, name="rcilab-notebook-page", daemon=True)
+        self._thread.start()
+
+    def halt(self) -> None:
+        """Brings every arm to rest that a session moves, also from a thread of somebody's own."""
+        for session in _sessions():
+            session.stop(_INTERRUPTED)
+
+    def close(self) -> None:
+        """Ends the watch."""
+        self._ending.set()
+        self._thread.join()
+
+    def _watch(self) -> None:
+        while not self._ending.wait(_LOOK):
+            self._look()  # Holding no session while it waits: one that nobody else holds is to go.
+
+    def _look(self) -> None:
+        sessions = _sessions()
+        if not sessions:
+            return
+        heart = kernel_heart()
+        heart.open()  # Before anything moves, so that nothing but questions comes meanwhile.
+        moving = [session for session in sessions if session.is_moving]
+        if moving:
+            heart.beat()
+        if moving and heart.is_gone:
+            for session in moving:
+                session.stop(LEFT_ALONE)
+
+
+def _sessions() -> list[RobotSession]:
+    module = sys.modules.get("rcilab.execution.open_sessions")  # Where it is not, nobody can have opened one.
+    return [] if module is None else module.open_sessions()

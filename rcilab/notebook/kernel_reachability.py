@@ -1,0 +1,140 @@
+"""Where the browser is, as far as the kernel can know: what decides whether a page of the kernel's can be framed.
+
+The rule, first line that fits:
+
+    1  Colab                                                            static: its frames reach no port of ours
+    2  VS Code in a browser (code-server), which says where a port is   proxy, at the address that it says
+    3  VS Code with a kernel elsewhere: over ssh, in a container, ...,  static
+       or of a notebook server as in 4, whose paths its page has not
+    4  a hub, a server that listens beyond loopback, a server below a   proxy where jupyter-server-proxy is installed,
+       path of its own (so something stands before it), or ssh          static where it is not
+    5  else the browser is on this machine                              loopback
+
+Who asks is told by the cell that runs: VS Code names its cells by an address of its own. Where no cell runs, what VS
+Code has started is known by its variables (microsoft/vscode-jupyter hands its own environment on to its kernels).
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, Literal
+
+from rcilab.i18n.localized_text import shell
+
+Way = Literal["loopback", "proxy", "static"]
+_LOOPBACK = ("127.0.0.1", "localhost", "::1", "")
+_CODE_CELL = "vscode-"  # What the addresses of its cells begin with.
+_CODE_SERVER = "CODE_SERVER_PARENT_PID"  # Others that tell where a port is want a login that VS Code's page has not.
+_CODE_PORTS, _PORT = "VSCODE_PROXY_URI", "{{port}}"
+_CODE_ELSEWHERE = ("SSH_CONNECTION", "REMOTE_CONTAINERS", "CODESPACES")
+_CODE_REMOTE = "VSCODE_IPC_HOOK_CLI"  # Its kernels have it where VS Code's own part beside them is a server's.
+_CODE_SAME = "WSL_DISTRO_NAME"  # Windows shares its loopback with that server.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Place:
+    """How a page that the kernel serves on loopback reaches the browser."""
+
+    way: Way
+    """loopback: by its own address; proxy: below the notebook server's; static: not at all."""
+    base: str = "/"
+    """Path of the notebook server, with slashes at both ends."""
+    ports: str = ""
+    """Where code-server shows the ports of its machine, {{port}} in place of the number; empty without one."""
+    proxy_helps: bool = True
+    """Whether jupyter-server-proxy beside the notebook server would make a static place a live one."""
+
+    def address(self, url: str) -> str:
+        """Returns where the browser finds a page of ours.
+
+        Args:
+            url: Its address on loopback, http://127.0.0.1:PORT/PATH.
+        """
+        if self.way != "proxy":
+            return url
+        port, _, path = url.removeprefix("http://").partition(":")[2].partition("/")
+        if self.ports:
+            return f"{self.ports.replace(_PORT, port).rstrip('/')}/{path}"
+        return f"{self.base}proxy/{port}/{path}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Server:
+    """The notebook server that started this kernel."""
+
+    hostname: str
+    base: str
+
+
+def find_place(
+    environment: Mapping[str, str] | None = None,
+    server: Server | None = None,
+    has_proxy: bool | None = None,
+    cell: str | None = None,
+) -> Place:
+    """Returns how the browser of this notebook reaches the kernel, by the rule above.
+
+    Args:
+        environment: Of the kernel; its own when absent.
+        server: What started it; looked up when absent.
+        has_proxy: Whether jupyter-server-proxy is installed; looked up when absent.
+        cell: What the notebook calls the cell that runs; looked up when absent.
+    """
+    known = os.environ if environment is None else environment
+    if "COLAB_RELEASE_TAG" in known:
+        return Place(way="static", proxy_helps=False)
+    found = _find_server(known) if server is None else server
+    hub = known.get("JUPYTERHUB_SERVICE_PREFIX")
+    base = hub or (found.base if found is not None else "/")
+    is_far = "SSH_CONNECTION" in known
+    is_proxied = hub is not None or (found is not None and (found.hostname not in _LOOPBACK or base != "/" or is_far))
+    if _is_code(known, found, _find_cell() if cell is None else cell):
+        return _find_code_place(known, is_proxied)
+    if is_proxied:
+        installed = find_spec("jupyter_server_proxy") is not None if has_proxy is None else has_proxy
+        return Place(way="proxy" if installed else "static", base=base)
+    return Place(way="loopback")
+
+
+def _is_code(known: Mapping[str, str], server: Server | None, cell: str | None) -> bool:
+    """Returns whether VS Code shows the notebook. A server started in its terminal inherits its variables."""
+    if cell is not None:
+        return cell.startswith(_CODE_CELL)
+    return server is None and any(name.startswith("VSCODE_") for name in known)
+
+
+def _find_code_place(known: Mapping[str, str], is_proxied: bool) -> Place:
+    ports = known.get(_CODE_PORTS, "")
+    if _CODE_SERVER in known and _PORT in ports:
+        return Place(way="proxy", ports=ports)
+    is_remote = _CODE_REMOTE in known and _CODE_SAME not in known
+    is_elsewhere = is_proxied or is_remote or any(name in known for name in _CODE_ELSEWHERE)
+    return Place(way="static", proxy_helps=False) if is_elsewhere else Place(way="loopback")
+
+
+def _find_cell() -> str | None:
+    """Returns what the notebook calls the cell that runs; None where none runs, or nobody names it."""
+    found = shell()
+    parent = found.get_parent() if hasattr(found, "get_parent") else {}
+    name = parent.get("metadata", {}).get("cellId")
+    return name if isinstance(name, str) else None
+
+
+def _find_server(environment: Mapping[str, str]) -> Server | None:
+    """Returns the server whose child this kernel is; None where no server of this machine is it."""
+    parent = environment.get("JPY_PARENT_PID", "")
+    if "ipykernel" not in sys.modules or not parent.isdecimal():
+        return None
+    from jupyter_core.paths import jupyter_runtime_dir  # Asking jupyter_server itself would load it all: a second.
+
+    try:
+        told: Any = json.loads((Path(jupyter_runtime_dir()) / f"jpserver-{parent}.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):  # Another program is the parent, or it runs elsewhere.
+        return None
+    return Server(hostname=str(told.get("hostname", "")), base=str(told.get("base_url", "/")))

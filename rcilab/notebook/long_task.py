@@ -1,0 +1,123 @@
+"""What takes longer than a press may: done beside the kernel's threads, with how far it is, and Cancel."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import Any, Generic
+
+import ipywidgets
+
+from rcilab.core.background_job import About, Background, Result, Tell
+from rcilab.core.errors import RcilabError
+from rcilab.i18n.translator import Text
+from rcilab.notebook.cells import kernel_cells
+from rcilab.notebook.subshell_routing import hear_at_once
+from rcilab.notebook.widget_sharing import lean
+
+_LOOK = 0.1  # [s] Between two looks at what is being done.
+
+
+class LongWork(Generic[About, Result]):
+    """One job of a part at a time; a bar and a button that are there while it is done.
+
+    Args:
+        text: Words of the part.
+        name: Of the threads.
+        take: Called with what the job was about and what came of it, by the thread that watches it.
+        rest: Called when nothing is being done any more, whatever came of it.
+        shown_after: For how long work is not worth a bar, [s].
+    """
+
+    def __init__(
+        self,
+        text: Text,
+        name: str,
+        take: Callable[[About, Result | RcilabError], None],
+        rest: Callable[[], None],
+        *,
+        shown_after: float = 0.0,
+    ) -> None:
+        self._name, self._take, self._rest, self._shown_after = name, take, rest, shown_after
+        self._work: Background[About, Result] = Background(name)
+        self._ending = threading.Event()
+        self._watcher: threading.Thread | None = None
+        self.progress: Any = lean(
+            ipywidgets.FloatProgress, min=0.0, max=1.0, layout=ipywidgets.Layout(width="14em", display="none")
+        )
+        self.cancel: Any = lean(
+            ipywidgets.Button,
+            description=text("learn.cancel"),
+            tooltip=text("learn.cancel"),
+            icon="times",
+            layout=ipywidgets.Layout(width="auto", display="none"),
+        )
+        hear_at_once(self.cancel)
+        self.cancel.on_click(lambda _: self.give_up())
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether something is being done."""
+        return self._work.progress is not None
+
+    def start(self, about: About, run: Callable[[Tell], Result]) -> None:
+        """Begins; what was being done is dropped.
+
+        Args:
+            about: What it is about; comes back with the result.
+            run: Does it.
+        """
+        self.end()
+        self._work.start(about, run)
+        self._ending.clear()
+        self.progress.value = 0.0
+        if not self._shown_after:
+            self._show(True)
+        self._watcher = threading.Thread(target=self._watch, name=f"{self._name}-watch", daemon=True)
+        self._watcher.start()
+
+    def wait_if_code(self) -> None:
+        """Returns to the page at once; to code that has pressed, a cell or a program, when there is a result."""
+        watcher = self._watcher
+        if watcher is None or not kernel_cells().is_calling:
+            return
+        try:
+            watcher.join()
+        except KeyboardInterrupt:
+            self.give_up()
+            raise
+
+    def give_up(self) -> None:
+        """Drops what is being done; from any thread, without waiting."""
+        self._work.cancel()
+
+    def end(self) -> None:
+        """Drops what is being done and waits until nobody watches it any more."""
+        self._ending.set()
+        self._work.cancel()
+        watcher, self._watcher = self._watcher, None
+        if watcher is not None and watcher is not threading.current_thread():
+            watcher.join()
+
+    def _watch(self) -> None:
+        """The watching thread."""
+        try:
+            self._work.wait(self._shown_after)
+            while not self._ending.is_set():
+                if self._work.is_done:
+                    self._take(*self._work.take())
+                    return
+                share = self._work.progress
+                if share is None:  # Given up.
+                    return
+                self.progress.value = share
+                self._show(True)
+                self._work.wait(_LOOK)
+        finally:
+            self._show(False)
+            if not self._ending.is_set():
+                self._rest()
+
+    def _show(self, is_shown: bool) -> None:
+        display = None if is_shown else "none"
+        self.progress.layout.display = self.cancel.layout.display = display

@@ -1,0 +1,21 @@
+"""The lab's own packages are an extra: who lacks one is told how to get it."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+
+from rcilab.core.errors import UsageError
+
+
+def require_installed(package: str, purpose: str) -> None:
+    """Does nothing when a package is here.
+
+    Args:
+        package: Name it is imported by.
+        purpose: What needs it, such as "plot".
+
+    Raises:
+        UsageError: It is not installed; the message says how to install it.
+    """
+    if find_spec(package) is None:
+        raise UsageError(f"{purpose} needs {package}, which is not installed: pip install -e '.[lab]' adds it")

@@ -1,0 +1,91 @@
+"""Pause, Go on, and the part of the planned speed that motions run at: also while they do."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import ipywidgets
+
+from rcilab.control_process import SupervisorStatus
+from rcilab.control_process.requested_speed import is_running
+from rcilab.i18n.translator import Text
+from rcilab.motion.speed_scaling import SLOWEST_PACE
+from rcilab.notebook.number_field import NumberField
+from rcilab.notebook.speed_override import PaceDesk
+from rcilab.notebook.state import LabState
+from rcilab.notebook.style import block, problem, soft, write
+from rcilab.notebook.subshell_routing import hear_at_once
+from rcilab.notebook.widget_sharing import lean
+
+_STEP = 5.0  # [%]
+
+
+class PaceFields:
+    """Part of `RunPanel`: `buttons` stand beside Execute, `fields` below it.
+
+    Args:
+        state: What the parts share.
+        text: Words.
+        desk: Tells the robot.
+    """
+
+    def __init__(self, state: LabState, text: Text, desk: PaceDesk) -> None:
+        self._state, self._text, self._desk = state, text, desk
+        self._writing = False
+        self.pause = self._button("run.pause", desk.pause, icon="pause", style="warning")
+        self.resume = self._button("run.resume", desk.resume, icon="play", style="info")
+        percent, slowest = 100.0 * state.pace, 100.0 * SLOWEST_PACE
+        self.slider: Any = lean(
+            ipywidgets.FloatSlider, value=percent, description=text("run.pace"), min=slowest, max=100.0, step=_STEP,
+            readout=False, continuous_update=False, tooltip=text("run.pace_hint"), layout={"width": "19em"},
+        )  # fmt: skip
+        self.field = NumberField(text, "", "%", slowest, 100.0, self._choose, of=text("run.pace"), value=percent)
+        self._way = block()
+        self.buttons = [self.pause, self.resume]
+        self.fields: list[Any] = [
+            lean(ipywidgets.HBox, [self.slider, *self.field.cells], layout={"align_items": "center"}),
+            self.field.said,
+            self._way,
+        ]
+        hear_at_once(*self.buttons, self.slider, self.field.box)
+        self.slider.observe(self._on_slider, names="value")
+
+    def show(self, status: SupervisorStatus | None) -> None:
+        """Follows the motion."""
+        running = is_running(status)
+        is_held = running and status is not None and status.code == "moving.held"
+        self.pause.layout.display = "none" if is_held else None
+        self.pause.disabled = not running
+        self.resume.layout.display = None if is_held else "none"
+        percent = 100.0 * self._state.pace
+        if self.slider.value != percent:
+            self._writing = True
+            try:
+                self.slider.value = percent
+                self.field.show(percent)
+            finally:
+                self._writing = False
+        refusal = self._desk.refusal
+        said = "" if not running or status is None else soft(self._tell_way(status, is_held))
+        write(self._way, said + ("" if refusal is None or not running else problem(self._text.say(refusal))))
+
+    def _tell_way(self, status: SupervisorStatus, is_held: bool) -> str:
+        pace = f"{100.0 * status.pace:.0f}"
+        place = f"{status.motion_place or 0.0:.1f}"
+        return self._text("run.held", place=place) if is_held else self._text("run.way", place=place, pace=pace)
+
+    def _on_slider(self, change: Any) -> None:
+        if not self._writing:
+            self.field.show(change["new"])
+            self._choose(change["new"])
+
+    def _choose(self, percent: float) -> None:
+        self._desk.choose(percent / 100.0)
+
+    def _button(self, code: str, act: Any, *, icon: str, style: str) -> Any:
+        button = lean(
+            ipywidgets.Button, description=self._text(code), tooltip=self._text(f"{code}_hint"), icon=icon,
+            button_style=style, layout=ipywidgets.Layout(width="auto"),
+        )  # fmt: skip
+        button.on_click(lambda _: act())
+        return button

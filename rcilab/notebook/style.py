@@ -1,0 +1,86 @@
+"""How the parts look, in a light and in a dark notebook: one style sheet and the few shapes that recur."""
+
+from __future__ import annotations
+
+import html
+from functools import lru_cache
+from importlib.resources import files
+from typing import Any, Literal
+
+import ipywidgets
+
+from rcilab.notebook.widget_sharing import is_shared, lean, once
+
+Tone = Literal["good", "warn", "bad", "none"]
+
+PHASE_TONES: dict[str, Tone] = {
+    "idle": "good",
+    "moving": "good",
+    "stopping": "warn",
+    "starting": "warn",
+    "connecting": "warn",
+}
+"""Of a robot that does well, or is about to; every other phase is bad."""
+
+esc = html.escape
+
+
+@lru_cache
+def _sheet() -> str:
+    return (files("rcilab.notebook") / "assets" / "lab.css").read_text(encoding="utf-8")
+
+
+def style_sheet() -> Any:
+    """Returns the widget that carries the style sheet, one for all parts; it takes no room."""
+    return once("sheet", lambda: lean(ipywidgets.HTML, f"<style>{_sheet()}</style>", layout={"display": "none"}))
+
+
+def block(content: str = "", **layout: str) -> Any:
+    """Returns a widget that shows HTML."""
+    return lean(ipywidgets.HTML, f'<div class="rl">{content}</div>' if content else "", layout=layout)
+
+
+def write(widget: Any, content: str) -> None:
+    """Shows other HTML, if it is other."""
+    wrapped = f'<div class="rl">{content}</div>' if content else ""
+    if widget.value != wrapped:
+        widget.value = wrapped
+
+
+def verdict(tone: Tone, word: str, rest: str) -> str:
+    """Returns a line with a coloured edge: a word that says it all, and the sentence."""
+    return f'<p class="rl-verdict rl-{tone}" role="status"><b>{esc(word)}</b> {esc(rest)}</p>'
+
+
+def soft(text: str) -> str:
+    """Returns a quiet line."""
+    return f'<p class="rl-soft">{esc(text)}</p>'
+
+
+def problem(text: str) -> str:
+    """Returns what is wrong with what was typed."""
+    return f'<p class="rl-problem" role="alert">{esc(text)}</p>' if text else ""
+
+
+def head(text: str) -> str:
+    """Returns a heading of a group of controls."""
+    return f'<p class="rl-head">{esc(text)}</p>'
+
+
+def table(heads: list[str], rows: list[list[str]], *, right: bool = False) -> str:
+    """Returns a table of plain text."""
+    top = "".join(f"<th>{esc(cell)}</th>" for cell in heads)
+    body = "".join("<tr>" + "".join(f"<td>{esc(cell)}</td>" for cell in row) + "</tr>" for row in rows)
+    return f'<table class="{"rl-right" if right else ""}"><tr>{top}</tr>{body}</table>'
+
+
+def close_tree(widget: Any) -> None:
+    """Closes a widget with all that is its own; ipywidgets keeps what is not closed as long as the kernel lives."""
+    for child in getattr(widget, "children", ()):
+        close_tree(child)
+    for name in ("layout", "style"):
+        part = getattr(widget, name, None)
+        if isinstance(part, ipywidgets.Widget) and not is_shared(part):
+            part.close()
+    if not is_shared(widget):
+        widget.close()

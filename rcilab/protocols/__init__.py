@@ -1,1 +1,0 @@
-"""Bytes and values of robot protocols; no sockets, no clocks."""

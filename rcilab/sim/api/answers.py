@@ -1,0 +1,134 @@
+"""What the virtual controller answers over its world port."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any, TypeAlias, cast
+
+from rcilab.i18n.translator import Remark
+from rcilab.sim.api.faults import NetworkFaults
+from rcilab.sim.api.fields import as_flag, as_float, as_floats, as_integer
+
+
+@dataclass(frozen=True, slots=True)
+class Done:
+    """The request was carried out."""
+
+
+@dataclass(frozen=True, slots=True)
+class Refused:
+    """The request was understood and not carried out."""
+
+    reason: str
+    """One English sentence: what, why, what to do."""
+    code: str = ""
+    """Names what is wrong, as `RcilabError.code` does; "" where nothing does."""
+    facts: Mapping[str, object] = field(default_factory=dict[str, object])
+    """What fills its words: numbers and text."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WorldStatus:
+    """How the virtual controller is: what its RCI state does not say."""
+
+    model: str
+    """Name of the arm."""
+    plant: str
+    """What moves: ideal or mujoco."""
+    cycle: int
+    """Number of the newest cycle; the message id of its state."""
+    phase: str
+    """What the robot is doing, in the controller's own words."""
+    faults: tuple[str, ...] = ()
+    """Names of the error bits that are set."""
+    reason: str = ""
+    """Why the last fault was raised, in words and numbers; a `Remark` where faces have words of their own for it."""
+    button: str = "none"
+    """Which safety stop is pressed: none, estop, gstop."""
+    q: tuple[float, ...] = ()
+    """Measured joint angles, [rad]."""
+    lost: int = 0
+    """Cycles of the last motion whose command did not come in time."""
+    lost_in_row: int = 0
+    """The most of them that followed one another; 10 to 20 end a motion."""
+    success_rate: float = 1.0
+    """As the state says it, 0 to 1."""
+    missed: int = 0
+    """Cycles that the controller's process was too late for and left out."""
+    misfits: int = 0
+    """Datagrams that had not the size of a command."""
+    strangers: int = 0
+    """Datagrams that somebody else than the client sent."""
+    ignored: int = 0
+    """Commands that came while none was wanted."""
+    pushed: bool = False
+    """Whether something presses on the arm."""
+    stalls: int = 0
+    """How often the clock has stood still on request."""
+    commands: NetworkFaults = field(default_factory=NetworkFaults)
+    """Faults of the network towards the controller."""
+    states: NetworkFaults = field(default_factory=NetworkFaults)
+    """Faults of the network towards the client, TCP included."""
+
+
+WorldAnswer: TypeAlias = Done | Refused | WorldStatus
+
+_COUNTS = ("cycle", "lost", "lost_in_row", "missed", "misfits", "strangers", "ignored", "stalls")
+_LARGEST_COUNT = 2**63
+
+
+def status_as_dict(status: WorldStatus) -> dict[str, Any]:
+    """Returns a status as JSON has it."""
+    content = {item.name: getattr(status, item.name) for item in fields(status)}
+    if isinstance(status.reason, Remark) and status.reason.code:
+        content["remark"] = status.reason.as_dict()
+    return content | {"commands": status.commands.as_dict(), "states": status.states.as_dict()}
+
+
+def status_from_dict(content: dict[str, Any]) -> WorldStatus:
+    """Returns the status in a JSON object.
+
+    Raises:
+        InvalidValueError: A value is of the wrong kind.
+        TypeError: A name is unknown or missing.
+    """
+    judged = dict(content)
+    for name in _COUNTS:
+        if name in judged:
+            judged[name] = as_integer(judged[name], name, 0, _LARGEST_COUNT)
+    judged["reason"] = _reason(judged.get("reason", ""), judged.pop("remark", None))
+    for name in ("model", "plant", "phase", "button"):
+        if name in judged:
+            judged[name] = _text(judged[name])
+    if "faults" in judged:
+        judged["faults"] = tuple(_text(name) for name in _items(judged["faults"]))
+    if "q" in judged:
+        judged["q"] = as_floats(judged["q"], len(_items(judged["q"])), "q", "rad")
+    if "success_rate" in judged:
+        judged["success_rate"] = as_float(judged["success_rate"], "success_rate", "", 0.0, 1.0)
+    if "pushed" in judged:
+        judged["pushed"] = as_flag(judged["pushed"], "pushed")
+    for name in ("commands", "states"):
+        if name in judged:
+            judged[name] = NetworkFaults(**judged[name])
+    return WorldStatus(**judged)
+
+
+def _reason(said: object, coded: object) -> str:
+    try:
+        return _text(said) if coded is None else Remark.from_dict(cast("dict[str, Any]", coded))
+    except (AttributeError, LookupError, RecursionError) as error:
+        raise TypeError(f"{coded!r} is no remark") from error
+
+
+def _text(value: object) -> str:
+    if not isinstance(value, str):
+        raise TypeError(f"{value!r} is no text")
+    return value
+
+
+def _items(value: object) -> list[object]:
+    if not isinstance(value, list):
+        raise TypeError(f"{value!r} is no list")
+    return value  # pyright: ignore[reportUnknownVariableType]

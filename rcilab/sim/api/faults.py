@@ -1,0 +1,100 @@
+"""What can be wrong with a network and with a clock, as values with ranges."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any, Literal, TypeAlias, get_args
+
+from rcilab.sim.api.fields import as_float, as_integer
+
+Direction: TypeAlias = Literal["both", "commands", "states"]
+"""Which UDP datagrams are meant: commands (to the controller), states (from it), or both."""
+DIRECTIONS: tuple[Direction, ...] = get_args(Direction)
+
+LONGEST_DELAY = 1.0  # [s] A thousand datagrams under way; a choice.
+LONGEST_TCP_DELAY = 10.0  # [s] Longer than any client waits; a choice.
+LONGEST_STALL = 5.0  # [s] A choice.
+LONGEST_TIME = 86400.0  # [s] For what is to happen later; a choice.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NetworkFaults:
+    """A bad network between a client and the virtual controller. The default is a perfect one.
+
+    Raises:
+        InvalidValueError: A value is out of range; the message says which.
+    """
+
+    loss: float = 0.0
+    """Share of the datagrams that never arrive, 0 to 1."""
+    delay: float = 0.0
+    """What every datagram takes at least, [s]."""
+    jitter: float = 0.0
+    """What it takes at most in addition, evenly distributed, [s]. The order is kept: that is `reorder`'s business."""
+    reorder: float = 0.0
+    """Share of the datagrams that are held back until later ones have overtaken them, 0 to 1."""
+    duplicate: float = 0.0
+    """Share of the datagrams that arrive twice, 0 to 1."""
+    corrupt: float = 0.0
+    """Share of the datagrams in which one bit is flipped, 0 to 1. Real networks drop most of these (checksum)."""
+    tcp_delay: float = 0.0
+    """What an answer over TCP takes in addition, [s]."""
+    tcp_split: int = 0
+    """Answers over TCP come in pieces of so many bytes, some time apart; 0: in one piece."""
+    tcp_break: int | None = None
+    """The TCP connection breaks after so many bytes of answers; None: it holds."""
+    seed: int = 0
+    """Of the random numbers: equal seeds and equal traffic give equal faults."""
+
+    def __post_init__(self) -> None:
+        """Checks every value."""
+        for name in ("loss", "reorder", "duplicate", "corrupt"):
+            _put(self, name, as_float(getattr(self, name), name, "", 0.0, 1.0))
+        for name in ("delay", "jitter"):
+            _put(self, name, as_float(getattr(self, name), name, "s", 0.0, LONGEST_DELAY))
+        _put(self, "tcp_delay", as_float(self.tcp_delay, "tcp_delay", "s", 0.0, LONGEST_TCP_DELAY))
+        _put(self, "tcp_split", as_integer(self.tcp_split, "tcp_split", 0, 65535))
+        if self.tcp_break is not None:
+            _put(self, "tcp_break", as_integer(self.tcp_break, "tcp_break", 0, 2**31))
+        _put(self, "seed", as_integer(self.seed, "seed", 0, 2**32 - 1))
+
+    @property
+    def spares_datagrams(self) -> bool:
+        """Whether UDP is left alone."""
+        return not (self.loss or self.delay or self.jitter or self.reorder or self.duplicate or self.corrupt)
+
+    @property
+    def spares_tcp(self) -> bool:
+        """Whether TCP is left alone."""
+        return not (self.tcp_delay or self.tcp_split) and self.tcp_break is None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Returns every field by its name."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stall:
+    """A controller whose clock stands still for a while: it neither moves nor listens nor sends, and is late then.
+
+    Raises:
+        InvalidValueError: A value is out of range, or the pauses would leave no time between them.
+    """
+
+    duration: float
+    """How long it stands still, [s]."""
+    after: float = 0.0
+    """When it does so first: this long after it was told, or after its start, [s]."""
+    period: float | None = None
+    """And again this long after the beginning of the last time, [s]; None: once."""
+
+    def __post_init__(self) -> None:
+        """Checks every value."""
+        _put(self, "duration", as_float(self.duration, "duration", "s", 0.001, LONGEST_STALL))
+        _put(self, "after", as_float(self.after, "after", "s", 0.0, LONGEST_TIME))
+        if self.period is not None:
+            _put(self, "period", as_float(self.period, "period", "s", self.duration + 0.001, LONGEST_TIME))
+
+
+def _put(owner: object, name: str, value: object) -> None:
+    object.__setattr__(owner, name, value)

@@ -1,0 +1,292 @@
+"""What can be done to a virtual robot from outside, one value a request. Nothing of it exists on a real one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar, Literal, TypeAlias, get_args
+
+from rcilab.core.errors import InvalidValueError
+from rcilab.sim.api.faults import (
+    DIRECTIONS,
+    LONGEST_STALL,
+    LONGEST_TIME,
+    Direction,
+    NetworkFaults,
+    Stall,
+)
+from rcilab.sim.api.fields import as_flag, as_float, as_floats, as_integer, as_name, as_word
+
+Floats: TypeAlias = tuple[float, ...]
+SafetyButton: TypeAlias = Literal["none", "estop", "gstop"]
+LimitTable: TypeAlias = Literal["manual", "sdk"]
+
+_BUTTONS: tuple[SafetyButton, ...] = get_args(SafetyButton)
+LIMIT_TABLES: tuple[LimitTable, ...] = get_args(LimitTable)
+_LARGEST_FORCE = 1e4  # [N], [N m] Far beyond what any arm here stands; a choice that catches wrong units.
+_FARTHEST = 100.0  # [m] Likewise.
+_SIGNALS = 6  # DI0_0 to DI0_3, DI1_0, DI1_1 (manual 3.1.13).
+
+
+@dataclass(frozen=True, slots=True)
+class Push:
+    """Something presses on the arm until the time is over, or until `Release`. It replaces the push before."""
+
+    name: ClassVar[str] = "push"
+    wrench: Floats
+    """Force and moment, base axes, shape (6,), [N, N m]."""
+    link: int | None = None
+    """Number of the link from 1; None: the tool."""
+    point: Floats | None = None
+    """Where the force acts, in the frame of the link, shape (3,), [m]; None: at its origin."""
+    duration: float | None = None
+    """In the controller's own time, [s]; None: until `Release`."""
+
+    def __post_init__(self) -> None:
+        """Checks every value."""
+        _put(self, "wrench", as_floats(self.wrench, 6, "wrench", "N, N m"))
+        largest = max(self.wrench, key=abs)
+        if abs(largest) > _LARGEST_FORCE:
+            raise InvalidValueError("wrench", largest, f"needs at most {_LARGEST_FORCE:g} [N, N m]")
+        if self.link is not None:
+            _put(self, "link", as_integer(self.link, "link", 1, 7))
+        if self.point is not None:
+            _put(self, "point", as_floats(self.point, 3, "point", "m"))
+        if self.duration is not None:
+            _put(self, "duration", as_float(self.duration, "duration", "s", 0.001, LONGEST_TIME))
+
+
+@dataclass(frozen=True, slots=True)
+class Release:
+    """Nothing presses on the arm any more."""
+
+    name: ClassVar[str] = "release"
+
+
+@dataclass(frozen=True, slots=True)
+class Press:
+    """Presses the emergency stop ("estop") or opens the safety gate ("gstop"); "none" puts both right again."""
+
+    name: ClassVar[str] = "press"
+    button: SafetyButton
+
+    def __post_init__(self) -> None:
+        """Checks the word."""
+        _put(self, "button", as_word(self.button, "button", _BUTTONS))
+
+
+@dataclass(frozen=True, slots=True)
+class SetInput:
+    """Sets a digital input of the controller."""
+
+    name: ClassVar[str] = "set_input"
+    signal: int
+    """0 to 3: DI0_0 to DI0_3; 4, 5: DI1_0, DI1_1."""
+    level: bool
+
+    def __post_init__(self) -> None:
+        """Checks both."""
+        _put(self, "signal", as_integer(self.signal, "signal", 0, _SIGNALS - 1))
+        _put(self, "level", as_flag(self.level, "level"))
+
+
+@dataclass(frozen=True, slots=True)
+class LoopBack:
+    """Wires every digital output to the input of the same number, or cuts these wires."""
+
+    name: ClassVar[str] = "loop_back"
+    on: bool
+
+    def __post_init__(self) -> None:
+        """Checks it."""
+        _put(self, "on", as_flag(self.on, "on"))
+
+
+@dataclass(frozen=True, slots=True)
+class AutoLimit:
+    """Has commands led to rest inside the soft joint limits, instead of raising a fault beyond them; or not."""
+
+    name: ClassVar[str] = "auto_limit"
+    on: bool
+
+    def __post_init__(self) -> None:
+        """Checks it."""
+        _put(self, "on", as_flag(self.on, "on"))
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """Chooses the Cartesian limits that commands are judged by: the manual's, or those of the vendor's SDK."""
+
+    name: ClassVar[str] = "limits"
+    table: LimitTable
+
+    def __post_init__(self) -> None:
+        """Checks the word."""
+        _put(self, "table", as_word(self.table, "table", LIMIT_TABLES))
+
+
+@dataclass(frozen=True, slots=True)
+class Network:
+    """Makes the network bad, or good again."""
+
+    name: ClassVar[str] = "network"
+    faults: NetworkFaults
+    direction: Direction = "both"
+    """Which datagrams are meant; TCP follows "both" and "states", whose way its answers go."""
+
+    def __post_init__(self) -> None:
+        """Checks both; a dictionary of faults, as in a line of JSON, becomes a value."""
+        _put(self, "faults", _network_faults(self.faults))
+        _put(self, "direction", as_word(self.direction, "direction", DIRECTIONS))
+
+
+@dataclass(frozen=True, slots=True)
+class StallClock:
+    """Has the controller's clock stand still, once or again and again; a new one replaces those before."""
+
+    name: ClassVar[str] = "stall"
+    duration: float
+    """[s]; 0 takes back what was asked for before."""
+    after: float = 0.0
+    """[s] from now."""
+    period: float | None = None
+    """[s]; None: once."""
+
+    def __post_init__(self) -> None:
+        """Checks every value."""
+        _put(self, "duration", as_float(self.duration, "duration", "s", 0.0, LONGEST_STALL))
+        stall = Stall(duration=self.duration or LONGEST_STALL, after=self.after, period=self.period)
+        _put(self, "after", stall.after)
+        _put(self, "period", stall.period)
+
+    @property
+    def stall(self) -> Stall | None:
+        """What is asked for; None: nothing more."""
+        return Stall(duration=self.duration, after=self.after, period=self.period) if self.duration else None
+
+
+@dataclass(frozen=True, slots=True)
+class PlaceBox:
+    """Puts a box that cannot move beside the arm, or moves the one of that name."""
+
+    name: ClassVar[str] = "place_box"
+    box: str
+    """Its name."""
+    size: Floats
+    """Edges along its own x, y and z, shape (3,), [m]."""
+    position: Floats
+    """Of its centre in base, shape (3,), [m]."""
+    wxyz: Floats = (1.0, 0.0, 0.0, 0.0)
+    """Its orientation in base, shape (4,)."""
+
+    def __post_init__(self) -> None:
+        """Checks every value."""
+        _put(self, "box", as_name(self.box, "box"))
+        _put(self, "size", as_floats(self.size, 3, "size", "m"))
+        _put(self, "position", as_floats(self.position, 3, "position", "m"))
+        _put(self, "wxyz", as_floats(self.wxyz, 4, "wxyz", ""))
+        for edge in self.size:
+            as_float(edge, "size", "m", 0.001, _FARTHEST)
+        for coordinate in self.position:
+            as_float(coordinate, "position", "m", -_FARTHEST, _FARTHEST)
+        if not 1e-6 < sum(number * number for number in self.wxyz) < 1e6:
+            raise InvalidValueError("wxyz", self.wxyz, "has no direction; a unit quaternion is expected")
+
+
+@dataclass(frozen=True, slots=True)
+class RemoveBox:
+    """Takes a box away."""
+
+    name: ClassVar[str] = "remove_box"
+    box: str
+
+    def __post_init__(self) -> None:
+        """Checks it."""
+        _put(self, "box", as_name(self.box, "box"))
+
+
+@dataclass(frozen=True, slots=True)
+class Floor:
+    """Puts a floor under the base that the arm can hit, or takes it away."""
+
+    name: ClassVar[str] = "floor"
+    on: bool
+
+    def __post_init__(self) -> None:
+        """Checks it."""
+        _put(self, "on", as_flag(self.on, "on"))
+
+
+@dataclass(frozen=True, slots=True)
+class Walls:
+    """Makes the faces of the active safety box solid, so that the links run into them, or not."""
+
+    name: ClassVar[str] = "walls"
+    on: bool
+
+    def __post_init__(self) -> None:
+        """Checks it."""
+        _put(self, "on", as_flag(self.on, "on"))
+
+
+@dataclass(frozen=True, slots=True)
+class Mount:
+    """Fixes a real load to the flange, whatever SetLoad says of it; without a mass again the one of SetLoad."""
+
+    name: ClassVar[str] = "mount"
+    mass: float | None = None
+    """[kg]."""
+    center_of_mass: Floats = (0.0, 0.0, 0.0)
+    """In the flange frame, shape (3,), [m]."""
+    inertia: Floats = (0.0,) * 9
+    """About the centre of mass, row by row, shape (9,), [kg m^2]."""
+
+    def __post_init__(self) -> None:
+        """Checks every value."""
+        if self.mass is not None:
+            _put(self, "mass", as_float(self.mass, "mass", "kg", 0.0, 100.0))
+        _put(self, "center_of_mass", as_floats(self.center_of_mass, 3, "center_of_mass", "m"))
+        _put(self, "inertia", as_floats(self.inertia, 9, "inertia", "kg m^2"))
+
+
+@dataclass(frozen=True, slots=True)
+class GetStatus:
+    """Asks how the controller is."""
+
+    name: ClassVar[str] = "status"
+
+
+WorldRequest: TypeAlias = (
+    Push
+    | Release
+    | Press
+    | SetInput
+    | LoopBack
+    | AutoLimit
+    | Limits
+    | Network
+    | StallClock
+    | PlaceBox
+    | RemoveBox
+    | Floor
+    | Walls
+    | Mount
+    | GetStatus
+)
+
+REQUESTS: dict[str, type[WorldRequest]] = {kind.name: kind for kind in get_args(WorldRequest)}
+"""Every request by its name."""
+
+
+def _network_faults(value: Any) -> NetworkFaults:
+    if isinstance(value, NetworkFaults):
+        return value
+    try:
+        return NetworkFaults(**value)
+    except TypeError:
+        known = ", ".join(NetworkFaults().as_dict())
+        raise InvalidValueError("faults", value, f"are no faults of a network; known: {known}") from None
+
+
+def _put(owner: object, name: str, value: object) -> None:
+    object.__setattr__(owner, name, value)

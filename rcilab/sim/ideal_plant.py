@@ -1,0 +1,138 @@
+"""The arm of theory: it is exactly where it was told to be, and torques move it as the rigid-body model says.
+
+    POSITION   q = q_c; the joints carry what that takes: tau = M ddq_c + C dq_c + g - J^T w
+    TORQUE     M ddq + C dq + g = tau_c + g_model + J^T w, integrated over 1 ms; no friction, no limit of torque
+    BRAKED     stands still at once, whatever presses
+
+w presses from outside (`push`). g_model is gravity as the controller knows it, g that of the load that is really
+there (`mount`): the same, until somebody sets a wrong load. Nothing solid stands in the way of this arm.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rcilab.core.arrays import JointVector, frozen, scalar, sealed
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.errors import UsageError
+from rcilab.core.safety_box import SafetyBox
+from rcilab.core.spatial import Pose
+from rcilab.model.dynamics.payload import Payload
+from rcilab.model.dynamics.rigid_body import RigidBody
+from rcilab.model.robot_model import RobotModel
+from rcilab.sim.plant import Drive, Measurement, Setpoint
+from rcilab.sim.push import Push
+
+_CYCLE, _HALF = scalar(CYCLE_TIME), scalar(CYCLE_TIME / 2.0)  # [s]
+
+
+class IdealPlant:
+    """The arm that follows exactly.
+
+    Args:
+        model: The arm with its tool and load.
+    """
+
+    kind = "ideal"
+
+    def __init__(self, model: RobotModel) -> None:
+        self._zeros = frozen(np.zeros(model.n))
+        self._model = model
+        self._mounted: Payload | None = None
+        self._body = model.rigid_body
+        self._push = Push(model, np.zeros(6))
+        self.reset(model.home)
+
+    def configure(self, model: RobotModel) -> None:
+        """Takes a new tool or load; the arm stays where it is, at rest."""
+        self._model = model
+        self._push = self._push.on(model)
+        self.mount(self._mounted)
+
+    def mount(self, load: Payload | None) -> None:
+        """Fixes a payload to the flange that the controller need not know of; None: the one that setLoad says."""
+        self._mounted = load
+        model = self._model
+        self._body = model.rigid_body if load is None else RigidBody(model.description, load, model.T_flange_tool)
+        self._rests = False
+
+    def reset(self, q: JointVector) -> Measurement:
+        """Puts the arm at `q`, shape (n,), [rad], at rest."""
+        return self._rest_at(frozen(q))
+
+    def push(self, wrench: ArrayLike, link: int | None = None, point: ArrayLike | None = None) -> None:
+        """Lets something outside press on the arm until told otherwise; see `Plant.push`."""
+        self._push = Push(self._model, wrench, link, point)
+        self._rests = False
+
+    def place_box(self, name: str, size: ArrayLike, pose: Pose) -> None:
+        """Refuses: nothing is solid here."""
+        raise UsageError(f"box {name!r}: the ideal plant knows no contact; use plant='mujoco'").coded("no_contact")
+
+    def remove_box(self, name: str) -> None:
+        """Refuses: nothing is solid here."""
+        raise UsageError(f"box {name!r}: the ideal plant knows no contact and has no boxes; use plant='mujoco'").coded(
+            "no_contact"
+        )
+
+    def set_floor(self, on: bool) -> None:
+        """Refuses a floor; to have none is granted."""
+        if on:
+            raise UsageError("floor: the ideal plant knows no contact; use plant='mujoco'").coded("no_contact")
+
+    def set_walls(self, box: SafetyBox | None) -> None:
+        """Refuses walls; to have none is granted."""
+        if box is not None:
+            raise UsageError("walls: the ideal plant knows no contact; use plant='mujoco'").coded("no_contact")
+
+    def step(self, setpoint: Setpoint) -> Measurement:
+        """Lives through one millisecond."""
+        last = self._measurement
+        if setpoint.drive is Drive.TORQUE:
+            return self._fall(self._zeros if setpoint.tau is None else np.asarray(setpoint.tau))
+        if setpoint.drive is Drive.BRAKED:
+            if self._rests:
+                return last
+            if not last.dq.any():
+                return self._rest_at(last.q)
+            return self._measure(last.q, self._zeros, last.dq / -CYCLE_TIME)  # What stopping at once takes.
+        stays = not any(setpoint.dq) and not any(setpoint.ddq) and last.q.tolist() == list(setpoint.q)
+        if stays:
+            return last if self._rests else self._rest_at(last.q)
+        return self._measure(*setpoint.as_arrays())
+
+    def _rest_at(self, q: JointVector) -> Measurement:
+        measurement = self._measure(q, self._zeros, self._zeros)
+        self._rests = True
+        return measurement
+
+    def _measure(self, q: JointVector, dq: JointVector, ddq: JointVector) -> Measurement:
+        tau = self._body.shared_torque(q, dq, ddq)
+        if self._push.is_active:
+            tau = sealed(tau - self._push.torque(q))
+        self._rests = False
+        self._measurement = Measurement(q, dq, tau)
+        return self._measurement
+
+    def _fall(self, tau_c: JointVector) -> Measurement:
+        """Lets torques move the arm.
+
+        Accelerations are those of the middle of the millisecond, so that a free swing keeps its energy; the step in q
+        is the new velocity's, so that measured velocities are the backward differences of measured angles.
+        """
+        q, dq = self._measurement.q, self._measurement.dq
+        outside = self._push.torque(q) if self._push.is_active else None
+        tau = tau_c if outside is None else tau_c + outside
+        accelerate = self._body.weightless_acceleration if self._mounted is None else self._acceleration
+        ddq = accelerate(q, dq, tau)
+        ddq = accelerate(q + _HALF * dq, dq + _HALF * ddq, tau)
+        dq = dq + _CYCLE * ddq
+        q = q + _CYCLE * dq
+        self._rests = False
+        self._measurement = Measurement(sealed(q), sealed(dq), sealed(tau_c + self._model.rigid_body.gravity(q)))
+        return self._measurement
+
+    def _acceleration(self, q: JointVector, dq: JointVector, tau: JointVector) -> JointVector:
+        """Returns how a load moves that the controller takes for another: gravity is not what it compensates."""
+        return self._body.acceleration(q, dq, tau + self._model.rigid_body.gravity(q))

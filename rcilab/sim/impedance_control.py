@@ -1,0 +1,147 @@
+"""Impedance control: the torque of springs between the commanded and the measured arm.
+
+Both laws are computed from measurement and model alone and act through `Drive.TORQUE`, where gravity and friction are
+compensated already, so M ddq + C dq = tau + J^T w. They give
+
+    tau = springs + dampers + M ddq_c + C dq
+
+so that an arm that nothing touches follows, but for what steps of 1 ms and the soft spring of the elbow leave, and one
+that something presses on yields by force over stiffness. Every mode is damped with `DAMPING_RATIO` of critical, see
+`compliance`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rcilab.core.arrays import Array, JointVector, Matrix, scalar
+from rcilab.core.spatial import Pose, turn_between
+from rcilab.model.dynamics.rigid_body import ToolTerms
+from rcilab.model.robot_model import RobotModel
+from rcilab.sim.compliance import DAMPING_RATIO, Damper, design_damping
+from rcilab.sim.plant import Measurement
+
+NULL_FREQUENCY = 5.0  # [rad/s] of the spring that holds the elbow of a 7-axis arm; soft, a choice
+NULL_DAMPING = 2.0 * DAMPING_RATIO * NULL_FREQUENCY  # [1/s]
+_PULL, _DRAG = scalar(NULL_FREQUENCY**2), scalar(NULL_DAMPING)  # [1/s^2], [1/s]
+_DAMPED_INVERSE = 1e-4 * np.eye(6)  # [1/kg] keeps feed-forward finite at a singularity; off it, it costs below 0.1 %
+
+
+def joint_impedance(
+    model: RobotModel,
+    q_c: JointVector,
+    dq_c: JointVector,
+    ddq_c: JointVector,
+    measured: Measurement,
+    stiffness: Sequence[float],
+    damper: Damper | None = None,
+) -> JointVector:
+    """Returns the torque of a spring at every joint, without gravity, shape (n,), [N m].
+
+    Args:
+        model: The arm as the controller knows it.
+        q_c: Commanded joint angles, shape (n,), [rad].
+        dq_c: Their velocities, shape (n,), [rad/s].
+        ddq_c: Their accelerations, shape (n,), [rad/s^2].
+        measured: Where the arm is.
+        stiffness: n numbers, [N m/rad].
+        damper: The one of the cycles before; None designs another.
+    """
+    body, q, dq = model.rigid_body, measured.q, measured.dq
+    K = np.array(stiffness)
+    tau = (damper or Damper()).torque(
+        lambda: design_damping(body.mass_inverse(q), np.diag(K)), K * (q_c - q), dq_c - dq
+    )
+    tau += body.motion_torque(q, dq, ddq_c)
+    return tau
+
+
+def cartesian_impedance(
+    model: RobotModel,
+    T_c: Pose,
+    twist_c: Sequence[float],
+    acc_c: Sequence[float],
+    null: tuple[JointVector, JointVector, JointVector],
+    measured: Measurement,
+    stiffness6: Sequence[float],
+    desired_wrench6: Sequence[float] = (0.0,) * 6,
+    axes: Matrix | None = None,
+    damper: Damper | None = None,
+) -> JointVector:
+    """Returns the torque of springs between the commanded and the measured tool, without gravity, shape (n,), [N m].
+
+    The orientation spring acts on the rotation vector from the measured to the commanded orientation. A 7-axis arm
+    keeps its elbow near `null`, softly and without a force on the tool. Stiffness, damping and desired force act
+    at the tool's origin, along the axes of setFcCoor.
+
+    Args:
+        model: The arm as the controller knows it, with its tool.
+        T_c: Commanded pose of the tool in base.
+        twist_c: Its velocity, base axes, linear first, shape (6,), [m/s, rad/s].
+        acc_c: Its acceleration, shape (6,), [m/s^2, rad/s^2].
+        null: Joint angles whose arm angle a 7-axis arm keeps, their velocities and accelerations, each of shape (n,),
+            [rad], [rad/s], [rad/s^2]. Other arms have no choice.
+        measured: Where the arm is.
+        stiffness6: Three translations [N/m], three rotations [N m/rad].
+        desired_wrench6: Force and moment that the arm exerts on its surroundings in addition, [N, N m].
+        axes: Rotation whose columns, in base, are the directions that both refer to, shape (3, 3); None: the base's.
+        damper: The one of the cycles before; None designs another.
+    """
+    body, q, dq = model.rigid_body, measured.q, measured.dq
+    terms = body.tool_terms(q, dq)
+    J = terms.jacobian
+    # Rows of J, error and desired wrench in the axes of the springs, where the stiffness is diagonal.
+    along = J if axes is None else _turned(J, axes)
+    error = _pose_error(T_c, terms.pose)
+    if axes is not None:
+        error = _turned(np.array(error), axes).tolist()
+    wrench = np.array([k * e + w for k, e, w in zip(stiffness6, error, desired_wrench6, strict=True)])
+    dq_c, ddq_c = _reference(model, terms, twist_c, acc_c, null, measured)
+    tau = (damper or Damper()).torque(
+        lambda: design_damping(terms.mass_inverse, along.T * stiffness6 @ along), along.T.dot(wrench), dq_c - dq
+    )
+    tau += body.motion_torque(q, dq, ddq_c)
+    return tau
+
+
+def _pose_error(T_c: Pose, T: Pose) -> tuple[float, ...]:
+    """Returns position and rotation vector from the measured to the commanded tool, base axes, [m, rad]."""
+    (r_c, (x, y, z)), (r, (px, py, pz)) = T_c.parts, T.parts
+    return x - px, y - py, z - pz, *turn_between(r, r_c)
+
+
+def _turned(rows: Array, axes: Matrix) -> Array:
+    """Returns what is linear in its first three rows and angular in the other three, given in base, in other axes."""
+    return np.concatenate((axes.T @ rows[:3], axes.T @ rows[3:]))
+
+
+def _reference(
+    model: RobotModel,
+    terms: ToolTerms,
+    twist: Sequence[float],
+    acc: Sequence[float],
+    null: tuple[JointVector, JointVector, JointVector],
+    measured: Measurement,
+) -> tuple[JointVector, JointVector]:
+    """Returns the joint velocities and accelerations that move the tool as commanded, shape (n,), [rad/s], [rad/s^2].
+
+    Of all that do, they are those of least kinetic energy. With Khatib's inertia at the tool, L = (J M^-1 J^T)^-1,
+
+        dq_c = M^-1 J^T L twist        ddq_c = M^-1 J^T L (acc - dJ/dt dq - J free) + free
+
+    On a 7-axis arm `free` is the acceleration of a damped spring at `null`, which moves along, and dq_c has the part of
+    its velocity of which the tool feels nothing, as it does of the spring.
+    """
+    J = terms.jacobian
+    wanted = np.array([*twist, *acc])
+    along = free = np.zeros(model.n)
+    if model.n == 7:
+        q_null, along, ddq_null = null
+        free = _PULL * (q_null - measured.q) + _DRAG * (along - measured.dq) + ddq_null
+        wanted[:6] -= J.dot(along)
+    wanted[6:] -= terms.acceleration(free) if any(twist) or any(acc) else J.dot(free)
+    back = terms.mass_inverse.dot(J.T)
+    joints = back.dot(model.rigid_body.tool_solver.solve(J.dot(back) + _DAMPED_INVERSE, wanted.reshape(2, 6).T))
+    return joints[:, 0] + along, joints[:, 1] + free

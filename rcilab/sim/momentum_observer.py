@@ -1,0 +1,88 @@
+"""What presses on the arm, told from its own sensors and model: the generalised-momentum observer.
+
+The residual r of De Luca and Mattone (2003), dr/dt = K (tau_ext - r), needs no acceleration sensor. In discrete time
+it is a first-order low pass on what Newton and Euler cannot explain: M (dq - dq_before)/h + C dq + g - tau.
+
+Signs: tau_ext and the wrench are those that the surroundings exert on the arm. A hand that presses the tool down gives
+a negative z force. The wrench is the one at the tool that explains tau_ext best; when something presses on another
+link, tau_ext is right and the wrench is not.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rcilab.core.arrays import Array, JointVector, frozen, scalar, sealed
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.model.robot_model import RobotModel
+from rcilab.sim.plant import Measurement
+
+BANDWIDTH = 200.0  # [rad/s] of the residual: a push shows with a time constant of 5 ms; a choice
+_CYCLE = scalar(CYCLE_TIME)  # [s]
+_SHARE = BANDWIDTH * CYCLE_TIME / (1.0 + BANDWIDTH * CYCLE_TIME)  # of what is new, in one cycle
+_GAIN = scalar(_SHARE)
+_NOTHING = 1e-6  # [N m] A residual this small is rounding: it is called zero.
+_DAMPING = 2.5e-5 * np.eye(6)  # [m^2, rad^2] keeps the wrench finite at a singularity
+
+
+class Observer:
+    """Estimates outside torques cycle by cycle. Owned by the controller's cycle.
+
+    Args:
+        model: The arm as the controller knows it: a load that was not set shows as an outside torque.
+    """
+
+    def __init__(self, model: RobotModel) -> None:
+        self._body = model.rigid_body
+        self._zeros = frozen(np.zeros(model.n))
+        self._none = (self._zeros, frozen(np.zeros(6)))
+        self._last: Measurement | None = None
+        self._is_static = True
+        self._answer = self._none
+        self._raw = self._zeros
+
+    def reset(self, measured: Measurement) -> None:
+        """Forgets the past; only when the arm was put somewhere at rest."""
+        self._last, self._is_static = measured, True
+        self._raw = self._unexplained(measured, self._zeros)
+        self._answer = self._answered(self._raw, measured)
+
+    def step(self, measured: Measurement) -> tuple[JointVector, Array]:
+        """Returns outside joint torques, shape (n,), [N m], and the wrench on the tool, base axes, shape (6,).
+
+        The wrench is taken at the tool's origin, force first, [N, N m]. Both arrays are read-only; while nothing
+        changes they are the same ones again.
+        """
+        last = self._last
+        if last is None:
+            self.reset(measured)
+            return self._answer
+        if measured is not last:
+            self._raw = self._unexplained(measured, (measured.dq - last.dq) / _CYCLE)
+            self._last, self._is_static = measured, False
+        elif not self._is_static:  # The same measurement again: its velocity has not changed.
+            self._raw = self._unexplained(measured, self._zeros)
+            self._is_static = True
+        tau_ext = self._answer[0]
+        if tau_ext is self._raw:
+            return self._answer
+        step = _GAIN * (self._raw - tau_ext)
+        is_there = _is_tiny(step, _SHARE * _NOTHING)
+        self._answer = self._answered(self._raw if is_there else sealed(tau_ext + step), measured)
+        return self._answer
+
+    def _unexplained(self, measured: Measurement, ddq: JointVector) -> JointVector:
+        raw = self._body.full_torque(measured.q, measured.dq, ddq)
+        raw -= measured.tau
+        return self._zeros if _is_tiny(raw, _NOTHING) else sealed(raw)
+
+    def _answered(self, tau_ext: JointVector, measured: Measurement) -> tuple[JointVector, Array]:
+        if tau_ext is self._zeros:
+            return self._none
+        J = self._body.tool_terms(measured.q, measured.dq).jacobian
+        return tau_ext, sealed(self._body.tool_solver.solve(J.dot(J.T) + _DAMPING, J.dot(tau_ext)))
+
+
+def _is_tiny(vector: Array, bound: float) -> bool:
+    values = vector.tolist()
+    return -bound < values[0] < bound and -bound < min(values) and max(values) < bound  # The first mostly tells.

@@ -1,0 +1,187 @@
+"""Solid things around a MuJoCo arm: a floor, boxes, the walls of a safety box.
+
+MuJoCo's models are of fixed size, and compiling one takes many cycles of the controller. So the geoms are there from
+the start and switched off; to place something is to set its numbers.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rcilab.core.arrays import Array, as_vector
+from rcilab.core.errors import InvalidValueError
+from rcilab.core.safety_box import SafetyBox
+from rcilab.core.spatial import Pose
+
+MOST_BOXES = 16
+_FLOOR = "floor"
+_WALLS = tuple(f"wall{number}" for number in range(6))
+_BOXES = tuple(f"box{number}" for number in range(MOST_BOXES))
+_NEAR = 0.1  # [m] Beyond this distance from a link a box is free.
+_GAP = 1e-3  # [m] Left between a box that was moved out of the way and the arm.
+_FARTHEST_WAY = 5.0  # [m] No arm of ours is that large.
+_DIRECTIONS = {
+    "+x": (1, 0, 0), "-x": (-1, 0, 0), "+y": (0, 1, 0), "-y": (0, -1, 0), "+z": (0, 0, 1), "-z": (0, 0, -1),
+}  # fmt: skip
+_ARM, _SOLID = 1, 1  # Bits: an arm's geom takes part as `conaffinity`, a solid one as `contype`.
+
+
+class Obstacles:
+    """What is solid around one arm. Owned by its plant; outlives the compiled models it is installed in."""
+
+    def __init__(self) -> None:
+        self._boxes: dict[str, tuple[float, float, float, Pose]] = {}
+        self._has_floor = False
+        self._walls: SafetyBox | None = None
+        self._model: Any = None
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether nothing is solid."""
+        return not (self._boxes or self._has_floor or self._walls)
+
+    def add_to(self, spec: Any, mj: Any) -> None:
+        """Adds the geoms to an `MjSpec` and takes contact among the arm's own geoms out of it."""
+        for geom in spec.geoms:
+            geom.contype, geom.conaffinity = 0, _ARM
+        for names, kind in (((_FLOOR, *_WALLS), mj.mjtGeom.mjGEOM_PLANE), (_BOXES, mj.mjtGeom.mjGEOM_BOX)):
+            for name in names:
+                size = [1.0, 1.0, 1.0]
+                spec.worldbody.add_geom(name=name, type=kind, size=size, contype=_SOLID, conaffinity=0, group=4)
+
+    def install(self, model: Any, mj: Any) -> None:
+        """Puts everything into a compiled model."""
+        self._model, self._mj = model, mj
+        model.opt.disableflags |= mj.mjtDisableBit.mjDSBL_MIDPHASE  # Its trees were built for the places at compiling.
+        for name in (_FLOOR, *_WALLS, *_BOXES):
+            model.geom_sameframe[model.geom(name).id] = 0
+        self._apply()
+
+    def place_box(self, name: str, size: ArrayLike, pose: Pose, data: Any) -> None:
+        """Puts a box somewhere, or moves it; see `Plant.place_box`.
+
+        Args:
+            name: See there, as the next two.
+            size: [m].
+            pose: In base.
+            data: MuJoCo's data of the arm as it is now, which must not stand in the box.
+        """
+        x, y, z = as_vector(size, 3, "box size", "m").tolist()
+        if min(x, y, z) <= 0.0:
+            raise InvalidValueError("box size", [x, y, z], "must be three lengths above 0 [m]").coded("box_size")
+        if name not in self._boxes and len(self._boxes) == MOST_BOXES:
+            problem = f"would be one too many; {MOST_BOXES} can be there, remove another"
+            raise InvalidValueError("box", name, problem).coded("box_many", name=name, most=MOST_BOXES)
+        before = dict(self._boxes)
+        self._boxes[name] = (x, y, z, pose)
+        self._apply()
+        try:
+            self._require_free(name, data)
+        except InvalidValueError:
+            self._boxes = before
+            self._apply()
+            raise
+
+    def _require_free(self, name: str, data: Any) -> None:
+        """Refuses a box that the arm stands in: MuJoCo would throw the arm out of it."""
+        index = int(self._model.geom(_BOXES[list(self._boxes).index(name)]).id)
+        depth, link = self._deepest(index, data)
+        if depth <= 0.0:
+            return
+        position = self._model.geom_pos[index].copy()
+        ways = {axis: self._way_out(index, data, np.array(direction)) for axis, direction in _DIRECTIONS.items()}
+        self._model.geom_pos[index] = position
+        axis = min(ways, key=lambda axis: ways[axis])
+        millimetres = {"depth": f"{1e3 * depth:.0f}", "way": f"{math.ceil(1e3 * ways[axis])}"}
+        problem = (
+            f"would overlap {link} of the arm by {millimetres['depth']} mm; place it {millimetres['way']} mm farther "
+            f"along {axis}, or move the arm first"
+        )
+        raise InvalidValueError("box", name, problem).coded(
+            "box_overlap", name=name, link=link, axis=axis, **millimetres
+        )
+
+    def _deepest(self, box: int, data: Any) -> tuple[float, str]:
+        """Returns how deep a link of the arm is in a box, [m], and its name; 0 or less where none is."""
+        model, mj = self._model, self._mj
+        mj.mj_kinematics(model, data)
+        moves = model.body_weldid[model.geom_bodyid] != 0  # The base may stand in a table: neither of them moves.
+        links = np.flatnonzero((model.geom_conaffinity & _ARM != 0) & moves)
+        distances = [mj.mj_geomDistance(model, data, int(link), box, _NEAR, None) for link in links]
+        nearest = int(np.argmin(distances))
+        return -distances[nearest], str(model.body(int(model.geom_bodyid[links[nearest]])).name)
+
+    def _way_out(self, box: int, data: Any, direction: Array) -> float:
+        """Returns how far a box has to move along a direction to be free of the arm, [m]."""
+        position, way = self._model.geom_pos[box].copy(), 0.0
+        while way < _FARTHEST_WAY:
+            depth, _ = self._deepest(box, data)
+            if depth <= 0.0:
+                break
+            way += depth + _GAP
+            self._model.geom_pos[box] = position + way * direction
+        self._model.geom_pos[box] = position
+        return way
+
+    def remove_box(self, name: str) -> None:
+        """Takes a box away; see `Plant.remove_box`."""
+        if name not in self._boxes:
+            known = ", ".join(self._boxes) or "none"
+            raise InvalidValueError("box", name, f"is not there; there are: {known}").coded("box_unknown", name=name)
+        del self._boxes[name]
+        self._apply()
+
+    def set_floor(self, on: bool) -> None:
+        """Lets the plane z = 0 be solid or not."""
+        self._has_floor = on
+        self._apply()
+
+    def set_walls(self, box: SafetyBox | None) -> None:
+        """Lets the faces of a box be solid from inside; None takes them away."""
+        self._walls = box
+        self._apply()
+
+    def _apply(self) -> None:
+        model, mj = self._model, self._mj
+        self._show(_FLOOR, self._has_floor, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
+        for slot, (position, wxyz) in zip(_WALLS, _faces(self._walls), strict=True):
+            self._show(slot, self._walls is not None, position, wxyz)
+        for slot in _BOXES[len(self._boxes) :]:
+            self._show(slot, False, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
+        for slot, (x, y, z, pose) in zip(_BOXES, self._boxes.values(), strict=False):
+            index = self._show(slot, True, pose.position, pose.wxyz)
+            half = (x / 2.0, y / 2.0, z / 2.0)
+            model.geom_size[index] = half
+            model.geom_aabb[index] = (0.0, 0.0, 0.0, *half)
+            model.geom_rbound[index] = math.hypot(*half)
+        flags = model.opt.disableflags & ~int(mj.mjtDisableBit.mjDSBL_CONTACT)
+        model.opt.disableflags = flags | (int(mj.mjtDisableBit.mjDSBL_CONTACT) if self.is_empty else 0)
+
+    def _show(self, name: str, on: bool, position: ArrayLike, wxyz: ArrayLike) -> int:
+        model = self._model
+        index = int(model.geom(name).id)
+        model.geom_contype[index] = _SOLID if on else 0
+        model.geom_pos[index], model.geom_quat[index] = position, wxyz
+        return index
+
+
+def _faces(box: SafetyBox | None) -> list[tuple[ArrayLike, ArrayLike]]:
+    """Returns position and quaternion of six planes whose z axes, the sides that are free, point into the box."""
+    turns = {0: (0.0, 1.0, 0.0), 1: (-1.0, 0.0, 0.0), 2: (0.0, 0.0, 0.0)}  # of +z to +x, +y, +z by +90 degrees
+    faces: list[tuple[ArrayLike, ArrayLike]] = []
+    for axis in range(3):
+        for sign in (-1.0, 1.0):  # the lower face looks up its axis, the upper one down
+            offset = np.zeros(3)
+            size = 1.0 if box is None else box.size[axis]
+            offset[axis] = sign * size / 2.0
+            turn = np.array(turns[axis]) * -sign * math.pi / 2.0
+            if axis == 2:
+                turn = np.array([math.pi if sign > 0.0 else 0.0, 0.0, 0.0])
+            T_base_box = Pose() if box is None else box.T_base_box
+            T = T_base_box @ Pose.from_rpy(offset, turn)
+            faces.append((T.position, T.wxyz))
+    return faces

@@ -1,0 +1,242 @@
+"""The arm as MuJoCo moves it: torques, inertia, friction, contact, and drives that follow as well as they can.
+
+Each millisecond is one `mj_step`. What the drives put on the joints:
+
+    POSITION   M (ddq_c + K_d (dq_c - dq) + K_p (q_c - q)) + C dq + g + friction  computed torque
+    TORQUE     tau_c + g_model + friction                               for M ddq + C dq = tau_c + J^T w
+    BRAKED     the brakes take the speed out within some 0.1 s and bear what presses, then the arm is rigid
+
+w is what presses from outside. The position servo knows the load that is really there, as one with an integrating
+controller learns it; TORQUE compensates the gravity of the load that setLoad says (`g_model`). The drives compensate
+90 % of the friction. In TORQUE a joint torque loop hides the inertia of the rotors, so that the commanded torque is
+the one behind the gear; in POSITION the rotors are accelerated along with the links.
+
+What a drive adds to the compensation is limited. The manual's torque figure is that of a torque command, and a drive
+must be able to do more: with the rated load, gravity of the stretched arm alone exceeds it, and the manual's
+accelerations need up to 3.9 times of it. The arm does not touch itself: the controller judges positions.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rcilab.core.arrays import Array, JointVector, scalar, sealed
+from rcilab.core.safety_box import SafetyBox
+from rcilab.core.spatial import Pose
+from rcilab.model.dynamics.payload import Payload
+from rcilab.model.robot_model import RobotModel
+from rcilab.robots.mjcf import ARMATURE_PER_TORQUE, DAMPING_PER_TORQUE, TIMESTEP, build_mjcf
+from rcilab.sim.mujoco_obstacles import Obstacles
+from rcilab.sim.plant import Drive, Measurement, Setpoint
+from rcilab.sim.push import Push
+
+BANDWIDTH = 80.0  # [rad/s] of the position servo, critically damped; a choice, about 13 Hz
+KP, KD = BANDWIDTH**2, 2.0 * BANDWIDTH  # [1/s^2], [1/s]
+FRICTION_KNOWN = 0.9  # Share of the friction that the drives compensate; no drive knows it exactly.
+PEAK_TORQUE = 4.0  # Times the manual's torque limit, what a drive adds at most; a choice, see above
+END_STOP = math.radians(10.0)  # [rad] of the end stops beyond the manual's joint range; a choice: room to come to rest
+BRAKE_TIME = 0.02  # [s] time constant of the brakes; a choice
+
+_KP, _KD, _STEP = scalar(KP), scalar(KD), scalar(TIMESTEP)
+_BACK, _AHEAD = scalar(KP * TIMESTEP), scalar(1.0 - KD * TIMESTEP)  # [1/s], [1]
+_BRAKES_HOLD = 1e-4  # [rad/s] below this closed brakes hold
+_STILL_SPEED = 1e-7  # [rad/s] below this a resting arm is said to rest
+_STILL_ERROR = 1e-9  # [rad] nearer than this to its setpoint a resting arm is said to be there
+_STILL_CYCLES = 100  # Cycles of stillness after which an arm that something keeps off its setpoint rests where it is.
+
+_log = logging.getLogger("rcilab.makers.rokae.controller")
+
+
+class MuJoCoPlant:
+    """An arm with mass, friction and limited torque, among things it can bump into.
+
+    Args:
+        model: The arm with its tool and load.
+        friction: Times the friction of the joints; 0 for an arm without any.
+    """
+
+    kind = "mujoco"
+
+    def __init__(self, model: RobotModel, *, friction: float = 1.0) -> None:
+        self._share_of_friction = friction
+        self._mounted: Payload | None = None
+        self._obstacles = Obstacles()
+        self._build(model)
+        self._push = Push(model, np.zeros(6))
+        self._measurement = self.reset(model.home)
+
+    def configure(self, model: RobotModel) -> None:
+        """Takes a new tool or load; the arm stays where it is, at rest."""
+        q = self._measurement.q
+        self._build(model)
+        self._push = self._push.on(model)
+        self.reset(q)
+
+    def mount(self, load: Payload | None) -> None:
+        """Fixes a payload to the flange that the controller need not know of; None: the one that setLoad says."""
+        q, dq = self._q.copy(), self._dq.copy()
+        self._mounted = load
+        self._build(self._robot)
+        self._q[:], self._dq[:] = q, dq
+        self._mj.mj_step1(self._model, self._data)
+        self._rests = False
+
+    def reset(self, q: JointVector) -> Measurement:
+        """Puts the arm at `q`, shape (n,), [rad], at rest."""
+        self._mj.mj_resetData(self._model, self._data)
+        return self._come_to_rest(np.asarray(q).tolist())
+
+    def push(self, wrench: ArrayLike, link: int | None = None, point: ArrayLike | None = None) -> None:
+        """Lets something outside press on the arm until told otherwise; see `Plant.push`."""
+        self._push = Push(self._robot, wrench, link, point)
+        self._rests = False
+
+    def place_box(self, name: str, size: ArrayLike, pose: Pose) -> None:
+        """Puts a solid box into the arm's way, or moves it; see `Plant.place_box`."""
+        self._obstacles.place_box(name, size, pose, self._data)
+        self._rests = False
+
+    def remove_box(self, name: str) -> None:
+        """Takes a box away; see `Plant.remove_box`."""
+        self._obstacles.remove_box(name)
+        self._rests = False
+
+    def set_floor(self, on: bool) -> None:
+        """Lets the floor, the plane z = 0 of the base frame, be solid or not."""
+        self._obstacles.set_floor(on)
+        self._rests = False
+
+    def set_walls(self, box: SafetyBox | None) -> None:
+        """Lets the faces of a safety box be solid walls for the links; None takes them away."""
+        self._obstacles.set_walls(box)
+        self._rests = False
+
+    def step(self, setpoint: Setpoint) -> Measurement:
+        """Lives through one millisecond with torques that try to be at the setpoint at its end."""
+        if self._rests and self._keeps_resting(setpoint):
+            return self._measurement
+        self._rests = False
+        mj, model, data = self._mj, self._model, self._data
+        self._let_rotors_be_felt(setpoint.drive is not Drive.TORQUE)
+        dq, bias = self._dq.copy(), self._bias.copy()
+        drive_torque = self._drive_torque(setpoint)
+        np.minimum(drive_torque, self._peak, out=drive_torque)  # np.clip takes three times as long as both together.
+        np.maximum(drive_torque, self._trough, out=drive_torque)
+        compensated = self._robot.rigid_body.gravity(self._q) if setpoint.drive is Drive.TORQUE else bias
+        motor = drive_torque + compensated + self._known_friction * dq
+        self._applied[:] = motor
+        if self._push.is_active:
+            self._applied += self._push_torque()
+        mj.mj_step2(model, data)
+        mj.mj_step1(model, data)  # Forces and contacts of the place it has come to.
+        # What is left of the motor torque behind rotor and friction, brought to the end of the millisecond.
+        loss = self._friction * self._dq
+        if self._rotors_are_felt:
+            loss += self._rotors * ((self._dq - dq) / _STEP)
+        self._measurement = self._measure(motor - loss + (self._bias - bias))
+        self._settle(setpoint)
+        return self._measurement
+
+    def _drive_torque(self, setpoint: Setpoint) -> Array:
+        """Returns what the drives add to their compensation, shape (n,), [N m]."""
+        q, dq = self._q, self._dq
+        if setpoint.drive is Drive.TORQUE:
+            return np.zeros(self._n) if setpoint.tau is None else np.array(setpoint.tau, dtype=np.float64)
+        if setpoint.drive is Drive.BRAKED:
+            return self._times_inertia(dq * (-1.0 / BRAKE_TIME)) - self._push_torque()
+        # The setpoint is where the arm is to be at the end of this millisecond; q and dq are those of its beginning:
+        # ddq_c + KD (dq_c - h ddq_c - dq) + KP (q_c - h dq_c - q), with the two steps back taken out of the brackets.
+        q_c, dq_c, ddq_c = setpoint.as_arrays()
+        return self._times_inertia(_KP * (q_c - q) + _KD * (dq_c - dq) - _BACK * dq_c + _AHEAD * ddq_c)
+
+    def _push_torque(self) -> Array | float:
+        """Returns what presses from outside as joint torques, shape (n,), [N m]; 0 where nothing does."""
+        return self._push.torque(self._q) if self._push.is_active else 0.0
+
+    def _settle(self, setpoint: Setpoint) -> None:
+        """Lets an arm that has come to rest be at rest: its last 1e-7 rad/s would otherwise never end."""
+        speeds: list[float] = self._dq.tolist()
+        speed = max(map(abs, speeds))
+        if setpoint.drive is Drive.BRAKED:
+            if speed < _BRAKES_HOLD:
+                self._come_to_rest(self._q.tolist())
+            return
+        if speed > _STILL_SPEED or setpoint.drive is Drive.TORQUE or any(setpoint.dq) or any(setpoint.ddq):
+            self._still_for = 0
+            return
+        self._still_for += 1
+        if not self._push.is_active and self._data.nefc == 0:  # Neither contact nor joint limit.
+            if np.abs(self._q - setpoint.q).max() < _STILL_ERROR:
+                self._come_to_rest(list(setpoint.q))
+        elif self._still_for > _STILL_CYCLES:
+            self._dq[:] = 0.0
+            self._measurement = self._measure(self._measurement.tau)
+            self._rests, self._rest_q = True, list(setpoint.q)
+
+    def _come_to_rest(self, q: Sequence[float]) -> Measurement:
+        self._q[:] = q
+        self._dq[:] = 0.0
+        self._mj.mj_step1(self._model, self._data)
+        self._measurement = self._measure(self._bias - self._push_torque())
+        self._rests, self._rest_q = True, q
+        return self._measurement
+
+    def _keeps_resting(self, setpoint: Setpoint) -> bool:
+        if setpoint.drive is Drive.BRAKED:
+            return True
+        stays = setpoint.drive is Drive.POSITION and not any(setpoint.dq) and not any(setpoint.ddq)
+        return stays and list(setpoint.q) == self._rest_q
+
+    def _measure(self, tau: Array) -> Measurement:
+        n, rows = self._n, sealed(np.concatenate((self._q, self._dq, tau)))  # One copy for all three.
+        return Measurement(rows[:n], rows[n : 2 * n], rows[2 * n :])
+
+    def _let_rotors_be_felt(self, are_felt: bool) -> None:
+        if are_felt is not self._rotors_are_felt:
+            self._rotors_are_felt = are_felt
+            self._armature[:] = self._rotors if are_felt else 0.0
+            self._mj.mj_step1(self._model, self._data)
+
+    def _times_inertia(self, ddq: Array) -> Array:
+        self._mj.mj_mulM(self._model, self._data, self._product, ddq)
+        return self._product.copy()
+
+    def _build(self, model: RobotModel) -> None:
+        import mujoco  # pyright: ignore[reportMissingTypeStubs]
+
+        mj: Any = mujoco
+        mj.set_mju_user_warning(_pass_on)  # Else MuJoCo would write a file into the user's directory.
+        load = model.load if self._mounted is None else self._mounted
+        spec: Any = mj.MjSpec.from_string(build_mjcf(model.description, T_flange_tool=model.T_flange_tool, load=load))
+        self._obstacles.add_to(spec, mj)
+        self._mj, self._robot, self._n = mj, model, model.n
+        self._model: Any = spec.compile()
+        self._obstacles.install(self._model, mj)
+        self._model.dof_damping *= self._share_of_friction
+        self._model.jnt_range[: self._n] += [-END_STOP, END_STOP]
+        self._data: Any = mj.MjData(self._model)
+        self._q: Array = self._data.qpos  # These are windows into MuJoCo's memory, not copies.
+        self._dq: Array = self._data.qvel
+        self._bias: Array = self._data.qfrc_bias
+        self._applied: Array = self._data.qfrc_applied
+        self._armature: Array = self._model.dof_armature
+        torque = model.limits.joint.torque
+        self._peak: Array = PEAK_TORQUE * torque
+        self._trough = -self._peak
+        self._rotors: Array = ARMATURE_PER_TORQUE * torque
+        self._friction: Array = self._share_of_friction * DAMPING_PER_TORQUE * torque
+        self._known_friction = FRICTION_KNOWN * self._friction
+        self._product = np.zeros(model.n)
+        self._rotors_are_felt = True
+        self._still_for = 0
+
+
+def _pass_on(warning: str) -> None:
+    """Takes what MuJoCo finds odd about a simulation; it says each thing once an arm."""
+    _log.warning("MuJoCo: %s", warning)

@@ -1,0 +1,16 @@
+"""Which plants there are, by the name they are chosen by."""
+
+from __future__ import annotations
+
+from rcilab.model.robot_model import RobotModel
+from rcilab.sim.ideal_plant import IdealPlant
+from rcilab.sim.plant import Plant
+
+
+def build_plant(kind: str, model: RobotModel) -> Plant:
+    """Returns the arm that a controller moves: "mujoco", or the ideal one."""
+    if kind == "mujoco":
+        from rcilab.sim.mujoco_plant import MuJoCoPlant
+
+        return MuJoCoPlant(model)
+    return IdealPlant(model)

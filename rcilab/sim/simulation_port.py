@@ -1,0 +1,157 @@
+"""The world port: a second listener, on loopback, through which things happen to the virtual robot from outside.
+
+For the user who started the controller; other accounts of the machine are refused. A guest that says nothing may stay
+until somebody else wants its place. Lines of JSON, see `rcilab.sim.api`. Whoever sends a line that is no
+request gets one line that says why and is cut off, so that a web page's POST gets nowhere: its first line already is
+none, and what follows is not looked at.
+"""
+
+from __future__ import annotations
+
+import ipaddress
+import socket
+import time
+from collections.abc import Callable, Sequence
+
+from rcilab.core.errors import DecodeError, UsageError
+from rcilab.sim.api import (
+    LineReader,
+    Refused,
+    WorldAnswer,
+    WorldRequest,
+    decode_world_request,
+    encode_world_answer,
+)
+from rcilab.sim.peer_user import is_ours
+
+MOST_GUESTS = 8  # At once; a choice. One script and one page need two.
+IDLE = 60.0  # [s] A choice: a guest that has been silent for so long gives its place to the next one.
+_FALLBACK = "127.0.0.1"  # For a controller that listens on an address which others can reach.
+_BYTES_AT_ONCE = 4096
+
+
+class WorldPort:
+    """Owns the listener and its connections. Never waits; owned by the thread that runs the controller.
+
+    Args:
+        host: Address of the controller; the world port is there, too, if that is a loopback address.
+        port: TCP port; 0 takes any free one.
+        handle: Carries a request out.
+        clock: Returns the time, [s].
+
+    Raises:
+        UsageError: The port cannot be used.
+    """
+
+    def __init__(
+        self,
+        host: str,
+        port: int,
+        handle: Callable[[WorldRequest], WorldAnswer],
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._handle, self._clock = handle, clock
+        self._listener = _listen(host if ipaddress.ip_address(host).is_loopback else _FALLBACK, port)
+        self._guests: dict[socket.socket, LineReader] = {}
+        self._heard: dict[socket.socket, float] = {}  # When each guest has said something last, [s].
+        self.sockets: Sequence[socket.socket] = (self._listener,)
+        """What to watch; another object whenever it changes."""
+
+    @property
+    def address(self) -> tuple[str, int]:
+        """Where it listens."""
+        host, port = self._listener.getsockname()
+        return host, port
+
+    def serve(self, readable: Sequence[socket.socket]) -> None:
+        """Reads from these sockets and carries out what they ask for."""
+        for sock in readable:
+            if sock is self._listener:
+                self._accept()
+            elif sock in self._guests:
+                self._read(sock)
+
+    def close(self) -> None:
+        """Closes every socket."""
+        for sock in (*self._guests, self._listener):
+            sock.close()
+        self._guests.clear()
+        self.sockets = ()
+
+    def _accept(self) -> None:
+        try:
+            guest, _ = self._listener.accept()
+        except OSError:  # It was gone before we looked.
+            return
+        if len(self._guests) >= MOST_GUESTS:
+            self._drop_idle()
+        if len(self._guests) >= MOST_GUESTS:
+            guest.close()
+            return
+        guest.setblocking(False)
+        guest.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._guests[guest], self._heard[guest] = LineReader(), self._clock()
+        if not is_ours(guest):
+            if self._answer(guest, Refused("this world port is for the user who started the controller"), 0):
+                self._drop(guest)
+            return
+        self.sockets = (self._listener, *self._guests)
+
+    def _read(self, guest: socket.socket) -> None:
+        try:
+            data = guest.recv(_BYTES_AT_ONCE)
+        except BlockingIOError:
+            return
+        except OSError:
+            data = b""
+        if not data:
+            self._drop(guest)
+            return
+        self._heard[guest] = self._clock()
+        try:
+            for line in self._guests[guest].feed(data):
+                request_id, request = decode_world_request(line)
+                answer = request if isinstance(request, Refused) else self._handle(request)
+                if not self._answer(guest, answer, request_id):
+                    return
+        except DecodeError as error:
+            if self._answer(guest, Refused(str(error)), 0):
+                self._drop(guest)
+
+    def _answer(self, guest: socket.socket, answer: WorldAnswer, request_id: int) -> bool:
+        """Returns whether the guest is still there."""
+        line = encode_world_answer(answer, request_id)
+        try:
+            is_sent = guest.send(line) == len(line)
+        except OSError:
+            is_sent = False
+        if not is_sent:  # It is gone, or does not read its answers.
+            self._drop(guest)
+        return is_sent
+
+    def _drop_idle(self) -> None:
+        """Lets go of the guest that has been silent the longest, if that was long."""
+        guest = min(self._heard, key=self._heard.__getitem__)
+        if self._clock() - self._heard[guest] > IDLE:
+            self._drop(guest)
+
+    def _drop(self, guest: socket.socket) -> None:
+        guest.close()
+        del self._guests[guest], self._heard[guest]
+        self.sockets = (self._listener, *self._guests)
+
+
+def _listen(host: str, port: int) -> socket.socket:
+    listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    try:
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.bind((host, port))
+        listener.listen(MOST_GUESTS)
+        listener.setblocking(False)
+    except OSError as error:
+        listener.close()
+        raise UsageError(
+            f"the world port {port} on {host} cannot be used ({error.strerror}); choose another with --world-port N "
+            "(0 takes any free one), or none with --no-world"
+        ) from error
+    return listener

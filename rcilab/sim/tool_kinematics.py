@@ -1,0 +1,99 @@
+"""How the tool and the elbow move when the joints do: pose, twist, acceleration and arm angle, one update a cycle."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from rcilab.core.arrays import Matrix
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.errors import SingularError
+from rcilab.core.spatial import Pose
+from rcilab.model.dynamics.rigid_body import ToolTerms, Twist
+from rcilab.model.kinematics.arm_angle import arm_angle
+from rcilab.model.kinematics.inverse import build_geometry
+from rcilab.model.robot_model import RobotModel
+
+_REST: Twist = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+class ToolMotion:
+    """Follows one motion of the joints, commanded or measured. Owned by the controller's cycle.
+
+    The arm angle is undefined where shoulder and wrist are one above the other or the arm is stretched: there its last
+    value stays, and at first 0. On 6-axis arms it is 0.
+
+    Attributes:
+        matrix: Pose of the tool in base as a homogeneous transform, shape (4, 4), [m].
+        twist: Its velocity in base axes, linear first, [m/s, rad/s]: Jacobian times joint velocity.
+        acceleration: The twist's backward difference over one cycle, [m/s^2, rad/s^2].
+        psi: Arm angle, [rad].
+        dpsi: Its backward difference over one cycle, the short way round, [rad/s].
+        ddpsi: The second, [rad/s^2].
+
+    Args:
+        model: The arm with its tool.
+        q: Where it rests, n plain floats, [rad].
+    """
+
+    def __init__(self, model: RobotModel, q: Sequence[float]) -> None:
+        self._body = model.rigid_body
+        self._geometry = build_geometry(model.description)
+        self._terms: ToolTerms
+        self.matrix: Matrix
+        self.twist = self.acceleration = _REST
+        self.psi = self.dpsi = self.ddpsi = 0.0
+        self.place(q)
+
+    @property
+    def pose(self) -> Pose:
+        """Pose of the tool in base; made when somebody asks for it."""
+        return self._terms.pose
+
+    @property
+    def position(self) -> list[float]:
+        """Where the tool is in base, 3 plain floats, [m]."""
+        return self.matrix[:3, 3].tolist()
+
+    @property
+    def is_at_rest(self) -> bool:
+        """Whether nothing would change if the joints stayed where they are."""
+        return not (any(self.twist) or any(self.acceleration) or self.dpsi or self.ddpsi)
+
+    def place(self, q: Sequence[float]) -> None:
+        """Puts the arm somewhere, at rest."""
+        self._terms = self._body.tool_motion(np.array(q), np.zeros(len(q)))
+        self.matrix = self._terms.matrix
+        self.twist = self.acceleration = _REST
+        self.psi, self.dpsi, self.ddpsi = self._arm_angle(q), 0.0, 0.0
+
+    def update(self, q: Sequence[float], motion: ToolTerms) -> None:
+        """Takes the joints of this cycle, n plain floats, [rad], and how the tool moves with them."""
+        h = CYCLE_TIME
+        self._terms, self.matrix, twist = motion, motion.matrix, motion.twist
+        a, b, c, d, e, f = twist
+        p, r, s, t, u, v = self.twist
+        self.acceleration = ((a - p) / h, (b - r) / h, (c - s) / h, (d - t) / h, (e - u) / h, (f - v) / h)
+        self.twist = twist
+        psi = self._arm_angle(q)
+        dpsi = math.remainder(psi - self.psi, math.tau) / h
+        self.psi, self.dpsi, self.ddpsi = psi, dpsi, (dpsi - self.dpsi) / h
+
+    def observe(self, q: Sequence[float], motion: ToolTerms) -> None:
+        """Takes what `coincide` would, from joints that were measured: nobody asks for the differences of those."""
+        self._terms, self.matrix, self.twist = motion, motion.matrix, motion.twist
+        self.psi = self._arm_angle(q)
+
+    def coincide(self, other: ToolMotion) -> None:
+        """Takes over where another one is: the arm is exactly where it was told to be."""
+        self._terms, self.matrix, self.twist, self.psi = other._terms, other.matrix, other.twist, other.psi
+
+    def _arm_angle(self, q: Sequence[float]) -> float:
+        if self._geometry.n != 7:
+            return 0.0
+        try:
+            return arm_angle(self._geometry.upper, self._geometry.fore, q)
+        except SingularError:
+            return self.psi

@@ -1,0 +1,54 @@
+"""Where the arm is: the angles that its controller measures, and the tool, beside the goal that sliders show."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rcilab.workbench.text import Text
+from rcilab.workbench.widgets import Ask, Html, esc, shown_pose
+
+if TYPE_CHECKING:
+    from rcilab.control_process import SupervisorStatus
+    from rcilab.model.robot_model import RobotModel
+    from rcilab.workbench.store import UiState
+
+_PERIOD = 0.2  # [s] A choice: numbers that change faster cannot be read.
+
+
+class ArmNowPanel:
+    """A group of the Jog tab and of the Run tab."""
+
+    def __init__(self, text: Text, ask: Ask) -> None:
+        self._text = text
+        self._shown = float("-inf")
+
+    def build(self, gui: Any, state: UiState) -> None:
+        """Adds the numbers."""
+        with gui.add_folder(self._text("arm.now")):
+            self._numbers = Html(gui)
+
+    def show(self, state: UiState, status: SupervisorStatus) -> None:
+        """Follows the arm."""
+        if time.monotonic() - self._shown >= _PERIOD:
+            self._shown = time.monotonic()
+            self._numbers.show(arm_html(state.model, status.q, self._text))
+
+
+def arm_html(model: RobotModel, q: np.ndarray | None, text: Text) -> str:
+    """Returns joint angles and tool pose in the units of the page.
+
+    Args:
+        model: The arm.
+        q: Measured, [rad], shape (n,); None, or of another arm, while no states arrive.
+        text: Words and units.
+    """
+    if q is None or len(q) != model.n:
+        return f'<p class="rl-note">{esc(text("arm.unknown"))}</p>'
+    heads = "".join(f"<th>J{joint + 1}</th>" for joint in range(model.n))
+    cells = "".join(f"<td>{text.unit('deg').restate(f'{angle + 0.0:.1f}')}</td>" for angle in np.degrees(q).round(1))
+    x, y, z, roll, pitch, yaw = (f"{float(number):.1f}" for number in shown_pose(model.forward(q)))
+    tool = text("arm.tool", x=x, y=y, z=z, roll=roll, pitch=pitch, yaw=yaw)
+    return f'<table class="rl-table rl-even"><tr>{heads}</tr><tr>{cells}</tr></table><p class="rl-note">{esc(tool)}</p>'

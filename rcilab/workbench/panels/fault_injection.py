@@ -1,0 +1,112 @@
+"""Lab: what happens to our own controller from outside: its safety buttons, and a network that can be spoiled."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from rcilab.control_process.status_messages import tell_success
+from rcilab.core.faults import name_faults
+from rcilab.i18n.error_messages import tell_note
+from rcilab.sim.api import DIRECTIONS
+from rcilab.workbench import requests
+from rcilab.workbench.run.driving import NETWORK_LAB, is_ours
+from rcilab.workbench.text import Text
+from rcilab.workbench.widgets import Ask, Html, Linked, esc, on_press
+
+if TYPE_CHECKING:
+    from rcilab.control_process import SupervisorStatus
+    from rcilab.workbench.store import UiState
+
+_SCALE = {"%": 100.0, "ms": 1000.0}
+_BUTTONS: tuple[tuple[Any, str, str], ...] = (
+    ("estop", "hand-stop", "red"),
+    ("gstop", "door", "orange"),
+    ("none", "lock-open", "blue"),
+)
+
+
+class LabPanel:
+    """Two groups of the Run tab; for a controller that is not ours they say why they do nothing."""
+
+    def __init__(self, text: Text, ask: Ask) -> None:
+        self._text, self._ask = text, ask
+
+    def build(self, gui: Any, state: UiState) -> None:
+        """Adds the controls."""
+        text, ask = self._text, self._ask
+        self._buttons: dict[str, Any] = {}
+        with gui.add_folder(text("safety.title"), expand_by_default=False):
+            gui.add_html('<i class="rl-buttons"></i>')
+            for name, icon, color in _BUTTONS:
+                button = gui.add_button(
+                    text(f"safety.{name}"), icon=icon, color=color, hint=text(f"safety.{name}_hint")
+                )
+                on_press(button, ask, lambda page, name=name: requests.PressSafety(page=page, button=name))
+                self._buttons[name] = button
+            self._button = Html(gui)
+        with gui.add_folder(text("network.title"), expand_by_default=False):
+            self._note = Html(gui)
+            self._sliders: dict[str, Linked] = {}
+            for name, (largest, unit) in NETWORK_LAB.items():
+                scale = _SCALE[unit]
+                slider = gui.add_slider(text(f"network.{name}"), 0.0, largest * scale, 0.5, 0.0)
+                self._sliders[name] = Linked(slider, ask, _set(name, scale))
+            names = {text(f"network.{way}"): way for way in DIRECTIONS}
+            self._ways = {way: label for label, way in names.items()}
+            way = gui.add_dropdown(text("network.way"), tuple(names), hint=text("network.way_hint"))
+            self._way = Linked(way, ask, lambda v, p: requests.SetNetwork(page=p, direction=names.get(v)))
+            self._pull = gui.add_button(text("network.pull"), icon="plug-connected-x", color="red")
+            on_press(self._pull, ask, lambda page: requests.SetNetwork(page=page, pulled=True))
+            self._plug = gui.add_button(text("network.plug"), icon="plug-connected", color="blue")
+            on_press(self._plug, ask, lambda page: requests.SetNetwork(page=page, pulled=False))
+            clear = gui.add_button(text("network.clear"), icon="restore", color="gray")
+            on_press(clear, ask, lambda page: requests.SetNetwork(page=page, clear=True))
+            self._noticed = Html(gui)
+
+    def show(self, state: UiState, status: SupervisorStatus) -> None:
+        """Follows our own controller."""
+        text, drive, ours = self._text, state.drive, is_ours(status)
+        world = drive.world
+        pressed = "none" if world is None else world.button
+        for name, button in self._buttons.items():
+            button.disabled = not ours or name == pressed
+        nobody = text("world.nobody") if status.phase == "closed" else text("world.not_ours", address=status.target)
+        said = text(f"safety.{pressed}_is") if ours else nobody
+        tone = "good" if ours and pressed == "none" else "warn"
+        self._button.show(f'<p class="rl-verdict rl-{tone}">{esc(said)}</p>')
+        for name, slider in self._sliders.items():
+            slider.show(round(getattr(drive.network, name) * _SCALE[NETWORK_LAB[name][1]], 3))
+            slider.handle.disabled = not ours or drive.pulled
+        self._way.show(self._ways[drive.direction])
+        self._way.handle.disabled = not ours or drive.pulled
+        self._pull.visible, self._plug.visible = not drive.pulled, drive.pulled
+        self._pull.disabled = self._plug.disabled = not ours
+        note = text("network.note") if ours else nobody
+        self._note.show(f'<p class="rl-note">{esc(note)}</p>')
+        self._noticed.show(noticed_html(state, status, text) if ours else "")
+
+
+def noticed_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
+    """Returns what the client and the controller each notice of the network."""
+    world = state.drive.world
+    faults = name_faults(status.faults) or text("bar.none")
+    rows = [
+        ("client_rate", f"{status.rate_hz:.0f} Hz"),
+        ("client_lost", f"{status.lost_cycles}"),
+        ("client_success", text.say(tell_success(status))),
+        ("controller_lost", "—" if world is None else f"{world.lost}"),
+        ("controller_ignored", "—" if world is None else f"{world.ignored}"),
+        ("controller_faults", faults),
+    ]
+    if world is not None and world.reason and status.faults:
+        rows.append(("controller_reason", text.tell(tell_note(world.reason))))
+    return f'<table class="rl-table rl-facts-table">{"".join(_row(*row, text) for row in rows)}</table>'
+
+
+def _row(name: str, value: str, text: Text) -> str:
+    told = f"<th>{esc(text(f'network.{name}'))}</th><td>{esc(value)}</td>"
+    return f'<tr title="{esc(text(f"network.{name}_help"))}">{told}</tr>'
+
+
+def _set(name: str, scale: float):  # type: ignore[no-untyped-def]
+    return lambda value, page: requests.SetNetwork(page=page, name=name, value=float(value) / scale)

@@ -1,0 +1,70 @@
+"""Plan there: joint by joint, along a line or an arc; how fast, and by which law."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from rcilab.app.planning import LAWS, PATH_KINDS
+from rcilab.workbench import requests
+from rcilab.workbench.panels.jog import problems_html
+from rcilab.workbench.panels.target import planned_html
+from rcilab.workbench.text import Text
+from rcilab.workbench.widgets import Ask, Html, Linked, NumberField, esc, on_press, shown
+
+if TYPE_CHECKING:
+    from rcilab.control_process import SupervisorStatus
+    from rcilab.workbench.store import UiState
+
+
+class WayPanel:
+    """The motion from where the arm is to the goal."""
+
+    def __init__(self, text: Text, ask: Ask) -> None:
+        self._text, self._ask = text, ask
+
+    def build(self, gui: Any, state: UiState) -> None:
+        """Adds the controls."""
+        text, ask = self._text, self._ask
+        with gui.add_folder(text("target.motion")):
+            ways = {text(f"way.{kind}"): kind for kind in PATH_KINDS}
+            self._ways = {kind: label for label, kind in ways.items()}
+            way = gui.add_dropdown(text("target.way"), tuple(ways), hint=text("target.way_hint"))
+            self._way = Linked(way, ask, lambda v, p: requests.SetWay(page=p, kind=ways.get(v)))
+            self._via = gui.add_button(text("target.via"), icon="map-pin-plus", color="gray", visible=False)
+            on_press(self._via, ask, lambda page: requests.SetWay(page=page, via=True))
+            self._note = Html(gui)
+            with gui.add_folder(text("target.speed")):
+                gui.add_html('<i class="rl-rows"></i>')
+                speed = gui.add_slider("%", 1, 100, 1, 50, hint=text("target.speed_hint"))
+                self._speed = Linked(speed, ask, lambda v, p: requests.SetSpeed(page=p, speed=v / 100.0))
+                self._field = NumberField(gui.add_text("", "", hint=text("target.speed_hint")), ask, "speed")
+            laws = {text(f"law.{law}"): law for law in LAWS}
+            self._laws = {law: label for label, law in laws.items()}
+            law = gui.add_dropdown(text("target.law"), tuple(laws))
+            gui.add_html(f'<p class="rl-note">{esc(text("target.law_hint"))}</p>')  # A tooltip would cover the list.
+            self._law = Linked(law, ask, lambda v, p: requests.SetLaw(page=p, law=laws.get(v, "")))
+            self._plan = gui.add_button(text("target.plan"), icon="route", hint=text("target.plan_hint"))
+            on_press(self._plan, ask, lambda page: requests.Plan(page=page))
+            self._problem, self._planned = Html(gui), Html(gui)
+
+    def show(self, state: UiState, status: SupervisorStatus) -> None:
+        """Follows the choices and the plan."""
+        text = self._text
+        self._way.show(self._ways[state.way])
+        self._via.visible = state.way == "arc"
+        self._note.show(_note_html(state, text))
+        self._speed.show(round(state.speed * 100.0))
+        self._field.show(shown(state.speed * 100.0), state.problems.get("speed"), state.entered)
+        self._problem.show(problems_html(state, text, [("speed", text("target.speed"))]))
+        self._law.show(self._laws[state.law])
+        self._planned.show(planned_html(state, text))
+
+
+def _note_html(state: UiState, text: Text) -> str:
+    """Returns what an arc leads over."""
+    if state.way != "arc":
+        return ""
+    if state.via is None:
+        return f'<p class="rl-note rl-why">{esc(text("target.via_none"))}</p>'
+    x, y, z = (f"{1000.0 * float(number):.0f}" for number in state.via.position)
+    return f'<p class="rl-note">{esc(text("target.via_at", x=x, y=y, z=z))}</p>'

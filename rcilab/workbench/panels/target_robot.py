@@ -1,0 +1,107 @@
+"""Where motions go: nowhere (preview), the virtual controller with an ideal arm or with MuJoCo, or an address."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from rcilab.workbench import requests
+from rcilab.workbench.run.driving import DESTINATIONS, destination
+from rcilab.workbench.run.readiness import is_moving
+from rcilab.workbench.status_text import phase_code, tell_status
+from rcilab.workbench.text import Text
+from rcilab.workbench.widgets import Ask, Html, Linked, PageText, esc, on_press
+
+if TYPE_CHECKING:
+    from rcilab.control_process import SupervisorStatus
+    from rcilab.workbench.store import UiState
+
+_TONES = {
+    "idle": "good",
+    "moving": "good",
+    "stopping": "warn",
+    "starting": "warn",
+    "connecting": "warn",
+    "closed": "warn",
+}
+
+
+class WherePanel:
+    """A group of the Run tab. An address is named once more before anything is sent there."""
+
+    def __init__(self, text: Text, ask: Ask) -> None:
+        self._text, self._ask = text, ask
+        self._picked: str | None = None  # "an address", before there is one.
+        self._asked = ""  # The address that the question is about.
+
+    def build(self, gui: Any, state: UiState) -> None:
+        """Adds the controls."""
+        text, ask = self._text, self._ask
+        with gui.add_folder(text("run.where"), order=0.0):  # First of its tab, whoever built before.
+            self._where = Html(gui)
+            names = {text(f"destination.{name}"): name for name in DESTINATIONS}
+            self._names = {name: label for label, name in names.items()}
+            first = state.plant if state.target == "virtual" else "address"
+            choice = gui.add_dropdown(
+                text("destination.title"), tuple(names), initial_value=self._names[first], hint=text("destination.hint")
+            )
+            self._choice = Linked(choice, ask, lambda v, p: self._pick(names.get(v, ""), p))
+            box = gui.add_text(text("run.address"), _address_of(state), hint=text("run.address_hint"))
+            self._address = PageText(box)
+            self._connect = gui.add_button(text("run.connect"), icon="plug-connected", color="gray")
+            on_press(self._connect, ask, lambda page: _choose(page, "address", self._address.of(page)))
+
+            @box.on_update
+            async def _(event: Any) -> None:
+                if self._asked and event.target.value.strip() != self._asked:
+                    ask(_choose(event.client_id, "address", answer="no"))
+
+            self._question = Html(gui)
+            self._yes = gui.add_button(text("destination.yes"), icon="plug-connected", color="red", visible=False)
+            on_press(self._yes, ask, lambda page: _choose(page, "address", self._address.of(page), "yes"))
+            self._no = gui.add_button(text("destination.no"), color="gray", visible=False)
+            on_press(self._no, ask, lambda page: _choose(page, "address", answer="no"))
+            self._again = gui.add_button(text("destination.again"), icon="refresh", color="gray", visible=False)
+            on_press(self._again, ask, lambda page: requests.ChooseRobot(page=page, target="virtual"))
+            self._leave = gui.add_button(text("destination.leave"), icon="plug-connected-x", color="gray")
+            on_press(self._leave, ask, lambda page: _choose(page, "preview"))
+
+    def show(self, state: UiState, status: SupervisorStatus) -> None:
+        """Follows the connection."""
+        text, moving, where = self._text, is_moving(status), destination(state, status)
+        if where != "preview" or self._picked != "address":
+            self._picked = self._picked if self._picked == "address" else None
+        self._choice.show(self._names[self._picked or where])
+        self._choice.handle.disabled = self._connect.disabled = moving
+        is_address = (self._picked or where) == "address"
+        if self._address.show(state.lease, _address_of(state)) and state.drive.typed_address:
+            self._ask(_choose(None, "address", answer="no"))  # Who asked has the controls no more.
+        self._address.handle.visible = self._connect.visible = is_address
+        asked = self._asked = state.drive.typed_address
+        said = "" if not asked else esc(text("destination.ask", address=asked, model=state.model.name))
+        self._question.show(said and f'<p class="rl-verdict rl-warn" role="alert">{said}</p>')
+        self._yes.visible = self._no.visible = bool(asked)
+        self._again.visible = where in ("ideal", "mujoco") and status.phase in ("lost", "crashed")
+        self._leave.disabled = moving or where == "preview"
+        tone = _TONES.get(status.phase, "bad")
+        name = text("destination.preview") if where == "preview" else text(f"where.{where}")
+        name = state.target if where == "address" else name
+        address = f'<br><span class="rl-dim">{esc(status.address)}</span>' if status.address else ""
+        note = (
+            text.say(tell_status(status)) if tone == "bad" else text("destination.note") if where == "preview" else ""
+        )
+        self._where.show(
+            f'<p class="rl-verdict rl-{tone}"><b>{esc(name)}</b> {esc(text(phase_code(status)))}{address}</p>'
+            + (f'<p class="rl-note">{esc(note)}</p>' if note else "")
+        )
+
+    def _pick(self, name: str, page: int | None) -> requests.Request | None:
+        self._picked = "address" if name == "address" else None
+        return None if name in ("", "address") else _choose(page, name)
+
+
+def _address_of(state: UiState) -> str:
+    return state.target if state.target != "virtual" else ""
+
+
+def _choose(page: int | None, where: str, address: str = "", answer: Any = "") -> requests.Request:
+    return requests.ChooseDestination(page=page, where=where, address=address, answer=answer)

@@ -1,0 +1,241 @@
+"""At once, but at most thirty times a second: lets stage, panels and bar show what of state and robot has changed."""
+
+from __future__ import annotations
+
+import threading
+import time
+from typing import TYPE_CHECKING, Any
+
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.views.viser_ext.persistent_tab import LastingTab
+from rcilab.workbench.failures import Failures
+from rcilab.workbench.learn.state import exhibited
+from rcilab.workbench.live import LiveChannel
+from rcilab.workbench.page import dress
+from rcilab.workbench.panels import Panel
+from rcilab.workbench.panels.arm_state import ArmNowPanel
+from rcilab.workbench.panels.branches import BranchesPanel
+from rcilab.workbench.panels.check import CheckPanel
+from rcilab.workbench.panels.elbow import ElbowPanel
+from rcilab.workbench.panels.extras import ExtrasPanel
+from rcilab.workbench.panels.fault_injection import LabPanel
+from rcilab.workbench.panels.health import HealthPanel
+from rcilab.workbench.panels.jog import JogPanel
+from rcilab.workbench.panels.learn import LearnPanel
+from rcilab.workbench.panels.learn_exhibit import LearnExhibitPanel
+from rcilab.workbench.panels.learn_lesson import LearnLessonPanel
+from rcilab.workbench.panels.mode import ModePanel
+from rcilab.workbench.panels.path_type import WayPanel
+from rcilab.workbench.panels.poses import PosesPanel
+from rcilab.workbench.panels.program import ProgramPanel
+from rcilab.workbench.panels.program_file import ProgramFilePanel
+from rcilab.workbench.panels.push import PushPanel
+from rcilab.workbench.panels.recording import RecordingPanel
+from rcilab.workbench.panels.run import RunPanel
+from rcilab.workbench.panels.runs_folder import RunsFolderPanel
+from rcilab.workbench.panels.settings import SettingsPanel
+from rcilab.workbench.panels.setup import SetupPanel
+from rcilab.workbench.panels.setup_numbers import SetupNumbersPanel
+from rcilab.workbench.panels.signals import SignalsPanel
+from rcilab.workbench.panels.soft_limits import SoftLimitsPanel
+from rcilab.workbench.panels.status import status_values
+from rcilab.workbench.panels.target import TargetPanel
+from rcilab.workbench.panels.target_robot import WherePanel
+from rcilab.workbench.panels.timeline import TimelinePanel
+from rcilab.workbench.panels.tool_jog import ToolJogPanel
+from rcilab.workbench.panels.waypoint import WaypointPanel
+from rcilab.workbench.program.waypoint_markers import ProgramMarks
+from rcilab.workbench.run.played import moment_played
+from rcilab.workbench.scene.stage import Stage
+from rcilab.workbench.session import Session
+from rcilab.workbench.store import Store
+from rcilab.workbench.text import Text
+from rcilab.workbench.widgets import Ask
+
+if TYPE_CHECKING:
+    import viser
+
+    from rcilab.control_process import SupervisorStatus
+    from rcilab.workbench.store import UiState
+
+_PERIOD = 1.0 / 30.0  # [s] A choice: the display's rate is enough, and it leaves the processor to the robot.
+_AT_REST = 0.25  # [s] A choice: so often counters and clocks are shown while nothing else changes.
+_READ = 0.25
+"""[s] A choice: where the scene is drawn lightly and a hand drags the goal in it, numbers and plots come so long after
+the arm: a page that draws in software shows the arm once it has applied all that came with it."""
+_MAIN_WIDTH, _TIMELINE_WIDTH = 352, 380  # [px]
+_TABS = (
+    ("tab.jog", "adjustments-horizontal", JogPanel, ToolJogPanel, ArmNowPanel, PosesPanel),
+    ("tab.target", "current-location", TargetPanel, ElbowPanel, BranchesPanel, WayPanel),
+    ("tab.program", "list-numbers", ProgramPanel, WaypointPanel, ProgramFilePanel),
+    ("tab.setup", "tool", SetupPanel, SetupNumbersPanel, SoftLimitsPanel),
+    ("tab.check", "clipboard-check", CheckPanel),
+    (
+        "tab.run",
+        "player-play",
+        RunPanel,
+        ArmNowPanel,
+        RecordingPanel,
+        WherePanel,
+        ModePanel,
+        PushPanel,
+        SignalsPanel,
+        LabPanel,
+        HealthPanel,
+    ),
+    ("tab.learn", "school", LearnLessonPanel, LearnPanel, LearnExhibitPanel),
+    ("tab.settings", "settings", SettingsPanel, ExtrasPanel, RunsFolderPanel),
+)
+
+
+def tab_name(index: int) -> str:
+    """Returns the key of a tab's label, counted from 0; "" where there is none."""
+    return _TABS[index][0] if index < len(_TABS) else ""
+
+
+class Presenter:
+    """Owns every handle of the page. It reads snapshots and knows no sockets.
+
+    Args:
+        server: The page.
+        store: Where the state is.
+        session: Where the robot is.
+        live: The bar.
+        ask: Takes requests.
+    """
+
+    def __init__(self, server: viser.ViserServer, store: Store, session: Session, live: LiveChannel, ask: Ask) -> None:
+        self._server, self._store, self._session, self._live, self._ask = server, store, session, live, ask
+        self._stage = Stage(server, ask)
+        self._marks = ProgramMarks(server)
+        self._text = Text(store.state.language, store.state.units)
+        self._panels: list[Panel] = []
+        self._tabs: list[LastingTab] = []  # Of the main panel, then that of the timeline's window.
+        self._built: tuple[object, ...] | None = None
+        self._theme = ""
+        self._shown: tuple[object, ...] = ()
+        self._next = 0.0
+        self._goal: object = None
+        self._owed: float | None = None  # [s] Since when the panels show another goal.
+        self._told: tuple[object, ...] = ()
+        self._ending = threading.Event()
+        self._thread: threading.Thread | None = None
+        self.errors = Failures()
+        """Failures of our own code; one a second at most is printed."""
+
+    def start(self) -> None:
+        """Draws once, then goes on in a thread of its own."""
+        self.show()
+        self._thread = threading.Thread(target=self._run, name="presenter", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Ends the thread."""
+        self._ending.set()
+        if self._thread is not None:
+            self._thread.join(5.0)
+
+    def place_at(self, share: float) -> float:
+        """Returns the place in the motion, 0 to 1, that stands at a part of the plots' time axis."""
+        state = exhibited(self._store.state)
+        if state.plan is None:
+            return 0.0
+        return moment_played(state, share * self._timeline.end) / max(state.plan.motion.duration, CYCLE_TIME)
+
+    def show(self) -> bool:
+        """Shows one snapshot, and returns whether there was anything to show; like the last it costs nothing."""
+        state, status = self._store.state, self._session.status()
+        shown, now = (state, *_traits(status)), time.monotonic()
+        if shown == self._shown and now < self._next:
+            return False
+        is_whole = self._draw(state, status)
+        self._shown, self._next = shown, now + (_AT_REST if is_whole else _PERIOD)
+        return True
+
+    def _draw(self, state: UiState, status: SupervisorStatus) -> bool:
+        """Shows a snapshot, first what is in the scene: a hand may be dragging it. Returns whether that was all."""
+        if _looks(state) != self._built:
+            with self._server.atomic():  # In one piece: a wake of viser's loop a message doubles the time it takes.
+                self._build(state)
+        if state.theme != self._theme:
+            self._theme = state.theme
+            dress(self._server, state.theme)
+        seen = exhibited(state)
+        self._stage.show(exhibited(state, scene=True), status, self._text)
+        self._marks.show(seen)
+        is_whole = not self._can_wait(state, status)
+        if is_whole:
+            self._show_panels(state, seen, status)
+        self._live.publish(**status_values(seen, status, self._text, self._timeline.end))
+        return is_whole
+
+    def _can_wait(self, state: UiState, status: SupervisorStatus) -> bool:
+        """Returns whether numbers and plots give way to the arm that follows a hand; news of the robot never do."""
+        is_dragged = state.goal is not self._goal and self._stage.is_held
+        if state.quality != "light" or not is_dragged or self._told != _traits(status):
+            return False
+        now = time.monotonic()
+        self._owed = now if self._owed is None else self._owed
+        return now - self._owed < _READ
+
+    def _show_panels(self, state: UiState, seen: UiState, status: SupervisorStatus) -> None:
+        self._goal, self._told, self._owed = state.goal, _traits(status), None
+        for panel in self._panels:
+            panel.show(seen if panel is self._timeline else state, status)
+
+    def _build(self, state: UiState) -> None:
+        """Makes the panels anew: another language or unit has other words, another arm other joints."""
+        gui: Any = self._server.gui  # Icons are plain strings here, which viser's types do not allow.
+        if not self._tabs:
+            self._lay_out(gui)
+        self._text = Text(state.language, state.units)
+        self._built = _looks(state)
+        gui.set_panel_label(self._text("panel.main"))
+        self._panels = []
+        for tab, (label, _, *kinds) in zip(self._tabs, _TABS, strict=False):
+            with tab.filled_anew(self._text(label)):
+                for kind in kinds:
+                    panel = kind(self._text, self._ask)
+                    panel.build(gui, state)
+                    self._panels.append(panel)
+        self._timeline = TimelinePanel(self._text, self._ask)
+        with self._tabs[-1].filled_anew(self._text("panel.timeline")):
+            self._timeline.build(gui, state)
+        self._panels.append(self._timeline)
+
+    def _lay_out(self, gui: Any) -> None:
+        """Makes the places that panels fill; they stay as people have arranged them."""
+        group, window = gui.add_tab_group(), gui.add_panel()
+        window.dock_left()
+        window.set_width(_TIMELINE_WIDTH)
+        gui.main_panel.dock_right()
+        gui.main_panel.set_width(_MAIN_WIDTH)
+        self._tabs = [LastingTab(group.add_tab, icon) for _, icon, *_ in _TABS]
+        self._tabs.append(LastingTab(window.add_tab, "timeline"))
+
+    def _run(self) -> None:
+        while not self._ending.is_set():
+            self._store.changed.clear()
+            began, has_drawn = time.monotonic(), True
+            try:
+                has_drawn = self.show()
+            except Exception as error:  # A panel that fails must not freeze the others for good.
+                self.errors.report(error)
+            if has_drawn:  # A slow page must not starve others.
+                self._ending.wait(max(0.3 * _PERIOD, began + _PERIOD - time.monotonic()))
+            else:
+                self._store.changed.wait(_PERIOD)
+
+
+def _traits(status: SupervisorStatus) -> tuple[object, ...]:
+    """Returns what of the robot side is shown at once when it changes; the rest counts up all the time."""
+    q, q_c = ((None if angles is None else angles.tobytes()) for angles in (status.q, status.q_c))
+    return (
+        status.phase, status.code, status.message, status.incident, status.address, status.robot_mode, status.faults,
+        status.powered, status.T_flange_tool, status.setup, status.pace, q, q_c,
+    )  # fmt: skip
+
+
+def _looks(state: UiState) -> tuple[object, ...]:
+    """Returns what the panels are built for."""
+    return state.language, state.units, state.model.name

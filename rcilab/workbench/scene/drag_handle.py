@@ -1,0 +1,88 @@
+"""The mouse's hand on the arm: a drag on a link asks for a pull there; an arrow shows what presses on the arm."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rcilab.views.arm_view import ArmView
+from rcilab.views.viser_scene import ViserScene
+from rcilab.workbench import requests
+from rcilab.workbench.run.active_force import SPRING, TOOL, can_grab
+from rcilab.workbench.text import Text
+from rcilab.workbench.widgets import Ask
+
+if TYPE_CHECKING:
+    import viser
+
+    from rcilab.control_process import SupervisorStatus
+    from rcilab.workbench.store import UiState
+
+_COLOR = (214, 66, 160)  # Magenta: no verdict, no axis and no plan has it.
+
+
+class Grip:
+    """Owned by the stage, and made anew with its arm.
+
+    Args:
+        server: The page.
+        drawing: Where the arm is drawn.
+        arm: The live arm.
+        ask: Takes requests.
+    """
+
+    def __init__(self, server: viser.ViserServer, drawing: ViserScene, arm: ArmView, ask: Ask) -> None:
+        self._drawing, self._arm, self._ask = drawing, arm, ask
+        self._is_on = False
+        self._said = ""
+        nowhere = np.zeros((1, 2, 3), dtype=np.float32)
+        self._arrow: Any = server.scene.add_arrows(
+            "/push", nowhere, _COLOR, shaft_radius=0.008, head_radius=0.022, head_length=0.05, visible=False
+        )
+        self._label: Any = server.scene.add_label(
+            "/push_label", "", anchor="bottom-left", depth_test=False, font_screen_scale=1.0, visible=False
+        )
+
+    def show(self, state: UiState, status: SupervisorStatus, text: Text) -> None:
+        """Takes hold of the arm's meshes or leaves them to the camera, and draws the push of this moment."""
+        wanted = can_grab(state, status)
+        if wanted != self._is_on:
+            self._is_on = wanted
+            for mesh, link in self._arm.link_meshes.items():
+                if wanted:
+                    self._drawing.on_drag(mesh, self._hear(link))
+                else:
+                    self._drawing.ignore_drag(mesh)
+        acting = state.push.acting
+        if self._arrow.visible != (acting is not None):
+            self._arrow.visible = self._label.visible = acting is not None
+        if acting is None:
+            return
+        end = acting.start + acting.force / SPRING
+        self._arrow.points = np.array([[acting.start, end]], dtype=np.float32)
+        self._label.position = end
+        where = text("push.tool") if acting.link == TOOL else text("push.link", number=acting.link)
+        said = text("push.label", newtons=f"{float(np.linalg.norm(acting.force)):.0f}", where=where)
+        if said != self._said:
+            self._said = said
+            self._label.text = said
+
+    def remove(self) -> None:
+        """Takes the arrow away; the arm's meshes go with the arm."""
+        self._arrow.remove()
+        self._label.remove()
+
+    def _hear(self, link: int) -> Any:
+        async def act(event: Any) -> None:
+            self._ask(
+                requests.PullArm(
+                    page=event.client_id,
+                    link=link,
+                    grabbed=tuple(map(float, event.start_position)),
+                    hand=tuple(map(float, event.end_position)),
+                    phase=event.phase,
+                )
+            )
+
+        return act

@@ -1,0 +1,127 @@
+"""The target in the scene: its handles, and the verdict of the inverse beside it."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rcilab.workbench import requests
+from rcilab.workbench.scene.configuration_view import hides_target
+from rcilab.workbench.text import Text
+from rcilab.workbench.widgets import HAND_AWAY, Ask
+
+if TYPE_CHECKING:
+    import viser
+
+    from rcilab.workbench.store import UiState
+
+TONE_COLORS = {"good": (38, 166, 91), "warn": (240, 150, 20), "bad": (214, 48, 38)}
+_VIA_COLOR = (11, 111, 194)
+_GIZMO_SCALE = 0.26  # [m]
+
+
+class GoalStage:
+    """Owned by the stage, and made anew with its arm.
+
+    Args:
+        server: The page.
+        state: Where the target is at first.
+        ask: Takes requests.
+    """
+
+    def __init__(self, server: viser.ViserServer, state: UiState, ask: Ask) -> None:
+        pose, scene = state.goal.target, server.scene
+        self._tone = self._said = ""
+        self._via: object = None
+        self._target: object = None
+        self._touched = float("-inf")
+        self._gizmo: Any = scene.add_transform_controls(
+            "/target", scale=_GIZMO_SCALE, line_width=3.0, depth_test=False, wxyz=pose.wxyz, position=pose.position
+        )
+        self._mark: Any = scene.add_icosphere(
+            "/mark", radius=0.075, color=TONE_COLORS["good"], opacity=0.4, cast_shadow=False, receive_shadow=False,
+            position=pose.position,
+        )  # fmt: skip
+        self._label: Any = scene.add_label(
+            "/verdict", "", position=_below(pose.position), anchor="top-center", depth_test=False,
+            font_screen_scale=1.0,
+        )  # fmt: skip
+        self._via_mark: Any = scene.add_icosphere(
+            "/via", radius=0.018, color=_VIA_COLOR, cast_shadow=False, receive_shadow=False, visible=False
+        )
+        self._via_label: Any = scene.add_label(
+            "/via_label", "", anchor="bottom-center", depth_test=False, font_screen_scale=1.0, visible=False
+        )
+
+        @self._gizmo.on_update
+        async def _(event: Any) -> None:
+            self._touched = time.monotonic()
+            ask(
+                requests.MoveTarget(
+                    page=event.client_id,
+                    position=tuple(map(float, event.target.position)),
+                    wxyz=tuple(map(float, event.target.wxyz)),
+                    ended=event.phase == "end",
+                )
+            )
+
+    @property
+    def is_held(self) -> bool:
+        """Whether a hand moves the handles, or has just let go of them."""
+        return time.monotonic() - self._touched <= HAND_AWAY
+
+    @property
+    def handles(self) -> tuple[str, ...]:
+        """The nodes that a hand can move just now."""
+        return (self._gizmo.name,) if self._gizmo.visible else ()
+
+    def show(self, state: UiState, text: Text) -> None:
+        """Follows the goal, unless a hand is moving the handles."""
+        goal = state.goal
+        away = hides_target(state)
+        if self._gizmo.visible == away:
+            self._gizmo.visible = self._mark.visible = self._label.visible = not away
+        if not self.is_held:
+            position, wxyz = goal.target.position, goal.target.wxyz
+            if np.abs(np.asarray(self._gizmo.position) - position).max() > 1e-7:
+                self._gizmo.position = position
+            if 1.0 - abs(float(np.asarray(self._gizmo.wxyz) @ wxyz)) > 1e-12:
+                self._gizmo.wxyz = wxyz
+        if goal.target is not self._target:
+            self._target = goal.target
+            self._label.position = _below(goal.target.position)
+            self._mark.position = goal.target.position
+        if goal.reach.tone != self._tone:
+            self._tone = goal.reach.tone
+            self._mark.color = TONE_COLORS[self._tone]
+        tone, reason = goal.reach.tone, text.say(goal.reach.reason)
+        said = text("reach.label") if tone == "good" else f"{text('reach.tone.' + tone)} {reason}"
+        said = text("target.handles", verdict=said)
+        if said != self._said:
+            self._said = said
+            self._label.text = said
+        self._show_via(state, text)
+
+    def remove(self) -> None:
+        """Takes everything of it out of the scene."""
+        for handle in (self._gizmo, self._mark, self._label, self._via_mark, self._via_label):
+            handle.remove()
+
+    def _show_via(self, state: UiState, text: Text) -> None:
+        via, said = state.via if state.way == "arc" else None, text("target.via_label")
+        if said != self._via_label.text:
+            self._via_label.text = said
+        if via is self._via:
+            return
+        self._via = via
+        self._via_mark.visible = self._via_label.visible = via is not None
+        if via is not None:
+            self._via_mark.position = self._via_label.position = via.position
+
+
+def _below(position: np.ndarray) -> tuple[float, float, float]:
+    """Returns a place clear of the handles, and of the wrist, which is above most of the time."""
+    x, y, z = (float(number) for number in position)
+    return x, y, z - 1.1 * _GIZMO_SCALE

@@ -1,0 +1,109 @@
+"""The planned path in the scene, coloured by how much of its limits it uses, with a bead at each violation."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rcilab.app.planning import PATH_POINTS
+from rcilab.views.usage_colors import usage_colors
+from rcilab.views.viser_scene import ViserScene
+from rcilab.workbench import requests
+from rcilab.workbench.check.freshness import outdated
+from rcilab.workbench.scene.path_strip import Bead, Ribbon
+from rcilab.workbench.text import Text
+from rcilab.workbench.widgets import Ask
+
+if TYPE_CHECKING:
+    import viser
+
+    from rcilab.workbench.store import UiState
+
+_NAMED = 5
+"""Beads with words beside them; the others say theirs when they are clicked. A choice."""
+_BEAD = np.array([(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1.35), (0, 0, -1.35)]) * 0.024  # [m]
+_BEAD_FACES = np.array(
+    [(0, 2, 4), (2, 1, 4), (1, 3, 4), (3, 0, 4), (2, 0, 5), (1, 2, 5), (3, 1, 5), (0, 3, 5)]
+)  # fmt: skip
+_BEAD_COLOR = (200, 16, 24)
+_THICK = 0.011  # [m]
+
+
+class RibbonStage:
+    """Owned by the stage, and made anew with its arm.
+
+    Args:
+        server: The page.
+        drawing: Where to draw.
+        ask: Takes requests.
+    """
+
+    def __init__(self, server: viser.ViserServer, drawing: ViserScene, ask: Ask) -> None:
+        self._scene, self._drawing, self._ask = server.scene, drawing, ask
+        self._drawn: tuple[Ribbon | None, str, bool] = (None, "", False)
+        self._beads = 0
+        self._labels: list[Any] = []
+        # There from the beginning: a page that renders in software can take seconds to mount a line that comes later.
+        drawing.add_segments("/path", np.zeros((PATH_POINTS - 1, 2, 3)), color=_BEAD_COLOR, thickness=_THICK)
+        drawing.set_visible("/path", False)
+
+    def show(self, state: UiState, text: Text) -> None:
+        """Draws the path of the newest plan."""
+        ribbon = state.scene.ribbon if state.plan is not None else None
+        is_old = state.learn.show is None and outdated(state) is not None  # What was broken may be kept by now.
+        wanted = (ribbon, text.language, is_old)
+        if wanted[0] is self._drawn[0] and wanted[1:] == self._drawn[1:]:
+            return
+        self._drawn = wanted
+        if ribbon is not None:
+            colors = usage_colors(ribbon.usage)
+            ends = np.stack([ribbon.path[:-1], ribbon.path[1:]], axis=1)
+            shades = np.repeat(colors[:-1, None], 2, axis=1)
+            self._drawing.add_segments("/path", ends, color=shades, thickness=_THICK)
+        self._drawing.set_visible("/path", ribbon is not None)
+        self._exchange_beads(() if ribbon is None or is_old else ribbon.beads, text)
+
+    def remove(self) -> None:
+        """Takes path and beads away."""
+        self._exchange_beads((), None)
+        self._drawing.remove("/path")
+
+    def _exchange_beads(self, beads: tuple[Bead, ...], text: Text | None) -> None:
+        for number in range(self._beads):
+            self._drawing.remove(f"/bead{number}")
+        for label in self._labels:
+            label.remove()
+        self._labels, self._beads = [], len(beads)
+        for number, bead in enumerate(beads):
+            name = f"/bead{number}"
+            self._drawing.add_mesh(name, _BEAD, _BEAD_FACES, color=_BEAD_COLOR)
+            self._drawing.set_transform(name, position=bead.position.tolist())
+            self._drawing.on_click(name, self._hear(number))
+            if number < _NAMED and text is not None:
+                x, y, z = (float(value) for value in bead.position)
+                self._labels.append(
+                    self._scene.add_label(
+                        f"/bead_label{number}",
+                        bead_words(bead, text),
+                        position=(x, y, z + 0.045),
+                        anchor="bottom-left",
+                        depth_test=False,
+                        font_screen_scale=0.85,
+                    )
+                )
+
+    def _hear(self, number: int) -> Any:
+        async def act(event: Any) -> None:
+            self._ask(requests.ShowBead(page=event.client_id, number=number))
+
+        return act
+
+
+def bead_words(bead: Bead, text: Text) -> str:
+    """Returns what is broken there, of which joint and when, in a few words."""
+    worst = bead.violations[0]
+    joint = f" J{worst.joint}" if worst.joint else ""
+    more = f" +{len(bead.violations) - 1}" if len(bead.violations) > 1 else ""
+    broken = text("scene.broken", condition=text("condition." + worst.condition.id))
+    return f"◆ {broken}{joint} · {worst.worst_time:.2f} s{more}"

@@ -1,0 +1,185 @@
+"""Copies of the fork server: what they are handed, how they end, and what becomes of them without it."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from contextlib import ExitStack
+
+import pytest
+
+from rcilab.control_process.forked import fork_server
+from rcilab.control_process.launch import Child, start_controller
+from rcilab.core.errors import ConnectionLostError
+from tests.control_process.test_supervisor import wait_for
+
+SOON = 20.0
+
+
+@pytest.fixture
+def run():
+    """Runs a line of Python in a copy; the standard library's stopwatch takes it, and does so once."""
+    with ExitStack() as afterwards:
+
+        def begin(line: str, **options) -> Child:
+            child = Child("timeit", ["-n", "1", "-r", "1", line], "a line of Python", **options)
+            afterwards.callback(child.end)
+            return child
+
+        yield begin
+
+
+def test_a_copy_has_its_own_session_name_output_and_is_our_fork_servers_child(run):
+    child = run("import os, sys; print(os.getppid(), os.getsid(0) == os.getpid()); print('oh', file=sys.stderr)")
+    assert child.wait(SOON)
+    assert child.how_it_ended == "exit code 0"
+    assert child.read_output().startswith(f"{fork_server().pid} True\n")
+    assert child.last_words == "oh"
+    with open("/proc/self/comm", encoding="ascii") as ours:
+        assert ours.read() != "rcilab timeit\n"
+
+
+def test_a_copy_is_called_after_what_it_runs(run):
+    assert run("print(open('/proc/self/comm').read())").wait(SOON)
+    child = run("print(open('/proc/self/comm').read())")
+    assert child.wait(SOON)
+    assert child.read_output().startswith("rcilab timeit\n")
+
+
+def test_a_copy_works_in_our_environment_and_folder_as_they_are_now(run, monkeypatch, tmp_path):
+    fork_server()
+    monkeypatch.setenv("OF_TODAY", "gr\udcfcn")  # No UTF-8, as a path may be.
+    monkeypatch.delenv("HOME", raising=False)
+    monkeypatch.chdir(tmp_path)
+    child = run("import os; print(ascii(os.environ['OF_TODAY']), 'HOME' in os.environ, os.getcwd())")
+    assert child.wait(SOON)
+    assert child.read_output().splitlines()[0] == rf"'gr\udcfcn' False {tmp_path}"
+
+
+def test_a_copy_is_handed_the_files_that_belong_to_it_under_their_numbers_and_no_other(run):
+    reader, writer = os.pipe()
+    try:
+        open_ones = "[n for n in range(999) if os.path.exists(f'/dev/fd/{n}')]"
+        child = run(f"import os; print(os.write({writer}, b'hello'), {open_ones})", descriptors=[writer])
+        assert child.wait(SOON)
+        assert child.read_output().splitlines()[0] == f"5 {sorted([0, 1, 2, writer])}"
+        assert os.read(reader, 100) == b"hello"
+    finally:
+        os.close(reader)
+        os.close(writer)
+
+
+@pytest.mark.parametrize(
+    ("line", "how"),
+    [
+        ("import os; os._exit(3)", "exit code 3"),
+        ("1 / 0", "exit code 1"),
+        ("import os; os.kill(os.getpid(), 9)", "signal 9 (SIGKILL)"),
+        ("import os; os.abort()", "signal 6 (SIGABRT)"),
+    ],
+)
+def test_it_is_known_how_a_copy_ended(run, line, how):
+    child = run(line)
+    assert child.wait(SOON)
+    assert child.how_it_ended == how
+    child.end()
+    assert child.how_it_ended == how
+    assert not child.is_alive
+
+
+def test_what_goes_wrong_in_a_copy_is_in_its_last_words(run):
+    child = run("1 / 0")
+    assert child.wait(SOON)
+    assert child.last_words.endswith("ZeroDivisionError: division by zero")
+    with pytest.raises(ConnectionLostError, match=r"did not start \(exit code 2\): rcilab: unknown robot 'none'"):
+        start_controller("none")
+
+
+def test_a_copy_is_asked_to_end_even_before_it_exists(run):
+    child = run("import time; time.sleep(60.0)")
+    child.end(timeout=SOON)
+    assert child.how_it_ended == "signal 15 (SIGTERM)"
+
+
+def test_a_fork_server_that_does_not_answer_is_replaced(run):
+    stuck = fork_server()
+    os.kill(stuck.pid, signal.SIGSTOP)
+    child = run("pass")
+    assert not child.wait(0.1)
+    assert child.pid is None
+    child.end(timeout=0.1)
+    assert not child.is_alive
+    assert child.how_it_ended == "nobody saw how"
+    assert run("pass").wait(SOON)
+    assert fork_server().pid != stuck.pid
+
+
+def test_without_their_fork_server_copies_end_and_the_next_one_has_another():
+    controller = start_controller("xMatePro7")
+    try:
+        first = fork_server().pid
+        os.kill(first, signal.SIGKILL)
+        assert controller.wait(SOON)
+        assert controller.how_it_ended == "nobody saw how"
+        following = start_controller("xMatePro7")
+        following.end()
+        assert following.how_it_ended == "exit code 0"
+        assert fork_server().pid != first
+    finally:
+        controller.end()
+
+
+FORK = """
+import os
+from rcilab.control_process.forked import fork_server
+from rcilab.control_process.launch import start_controller
+controller = start_controller("xMatePro7")
+pid = os.fork()
+if pid == 0:
+    ours = fork_server().pid
+    start_controller("xMatePro7").end()
+    os._exit(ours == controller.pid)
+ended = os.waitpid(pid, 0)[1]
+print(ended, controller.is_alive)
+controller.end()
+print(controller.how_it_ended)
+"""
+
+
+def test_a_fork_of_this_process_has_a_fork_server_of_its_own_and_leaves_ours_alone():
+    done = subprocess.run([sys.executable, "-c", FORK], capture_output=True, text=True, check=True, timeout=60.0)
+    assert done.stdout.split("\n") == ["0 True", "exit code 0", ""]
+
+
+def test_many_come_and_go_at_once_and_no_file_stays_open(run):
+    run("pass").wait(SOON)
+    before = set(os.listdir("/proc/self/fd"))
+    children = [run(f"import os; os._exit({number})") for number in range(20)]
+    for number, child in enumerate(children):
+        assert child.wait(SOON)
+        assert child.how_it_ended == f"exit code {number}"
+        child.end()
+    assert set(os.listdir("/proc/self/fd")) <= before
+    server = f"/proc/{fork_server().pid}/fd"
+    wait_for(lambda: len(os.listdir(server)) < 10)
+
+
+LAST = """
+import atexit
+
+def finish():
+    print(controller.is_alive)
+    controller.end()
+
+atexit.register(finish)  # What is registered first is called last.
+from rcilab.control_process.launch import start_controller
+controller = start_controller("xMatePro7")
+"""
+
+
+def test_at_the_interpreters_end_there_are_no_complaints_and_what_is_done_last_still_has_its_processes():
+    command = [sys.executable, "-X", "dev", "-c", LAST]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60.0)
+    assert (done.stdout, done.stderr) == ("True\n", "")

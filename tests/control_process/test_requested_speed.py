@@ -1,0 +1,64 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from rcilab.control_process import SupervisorStatus
+from rcilab.control_process.requested_speed import PaceWish, tell_pace_refusal
+from rcilab.core.errors import ConnectionLostError, PlanningError
+
+IDLE = SupervisorStatus(phase="idle", code="idle")
+MOVING = SupervisorStatus(phase="moving", code="moving", motion_duration=3.0, pace=1.0)
+HELD = replace(MOVING, code="moving.held", pace=0.0)
+
+
+def due(wish: PaceWish, status: SupervisorStatus, *, is_under_way: bool = False) -> float | None:
+    return wish.due(status, is_under_way=is_under_way)
+
+
+def test_of_many_wishes_only_the_newest_is_handed_over_and_only_once() -> None:
+    wish = PaceWish()
+    for pace in (0.9, 0.5, 0.3):
+        wish.choose(pace, MOVING)
+    assert due(wish, MOVING, is_under_way=True) is None
+    assert due(wish, MOVING) == 0.3
+    assert due(wish, MOVING) is None
+
+
+def test_what_is_chosen_while_nothing_moves_is_no_wish_of_the_next_motion() -> None:
+    wish = PaceWish()
+    wish.choose(0.4, IDLE)
+    assert due(wish, IDLE) is None
+    assert due(wish, MOVING) is None, "it begins at the pace it is executed with"
+    wish.choose(0.4, MOVING)
+    assert due(wish, replace(MOVING, pace=0.4)) is None
+
+
+def test_a_held_motion_keeps_waiting_while_the_pace_is_chosen() -> None:
+    wish = PaceWish()
+    wish.hold()
+    assert due(wish, MOVING) == 0.0
+    wish.choose(0.5, HELD)
+    assert due(wish, HELD) is None
+    wish.go_on(0.5)
+    assert due(wish, HELD) == 0.5
+
+
+@pytest.mark.parametrize("status", [IDLE, replace(MOVING, motion_duration=None)])
+def test_nothing_is_asked_of_an_arm_that_no_motion_moves(status: SupervisorStatus) -> None:
+    wish = PaceWish()
+    wish.hold()
+    assert due(wish, status) is None
+    assert due(wish, MOVING) is None, "what was wanted before is forgotten"
+
+
+def test_a_refusal_says_what_cannot_be_and_nothing_once_the_motion_is_over() -> None:
+    def code(error: PlanningError | ConnectionLostError, pace: float, status: SupervisorStatus) -> str | None:
+        told = tell_pace_refusal(error, pace, status)
+        return None if told is None else told.code
+
+    assert code(PlanningError("no"), 0.0, MOVING) == "pace.no_pause"
+    assert code(PlanningError("no"), 0.5, MOVING) == "pace.no_change"
+    assert code(ConnectionLostError("late"), 0.5, HELD) == "pace.late"
+    assert code(ConnectionLostError("late"), 0.5, IDLE) is None

@@ -1,0 +1,278 @@
+"""The shared block and what lives in it."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import struct
+import subprocess
+import sys
+import threading
+from pathlib import Path
+from random import Random
+
+import numpy as np
+import pytest
+
+from rcilab.control_process import jitter_histogram as lateness
+from rcilab.control_process.error_codec import pack_failure, unpack_failure
+from rcilab.control_process.jitter_histogram import LatenessHistogram, summarise
+from rcilab.control_process.layout import MAIL_SIZE, MAIL_SLOTS, RING_CYCLES, VERSION, ControlBlock, Word
+from rcilab.control_process.message_ring import Mailbox
+from rcilab.control_process.ring import RingReader
+from rcilab.control_process.settings import build_settings, parse_settings
+from rcilab.control_process.snapshot import Snapshot, read_snapshot, write_snapshot
+from rcilab.core.command import JointPosition
+from rcilab.core.cycle_log import cycle_dtype
+from rcilab.core.errors import ConnectionLostError, ControlError, UsageError, VersionMismatchError
+from rcilab.core.faults import Fault
+from rcilab.core.spatial import Pose
+from rcilab.execution.recorder import CycleLog, Recorder
+from rcilab.makers.rokae import wire as rci
+from rcilab.model.robot_model import load_model
+
+
+@pytest.fixture
+def block():
+    block = ControlBlock.create(7, {"arm": "seven joints"})
+    yield block
+    block.close()
+
+
+def requests_of(block: ControlBlock) -> Mailbox:
+    return Mailbox(block.requests, block.words, Word.REQUESTS_POSTED, Word.REQUESTS_TAKEN)
+
+
+def write_rows(recorder: Recorder, block: ControlBlock, count: int) -> None:
+    zeros = [0.0] * 7
+    for _ in range(count):
+        k = recorder.count
+        recorder.write(k, k * 1e-3, k, k, 0.0, 1.0, [float(k)] * 7, zeros, zeros, zeros, 0, 0, (1, 5, 0))
+        block.words[Word.CYCLES] = recorder.count
+
+
+def test_the_other_side_sees_the_same_block(block):
+    other = ControlBlock(os.dup(block.descriptor))
+    block.words[Word.STOPS_ASKED] = 41
+    block.motion[2] = range(7)
+    assert other.n == 7
+    assert other.settings == {"arm": "seven joints"}
+    assert other.words[Word.STOPS_ASKED] == 41
+    assert other.motion[2].tolist() == list(range(7))
+    other.close()
+
+
+@pytest.mark.parametrize(
+    ("place", "value"), [(0, b"X"), (8, struct.pack("<I", VERSION + 1)), (12, struct.pack("<I", 6))]
+)
+def test_another_build_s_block_is_refused(block, place, value):
+    os.pwrite(block.descriptor, value, place)
+    with pytest.raises(VersionMismatchError, match="restart both sides"):
+        ControlBlock(os.dup(block.descriptor))
+
+
+def test_a_file_that_is_no_block_is_refused(tmp_path):
+    (tmp_path / "short").write_bytes(b"RCI")
+    with pytest.raises(VersionMismatchError):
+        ControlBlock(os.open(tmp_path / "short", os.O_RDWR))
+
+
+def test_the_block_has_no_name_that_could_be_left_behind():
+    before = set(Path("/dev/shm").iterdir()) if Path("/dev/shm").is_dir() else set()
+    block = ControlBlock.create(7, {})
+    after = set(Path("/dev/shm").iterdir()) if Path("/dev/shm").is_dir() else set()
+    assert after == before
+    assert os.fstat(block.descriptor).st_nlink == 0
+    block.close()
+
+
+def test_letters_come_out_in_order_and_a_full_box_says_so(block):
+    box = requests_of(block)
+    for number in range(3 * MAIL_SLOTS):
+        box.post({"id": number})
+        assert box.waiting
+        assert box.take() == {"id": number}
+    assert box.take() is None
+    for number in range(MAIL_SLOTS):
+        box.post({"id": number})
+    with pytest.raises(UsageError, match="does not keep up"):
+        box.post({"id": 99})
+    with pytest.raises(UsageError, match="does not fit"):
+        box.post({"id": "x" * MAIL_SIZE})
+
+
+def test_the_ring_is_drained_once_and_in_order(block):
+    recorder, reader = Recorder(7, RING_CYCLES, block.cycles), RingReader(block)
+    assert reader.newest() is None
+    assert len(reader.drain()) == 0
+    write_rows(recorder, block, 100)
+    assert reader.drain()["message_id"].tolist() == list(range(100))
+    write_rows(recorder, block, 5)
+    rows = reader.drain()
+    assert rows["message_id"].tolist() == [100, 101, 102, 103, 104]
+    assert rows["q"][0].tolist() == [100.0] * 7
+    assert reader.newest()["message_id"][0] == 104
+
+
+def test_an_overrun_is_counted_and_what_is_left_is_whole(block):
+    recorder, reader = Recorder(7, RING_CYCLES, block.cycles), RingReader(block)
+    write_rows(recorder, block, RING_CYCLES + 500)
+    rows = reader.drain()
+    first = int(rows["message_id"][0])
+    assert rows["message_id"].tolist() == list(range(first, RING_CYCLES + 500))
+    assert reader.overrun == first == rows["lost"][0]
+    assert first >= 501  # The row that the writer may be writing right now counts as lost, too.
+
+
+def test_a_snapshot_is_never_seen_half_written(block):
+    """One thread writes snapshots whose fields belong together, the other must never see a mixture."""
+    stop = threading.Event()
+
+    def write():
+        k = 0
+        while not stop.is_set():
+            k += 1
+            write_snapshot(
+                block.snapshot, block.words, Snapshot(message=f"{k}", rate_hz=float(k), motion_time=float(k))
+            )
+
+    write_snapshot(block.snapshot, block.words, Snapshot(message="0", rate_hz=0.0, motion_time=0.0))
+    writer = threading.Thread(target=write)
+    writer.start()
+    try:
+        for _ in range(3000):
+            seen = read_snapshot(block.snapshot, block.words)
+            assert float(seen.message) == seen.rate_hz == seen.motion_time
+    finally:
+        stop.set()
+        writer.join()
+
+
+def test_a_snapshot_comes_back_as_it_went_in_and_a_long_message_is_cut_at_a_character(block):
+    snapshot = Snapshot(
+        phase="moving", code="moving", message="臂" * 500, powered=True, is_fifo=True, memory_locked=True
+    )
+    write_snapshot(block.snapshot, block.words, snapshot)
+    seen = read_snapshot(block.snapshot, block.words)
+    assert (seen.phase, seen.code, seen.powered, seen.is_fifo, seen.memory_locked) == (
+        "moving",
+        "moving",
+        True,
+        True,
+        True,
+    )
+    assert seen.message == "臂" * 341
+    assert seen.motion_time is None
+
+
+def test_percentiles_of_the_histogram_are_those_of_the_numbers():
+    rng = np.random.default_rng(5)
+    numbers = 10.0 ** rng.uniform(-5.5, -2.5, 5000)
+    words = memoryview(bytearray(8 * lateness.SIZE)).cast("Q")
+    histogram = LatenessHistogram(words)
+    for number in numbers:
+        histogram.add(float(number))
+    figures = summarise(words)
+    for share, found in ((0.5, figures.p50), (0.99, figures.p99), (0.999, figures.p999)):
+        assert found == pytest.approx(np.quantile(numbers, share) * 1e6, rel=0.07)
+    assert figures.max == pytest.approx(numbers.max() * 1e6, rel=1e-3)
+    assert figures.cycles == figures.histogram.sum() == 5000
+    assert lateness.late_cycles(words) == (numbers > 1e-3).sum()
+    histogram.add(0.0)
+    histogram.add(1e9)
+    assert summarise(words).cycles == 5002
+    histogram.clear()
+    assert summarise(words).cycles == 0
+
+
+def test_settings_survive_the_way_through_json():
+    model = load_model("xMate3", tool=Pose((0.0, 0.0, 0.1)))
+    settings = parse_settings(json.loads(json.dumps(build_settings(model))))
+    assert settings.n == 6
+    assert settings.T_flange_tool.is_close(model.T_flange_tool, 0.0)
+    assert np.array_equal(settings.limits.joint.jerk, model.limits.joint.jerk)
+    assert settings.limits.cartesian == model.limits.cartesian
+
+
+def test_an_error_keeps_its_kind_its_sentence_and_its_faults():
+    error = ControlError("joint 4 was too fast", (Fault.COLLISION,), None)
+    back = unpack_failure(json.loads(json.dumps(pack_failure(error))))
+    assert isinstance(back, ControlError)
+    assert (str(back), back.faults) == ("joint 4 was too fast", (Fault.COLLISION,))
+    assert isinstance(unpack_failure(pack_failure(ConnectionLostError("gone"))), ConnectionLostError)
+    assert "ZeroDivisionError" in str(unpack_failure(pack_failure(ZeroDivisionError("x"))))
+
+
+def test_a_row_takes_what_was_written():
+    recorder = Recorder(6, 4)
+    six = [float(k) for k in range(6)]
+    for number in range(6):
+        recorder.write(number, 0.1, 10, 20, 1e-4, 0.9, six, six, six, six, 1 << 15, 2, (2, 0, 1))
+    row = recorder.last(1)[0]
+    assert cycle_dtype(6) == recorder.rows().dtype
+    assert (row["message_id"], row["t"], row["sent_ns"], row["lost"], row["faults"]) == (5, 0.1, 20, 2, 1 << 15)
+    assert (row["robot_mode"], row["controller_mode"], row["motion_generator_mode"]) == (2, 0, 1)
+    assert row["command"].tolist() == six
+    assert recorder.truncated
+    assert recorder.rows()["message_id"].tolist() == [2, 3, 4, 5]
+
+
+def test_a_row_that_repeats_is_the_row_that_would_have_been_written():
+    random = Random(3)
+    decoder, quick, thorough = rci.StateDecoder(), CycleLog(Recorder(7, 50)), CycleLog(Recorder(7, 50))
+    body = bytearray(rci.STATE_SIZE)
+    number = 0
+    for _ in range(400):
+        if random.random() < 0.2:
+            body[random.randrange(8, rci.STATE.offset("motion_generator_mode"))] = random.randrange(2)
+        if random.random() < 0.02:
+            quick.restart()
+            thorough.restart()
+            number = 0
+        number += random.choice((1, 1, 1, 3))
+        datagram = number.to_bytes(8, "big") + bytes(body[8:])
+        arrived = number * 1_000_000 + random.randrange(400_000)
+        is_moving = random.random() < 0.2
+        answer = (0.1, arrived + 50, JointPosition(q=np.full(7, 0.3))) if is_moving else ()
+        quick.write(decoder.decode(datagram, 7), arrived, *answer)
+        thorough.write(rci.decode_state(datagram, 7), arrived, *answer)
+        assert quick.recorder.last(1).tobytes() == thorough.recorder.last(1).tobytes()
+        assert (quick.lateness, quick.lost_total) == (thorough.lateness, thorough.lost_total)
+
+
+def test_lateness_is_against_the_robot_s_grid_and_forgets_a_slip():
+    def late(arrivals_ms):
+        log, found = CycleLog(Recorder(7, 100)), []
+        for number, arrival in enumerate(arrivals_ms):
+            datagram = number.to_bytes(8, "big") + bytes(rci.STATE_SIZE - 8)
+            log.write(rci.decode_state(datagram, 7), round(arrival * 1e6))
+            found.append(round(log.lateness * 1e3, 6))
+        return found
+
+    assert late([0, 1, 2.3, 3, 4]) == [0, 0, 0.3, 0, 0]
+    assert late([0, 1, 5, 5, 5, 5, 6]) == [0, 0, 3, 2, 1, 0, 0]
+    assert late([0, *range(2, 22)])[-1] == 0  # The controller left a cycle out: its grid has moved.
+
+
+def test_a_state_that_nobody_waited_for_is_recorded_and_tells_nothing_of_lateness():
+    log, found = CycleLog(Recorder(7, 100)), []
+    cycles = (0.0, True), (4.0, False), (4.0, False), (4.0, False), (4.1, True)
+    for number, (arrival, is_awaited) in enumerate(cycles):
+        datagram = number.to_bytes(8, "big") + bytes(rci.STATE_SIZE - 8)
+        log.write(rci.decode_state(datagram, 7), round(arrival * 1e6), is_awaited=is_awaited)
+        found.append(round(log.lateness * 1e3, 6))
+    assert np.array_equal(found, [0, math.nan, math.nan, math.nan, 0.1], equal_nan=True)
+    assert log.recorder.rows()["message_id"].tolist() == [0, 1, 2, 3, 4]
+    assert np.isnan(log.recorder.rows()["lateness"]).tolist() == [False, True, True, True, False]
+    assert log.lost_total == 0
+
+
+def test_the_control_process_imports_nothing_that_draws():
+    code = "import sys, rcilab.control_process.worker; print(' '.join(sorted(m.split('.')[0] for m in sys.modules)))"
+    loaded = set(
+        subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    )
+    assert "rcilab" in loaded
+    banned = {"viser", "meshcat", "yourdfpy", "trimesh", "jupyterlab", "IPython", "ipykernel", "ipywidgets"}
+    assert not loaded & (banned | {"matplotlib", "mujoco", "pinocchio"})

@@ -1,0 +1,183 @@
+"""Files that unpack to far more than they are: refused from their headers in one sentence, taken when it is meant."""
+
+from __future__ import annotations
+
+import io
+import json
+import struct
+import subprocess
+import sys
+import zipfile
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rcilab
+from rcilab.core.errors import InvalidValueError, PlanningError
+from rcilab.core.file_bounds import MOST_ROWS
+from rcilab.motion import Motion, Program, Waypoint
+from rcilab.recording.chunks import encode_block, encode_header
+from rcilab.recording.export import export_run
+from tests.recording.runs import some_run
+
+MODEL = rcilab.load_model("xMatePro7")
+MEMORY = 1_500_000_000  # [bytes] Address space that a reader gets: the libraries take two thirds of it.
+
+
+def recording(path: Path) -> Path:
+    """9 million cycles, zeros, in a few megabytes."""
+    run = some_run()
+    fields = [[name, field[0].base.str, list(field[0].shape)] for name, field in run.cycles.dtype.fields.items()]
+    size = run.cycles.dtype.itemsize
+    head = {"arm": None, "fields": fields, "bytes": size, "realtime": True, "setup": {}, "report": None}
+    rows = 900_000
+    pack, zeros = zlib.compressobj(9), bytes(size * 1000)
+    packed = b"".join(pack.compress(zeros) for _ in range(rows // 1000)) + pack.flush()
+    block = encode_block("CYCL", struct.pack("<I", rows) + packed)
+    path.write_bytes(encode_header() + encode_block("HEAD", json.dumps(head).encode()) + 10 * block)
+    return path
+
+
+def broad(path: Path) -> Path:
+    """A million cycles of 4 kB, zeros: what no version has written fills three quarters of each."""
+    fields = [[name, field[0].base.str, list(field[0].shape)] for name, field in some_run().cycles.dtype.fields.items()]
+    size = some_run().cycles.dtype.itemsize
+    fields = [[name, kind, [shape[0] + 4096 - size] if name == "reserved" else shape] for name, kind, shape in fields]
+    head = {"arm": None, "fields": fields, "bytes": 4096, "realtime": True, "setup": {}, "report": None}
+    rows = 1_000_000
+    pack, zeros = zlib.compressobj(1), bytes(4096 * 1000)
+    packed = b"".join(pack.compress(zeros) for _ in range(rows // 1000)) + pack.flush()
+    block = encode_block("CYCL", struct.pack("<I", rows) + packed)
+    path.write_bytes(encode_header() + encode_block("HEAD", json.dumps(head).encode()) + block)
+    return path
+
+
+def within(path: Path) -> Path:
+    """Coefficients of 0.9 GB, zeros: below what a file may hold, and above what there is room for."""
+    return archive(path, pieces=4_000_000, order=4)
+
+
+def archive(path: Path, pieces: int = 1_300_000, order: int = 18) -> Path:
+    """Coefficients of 1.3 GB, zeros, in 1.3 MB."""
+    motion = rcilab.plan_joint(MODEL, MODEL.home, MODEL.home + 0.1)
+    motion.save(path)
+    parts = dict(np.load(path))
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as file:
+        for name, array in parts.items():
+            with file.open(f"{name}.npy", "w", force_zip64=True) as stream:
+                if name == "coefficients":
+                    np.lib.format.write_array_header_1_0(
+                        stream, {"descr": "<f8", "fortran_order": False, "shape": (pieces, 7, order)}
+                    )
+                    for _ in range(7 * order):
+                        stream.write(bytes(8 * pieces))
+                else:
+                    np.lib.format.write_array(stream, array)
+    return path
+
+
+def header(path: Path) -> Path:
+    """An array that says it has 8 TB, and has none of it."""
+    with zipfile.ZipFile(path, "w") as file, file.open("breaks.npy", "w") as stream:
+        np.lib.format.write_array_header_1_0(stream, {"descr": "<f8", "fortran_order": False, "shape": (10**12,)})
+    return path
+
+
+def slow(path: Path) -> Path:
+    """A sound motion that takes two months."""
+    rcilab.plan_joint(MODEL, MODEL.home, MODEL.home + 0.1).save(path)
+    parts = dict(np.load(path))
+    np.savez(path, **{**parts, "breaks": 1e7 * parts["breaks"]})
+    return path
+
+
+def sparse(path: Path) -> Path:
+    """Two samples, two hours apart."""
+    row = ",".join(f"{angle:.3f}" for angle in MODEL.home)
+    path.write_text(f"0,{row}\n7000,{row}\n")
+    return path
+
+
+def wide(path: Path) -> Path:
+    """One line of 5 million cells."""
+    path.write_text("0," * 5_000_000)
+    return path
+
+
+def tall(path: Path) -> Path:
+    """20 million lines."""
+    path.write_text("0\n" * 20_000_000)
+    return path
+
+
+CHECK = ("check", "--model", "xMatePro7")
+
+
+@pytest.mark.parametrize(
+    ("make", "name", "command", "said"),
+    [
+        (
+            recording,
+            "a.rcirun",
+            ("replay", "--no-browser", "--port", "0"),
+            "9000000 rows of 1 ms are more than 1000000",
+        ),
+        (broad, "a.rcirun", ("replay", "--no-browser", "--port", "0"), "a cycle takes 4096 bytes"),
+        (within, "a.npz", CHECK, "not enough free memory"),
+        (archive, "a.npz", CHECK, "MB, unpacked, are more than 1024.0"),
+        (header, "a.npz", CHECK, "MB, unpacked, are more than 1024.0"),
+        (slow, "a.npz", CHECK, "rows of 1 ms are more than 1000000"),
+        (sparse, "a.csv", CHECK, "7000001 rows of 1 ms are more than 1000000"),
+        (wide, "a.csv", CHECK, "characters are more than a line has"),
+        (tall, "a.csv", CHECK, "rows of 1 ms are more than 1000000"),
+    ],
+)
+def test_a_bomb_is_refused_in_one_sentence_within_the_memory_of_a_small_machine(
+    tmp_path: Path, make: Callable[[Path], Path], name: str, command: tuple[str, ...], said: str
+):
+    file = make(tmp_path / name)
+    limited = f"import resource, runpy, sys; resource.setrlimit(resource.RLIMIT_AS, ({MEMORY}, {MEMORY})); "
+    start = "sys.argv[0] = 'rcilab'; runpy.run_module('rcilab', run_name='__main__')"
+    done = subprocess.run(
+        [sys.executable, "-c", limited + start, command[0], str(file), *command[1:]],
+        capture_output=True, text=True, timeout=120, check=False, env={"OPENBLAS_NUM_THREADS": "1", "PATH": "/usr/bin"},
+    )  # fmt: skip
+    assert done.returncode == 2, done.stderr[-2000:]
+    assert said in done.stderr
+    assert "Traceback" not in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+def test_what_is_meant_is_taken(tmp_path: Path):
+    motion = rcilab.plan_joint(MODEL, MODEL.home, MODEL.home + 0.1)
+    for name in ("a.npz", "a.csv"):
+        motion.save(tmp_path / name)
+        with pytest.raises(InvalidValueError, match=f"max_rows={len(motion)}"):
+            Motion.load(tmp_path / name, max_rows=len(motion) - 1)
+        assert len(Motion.load(tmp_path / name, max_rows=len(motion))) == len(motion)
+    with pytest.raises(InvalidValueError, match="max_rows"):
+        Motion.load_samples(tmp_path / "a.csv", max_rows=len(motion) - 1)
+    run = some_run()
+    (tmp_path / "a.rcirun").write_bytes(export_run(run, ".rcirun"))
+    with pytest.raises(InvalidValueError, match=f"--max-rows {len(run.cycles)}"):
+        rcilab.load_run(tmp_path / "a.rcirun", max_rows=len(run.cycles) - 1)
+    assert len(rcilab.load_run(tmp_path / "a.rcirun", max_rows=max(len(run.cycles), len(run.plan))).cycles) == len(
+        run.cycles
+    )
+
+
+def test_a_program_that_takes_hours_is_refused_before_it_is_judged():
+    there = (Waypoint.joint(MODEL.home + 0.1, dwell=600.0), Waypoint.joint(MODEL.home, dwell=600.0))
+    program = Program(model=MODEL.name, start=MODEL.home, waypoints=there)
+    with pytest.raises(PlanningError, match="take fewer rounds or shorter dwells, or pass max_rows=12"):
+        rcilab.plan_program(MODEL, program)
+    assert rcilab.plan_program(MODEL, program, max_rows=2 * MOST_ROWS).duration > 1200.0
+
+
+@pytest.mark.parametrize("bound", [0, -1, 1.5, True, None, "many"])
+def test_a_bound_that_is_none_is_refused(bound: object):
+    with pytest.raises(InvalidValueError, match="max_rows"):
+        Motion.load(io.BytesIO(b""), max_rows=bound)  # type: ignore[arg-type]

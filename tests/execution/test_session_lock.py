@@ -1,0 +1,75 @@
+"""Whose turn it is on a connection, without one."""
+
+from __future__ import annotations
+
+import threading
+
+import pytest
+
+from rcilab.core.errors import UsageError
+from rcilab.execution.session_lock import Turns
+from tests.waiting import wait_for
+
+
+def test_a_request_waits_for_another_threads_turn() -> None:
+    turns, seen = Turns(lambda: None), []
+
+    def ask() -> None:
+        with turns.take("a question"):
+            seen.append("asked")
+
+    asker = threading.Thread(target=ask)
+    with turns.set_out("a motion"):
+        asker.start()
+        with turns.take("its own question"):  # Who sets out may still ask.
+            assert seen == []
+    asker.join(5.0)
+    assert seen == ["asked"]
+
+
+def test_a_request_is_refused_while_a_motion_runs_in_its_own_thread_too() -> None:
+    turns = Turns(lambda: None)
+    with turns.set_out("a motion"), turns.move():
+        with pytest.raises(UsageError, match="no question meanwhile"), turns.take("question"):
+            pass
+    with turns.take("question"):
+        assert not turns.is_moving
+
+
+def test_a_stop_counts_from_setting_out_on_and_for_one_motion() -> None:
+    turns = Turns(lambda: None)
+    turns.stop("too early")
+    with turns.set_out("a motion"):
+        assert turns.reason_to_stop(0.0) is None
+        turns.stop("now")
+        turns.stop("later")
+        with turns.move():
+            assert turns.reason_to_stop(0.0) == "now"
+    with turns.set_out("the next one"):
+        assert turns.reason_to_stop(0.0) is None
+
+
+def test_a_motion_that_closes_its_own_connection_comes_to_its_end_first() -> None:
+    said: list[str] = []
+    turns = Turns(lambda: said.append("disconnected"))
+    with turns.set_out("a motion"), turns.move():
+        turns.close()
+        assert turns.reason_to_stop(0.0) is not None
+        assert said == []
+    assert said == ["disconnected"]
+    with pytest.raises(UsageError, match="closed"), turns.take("question"):
+        pass
+
+
+def test_another_thread_that_closes_waits_for_the_motion() -> None:
+    said: list[str] = []
+    turns = Turns(lambda: said.append("disconnected"))
+    closer = threading.Thread(target=turns.close)
+    with turns.set_out("a motion"):
+        with turns.move():
+            closer.start()
+            wait_for(lambda: turns.is_closing)
+            assert said == []
+        assert said == ["disconnected"]
+    closer.join(5.0)
+    assert not closer.is_alive()

@@ -1,0 +1,128 @@
+"""Errors in the words of faces: every code has words in both languages, and they survive the way between processes."""
+
+from __future__ import annotations
+
+import ast
+import json
+import pickle
+from collections.abc import Iterator
+from pathlib import Path
+from string import Formatter
+
+import pytest
+
+import rcilab
+from rcilab.control_process.error_codec import pack_failure, unpack_failure
+from rcilab.core.errors import CommandRejectedError, PlanningError, RcilabError, UnreachableError, UsageError
+from rcilab.i18n.error_messages import _ADVISING, tell, tell_note
+from rcilab.i18n.locale import LANGUAGES, load_words
+from rcilab.i18n.translator import Finished, Message, Remark, Text
+from rcilab.makers.rokae.wire import (
+    GuideStatus,
+    RecoveryStatus,
+    SettingStatus,
+    StartStatus,
+    StopStatus,
+)
+
+
+def coded() -> Iterator[tuple[str, set[str | None]]]:
+    """Every code in the source, with the names of the facts it is given; None among them stands for others."""
+    for path in sorted(Path(rcilab.__file__).parent.rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            is_call = isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == "coded"
+            if is_call and node.args and isinstance(code := node.args[0], ast.Constant) and code.value:
+                yield str(code.value), {keyword.arg for keyword in node.keywords}
+
+
+def places(entry: str) -> set[str]:
+    return {name for _, name, _, _ in Formatter().parse(entry) if name}
+
+
+def test_every_code_has_words_and_whatever_fills_them():
+    used = list(coded())
+    assert len(used) > 70
+    for language in LANGUAGES:
+        words = load_words("rcilab.i18n", language)
+        known = {key.removeprefix("error.") for key in words if key.startswith("error.")}
+        assert {code for code, _ in used} == known
+        for code, facts in used:
+            assert None in facts or places(words[f"error.{code}"]) <= facts, code
+
+
+def test_what_a_waypoint_asks_for_is_not_said_of_a_target():
+    reason = UnreachableError("out of reach", distance=0.02).coded("too_far", distance="20.0")
+    place = "900, 0, 300"
+    for language, target, waypoint in (("en", "target", "waypoint"), ("zh", "目标", "路点")):
+        text = Text(language, "rcilab.workbench")
+        said = {"": text.say(tell(reason))}
+        for code, facts in (("waypoint", {}), ("way", {"place": place}), ("blend", {"place": place})):
+            error = PlanningError("waypoint 2").coded(code, number=2, kind="line", reason=reason, **facts)
+            said[code] = text.say(tell(error))
+        assert target in said[""]
+        assert all(waypoint in said[code] and target not in said[code] for code in ("waypoint", "way", "blend"))
+
+
+@pytest.mark.parametrize("about", ["waypoint_error", "way_error"])
+def test_all_that_advises_has_its_words_for_programs_too(about):
+    for language in LANGUAGES:
+        words = load_words("rcilab.i18n", language)
+        found = {key.removeprefix(f"{about}.") for key in words if key.startswith(f"{about}.")}
+        assert found == _ADVISING
+        for code in found:
+            assert places(words[f"{about}.{code}"]) == places(words[f"error.{code}"])
+
+
+@pytest.mark.parametrize("kind", [SettingStatus, StartStatus, StopStatus, RecoveryStatus, GuideStatus])
+def test_every_refusal_has_words(kind):
+    words = load_words("rcilab.i18n", "zh")
+    for status in kind:
+        if status:
+            said = tell(CommandRejectedError("StartMove", status))
+            assert isinstance(said, Message)
+            assert isinstance(status_said := said.values["status"], Message)
+            assert status_said.code in words
+
+
+def test_the_english_sentence_stays_and_facts_come_along():
+    inner = UsageError("the arm is moving").coded("moving")
+    error = PlanningError("waypoint 2: the arm is moving", waypoint=2).coded(
+        "waypoint", number=2, kind="line", reason=inner
+    )
+    assert str(error) == "waypoint 2: the arm is moving"
+    for same in (error, unpack_failure(pack_failure(error)), pickle.loads(pickle.dumps(error))):
+        said = tell(same)
+        assert isinstance(said, Message)
+        assert (said.code, said.values["number"]) == ("error.waypoint", 2)
+        assert said.values["reason"] == tell(inner)
+        assert Text("zh", "rcilab.i18n").say(said) == "路点 2（直线）：机械臂正在运动：请先停止，或等待到达"
+    assert tell(RcilabError("nobody named this")) == Finished("nobody named this")
+
+
+def test_a_note_keeps_its_words_in_a_file_of_its_own():
+    note = Remark("line 2: blend shortened", "blend", number=2, asked="50.0", radius="10.0")
+    back = pickle.loads(pickle.dumps(note))
+    said = tell_note(back)
+    assert isinstance(said, Message)
+    assert said.values["radius"] == "10.0"
+    assert set(said.values) == {
+        name for _, name, _, _ in Formatter().parse(load_words("rcilab.i18n", "en")[said.code]) if name
+    }
+    assert tell_note("plain") == Finished("plain")
+
+
+def test_many_remarks_in_one_line_grow_with_their_number_and_are_said_in_every_language():
+    single = [Remark(f"{n} commands in a row were lost", "lost_in_row", count=n) for n in range(1, 41)]
+    whole = Remark.all([Remark.all(single[:20]), *single[20:], "and so on"])
+    assert str(whole) == "; ".join([*map(str, single), "and so on"])
+    size = [len(json.dumps(Remark.all(single[:count]).as_dict())) for count in (10, 20, 40)]
+    assert size[2] < 2.2 * size[1] < 5.0 * size[0]
+    back = Remark.from_dict(json.loads(json.dumps(whole.as_dict())))
+    assert back == whole
+    assert back.parts == whole.parts
+    for language in ("en", "zh"):
+        said = Text(language, "rcilab.i18n").say(tell_note(whole))
+        assert said.count("40") == 1
+        assert said.endswith("and so on")
+    assert Remark.all([]) == ""
+    assert Remark.all(single[:1]) is single[0]

@@ -1,0 +1,178 @@
+"""`rcilab controller` as a process of its own: what it prints, how it ends, and what its options set."""
+
+from __future__ import annotations
+
+import argparse
+import re
+import select
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import pytest
+
+from rcilab.cli import controller as command
+from rcilab.core.errors import InvalidValueError
+from rcilab.execution.simulation_control import World
+from rcilab.sim.api import NetworkFaults, Stall, WorldStatus
+
+# Straight to the command: the command line itself is tested elsewhere.
+_MAIN = """
+import argparse, sys
+from rcilab.cli import controller
+from rcilab.core.errors import RcilabError
+parser = argparse.ArgumentParser()
+controller.add_parser(parser.add_subparsers())
+try:
+    args = parser.parse_args(["controller", *sys.argv[1:]])
+    sys.exit(args.run(args))
+except RcilabError as error:
+    sys.exit(str(error))
+"""
+PATIENCE = 30.0  # [s] A cold start on a busy machine.
+
+
+@contextmanager
+def controller(*arguments: str) -> Iterator[subprocess.Popen[str]]:
+    command = [sys.executable, "-c", _MAIN, *arguments]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def first_line(process: subprocess.Popen[str]) -> str:
+    assert process.stdout is not None
+    assert select.select([process.stdout], [], [], PATIENCE)[0]
+    return process.stdout.readline()
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_it_says_where_it_is_when_it_is_ready_and_ends_cleanly(number: signal.Signals) -> None:
+    with controller("--model", "xmatepro3", "--port", "0", "--lockstep") as process:
+        line = first_line(process)
+        found = re.fullmatch(r"listening rci://127\.0\.0\.2:(\d+) model=xMatePro3 plant=ideal\n", line)
+        assert found
+        assert process.stdout is not None
+        socket.create_connection(("127.0.0.2", int(found[1])), timeout=PATIENCE).close()
+        assert re.fullmatch(r"world 127\.0\.0\.2:\d+\n", process.stdout.readline())
+        process.send_signal(number)
+        output, errors = process.communicate(timeout=PATIENCE)
+        assert (process.returncode, output, errors) == (0, "", "")
+
+
+def status_of(process: subprocess.Popen[str]) -> WorldStatus:
+    """What the controller says over the world port that its second line names."""
+    first_line(process)
+    assert process.stdout is not None
+    host, _, port = process.stdout.readline().removeprefix("world ").strip().partition(":")
+    with World(host, int(port)) as world:
+        return world.status()
+
+
+def test_the_faults_of_the_command_line_are_in_force() -> None:
+    udp = "--loss 0.01 --delay 0.002 --jitter 0.001 --reorder 0.02 --duplicate 0.03 --corrupt 0.04".split()
+    tcp = "--tcp-delay 0.01 --tcp-split --tcp-break 5000 --seed 9".split()
+    rest = "--faults-on commands --stall 0.01@0.0 --auto-limit --loop-back --limits sdk".split()
+    with controller("--model", "xMate3", "--port", "0", *udp, *tcp, *rest) as process:
+        status = status_of(process)
+    assert status.states == NetworkFaults(tcp_delay=0.01, tcp_split=1, tcp_break=5000, seed=9)
+    assert status.commands == NetworkFaults(
+        loss=0.01, delay=0.002, jitter=0.001, reorder=0.02, duplicate=0.03, corrupt=0.04,
+        tcp_delay=0.01, tcp_split=1, tcp_break=5000, seed=9,
+    )  # fmt: skip
+    assert status.stalls == 1
+
+
+def test_without_a_world_there_is_no_second_line() -> None:
+    with controller("--model", "xMate3", "--port", "0", "--lockstep", "--no-world") as process:
+        assert first_line(process).startswith("listening ")
+        process.terminate()
+        output, _ = process.communicate(timeout=PATIENCE)
+        assert (process.returncode, output) == (0, "")
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "message"),
+    [
+        ("--loss", "1.5", r"--loss: 1\.5 needs 0 to 1"),
+        ("--delay", "nan", "--delay: nan must be a finite number"),
+        ("--tcp-split", "-1", "--tcp-split: -1 needs a whole number"),
+        ("--faults-on", "tcp", "--faults-on: 'tcp' is unknown; known: both, commands, states"),
+        ("--stall", "soon", r"--stall: 'soon' needs seconds, as 0\.05@2\.0"),
+        ("--stall", "9", "duration: 9.0 needs 0.001 to 5"),
+        ("--stall", "0.5/0.1", "period: 0.1 needs"),
+        ("--limits", "none", "--limits: 'none' is unknown; known: manual, sdk"),
+        ("--world-port", "70000", "--world-port: 70000 is no port"),
+    ],
+)
+def test_an_option_out_of_range_is_one_sentence(option: str, value: str, message: str) -> None:
+    parser = argparse.ArgumentParser()
+    command.add_parser(parser.add_subparsers())
+    args = parser.parse_args(["controller", "--model", "xMate3", "--port", "0", f"{option}={value}"])
+    with pytest.raises(InvalidValueError, match=message):
+        args.run(args)
+
+
+@pytest.mark.parametrize(
+    ("text", "stall"),
+    [
+        ("0.05@2.0", Stall(duration=0.05, after=2.0)),
+        ("0.02/1.0", Stall(duration=0.02, period=1.0)),
+        ("0.02@5/1.0", Stall(duration=0.02, after=5.0, period=1.0)),
+        ("1", Stall(duration=1.0)),
+    ],
+)
+def test_a_stall_is_written_as_duration_time_and_period(text: str, stall: Stall) -> None:
+    assert command.parse_stall(text) == stall
+
+
+def test_a_port_in_use_is_one_sentence_and_a_status() -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.2", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        with controller("--model", "xMate3", "--port", str(port)) as process:
+            _, errors = process.communicate(timeout=PATIENCE)
+            assert process.returncode != 0
+            assert re.fullmatch(rf"TCP port {port} on 127\.0\.0\.2 is in use; .*--port N.*\n", errors)
+
+
+def test_an_address_that_others_can_reach_gets_a_warning() -> None:
+    with controller("--model", "xMate3", "--port", "0", "--host", "0.0.0.0", "--lockstep") as process:
+        first_line(process)
+        process.terminate()
+        _, errors = process.communicate(timeout=PATIENCE)
+        assert "warning: 0.0.0.0 is reachable from outside this machine" in errors
+
+
+def test_a_private_controller_ends_when_its_parent_is_gone() -> None:
+    # The parent starts the controller, passes its line on and ends without a word to it.
+    parent = f"""
+import subprocess, sys
+child = subprocess.Popen(
+    [sys.executable, "-c", {_MAIN!r}, "--model", "xMate3", "--port", "0", "--lockstep", "--exit-with-parent"],
+    stdout=subprocess.PIPE, text=True, stderr=subprocess.DEVNULL)
+print(child.stdout.readline(), end="", flush=True)
+import os; os._exit(0)
+"""
+    line = subprocess.run([sys.executable, "-c", parent], stdout=subprocess.PIPE, text=True, timeout=PATIENCE).stdout
+    port = int(line.split()[1].rpartition(":")[2])
+    assert is_gone(port)
+
+
+def is_gone(port: int) -> bool:
+    """Whether nobody listens there any more within the time a person would wait."""
+    pause = threading.Event()
+    for _ in range(int(PATIENCE / 0.05)):
+        with socket.socket() as sock:
+            if sock.connect_ex(("127.0.0.2", port)):
+                return True
+        pause.wait(0.05)
+    return False

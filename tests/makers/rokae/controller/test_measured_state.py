@@ -1,0 +1,93 @@
+"""What the sensors say of a moving arm, and what they make of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from rcilab.core.arrays import frozen
+from rcilab.core.faults import Fault
+from rcilab.makers.rokae import wire as rci
+from rcilab.makers.rokae.controller.cycle import ControlCycle
+from rcilab.model.robot_model import RobotModel
+from rcilab.sim.ideal_plant import IdealPlant
+from rcilab.sim.plant import Measurement, Setpoint
+from tests.makers.rokae.controller.conftest import Hand
+
+F = Fault
+
+
+class SlippingPlant(IdealPlant):
+    """An ideal arm whose sensors read something else."""
+
+    q_off = np.zeros(7)
+    dq_off = np.zeros(7)
+
+    def step(self, setpoint: Setpoint) -> Measurement:
+        measured = super().step(setpoint)
+        if not self.q_off.any() and not self.dq_off.any():
+            return measured
+        return Measurement(frozen(measured.q + self.q_off), frozen(measured.dq + self.dq_off), measured.tau)
+
+
+def slip(joint: int, speed: float) -> Callable[[Hand, SlippingPlant], None]:
+    def act(hand: Hand, plant: SlippingPlant) -> None:
+        plant.dq_off = np.zeros(7)
+        plant.dq_off[joint - 1] = speed
+
+    return act
+
+
+def creep(joint: int, speed: float) -> Callable[[Hand, SlippingPlant], None]:
+    def act(hand: Hand, plant: SlippingPlant) -> None:
+        for k in range(400):
+            slip(joint, speed * k / 400.0)(hand, plant)
+            if hand.command(hand.state.q_c, T_base_tool_c=hand.state.T_base_tool_c.as_row_major()).faults:
+                return
+
+    return act
+
+
+def displace(hand: Hand, plant: SlippingPlant) -> None:
+    plant.q_off = np.full(7, 0.13)
+
+
+def swivel(hand: Hand, plant: SlippingPlant) -> None:
+    plant.q_off = np.array((0, 0, 0.02, 0, 0, 0, 0))
+
+
+JOINT, CARTESIAN = (0, 1), (1, 2)
+MEASURED = [
+    (CARTESIAN, displace, F.ACTUAL_JOINT_POSITION_LIMITS_VIOLATION),
+    (CARTESIAN, displace, F.ACTUAL_CARTESIAN_POSITION_LIMITS_VIOLATION),
+    (CARTESIAN, swivel, F.ACTUAL_CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION),
+    (JOINT, creep(7, 2.95), F.ACTUAL_JOINT_VELOCITY_LIMITS_VIOLATION),
+    (CARTESIAN, creep(1, 2.0), F.ACTUAL_CARTESIAN_VELOCITY_LIMITS_VIOLATION),
+    (CARTESIAN, slip(3, 0.6), F.ACTUAL_JOINT_ACCELERATION_LIMITS_VIOLATION),
+    (CARTESIAN, slip(1, 0.2), F.ACTUAL_CARTESIAN_ACCELERATION_LIMITS_VIOLATION),
+]
+
+
+@pytest.mark.parametrize(("mode", "act", "fault"), MEASURED, ids=lambda value: getattr(value, "name", ""))
+def test_what_the_sensors_say_is_judged_in_that_cycle(model: RobotModel, mode, act, fault: Fault) -> None:
+    hand = Hand(model)
+    plant = SlippingPlant(model)
+    hand.cycle = ControlCycle(model, plant, mode_delay=3, prefill=0)
+    hand.states = [hand.cycle.state]
+    hand.ask(rci.SetJointLimit(tuple(model.home + 0.1), tuple(model.home - 0.1)))
+    hand.ask(hand.box(0.04))
+    hand.start(*mode)
+    q, T = hand.state.q_c, hand.state.T_base_tool_c.as_row_major()
+    for _ in range(5):
+        hand.command(q, T_base_tool_c=T)
+    before = len(hand.states)
+    act(hand, plant)
+    for _ in range(8):
+        if hand.state.faults:
+            break
+        hand.command(q, T_base_tool_c=T)
+    assert fault in hand.state.faults, (hand.state.faults, hand.cycle.reason)
+    assert "measured" in hand.cycle.reason
+    assert len(hand.states) > before

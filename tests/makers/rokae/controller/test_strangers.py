@@ -1,0 +1,135 @@
+"""Who is not the client moves nothing, learns nothing and spoils nothing; what nobody reads holds nobody up."""
+
+from __future__ import annotations
+
+import logging
+import os
+import signal
+import socket
+import struct
+import subprocess
+import sys
+import time
+from contextlib import suppress
+
+import numpy as np
+import pytest
+
+from rcilab.control_process.simulate import simulate
+from rcilab.makers.rokae import wire as rci
+from rcilab.makers.rokae.wire.bounds import LOWEST_CLIENT_PORT
+from rcilab.model.robot_model import load_model
+from rcilab.motion import plan_joint
+from rcilab.sim.log_lines import LineHandler, LogLines, SeldomLines
+from tests.makers.rokae.controller.test_server import running
+
+MODEL = load_model("xMatePro7")
+
+
+def absurd(message_id: int) -> bytes:
+    """A command that no arm can follow."""
+    return rci.encode_command(rci.CommandPacket(message_id, (1.0,) * 7))
+
+
+@pytest.mark.parametrize("host", ["127.0.0.9", "127.0.0.1"], ids=["another address", "another port"])
+def test_commands_of_a_stranger_do_not_end_a_motion_and_are_counted(host):
+    with simulate(MODEL) as robot, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp:
+        udp.bind((host, 0))
+        place = robot.address.removeprefix("rci://").split("?")[0].split(":")
+        robot.power_on()
+        motion = plan_joint(MODEL, MODEL.home, MODEL.home + 0.1)
+        sent = []
+
+        def tell(t, duration):
+            if t == 0.0:  # The client has not sent anything yet: its port is not learned.
+                return
+            udp.sendto(absurd(robot.state.message_id), (place[0], int(place[1])))
+            sent.append(t)
+
+        run = robot.execute(motion, progress=tell)
+        assert run.faults == ()
+        assert np.array_equal(robot.state.q_c, motion.goal)
+        assert sent
+        assert 1 <= robot.world.status().strangers <= len(sent)
+
+
+def test_a_connect_request_is_for_its_own_connection_and_for_ports_of_programs():
+    with simulate(MODEL) as robot, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp:
+        for port in (0, 9, LOWEST_CLIENT_PORT - 1):
+            answer = robot._link.request(rci.Connect(port))
+            assert answer.status is rci.SettingStatus.INVALID_ARGUMENT
+            assert robot.receive_states(), "they still come here"
+        udp.bind((robot._link.local_address[0], 0))
+        udp.settimeout(10.0)
+        robot._link.request(rci.Connect(udp.getsockname()[1]))
+        assert len(udp.recv(2000)) == rci.STATE_SIZE
+
+
+def test_what_anybody_can_cause_is_written_once_in_a_while_and_summed_up():
+    written, now = [], 100.0
+    lines = SeldomLines(written.append, lambda: now)
+    for number in range(1000):
+        lines.write("left", f"the client left {number}", "were lost")
+    lines.write("refused", "another kind", "were refused")
+    now += 60.0
+    lines.write("left", "the client left", "were lost")
+    lines.write("refused", "another kind", "were refused")
+    assert written == [
+        "the client left 0", "another kind", "the client left (999 more were lost since the last line)", "another kind",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("sent", [b"oops, a line of text", struct.pack("<HHH", 10, 1, 999) + bytes(4)])
+def test_connections_that_speak_no_rci_are_summed_up(sent):
+    with running() as found:
+        for _ in range(30):
+            with socket.create_connection((found.host, found.port), timeout=30.0) as link:
+                link.sendall(sent)
+                with suppress(ConnectionResetError):
+                    while link.recv(4096):
+                        pass
+        found.wait_for_line("no RCI")
+    assert len(found.lines) == 1
+
+
+def test_lines_that_nobody_reads_are_left_out_and_counted_and_hold_up_nobody():
+    reader, writer = os.pipe()
+    lines = LogLines(writer)
+    began = time.monotonic()
+    for number in range(20_000):
+        lines.write(f"line {number} " + "x" * 100)
+    assert time.monotonic() - began < 5.0, "a pipe takes 64 kB, and then waits for ever"
+    time.sleep(0.2)
+    with os.fdopen(reader, "rb", buffering=0) as stream:
+        said = b""
+        while b"lines were left out" not in said:
+            said += stream.read(65536)
+            lines.write("the last one")
+        lines.close()
+    assert said.startswith(b"rcilab controller: line 0 ")
+
+
+def test_a_controller_whose_stderr_is_never_read_goes_on_and_ends_when_it_is_told_to():
+    command = [sys.executable, "-m", "rcilab.cli", "controller", "--model", "xMatePro7", "--port", "0", "--lockstep"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        line = process.stdout.readline()
+        host, port = line.split()[1].removeprefix("rci://").split("?")[0].split(":")
+        with socket.create_connection((host, int(port))):
+            for _ in range(800):  # Each is refused; a line for each would fill the pipe, and the controller would wait.
+                socket.create_connection((host, int(port))).close()
+                time.sleep(2e-3)  # It takes one at a time; a queue that is full costs a second.
+            process.send_signal(signal.SIGINT)
+            assert process.wait(20.0) in (0, 130, -signal.SIGINT)
+
+
+def test_what_the_simulation_finds_odd_goes_the_way_of_all_lines(capfd: pytest.CaptureFixture[str]) -> None:
+    """A warning of MuJoCo comes in the middle of a cycle."""
+    lines: list[str] = []
+    handler, log = LineHandler(lines.append), logging.getLogger("rcilab.makers.rokae.controller")
+    log.addHandler(handler)
+    try:
+        log.warning("MuJoCo: %s", "odd")
+    finally:
+        log.removeHandler(handler)
+    assert lines == ["MuJoCo: odd"]
+    assert capfd.readouterr().err == ""

@@ -1,0 +1,23 @@
+"""Loads that cannot be meant."""
+
+from __future__ import annotations
+
+import pytest
+
+from rcilab.core.errors import InvalidValueError
+from rcilab.model.dynamics.payload import Payload
+
+
+@pytest.mark.parametrize(
+    ("facts", "said"),
+    [
+        ({"mass": 2500}, r"load mass: 2500.0 must be from 0 to 100 \[kg\]"),
+        ({"mass": -1}, "must be from 0 to 100"),
+        ({"mass": float("nan")}, "must be from 0 to 100"),
+        ({"mass": "2kg"}, r"load mass: '2kg' is not a number \[kg\]"),
+        ({"mass": 1, "center_of_mass": [0, 0, 100]}, "farther than 5 m; give metres"),
+    ],
+)
+def test_grams_millimetres_and_words_are_refused(facts, said):
+    with pytest.raises(InvalidValueError, match=said):
+        Payload(**facts)

@@ -1,0 +1,70 @@
+"""The Panda's inverse at a held elbow: one polynomial of degree 8 in joint 7, and nothing of it is overlooked."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from rcilab.model.kinematics.ik_fixed_elbow import DEGREE, polynomial, solve_held
+from rcilab.model.kinematics.solvers.offset7.arm import build_offset_geometry, trace, wrapped
+from rcilab.model.kinematics.solvers.offset7.singularity import held_singularity, held_singularity_path
+from rcilab.model.robot_model import load_model
+
+PANDA = load_model("Panda")
+ARM = build_offset_geometry(PANDA.description)
+LIMITS = PANDA.limits.joint
+
+
+@pytest.fixture(scope="module")
+def case():
+    """Random configurations, their poses, and all solutions at their elbows."""
+    q = np.random.default_rng(11).uniform(LIMITS.lower, LIMITS.upper, (600, 7))
+    T = PANDA.forward_path(q)
+    return q, T, *solve_held(ARM, T[:, :3, :3], T[:, :3, 3], q[:, 2])
+
+
+def test_the_polynomial_is_of_degree_8_and_its_higher_orders_cancel_to_rounding(case):
+    q, T, _, _ = case
+    values = polynomial(ARM, T[:, :3, :3], T[:, :3, 3], q[:, 2], np.arange(64) * (math.tau / 64))
+    sizes = np.abs(np.fft.rfft(values, axis=1))
+    assert (sizes[:, DEGREE + 1 :].max(axis=1) < 1e-13 * sizes.max(axis=1)).all()
+    assert (sizes[:, DEGREE] > 1e-13 * sizes.max(axis=1)).mean() > 0.9
+
+
+def test_every_solution_has_the_pose_and_the_elbow_and_each_is_there_once(case):
+    q, T, rows, found = case
+    assert np.abs(PANDA.forward_path(found) - T[rows]).max() < 2e-10
+    assert np.abs(wrapped(found[:, 2] - q[rows, 2])).max() < 1e-15
+    assert np.bincount(rows).max() <= 2 * DEGREE
+    for shift in range(1, 2 * DEGREE):
+        same = rows[shift:] == rows[:-shift]
+        assert (np.abs(wrapped(found[shift:] - found[:-shift])).max(axis=1)[same] > 1e-6).all()
+
+
+def test_the_arms_own_configuration_is_among_them_unless_two_meet_there(case):
+    q, _, rows, found = case
+    apart = np.full(len(q), np.inf)
+    np.minimum.at(apart, rows, np.abs(wrapped(found - q[rows])).max(axis=1))
+    assert (held_singularity_path(ARM, q[apart > 1e-7]) > 100.0).all()
+    assert apart.max() < 1e-4
+
+
+def test_a_fine_search_along_the_self_motion_finds_no_other(case):
+    q, T, rows, found = case
+    q7 = np.linspace(-math.pi, math.pi, 4001)
+    for row in range(25):
+        table, _ = trace(ARM, T[row, :3, :3], T[row, :3, 3], q7)
+        miss = wrapped(2.0 * (table[..., 2] - q[row, 2])).reshape(4, -1)  # The twin is half a turn away.
+        crosses = (miss[:, 1:] * miss[:, :-1] < 0.0) & (np.abs(np.diff(miss)) < 0.5)
+        places = 0.5 * (q7[1:] + q7[:-1])[np.nonzero(crosses)[1]]
+        known = found[rows == row, 6]
+        assert len(places) <= len(known)
+        assert all(np.abs(wrapped(known - place)).min() < 2e-3 for place in places.tolist())
+
+
+def test_one_and_many_configurations_are_judged_alike_for_singularities(case):
+    q = case[0][:50]
+    one = [held_singularity(ARM, row) for row in q.tolist()]
+    np.testing.assert_allclose(one, held_singularity_path(ARM, q), rtol=1e-9)

@@ -1,0 +1,198 @@
+"""What the library's errors and states are called on the page: in both languages, without a call of Python."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
+
+import pytest
+
+from rcilab.app.planning import Plan, make_plan
+from rcilab.control_process import SupervisorStatus
+from rcilab.control_process.status import MESSAGES, Incident
+from rcilab.core.errors import CertificateError, ConnectionLostError, ControlError, InvalidValueError, RcilabError
+from rcilab.core.faults import Fault
+from rcilab.core.state import RobotMode
+from rcilab.makers.rokae.driver.address import parse_address
+from rcilab.sim.api import WorldStatus
+from rcilab.workbench.panels.health import health_html
+from rcilab.workbench.panels.status import status_values
+from rcilab.workbench.run.actions import RobotActions
+from rcilab.workbench.run.readiness import obstacle
+from rcilab.workbench.session import Session
+from rcilab.workbench.status_text import StartingError, phase_code, tell_error, tell_incident, tell_status
+from rcilab.workbench.store import Store
+from rcilab.workbench.text import Text
+
+CALLS = ("()", "load_model", ".record", "restart", "reconnect", "recover leads", "COMMAND_")
+
+
+def status(**facts) -> SupervisorStatus:
+    return SupervisorStatus(**{"phase": "idle", "code": "idle", "message": "", **facts})
+
+
+def address_error() -> RcilabError:
+    try:
+        parse_address("http://robot")
+    except InvalidValueError as error:
+        return error
+    raise AssertionError
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        ControlError("recover() clears the fault; .record holds the last cycles", [Fault.COLLISION]),
+        ControlError("power_on()", [Fault.INSTABILITY_DETECTION]).coded("safety_stop", status="estop"),
+        CertificateError("plan again from robot.state.q_c with plan_joint()"),
+        ConnectionLostError("rci://127.0.0.1:9 went silent; look whether the cable is in"),
+        StartingError("the control process is still starting"),
+        address_error(),
+    ],
+)
+def test_errors_say_what_to_press_and_name_no_call(error):
+    for target in ("virtual", "rci://192.168.0.160:1337"):
+        where = status(phase="lost", code="lost.silent", target=target)
+        english, chinese = (Text(language).say(tell_error(error, where)) for language in ("en", "zh"))
+        assert not any(call in english for call in CALLS)
+        assert str(error) not in chinese
+        assert ("cable" in english) == (target != "virtual" and isinstance(error, ConnectionLostError))
+
+
+def test_an_emergency_stop_in_mid_motion_is_named_and_no_error_bit():
+    error = ControlError("power_on()", [Fault.INSTABILITY_DETECTION]).coded("safety_stop", status="estop")
+    said = Text("en").say(tell_error(error, status()))
+    assert "an emergency stop is pressed: release it first" in said
+    assert "Instability" not in said
+
+
+@pytest.mark.parametrize("code", [code for code in MESSAGES if code.startswith(("crashed", "lost", "fault"))])
+def test_states_and_incidents_are_told_from_the_catalogues(code):
+    where = status(phase=code.partition(".")[0], code=code, message=MESSAGES[code], target="rci://192.168.0.160:1337")
+    for said in (tell_status(where), tell_incident(code, MESSAGES[code], where)):
+        for language in ("en", "zh"):
+            sentence = Text(language).say(said)
+            assert MESSAGES[code] not in sentence
+            assert not any(call in sentence for call in CALLS)
+
+
+@pytest.mark.parametrize(
+    ("code", "english", "chinese"),
+    [
+        ("crashed.controller", "virtual controller died", "虚拟控制器已退出"),
+        ("crashed.worker", "control process died", "控制进程已退出"),
+    ],
+)
+def test_the_chip_names_what_died(code, english, chinese):
+    died = status(phase="crashed", code=code)
+    assert (Text("en")(phase_code(died)), Text("zh")(phase_code(died))) == (english, chinese)
+
+
+def test_a_pressed_stop_is_not_called_ready():
+    pressed = status(robot_mode=RobotMode.USER_STOPPED, powered=False)
+    assert Text("en")(phase_code(pressed)) == "stop pressed, power off"
+    assert Text("zh")(phase_code(pressed)) == "已按下停止，未上电"
+    assert phase_code(status(powered=False)) == "phase.unpowered"
+    assert phase_code(status(powered=True)) == "phase.idle"
+
+
+def test_a_request_that_failed_with_its_controller_does_not_ask_for_a_cable():
+    gone = status(
+        incident=Incident(number=1, code="crashed.controller", message=""), phase="connecting", code="connecting"
+    )
+    said = tell_error(ConnectionLostError("look whether the cable is in"), gone)
+    assert said.code == "incident.crashed.controller"
+
+
+class Power:
+    """A robot side whose control process comes late and refuses power once."""
+
+    is_ready = True
+
+    def __init__(self) -> None:
+        self.is_there, self.asked = False, 0
+        self.ticket = SimpleNamespace(done=True, error=RcilabError("busy"))
+
+    def status(self) -> SupervisorStatus:
+        return status(powered=False)
+
+    def supervisor(self):
+        if not self.is_there:
+            raise StartingError("the control process is still starting")
+        return self
+
+    def power_on(self):
+        self.asked += 1
+        return self.ticket
+
+    def drain(self):
+        raise RcilabError("nothing recorded")
+
+
+def test_the_virtual_arm_is_switched_on_however_late_its_control_process_comes(monkeypatch):
+    store, side, now = Store(initial_state()), Power(), [100.0]
+    monkeypatch.setattr("rcilab.workbench.run.actions.time.monotonic", lambda: now[0])
+    robot = RobotActions(store, cast(Session, side))
+    robot.watch()
+    assert (store.state.notice, side.asked) == (None, 0), "nobody asked for anything"
+    side.is_there = True
+    robot.watch()
+    assert side.asked == 1
+    now[0] += 10.0
+    robot.watch()
+    assert side.asked == 2, "it was refused, so it is asked for again"
+    side.ticket.error = None
+    now[0] += 10.0
+    robot.watch()
+    now[0] += 10.0
+    robot.watch()
+    assert side.asked == 2, "it has succeeded: a person may switch it off now"
+
+
+def test_a_held_motion_has_its_own_word_and_the_cursor_stands_where_it_is_held():
+    state = initial_state()
+    plan = make_plan(state.model, state.model.home, state.model.home + 0.1, 0.5, "jerk_limited")
+    assert isinstance(plan, Plan)
+    state = replace(state, plan=plan, place=1.0)
+    held = status(phase="moving", code="moving.held", motion_time=1.9, motion_place=0.25, motion_duration=9.0)
+    for language, word in (("en", "held"), ("zh", "已暂停")):
+        bar = status_values(state, held, Text(language), 2.0)
+        chip = next(chip for chip in bar["chips"] if chip["id"] == "phase")
+        assert (chip["value"], chip["tone"], chip["hint"]) == (word, "warn", word)
+        assert bar["cursor"] == {"place": 0.125}, "the place in the plan, not how long it took to come there"
+
+
+def test_health_says_how_many_commands_were_lost_in_a_row():
+    world = WorldStatus(model="xMatePro7", plant="ideal", cycle=9, phase="move", lost=30, lost_in_row=12)
+    state = initial_state()
+    spoiled = replace(state, drive=replace(state.drive, world=world))
+    assert "<th>Commands lost in a row, at most</th><td>12<br>" in health_html(spoiled, status(), Text("en"))
+    assert "<td>—<br>" in health_html(state, status(), Text("en")), "another controller does not tell"
+
+
+def test_the_bar_and_the_reason_on_run_speak_of_the_same_death():
+    state, died = initial_state(), status(phase="crashed", code="crashed.controller")
+    reason = obstacle(state, died)
+    assert reason is not None
+    bar = status_values(state, died, Text("en"), 1.0)
+    assert any(chip["value"] == "virtual controller died" for chip in bar["chips"])
+    assert Text("en").say(reason).startswith("The virtual controller has died")
+
+
+def test_the_share_of_commands_in_time_is_that_of_a_motion_and_marked_as_past_after_it():
+    state, facts = initial_state(), {"success_rate": 0.62, "rate_hz": 1000.0}
+    for phase, bar, table in (("moving", "62 %", "62.0 %<"), ("idle", "—", "62.0 % in the last motion<")):
+        now = status(phase=phase, code=phase, **facts)
+        chips = {chip["id"]: chip["value"] for chip in status_values(state, now, Text("en"), 1.0)["chips"]}
+        assert chips["success"] == bar
+        assert f"<td>{table}" in health_html(state, now, Text("en"))
+
+
+def initial_state():
+    from rcilab.model.robot_model import load_model
+    from rcilab.workbench.goal.actions import initial_goal
+    from rcilab.workbench.store import UiState
+
+    model = load_model("xMatePro7")
+    return UiState(model=model, goal=initial_goal(model, model.home))
