@@ -13,44 +13,18 @@ import pytest
 ROOT = Path(__file__).parents[1]
 
 LAYERS = [  # From the bottom. A part imports from lines below its own, and from itself; the base may import the base.
-    {
-        "errors",
-        "arrays",
-        "clock",
-        "faults",
-        "language",
-        "spoken",
-        "franka_errors",
-        "limits",
-        "command",
-        "state",
-        "spatial",
-        "reported_pose",
-        "realtime",
-        "awake",
-        "one_core",
-        "safety_box",
-        "safety_distance",
-        "closing",
-        "background",
-        "whole_file",
-        "file_bounds",
-        "cycle_file",
-        "words",
-    },
-    {"protocols", "robots"},
-    {"kinematics", "dynamics"},
+    {"core", "i18n", "realtime"},
+    {"robots"},
     {"model"},
     {"motion"},
     {"conformance"},
-    {"recording"},
-    {"client", "controller", "views"},
-    {"posing"},
-    {"supervisor"},
-    {"gallery"},
+    {"sim", "recording", "views"},
+    {"makers"},
+    {"execution"},
+    {"control_process"},
+    {"app"},
     {"workbench", "notebook"},
-    {"bench"},
-    {"doctor"},
+    {"diagnostics"},
     {""},  # rcilab itself, the lazy front door: only the top goes through it.
     {"cli"},
     {"__main__"},
@@ -58,11 +32,11 @@ LAYERS = [  # From the bottom. A part imports from lines below its own, and from
 HEIGHT = {part: height for height, parts in enumerate(LAYERS) for part in parts}
 
 FENCES = {
-    "pinocchio": ("kinematics/", "dynamics/", "model.py", "bench/compare/"),  # There it is one of the compared.
-    "coal": ("kinematics/collision.py",),
-    "eigenpy": ("dynamics/symmetric_solver.py",),
+    "pinocchio": ("model/", "diagnostics/bench/compare/"),  # There it is one of the compared.
+    "coal": ("model/kinematics/collision.py",),
+    "eigenpy": ("model/dynamics/symmetric_solver.py",),
     "ruckig": ("motion/_ruckig.py",),
-    "mujoco": ("controller/mujoco_plant.py",),
+    "mujoco": ("sim/mujoco_plant.py",),
     "viser": ("views/", "workbench/", "notebook/"),
     "meshcat": ("views/", "notebook/"),
     "yourdfpy": ("views/", "workbench/", "notebook/"),
@@ -72,9 +46,9 @@ FENCES = {
     "matplotlib": ("views/", "notebook/"),
     "ipywidgets": ("notebook/",),
     "IPython": ("notebook/",),
-    "pink": ("bench/compare/",),
-    "ssik": ("bench/compare/",),
-    "toppra": ("bench/compare/",),
+    "pink": ("diagnostics/bench/compare/",),
+    "ssik": ("diagnostics/bench/compare/",),
+    "toppra": ("diagnostics/bench/compare/",),
 }
 
 MODULES = sorted((ROOT / "rcilab").rglob("*.py"))

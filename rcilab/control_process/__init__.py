@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from rcilab.control_process.status import SupervisorStatus as SupervisorStatus
     from rcilab.control_process.supervisor import Supervisor as Supervisor
 
-_HOME = {"Supervisor": "supervisor", "Ticket": "ticket", "SupervisorStatus": "status"}
+_HOME = {"Supervisor": "supervisor", "Ticket": "pending_request", "SupervisorStatus": "status"}
 
 __all__ = ["Supervisor", "SupervisorStatus", "Ticket"]
 

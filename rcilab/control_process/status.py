@@ -116,7 +116,7 @@ class SupervisorStatus:
     address: str | None = None
     """Where the controller really is, such as rci://127.0.0.2:40123; None while it has none."""
     world_address: str | None = None
-    """Where its world port is, as HOST:PORT, see `rcilab.execution.simulation_control`; None: it is not ours, or has none."""
+    """Address of its simulation port, HOST:PORT (`execution.simulation_control`); None: it is not ours, or has none."""
     q: JointVector | None = None
     """Measured joint angles, shape (n,), [rad]; None as long as no state has arrived."""
     q_c: JointVector | None = None

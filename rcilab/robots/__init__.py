@@ -9,8 +9,9 @@ from rcilab.robots.description import DhRow, Link, RobotDescription
 
 __all__ = ["RCI_ROBOT_NAMES", "ROBOT_NAMES", "DhRow", "Link", "RobotDescription", "describe_robot"]
 
-_XMATES = {"xMatePro3": "xmate_pro3", "xMatePro7": "xmate_pro7", "xMate3": "xmate3", "xMate7": "xmate7"}
-_MODULES = {**_XMATES, "Panda": "panda"}
+_XMATE_FILES = {"xMatePro3": "xmate_pro3", "xMatePro7": "xmate_pro7", "xMate3": "xmate3", "xMate7": "xmate7"}
+_XMATES = {name: f"rcilab.makers.rokae.robots.{module}" for name, module in _XMATE_FILES.items()}
+_MODULES = {**_XMATES, "Panda": "rcilab.makers.franka.robots.panda"}
 
 ROBOT_NAMES = tuple(_MODULES)
 """Every arm that can be computed with."""
@@ -26,5 +27,5 @@ def describe_robot(name: str) -> RobotDescription:
     """
     for known, module in _MODULES.items():
         if known.lower() == str(name).lower():
-            return import_module(f"rcilab.robots.{module}").DESCRIPTION
+            return import_module(module).DESCRIPTION
     raise ModelError(f"unknown robot {plain_text(repr(name), 60)}; known robots: {', '.join(ROBOT_NAMES)}")

@@ -10,9 +10,9 @@ import numpy as np
 
 from rcilab.core.arrays import Array, JointVector, Matrix
 from rcilab.core.clock import CYCLE_TIME
-from rcilab.makers.rokae.controller.filters import low_pass_gain
 from rcilab.model.robot_model import RobotModel
 from rcilab.sim.drive_model import DriveModel
+from rcilab.sim.filters import low_pass_gain
 from rcilab.sim.plant import Measurement
 
 _SETTLED_TORQUE = 1e-6  # [N m] A filtered torque this close to the true one takes its value, so that rest is rest.

@@ -1,4 +1,4 @@
-"""What errors, incidents and states of the library are called on the page: see `rcilab.control_process.status_messages`."""
+"""What errors, incidents and states of the library are called on the page: see `control_process.status_messages`."""
 
 from __future__ import annotations
 

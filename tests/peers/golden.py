@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from tests.peers import programs, wire
 from tests.peers.arena import arena
 
-FOLDER = Path(__file__).parents[1] / "controller" / "golden"
+FOLDER = Path(__file__).parents[1] / "makers" / "rokae" / "controller" / "golden"
 SECONDS, PERIOD = 0.625, 1.25  # [s] Half a swing, from rest to rest.
 STRIDE = 5  # [cycles]
 FIELDS = ("q", "q_c", "psi_m", "vel_c", "tau_m", "tau_c", "tau_ext_in_base")

@@ -44,7 +44,7 @@ class Exhibit:
     said: str
     """The controller's own words and numbers."""
     cycles: NDArray[np.void]
-    """Recorded cycles from the first command on, see `rcilab.core.cycle_log.cycle_dtype`; the last one shows the fault."""
+    """Recorded cycles from the first command on (`core.cycle_log.cycle_dtype`); the last one shows the fault."""
     after: NDArray[np.void]
     """Recorded cycles after the fault, in which the controller brings the arm to rest; nothing is commanded in them."""
     signal: Signal

@@ -33,7 +33,10 @@ def describe_machine() -> dict[str, Any]:
 
 def ask_realtime() -> tuple[bool, bool]:
     """Returns whether a control process gets SCHED_FIFO and locked memory, tried in a process that then ends."""
-    code = f"from rcilab.realtime.scheduling import enter_realtime as e; s = e({_PRIORITY}); print(s.policy, s.memory_locked)"
+    code = (
+        "from rcilab.realtime.scheduling import enter_realtime\n"
+        f"s = enter_realtime({_PRIORITY}); print(s.policy, s.memory_locked)"
+    )
     answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     policy, locked = answer.stdout.split()
     return policy == "SCHED_FIFO", locked == "True"

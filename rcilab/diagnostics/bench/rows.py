@@ -42,17 +42,17 @@ ROWS = MappingProxyType(
         "replan": "paths",
         "drag": "page",
         "mirror": "mirror",
-        "scrub": "scrub",
+        "scrub": "seek_latency",
         "page_ready": "page_ready",
         "page_drag": "page_drag",
-        "page_scrub": "scrub",
+        "page_scrub": "seek_latency",
         "lab_slider": "notebook",
         "lab_shown": "notebook",
         "import": "start",
         "start": "start",
         "state_period": "controller",
         "control_loop": "page",
-        "spectators": "spectators",
+        "spectators": "viewer_load",
     }
 )
 """Name of each row and the module of its function, in the order they run; the slow ones last."""

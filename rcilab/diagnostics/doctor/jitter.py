@@ -1,4 +1,6 @@
-"""How late a 1 kHz loop is on this machine, measured: `python -m rcilab.diagnostics.doctor.jitter SECONDS` is that loop.
+"""How late a 1 kHz loop is on this machine, measured.
+
+`python -m rcilab.diagnostics.doctor.jitter SECONDS` is that loop.
 
 It does nothing but wake up, with the priority of the control process and on cores that do not sleep; whatever it is
 late by is the machine's. Once a second it prints the lateness of that second's cycles, [ns], as one JSON list.

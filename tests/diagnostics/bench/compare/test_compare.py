@@ -79,7 +79,7 @@ def test_what_is_no_peers_package_is_no_reason_to_skip_a_row():
 
 
 def test_peers_are_an_extra_of_their_own_and_nothing_that_rcilab_or_its_tests_need():
-    text = (Path(__file__).parents[3] / "pyproject.toml").read_text(encoding="utf-8")
+    text = (Path(__file__).parents[4] / "pyproject.toml").read_text(encoding="utf-8")
     project = tomllib.loads(text)["project"]
     extras = project["optional-dependencies"]
     needed = {word.strip("'") for advice in peer._REQUIREMENTS.values() for word in advice.split()}

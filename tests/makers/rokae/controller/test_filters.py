@@ -9,8 +9,8 @@ import pytest
 
 from rcilab.core.spatial import IDENTITY, Pose, turn_between
 from rcilab.makers.rokae import wire as rci
-from rcilab.makers.rokae.controller.filters import LowPass, PoseLowPass, low_pass_gain
 from rcilab.motion.joint import plan_joint
+from rcilab.sim.filters import LowPass, PoseLowPass, low_pass_gain
 
 
 @pytest.mark.parametrize("frequency", [1.0, 100.0, 999.0])

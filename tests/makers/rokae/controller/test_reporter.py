@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from rcilab.makers.rokae import wire as rci
-from rcilab.makers.rokae.controller.filters import low_pass_gain
 from rcilab.model.robot_model import RobotModel
 from rcilab.motion.joint import plan_joint
 from rcilab.sim.drive_model import DriveModel
+from rcilab.sim.filters import low_pass_gain
 
 
 @pytest.mark.parametrize("name", ["xMatePro7", "xMate7"])

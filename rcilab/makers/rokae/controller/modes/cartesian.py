@@ -21,13 +21,13 @@ from rcilab.core.errors import InvalidValueError, KinematicsError
 from rcilab.core.faults import Fault
 from rcilab.core.spatial import Pose, rotation_from_wxyz, turn_between, wxyz_from_rotation
 from rcilab.i18n.translator import Remark
-from rcilab.makers.rokae.controller.filters import PoseLowPass
 from rcilab.makers.rokae.controller.jitter_buffer import Playback
 from rcilab.makers.rokae.controller.modes.generator import Gap, JointReference, Step, Terms, lost_motion
 from rcilab.makers.rokae.controller.modes.ik_tracker import Follower
 from rcilab.makers.rokae.controller.modes.start import StartMonitor, find_tool_jump
 from rcilab.makers.rokae.wire import CommandPacket
 from rcilab.sim.command_extrapolator import Stream
+from rcilab.sim.filters import PoseLowPass
 
 _INVALID = (Fault.CARTESIAN_POSITION_MOTION_GENERATOR_INVALID_FRAME,)
 _ELBOW = (Fault.COMMAND_CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION,)

@@ -11,11 +11,11 @@ from math import isfinite
 
 from rcilab.core.faults import Fault
 from rcilab.i18n.translator import Remark
-from rcilab.makers.rokae.controller.filters import LowPass
 from rcilab.makers.rokae.controller.jitter_buffer import Playback
 from rcilab.makers.rokae.controller.modes.generator import Gap, JointReference, Step, Terms
 from rcilab.makers.rokae.wire import CommandPacket
 from rcilab.sim.command_extrapolator import Stream
+from rcilab.sim.filters import LowPass
 
 
 class JointGenerator:

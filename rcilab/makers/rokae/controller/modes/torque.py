@@ -14,11 +14,11 @@ from rcilab.conformance.limit_violation import describe_breaches
 from rcilab.conformance.torque_monitor import TorqueMonitor
 from rcilab.core.faults import Fault
 from rcilab.i18n.translator import Remark
-from rcilab.makers.rokae.controller.filters import LowPass
 from rcilab.makers.rokae.controller.jitter_buffer import Playback
 from rcilab.makers.rokae.controller.modes.generator import Gap, Step, Terms
 from rcilab.makers.rokae.wire import CommandPacket
 from rcilab.sim.command_extrapolator import Stream
+from rcilab.sim.filters import LowPass
 
 
 class TorqueGenerator:

@@ -13,8 +13,9 @@ from math import pi, remainder, tau
 
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.spatial import Pose
-from rcilab.makers.rokae.wire.bounds import FILTER_OFF
 from rcilab.model.kinematics.closest_pose import interpolate
+
+SAMPLING_RATE = 1.0 / CYCLE_TIME  # [Hz] A filter with this cut-off frequency is off.
 
 
 def low_pass_gain(frequency: float) -> float:
@@ -23,7 +24,7 @@ def low_pass_gain(frequency: float) -> float:
     Args:
         frequency: Cut-off frequency, 0.1 to 1000 Hz.
     """
-    if frequency >= FILTER_OFF:
+    if frequency >= SAMPLING_RATE:
         return 1.0
     return CYCLE_TIME / (CYCLE_TIME + 1.0 / (2.0 * pi * frequency))
 
