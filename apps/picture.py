@@ -146,7 +146,7 @@ class Camera:
     def go(self, degrees: tuple[float, ...]) -> None:
         """Brings the arm to where the film begins."""
         self.pose(degrees)
-        self.ask(requests.Drive(what="execute", page=self.bench.store.state.lease.holder))
+        self.ask(requests.RobotCommand(what="execute", page=self.bench.store.state.lease.holder))
         self.wait(lambda: self.bench.store.state.recording is not None and self.idle)
         self.ask(requests.PoseGoal(name="here"))
         self.wait(lambda: self.bench.store.state.plan is None)

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from rcilab.conformance.motion_monitor import Monitor as Monitor
     from rcilab.conformance.report import Report as Report
     from rcilab.control_process.simulate import simulate as simulate
-    from rcilab.core.clearance import SafetyDistance as SafetyDistance
+    from rcilab.core.clearance import ClearanceLimit as ClearanceLimit
     from rcilab.core.command import CartesianPosition as CartesianPosition
     from rcilab.core.command import JointPosition as JointPosition
     from rcilab.core.command import JointTorque as JointTorque
@@ -59,7 +59,7 @@ _HOMES = {
     "RobotSession": "rcilab.execution.session",
     "Run": "rcilab.recording.run",
     "SafetyBox": "rcilab.core.safety_box",
-    "SafetyDistance": "rcilab.core.clearance",
+    "ClearanceLimit": "rcilab.core.clearance",
     "Waypoint": "rcilab.motion.waypoint",
     "check": "rcilab.conformance.check",
     "connect": "rcilab.execution.session",

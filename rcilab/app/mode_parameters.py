@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from rcilab.core.state import Mode
 from rcilab.i18n.translator import Message, message
-from rcilab.makers.rokae.driver.controller_parameters import ControlPart, ControlSettings, Range, standard_control
+from rcilab.makers.rokae.driver.controller_parameters import ControllerParameters, ControlPart, Range, standard_control
 
 if TYPE_CHECKING:
     from rcilab.core.limits import Limits
@@ -33,22 +33,22 @@ _AXES = ("x", "y", "z", "a", "b", "c")
 _FILTERS = ("joint", "cartesian", "torque")
 
 
-def shown_numbers(control: ControlSettings | None, part: ControlPart, limits: Limits) -> tuple[float, ...]:
+def shown_numbers(control: ControllerParameters | None, part: ControlPart, limits: Limits) -> tuple[float, ...]:
     """Returns the numbers of a part that stand in its fields: those wanted, or what a controller wakes up with."""
     numbers = None if control is None else getattr(control, part)
     return getattr(standard_control(limits), part) if numbers is None else numbers
 
 
 def with_number(
-    control: ControlSettings | None, part: ControlPart, place: int, value: float, limits: Limits
-) -> ControlSettings:
+    control: ControllerParameters | None, part: ControlPart, place: int, value: float, limits: Limits
+) -> ControllerParameters:
     """Returns the parameters with another number among them."""
     numbers = list(shown_numbers(control, part, limits))
     numbers[place] = value
-    return replace(control or ControlSettings(), **{part: tuple(numbers)})
+    return replace(control or ControllerParameters(), **{part: tuple(numbers)})
 
 
-def is_control_pending(wanted: ControlSettings | None, held: ControlSettings | None) -> bool:
+def is_control_pending(wanted: ControllerParameters | None, held: ControllerParameters | None) -> bool:
     """Returns whether a controller has not taken the parameters yet.
 
     Args:
@@ -62,7 +62,7 @@ def is_control_pending(wanted: ControlSettings | None, held: ControlSettings | N
 
 
 def control_obstacle(
-    wanted: ControlSettings | None, held: ControlSettings | None, refusal: Message | None, address: str | None
+    wanted: ControllerParameters | None, held: ControllerParameters | None, refusal: Message | None, address: str | None
 ) -> Message | None:
     """Returns why nothing may run with these parameters, or None when the controller has them.
 
@@ -107,7 +107,9 @@ def said_ranges(ranges: tuple[Range, ...]) -> str:
     return f"[{', '.join(said)}]"
 
 
-def held_rows(mode: Mode, held: ControlSettings | None, own: ControlSettings, text: Text) -> list[tuple[str, str]]:
+def held_rows(
+    mode: Mode, held: ControllerParameters | None, own: ControllerParameters, text: Text
+) -> list[tuple[str, str]]:
     """Returns the parameters of a mode as the controller has acknowledged them, name and numbers.
 
     Args:

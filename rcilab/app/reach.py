@@ -22,7 +22,7 @@ NEAR_SINGULAR = 0.03  # A choice: smallest singular value of the Jacobian below 
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Reach:
+class TargetStatus:
     """What the inverse says about a target."""
 
     tone: Tone
@@ -38,7 +38,7 @@ class Reach:
 
 
 @dataclass(frozen=True, slots=True)
-class Margin:
+class JointLimitMargin:
     """How far a configuration is from the nearest joint limit."""
 
     angle: float
@@ -47,11 +47,11 @@ class Margin:
     """From 1."""
 
 
-def margin(model: RobotModel, q: JointVector) -> Margin:
+def margin(model: RobotModel, q: JointVector) -> JointLimitMargin:
     """Returns the smallest distance to a joint limit and the joint it belongs to."""
     distances = np.minimum(q - model.limits.joint.lower, model.limits.joint.upper - q)
     worst = int(np.argmin(distances))
-    return Margin(float(distances[worst]), worst + 1)
+    return JointLimitMargin(float(distances[worst]), worst + 1)
 
 
 def telling_joints(solutions: np.ndarray) -> tuple[int, ...]:
@@ -69,7 +69,7 @@ def telling_joints(solutions: np.ndarray) -> tuple[int, ...]:
     return tuple(sorted(told))
 
 
-def judge_pose(model: RobotModel, target: Pose, near: JointVector, psi: float | None = None) -> Reach:
+def judge_pose(model: RobotModel, target: Pose, near: JointVector, psi: float | None = None) -> TargetStatus:
     """Returns the branch nearest to `near` at a target, or at the reachable pose nearest to it.
 
     Args:
@@ -81,7 +81,7 @@ def judge_pose(model: RobotModel, target: Pose, near: JointVector, psi: float | 
     found = model.closest(target, near, psi)
     if found.refusal is not None:
         missed, turned = _miss(target, found.pose)
-        return Reach(
+        return TargetStatus(
             tone="bad",
             reason=why_not(found.refusal, missed),
             q=found.q,
@@ -91,7 +91,7 @@ def judge_pose(model: RobotModel, target: Pose, near: JointVector, psi: float | 
     return _judge_configuration(model, found.q, found.solutions)
 
 
-def judge_joints(model: RobotModel, q: JointVector) -> Reach:
+def judge_joints(model: RobotModel, q: JointVector) -> TargetStatus:
     """Returns what is to be said about a configuration that was posed joint by joint."""
     try:
         solutions = model.inverse(model.forward(q), near=q)
@@ -114,16 +114,16 @@ def why_not(refusal: UnreachableError, missed: float) -> Message:
     return message("reach.no")
 
 
-def _judge_configuration(model: RobotModel, q: JointVector, solutions: Solutions | None) -> Reach:
+def _judge_configuration(model: RobotModel, q: JointVector, solutions: Solutions | None) -> TargetStatus:
     least = margin(model, q)
     if least.angle <= 0.0:
-        return Reach(tone="warn", reason=message("reach.at_limit", joint=least.joint), q=q, solutions=solutions)
+        return TargetStatus(tone="warn", reason=message("reach.at_limit", joint=least.joint), q=q, solutions=solutions)
     if model.dexterity(q).smallest < NEAR_SINGULAR:
-        return Reach(tone="warn", reason=message("reach.singular"), q=q, solutions=solutions)
+        return TargetStatus(tone="warn", reason=message("reach.singular"), q=q, solutions=solutions)
     if least.angle < NEAR_LIMIT:
         reason = message("reach.limit", joint=least.joint, margin=f"{math.degrees(least.angle):.1f}")
-        return Reach(tone="warn", reason=reason, q=q, solutions=solutions)
-    return Reach(tone="good", reason=message("reach.good"), q=q, solutions=solutions)
+        return TargetStatus(tone="warn", reason=reason, q=q, solutions=solutions)
+    return TargetStatus(tone="good", reason=message("reach.good"), q=q, solutions=solutions)
 
 
 def _miss(target: Pose, reached: Pose) -> tuple[float, float]:

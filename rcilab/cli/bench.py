@@ -16,7 +16,7 @@ from rcilab.diagnostics.bench.rows import ROWS
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from rcilab.diagnostics.bench.cpu_speed_monitor import PaceWatch
+    from rcilab.diagnostics.bench.cpu_speed_monitor import CpuSpeedMonitor
     from rcilab.diagnostics.bench.measure import Absent, Measurement
 
 BENCHES = tuple(ROWS)
@@ -78,9 +78,9 @@ def run(args: argparse.Namespace) -> int:
         print("[\n" + json.dumps(machine), end="", flush=True)
     else:
         _print_machine(machine)
-    from rcilab.diagnostics.bench.cpu_speed_monitor import PaceWatch
+    from rcilab.diagnostics.bench.cpu_speed_monitor import CpuSpeedMonitor
 
-    kept, out, pace = True, sys.stdout, PaceWatch()
+    kept, out, pace = True, sys.stdout, CpuSpeedMonitor()
     for name in names:
         if not args.json and sys.stderr.isatty():
             print(f"{name} ...", end="\r", file=sys.stderr, flush=True)
@@ -116,7 +116,7 @@ def _measured(name: str, seconds: float) -> Iterable[Measurement | Absent]:
     return (measure_apart(name, seconds),)
 
 
-def _with_pace(note: str, pace: PaceWatch) -> str:
+def _with_pace(note: str, pace: CpuSpeedMonitor) -> str:
     """Returns the note of a row, with a word about the machine where that was slow meanwhile."""
     from rcilab.diagnostics.bench.cpu_speed_monitor import SLOW
 

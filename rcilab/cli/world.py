@@ -38,14 +38,14 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 def run(args: argparse.Namespace) -> int:
     """Asks for it and prints what the answer says, as JSON when that is more than that it was done."""
     from rcilab.core.errors import InvalidValueError
-    from rcilab.execution.simulation_control import World
+    from rcilab.execution.simulation_control import SimulationControl
     from rcilab.sim.api import WorldStatus, status_as_dict
 
     host, colon, port = args.address.rpartition(":")
     if not colon or not host or not (port.isascii() and port.isdigit() and 0 < int(port) < 65536):
         raise InvalidValueError("address", args.address, "needs HOST:PORT, such as 127.0.0.2:40123")
     request = _request(args.request, args.fields)
-    with World(host, int(port)) as world:
+    with SimulationControl(host, int(port)) as world:
         answer = world.ask(request)
     print(json.dumps(status_as_dict(answer), indent=1) if isinstance(answer, WorldStatus) else "done")
     return 0

@@ -12,7 +12,7 @@ from rcilab.conformance.condition import Condition
 from rcilab.conformance.condition_tables import CONDITION_TABLES, ConditionTable, condition_table
 from rcilab.conformance.conditions import CONDITIONS, CYCLE_CONDITIONS, explain_fault, find_condition
 from rcilab.conformance.limit_tables import LimitTable, cartesian_limits
-from rcilab.conformance.limit_violation import Breach, describe_breaches
+from rcilab.conformance.limit_violation import LimitViolation, describe_breaches
 from rcilab.conformance.measured_monitor import MeasuredMonitor
 from rcilab.conformance.monitor import JointMonitor
 from rcilab.conformance.motion_monitor import Monitor
@@ -26,7 +26,7 @@ __all__ = [
     "CONDITION_TABLES",
     "CYCLE_CONDITIONS",
     "BoxMonitor",
-    "Breach",
+    "LimitViolation",
     "CartesianMonitor",
     "Certificate",
     "ClearanceMonitor",

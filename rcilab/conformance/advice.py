@@ -6,7 +6,7 @@ from math import ceil, degrees, floor, isfinite
 
 from rcilab.conformance.catalogue import Phrase
 from rcilab.conformance.condition import Condition, Signal
-from rcilab.motion.motion import Law, Motion
+from rcilab.motion.motion import Motion, TimeLaw
 
 
 def amount(value: float, bound: float) -> tuple[str, str]:
@@ -85,7 +85,7 @@ _WAYS: dict[Signal, str] = {
 """What to do about signals that are themselves out of bounds, not their derivatives; of joints it is the range."""
 
 
-_PLANNED: tuple[Law, ...] = ("jerk_limited", "torque_rate_limited", "s_profile")
+_PLANNED: tuple[TimeLaw, ...] = ("jerk_limited", "torque_rate_limited", "s_profile")
 """Laws whose planners take a speed."""
 
 

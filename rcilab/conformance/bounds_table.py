@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from rcilab.conformance.condition import AnyLimits, Condition
-from rcilab.conformance.limit_violation import Breach, faults_of
+from rcilab.conformance.limit_violation import LimitViolation, faults_of
 from rcilab.core.faults import Fault
 
 
-class BoundRows:
+class BoundsTable:
     """Conditions with their bounds, spread over the axes that each of them judges.
 
     Args:
@@ -38,11 +38,11 @@ class BoundRows:
                 return faults_of(self.broken(values))
         return ()
 
-    def broken(self, values: Sequence[float]) -> list[Breach]:
+    def broken(self, values: Sequence[float]) -> list[LimitViolation]:
         """Returns what values break; no values break nothing."""
         bounds = zip(self._rows, values, self._lower, self._upper, strict=False)
         return [
-            Breach(row, axis, value, low if value <= low else high)
+            LimitViolation(row, axis, value, low if value <= low else high)
             for (row, axis), value, low, high in bounds
             if not low < value < high
         ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rcilab.conformance.condition import Condition
-from rcilab.conformance.limit_violation import Breach
+from rcilab.conformance.limit_violation import LimitViolation
 from rcilab.conformance.tool_conditions import BOX_TOLERANCE, CARTESIAN_POSITION
 from rcilab.core.faults import Fault
 from rcilab.core.safety_box import EntryBox, SafetyBox, active_box
@@ -46,8 +46,8 @@ class BoxMonitor:
         self.excess = self._box.excess(position)
         return () if self.excess < BOX_TOLERANCE else (Fault.COMMAND_CARTESIAN_POSITION_LIMITS_VIOLATION,)
 
-    def broken(self) -> list[Breach]:
+    def broken(self) -> list[LimitViolation]:
         """Returns what the last step broke."""
         if self.excess < BOX_TOLERANCE:
             return []
-        return [Breach(self._row, 0, self.excess, BOX_TOLERANCE)]
+        return [LimitViolation(self._row, 0, self.excess, BOX_TOLERANCE)]

@@ -6,10 +6,10 @@ import math
 from collections.abc import Sequence
 from typing import TypeAlias
 
-from rcilab.conformance.bounds_table import BoundRows
+from rcilab.conformance.bounds_table import BoundsTable
 from rcilab.conformance.condition import Condition
 from rcilab.conformance.divided_differences import spans
-from rcilab.conformance.limit_violation import Breach
+from rcilab.conformance.limit_violation import LimitViolation
 from rcilab.conformance.tool_conditions import TOOL_CONDITIONS
 from rcilab.core.faults import Fault
 from rcilab.core.limits import Limits
@@ -49,7 +49,7 @@ class CartesianMonitor:
         self, limits: Limits, box: SafetyBox | EntryBox | None = None, rows: Sequence[Condition] = TOOL_CONDITIONS
     ) -> None:
         self._box = box if isinstance(box, EntryBox) else active_box(box)
-        self._rows = BoundRows(rows, limits)
+        self._rows = BoundsTable(rows, limits)
         self.reset(IDENTITY)
 
     def reset(self, pose: Pose, psi: float | None = None) -> None:
@@ -92,7 +92,7 @@ class CartesianMonitor:
         self._values = self._signals(_NO_BOX if self._box is None else self._box.excess(pose.parts[1]))
         return self._rows.judge(self._values)
 
-    def broken(self) -> list[Breach]:
+    def broken(self) -> list[LimitViolation]:
         """Returns what the last step broke."""
         return self._rows.broken(self._values)
 

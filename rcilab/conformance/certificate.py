@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike
 
 from rcilab.conformance.conditions import START_POSITION_TOLERANCE
 from rcilab.conformance.start import StartState, as_start
-from rcilab.core.arrays import Words
-from rcilab.core.clearance import SafetyDistance
+from rcilab.core.arrays import Unquoted
+from rcilab.core.clearance import ClearanceLimit
 from rcilab.core.errors import CertificateError, InvalidValueError
 from rcilab.core.safety_box import SafetyBox, active_box
 from rcilab.core.state import Mode
@@ -54,7 +54,7 @@ class Certificate:
         model: RobotModel,
         start_q: ArrayLike | StartState,
         box: SafetyBox | None = None,
-        distance: SafetyDistance | None = None,
+        distance: ClearanceLimit | None = None,
         mode: Mode = "joint_position",
     ) -> None:
         """Makes sure that this certificate is for this motion on this arm from this start.
@@ -137,7 +137,7 @@ def issue_certificate(
     model: RobotModel,
     start: StartState,
     box: SafetyBox | None = None,
-    distance: SafetyDistance | None = None,
+    distance: ClearanceLimit | None = None,
     mode: Mode = "joint_position",
 ) -> Certificate:
     """Returns the certificate of a motion; only a report that is ok may hand it out."""
@@ -159,7 +159,7 @@ def verify_certificate(
     model: RobotModel,
     start_q: ArrayLike | StartState,
     box: SafetyBox | None = None,
-    distance: SafetyDistance | None = None,
+    distance: ClearanceLimit | None = None,
     mode: Mode = "joint_position",
 ) -> None:
     """Makes sure that there is a certificate and that it is for this; the gate in front of every hand-off.
@@ -189,7 +189,7 @@ def require_certificate(certificate: object) -> Certificate:
     if isinstance(certificate, Certificate):
         return certificate
     if hasattr(certificate, "certificate"):
-        raise InvalidValueError("certificate", Words("pass report.certificate,"), "not the report")
+        raise InvalidValueError("certificate", Unquoted("pass report.certificate,"), "not the report")
     raise InvalidValueError("certificate", certificate, "is no certificate; pass check(motion, model).certificate")
 
 
@@ -198,7 +198,7 @@ def _start_fingerprint(start: StartState) -> str:
     return hashlib.sha256(state.tobytes()).hexdigest()
 
 
-def _distance_fingerprint(distance: SafetyDistance | None) -> str:
+def _distance_fingerprint(distance: ClearanceLimit | None) -> str:
     return NOT_JUDGED if distance is None else hashlib.sha256(repr(distance).encode()).hexdigest()
 
 

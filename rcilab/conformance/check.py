@@ -20,7 +20,7 @@ from rcilab.conformance.signals import HOLD_SAMPLES as HOLD_SAMPLES
 from rcilab.conformance.signals import MotionSignals
 from rcilab.conformance.start import StartState, as_start
 from rcilab.core.arrays import Array, described
-from rcilab.core.clearance import STANDARD_DISTANCE, SafetyDistance
+from rcilab.core.clearance import STANDARD_DISTANCE, ClearanceLimit
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.limits import Limits
@@ -37,7 +37,7 @@ def check(
     *,
     start: ArrayLike | StartState | None = None,
     box: SafetyBox | None = None,
-    distance: SafetyDistance | None = STANDARD_DISTANCE,
+    distance: ClearanceLimit | None = STANDARD_DISTANCE,
     mode: Mode = "joint_position",
 ) -> Report:
     """Returns what the robot would say to this motion, and whether its links keep their distance.
@@ -78,8 +78,8 @@ def check(
     if motion.n != model.n:
         raise InvalidValueError("motion", motion, f"is for {motion.n} joints, {model.name} has {model.n}")
     box = active_box(box)
-    if distance is not None and not isinstance(distance, SafetyDistance):  # pyright: ignore[reportUnnecessaryIsInstance]
-        raise InvalidValueError("distance", described(distance), "is no SafetyDistance; SafetyDistance(links=...) is")
+    if distance is not None and not isinstance(distance, ClearanceLimit):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise InvalidValueError("distance", described(distance), "is no ClearanceLimit; ClearanceLimit(links=...) is")
     state = as_start(motion.start if start is None else start, model.n)
     mode = require_mode(mode)
     rows = condition_table(model.description).rows(mode, has_elbow=model.n == 7, has_box=box is not None)
@@ -95,11 +95,11 @@ def _report(
     model: RobotModel,
     start: StartState,
     box: SafetyBox | None,
-    distance: SafetyDistance | None,
+    distance: ClearanceLimit | None,
     mode: Mode,
 ) -> Report:
     """Returns the verdict of some of the conditions on a motion for this arm."""
-    judge = _Judge(motion, model, start, box, distance, mode)
+    judge = _MotionChecker(motion, model, start, box, distance, mode)
     results = [judge.judge(row) for row in rows]
     found = sorted((v for _, violations in results for v in violations), key=lambda v: -v.ratio)
     facts = {"model": model.name, "law": motion.law, "duration": f"{motion.duration:.3f}", "speed": f"{motion.speed:g}"}
@@ -116,7 +116,7 @@ def _report(
     )
 
 
-class _Judge:
+class _MotionChecker:
     """Compares one motion's signals with the bounds."""
 
     def __init__(
@@ -125,7 +125,7 @@ class _Judge:
         model: RobotModel,
         start: StartState,
         box: SafetyBox | None,
-        distance: SafetyDistance | None,
+        distance: ClearanceLimit | None,
         mode: Mode,
     ) -> None:
         self._motion = motion

@@ -13,7 +13,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from rcilab.conformance.condition import AnyLimits, Bounds, Condition, Necessity
-from rcilab.core.clearance import STANDARD_DISTANCE, SafetyDistance
+from rcilab.core.clearance import STANDARD_DISTANCE, ClearanceLimit
 
 OWN = "rcilab's own, not the controller's; capsules of the URDF"
 FAR = 0.1  # [m]
@@ -28,7 +28,7 @@ _QUANTITIES: dict[Distance, str] = {
 }
 
 
-def clearance_conditions(distance: SafetyDistance) -> tuple[Condition, ...]:
+def clearance_conditions(distance: ClearanceLimit) -> tuple[Condition, ...]:
     """Returns the rows that judge a safety distance: what is necessary first, then what is recommended beyond it."""
     necessary: dict[Distance, float] = {"link_distance": distance.links, "floor_distance": distance.floor}
     if distance.floor_height is None:

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 from rcilab.conformance.clearance_conditions import clearance_conditions
 from rcilab.conformance.clearance_path import in_between
-from rcilab.conformance.limit_violation import Breach
+from rcilab.conformance.limit_violation import LimitViolation
 from rcilab.core.arrays import JointVector, as_vector
-from rcilab.core.clearance import STANDARD_DISTANCE, SafetyDistance
+from rcilab.core.clearance import STANDARD_DISTANCE, ClearanceLimit
 
 if TYPE_CHECKING:
     from rcilab.model.kinematics.collision import LinkPair
@@ -30,7 +30,7 @@ class ClearanceMonitor:
         distance: What to keep. The monitor starts at `model.home`; `reset` places it.
     """
 
-    def __init__(self, model: RobotModel, distance: SafetyDistance = STANDARD_DISTANCE) -> None:
+    def __init__(self, model: RobotModel, distance: ClearanceLimit = STANDARD_DISTANCE) -> None:
         from rcilab.model.kinematics.collision import ClearanceQuery
 
         geometry = model.collision_geometry(distance)
@@ -64,13 +64,13 @@ class ClearanceMonitor:
         self._look(before)
         return not any(row.necessity == "necessary" for row, *_ in self.broken())
 
-    def broken(self) -> list[Breach]:
+    def broken(self) -> list[LimitViolation]:
         """Returns what the last step broke, recommendations too."""
-        found: list[Breach] = []
+        found: list[LimitViolation] = []
         for row, least in self._rows:
             distance, links = self._found[row.signal]
             if not least < distance:
-                found.append(Breach(row, 0, distance, least, links))
+                found.append(LimitViolation(row, 0, distance, least, links))
         return found
 
     def _look(self, before: JointVector | None = None) -> None:

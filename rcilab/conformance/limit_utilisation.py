@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rcilab.conformance.condition import Condition
-from rcilab.core.arrays import Array, frozen
+from rcilab.core.arrays import Array, readonly_copy
 
 FREE = 0.8
 """Part of a joint's range, or of the way to a face of the safety box, that uses nothing of it. A choice."""
@@ -60,4 +60,4 @@ def worst_of(tables: Iterable[tuple[Condition, Array]]) -> Usage:
     row = table.argmax(axis=0)
     row.flags.writeable = False
     worst = np.take_along_axis(table, row[np.newaxis], axis=0)[0]
-    return Usage(ratio=frozen(worst), row=row, conditions=tuple(conditions))
+    return Usage(ratio=readonly_copy(worst), row=row, conditions=tuple(conditions))

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from rcilab.model.kinematics.collision import LinkPair
 
 
-class Breach(NamedTuple):
+class LimitViolation(NamedTuple):
     """What a monitor's last step broke."""
 
     condition: Condition
@@ -56,11 +56,11 @@ class Breach(NamedTuple):
         return Remark(self.text, "passes", condition=row.id, **amounts)
 
 
-def describe_breaches(breaches: Iterable[Breach]) -> Remark:
+def describe_breaches(breaches: Iterable[LimitViolation]) -> Remark:
     """Returns all of them in one line."""
     return Remark.all(breach.remark for breach in breaches)
 
 
-def faults_of(breaches: Iterable[Breach]) -> tuple[Fault, ...]:
+def faults_of(breaches: Iterable[LimitViolation]) -> tuple[Fault, ...]:
     """Returns the faults of the RCI that they raise, in wire order and once each."""
     return tuple(sorted({fault for row, *_ in breaches if isinstance(fault := row.fault, Fault)}))

@@ -17,7 +17,7 @@ import numpy as np
 
 from rcilab.conformance.condition import MANUAL, AnyLimits, Bounds, Condition, joint_limits, same
 from rcilab.conformance.tool_conditions import arm_angle_bounds, tool_bounds
-from rcilab.core.arrays import frozen
+from rcilab.core.arrays import readonly_copy
 from rcilab.core.faults import Fault
 from rcilab.core.limits import Limits
 
@@ -43,7 +43,7 @@ def yielding_limits(limits: Limits) -> Limits:
     joint, cartesian = limits.joint, limits.cartesian
     return replace(
         limits,
-        joint=replace(joint, acceleration=frozen(YIELDING_ALLOWANCE * joint.acceleration)),
+        joint=replace(joint, acceleration=readonly_copy(YIELDING_ALLOWANCE * joint.acceleration)),
         cartesian=replace(
             cartesian,
             translation_acceleration=YIELDING_ALLOWANCE * cartesian.translation_acceleration,

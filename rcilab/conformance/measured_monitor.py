@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from rcilab.conformance.bounds_table import BoundRows
-from rcilab.conformance.limit_violation import Breach
+from rcilab.conformance.bounds_table import BoundsTable
+from rcilab.conformance.limit_violation import LimitViolation
 from rcilab.conformance.measured_conditions import ACCELERATION_CUTOFF, MEASURED_CONDITIONS
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError
@@ -38,7 +38,7 @@ class MeasuredMonitor:
     def __init__(self, limits: Limits, box: SafetyBox | EntryBox | None = None) -> None:
         self._n = len(limits.joint.velocity)
         self._box = box if isinstance(box, EntryBox) else active_box(box)
-        self._rows = BoundRows(MEASURED_CONDITIONS, limits)
+        self._rows = BoundsTable(MEASURED_CONDITIONS, limits)
         self.reset([0.0] * self._n)
 
     @property
@@ -95,7 +95,7 @@ class MeasuredMonitor:
         self._values = [*q, outside, speed, *dq, *velocity, *self.acceleration, *acceleration]
         return self._rows.judge(self._values)
 
-    def broken(self) -> list[Breach]:
+    def broken(self) -> list[LimitViolation]:
         """Returns what the last step broke."""
         return self._rows.broken(self._values)
 
@@ -104,7 +104,7 @@ def _low_passed(state: list[float], new: Sequence[float] | None, old: Sequence[f
     """Returns the filtered difference one cycle later; from rest when there is nothing to take a difference of."""
     if new is None or old is None:
         return [0.0] * len(state)
-    triples = zip(state, new, old)  # noqa: B905  # As in `BoundRows`.
+    triples = zip(state, new, old)  # noqa: B905  # As in `BoundsTable`.
     return [x + _SHARE * ((a - b) / CYCLE_TIME - x) for x, a, b in triples]
 
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from operator import sub
 
-from rcilab.conformance.bounds_table import BoundRows
+from rcilab.conformance.bounds_table import BoundsTable
 from rcilab.conformance.condition import Condition
 from rcilab.conformance.conditions import JOINT_CONDITIONS
 from rcilab.conformance.divided_differences import EVEN, spans
-from rcilab.conformance.limit_violation import Breach
+from rcilab.conformance.limit_violation import LimitViolation
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.faults import Fault
 from rcilab.core.limits import JointLimits
@@ -39,7 +39,7 @@ class JointMonitor:
 
     def __init__(self, limits: JointLimits, rows: Sequence[Condition] = JOINT_CONDITIONS) -> None:
         self._n = len(limits.velocity)
-        self._rows = BoundRows(rows, limits)
+        self._rows = BoundsTable(rows, limits)
         self.reset([0.0] * self._n)
 
     def reset(self, q: Sequence[float], dq: Sequence[float] | None = None, ddq: Sequence[float] | None = None) -> None:
@@ -80,7 +80,7 @@ class JointMonitor:
         self.q, self.dq, self.ddq, self.jerk = q, dq, ddq, jerk
         return self._rows.judge([*q, *dq, *ddq, *jerk])
 
-    def broken(self) -> list[Breach]:
+    def broken(self) -> list[LimitViolation]:
         """Returns what the last step broke."""
         return self._rows.broken((*self.q, *self.dq, *self.ddq, *self.jerk))
 

@@ -14,16 +14,16 @@ from rcilab.conformance.cartesian_monitor import CartesianMonitor
 from rcilab.conformance.clearance_monitor import ClearanceMonitor
 from rcilab.conformance.condition import Condition
 from rcilab.conformance.condition_tables import condition_table
-from rcilab.conformance.limit_violation import Breach
+from rcilab.conformance.limit_violation import LimitViolation
 from rcilab.conformance.measured_monitor import MeasuredMonitor
 from rcilab.conformance.monitor import JointMonitor
 from rcilab.conformance.pose_validation import find_frame_error
-from rcilab.conformance.standstill_monitor import RestMonitor
+from rcilab.conformance.standstill_monitor import StandstillMonitor
 from rcilab.conformance.start import StartState, as_start
 from rcilab.conformance.tool_signals import commands_before
 from rcilab.conformance.torque_monitor import TorqueMonitor
 from rcilab.core.arrays import Array, JointVector, as_vector, described
-from rcilab.core.clearance import SafetyDistance
+from rcilab.core.clearance import ClearanceLimit
 from rcilab.core.command import CartesianPosition, Command, JointPosition, JointTorque
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.safety_box import SafetyBox, active_box, box_from
@@ -56,7 +56,7 @@ class Monitor:
         mode: Mode = "joint_position",
         *,
         box: SafetyBox | None = None,
-        distance: SafetyDistance | None = None,
+        distance: ClearanceLimit | None = None,
     ) -> None:
         self._model, self.mode = require_model(model), require_mode(mode)
         table, self._safety_box = condition_table(model.description), active_box(box)
@@ -71,7 +71,7 @@ class Monitor:
             self._torques = torques
         else:
             self._joint_rows, self._needed = _throughout(rows, "joint"), torques
-            self._rest = RestMonitor(limits, [row for row in rows if row.stage != "throughout" and row.order > 0])
+            self._rest = StandstillMonitor(limits, [row for row in rows if row.stage != "throughout" and row.order > 0])
         self._is_cartesian = self.mode.startswith("cartesian")
         if self._is_cartesian:
             self._tool_rows = (table.box, *_throughout(table.cartesian, "arm_angle", "translation", "rotation"))
@@ -128,7 +128,7 @@ class Monitor:
         self._tool = CartesianMonitor(limits, box, self._tool_rows) if self._is_cartesian else None
         self._box = BoxMonitor(None if self._is_cartesian or self.mode == "torque" else box, self._box_row)
 
-    def step(self, command: Command, cycles: int = 1, side: int | None = None) -> tuple[Breach, ...]:
+    def step(self, command: Command, cycles: int = 1, side: int | None = None) -> tuple[LimitViolation, ...]:
         """Takes the command of this cycle and returns what it breaks, recommendations too; nothing when all is well.
 
         A number that is none breaks every condition on it. After a breach of a necessary condition a controller stops;
@@ -153,7 +153,7 @@ class Monitor:
         self._is_first = False
         return tuple(found)
 
-    def observe(self, q: Sequence[float] | Array, dq: Sequence[float] | Array) -> tuple[Breach, ...]:
+    def observe(self, q: Sequence[float] | Array, dq: Sequence[float] | Array) -> tuple[LimitViolation, ...]:
         """Takes what the sensors say in this cycle and returns what the arm itself breaks.
 
         Args:
@@ -173,18 +173,20 @@ class Monitor:
             found += self._distances(angles)
         return tuple(found)
 
-    def _step_torques(self, monitor: TorqueMonitor, command: Command, cycles: int) -> list[Breach]:
+    def _step_torques(self, monitor: TorqueMonitor, command: Command, cycles: int) -> list[LimitViolation]:
         tau = self._numbers(command.tau if isinstance(command, JointTorque) else None, "tau", command)
         monitor.step(tau, cycles)
         return self._at_start({"torque": tau}) + monitor.broken()
 
-    def _step_joints(self, command: Command, cycles: int) -> list[Breach]:
+    def _step_joints(self, command: Command, cycles: int) -> list[LimitViolation]:
         q = self._numbers(command.q if isinstance(command, JointPosition) else None, "q", command)
         away = [new - old for new, old in zip(q, self._start.q.tolist(), strict=True)]
         found = self._at_start({"joint": away}) + self._judge_joints(q, cycles)
         return found + self._rest.step(self._difference, cycles, is_last=command.finished)
 
-    def _step_pose(self, monitor: CartesianMonitor, command: Command, cycles: int, side: int | None) -> list[Breach]:
+    def _step_pose(
+        self, monitor: CartesianMonitor, command: Command, cycles: int, side: int | None
+    ) -> list[LimitViolation]:
         if not isinstance(command, CartesianPosition):
             raise self._wrong(command)
         numbers = np.asarray(command.T_base_tool, dtype=np.float64).ravel().tolist()
@@ -208,7 +210,7 @@ class Monitor:
         found += self._judge_elbow(q) + self._judge_joints(q, cycles)
         return found + self._rest.step(self._difference, cycles, is_last=command.finished)
 
-    def _judge_joints(self, q: list[float], cycles: int) -> list[Breach]:
+    def _judge_joints(self, q: list[float], cycles: int) -> list[LimitViolation]:
         assert self._joints is not None
         self._joints.step(q, cycles)
         found = self._joints.broken()
@@ -240,37 +242,39 @@ class Monitor:
             return self._q
         return [*self._q[:3], 2.0 * flip - self._q[3], *self._q[4:]]
 
-    def _judge_elbow(self, q: list[float]) -> list[Breach]:
+    def _judge_elbow(self, q: list[float]) -> list[LimitViolation]:
         row = self._pose_rows.get("elbow_sign")
         if row is None or self._model.elbow(q)[1] == self._start_side:
             return []
-        return [Breach(row, 0, -1.0, 0.0)]
+        return [LimitViolation(row, 0, -1.0, 0.0)]
 
-    def _at_start(self, values: dict[str, list[float]]) -> list[Breach]:
+    def _at_start(self, values: dict[str, list[float]]) -> list[LimitViolation]:
         """Returns what the first command of a standing arm breaks for being elsewhere than the arm is."""
         if not self._is_first:
             return []
-        found: list[Breach] = []
+        found: list[LimitViolation] = []
         for row in self._start_rows:
             lower, upper = (bound.tolist() for bound in row.bounds(self._model.limits))
             for axis, (value, low, high) in enumerate(zip(values[row.signal], lower, upper, strict=True), 1):
                 if not low < value < high:
-                    found.append(Breach(row, axis if row.is_per_joint else 0, value, low if value <= low else high))
+                    found.append(
+                        LimitViolation(row, axis if row.is_per_joint else 0, value, low if value <= low else high)
+                    )
         return found
 
-    def _distances(self, q: Sequence[float] | Array) -> list[Breach]:
+    def _distances(self, q: Sequence[float] | Array) -> list[LimitViolation]:
         if self._clearance is None:
             return []
         self._clearance.step(q)
         return self._clearance.broken()
 
-    def _own(self, breaches: list[Breach]) -> list[Breach]:
+    def _own(self, breaches: list[LimitViolation]) -> list[LimitViolation]:
         """Returns breaches of the manual's rows as those of the arm's own table; what it has no row for is none."""
         own = self._own_rows
         return [breach._replace(condition=own[row.id]) for breach in breaches if (row := breach.condition).id in own]
 
-    def _improper(self, nearness: float) -> Breach:
-        return Breach(self._pose_rows["frame"], 0, nearness, 1.0)
+    def _improper(self, nearness: float) -> LimitViolation:
+        return LimitViolation(self._pose_rows["frame"], 0, nearness, 1.0)
 
     def _arm_angle(self, q: Array) -> float | None:
         return self._model.arm_angle(q) if self._model.n == 7 else None

@@ -15,7 +15,7 @@ from rcilab.conformance.standstill import beyond_a_cycle
 from rcilab.conformance.start import StartState
 from rcilab.conformance.tool_signals import ToolSignals
 from rcilab.core.arrays import Array
-from rcilab.core.clearance import SafetyDistance
+from rcilab.core.clearance import ClearanceLimit
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.safety_box import EntryBox, SafetyBox, box_from
 from rcilab.core.state import Mode
@@ -58,7 +58,7 @@ class MotionSignals:
         model: RobotModel,
         start: StartState,
         box: SafetyBox | None,
-        distance: SafetyDistance | None = None,
+        distance: ClearanceLimit | None = None,
         mode: Mode = "joint_position",
     ) -> None:
         self._motion = motion

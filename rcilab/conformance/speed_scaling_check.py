@@ -13,13 +13,13 @@ from rcilab.core.errors import PlanningError
 from rcilab.core.state import Mode
 from rcilab.model.robot_model import RobotModel
 from rcilab.motion.motion import Motion
-from rcilab.motion.speed_scaling import PacedMotion, begun_at, changed_pace, require_pace
+from rcilab.motion.speed_scaling import SpeedScaledMotion, begun_at, changed_pace, require_pace
 
 _ATTEMPTS = 12  # Candidates that are judged in full; a choice.
 _PAST = 3  # Rows that the differences of a row reach back to.
 
 
-def plan_start(motion: Motion, pace: float, model: RobotModel, mode: Mode) -> PacedMotion:
+def plan_start(motion: Motion, pace: float, model: RobotModel, mode: Mode) -> SpeedScaledMotion:
     """Returns a motion that runs at a pace from its first row on, judged by the conditions of its mode.
 
     The way is the one that was judged, so safety box and distances need no other look; at 1 nothing does.
@@ -46,7 +46,7 @@ def plan_start(motion: Motion, pace: float, model: RobotModel, mode: Mode) -> Pa
     return paced
 
 
-def plan_pace(paced: PacedMotion, cycle: int, pace: float, model: RobotModel, mode: Mode) -> PacedMotion:
+def plan_pace(paced: SpeedScaledMotion, cycle: int, pace: float, model: RobotModel, mode: Mode) -> SpeedScaledMotion:
     """Returns the motion that goes on with another pace from a cycle on, as soon as all conditions allow it.
 
     The way stays what was judged before, so safety box and distances need no other look. Where the same pace is asked
@@ -71,7 +71,7 @@ def plan_pace(paced: PacedMotion, cycle: int, pace: float, model: RobotModel, mo
     ).coded("no_way_to_pace", pace=f"{100 * pace:.0f}")
 
 
-def _breaches(candidate: PacedMotion, model: RobotModel, mode: Mode) -> list[Violation]:
+def _breaches(candidate: SpeedScaledMotion, model: RobotModel, mode: Mode) -> list[Violation]:
     """Returns what the rows from the change on would break."""
     first = candidate.changed - 1
     rows = candidate.q[first:]

@@ -7,12 +7,12 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from rcilab.conformance.condition import Condition
-from rcilab.conformance.limit_violation import Breach
+from rcilab.conformance.limit_violation import LimitViolation
 from rcilab.conformance.standstill import beyond_a_cycle
 from rcilab.core.limits import Limits
 
 
-class RestMonitor:
+class StandstillMonitor:
     """Judges whether a motion leaves rest and comes to rest, from the differences that other monitors took.
 
     Owned by the thread that runs the cycle. A velocity needs two commands, an acceleration three, so those at the start
@@ -36,7 +36,9 @@ class RestMonitor:
         """
         self._passed = 0 if is_moving else -1
 
-    def step(self, differences: Callable[[Condition], Sequence[float]], cycles: int, *, is_last: bool) -> list[Breach]:
+    def step(
+        self, differences: Callable[[Condition], Sequence[float]], cycles: int, *, is_last: bool
+    ) -> list[LimitViolation]:
         """Takes the differences of this cycle and returns what they break at an end of the motion.
 
         Args:
@@ -46,7 +48,7 @@ class RestMonitor:
         """
         before = self._passed
         self._passed = before + cycles if before >= 0 else 0
-        found: list[Breach] = []
+        found: list[LimitViolation] = []
         for row, lower, upper in self._rows:
             if not (is_last if row.stage == "end" else before < row.order <= self._passed):
                 continue
@@ -55,5 +57,7 @@ class RestMonitor:
                 zip(values.tolist(), lower.tolist(), upper.tolist(), strict=True), 1
             ):
                 if not low < value < high:
-                    found.append(Breach(row, axis if row.is_per_joint else 0, value, low if value <= low else high))
+                    found.append(
+                        LimitViolation(row, axis if row.is_per_joint else 0, value, low if value <= low else high)
+                    )
         return found

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from rcilab.conformance.bounds_table import BoundRows
+from rcilab.conformance.bounds_table import BoundsTable
 from rcilab.conformance.condition import Condition
-from rcilab.conformance.limit_violation import Breach
+from rcilab.conformance.limit_violation import LimitViolation
 from rcilab.conformance.tool_conditions import TORQUE_CONDITIONS
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError
@@ -31,7 +31,7 @@ class TorqueMonitor:
 
     def __init__(self, limits: JointLimits, rows: Sequence[Condition] = TORQUE_CONDITIONS) -> None:
         self._n = len(limits.torque)
-        self._rows = BoundRows(rows, limits)
+        self._rows = BoundsTable(rows, limits)
         self.reset([0.0] * self._n)
 
     def reset(self, tau: Sequence[float]) -> None:
@@ -63,6 +63,6 @@ class TorqueMonitor:
         self.tau = new
         return self._rows.judge([*self.dtau, *new])
 
-    def broken(self) -> list[Breach]:
+    def broken(self) -> list[LimitViolation]:
         """Returns what the last step broke."""
         return self._rows.broken((*self.dtau, *self.tau))

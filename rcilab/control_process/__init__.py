@@ -8,13 +8,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from rcilab.control_process.pending_request import Ticket as Ticket
+    from rcilab.control_process.pending_request import PendingRequest as PendingRequest
     from rcilab.control_process.status import SupervisorStatus as SupervisorStatus
     from rcilab.control_process.supervisor import Supervisor as Supervisor
 
-_HOME = {"Supervisor": "supervisor", "Ticket": "pending_request", "SupervisorStatus": "status"}
+_HOME = {"Supervisor": "supervisor", "PendingRequest": "pending_request", "SupervisorStatus": "status"}
 
-__all__ = ["Supervisor", "SupervisorStatus", "Ticket"]
+__all__ = ["Supervisor", "SupervisorStatus", "PendingRequest"]
 
 
 def __getattr__(name: str) -> object:

@@ -9,19 +9,19 @@ from typing import TYPE_CHECKING, Any
 from numpy.typing import ArrayLike
 
 from rcilab.control_process.configuration_codec import pack_setup
-from rcilab.control_process.configuration_sync import SetupDesk
+from rcilab.control_process.configuration_sync import ConfigurationSync
 from rcilab.control_process.guiding import GuideKind, GuideSpace, require_guidable
 from rcilab.control_process.jog_command import JogKind, build_jog, hold_jog, release_jog
-from rcilab.control_process.layout import ControlBlock, Word
+from rcilab.control_process.layout import ControlBlock, Counter
 from rcilab.control_process.motion_preconditions import require_admissible, require_ready
-from rcilab.control_process.pending_request import Ticket
-from rcilab.control_process.speed_override import LEADS, PaceDesk
+from rcilab.control_process.pending_request import PendingRequest
+from rcilab.control_process.speed_override import LEADS, SpeedOverride
 from rcilab.control_process.status import SupervisorStatus
 from rcilab.core.errors import UsageError
 from rcilab.core.state import Mode
 from rcilab.makers.rokae.driver.commands import require_signal
-from rcilab.makers.rokae.driver.configuration import RobotSetup, require_setup
-from rcilab.motion.speed_scaling import PacedMotion, require_pace
+from rcilab.makers.rokae.driver.configuration import RobotConfiguration, require_setup
+from rcilab.motion.speed_scaling import SpeedScaledMotion, require_pace
 
 if TYPE_CHECKING:
     from rcilab.conformance import Certificate
@@ -30,22 +30,22 @@ if TYPE_CHECKING:
 
 
 class ArmRequests:
-    """The requests of a `Supervisor`; each returns a `Ticket` at once."""
+    """The requests of a `Supervisor`; each returns a `PendingRequest` at once."""
 
     model: RobotModel
     """The arm, with the tool and the load that the controller was told of last."""
     _lock: threading.RLock
     _block: ControlBlock | None
-    _setup: SetupDesk
-    _pace: PaceDesk
-    _jogging: Ticket | None
+    _setup: ConfigurationSync
+    _pace: SpeedOverride
+    _jogging: PendingRequest | None
 
     @abstractmethod
     def status(self) -> SupervisorStatus:
         """Returns a snapshot."""
 
     @abstractmethod
-    def _ask(self, what: str, **letter: Any) -> Ticket:
+    def _ask(self, what: str, **letter: Any) -> PendingRequest:
         """Sends a request to the control process."""
 
     @abstractmethod
@@ -60,11 +60,11 @@ class ArmRequests:
     def _motion_cycle(self) -> int | None:
         """Returns the cycle of the motion under way; None when there is none."""
 
-    def power_on(self) -> Ticket:
+    def power_on(self) -> PendingRequest:
         """Asks for motor power."""
         return self._ask("power on", kind="power", on=True)
 
-    def power_off(self) -> Ticket:
+    def power_off(self) -> PendingRequest:
         """Asks for motor power to be taken away."""
         return self._ask("power off", kind="power", on=False)
 
@@ -72,7 +72,7 @@ class ArmRequests:
     def stops(self) -> int:
         """How often `stop` has been called since `start`; what was wanted before the last one moves nothing."""
         with self._lock:
-            return 0 if self._block is None else self._block.words[Word.STOPS_ASKED]
+            return 0 if self._block is None else self._block.words[Counter.STOPS_ASKED]
 
     def execute(
         self,
@@ -82,7 +82,7 @@ class ArmRequests:
         *,
         pace: float = 1.0,
         stops: int | None = None,
-    ) -> Ticket:
+    ) -> PendingRequest:
         """Streams a checked motion; the ticket is done when the arm stands still again.
 
         It is judged once more before it is handed over, which takes up to some 0.2 s; a `stop` meanwhile counts.
@@ -122,7 +122,7 @@ class ArmRequests:
             duration = paced.duration if paced.changed else motion.duration  # As planned it may end within a cycle.
             return self._ask("execute", kind="execute", rows=len(paced.q), duration=duration, mode=mode)
 
-    def pause(self) -> Ticket:
+    def pause(self) -> PendingRequest:
         """Holds the motion under way, along its way and within all limits; done once that is handed over.
 
         `resume` goes on; a motion that is held for more than 120 s is given up.
@@ -133,11 +133,11 @@ class ArmRequests:
         """
         return self._change_pace(0.0)
 
-    def resume(self, pace: float = 1.0) -> Ticket:
+    def resume(self, pace: float = 1.0) -> PendingRequest:
         """Goes on with a motion that is held; see `set_pace`."""
         return self.set_pace(pace)
 
-    def set_pace(self, pace: float) -> Ticket:
+    def set_pace(self, pace: float) -> PendingRequest:
         """Runs the motion under way at part of its planned speed; done once that is handed over.
 
         The change is planned here, along the way, and judged by the conditions of the motion's mode before any of it
@@ -154,13 +154,13 @@ class ArmRequests:
         return self._change_pace(require_pace(pace))
 
     @property
-    def paced(self) -> PacedMotion | None:
+    def paced(self) -> SpeedScaledMotion | None:
         """The motion of the last `execute` as it was really commanded, with every change of pace; None before."""
         with self._lock:
             self._require_block()
             return self._pace.paced
 
-    def _change_pace(self, pace: float) -> Ticket:
+    def _change_pace(self, pace: float) -> PendingRequest:
         for lead in LEADS:
             changed = self._pace.plan(pace, lead, self._require_cycle())
             with self._lock:
@@ -183,8 +183,8 @@ class ArmRequests:
         return cycle
 
     def jog(
-        self, kind: JogKind, values: ArrayLike, *, goes_on: Ticket | None = None, stops: int | None = None
-    ) -> Ticket:
+        self, kind: JogKind, values: ArrayLike, *, goes_on: PendingRequest | None = None, stops: int | None = None
+    ) -> PendingRequest:
         """Moves the arm as long as it is held: call it at least five times a second, and `release_jog` at the end.
 
         The first call begins a jog, the next ones go on with it, whatever direction they ask for: on-line re-planning
@@ -230,7 +230,7 @@ class ArmRequests:
 
     def start_guiding(
         self, space: GuideSpace = "joint", kind: GuideKind = "free", *, stops: int | None = None
-    ) -> Ticket:
+    ) -> PendingRequest:
         """Frees the arm for a hand to guide it (startDrag), until `stop_guiding` or `stop`; done once it is free.
 
         The phase is "moving" meanwhile and the code "moving.guided". It ends like a motion when nobody is at the
@@ -253,17 +253,17 @@ class ArmRequests:
             self._setup.require_given()
             return self._ask("start guiding", kind="start_guiding", space=space, type=kind)
 
-    def stop_guiding(self) -> Ticket:
+    def stop_guiding(self) -> PendingRequest:
         """Ends hand guiding (stopDrag); done once the arm stands still."""
         return self._ask("stop guiding", kind="stop_guiding")
 
-    def stop(self) -> Ticket:
+    def stop(self) -> PendingRequest:
         """Brings a running motion to rest within the limits, or ends guiding; done when the arm stands still."""
         with self._lock:
             block = self._require_block()
             release_jog(block.words)
-            block.words[Word.STOPS_ASKED] += 1
-            return self._ask("stop", kind="stop", number=block.words[Word.STOPS_ASKED])
+            block.words[Counter.STOPS_ASKED] += 1
+            return self._ask("stop", kind="stop", number=block.words[Counter.STOPS_ASKED])
 
     def _require_unstopped(self, stops: int | None) -> None:
         """Refuses what was wanted before the last stop, and all while not running; call with the lock."""
@@ -273,7 +273,7 @@ class ArmRequests:
                 "stopped_before"
             )
 
-    def set_up(self, setup: RobotSetup) -> Ticket:
+    def set_up(self, setup: RobotConfiguration) -> PendingRequest:
         """Tells the controller a tool, a load, a safety box, a force-control frame; done once it has taken all of it.
 
         From now on motions are checked with it, and it is told again at every new connection.
@@ -294,15 +294,15 @@ class ArmRequests:
             self.model = model
             return ticket
 
-    def set_output(self, signal: int, level: bool) -> Ticket:
+    def set_output(self, signal: int, level: bool) -> PendingRequest:
         """Sets a digital output, 0 to 5, and reads the inputs again; the status shows both."""
         return self._ask("set output", kind="output", signal=require_signal(signal), level=bool(level))
 
-    def read_inputs(self) -> Ticket:
+    def read_inputs(self) -> PendingRequest:
         """Reads the digital inputs; the status shows them."""
         return self._ask("read inputs", kind="inputs")
 
-    def reboot(self) -> Ticket:
+    def reboot(self) -> PendingRequest:
         """Restarts the controller, which ends the connection; `reconnect` makes the next one, and sets all up again.
 
         Raises:
@@ -313,6 +313,6 @@ class ArmRequests:
             require_ready(self.status(), is_operator_overdue=False)
             return self._ask("reboot", kind="reboot")
 
-    def recover(self) -> Ticket:
+    def recover(self) -> PendingRequest:
         """Asks the controller to clear its faults (automatic error recovery)."""
         return self._ask("recover", kind="recover")

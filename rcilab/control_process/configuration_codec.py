@@ -8,13 +8,13 @@ import numpy as np
 
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
-from rcilab.makers.rokae.driver.configuration import ForceControlFrame, RobotSetup, SoftJointLimits
-from rcilab.makers.rokae.driver.controller_parameters import ControlSettings
+from rcilab.makers.rokae.driver.configuration import ForceControlFrame, RobotConfiguration, SoftJointLimits
+from rcilab.makers.rokae.driver.controller_parameters import ControllerParameters
 from rcilab.makers.rokae.wire import ForceFrame
 from rcilab.model.dynamics.payload import Payload
 
 
-def pack_setup(setup: RobotSetup) -> dict[str, Any]:
+def pack_setup(setup: RobotConfiguration) -> dict[str, Any]:
     """Returns a set-up as a part of a letter."""
     letter: dict[str, Any] = {}
     if setup.tool is not None:
@@ -33,7 +33,7 @@ def pack_setup(setup: RobotSetup) -> dict[str, Any]:
     return letter
 
 
-def parse_setup(letter: dict[str, Any]) -> RobotSetup:
+def parse_setup(letter: dict[str, Any]) -> RobotConfiguration:
     """Returns what `pack_setup` wrote."""
     tool = load = box = force = joints = control = None
     if "tool" in letter:
@@ -51,5 +51,5 @@ def parse_setup(letter: dict[str, Any]) -> RobotSetup:
         lower, upper = map(tuple, letter["joints"])
         joints = SoftJointLimits(lower=lower, upper=upper)
     if "control" in letter:
-        control = ControlSettings.from_letter(letter["control"])
-    return RobotSetup(box=box, tool=tool, load=load, force=force, joints=joints, control=control)
+        control = ControllerParameters.from_letter(letter["control"])
+    return RobotConfiguration(box=box, tool=tool, load=load, force=force, joints=joints, control=control)

@@ -7,35 +7,35 @@ from typing import TYPE_CHECKING, Any
 from rcilab.control_process.configuration_codec import pack_setup
 from rcilab.core.errors import RcilabError, UsageError
 from rcilab.core.spatial import IDENTITY
-from rcilab.makers.rokae.driver.configuration import RobotSetup
+from rcilab.makers.rokae.driver.configuration import RobotConfiguration
 
 if TYPE_CHECKING:
-    from rcilab.control_process.pending_request import Ticket
+    from rcilab.control_process.pending_request import PendingRequest
     from rcilab.model.robot_model import RobotModel
 
 
-class SetupDesk:
+class ConfigurationSync:
     """Guarded by the lock of its owner.
 
     Args:
         setup: What the controller is told at its first connection.
     """
 
-    def __init__(self, setup: RobotSetup) -> None:
+    def __init__(self, setup: RobotConfiguration) -> None:
         self.wanted = setup
         """What it was told last, all of it."""
-        self.acknowledged = RobotSetup()
+        self.acknowledged = RobotConfiguration()
         """What it has answered yes to since it was connected."""
         self.times = 0
         """At how many connections it has taken a set-up."""
-        self._waiting: list[tuple[Ticket, RobotSetup, bool]] = []
+        self._waiting: list[tuple[PendingRequest, RobotConfiguration, bool]] = []
         self._refusal: RcilabError | None = None
 
     def letter(self) -> dict[str, Any]:
         """Returns what a letter that connects says of the set-up."""
         return pack_setup(self.wanted)
 
-    def follow(self, ticket: Ticket, setup: RobotSetup, *, is_new_connection: bool = False) -> None:
+    def follow(self, ticket: PendingRequest, setup: RobotConfiguration, *, is_new_connection: bool = False) -> None:
         """Takes note of a request that carries a set-up.
 
         Args:
@@ -52,7 +52,7 @@ class SetupDesk:
         while self._waiting and self._waiting[0][0].done:
             ticket, setup, is_new_connection = self._waiting.pop(0)
             if is_new_connection:
-                self.acknowledged = RobotSetup()
+                self.acknowledged = RobotConfiguration()
             if ticket.error is not None:
                 self._refusal = ticket.error
                 # It may have taken some of it: what it has of these parts now, nobody knows.
@@ -79,7 +79,7 @@ class SetupDesk:
             )
 
 
-def standard_setup(model: RobotModel, *, is_virtual: bool) -> RobotSetup:
+def standard_setup(model: RobotModel, *, is_virtual: bool) -> RobotConfiguration:
     """Returns what a controller is told unless somebody says otherwise.
 
     Args:
@@ -87,6 +87,8 @@ def standard_setup(model: RobotModel, *, is_virtual: bool) -> RobotSetup:
         is_virtual: Whether the controller is ours: then it is told of tool and load. A real one has its own settings.
     """
     if not is_virtual:
-        return RobotSetup()
+        return RobotConfiguration()
     has_tool = not model.T_flange_tool.is_close(IDENTITY, 0.0)
-    return RobotSetup(tool=model.T_flange_tool if has_tool else None, load=model.load if model.load.mass else None)
+    return RobotConfiguration(
+        tool=model.T_flange_tool if has_tool else None, load=model.load if model.load.mass else None
+    )

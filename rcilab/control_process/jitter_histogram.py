@@ -30,7 +30,7 @@ _SHOWN_BIN = np.searchsorted(_EDGES, _MIDDLES, side="right") - 1
 _SHARES = np.array((0.5, 0.99, 0.999))
 
 
-class LatenessHistogram:
+class JitterHistogram:
     """Counts in shared memory. Owned by the control process; others read.
 
     Args:

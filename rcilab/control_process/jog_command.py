@@ -9,7 +9,7 @@ from typing import Literal, TypeAlias, get_args
 
 from numpy.typing import ArrayLike
 
-from rcilab.control_process.layout import Word
+from rcilab.control_process.layout import Counter
 from rcilab.core.arrays import as_vector
 from rcilab.core.errors import InvalidValueError
 
@@ -49,33 +49,33 @@ def build_jog(kind: JogKind, values: ArrayLike, n: int) -> JogCommand:
 def hold_jog(memory: memoryview, words: memoryview, command: JogCommand) -> None:
     """Writes the jog that is held now, and when."""
     write_jog(memory, words, command)
-    words[Word.JOG_BEAT] = time.monotonic_ns()
+    words[Counter.JOG_BEAT] = time.monotonic_ns()
 
 
 def release_jog(words: memoryview) -> None:
     """Says that nothing is held any more."""
-    words[Word.JOG_BEAT] = 0
+    words[Counter.JOG_BEAT] = 0
 
 
 def is_held(words: memoryview) -> bool:
     """Returns whether a jog has been held within the last `HOLD_TIMEOUT`."""
-    return time.monotonic_ns() - words[Word.JOG_BEAT] <= HOLD_TIMEOUT * 1e9
+    return time.monotonic_ns() - words[Counter.JOG_BEAT] <= HOLD_TIMEOUT * 1e9
 
 
 def write_jog(memory: memoryview, words: memoryview, command: JogCommand) -> None:
     """Writes the jog; the sequence word is odd meanwhile."""
     numbers = (*command.values, *(0.0,) * (7 - len(command.values)))
-    sequence = words[Word.JOG] | 1
-    words[Word.JOG] = sequence
+    sequence = words[Counter.JOG] | 1
+    words[Counter.JOG] = sequence
     _RECORD.pack_into(memory, 0, _KINDS.index(command.kind), len(command.values), *numbers)
-    words[Word.JOG] = sequence + 1
+    words[Counter.JOG] = sequence + 1
 
 
 def read_jog(memory: memoryview, words: memoryview) -> JogCommand | None:
     """Returns the jog as a whole, or None when it is just being written."""
     for _ in range(_ATTEMPTS):
-        before = words[Word.JOG]
+        before = words[Counter.JOG]
         kind, count, *numbers = _RECORD.unpack_from(memory, 0)
-        if before % 2 == 0 and words[Word.JOG] == before:
+        if before % 2 == 0 and words[Counter.JOG] == before:
             return JogCommand(_KINDS[kind], tuple(numbers[:count]))
     return None

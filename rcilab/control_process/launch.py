@@ -34,7 +34,7 @@ def require_plant(plant: object) -> None:
         raise InvalidValueError("plant", plant, f"is unknown; known: {', '.join(PLANT_KINDS)}")
 
 
-class Child:
+class ManagedProcess:
     """A process of ours with what it says kept for error messages.
 
     Args:
@@ -138,7 +138,7 @@ def parent_pid() -> int:
         raise ConnectionLostError(f"Python could not be started once more: {error}").coded("no_process") from error
 
 
-class VirtualController(Child):
+class VirtualController(ManagedProcess):
     """A private `rcilab controller` on loopback and free ports; it ends with this process, whatever happens to it.
 
     Args:

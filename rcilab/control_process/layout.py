@@ -54,7 +54,7 @@ _SNAPSHOT_SIZE = _PAGE
 _MEMORY = Path("/dev/shm")  # Linux: files there live in memory. Elsewhere, or when it is full: the temp directory.
 
 
-class Word(IntEnum):
+class Counter(IntEnum):
     """Place of each counter among the words, and who writes it."""
 
     SUPERVISOR_BEAT = 0

@@ -6,13 +6,13 @@ import json
 import struct
 from typing import Any
 
-from rcilab.control_process.layout import MAIL_SIZE, MAIL_SLOTS, Word
+from rcilab.control_process.layout import MAIL_SIZE, MAIL_SLOTS, Counter
 from rcilab.core.errors import UsageError
 
 _LENGTH = struct.Struct("<I")
 
 
-class Mailbox:
+class MessageRing:
     """One direction of mail. `post` belongs to one side, `take` to the other.
 
     Args:
@@ -22,7 +22,7 @@ class Mailbox:
         taken: Which counter the reader counts up.
     """
 
-    def __init__(self, slots: memoryview, words: memoryview, posted: Word, taken: Word) -> None:
+    def __init__(self, slots: memoryview, words: memoryview, posted: Counter, taken: Counter) -> None:
         self._slots = slots
         self._words = words
         self._posted = posted

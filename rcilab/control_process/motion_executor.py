@@ -6,9 +6,9 @@ import gc
 
 from rcilab.control_process.jogging import HeldJog
 from rcilab.control_process.layout import OPERATOR_TIMEOUT, ControlBlock
-from rcilab.control_process.request_channel import Letter, Letters
-from rcilab.control_process.status_writer import Publisher
-from rcilab.control_process.stop_conditions import Oversight
+from rcilab.control_process.request_channel import Letter, RequestChannel
+from rcilab.control_process.status_writer import StatusWriter
+from rcilab.control_process.stop_conditions import StopConditions
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import ControlError, UsageError
 from rcilab.core.limits import Limits
@@ -19,7 +19,7 @@ from rcilab.execution.recorder import CycleLog
 from rcilab.execution.start_pose_check import describe_start_mismatch
 from rcilab.execution.streaming import MotionStream
 from rcilab.makers.rokae.driver.commands import RciCommands
-from rcilab.makers.rokae.driver.connection import Link
+from rcilab.makers.rokae.driver.connection import RciConnection
 from rcilab.model.robot_model import RobotModel
 from rcilab.realtime.cpu_latency import awake_cores
 
@@ -30,7 +30,7 @@ class StoppedError(ControlError):
     """A motion was brought to rest before its end, because somebody wanted it so."""
 
 
-class Mover:
+class MotionExecutor:
     """One motion after the other. Owned by the control process's one thread.
 
     Args:
@@ -46,10 +46,10 @@ class Mover:
         self,
         block: ControlBlock,
         limits: Limits,
-        publisher: Publisher,
+        publisher: StatusWriter,
         log: CycleLog,
-        letters: Letters,
-        oversight: Oversight,
+        letters: RequestChannel,
+        oversight: StopConditions,
     ) -> None:
         self._block, self._limits = block, limits
         self._publisher, self._log = publisher, log
@@ -59,7 +59,7 @@ class Mover:
         self._mode: Mode = "joint_position"
         self._softly: str | None = None  # Why a motion in torques is being brought to rest.
 
-    def execute(self, link: Link, commands: RciCommands, model: RobotModel, request: Letter) -> None:
+    def execute(self, link: RciConnection, commands: RciCommands, model: RobotModel, request: Letter) -> None:
         """Streams the rows that lie in the block; returns once the arm stands at their end.
 
         Raises:
@@ -82,7 +82,7 @@ class Mover:
         finally:
             self._stream = None
 
-    def jog(self, link: Link, commands: RciCommands, model: RobotModel) -> None:
+    def jog(self, link: RciConnection, commands: RciCommands, model: RobotModel) -> None:
         """Moves the arm as long as somebody holds it, and returns once it stands.
 
         Raises:
@@ -100,7 +100,7 @@ class Mover:
 
     def _move(
         self,
-        link: Link,
+        link: RciConnection,
         commands: RciCommands,
         model: RobotModel,
         callback: Callback,

@@ -7,7 +7,7 @@ import threading
 from rcilab.core.errors import DeadlineError, RcilabError
 
 
-class Ticket:
+class PendingRequest:
     """A request on its way through the control process. Safe to look at from any thread.
 
     Args:

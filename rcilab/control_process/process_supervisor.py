@@ -8,8 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from rcilab.control_process.launch import START_TIMEOUT, Child, VirtualController, parent_pid
-from rcilab.control_process.layout import ControlBlock, Word
+from rcilab.control_process.launch import START_TIMEOUT, ManagedProcess, VirtualController, parent_pid
+from rcilab.control_process.layout import ControlBlock, Counter
 from rcilab.control_process.snapshot import read_snapshot
 from rcilab.control_process.status import MESSAGES
 from rcilab.core.errors import ConnectionLostError
@@ -24,7 +24,7 @@ _RESTARTS, _RESTART_WINDOW = 3, 60.0  # Restarts by itself, in so many seconds.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Death:
+class ProcessExit:
     """A process of ours ended, or froze and was ended, without anybody having wanted that."""
 
     code: str
@@ -35,7 +35,7 @@ class Death:
     """Whether it was the control process: every request under way is lost with it."""
 
 
-class ProcessKeeper:
+class ProcessSupervisor:
     """Owns the control process and, where the controller is ours, the virtual controller.
 
     It has no thread and no lock: `look()` is called often, and every call is guarded by the lock of whoever owns it.
@@ -57,7 +57,7 @@ class ProcessKeeper:
         self._plant = plant
         self._foreign_address = address
         self._auto_restart = auto_restart
-        self._worker: Child | None = None
+        self._worker: ManagedProcess | None = None
         self._worker_started = 0.0
         self._controller: VirtualController | None = None
         self._restarts: deque[float] = deque(maxlen=_RESTARTS)
@@ -82,7 +82,7 @@ class ProcessKeeper:
     @property
     def is_ready(self) -> bool:
         """Whether the control process listens and there is a controller to send it to."""
-        return self.address is not None and self._block.words[Word.WORKER_BEAT] != 0 and self.worker_pid is not None
+        return self.address is not None and self._block.words[Counter.WORKER_BEAT] != 0 and self.worker_pid is not None
 
     def launch(self) -> None:
         """Starts what belongs to us and returns at once; earlier restarts are forgiven.
@@ -96,7 +96,7 @@ class ProcessKeeper:
             self._start_controller()
         self._start_worker()
 
-    def look(self) -> list[Death]:
+    def look(self) -> list[ProcessExit]:
         """Buries what has died or frozen since the last look and starts it again where that is wanted."""
         return [death for death in (self._look_after_controller(), self._look_after_worker()) if death is not None]
 
@@ -117,19 +117,19 @@ class ProcessKeeper:
     def _start_worker(self) -> None:
         words = self._block.words
         # Whatever lay in the mailboxes was for a process that is no more.
-        for word in (Word.REQUESTS_POSTED, Word.REQUESTS_TAKEN, Word.REPLIES_POSTED, Word.REPLIES_TAKEN):
+        for word in (Counter.REQUESTS_POSTED, Counter.REQUESTS_TAKEN, Counter.REPLIES_POSTED, Counter.REPLIES_TAKEN):
             words[word] = 0
-        words[Word.WORKER_BEAT] = 0
+        words[Counter.WORKER_BEAT] = 0
         self._worker_started = time.monotonic()
-        words[Word.SUPERVISOR_BEAT] = time.monotonic_ns()
-        self._worker = Child(
+        words[Counter.SUPERVISOR_BEAT] = time.monotonic_ns()
+        self._worker = ManagedProcess(
             "rcilab.control_process.worker",
             ["--block", str(self._block.descriptor), "--parent", str(parent_pid())],
             "the control process",
             [self._block.descriptor],
         )
 
-    def _look_after_controller(self) -> Death | None:
+    def _look_after_controller(self) -> ProcessExit | None:
         controller = self._controller
         if controller is None:
             return None
@@ -138,14 +138,14 @@ class ProcessKeeper:
             self.address = controller.address
         except ConnectionLostError as error:  # It has never been ready: another attempt would end the same way.
             self._end_controller()
-            return Death(code="crashed.controller", message=str(error), is_worker=False)
+            return ProcessExit(code="crashed.controller", message=str(error), is_worker=False)
         if controller.is_alive:
             return None
         how = controller.how_it_ended
         self._end_controller()
         return self._succeed("crashed.controller", self._start_controller if was_ready else None, how=how)
 
-    def _look_after_worker(self) -> Death | None:
+    def _look_after_worker(self) -> ProcessExit | None:
         worker = self._worker
         if worker is None:
             return None
@@ -165,7 +165,7 @@ class ProcessKeeper:
 
     def _silence_of_worker(self) -> float:
         """Returns how long the control process has given no sign of life, [s]; 0 while that is to be expected."""
-        beat = self._block.words[Word.WORKER_BEAT]
+        beat = self._block.words[Counter.WORKER_BEAT]
         if beat == 0:  # It is still loading.
             loading = time.monotonic() - self._worker_started
             return loading if loading > LOAD_TIMEOUT else 0.0
@@ -174,7 +174,7 @@ class ProcessKeeper:
         is_connecting = read_snapshot(self._block.snapshot, self._block.words).phase == "connecting"
         return 0.0 if is_connecting and silence < 3.0 * ANSWER_TIMEOUT else silence
 
-    def _succeed(self, code: str, start: Callable[[], None] | None, **facts: Any) -> Death:
+    def _succeed(self, code: str, start: Callable[[], None] | None, **facts: Any) -> ProcessExit:
         """Starts a successor of what died, if that is wanted, and returns the death in words.
 
         Args:
@@ -188,7 +188,7 @@ class ProcessKeeper:
         following = "it is being started again" if again else "restart starts it again"
         if is_often:
             following = f"that was {_RESTARTS} times in a minute; restart"
-        death = Death(
+        death = ProcessExit(
             code=code, message=MESSAGES[code].format(**facts, next=following), is_worker=code != "crashed.controller"
         )
         if again and start is not None:

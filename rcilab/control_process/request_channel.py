@@ -5,14 +5,14 @@ from __future__ import annotations
 from typing import Any, TypeAlias
 
 from rcilab.control_process.error_codec import pack_failure
-from rcilab.control_process.layout import ControlBlock, Word
-from rcilab.control_process.message_ring import Mailbox
+from rcilab.control_process.layout import ControlBlock, Counter
+from rcilab.control_process.message_ring import MessageRing
 
 Letter: TypeAlias = "dict[str, Any]"
 """A request: its id, its kind, and what that takes."""
 
 
-class Letters:
+class RequestChannel:
     """Takes requests and answers them. Owned by the control process's one thread.
 
     Args:
@@ -20,8 +20,8 @@ class Letters:
     """
 
     def __init__(self, block: ControlBlock) -> None:
-        self._inbox = Mailbox(block.requests, block.words, Word.REQUESTS_POSTED, Word.REQUESTS_TAKEN)
-        self._outbox = Mailbox(block.replies, block.words, Word.REPLIES_POSTED, Word.REPLIES_TAKEN)
+        self._inbox = MessageRing(block.requests, block.words, Counter.REQUESTS_POSTED, Counter.REQUESTS_TAKEN)
+        self._outbox = MessageRing(block.replies, block.words, Counter.REPLIES_POSTED, Counter.REPLIES_TAKEN)
         self._put_off: list[Letter] = []
 
     @property

@@ -6,13 +6,13 @@ from contextlib import suppress
 from typing import Any
 
 from rcilab.control_process.error_codec import unpack_failure
-from rcilab.control_process.layout import ControlBlock, Word
-from rcilab.control_process.message_ring import Mailbox
-from rcilab.control_process.pending_request import Ticket
+from rcilab.control_process.layout import ControlBlock, Counter
+from rcilab.control_process.message_ring import MessageRing
+from rcilab.control_process.pending_request import PendingRequest
 from rcilab.core.errors import RcilabError, UsageError
 
 
-class TicketDesk:
+class RequestClient:
     """Owns the supervisor's ends of both mailboxes and the tickets under way; guarded by the lock of its owner.
 
     Args:
@@ -20,12 +20,12 @@ class TicketDesk:
     """
 
     def __init__(self, block: ControlBlock) -> None:
-        self._requests = Mailbox(block.requests, block.words, Word.REQUESTS_POSTED, Word.REQUESTS_TAKEN)
-        self._replies = Mailbox(block.replies, block.words, Word.REPLIES_POSTED, Word.REPLIES_TAKEN)
-        self._tickets: dict[int, Ticket] = {}
+        self._requests = MessageRing(block.requests, block.words, Counter.REQUESTS_POSTED, Counter.REQUESTS_TAKEN)
+        self._replies = MessageRing(block.replies, block.words, Counter.REPLIES_POSTED, Counter.REPLIES_TAKEN)
+        self._tickets: dict[int, PendingRequest] = {}
         self._next_id = 1
 
-    def send(self, what: str, letter: dict[str, Any]) -> Ticket:
+    def send(self, what: str, letter: dict[str, Any]) -> PendingRequest:
         """Sends a request and returns the ticket for it.
 
         Args:
@@ -35,7 +35,7 @@ class TicketDesk:
         Raises:
             UsageError: Too many requests wait already.
         """
-        ticket = Ticket(what)
+        ticket = PendingRequest(what)
         self._requests.post({"id": self._next_id, **letter})
         self._tickets[self._next_id] = ticket
         self._next_id += 1

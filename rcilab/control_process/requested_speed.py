@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 _SAME_PACE = 1e-3
 
 
-class PaceWish:
+class RequestedSpeed:
     """The part of its planned speed that somebody wants a motion to run at; of a slider's many only the newest counts.
 
     Used by one thread, or under a lock.

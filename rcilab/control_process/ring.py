@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rcilab.control_process.layout import RING_CYCLES, ControlBlock, Word
+from rcilab.control_process.layout import RING_CYCLES, ControlBlock, Counter
 from rcilab.core.cycle_log import cycle_dtype
 
 
@@ -26,26 +26,26 @@ class RingReader:
     def newest(self) -> NDArray[np.void] | None:
         """Returns a copy of the newest row, shape (1,), or None while there is none; does not move the reader."""
         while True:
-            count = self._words[Word.CYCLES]
+            count = self._words[Counter.CYCLES]
             if count == 0:
                 return None
             place = (count - 1) % RING_CYCLES
             row = self._rows[place : place + 1].copy()
-            if self._words[Word.CYCLES] - (count - 1) < RING_CYCLES:
+            if self._words[Counter.CYCLES] - (count - 1) < RING_CYCLES:
                 return row
 
     def last(self, count: int) -> NDArray[np.void]:
         """Returns a copy of the newest rows, at most `count`, oldest first; does not move the reader."""
-        end = self._words[Word.CYCLES]
+        end = self._words[Counter.CYCLES]
         return self._copy(max(end - count, 0), end)
 
     def drain(self) -> NDArray[np.void]:
         """Returns a copy of every row since the last call, oldest first."""
-        count = self._words[Word.CYCLES]
+        count = self._words[Counter.CYCLES]
         first = max(self._next, count - RING_CYCLES)
         rows = self._copy(first, count)
         # What the writer has overwritten while we copied is rubbish; the row it writes just now counts as well.
-        spoiled = max(0, self._words[Word.CYCLES] + 1 - RING_CYCLES - first)
+        spoiled = max(0, self._words[Counter.CYCLES] + 1 - RING_CYCLES - first)
         lost = first - self._next + min(spoiled, len(rows))
         rows = rows[spoiled:]
         self.overrun += lost

@@ -10,7 +10,7 @@ import numpy as np
 from rcilab.control_process.launch import require_plant, start_controller
 from rcilab.core.spatial import IDENTITY
 from rcilab.execution.session import RobotSession, open_session
-from rcilab.execution.simulation_control import World
+from rcilab.execution.simulation_control import SimulationControl
 
 if TYPE_CHECKING:
     from rcilab.model.robot_model import RobotModel
@@ -72,8 +72,8 @@ def simulate(
     return session
 
 
-def _world(address: str | None) -> World | None:
+def _world(address: str | None) -> SimulationControl | None:
     if address is None:
         return None
     host, _, port = address.partition(":")
-    return World(host, int(port))
+    return SimulationControl(host, int(port))

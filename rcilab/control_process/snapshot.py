@@ -5,7 +5,7 @@ from __future__ import annotations
 import struct
 from dataclasses import dataclass
 
-from rcilab.control_process.layout import Word
+from rcilab.control_process.layout import Counter
 from rcilab.control_process.status import PHASES, Phase
 
 _RECORD = struct.Struct("<BbBBbBBxddd96s1024s")
@@ -35,8 +35,8 @@ class Snapshot:
 
 def write_snapshot(memory: memoryview, words: memoryview, snapshot: Snapshot) -> None:
     """Writes a snapshot; the sequence word is odd meanwhile."""
-    sequence = words[Word.SNAPSHOT] | 1
-    words[Word.SNAPSHOT] = sequence
+    sequence = words[Counter.SNAPSHOT] | 1
+    words[Counter.SNAPSHOT] = sequence
     _RECORD.pack_into(
         memory,
         0,
@@ -53,16 +53,16 @@ def write_snapshot(memory: memoryview, words: memoryview, snapshot: Snapshot) ->
         snapshot.code.encode(),
         _fitting(snapshot.message, 1024),
     )
-    words[Word.SNAPSHOT] = sequence + 1
+    words[Counter.SNAPSHOT] = sequence + 1
 
 
 def read_snapshot(memory: memoryview, words: memoryview) -> Snapshot:
     """Returns the latest whole snapshot."""
     data = b""
     for _ in range(_ATTEMPTS):
-        before = words[Word.SNAPSHOT]
+        before = words[Counter.SNAPSHOT]
         data = bytes(memory[: _RECORD.size])
-        if before % 2 == 0 and words[Word.SNAPSHOT] == before:
+        if before % 2 == 0 and words[Counter.SNAPSHOT] == before:
             break
     facts = _RECORD.unpack(data)
     phase, powered, is_fifo, locked, inputs, outputs_known, outputs, rate_hz, time, duration, code, message = facts

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from rcilab.control_process.layout import MOTION_ROWS, MOTION_TIME, ControlBlock
-from rcilab.control_process.pending_request import Ticket
+from rcilab.control_process.pending_request import PendingRequest
 from rcilab.core.errors import PlanningError, RcilabError, UsageError
 from rcilab.core.state import Mode
-from rcilab.motion.speed_scaling import PacedMotion
+from rcilab.motion.speed_scaling import SpeedScaledMotion
 
 if TYPE_CHECKING:
     from rcilab.model.robot_model import RobotModel
@@ -32,7 +32,7 @@ class HandedOver:
     count: int
 
 
-class PaceDesk:
+class SpeedOverride:
     """Plans changes of pace for the motion under way. `plan` may take a tenth of a second and is called without a lock.
 
     Args:
@@ -44,12 +44,12 @@ class PaceDesk:
         self._planning = threading.Lock()
         self._model: RobotModel | None = None
         self._in_use: list[HandedOver] = []
-        self.paced: PacedMotion | None = None
+        self.paced: SpeedScaledMotion | None = None
         """The motion under way, or the last one."""
         self.mode: Mode = "joint_position"
-        self._before: tuple[Ticket, PacedMotion | None, list[HandedOver]] | None = None
+        self._before: tuple[PendingRequest, SpeedScaledMotion | None, list[HandedOver]] | None = None
 
-    def begin(self, paced: PacedMotion, model: RobotModel, mode: Mode) -> None:
+    def begin(self, paced: SpeedScaledMotion, model: RobotModel, mode: Mode) -> None:
         """Takes note of a motion that begins and writes its rows into the block, from the first place on.
 
         Raises:
@@ -63,7 +63,7 @@ class PaceDesk:
         self.paced, self._model, self.mode = paced, model, mode
         self._before = None
 
-    def plan(self, pace: float, lead: int, cycle: int) -> PacedMotion:
+    def plan(self, pace: float, lead: int, cycle: int) -> SpeedScaledMotion:
         """Returns the motion under way with another pace.
 
         Args:
@@ -83,7 +83,7 @@ class PaceDesk:
                 raise UsageError("no motion runs whose pace could change").coded("no_pace")
             return plan_pace(self.paced, cycle + lead, pace, self._model, self.mode)
 
-    def hand_over(self, changed: PacedMotion, cycle: int) -> HandedOver | None:
+    def hand_over(self, changed: SpeedScaledMotion, cycle: int) -> HandedOver | None:
         """Writes the rows of a change where nobody reads just now; None when it is too late for that.
 
         Raises:
@@ -101,7 +101,7 @@ class PaceDesk:
         self._block.motion[place : place + len(tail)] = tail
         return HandedOver(first, place, len(tail))
 
-    def follow(self, ticket: Ticket, changed: PacedMotion, handed: HandedOver) -> None:
+    def follow(self, ticket: PendingRequest, changed: SpeedScaledMotion, handed: HandedOver) -> None:
         """Takes it that the control process goes on with a change; what it refuses is taken back."""
         self._before = ticket, self.paced, self._in_use
         self._in_use = [*self._in_use[-2:], handed]
@@ -122,7 +122,7 @@ class PaceDesk:
             self.paced, self._in_use = paced, in_use
 
 
-def _too_long(paced: PacedMotion) -> PlanningError:
+def _too_long(paced: SpeedScaledMotion) -> PlanningError:
     return PlanningError(
         f"at this pace the motion would last {paced.duration:.0f} s; {MOTION_TIME:g} s at most can be handed over, "
         "less what is being streamed; choose a faster one"

@@ -13,7 +13,7 @@ from rcilab.core.cycle_log import cycle_dtype
 from rcilab.core.faults import Fault
 from rcilab.core.spatial import Pose
 from rcilab.core.state import ControllerMode, Mode, RobotMode
-from rcilab.makers.rokae.driver.configuration import RobotSetup
+from rcilab.makers.rokae.driver.configuration import RobotConfiguration
 
 __all__ = ["MESSAGES", "PHASES", "Incident", "Lateness", "Phase", "SupervisorStatus", "cycle_dtype"]
 
@@ -127,7 +127,7 @@ class SupervisorStatus:
     """Force and moment from outside as the controller estimates them, base axes, shape (6,), [N, N m]."""
     T_flange_tool: Pose | None = None
     """The tool that the controller has, by the poses it reports at rest; None while unknown."""
-    setup: RobotSetup = field(default_factory=RobotSetup)
+    setup: RobotConfiguration = field(default_factory=RobotConfiguration)
     """What the controller has acknowledged of its set-up since it was connected; it can be asked for none of it."""
     setup_times: int = 0
     """At how many connections it has taken a set-up."""

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from rcilab.control_process.jitter_histogram import late_cycles, summarise
-from rcilab.control_process.layout import ControlBlock, Word
+from rcilab.control_process.layout import ControlBlock, Counter
 from rcilab.control_process.ring import RingReader
 from rcilab.control_process.snapshot import Snapshot, read_snapshot
 from rcilab.core.clock import CYCLE_TIME
@@ -51,7 +51,7 @@ class StatusReader:
             "scheduling": "SCHED_FIFO" if shown.is_fifo else "normal",
             "memory_locked": shown.memory_locked,
             "late_cycles": late_cycles(self._block.histogram),
-            "lost_cycles": self._block.words[Word.LOST],
+            "lost_cycles": self._block.words[Counter.LOST],
             "lateness": summarise(self._block.histogram),
             "motion_time": shown.motion_time,
             "motion_duration": shown.motion_duration,

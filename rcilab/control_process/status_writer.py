@@ -7,8 +7,8 @@ import time
 from dataclasses import replace
 from typing import Any
 
-from rcilab.control_process.jitter_histogram import LatenessHistogram
-from rcilab.control_process.layout import RING_CYCLES, ControlBlock, Word
+from rcilab.control_process.jitter_histogram import JitterHistogram
+from rcilab.control_process.layout import RING_CYCLES, ControlBlock, Counter
 from rcilab.control_process.snapshot import Snapshot, write_snapshot
 from rcilab.control_process.status import MESSAGES, Phase
 from rcilab.core.arrays import Array
@@ -22,7 +22,7 @@ _POSE = struct.Struct("=16d")
 _RATE_TIME = 1.0  # [s] over which states are counted.
 
 
-class Publisher:
+class StatusWriter:
     """Owns the control process's side of the shared block. One thread.
 
     Args:
@@ -33,9 +33,9 @@ class Publisher:
         self._block = block
         self._words = block.words
         self.recorder = Recorder(block.n, RING_CYCLES, block.cycles)
-        self.recorder.count = self._words[Word.CYCLES]  # A successor goes on where its predecessor died.
+        self.recorder.count = self._words[Counter.CYCLES]  # A successor goes on where its predecessor died.
         self.snapshot = Snapshot()
-        self._histogram = LatenessHistogram(block.histogram)
+        self._histogram = JitterHistogram(block.histogram)
         self._rate_since = time.monotonic_ns()
         self._rate_from = self.recorder.count
         self._motion_cycle = 0
@@ -46,12 +46,12 @@ class Publisher:
         """Forgets the timing: another connection begins."""
         self._histogram.clear()
         self._block.tool[15] = 0.0
-        self._words[Word.LOST] = 0
+        self._words[Counter.LOST] = 0
 
     def beat(self) -> None:
         """Gives a sign of life, and counts states a second."""
         now = time.monotonic_ns()
-        self._words[Word.WORKER_BEAT] = now
+        self._words[Counter.WORKER_BEAT] = now
         elapsed = (now - self._rate_since) * 1e-9
         if elapsed >= _RATE_TIME:
             self.update(rate_hz=(self.recorder.count - self._rate_from) / elapsed)
@@ -70,8 +70,8 @@ class Publisher:
     def on_row(self, log: CycleLog) -> None:
         """Announces a row that was written to the ring."""
         count = self.recorder.count
-        self._words[Word.CYCLES] = count
-        self._words[Word.LOST] = log.lost_total
+        self._words[Counter.CYCLES] = count
+        self._words[Counter.LOST] = log.lost_total
         if log.lateness == log.lateness:  # NaN where nobody waited for the state.
             self._histogram.add(log.lateness)
         if log.state is not None and log.state.tau_ext_in_base is not self._felt:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import os
 import time
 
-from rcilab.control_process.layout import OPERATOR_TIMEOUT, Word
+from rcilab.control_process.layout import OPERATOR_TIMEOUT, Counter
 
 
-class Oversight:
+class StopConditions:
     """Looks at stops that were asked for, at the operator's and the supervisor's signs of life.
 
     Args:
@@ -18,7 +18,7 @@ class Oversight:
 
     def __init__(self, words: memoryview, parent: int) -> None:
         self._words, self._parent = words, parent
-        self._stops_seen = words[Word.STOPS_ASKED]
+        self._stops_seen = words[Counter.STOPS_ASKED]
         self._is_dismissed = False
 
     def dismiss(self) -> None:
@@ -33,16 +33,16 @@ class Oversight:
     @property
     def is_operator_gone(self) -> bool:
         """Whether somebody was at the controls once, and nobody is."""
-        beat = self._words[Word.OPERATOR_BEAT]
+        beat = self._words[Counter.OPERATOR_BEAT]
         if beat == 0:
             return False
         # A supervisor that hangs cannot tell whether anybody is there: that counts as nobody.
-        oldest = min(beat, self._words[Word.SUPERVISOR_BEAT])
+        oldest = min(beat, self._words[Counter.SUPERVISOR_BEAT])
         return time.monotonic_ns() - oldest > OPERATOR_TIMEOUT * 1e9
 
     def reason_to_stop(self) -> str | None:
         """Returns the code of the message for why a motion is to end, or None."""
-        if self._words[Word.STOPS_ASKED] != self._stops_seen:
+        if self._words[Counter.STOPS_ASKED] != self._stops_seen:
             return "idle.stopped"
         if self.is_operator_gone:
             return "idle.operator"

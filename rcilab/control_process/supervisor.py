@@ -11,40 +11,40 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rcilab.control_process.arm_requests import ArmRequests
-from rcilab.control_process.configuration_sync import SetupDesk, standard_setup
+from rcilab.control_process.configuration_sync import ConfigurationSync, standard_setup
 from rcilab.control_process.launch import require_plant
-from rcilab.control_process.layout import OPERATOR_TIMEOUT, ControlBlock, Word
-from rcilab.control_process.pending_request import Ticket
-from rcilab.control_process.process_supervisor import ANSWER_TIMEOUT, ProcessKeeper
-from rcilab.control_process.request_client import TicketDesk
+from rcilab.control_process.layout import OPERATOR_TIMEOUT, ControlBlock, Counter
+from rcilab.control_process.pending_request import PendingRequest
+from rcilab.control_process.process_supervisor import ANSWER_TIMEOUT, ProcessSupervisor
+from rcilab.control_process.request_client import RequestClient
 from rcilab.control_process.ring import RingReader
 from rcilab.control_process.round_trip import RoundTrip
 from rcilab.control_process.settings import build_settings
 from rcilab.control_process.snapshot import Snapshot
-from rcilab.control_process.speed_override import PaceDesk
+from rcilab.control_process.speed_override import SpeedOverride
 from rcilab.control_process.status import MESSAGES, Incident, Phase, SupervisorStatus
 from rcilab.control_process.status_reader import StatusReader
 from rcilab.core.clock import CYCLE_TIME
-from rcilab.core.closeable import Closing
+from rcilab.core.closeable import Closeable
 from rcilab.core.errors import ConnectionLostError, RcilabError, UsageError
 from rcilab.makers.rokae.driver.address import parse_address
-from rcilab.makers.rokae.driver.configuration import RobotSetup, require_setup
+from rcilab.makers.rokae.driver.configuration import RobotConfiguration, require_setup
 
 if TYPE_CHECKING:
     from rcilab.model.robot_model import RobotModel
 
-__all__ = ["Supervisor", "Ticket"]
+__all__ = ["Supervisor", "PendingRequest"]
 
 VIRTUAL = "virtual"
 _TICK = 0.02  # [s] between two looks of the watching thread.
 
 
-class Supervisor(ArmRequests, Closing):
+class Supervisor(ArmRequests, Closeable):
     """Runs motions in a process of its own, so that nothing the page does can disturb a cycle.
 
-    What moves the arm is in `ArmRequests`. All methods may be called from any thread. Requests return a `Ticket` at
+    What moves the arm is in `ArmRequests`. All methods may be called from any thread. Requests return a `PendingRequest` at
     once; nothing here waits for the robot except `start()`, `restart()` and `close()`. The processes belong to a
-    `ProcessKeeper`, the requests under way to a `TicketDesk`; a thread of this object looks after both.
+    `ProcessSupervisor`, the requests under way to a `RequestClient`; a thread of this object looks after both.
 
     Args:
         model: The arm.
@@ -68,7 +68,7 @@ class Supervisor(ArmRequests, Closing):
         *,
         stop_without_operator: bool = True,
         auto_restart: bool = True,
-        setup: RobotSetup | None = None,
+        setup: RobotConfiguration | None = None,
     ) -> None:
         from rcilab.model.robot_model import require_model, require_rci
 
@@ -78,14 +78,14 @@ class Supervisor(ArmRequests, Closing):
         if setup is None:
             setup = standard_setup(self.model, is_virtual=self._target == VIRTUAL)
         self.model = require_setup(setup).applied_to(self.model)
-        self._setup = SetupDesk(setup)
+        self._setup = ConfigurationSync(setup)
         self._plant = plant
         self._stop_without_operator = stop_without_operator
         self._auto_restart = auto_restart
         self._lock = threading.RLock()  # Guards everything below; held for long only while our processes are ended.
         self._block: ControlBlock | None = None  # With it come and go the keeper, the desk and the readers.
-        self._connecting: Ticket | None = None
-        self._jogging: Ticket | None = None
+        self._connecting: PendingRequest | None = None
+        self._jogging: PendingRequest | None = None
         self._crash: tuple[str, str] | None = None
         self._incident: Incident | None = None
         self._watcher: threading.Thread | None = None
@@ -170,7 +170,7 @@ class Supervisor(ArmRequests, Closing):
                 **self._round_trip.read_fields(),
             )
 
-    def reconnect(self) -> Ticket:
+    def reconnect(self) -> PendingRequest:
         """Drops the connection to the controller and makes a new one.
 
         Raises:
@@ -199,8 +199,8 @@ class Supervisor(ArmRequests, Closing):
             if self._block is None or not self._stop_without_operator:
                 return
             words = self._block.words
-            if present or words[Word.OPERATOR_BEAT] == 0:
-                words[Word.OPERATOR_BEAT] = time.monotonic_ns()
+            if present or words[Counter.OPERATOR_BEAT] == 0:
+                words[Counter.OPERATOR_BEAT] = time.monotonic_ns()
 
     def drain(self) -> NDArray[np.void]:
         """Returns every cycle recorded since the last call, oldest first.
@@ -222,7 +222,7 @@ class Supervisor(ArmRequests, Closing):
         self.start()
         return self
 
-    def _ask(self, what: str, **letter: Any) -> Ticket:
+    def _ask(self, what: str, **letter: Any) -> PendingRequest:
         """Sends a request to the control process."""
         with self._lock:
             self._require_block()
@@ -236,9 +236,9 @@ class Supervisor(ArmRequests, Closing):
         """Makes the shared block and what works on it, and starts the processes."""
         block = ControlBlock.create(self.model.n, build_settings(self.model))
         address = None if self._target == VIRTUAL else self._target
-        self._keeper = ProcessKeeper(block, self.model.name, self._plant, address, auto_restart=self._auto_restart)
-        self._desk = TicketDesk(block)
-        self._pace, self._round_trip = PaceDesk(block), RoundTrip(block)
+        self._keeper = ProcessSupervisor(block, self.model.name, self._plant, address, auto_restart=self._auto_restart)
+        self._desk = RequestClient(block)
+        self._pace, self._round_trip = SpeedOverride(block), RoundTrip(block)
         self._reader, self._ring = StatusReader(block), RingReader(block)
         self._is_closing.clear()
         self._block = block
@@ -265,7 +265,7 @@ class Supervisor(ArmRequests, Closing):
             with self._lock:
                 if self._block is None:
                     return
-                self._block.words[Word.SUPERVISOR_BEAT] = time.monotonic_ns()
+                self._block.words[Counter.SUPERVISOR_BEAT] = time.monotonic_ns()
                 self._collect_replies()
                 self._bear_deaths()
                 if self._connecting is None and self._keeper.is_ready:
@@ -333,7 +333,7 @@ class Supervisor(ArmRequests, Closing):
 
     def _is_operator_overdue(self) -> bool:
         with self._lock:
-            beat = self._block.words[Word.OPERATOR_BEAT] if self._block is not None else 0
+            beat = self._block.words[Counter.OPERATOR_BEAT] if self._block is not None else 0
         return beat != 0 and time.monotonic_ns() - beat > OPERATOR_TIMEOUT * 1e9
 
     def _require_block(self) -> ControlBlock:

@@ -19,11 +19,11 @@ import numpy as np
 from rcilab.control_process.configuration_codec import parse_setup
 from rcilab.control_process.guiding import HandGuide
 from rcilab.control_process.layout import OPERATOR_TIMEOUT, ControlBlock
-from rcilab.control_process.motion_executor import Mover, StoppedError
-from rcilab.control_process.request_channel import Letter, Letters
+from rcilab.control_process.motion_executor import MotionExecutor, StoppedError
+from rcilab.control_process.request_channel import Letter, RequestChannel
 from rcilab.control_process.settings import parse_settings
-from rcilab.control_process.status_writer import Publisher
-from rcilab.control_process.stop_conditions import Oversight
+from rcilab.control_process.status_writer import StatusWriter
+from rcilab.control_process.stop_conditions import StopConditions
 from rcilab.core.arrays import JointVector
 from rcilab.core.errors import ConnectionLostError, ControlError, InvalidValueError, ModelError, RcilabError, UsageError
 from rcilab.core.faults import name_faults
@@ -33,7 +33,7 @@ from rcilab.execution.recorder import CycleLog
 from rcilab.makers.rokae.driver.address import parse_address
 from rcilab.makers.rokae.driver.commands import SIGNALS, RciCommands
 from rcilab.makers.rokae.driver.configuration import give_setup
-from rcilab.makers.rokae.driver.connection import Link
+from rcilab.makers.rokae.driver.connection import RciConnection
 from rcilab.makers.rokae.driver.handshake import await_first_state, require_arm_there
 from rcilab.makers.rokae.driver.recovery import recover
 from rcilab.makers.rokae.driver.transport import SocketTransport
@@ -48,7 +48,7 @@ _LOOK = 0.02  # [s] Longest wait in the idle loop, and between looks for the sup
 _NAP = 0.004  # [s] between two states that a control process waits for while nothing moves; a choice.
 
 
-class Worker:
+class ControlProcess:
     """The control process's state. Everything here belongs to its one thread.
 
     Args:
@@ -58,12 +58,14 @@ class Worker:
 
     def __init__(self, block: ControlBlock, parent: int) -> None:
         self._settings = parse_settings(block.settings)
-        self._letters = Letters(block)
-        self._oversight = Oversight(block.words, parent)
-        self._publisher = Publisher(block)
+        self._letters = RequestChannel(block)
+        self._oversight = StopConditions(block.words, parent)
+        self._publisher = StatusWriter(block)
         self._log = CycleLog(self._publisher.recorder, self._publisher.on_row)
-        self._mover = Mover(block, self._settings.limits, self._publisher, self._log, self._letters, self._oversight)
-        self._link: Link | None = None
+        self._mover = MotionExecutor(
+            block, self._settings.limits, self._publisher, self._log, self._letters, self._oversight
+        )
+        self._link: RciConnection | None = None
         self._address = ""
         self._is_ending = False
         self._next_look = 0.0
@@ -189,7 +191,7 @@ class Worker:
         place = parse_address(self._address)
         transport = SocketTransport(place, STATE_SIZE, request["timeout"])
         try:
-            link = Link(transport, self._settings.n, str(place), request["timeout"])
+            link = RciConnection(transport, self._settings.n, str(place), request["timeout"])
             require_arm_there(RciCommands(link), self._settings.name, self._settings.lengths, str(place))
             await_first_state(link, place, transport.local_address, request["timeout"])
         except BaseException:
@@ -315,7 +317,7 @@ class Worker:
         else:
             self._publisher.say("fault", "fault", faults=name_faults(faults))
 
-    def _require_link(self) -> Link:
+    def _require_link(self) -> RciConnection:
         if self._link is None:
             raise UsageError("no controller is connected; reconnect first").coded("not_connected")
         return self._link
@@ -341,7 +343,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--block", type=int, required=True, metavar="FD", help="open descriptor of the shared block")
     parser.add_argument("--parent", type=int, required=True, metavar="PID", help="end when it is gone")
     args = parser.parse_args(argv)
-    worker = Worker(ControlBlock(args.block), args.parent)
+    worker = ControlProcess(ControlBlock(args.block), args.parent)
     # Not in mid-motion: before VS Code ends a kernel it asks every process below it to end.
     signal.signal(signal.SIGTERM, lambda *_: worker.leave())
     return worker.run()

@@ -27,26 +27,26 @@ Matrix: TypeAlias = Array
 
 def scalar(value: float) -> Array:
     """Returns a number as a read-only array of shape (): a constant that numpy need not convert in every product."""
-    return frozen(value)
+    return readonly_copy(value)
 
 
-def frozen(value: ArrayLike) -> Array:
+def readonly_copy(value: ArrayLike) -> Array:
     """Returns a read-only float64 copy of `value`, or itself where it is such a copy already."""
     if isinstance(value, np.ndarray):
         array = cast("Array", value)
         if array.base is None and array.dtype == np.float64 and not array.flags.writeable:
             return array
-    return sealed(np.array(value, dtype=np.float64))
+    return make_readonly(np.array(value, dtype=np.float64))
 
 
-def sealed(array: Array) -> Array:
-    """Makes an array read-only that nobody else writes to, and returns it: `frozen` needs no copy of it."""
+def make_readonly(array: Array) -> Array:
+    """Makes an array read-only that nobody else writes to, and returns it: `readonly_copy` needs no copy of it."""
     # By its place, which the stubs do not know of: by its name it takes twice as long.
     array.setflags(False)  # pyright: ignore[reportCallIssue]
     return array
 
 
-class Words(str):
+class Unquoted(str):
     """Text that an error shows as it is, without quotes, where a value would stand."""
 
     __slots__ = ()
@@ -57,7 +57,7 @@ class Words(str):
 def described(value: object) -> object:
     """Returns what an error should show of a value, in one line: of a table its shape, anything else as it is."""
     if getattr(value, "ndim", 0) > 1:
-        return Words(f"an array of shape {getattr(value, 'shape', '')}")
+        return Unquoted(f"an array of shape {getattr(value, 'shape', '')}")
     return value.tolist() if isinstance(value, np.ndarray) else value
 
 
@@ -157,7 +157,7 @@ def as_rows(value: ArrayLike, columns: int, name: str, unit: str = "", like: Arr
     array = as_path(value, columns, name, unit) if is_table else as_vector(value, columns, name, unit)
     if like is not None and array.shape[:-1] != like.shape[:-1]:
         needed = f"needs one row for each of the {len(like)}" if like.ndim > 1 else "needs a single row"
-        raise InvalidValueError(name, Words(f"an array of shape {array.shape}"), needed + _in(unit))
+        raise InvalidValueError(name, Unquoted(f"an array of shape {array.shape}"), needed + _in(unit))
     return array
 
 

@@ -9,14 +9,14 @@ from typing import Generic, TypeAlias, TypeVar
 
 from rcilab.core.errors import RcilabError
 
-About = TypeVar("About")
+Context = TypeVar("Context")
 Result = TypeVar("Result")
 
-Tell: TypeAlias = Callable[[float], None]
+ProgressCallback: TypeAlias = Callable[[float], None]
 """Takes how much is done, 0 to 1; does not return where nobody wants the result any more."""
 
 
-class Background(Generic[About, Result]):
+class BackgroundJob(Generic[Context, Result]):
     """Starts, drops and takes jobs. Its owner looks several times a second what has come of one.
 
     Args:
@@ -25,7 +25,7 @@ class Background(Generic[About, Result]):
 
     def __init__(self, name: str) -> None:
         self._name = name
-        self._job: _Job[About, Result] | None = None
+        self._job: _Job[Context, Result] | None = None
 
     @property
     def progress(self) -> float | None:
@@ -43,7 +43,7 @@ class Background(Generic[About, Result]):
         if job is not None:
             wait([job.outcome], timeout)
 
-    def start(self, about: About, run: Callable[[Tell], Result]) -> None:
+    def start(self, about: Context, run: Callable[[ProgressCallback], Result]) -> None:
         """Begins; what was being worked out is dropped.
 
         Args:
@@ -60,7 +60,7 @@ class Background(Generic[About, Result]):
             self._job.unwanted.set()
         self._job = None
 
-    def take(self) -> tuple[About, Result | RcilabError]:
+    def take(self) -> tuple[Context, Result | RcilabError]:
         """Returns what the job was about and what came of it, once it is done; a failure of ours is raised."""
         job, self._job = self._job, None
         assert job is not None
@@ -74,10 +74,10 @@ class _CancelledError(Exception):
     """Nobody wants the result any more."""
 
 
-class _Job(Generic[About, Result]):
+class _Job(Generic[Context, Result]):
     """One job in its thread."""
 
-    def __init__(self, about: About, run: Callable[[Tell], Result]) -> None:
+    def __init__(self, about: Context, run: Callable[[ProgressCallback], Result]) -> None:
         self.about, self._run = about, run
         self.progress = 0.0
         self.unwanted = threading.Event()

@@ -13,7 +13,7 @@ ADVISED_DISTANCE = 0.02  # [m]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SafetyDistance:
+class ClearanceLimit:
     """How far the capsules around the links shall stay from each other and from the floor.
 
     A motion that comes as near as `links` or `floor` is refused; one that comes as near as `advised` is advised
@@ -49,5 +49,5 @@ class SafetyDistance:
             object.__setattr__(self, name, number)
 
 
-STANDARD_DISTANCE = SafetyDistance()
+STANDARD_DISTANCE = ClearanceLimit()
 """Links that do not touch each other nor a floor at height 0, with 20 mm recommended."""

@@ -7,7 +7,7 @@ from types import TracebackType
 from typing import Self
 
 
-class Closing(ABC):
+class Closeable(ABC):
     """Owns something until it is closed; leaving its `with` block closes it, whatever happened there."""
 
     @abstractmethod

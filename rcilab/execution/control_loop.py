@@ -30,9 +30,9 @@ from rcilab.execution.command_validation import check_command, describe_distance
 from rcilab.execution.fault_report import describe_faults
 from rcilab.execution.filters import CommandFilter, is_near
 from rcilab.execution.recorder import CycleLog
-from rcilab.execution.stop_planner import Brake, CartesianBrake, JointBrake, TorqueBrake
+from rcilab.execution.stop_planner import CartesianStopPlanner, JointStopPlanner, StopPlanner, TorqueStopPlanner
 from rcilab.makers.rokae.driver.commands import RciCommands
-from rcilab.makers.rokae.driver.connection import Link
+from rcilab.makers.rokae.driver.connection import RciConnection
 from rcilab.makers.rokae.driver.refusal import Refusal
 from rcilab.makers.rokae.wire import SafetyStop, StartMotionMode, build_command
 
@@ -56,7 +56,7 @@ RECORD_CYCLES = 50  # Cycles that a ControlError carries, as many as the vendor'
 
 Callback: TypeAlias = Callable[[RobotState, float], Command]
 """`(state, t) -> command`; t counts controller cycles since the first call, [s]."""
-Watch: TypeAlias = Callable[[float], str | None]
+StopCheck: TypeAlias = Callable[[float], str | None]
 """Asked in every cycle, with t; anything but None brings the motion to rest and is the reason."""
 
 _MOTION_MODES = {
@@ -92,13 +92,13 @@ class ControlLoop:
 
     def __init__(
         self,
-        link: Link,
+        link: RciConnection,
         commands: RciCommands,
         limits: Limits,
         mode: ControllerMode,
         log: CycleLog,
         *,
-        watch: Watch,
+        watch: StopCheck,
         model: RobotModel,
         filters: Sequence[CommandFilter],
         box: SafetyBox | None = None,
@@ -127,10 +127,10 @@ class ControlLoop:
         self._calls = CallTimes()
         self._command: Command | None = None
         self._pending: deque[RobotState] = deque()
-        self._brake: Brake = {
-            StartMotionMode.JOINT: lambda: JointBrake(limits.joint),
-            StartMotionMode.CARTESIAN: lambda: CartesianBrake(limits, model),
-            StartMotionMode.IDLE: lambda: TorqueBrake(limits.joint),
+        self._brake: StopPlanner = {
+            StartMotionMode.JOINT: lambda: JointStopPlanner(limits.joint),
+            StartMotionMode.CARTESIAN: lambda: CartesianStopPlanner(limits, model),
+            StartMotionMode.IDLE: lambda: TorqueStopPlanner(limits.joint),
         }[self._motion_mode]()
 
     def run(self, callback: Callback) -> str | None:

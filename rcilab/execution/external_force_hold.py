@@ -18,9 +18,9 @@ from dataclasses import dataclass
 from numpy.typing import ArrayLike
 
 from rcilab.core.arrays import as_vector
-from rcilab.core.closeable import Closing
+from rcilab.core.closeable import Closeable
 from rcilab.core.errors import RcilabError
-from rcilab.execution.simulation_control import World
+from rcilab.execution.simulation_control import SimulationControl
 
 HOLD_TIMEOUT = 0.4  # [s] without `hold` after which a push ends; a choice, as a page says it ten times a second.
 _LENGTH = 0.5  # [s] of each push that the controller hears of, in its own time; a choice above the next number.
@@ -34,14 +34,14 @@ class _Held:
     point: tuple[float, ...] | None
 
 
-class HeldPush(Closing):
+class ExternalForceHold(Closeable):
     """Pushes one virtual arm while it is held.
 
     Args:
         world: The arm's world port; closed with this object.
     """
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: SimulationControl) -> None:
         self._world = world
         self._condition = threading.Condition()
         self._wanted: _Held | None = None

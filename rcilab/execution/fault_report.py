@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rcilab.conformance import Breach, CartesianMonitor, JointMonitor, TorqueMonitor
+from rcilab.conformance import CartesianMonitor, JointMonitor, LimitViolation, TorqueMonitor
 from rcilab.core.arrays import Array, JointVector
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.faults import BOX_FAULTS, RANGE_FAULTS, Fault, name_faults
@@ -147,7 +147,7 @@ def _describe_commanded(faults: tuple[Fault, ...], record: NDArray[np.void], lim
     return "", is_broken
 
 
-def _judge_joints(q: Array, psi: Array, limits: Limits) -> Iterator[tuple[int, list[Breach]]]:
+def _judge_joints(q: Array, psi: Array, limits: Limits) -> Iterator[tuple[int, list[LimitViolation]]]:
     if len(q) <= _HISTORY:
         return
     dq = np.diff(q[:_HISTORY], axis=0) / CYCLE_TIME
@@ -158,7 +158,7 @@ def _judge_joints(q: Array, psi: Array, limits: Limits) -> Iterator[tuple[int, l
         yield place, monitor.broken()
 
 
-def _judge_poses(T: Array, psi: Array, limits: Limits) -> Iterator[tuple[int, list[Breach]]]:
+def _judge_poses(T: Array, psi: Array, limits: Limits) -> Iterator[tuple[int, list[LimitViolation]]]:
     monitor = CartesianMonitor(limits)
     poses = [_pose(matrix) for matrix in T]
     angles = [angle if math.isfinite(angle) else None for angle in psi.tolist()]
@@ -169,7 +169,7 @@ def _judge_poses(T: Array, psi: Array, limits: Limits) -> Iterator[tuple[int, li
             yield place, monitor.broken()
 
 
-def _judge_torques(tau: Array, psi: Array, limits: Limits) -> Iterator[tuple[int, list[Breach]]]:
+def _judge_torques(tau: Array, psi: Array, limits: Limits) -> Iterator[tuple[int, list[LimitViolation]]]:
     monitor = TorqueMonitor(limits.joint)
     monitor.reset(tau[0].tolist())
     for place in range(1, len(tau)):

@@ -67,14 +67,14 @@ class Bounds(NamedTuple):
     jerk: float | Array
 
 
-class Rate(NamedTuple):
+class SignalState(NamedTuple):
     """Where a limited signal is, by backward differences at 1 ms."""
 
     velocity: Array
     acceleration: Array
 
 
-def limit_rate(behind: Array, wanted: Array, last: Rate, bounds: Bounds) -> Rate:
+def limit_rate(behind: Array, wanted: Array, last: SignalState, bounds: Bounds) -> SignalState:
     """Returns the next step of coordinates that each keep their own bounds.
 
     A stream inside the bounds passes unchanged. After a jump they run towards it as fast as the bounds allow and brake
@@ -96,10 +96,10 @@ def limit_rate(behind: Array, wanted: Array, last: Rate, bounds: Bounds) -> Rate
     acceleration = np.minimum(np.maximum(acceleration, lowest), highest)
     step = bounds.jerk * CYCLE_TIME
     acceleration = np.clip(acceleration, last.acceleration - step, last.acceleration + step)
-    return Rate(last.velocity + acceleration * CYCLE_TIME, acceleration)
+    return SignalState(last.velocity + acceleration * CYCLE_TIME, acceleration)
 
 
-def limit_vector_rate(behind: Array, wanted: Array, last: Rate, bounds: Bounds) -> Rate:
+def limit_vector_rate(behind: Array, wanted: Array, last: SignalState, bounds: Bounds) -> SignalState:
     """Returns the next step of a vector whose length keeps the bounds: the tool's translation, or its rotation.
 
     As `limit_rate`, shapes (3,), bounds as numbers.
@@ -124,7 +124,7 @@ def limit_vector_rate(behind: Array, wanted: Array, last: Rate, bounds: Bounds) 
             else:
                 high = middle
     acceleration = ease + low * (goal - ease)
-    return Rate(last.velocity + acceleration * CYCLE_TIME, acceleration)
+    return SignalState(last.velocity + acceleration * CYCLE_TIME, acceleration)
 
 
 class CommandFilter(Protocol):
@@ -192,7 +192,7 @@ class RateLimiter:
         self._torque_step = LIMIT_MARGIN * joint.torque_rate * CYCLE_TIME
         self._command: Command | None = None  # As it was asked for.
         self._sent: Command | None = None
-        self._rates: list[Rate] = []
+        self._rates: list[SignalState] = []
 
     def begin(self, command: Command) -> None:
         """Starts at rest at the first command of a motion; torques start at zero."""
@@ -280,7 +280,7 @@ def _rising(room: Array, jerk: float | Array) -> Array:
     return jerk * (np.sqrt(half * half + 2.0 * np.maximum(room, 0.0) / jerk) - half)
 
 
-def _is_allowed(acceleration: Array, last: Rate, bounds: Bounds) -> bool:
+def _is_allowed(acceleration: Array, last: SignalState, bounds: Bounds) -> bool:
     """Returns whether a vector's acceleration keeps the bounds, now and when it eases off from here."""
     size = float(np.linalg.norm(acceleration))
     change = float(np.linalg.norm(acceleration - last.acceleration))
@@ -296,8 +296,8 @@ def _bounds(velocity: float | Array, acceleration: float | Array, jerk: float | 
     return Bounds(LIMIT_MARGIN * velocity, LIMIT_MARGIN * acceleration, LIMIT_MARGIN * jerk)
 
 
-def _rest(size: int) -> Rate:
-    return Rate(np.zeros(size), np.zeros(size))
+def _rest(size: int) -> SignalState:
+    return SignalState(np.zeros(size), np.zeros(size))
 
 
 def _shortened(vector: Array, longest: float | Array) -> Array:

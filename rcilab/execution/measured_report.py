@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rcilab.conformance import Breach, MeasuredMonitor
+from rcilab.conformance import LimitViolation, MeasuredMonitor
 from rcilab.conformance.measured_conditions import yielding_limits
 from rcilab.core.arrays import Array, JointVector
 from rcilab.core.errors import KinematicsError
@@ -31,7 +31,7 @@ YIELDING_MODES = (ControllerMode.JOINT_IMPEDANCE, ControllerMode.CARTESIAN_IMPED
 class _Measured(NamedTuple):
     """The last cycles judged as our virtual controller does; a real one may allow less."""
 
-    breaches: list[Breach]
+    breaches: list[LimitViolation]
     ddq: Array
     """Low-passed joint accelerations, shape (N, n), [rad/s^2]."""
 

@@ -8,7 +8,7 @@ from rcilab.core.state import Mode
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class UnderWay:
+class MotionProgress:
     """The motion that `RobotSession.execute` streams just now; see `RobotSession.under_way`."""
 
     time: float

@@ -13,10 +13,10 @@ from rcilab.core.state import ControllerMode, Mode
 from rcilab.execution.control_loop import Callback, ControlLoop
 from rcilab.execution.filters import CommandFilter
 from rcilab.execution.recorder import RECORD_TIME, CycleLog, Recorder
-from rcilab.execution.session_lock import Turns
-from rcilab.execution.speed_scaled_stream import PacedStream
+from rcilab.execution.session_lock import SessionLock
+from rcilab.execution.speed_scaled_stream import SpeedScaledStream
 from rcilab.makers.rokae.driver.commands import RciCommands
-from rcilab.makers.rokae.driver.connection import Link
+from rcilab.makers.rokae.driver.connection import RciConnection
 from rcilab.realtime.cpu_affinity import one_core
 from rcilab.realtime.punctual import punctual
 from rcilab.recording.run import Run, build_run
@@ -32,7 +32,7 @@ Ear: TypeAlias = Callable[[Run, BaseException | None], None]
 _SPARE_CYCLES = 2000  # Room in the recorder for what comes before and after the motion itself.
 
 
-class Runner:
+class MotionRunner:
     """Runs motions on a connection, one at a time, and tells who listens what became of each.
 
     Attributes:
@@ -49,7 +49,14 @@ class Runner:
     """
 
     def __init__(
-        self, link: Link, turns: Turns, *, realtime: bool, silence: float, partner: int | None, record_all: bool
+        self,
+        link: RciConnection,
+        turns: SessionLock,
+        *,
+        realtime: bool,
+        silence: float,
+        partner: int | None,
+        record_all: bool,
     ) -> None:
         self.partner = partner
         self.collision_thresholds: JointVector | None = None
@@ -78,7 +85,7 @@ class Runner:
         callback: Callback,
         mode: Mode,
         model: RobotModel,
-        plan: Motion | PacedStream | None = None,
+        plan: Motion | SpeedScaledStream | None = None,
         filters: Sequence[CommandFilter] = (),
         *,
         box: SafetyBox | None = None,
@@ -119,8 +126,8 @@ class Runner:
         def tell(stopped: str | None, error: BaseException | None = None) -> Run:
             run = build_run(
                 recorder.rows(),
-                plan=plan.as_motion() if isinstance(plan, PacedStream) else plan,
-                paced=isinstance(plan, PacedStream) and plan.is_paced,
+                plan=plan.as_motion() if isinstance(plan, SpeedScaledStream) else plan,
+                paced=isinstance(plan, SpeedScaledStream) and plan.is_paced,
                 stopped=stopped,
                 truncated=recorder.truncated,
                 realtime=self._realtime,

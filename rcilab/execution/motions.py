@@ -15,13 +15,13 @@ from rcilab.core.state import Mode, RobotState, require_mode
 from rcilab.execution.control_loop import Callback
 from rcilab.execution.filters import CommandFilter, LowPass, RateLimiter
 from rcilab.execution.motion_callback import Progress, follow, follow_poses, report_progress
-from rcilab.execution.motion_progress import UnderWay
-from rcilab.execution.motion_runner import Runner
-from rcilab.execution.session_lock import Turns
-from rcilab.execution.speed_scaled_stream import PacedStream
+from rcilab.execution.motion_progress import MotionProgress
+from rcilab.execution.motion_runner import MotionRunner
+from rcilab.execution.session_lock import SessionLock
+from rcilab.execution.speed_scaled_stream import SpeedScaledStream
 from rcilab.execution.start_pose_check import describe_start_mismatch, require_motion
 from rcilab.makers.rokae.driver.commands import RciCommands
-from rcilab.makers.rokae.driver.connection import Link
+from rcilab.makers.rokae.driver.connection import RciConnection
 from rcilab.motion.speed_scaling import require_pace
 from rcilab.recording.run import Run
 
@@ -45,11 +45,11 @@ class Motions(RciCommands):
         runner: Runs motions on it.
     """
 
-    def __init__(self, link: Link, limits: Limits, turns: Turns, runner: Runner) -> None:
+    def __init__(self, link: RciConnection, limits: Limits, turns: SessionLock, runner: MotionRunner) -> None:
         super().__init__(link, limits)
         self._turns = turns
         self._runner = runner
-        self._streamed: PacedStream | None = None
+        self._streamed: SpeedScaledStream | None = None
         """What `execute` streams just now."""
 
     def execute(
@@ -97,7 +97,7 @@ class Motions(RciCommands):
             else:
                 certificate.verify(motion, self.model, state.q_c, self.safety_box, mode=mode)
             paced = plan_start(motion, pace, self.model, mode)
-            streamed = PacedStream(paced, mode, self.model, report_progress(paced.as_motion(), progress))
+            streamed = SpeedScaledStream(paced, mode, self.model, report_progress(paced.as_motion(), progress))
             self._streamed = streamed
             try:
                 filters = [RateLimiter(self.model.limits)] if mode == "torque" else []
@@ -106,7 +106,7 @@ class Motions(RciCommands):
                 self._streamed = None
 
     @property
-    def under_way(self) -> UnderWay | None:
+    def under_way(self) -> MotionProgress | None:
         """Place and pace of the motion that `execute` runs in another thread; None while it runs none."""
         streamed = self._streamed
         return None if streamed is None else streamed.under_way

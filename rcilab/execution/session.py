@@ -9,20 +9,20 @@ from typing import TYPE_CHECKING, Any
 from numpy.typing import ArrayLike
 
 from rcilab.core.arrays import as_number, as_vector
-from rcilab.core.closeable import Closing
+from rcilab.core.closeable import Closeable
 from rcilab.core.errors import ConnectionLostError, InvalidValueError, UsageError
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.core.state import RobotState
 from rcilab.execution.control_loop import SILENCE, SILENCE_HERE
-from rcilab.execution.motion_runner import Ear, Runner
+from rcilab.execution.motion_runner import Ear, MotionRunner
 from rcilab.execution.motions import Motions
 from rcilab.execution.open_sessions import enlist
-from rcilab.execution.session_lock import Turns
-from rcilab.execution.simulation_control import World
+from rcilab.execution.session_lock import SessionLock
+from rcilab.execution.simulation_control import SimulationControl
 from rcilab.makers.rokae.driver.address import parse_address
 from rcilab.makers.rokae.driver.commands import RciCommands
-from rcilab.makers.rokae.driver.connection import Link
+from rcilab.makers.rokae.driver.connection import RciConnection
 from rcilab.makers.rokae.driver.handshake import await_first_state, require_arm_there, require_timeout, with_tool_of
 from rcilab.makers.rokae.driver.identify import dh_lengths, identify_robot
 from rcilab.makers.rokae.driver.recovery import recover
@@ -65,7 +65,7 @@ def open_session(
     realtime: bool = True,
     silence: float | None = None,
     on_close: Callable[[], None] = lambda: None,
-    world: World | None = None,
+    world: SimulationControl | None = None,
     partner: int | None = None,
 ) -> RobotSession:
     """Returns a session as `connect` does, with what only a simulation sets.
@@ -90,7 +90,7 @@ def open_session(
         require_rci(require_model(model))
     transport = SocketTransport(place, STATE_SIZE, timeout)
     try:
-        link = Link(transport, 7 if model is None else model.n, str(place), timeout)
+        link = RciConnection(transport, 7 if model is None else model.n, str(place), timeout)
         if model is None:
             from rcilab.model.robot_model import load_model
 
@@ -101,23 +101,23 @@ def open_session(
         await_first_state(link, place, transport.local_address, timeout)
         model = with_tool_of(link, model)
         if world is None and place.world_port is not None:
-            world = World(place.host, place.world_port)
+            world = SimulationControl(place.host, place.world_port)
         closing = ExitStack()
         closing.callback(on_close)
         if world is not None:
             closing.callback(world.close)
         closing.callback(link.close)
-        turns = Turns(closing.close)
+        turns = SessionLock(closing.close)
         if silence is None:
             silence = SILENCE_HERE if place.is_here else SILENCE
-        runner = Runner(link, turns, realtime=realtime, silence=silence, partner=partner, record_all=record_all)
+        runner = MotionRunner(link, turns, realtime=realtime, silence=silence, partner=partner, record_all=record_all)
         return RobotSession(link, model, turns, runner, world)
     except BaseException:
         transport.close()
         raise
 
 
-class RobotSession(Motions, Closing):
+class RobotSession(Motions, Closeable):
     """A connected arm: its state, every RCI command, and motions at 1 kHz. Made by `connect` and `simulate`.
 
     While a motion runs, `stop`, `close`, `state` and what a controller answers then may be called, from any thread and
@@ -133,7 +133,14 @@ class RobotSession(Motions, Closing):
         world: What surrounds a virtual robot; None where nothing of the kind is known.
     """
 
-    def __init__(self, link: Link, model: RobotModel, turns: Turns, runner: Runner, world: World | None) -> None:
+    def __init__(
+        self,
+        link: RciConnection,
+        model: RobotModel,
+        turns: SessionLock,
+        runner: MotionRunner,
+        world: SimulationControl | None,
+    ) -> None:
         from rcilab.model.robot_model import load_model
 
         own = load_model(model.name).limits  # A model may have soft limits: they bound motions, not what may be set.
@@ -159,7 +166,7 @@ class RobotSession(Motions, Closing):
         return self._link.name
 
     @property
-    def world(self) -> World:
+    def world(self) -> SimulationControl:
         """What surrounds a virtual robot: `robot.world.push([0, 0, -20, 0, 0, 0])`.
 
         Raises:

@@ -13,7 +13,7 @@ _CLOSE_TIMEOUT = 10.0  # [s] for another thread to bring its motion to rest; the
 _LOOK = 0.02  # [s] Longest wait for another thread's request before it is looked at again what that thread does.
 
 
-class Turns:
+class SessionLock:
     """Threads take turns with requests; while one runs a motion, only `stop` and `close` reach it.
 
     Attributes:

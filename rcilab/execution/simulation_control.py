@@ -17,7 +17,7 @@ import time
 from numpy.typing import ArrayLike
 
 from rcilab.core.arrays import as_vector
-from rcilab.core.closeable import Closing
+from rcilab.core.closeable import Closeable
 from rcilab.core.errors import ConnectionLostError, DecodeError, ProtocolError, UsageError, plain_text
 from rcilab.core.spatial import Pose, as_pose
 from rcilab.model.dynamics.payload import Payload
@@ -54,7 +54,7 @@ from rcilab.sim.api import (
 TIMEOUT = LONGEST_STALL + 5.0  # [s] A controller that stalls on request answers afterwards; on a busy machine later.
 
 
-class World(Closing):
+class SimulationControl(Closeable):
     """What surrounds one virtual robot. Connects when it is first used; `close` ends that.
 
     Args:

@@ -1,6 +1,6 @@
 """A world port that nobody has to wait for: requests go out one after the other, its status comes in now and then.
 
-with WorldWatch(World(host, port)) as watch:
+with SimulationStatusPoller(World(host, port)) as watch:
     watch.ask(Press("estop"))
     watch.status
 """
@@ -10,22 +10,22 @@ from __future__ import annotations
 import threading
 from collections import deque
 
-from rcilab.core.closeable import Closing
+from rcilab.core.closeable import Closeable
 from rcilab.core.errors import RcilabError
-from rcilab.execution.simulation_control import World
+from rcilab.execution.simulation_control import SimulationControl
 from rcilab.sim.api import WorldRequest, WorldStatus
 
 PERIOD = 0.3  # [s] between two looks at the status; a choice, as fast as one reads.
 
 
-class WorldWatch(Closing):
+class SimulationStatusPoller(Closeable):
     """Talks to one world port in a thread of its own.
 
     Args:
         world: The world port; closed with this object.
     """
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: SimulationControl) -> None:
         self._world = world
         self._condition = threading.Condition()
         self._requests: deque[WorldRequest] = deque()

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import UsageError
 from rcilab.core.state import Mode
-from rcilab.execution.motion_progress import UnderWay
+from rcilab.execution.motion_progress import MotionProgress
 from rcilab.execution.streaming import MotionStream
-from rcilab.motion.speed_scaling import PacedMotion
+from rcilab.motion.speed_scaling import SpeedScaledMotion
 
 if TYPE_CHECKING:
     from rcilab.model.robot_model import RobotModel
@@ -20,7 +20,7 @@ PACE_LEADS = (100, 300, 1000, 4000)  # Cycles from now on which another pace beg
 HANDING_OVER = 30  # Cycles between the rows of now and the first of others.
 
 
-class PacedStream:
+class SpeedScaledStream:
     """What `RobotSession.execute` streams. The control loop's thread calls `stream`, any other one `change_pace`.
 
     Attributes:
@@ -35,7 +35,7 @@ class PacedStream:
     """
 
     def __init__(
-        self, paced: PacedMotion, mode: Mode, model: RobotModel, on_cycle: Callable[[int], None] | None
+        self, paced: SpeedScaledMotion, mode: Mode, model: RobotModel, on_cycle: Callable[[int], None] | None
     ) -> None:
         self.paced = paced
         self.stream = MotionStream(paced.q, mode, model, on_cycle)
@@ -57,10 +57,10 @@ class PacedStream:
         return self.paced.as_motion()
 
     @property
-    def under_way(self) -> UnderWay:
+    def under_way(self) -> MotionProgress:
         """Its place and pace."""
         paced, cycle = self.paced, self.stream.cycle
-        return UnderWay(
+        return MotionProgress(
             time=cycle * CYCLE_TIME,
             duration=paced.duration,
             place=paced.place_at(cycle),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from rcilab.conformance import Breach, CartesianMonitor, JointMonitor
+from rcilab.conformance import CartesianMonitor, JointMonitor, LimitViolation
 from rcilab.core.arrays import Array, JointVector
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.command import CartesianPosition, Command, JointPosition, JointTorque
@@ -31,7 +31,7 @@ _HISTORY = 3  # Commands that a third difference looks back to.
 _FAR = 1e3  # Position bounds that a Cartesian brake never meets: [m], [rad].
 
 
-class Brake(Protocol):
+class StopPlanner(Protocol):
     """Remembers what was commanded and knows how to end it. Owned by the control loop."""
 
     def begin(self, state: RobotState) -> None:
@@ -46,12 +46,12 @@ class Brake(Protocol):
         """Returns the commands that lead to rest within the limits, one a cycle after the last; at least one."""
         ...
 
-    def find_motion(self) -> Breach | None:
+    def find_motion(self) -> LimitViolation | None:
         """Returns what the last command breaks when it is repeated, because it still moved; None: it may stand."""
         ...
 
 
-class StreamBrake:
+class StreamStopPlanner:
     """Brings sampled coordinates to rest, whatever they are.
 
     The past is taken as the parabola through the last three samples: its continuation by a curve that keeps the
@@ -93,7 +93,7 @@ class StreamBrake:
         return self._past[-1][1]
 
 
-class JointBrake:
+class JointStopPlanner:
     """Brings commanded joint angles to rest.
 
     Args:
@@ -102,7 +102,7 @@ class JointBrake:
 
     def __init__(self, limits: JointLimits) -> None:
         self._limits = limits
-        self._stream = StreamBrake(limits)
+        self._stream = StreamStopPlanner(limits)
 
     def begin(self, state: RobotState) -> None:
         """Starts from the arm standing at its commanded angles."""
@@ -116,7 +116,7 @@ class JointBrake:
         """Returns the angles that lead to rest."""
         return [JointPosition(row) for row in self._stream.rows()]
 
-    def find_motion(self) -> Breach | None:
+    def find_motion(self) -> LimitViolation | None:
         """Returns what the last command breaks when it is repeated; None: it may stand."""
         q = self._stream.last.tolist()
         monitor = JointMonitor(self._limits)
@@ -124,7 +124,7 @@ class JointBrake:
         return _first_breach(monitor, lambda: monitor.step(q))
 
 
-class CartesianBrake:
+class CartesianStopPlanner:
     """Brings a commanded pose to rest: position, rotation about the last orientation, and arm angle each by itself.
 
     The controller judges the joints that it computes, too, and they are often the narrower bound: a tool stopped with
@@ -163,7 +163,7 @@ class CartesianBrake:
             turn = rotation_vector(R, pose.T_base_tool[:3, :3])
             psi = 0.0 if pose.psi is None or last.psi is None else pose.psi - last.psi
             past.append((cycle, np.concatenate((pose.T_base_tool[:3, 3], turn, [psi]))))
-        stream = StreamBrake(self._bounds())
+        stream = StreamStopPlanner(self._bounds())
         stream.begin(*past)
         way: list[Command] = []
         for row in stream.rows():
@@ -173,7 +173,7 @@ class CartesianBrake:
             way.append(CartesianPosition(T, None if last.psi is None else last.psi + float(row[6])))
         return way
 
-    def find_motion(self) -> Breach | None:
+    def find_motion(self) -> LimitViolation | None:
         """Returns what the last command breaks when it is repeated; None: it may stand. Joints are not computed."""
         monitor = CartesianMonitor(self._limits)
         (before, first), *later = self._poses
@@ -206,7 +206,7 @@ class CartesianBrake:
         )  # fmt: skip
 
 
-class TorqueBrake:
+class TorqueStopPlanner:
     """Takes commanded torques back to zero at the allowed rate; what is left is the controller's own compensation.
 
     Args:
@@ -233,12 +233,14 @@ class TorqueBrake:
             way.append(JointTorque(np.sign(tau) * np.maximum(np.abs(tau) - self._step, 0.0)))
         return way
 
-    def find_motion(self) -> Breach | None:
+    def find_motion(self) -> LimitViolation | None:
         """Returns None: torques may be repeated."""
         return None
 
 
-def _first_breach(monitor: JointMonitor | CartesianMonitor, repeat: Callable[[], tuple[Fault, ...]]) -> Breach | None:
+def _first_breach(
+    monitor: JointMonitor | CartesianMonitor, repeat: Callable[[], tuple[Fault, ...]]
+) -> LimitViolation | None:
     """Returns what the first broken cycle of as many repetitions breaks as a third difference looks back to."""
     for _ in range(_HISTORY):
         breaches = [breach for breach in monitor.broken() if breach.condition.order > 0] if repeat() else []

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rcilab.core.arrays import JointVector, as_path, as_rows, as_vector, described
-from rcilab.core.clearance import STANDARD_DISTANCE, SafetyDistance
+from rcilab.core.clearance import STANDARD_DISTANCE, ClearanceLimit
 from rcilab.core.errors import InvalidValueError, KinematicsError, ModelError
 from rcilab.core.limits import Limits
 from rcilab.core.safety_box import SafetyBox
@@ -21,7 +21,7 @@ from rcilab.core.spatial import IDENTITY, Pose
 from rcilab.model.dynamics.payload import NO_LOAD, Payload
 from rcilab.model.kinematics.frames import Frame
 from rcilab.model.kinematics.reaching_arm import ReachingArm
-from rcilab.model.kinematics.singularity import Dexterity, DexterityPath, dexterity, dexterity_path
+from rcilab.model.kinematics.singularity import Manipulability, ManipulabilityPath, dexterity, dexterity_path
 from rcilab.model.kinematics.workspace import Workspace, sample_workspace
 from rcilab.robots import RCI_ROBOT_NAMES, RobotDescription, describe_robot
 
@@ -188,11 +188,11 @@ class RobotModel(ReachingArm):
         angles = self._floats(q)
         return angles[2], 1 if angles[3] > flip else -1
 
-    def dexterity(self, q: ArrayLike) -> Dexterity:
+    def dexterity(self, q: ArrayLike) -> Manipulability:
         """Returns how well the tool can be moved here: manipulability, smallest singular value, condition."""
         return dexterity(self.jacobian(q))
 
-    def dexterity_path(self, q: ArrayLike, frame: Frame = "tool") -> DexterityPath:
+    def dexterity_path(self, q: ArrayLike, frame: Frame = "tool") -> ManipulabilityPath:
         """Returns the measures of `dexterity` along a path, each of shape (N,), for q of shape (N, n), [rad]."""
         return dexterity_path(self.jacobian(as_path(q, self.n, "q", "rad"), frame))
 
@@ -256,7 +256,7 @@ class RobotModel(ReachingArm):
             raise InvalidValueError("friction", described(friction), "is neither True nor False nor a JointFriction")
         return terms.with_friction(law.torque(speeds))
 
-    def clearance(self, q: ArrayLike, distance: SafetyDistance = STANDARD_DISTANCE) -> Clearance:
+    def clearance(self, q: ArrayLike, distance: ClearanceLimit = STANDARD_DISTANCE) -> Clearance:
         """Returns how near the links come to each other and to the floor, and which: distances between their capsules.
 
         Neighbouring links always touch and are not compared, nor is the tool with the last two links. The capsules are
@@ -278,7 +278,7 @@ class RobotModel(ReachingArm):
         found = ClearanceQuery(self.collision_geometry(distance)).path(np.atleast_2d(angles))
         return found if angles.ndim > 1 else Clearance(found.distance[0], found.links[0])
 
-    def collision_geometry(self, distance: SafetyDistance = STANDARD_DISTANCE) -> CollisionGeometry:
+    def collision_geometry(self, distance: ClearanceLimit = STANDARD_DISTANCE) -> CollisionGeometry:
         """Returns what `clearance` compares, for a floor and a tool with or without a body."""
         from rcilab.model.kinematics.collision import collision_geometry
 

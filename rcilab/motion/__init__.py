@@ -6,7 +6,7 @@ from rcilab.motion.cartesian import plan_arc, plan_circle, plan_line, plan_nulls
 from rcilab.motion.differences import derivatives_from_differences, differences_from_derivatives
 from rcilab.motion.joint import plan_joint
 from rcilab.motion.margin import LIMIT_MARGIN
-from rcilab.motion.motion import Law, Motion, MotionSample, require_motion
+from rcilab.motion.motion import Motion, MotionSample, TimeLaw, require_motion
 from rcilab.motion.online import Jog
 from rcilab.motion.piecewise import PiecewisePolynomial
 from rcilab.motion.plan_program import plan_program
@@ -19,7 +19,7 @@ from rcilab.motion.waypoint import Waypoint
 __all__ = [
     "LIMIT_MARGIN",
     "Jog",
-    "Law",
+    "TimeLaw",
     "Motion",
     "MotionSample",
     "PiecewisePolynomial",

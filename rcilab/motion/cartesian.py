@@ -31,7 +31,7 @@ from rcilab.motion.path_timing import curve_through, plan_along, require_path
 from rcilab.motion.piecewise import join_pieces
 from rcilab.motion.range import require_inside
 from rcilab.motion.s_curve import plan_s_curve
-from rcilab.motion.time_parametrization import TimeLaw
+from rcilab.motion.time_parametrization import TimeParametrization
 from rcilab.motion.torque_rate import plan_within_torque_rate
 
 PathLaw: TypeAlias = JointLaw
@@ -303,19 +303,19 @@ def follow_path(model: RobotModel, q: JointVector, path: Path, speed: float) -> 
     return Motion(polynomial=curve_through(model, path, rows, law), goal=rows[-1], law="s_profile", speed=speed)
 
 
-def _s_law(path: Path, speed: float) -> TimeLaw:
+def _s_law(path: Path, speed: float) -> TimeParametrization:
     speed = as_number(speed, "speed")
     if not MIN_SPEED <= speed <= 1.0:
         raise InvalidValueError("speed", speed, f"must be from {MIN_SPEED:g} to 1: the part of the generator's speed")
     if path.distance == 0.0:
-        return TimeLaw(np.ones(1), np.zeros(1), np.zeros(1))
+        return TimeParametrization(np.ones(1), np.zeros(1), np.zeros(1))
     curve = plan_s_curve(path.distance, S_PROFILE_PATH_VELOCITY * speed, S_PROFILE_PATH_ACCELERATION * speed)
     starts, coefficients = curve.pieces()
     profile = join_pieces(starts[np.newaxis], coefficients[np.newaxis], curve.duration)
     times = np.arange(math.ceil(curve.duration / CYCLE_TIME - 1e-9) + 1) * CYCLE_TIME
     shares, du, ddu = (profile.sample(times, order)[:, 0] / path.distance for order in range(3))
     shares[-1], du[-1], ddu[-1] = 1.0, 0.0, 0.0
-    return TimeLaw(np.clip(shares, 0.0, 1.0), du, ddu)
+    return TimeParametrization(np.clip(shares, 0.0, 1.0), du, ddu)
 
 
 def plan_path(model: RobotModel, q: JointVector, path: Path, speed: float, law: PathLaw) -> Motion:

@@ -6,12 +6,14 @@ import numpy as np
 
 from rcilab.core.arrays import Array, JointPath, JointVector
 from rcilab.core.spatial import IDENTITY
-from rcilab.model.kinematics.branch import Loss
+from rcilab.model.kinematics.branch import BranchEnd
 from rcilab.model.kinematics.closed_form import build_closed_form
 from rcilab.model.robot_model import RobotModel
 
 
-def inverse_path(model: RobotModel, T: Array, psi: Array | None, start: JointVector) -> tuple[JointPath, Loss | None]:
+def inverse_path(
+    model: RobotModel, T: Array, psi: Array | None, start: JointVector
+) -> tuple[JointPath, BranchEnd | None]:
     """Returns the joint angles along a path of the tool on one branch, without a jump from row to row.
 
     Joint limits are not looked at. About 2 us a row; 20 us with offsets, where the inverse is no closed form.

@@ -13,7 +13,7 @@ from json import JSONDecodeError, JSONDecoder
 from types import MappingProxyType
 from typing import TypeAlias
 
-from rcilab.core.arrays import Words
+from rcilab.core.arrays import Unquoted
 from rcilab.core.errors import InvalidValueError
 
 LONGEST = 8_000_000
@@ -67,7 +67,7 @@ def read_json(content: bytes, name: str, most: Mapping[str, int] = MappingProxyT
         InvalidValueError: It is no JSON, or not what this reader takes; the message names the line.
     """
     if len(content) > LONGEST:
-        raise InvalidValueError(name, Words(f"{len(content) / 1e6:.1f} MB"), f"is above {LONGEST / 1e6:g} MB").coded(
+        raise InvalidValueError(name, Unquoted(f"{len(content) / 1e6:.1f} MB"), f"is above {LONGEST / 1e6:g} MB").coded(
             "file_large", file=name, size=f"{len(content) / 1e6:.1f}", most=f"{LONGEST / 1e6:g}"
         )
     try:
@@ -187,7 +187,7 @@ class _Reader:
     def _error(self, problem: str) -> InvalidValueError:
         word = _WORD.match(self._text, self._at)
         shown = word[0] if word else self._text[self._at : self._at + 20].split("\n")[0]
-        found = Words(shown[:60]) if shown else Words("the end of the text")
+        found = Unquoted(shown[:60]) if shown else Unquoted("the end of the text")
         error = InvalidValueError(f"{self._name}, line {self._line()}", found, problem)
         if not shown:
             return error.coded("file_json_end", file=self._name, line=self._line())

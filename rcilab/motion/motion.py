@@ -11,7 +11,7 @@ from typing import BinaryIO, Literal, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rcilab.core.arrays import Array, JointPath, JointVector, as_number, as_path, as_vector, described, frozen
+from rcilab.core.arrays import Array, JointPath, JointVector, as_number, as_path, as_vector, described, readonly_copy
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.file_bounds import MOST_ROWS
@@ -20,11 +20,11 @@ from rcilab.i18n.localized_text import language
 from rcilab.i18n.translator import Remark
 from rcilab.motion.piecewise import DERIVATIVES, PiecewisePolynomial
 
-Law: TypeAlias = Literal["jerk_limited", "torque_rate_limited", "s_profile", "stop", "samples"]
+TimeLaw: TypeAlias = Literal["jerk_limited", "torque_rate_limited", "s_profile", "stop", "samples"]
 """How a motion runs along its path: as fast as all limits allow, the same with the recommended torque rate kept too, by
 the manual's S profile (3.5), as the fastest stop, or through rows that somebody else made."""
 
-LAWS: tuple[Law, ...] = ("jerk_limited", "torque_rate_limited", "s_profile", "stop", "samples")
+LAWS: tuple[TimeLaw, ...] = ("jerk_limited", "torque_rate_limited", "s_profile", "stop", "samples")
 
 _CARD: dict[Language, tuple[str, str, str]] = {
     "en": ("Motion, {law}: {duration:.3f} s at speed {speed:g} (angles in °)", "start", "goal"),
@@ -67,7 +67,7 @@ class Motion:
     """The curve."""
     goal: JointVector
     """Where it ends and holds, shape (n,), [rad]."""
-    law: Law
+    law: TimeLaw
     speed: float = 1.0
     """The speed it was planned with, as a part of the limits, in (0, 1]."""
     segment_starts: Array = field(default_factory=lambda: np.zeros(1))
@@ -82,7 +82,7 @@ class Motion:
             raise InvalidValueError("law", self.law, f"is unknown; known: {', '.join(LAWS)}")
         if not 0.0 < self.speed <= 1.0:
             raise InvalidValueError("speed", self.speed, "must be in (0, 1]")
-        starts = frozen(self.segment_starts)
+        starts = readonly_copy(self.segment_starts)
         if starts.ndim != 1 or not starts.size or starts[0] != 0.0 or not (np.diff(starts, append=np.inf) >= 0.0).all():
             raise InvalidValueError("segment_starts", self.segment_starts, "must begin at 0 and never decrease [s]")
         object.__setattr__(self, "segment_starts", starts)
@@ -216,7 +216,7 @@ class Motion:
         if math.isnan(t):
             raise InvalidValueError("t", t, "is not a time [s]")
         if t >= self.duration:
-            rest = frozen(np.zeros(self.n))
+            rest = readonly_copy(np.zeros(self.n))
             return MotionSample(self.goal, rest, rest, rest)
         return _sample(self.polynomial.at(t))
 
@@ -349,7 +349,7 @@ def require_motion(motion: object) -> Motion:
     raise InvalidValueError("motion", described(motion), "is no motion; plan_joint or Motion.from_samples makes one")
 
 
-def standing(q: ArrayLike, *, law: Law = "jerk_limited", speed: float = 1.0) -> Motion:
+def standing(q: ArrayLike, *, law: TimeLaw = "jerk_limited", speed: float = 1.0) -> Motion:
     """Returns the motion of zero length that stands at `q`, shape (n,), [rad]."""
     angles = np.asarray(q, dtype=np.float64)
     still = PiecewisePolynomial(np.zeros(2), angles.reshape(1, -1, 1))
@@ -368,6 +368,11 @@ def _sample(arrays: tuple[JointVector, JointVector, JointVector, JointVector]) -
 
 
 def _rebuild(
-    polynomial: PiecewisePolynomial, goal: JointVector, law: Law, speed: float, starts: Array, notes: tuple[str, ...]
+    polynomial: PiecewisePolynomial,
+    goal: JointVector,
+    law: TimeLaw,
+    speed: float,
+    starts: Array,
+    notes: tuple[str, ...],
 ) -> Motion:
     return Motion(polynomial=polynomial, goal=goal, law=law, speed=speed, segment_starts=starts, notes=notes)

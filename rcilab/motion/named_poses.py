@@ -10,7 +10,7 @@ from typing import Any, cast
 
 from numpy.typing import ArrayLike
 
-from rcilab.core.arrays import JointVector, as_vector, described, frozen
+from rcilab.core.arrays import JointVector, as_vector, described, readonly_copy
 from rcilab.core.atomic_file import write_whole
 from rcilab.core.errors import InvalidValueError, VersionMismatchError
 from rcilab.model.robot_model import RobotModel, require_model
@@ -26,7 +26,7 @@ def default_file() -> Path:
     return (Path(home) if os.path.isabs(home) else Path.home() / ".config") / "rcilab" / "poses.json"
 
 
-class PoseBook:
+class NamedPoseStore:
     """The stored poses of one arm. Every call reads the file anew: other programs may have written to it.
 
     Args:
@@ -72,7 +72,7 @@ class PoseBook:
                     f"pose {name!r} has joint {joint} at {math.degrees(angle):.1f} deg, outside "
                     f"{math.degrees(low):.0f} to {math.degrees(high):.0f} deg; mend or delete it"
                 ).coded("pose_damaged", name=name)
-        return frozen(q)
+        return readonly_copy(q)
 
     def store(self, name: str, q: ArrayLike) -> str:
         """Stores joint angles under a name that is not taken, and returns the name as it is stored.

@@ -7,14 +7,14 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.core.arrays import JointVector, as_number, as_vector, frozen
+from rcilab.core.arrays import JointVector, as_number, as_vector, readonly_copy
 from rcilab.core.errors import InvalidValueError
 from rcilab.model.robot_model import RobotModel, require_model
 from rcilab.motion import _ruckig
 from rcilab.motion.jog_start import require_stoppable
 from rcilab.motion.joint import MIN_SPEED
 from rcilab.motion.margin import LIMIT_MARGIN
-from rcilab.motion.twist import Frame, TwistFollower
+from rcilab.motion.twist import Frame, TwistController
 
 POSITION_MARGIN = 1e-4  # [rad] How far inside its position limits a joint is brought to rest. A choice.
 
@@ -79,7 +79,7 @@ class Jog:
         self._ranges = list(zip(self._lower, self._upper, strict=True))
         # Of all joints: the smallest acceleration, the longest time to let go, the largest change of speed by that.
         self._slowest = min(a), max(let_go), float((limits.acceleration**2 / (2.0 * LIMIT_MARGIN * limits.jerk)).max())
-        self._tool = TwistFollower(model, self._lower, self._upper, self._speeds, a, j, speed)
+        self._tool = TwistController(model, self._lower, self._upper, self._speeds, a, j, speed)
         self._axes = _ruckig.Stepper(start.tolist(), velocity.tolist(), acceleration.tolist(), a, j)
         self._rest = [0.0] * n
         self._goal = self._rest
@@ -89,17 +89,17 @@ class Jog:
     @property
     def q(self) -> JointVector:
         """Joint angles now, shape (n,), [rad]."""
-        return frozen(self._axes.q)
+        return readonly_copy(self._axes.q)
 
     @property
     def dq(self) -> JointVector:
         """Joint velocities now, shape (n,), [rad/s]; derivatives of the curve."""
-        return frozen(self._axes.dq)
+        return readonly_copy(self._axes.dq)
 
     @property
     def ddq(self) -> JointVector:
         """Joint accelerations now, shape (n,), [rad/s^2]."""
-        return frozen(self._axes.ddq)
+        return readonly_copy(self._axes.ddq)
 
     @property
     def is_at_rest(self) -> bool:

@@ -19,7 +19,7 @@ its other end."""
 
 
 @dataclass(frozen=True, slots=True)
-class SteadyTurn:
+class Slerp:
     """A turn about one axis in proportion to the way; between two orientations it is their slerp."""
 
     start: Rotation9
@@ -47,7 +47,7 @@ class SteadyTurn:
 
 
 @dataclass(frozen=True, slots=True)
-class TurnThrough:
+class ViaOrientation:
     """A turn that passes exactly through an orientation at a place on the way, with continuous acceleration.
 
     The orientation is R_middle exp(p(u)) with a rotation vector p(u) in the axes of the middle one: on each side of
@@ -97,15 +97,15 @@ class TurnThrough:
         return mean * min(1.0, _STEEPEST * min(size_a, size_b) / size) if size > 0.0 else mean
 
 
-Turning: TypeAlias = SteadyTurn | TurnThrough
+Turning: TypeAlias = Slerp | ViaOrientation
 
 
-def turn_to(start: Rotation9, goal: Rotation9) -> SteadyTurn:
+def turn_to(start: Rotation9, goal: Rotation9) -> Slerp:
     """Returns the turn by slerp from one orientation to another, the shorter way, both row-major."""
-    return SteadyTurn(start, _turn_of(start, goal))
+    return Slerp(start, _turn_of(start, goal))
 
 
-def turn_through(start: Rotation9, middle: Rotation9, goal: Rotation9, place: float) -> TurnThrough:
+def turn_through(start: Rotation9, middle: Rotation9, goal: Rotation9, place: float) -> ViaOrientation:
     """Returns the turn from start to goal that passes the middle orientation at a place.
 
     Both parts turn the shorter way, so that the whole may turn by up to 2 pi.
@@ -116,7 +116,7 @@ def turn_through(start: Rotation9, middle: Rotation9, goal: Rotation9, place: fl
         goal: Orientation, row-major.
         place: Share of the way at which the middle one is passed, between 0 and 1.
     """
-    return TurnThrough(middle, place, _turn_of(middle, start), _turn_of(middle, goal))
+    return ViaOrientation(middle, place, _turn_of(middle, start), _turn_of(middle, goal))
 
 
 def turns_between(rotations: Array) -> Array:

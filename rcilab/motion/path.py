@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from rcilab.core.arrays import Array, as_number, as_vector, described
 from rcilab.core.errors import InvalidValueError, PlanningError
 from rcilab.core.spatial import Pose, Rotation9, as_pose, rotation_from_wxyz, wxyz_from_rotation
-from rcilab.motion.orientation_path import SteadyTurn, Turning, turn_through, turn_to
+from rcilab.motion.orientation_path import Slerp, Turning, turn_through, turn_to
 from rcilab.motion.s_curve import STANDSTILL_DISTANCE
 
 _COLLINEAR = 1e-4
@@ -242,7 +242,7 @@ def build_circle(
     turning = None
     if orientation == "turning":
         # The axis in the axes of the tool, where its own turn does not move it.
-        turning = SteadyTurn(rotation, _point(angle * (normal @ start.rotation)))
+        turning = Slerp(rotation, _point(angle * (normal @ start.rotation)))
         rotation = _rotation(turning.sample(np.ones(1))[0])
     end = start if angle == math.tau else Pose.from_parts(rotation, _point(turned))
     turn = 0.0 if turning is None else turning.fastest

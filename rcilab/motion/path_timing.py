@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rcilab.core.arrays import Array, JointPath, JointVector, as_number, sealed
+from rcilab.core.arrays import Array, JointPath, JointVector, as_number, make_readonly
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError, PlanningError
 from rcilab.model.robot_model import RobotModel
@@ -22,13 +22,13 @@ from rcilab.motion.inverse_path import inverse_path
 from rcilab.motion.joint import MIN_SPEED
 from rcilab.motion.margin import LIMIT_MARGIN
 from rcilab.motion.motion import Motion, standing
-from rcilab.motion.orientation_path import TurnThrough, turns_between
+from rcilab.motion.orientation_path import ViaOrientation, turns_between
 from rcilab.motion.path import Path
 from rcilab.motion.path_bounds import LEAST, ROUNDNESS, PathBounds, half_planes, path_bounds
 from rcilab.motion.path_infeasibility import examine, refusal
 from rcilab.motion.piecewise import PiecewisePolynomial
 from rcilab.motion.slowdown import spread
-from rcilab.motion.time_parametrization import FastestLaw, TimeLaw, smooth_law
+from rcilab.motion.time_parametrization import FastestLaw, TimeParametrization, smooth_law
 
 _KNOTS = 500
 """Steps of the path between which bounds are interpolated. A choice: two millimetres of a line of a metre."""
@@ -116,7 +116,7 @@ def plan_along(model: RobotModel, q: JointVector, path: Path, speed: float) -> M
     raise refusal(path, worst, PlanningError(reason).coded("jump"))
 
 
-def curve_through(model: RobotModel, path: Path, rows: JointPath, law: TimeLaw) -> PiecewisePolynomial:
+def curve_through(model: RobotModel, path: Path, rows: JointPath, law: TimeParametrization) -> PiecewisePolynomial:
     """Returns the curve through joint angles along a path, from rest to rest, with continuous acceleration.
 
     Args:
@@ -205,7 +205,7 @@ def _columns(path: Path, rows: JointPath, shares: Array) -> Array:
 
 
 def _turns_unevenly(path: Path) -> bool:
-    return isinstance(path.turning, TurnThrough)
+    return isinstance(path.turning, ViaOrientation)
 
 
 def _path_bounds(path: Path, knots: JointPath, bounds: _Bounds) -> PathBounds:
@@ -294,7 +294,9 @@ def _excess_between(bounds: _Bounds, powers: list[Array]) -> Array:
     return excess
 
 
-def _quintics(model: RobotModel, path: Path, rows: JointPath, law: TimeLaw) -> Iterator[tuple[slice, list[Array]]]:
+def _quintics(
+    model: RobotModel, path: Path, rows: JointPath, law: TimeParametrization
+) -> Iterator[tuple[slice, list[Array]]]:
     """Yields the curve through the rows with the path's velocities and accelerations: continuous in both.
 
     Yields:
@@ -320,4 +322,4 @@ def _quintics(model: RobotModel, path: Path, rows: JointPath, law: TimeLaw) -> I
 
 def _joined(coefficients: Array) -> PiecewisePolynomial:
     breaks = np.arange(len(coefficients) + 1, dtype=np.float64) * CYCLE_TIME
-    return PiecewisePolynomial(breaks, sealed(coefficients))
+    return PiecewisePolynomial(breaks, make_readonly(coefficients))

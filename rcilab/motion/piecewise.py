@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rcilab.core.arrays import Array, JointPath, JointVector, frozen
+from rcilab.core.arrays import Array, JointPath, JointVector, readonly_copy
 from rcilab.core.errors import InvalidValueError
 
 DERIVATIVES = 4
@@ -38,7 +38,7 @@ class PiecewisePolynomial:
     _starts: list[float] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        breaks, coefficients = frozen(self.breaks), frozen(self.coefficients)
+        breaks, coefficients = readonly_copy(self.breaks), readonly_copy(self.coefficients)
         if breaks.ndim != 1 or breaks.size < 2 or coefficients.ndim != 3 or coefficients.shape[0] != breaks.size - 1:
             shapes = f"breaks of shape {breaks.shape}, coefficients of shape {coefficients.shape}"
             raise InvalidValueError("polynomial pieces", shapes, "must have shapes (S + 1,) and (S, n, k)")

@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.core.arrays import Array, JointVector, as_number, as_vector, described, sealed
+from rcilab.core.arrays import Array, JointVector, as_number, as_vector, described, make_readonly
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError, PlanningError
 from rcilab.core.file_bounds import MOST_ROWS, require_max_rows
@@ -310,7 +310,7 @@ class _Track:
         for piece in self._pieces:
             coefficients[first : first + len(piece), :, : piece.shape[2]] = piece
             first += len(piece)
-        curve = PiecewisePolynomial(np.concatenate((*self._breaks, [self._end])), sealed(coefficients))
+        curve = PiecewisePolynomial(np.concatenate((*self._breaks, [self._end])), make_readonly(coefficients))
         return Motion(
             polynomial=curve, goal=self._goal, law=law, speed=speed,
             segment_starts=np.array(self._starts), notes=tuple(self.notes),

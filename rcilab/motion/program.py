@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from os import PathLike
 
-from rcilab.core.arrays import Words, as_vector, described
+from rcilab.core.arrays import Unquoted, as_vector, described
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.spatial import Pose
 from rcilab.motion.waypoint import Floats, Waypoint, angles_of, named_value, require_fit, vector_of
@@ -23,7 +23,7 @@ def require_count(count: int) -> None:
         InvalidValueError: It is not 1 to `MOST_WAYPOINTS`.
     """
     if not 1 <= count <= MOST_WAYPOINTS:
-        raise InvalidValueError("waypoints", Words(str(count)), f"must be 1 to {MOST_WAYPOINTS}").coded(
+        raise InvalidValueError("waypoints", Unquoted(str(count)), f"must be 1 to {MOST_WAYPOINTS}").coded(
             "span", low="1", high=str(MOST_WAYPOINTS)
         )
 

@@ -8,7 +8,7 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
 
-from rcilab.core.arrays import Words, described
+from rcilab.core.arrays import Unquoted, described
 from rcilab.core.atomic_file import read_whole, replacing
 from rcilab.core.errors import InvalidValueError, ModelError, VersionMismatchError, plain_text
 from rcilab.motion.lined_json import LONGEST, LongListError, Node, read_json
@@ -160,7 +160,7 @@ def _waypoint(node: Node, number: int, name: str, robot: RobotDescription) -> Wa
 
 
 def _placed(error: InvalidValueError, name: str, node: Node, prefix: str = "", number: int = 0) -> InvalidValueError:
-    value = Words("nothing") if error.value is None else error.value
+    value = Unquoted("nothing") if error.value is None else error.value
     placed = InvalidValueError(f"{name}, line {node.line}, {prefix}{error.name}", value, error.requirement)
     reason = error if error.code else error.requirement
     facts: dict[str, object] = {"file": name, "line": node.line, "key": error.name, "value": _shown(error.value)}

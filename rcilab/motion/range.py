@@ -7,7 +7,7 @@ from math import degrees, inf, radians
 
 import numpy as np
 
-from rcilab.core.arrays import JointVector, frozen
+from rcilab.core.arrays import JointVector, readonly_copy
 from rcilab.core.errors import PlanningError
 from rcilab.core.limits import JointLimits
 
@@ -57,7 +57,7 @@ def range_from(limits: JointLimits, q: JointVector, most: float = inf) -> JointL
     is_near = beyond <= most
     lower = np.where(is_near, np.minimum(limits.lower, q - _ROUNDING), limits.lower)
     upper = np.where(is_near, np.maximum(limits.upper, q + _ROUNDING), limits.upper)
-    return replace(limits, lower=frozen(lower), upper=frozen(upper))
+    return replace(limits, lower=readonly_copy(lower), upper=readonly_copy(upper))
 
 
 def angle_text(value: float) -> str:

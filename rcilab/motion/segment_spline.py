@@ -39,7 +39,7 @@ Rows: TypeAlias = NDArray[np.intp]
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Chain:
+class SegmentSpline:
     """A curve in s through C columns: joint angles, arm angle, the tool's position and its turn summed up.
 
     The turn's derivative is the tool's rotation by s, in base axes. On joint moves and beside them only the joint
@@ -125,7 +125,7 @@ class _Piece:
         return T, np.zeros(len(T)) if psi is None else psi
 
 
-def build_chain(model: RobotModel, segments: list[Segment], blends: list[Blend], scale: float) -> Chain:
+def build_chain(model: RobotModel, segments: list[Segment], blends: list[Blend], scale: float) -> SegmentSpline:
     """Returns the chain of segments that are joined by blends.
 
     Args:
@@ -160,7 +160,7 @@ def build_chain(model: RobotModel, segments: list[Segment], blends: list[Blend],
     left, right = tuple(state[:-1] for state in states), tuple(state[1:] for state in states)
     powers = quintic((left[0], left[1], left[2]), (right[0], right[1], right[2]), steps)
     middles = [start + LENGTH / 2.0 for start, piece in zip(starts, pieces, strict=False) if piece.blend is not None]
-    return Chain(
+    return SegmentSpline(
         knots=knots,
         powers=tuple(power / steps**order for order, power in enumerate(powers)),
         n=model.n,
@@ -305,7 +305,7 @@ def _refusal(piece: _Piece, T: Array, reason: RcilabError) -> PlanningError:
     ).coded("blend", **facts)
 
 
-def derivatives_at_knots(chain: Chain) -> tuple[Array, Array, Array]:
+def derivatives_at_knots(chain: SegmentSpline) -> tuple[Array, Array, Array]:
     """Returns the derivatives by s at the knots, each of shape (K + 1, C); of the third the size, the larger one's."""
     steps = np.diff(chain.knots)[:, np.newaxis]
     _, first, second = chain.sample(chain.knots)

@@ -11,7 +11,7 @@ from rcilab.core.arrays import Array
 from rcilab.core.limits import Limits
 from rcilab.motion.margin import LIMIT_MARGIN
 from rcilab.motion.path_bounds import ROUNDNESS, PathBounds, half_planes, path_bounds
-from rcilab.motion.segment_spline import Chain, derivatives_at_knots
+from rcilab.motion.segment_spline import SegmentSpline, derivatives_at_knots
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -40,7 +40,7 @@ def column_limits(limits: Limits) -> ColumnLimits:
     )
 
 
-def chain_bounds(chain: Chain, limits: ColumnLimits) -> PathBounds:
+def chain_bounds(chain: SegmentSpline, limits: ColumnLimits) -> PathBounds:
     """Returns what a chain allows."""
     first, second, third = derivatives_at_knots(chain)
     n = chain.n

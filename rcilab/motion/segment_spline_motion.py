@@ -13,10 +13,10 @@ from rcilab.core.errors import PlanningError
 from rcilab.core.limits import JointLimits, Limits
 from rcilab.motion.blocks import blocks
 from rcilab.motion.hermite import quintic
-from rcilab.motion.segment_spline import Chain, Rows
+from rcilab.motion.segment_spline import Rows, SegmentSpline
 from rcilab.motion.segment_spline_bounds import ColumnLimits, chain_bounds, column_limits
 from rcilab.motion.slowdown import spread
-from rcilab.motion.time_parametrization import FastestLaw, TimeLaw, smooth_law
+from rcilab.motion.time_parametrization import FastestLaw, TimeParametrization, smooth_law
 
 _ROUNDS = 12
 """How often to slow down in places, and then as often as a whole. Seen: 1 to 4 in places."""
@@ -33,7 +33,7 @@ _HASTE = 1.002
 few rounds do, and places that were good stay so when the cycles fall elsewhere. A choice."""
 
 
-def plan_chain(chain: Chain, limits: Limits, tell: Callable[[float], None]) -> tuple[Array, list[float]]:
+def plan_chain(chain: SegmentSpline, limits: Limits, tell: Callable[[float], None]) -> tuple[Array, list[float]]:
     """Returns the fastest curve along a chain from rest to rest, and when it passes each corner, [s].
 
     A quintic a cycle, through the chain at every cycle with its velocity and acceleration there: its coefficients,
@@ -91,7 +91,7 @@ def plan_chain(chain: Chain, limits: Limits, tell: Callable[[float], None]) -> t
     )
 
 
-def _curve(chain: Chain, law: TimeLaw) -> tuple[Array, Array]:
+def _curve(chain: SegmentSpline, law: TimeParametrization) -> tuple[Array, Array]:
     """Returns the joint angles at N cycles, shape (N, n), and the coefficients between, shape (N - 1, n, 6)."""
     q, coefficients = np.empty((len(law.s), chain.n)), np.empty((len(law.s) - 1, chain.n, 6))
     for block in blocks(len(coefficients)):
@@ -101,7 +101,9 @@ def _curve(chain: Chain, law: TimeLaw) -> tuple[Array, Array]:
     return q, coefficients
 
 
-def _excess(chain: Chain, limits: ColumnLimits, law: TimeLaw, interval: Rows, looked_at: Array) -> Array:
+def _excess(
+    chain: SegmentSpline, limits: ColumnLimits, law: TimeParametrization, interval: Rows, looked_at: Array
+) -> Array:
     """Returns how much slower each row must be passed to keep every bound, shape (N,), in blocks that are looked at.
 
     Args:
@@ -122,7 +124,7 @@ def _excess(chain: Chain, limits: ColumnLimits, law: TimeLaw, interval: Rows, lo
     return excess
 
 
-def _quintics(chain: Chain, law: TimeLaw, rows: slice) -> tuple[Array, list[Array]]:
+def _quintics(chain: SegmentSpline, law: TimeParametrization, rows: slice) -> tuple[Array, list[Array]]:
     """Returns the joint angles at N cycles, shape (N, n), and the curve's coefficients by power, each (N - 1, n)."""
     h = CYCLE_TIME
     q, first, second = chain.sample(law.s[rows], slice(chain.n))
@@ -137,7 +139,7 @@ def _quintics(chain: Chain, law: TimeLaw, rows: slice) -> tuple[Array, list[Arra
     return q, [part / h**power for power, part in enumerate(parts)]
 
 
-def _joint_excess(chain: Chain, limits: ColumnLimits, powers: list[Array], interval: Rows) -> Array:
+def _joint_excess(chain: SegmentSpline, limits: ColumnLimits, powers: list[Array], interval: Rows) -> Array:
     """Returns how much slower each cycle must be to keep the joints' bounds in it, shape (N - 1,)."""
     n = chain.n
     speed = np.maximum(chain.speed[interval[:-1]], chain.speed[interval[1:]])
@@ -156,7 +158,9 @@ def _joint_excess(chain: Chain, limits: ColumnLimits, powers: list[Array], inter
     return excess
 
 
-def _tool_excess(chain: Chain, limits: ColumnLimits, law: TimeLaw, interval: Rows, rows: slice) -> Array:
+def _tool_excess(
+    chain: SegmentSpline, limits: ColumnLimits, law: TimeParametrization, interval: Rows, rows: slice
+) -> Array:
     """Returns how much slower each of some rows must be to keep the bounds on tool and arm angle.
 
     By backward differences at 1 ms, as the controller judges them, with rest before and after: the last row answers for
@@ -194,7 +198,7 @@ def _looking_back(values: Array, join: np.ufunc) -> Array:
     return join(join(values[3:], values[2:-1]), join(values[1:-2], values[:-3]))
 
 
-def _require_inside(chain: Chain, q: Array, law: TimeLaw, limits: JointLimits) -> None:
+def _require_inside(chain: SegmentSpline, q: Array, law: TimeParametrization, limits: JointLimits) -> None:
     outside = np.argwhere(~((limits.lower < q) & (q < limits.upper)))
     if outside.size:
         row, joint = outside[0].tolist()

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rcilab.core.arrays import Array, JointPath, as_number, sealed
+from rcilab.core.arrays import Array, JointPath, as_number, make_readonly
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.limits import JointLimits
@@ -35,7 +35,7 @@ _ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class PacedMotion:
+class SpeedScaledMotion:
     """A motion and how it is run through, row by row, one a controller cycle since its first command."""
 
     motion: Motion
@@ -94,15 +94,17 @@ class PacedMotion:
         return Motion(polynomial=PiecewisePolynomial(breaks, pieces), goal=self.q[-1], law="samples")
 
 
-def as_planned(motion: Motion) -> PacedMotion:
+def as_planned(motion: Motion) -> SpeedScaledMotion:
     """Returns a motion at the pace it was planned with."""
     count = len(motion)
-    still = sealed(np.zeros(count))
-    place = sealed(np.minimum(motion.times, motion.duration))
-    return PacedMotion(motion=motion, q=motion.q, place=place, rate=sealed(np.ones(count)), drate=still, ddrate=still)
+    still = make_readonly(np.zeros(count))
+    place = make_readonly(np.minimum(motion.times, motion.duration))
+    return SpeedScaledMotion(
+        motion=motion, q=motion.q, place=place, rate=make_readonly(np.ones(count)), drate=still, ddrate=still
+    )
 
 
-def begun_at(motion: Motion, pace: float) -> PacedMotion:
+def begun_at(motion: Motion, pace: float) -> SpeedScaledMotion:
     """Returns a motion that runs at a pace from its first row on; as planned at 1.
 
     Args:
@@ -114,12 +116,12 @@ def begun_at(motion: Motion, pace: float) -> PacedMotion:
     count = int(np.ceil(motion.duration / (pace * CYCLE_TIME) - _ROUNDING)) + 1
     place = np.minimum(pace * CYCLE_TIME * np.arange(count), motion.duration)
     place[-1] = motion.duration
-    still = sealed(np.zeros(count))
-    return PacedMotion(
+    still = make_readonly(np.zeros(count))
+    return SpeedScaledMotion(
         motion=motion,
-        q=sealed(np.concatenate((motion.q[:1], _rows(motion, place[1:])))),
-        place=sealed(place),
-        rate=sealed(np.full(count, pace)),
+        q=make_readonly(np.concatenate((motion.q[:1], _rows(motion, place[1:])))),
+        place=make_readonly(place),
+        rate=make_readonly(np.full(count, pace)),
         drate=still,
         ddrate=still,
         pace=pace,
@@ -141,7 +143,7 @@ def require_pace(pace: object) -> float:
     return number
 
 
-def changed_pace(paced: PacedMotion, cycle: int, pace: float, limits: JointLimits) -> Iterator[PacedMotion]:
+def changed_pace(paced: SpeedScaledMotion, cycle: int, pace: float, limits: JointLimits) -> Iterator[SpeedScaledMotion]:
     """Yields motions that go on with another pace from a cycle on, those that have it soonest first.
 
     Each keeps the joints' limits; what else is to be judged is up to the caller, who takes the first that will do.
@@ -163,12 +165,12 @@ def changed_pace(paced: PacedMotion, cycle: int, pace: float, limits: JointLimit
             yield _joined(paced, first, law, pace)
 
 
-def _continued(paced: PacedMotion, count: int) -> PacedMotion:
+def _continued(paced: SpeedScaledMotion, count: int) -> SpeedScaledMotion:
     """Returns a held motion with as many rows as that: it waits in its last row."""
     more = count - len(paced.q)
     if not paced.holds or more <= 0:
         return paced
-    return PacedMotion(
+    return SpeedScaledMotion(
         motion=paced.motion,
         q=np.concatenate((paced.q, np.repeat(paced.q[-1:], more, axis=0))),
         place=np.concatenate((paced.place, np.repeat(paced.place[-1:], more))),
@@ -180,7 +182,7 @@ def _continued(paced: PacedMotion, count: int) -> PacedMotion:
     )
 
 
-def _ramp(paced: PacedMotion, first: int, pace: float, ramp: float) -> Array | None:
+def _ramp(paced: SpeedScaledMotion, first: int, pace: float, ramp: float) -> Array | None:
     """Returns place, rate, rate' and rate'' until the change is over, shape (4, K); None: there is no such ramp."""
     count = round(ramp / CYCLE_TIME)
     rate, drate, ddrate = float(paced.rate[first]), float(paced.drate[first]), float(paced.ddrate[first])
@@ -198,7 +200,7 @@ def _ramp(paced: PacedMotion, first: int, pace: float, ramp: float) -> Array | N
     return law
 
 
-def _keeps_limits(paced: PacedMotion, first: int, law: Array, limits: JointLimits) -> bool:
+def _keeps_limits(paced: SpeedScaledMotion, first: int, law: Array, limits: JointLimits) -> bool:
     q = np.concatenate((paced.q[max(first + 1 - _PAST, 0) : first + 1], _rows(paced.motion, law[0])))
     if first + 1 < _PAST:  # The arm stood there before.
         q = np.concatenate((np.repeat(q[:1], _PAST, axis=0), q))
@@ -211,7 +213,7 @@ def _keeps_limits(paced: PacedMotion, first: int, law: Array, limits: JointLimit
     return True
 
 
-def _joined(paced: PacedMotion, first: int, law: Array, pace: float) -> PacedMotion:
+def _joined(paced: SpeedScaledMotion, first: int, law: Array, pace: float) -> SpeedScaledMotion:
     """Returns all rows: those so far, the change, and the rest of the way at the new pace."""
     end = paced.motion.duration
     if pace > 0.0 and law[0, -1] < end:
@@ -224,11 +226,11 @@ def _joined(paced: PacedMotion, first: int, law: Array, pace: float) -> PacedMot
         law[0, -1] = end
     keep = first + 1
     place, rate, drate, ddrate = (
-        sealed(np.concatenate((before[:keep], after)))
+        make_readonly(np.concatenate((before[:keep], after)))
         for before, after in zip((paced.place, paced.rate, paced.drate, paced.ddrate), law, strict=True)
     )
-    q = sealed(np.concatenate((paced.q[:keep], _rows(paced.motion, law[0]))))
-    return PacedMotion(
+    q = make_readonly(np.concatenate((paced.q[:keep], _rows(paced.motion, law[0]))))
+    return SpeedScaledMotion(
         motion=paced.motion, q=q, place=place, rate=rate, drate=drate, ddrate=ddrate, pace=pace, changed=keep
     )
 

@@ -28,7 +28,7 @@ _CHORDS = 8
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class TimeLaw:
+class TimeParametrization:
     """The way at every cycle, with its derivatives, each of shape (N,)."""
 
     s: Array
@@ -150,7 +150,7 @@ def duration_of(knots: Array, squares: Array) -> float:
     return float(_knot_times(knots, squares)[-1])
 
 
-def smooth_law(knots: Array, squares: Array, cycles: int) -> TimeLaw:
+def smooth_law(knots: Array, squares: Array, cycles: int) -> TimeParametrization:
     """Returns the law on the grid of cycles whose acceleration is the mean of the given one's over some cycles.
 
     It begins and ends at rest and without acceleration, takes `cycles` longer and less than a cycle more, and its jerk
@@ -172,7 +172,7 @@ def smooth_law(knots: Array, squares: Array, cycles: int) -> TimeLaw:
     way = ds[:-1] * h + (2.0 * dds[:-1] + dds[1:]) * (h * h / 6.0)
     s = np.concatenate(([0.0], np.cumsum(way)))
     part = knots[-1] / s[-1]
-    return TimeLaw(np.minimum(s * part, knots[-1]), ds * part, dds * part)
+    return TimeParametrization(np.minimum(s * part, knots[-1]), ds * part, dds * part)
 
 
 def _chords(offset: Array, slope: Array, top: Array) -> list[list[float]]:

@@ -44,7 +44,7 @@ _SAME = 1e-9  # [m/s, rad/s] Twists closer than this are the same; as a number, 
 _SLOWEST = 1e-12  # [rad/s] Below this a joint stands.
 
 
-class TwistFollower:
+class TwistController:
     """Turns one twist after another into joint velocities. Owned by the thread that runs the cycle.
 
     Attributes:

@@ -35,12 +35,12 @@ class _Answer(ipywidgets.IntText):
 
 
 @cache
-def kernel_heart() -> Heart:
+def kernel_heart() -> BrowserHeartbeat:
     """Returns the kernel's own."""
-    return Heart()
+    return BrowserHeartbeat()
 
 
-class Heart:
+class BrowserHeartbeat:
     """Asks the page for signs of life while somebody wants to know. Where no page ever answered, none is missed."""
 
     def __init__(self) -> None:

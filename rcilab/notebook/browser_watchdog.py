@@ -22,7 +22,7 @@ _INTERRUPTED = "the kernel was interrupted"
 _LOOK = 0.1  # [s] Between two looks for a motion.
 
 
-class PageWatch:
+class BrowserWatchdog:
     """Looks after every session of the kernel. One thread; it sends nothing while nothing moves.
 
     It imports nothing either: two threads that load the same libraries can find them half loaded.

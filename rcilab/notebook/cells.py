@@ -21,7 +21,7 @@ from importlib.util import find_spec
 from typing import Any, Protocol
 
 
-class Owned(Protocol):
+class CellResource(Protocol):
     """What a cell may own."""
 
     def close(self) -> None:
@@ -33,7 +33,7 @@ class Owned(Protocol):
         ...
 
 
-class Cells:
+class CellRegistry:
     """Who was made by which cell. There is one for the kernel; tests make their own.
 
     Args:
@@ -42,8 +42,8 @@ class Cells:
 
     def __init__(self, shell: Any) -> None:
         self._shell = shell
-        self._owned: dict[str, list[weakref.ref[Owned]]] = {}
-        self._keep: dict[int, Owned] = {}  # An output may be the only one to hold a part.
+        self._owned: dict[str, list[weakref.ref[CellResource]]] = {}
+        self._keep: dict[int, CellResource] = {}  # An output may be the only one to hold a part.
         self._running = threading.Event()
         if shell is not None:
             shell.events.register("pre_run_cell", self.begin)
@@ -64,18 +64,18 @@ class Cells:
             return True
         return self.is_running and threading.current_thread() is threading.main_thread()
 
-    def adopt(self, thing: Owned) -> None:
+    def adopt(self, thing: CellResource) -> None:
         """Ties something to the cell that is running now; what a press makes between two cells ends with its maker."""
         cell = self._current()
         if cell is not None:
             self._owned.setdefault(cell, []).append(weakref.ref(thing))
         self.keep(thing)
 
-    def keep(self, thing: Owned) -> None:
+    def keep(self, thing: CellResource) -> None:
         """Has something end with the kernel only."""
         self._keep[id(thing)] = thing
 
-    def forget(self, thing: Owned) -> None:
+    def forget(self, thing: CellResource) -> None:
         """Lets go of what has been closed."""
         self._keep.pop(id(thing), None)
 
@@ -122,7 +122,7 @@ class Cells:
         return _name(parent.get("metadata", {}).get("cellId"), content["code"])
 
 
-def kernel_cells() -> Cells:
+def kernel_cells() -> CellRegistry:
     """Returns the kernel's own."""
     global _kernel_cells
     if _kernel_cells is None:
@@ -131,16 +131,16 @@ def kernel_cells() -> Cells:
             from IPython.core.getipython import get_ipython
 
             shell = get_ipython()
-        _kernel_cells = Cells(shell)
+        _kernel_cells = CellRegistry(shell)
         atexit.register(_kernel_cells.close)
         if getattr(shell, "kernel", None) is not None and find_spec("ipywidgets") is not None:
-            from rcilab.notebook.browser_watchdog import PageWatch
+            from rcilab.notebook.browser_watchdog import BrowserWatchdog
 
-            _kernel_cells.keep(PageWatch())
+            _kernel_cells.keep(BrowserWatchdog())
     return _kernel_cells
 
 
-_kernel_cells: Cells | None = None
+_kernel_cells: CellRegistry | None = None
 
 
 def _name(cell_id: str | None, code: str | None) -> str:

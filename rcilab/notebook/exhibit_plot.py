@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from rcilab.app.fault_lab.demo_view import seen_lower
-from rcilab.app.fault_lab.fault_demo import Exhibit
+from rcilab.app.fault_lab.fault_demo import FaultDemo
 from rcilab.notebook.style import esc
 from rcilab.notebook.svg_plot import BAD, LINE, SOFT, number, ticks
 
@@ -19,7 +19,7 @@ _NAME = 60.0  # What the name of the time axis takes at its end.
 _CURVE = "#0072B2"
 
 
-def draw_exhibit(exhibit: Exhibit, title: str, time: str, factor: float = 1.0) -> str:
+def draw_exhibit(exhibit: FaultDemo, title: str, time: str, factor: float = 1.0) -> str:
     """Returns the picture.
 
     Args:

@@ -9,7 +9,7 @@ import ipywidgets
 
 from rcilab.app.fault_lab.demo_motion import exhibition_of
 from rcilab.app.fault_lab.demo_view import body_html, head_html
-from rcilab.app.fault_lab.fault_demo import Exhibit
+from rcilab.app.fault_lab.fault_demo import FaultDemo
 from rcilab.app.fault_lab.private_arm import PrivateArm
 from rcilab.app.fault_lab.table import FAULTS
 from rcilab.control_process.status_messages import tell_error
@@ -18,7 +18,7 @@ from rcilab.core.faults import Fault, name_faults
 from rcilab.i18n.translator import Text, message
 from rcilab.notebook.exhibit_plot import draw_exhibit
 from rcilab.notebook.flight_recorder import record_html
-from rcilab.notebook.long_task import LongWork
+from rcilab.notebook.long_task import LongTask
 from rcilab.notebook.part import Part
 from rcilab.notebook.style import block, esc, problem, soft, verdict, write
 from rcilab.notebook.widget_sharing import lean
@@ -39,13 +39,13 @@ class FaultPanel(Part):
     def __init__(self, subject: object, *, language: str | None = None) -> None:
         super().__init__(subject, language)
         text = self.text
-        self.exhibit: Exhibit | None = None
+        self.exhibit: FaultDemo | None = None
         """The fault on show; None as long as none was provoked."""
         self._failed = ""  # Why it could not be provoked.
         self._now, self._told, self._record = block(), block(), block()
         self._set: tuple[Fault, ...] | None = None
         self._arm = PrivateArm()
-        self._work: LongWork[Fault, Exhibit] = LongWork(text, "rcilab-gallery", self._take, self._tell)
+        self._work: LongTask[Fault, FaultDemo] = LongTask(text, "rcilab-gallery", self._take, self._tell)
         self.fault: Any = lean(
             ipywidgets.Dropdown, description=text("fault.which"), layout={"width": "98%", "max_width": "46em"},
             options=[(f"{text(f'learn.fault.{fault.name}')} · {fault.manual_name}", fault) for fault in Fault],
@@ -87,7 +87,7 @@ class FaultPanel(Part):
         self.fault.value = faults[0]
 
     @property
-    def _shown(self) -> Exhibit | None:
+    def _shown(self) -> FaultDemo | None:
         """The exhibit, if its fault is the one that is chosen."""
         exhibit = self.exhibit
         return exhibit if exhibit is not None and exhibit.fault is self.fault.value else None
@@ -125,7 +125,7 @@ class FaultPanel(Part):
         self._work.start(fault, partial(self._arm.provoke, fault, self.model.name))
         self._tell()
 
-    def _take(self, fault: Fault, found: Exhibit | RcilabError) -> None:
+    def _take(self, fault: Fault, found: FaultDemo | RcilabError) -> None:
         if isinstance(found, RcilabError):
             self._failed = problem(self.text.say(message("learn.failed", error=tell_error(found))))
             return
@@ -157,7 +157,7 @@ def _card_html(fault: Fault, text: Text) -> str:
     )
 
 
-def _exhibit_html(exhibit: Exhibit, text: Text) -> str:
+def _exhibit_html(exhibit: FaultDemo, text: Text) -> str:
     factor = text.units.from_si(exhibit.condition.unit)[0]
     picture = draw_exhibit(exhibit, text(f"condition.{exhibit.condition.id}"), text("plot.time"), factor)
     script = f"<details><summary>{esc(text('learn.script'))}</summary><pre>{esc(exhibit.script)}</pre></details>"

@@ -9,7 +9,7 @@ import ipywidgets
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.core.arrays import JointVector, frozen
+from rcilab.core.arrays import JointVector, readonly_copy
 from rcilab.i18n.rounding import fixed
 from rcilab.notebook.number_field import NumberField
 from rcilab.notebook.part import Part
@@ -125,7 +125,7 @@ class JogPanel(Part):
     def _pose_inside(self, q: JointVector) -> None:
         """Poses the arm as near as its limits allow: a session may have set soft ones since."""
         limits = self.model.limits.joint
-        self.state.pose(frozen(np.clip(q, limits.lower, limits.upper)))
+        self.state.pose(readonly_copy(np.clip(q, limits.lower, limits.upper)))
 
     def _on_button(self, name: str) -> None:
         if name == "undo":

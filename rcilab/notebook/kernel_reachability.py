@@ -38,7 +38,7 @@ _CODE_SAME = "WSL_DISTRO_NAME"  # Windows shares its loopback with that server.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Place:
+class KernelReachability:
     """How a page that the kernel serves on loopback reaches the browser."""
 
     way: Way
@@ -77,7 +77,7 @@ def find_place(
     server: Server | None = None,
     has_proxy: bool | None = None,
     cell: str | None = None,
-) -> Place:
+) -> KernelReachability:
     """Returns how the browser of this notebook reaches the kernel, by the rule above.
 
     Args:
@@ -88,7 +88,7 @@ def find_place(
     """
     known = os.environ if environment is None else environment
     if "COLAB_RELEASE_TAG" in known:
-        return Place(way="static", proxy_helps=False)
+        return KernelReachability(way="static", proxy_helps=False)
     found = _find_server(known) if server is None else server
     hub = known.get("JUPYTERHUB_SERVICE_PREFIX")
     base = hub or (found.base if found is not None else "/")
@@ -98,8 +98,8 @@ def find_place(
         return _find_code_place(known, is_proxied)
     if is_proxied:
         installed = find_spec("jupyter_server_proxy") is not None if has_proxy is None else has_proxy
-        return Place(way="proxy" if installed else "static", base=base)
-    return Place(way="loopback")
+        return KernelReachability(way="proxy" if installed else "static", base=base)
+    return KernelReachability(way="loopback")
 
 
 def _is_code(known: Mapping[str, str], server: Server | None, cell: str | None) -> bool:
@@ -109,13 +109,13 @@ def _is_code(known: Mapping[str, str], server: Server | None, cell: str | None) 
     return server is None and any(name.startswith("VSCODE_") for name in known)
 
 
-def _find_code_place(known: Mapping[str, str], is_proxied: bool) -> Place:
+def _find_code_place(known: Mapping[str, str], is_proxied: bool) -> KernelReachability:
     ports = known.get(_CODE_PORTS, "")
     if _CODE_SERVER in known and _PORT in ports:
-        return Place(way="proxy", ports=ports)
+        return KernelReachability(way="proxy", ports=ports)
     is_remote = _CODE_REMOTE in known and _CODE_SAME not in known
     is_elsewhere = is_proxied or is_remote or any(name in known for name in _CODE_ELSEWHERE)
-    return Place(way="static", proxy_helps=False) if is_elsewhere else Place(way="loopback")
+    return KernelReachability(way="static", proxy_helps=False) if is_elsewhere else KernelReachability(way="loopback")
 
 
 def _find_cell() -> str | None:

@@ -10,7 +10,7 @@ import ipywidgets
 
 from rcilab.core.errors import UsageError
 from rcilab.notebook.jog_panel import JogPanel
-from rcilab.notebook.kernel_reachability import Place
+from rcilab.notebook.kernel_reachability import KernelReachability
 from rcilab.notebook.motion_plot import MotionPlot
 from rcilab.notebook.part import Part
 from rcilab.notebook.robot_words import name_phase
@@ -58,7 +58,7 @@ class Lab(Part):
         view: View = "auto",
         height: int = 440,
         language: str | None = None,
-        place: Place | None = None,
+        place: KernelReachability | None = None,
     ) -> None:
         super().__init__(subject, language)
         text = self.text

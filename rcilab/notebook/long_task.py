@@ -8,7 +8,7 @@ from typing import Any, Generic
 
 import ipywidgets
 
-from rcilab.core.background_job import About, Background, Result, Tell
+from rcilab.core.background_job import BackgroundJob, Context, ProgressCallback, Result
 from rcilab.core.errors import RcilabError
 from rcilab.i18n.translator import Text
 from rcilab.notebook.cells import kernel_cells
@@ -18,7 +18,7 @@ from rcilab.notebook.widget_sharing import lean
 _LOOK = 0.1  # [s] Between two looks at what is being done.
 
 
-class LongWork(Generic[About, Result]):
+class LongTask(Generic[Context, Result]):
     """One job of a part at a time; a bar and a button that are there while it is done.
 
     Args:
@@ -33,13 +33,13 @@ class LongWork(Generic[About, Result]):
         self,
         text: Text,
         name: str,
-        take: Callable[[About, Result | RcilabError], None],
+        take: Callable[[Context, Result | RcilabError], None],
         rest: Callable[[], None],
         *,
         shown_after: float = 0.0,
     ) -> None:
         self._name, self._take, self._rest, self._shown_after = name, take, rest, shown_after
-        self._work: Background[About, Result] = Background(name)
+        self._work: BackgroundJob[Context, Result] = BackgroundJob(name)
         self._ending = threading.Event()
         self._watcher: threading.Thread | None = None
         self.progress: Any = lean(
@@ -60,7 +60,7 @@ class LongWork(Generic[About, Result]):
         """Whether something is being done."""
         return self._work.progress is not None
 
-    def start(self, about: About, run: Callable[[Tell], Result]) -> None:
+    def start(self, about: Context, run: Callable[[ProgressCallback], Result]) -> None:
         """Begins; what was being done is dropped.
 
         Args:

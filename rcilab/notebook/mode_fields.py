@@ -19,13 +19,13 @@ from rcilab.control_process import SupervisorStatus
 from rcilab.core.state import MODES
 from rcilab.i18n.translator import Text
 from rcilab.makers.rokae.driver.controller_parameters import (
+    ControllerParameters,
     ControlPart,
-    ControlSettings,
     control_ranges,
     standard_control,
 )
 from rcilab.notebook.number_field import NumberField
-from rcilab.notebook.parameter_sync import ParameterDesk
+from rcilab.notebook.parameter_sync import ParameterSync
 from rcilab.notebook.state import LabState
 from rcilab.notebook.style import block, esc, head, problem, soft, table, verdict, write
 from rcilab.notebook.widget_sharing import lean
@@ -43,7 +43,7 @@ class ModeFields:
         desk: Tells the robot.
     """
 
-    def __init__(self, state: LabState, text: Text, desk: ParameterDesk) -> None:
+    def __init__(self, state: LabState, text: Text, desk: ParameterSync) -> None:
         self._state, self._text, self._desk = state, text, desk
         self._ranges = control_ranges(state.model.limits)
         self.mode: Any = lean(
@@ -57,7 +57,7 @@ class ModeFields:
         self.folders: dict[ControlPart, Any] = {part: self._folder(part) for part in self._ranges}
         self.send = self._button("control.send", self._on_send)
         self.reset = self._button("control.reset", desk.reset)
-        self._shown: ControlSettings | None = None
+        self._shown: ControllerParameters | None = None
         self.choice = lean(ipywidgets.VBox, [self.mode, self._note])
         self.parameters = lean(ipywidgets.VBox, [
             block(head(text("control.title"))),
@@ -94,7 +94,7 @@ class ModeFields:
         if state.refusal is not None:
             return problem(text("ready.control_refused", error=text.say(state.refusal)))
         known = state.session is None and state.robot is not None and state.robot.is_virtual
-        own = standard_control(state.model.limits) if known else ControlSettings()
+        own = standard_control(state.model.limits) if known else ControllerParameters()
         rows = held_rows(state.mode, status.setup.control, own, text)
         told = soft(text("control.held")) + table([], [list(row) for row in rows])
         return told + (f'<p class="rl-soft"><b>{esc(text("control.pending"))}</b></p>' if pending else "")

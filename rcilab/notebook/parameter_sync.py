@@ -10,11 +10,11 @@ from rcilab.control_process.status_messages import tell_error
 from rcilab.core.errors import RcilabError, UsageError
 from rcilab.i18n.translator import Message
 from rcilab.makers.rokae.driver.controller_parameters import ControlPart, standard_control
-from rcilab.notebook.robot_side import RobotSide
+from rcilab.notebook.robot_side import RobotBackend
 from rcilab.notebook.state import LabState
 
 
-class ParameterDesk:
+class ParameterSync:
     """Our own controller is told at once, a foreign one when asked for twice. Used by kernel and watching thread.
 
     Args:
@@ -43,7 +43,7 @@ class ParameterDesk:
             state.control, state.refusal = standard_control(state.model.limits), None
             state.tell("robot")
 
-    def press_send(self, robot: RobotSide) -> Message | None:
+    def press_send(self, robot: RobotBackend) -> Message | None:
         """Tells a controller that is not ours, at the second press; returns the question at the first."""
         now = time.monotonic()
         if now - self._asked_to_send > SECOND_THOUGHT:
@@ -54,7 +54,7 @@ class ParameterDesk:
         self._send(robot)
         return None
 
-    def tick(self, robot: RobotSide) -> None:
+    def tick(self, robot: RobotBackend) -> None:
         """Tells our own controller what is new."""
         status = robot.status()
         if robot.is_virtual and self._state.refusal is None and status.phase == "idle":
@@ -70,7 +70,7 @@ class ParameterDesk:
         """Expects no answer any more: another robot comes."""
         self._is_under_way, self._state.refusal = False, None
 
-    def _send(self, robot: RobotSide) -> None:
+    def _send(self, robot: RobotBackend) -> None:
         control = self._state.control
         if self._is_under_way or control is None or not is_control_pending(control, robot.status().setup.control):
             return

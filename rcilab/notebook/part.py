@@ -8,7 +8,7 @@ from typing import Any
 
 import ipywidgets
 
-from rcilab.core.closeable import Closing
+from rcilab.core.closeable import Closeable
 from rcilab.i18n.localized_text import chosen_language
 from rcilab.i18n.translator import Text
 from rcilab.model.robot_model import RobotModel
@@ -20,7 +20,7 @@ from rcilab.notebook.widget_sharing import lean
 _PACKAGE = "rcilab.notebook"
 
 
-class Part(Closing):
+class Part(Closeable):
     """A part: shows itself as the last line of a cell, combines with others, ends when its cell runs again.
 
     Args:

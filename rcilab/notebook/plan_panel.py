@@ -10,11 +10,11 @@ import ipywidgets
 
 from rcilab.app.planning import LAWS, Plan, picture
 from rcilab.conformance.time_scaling import SlowDown
-from rcilab.core.background_job import Tell
+from rcilab.core.background_job import ProgressCallback
 from rcilab.core.errors import RcilabError
 from rcilab.i18n.error_messages import tell
 from rcilab.i18n.translator import Message, message
-from rcilab.notebook.long_task import LongWork
+from rcilab.notebook.long_task import LongTask
 from rcilab.notebook.number_field import NumberField
 from rcilab.notebook.part import Part
 from rcilab.notebook.slider_echo import SliderEcho
@@ -66,7 +66,7 @@ class PlanPanel(Part):
             layout=ipywidgets.Layout(width="auto", display="none"),
         )  # fmt: skip
         self._said = block()
-        self._work: LongWork[Plan | None, Plan | Message | SlowDown] = LongWork(
+        self._work: LongTask[Plan | None, Plan | Message | SlowDown] = LongTask(
             text, "rcilab-plan", self._take, self._show, shown_after=_UNSEEN
         )
         self.progress, self.cancel = self._work.progress, self._work.cancel
@@ -129,7 +129,7 @@ class PlanPanel(Part):
             report = plan.report  # What passes is slowed down for what is recommended, as on the page.
             self._begin(plan, lambda progress: report.slow_down(recommended=report.ok, progress=progress))
 
-    def _begin(self, about: Plan | None, run: Callable[[Tell], Plan | Message | SlowDown]) -> None:
+    def _begin(self, about: Plan | None, run: Callable[[ProgressCallback], Plan | Message | SlowDown]) -> None:
         self.plan.disabled = self.slow_down.disabled = True
         self._work.start(about, run)
         self._work.wait_if_code()

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from rcilab.core.arrays import Array, as_vector
 from rcilab.core.atomic_file import replacing
-from rcilab.core.closeable import Closing
+from rcilab.core.closeable import Closeable
 from rcilab.core.errors import InvalidValueError, UsageError
 from rcilab.i18n.localized_text import chosen_language
 from rcilab.i18n.translator import Text
@@ -34,7 +34,7 @@ _MIDDLE = (0.2, 0.0, 0.5)  # [m] What the camera turns about.
 _CAMERA_POSITION = (0.7, -1.0, 0.35)  # [m] seen from there
 
 
-class Preview(Closing):
+class Preview(Closeable):
     """An arm in a meshcat viewer; shows itself in a notebook. Nothing in it can move a robot.
 
     Live, it is served on loopback by the kernel, and `show` moves it while you look. Static, it is part of the

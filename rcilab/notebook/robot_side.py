@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from numpy.typing import NDArray
 
-from rcilab.control_process import Supervisor, SupervisorStatus, Ticket
+from rcilab.control_process import PendingRequest, Supervisor, SupervisorStatus
 from rcilab.control_process.supervisor import VIRTUAL
 from rcilab.core.errors import RcilabError, UsageError
-from rcilab.makers.rokae.driver.configuration import RobotSetup
-from rcilab.makers.rokae.driver.controller_parameters import ControlSettings
+from rcilab.makers.rokae.driver.configuration import RobotConfiguration
+from rcilab.makers.rokae.driver.controller_parameters import ControllerParameters
 from rcilab.recording.live import LiveRecording, RunFacts
 from rcilab.recording.run import Run
 from rcilab.recording.setup import Setup
@@ -58,7 +58,7 @@ class BusyError(UsageError):
         self.under_way = under_way
 
 
-class RobotSide(Protocol):
+class RobotBackend(Protocol):
     """What a notebook asks of a robot. No method waits for it."""
 
     name: str
@@ -86,7 +86,7 @@ class RobotSide(Protocol):
         """
         ...
 
-    def set_control(self, control: ControlSettings) -> None:
+    def set_control(self, control: ControllerParameters) -> None:
         """Tells the controller parameters of the modes; what is acknowledged stands in the status.
 
         Raises:
@@ -154,7 +154,7 @@ class SupervisedRobot:
         self.is_virtual = target == VIRTUAL
         self._model, self._plant = model, plant
         self._supervisor = Supervisor(model, target, plant)
-        self._tickets: list[tuple[str, Ticket]] = []
+        self._tickets: list[tuple[str, PendingRequest]] = []
         self._done: list[Outcome] = []
         self._live: LiveRecording | None = None
         self._reader: Any = None
@@ -194,9 +194,9 @@ class SupervisedRobot:
         self._live = LiveRecording(RunFacts(plan=plan.motion, model=self._model, setup=setup))
         self._tickets.append(("execute", self._supervisor.execute(plan.motion, certificate, plan.mode, pace=pace)))
 
-    def set_control(self, control: ControlSettings) -> None:
+    def set_control(self, control: ControllerParameters) -> None:
         """Tells the controller parameters of the modes."""
-        self._tickets.append(("control", self._supervisor.set_up(RobotSetup(control=control))))
+        self._tickets.append(("control", self._supervisor.set_up(RobotConfiguration(control=control))))
 
     def set_output(self, signal: int, level: bool) -> None:
         """Sets a digital output."""

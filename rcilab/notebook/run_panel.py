@@ -14,15 +14,15 @@ from rcilab.control_process.supervisor import VIRTUAL
 from rcilab.core.errors import PlanningError, RcilabError
 from rcilab.notebook.browser_heartbeat import kernel_heart
 from rcilab.notebook.mode_fields import ModeFields
-from rcilab.notebook.parameter_sync import ParameterDesk
+from rcilab.notebook.parameter_sync import ParameterSync
 from rcilab.notebook.part import Part
 from rcilab.notebook.ready import obstacle
-from rcilab.notebook.robot_side import Outcome, RobotSide, SupervisedRobot
+from rcilab.notebook.robot_side import Outcome, RobotBackend, SupervisedRobot
 from rcilab.notebook.robot_words import health_html, name_phase, outcome_html, tell_refusal, tell_trouble
 from rcilab.notebook.session_robot import SessionRobot
 from rcilab.notebook.signal_fields import SignalFields
-from rcilab.notebook.speed_fields import PaceFields
-from rcilab.notebook.speed_override import PaceDesk
+from rcilab.notebook.speed_fields import SpeedFields
+from rcilab.notebook.speed_override import SpeedOverride
 from rcilab.notebook.style import PHASE_TONES, block, problem, soft, verdict, write
 from rcilab.notebook.subshell_routing import hear_at_once
 from rcilab.notebook.widget_sharing import lean
@@ -78,9 +78,9 @@ class RunPanel(Part):
         self._health, self._outcome = block(), block()
         self._was_cells = False
         self._running = 0.0  # [s] Planned duration of the motion under way.
-        self._pacing = PaceDesk(self.state)
-        self.pace = PaceFields(self.state, text, self._pacing)
-        self._desk = ParameterDesk(self.state)
+        self._pacing = SpeedOverride(self.state)
+        self.pace = SpeedFields(self.state, text, self._pacing)
+        self._desk = ParameterSync(self.state)
         self.modes = ModeFields(self.state, text, self._desk)
         self.signals = SignalFields(text, lambda: self._robot, self._button)
         self._answers = lean(ipywidgets.HBox, [self.yes, self.no], layout=ipywidgets.Layout(display="none"))
@@ -119,7 +119,7 @@ class RunPanel(Part):
         self._release()
 
     @property
-    def _robot(self) -> RobotSide:
+    def _robot(self) -> RobotBackend:
         robot = self.state.robot
         assert robot is not None  # The buttons that ask it are disabled without one.
         return robot
@@ -139,7 +139,7 @@ class RunPanel(Part):
         self._release()
         self.state.tell("robot")
 
-    def _take(self, robot: RobotSide) -> None:
+    def _take(self, robot: RobotBackend) -> None:
         self._desk.forget()
         self._pacing.forget()
         self.state.robot = robot
@@ -159,7 +159,7 @@ class RunPanel(Part):
                 self.state.leave_arm(last)
             robot.close()
 
-    def _watch(self, robot: RobotSide) -> None:
+    def _watch(self, robot: RobotBackend) -> None:
         """The watching thread: shows the robot, says that somebody is here, stops when nobody is any more."""
         while not self._ending.wait(_LOOK):
             self._heart.beat()
@@ -263,7 +263,7 @@ class RunPanel(Part):
         self.signals.show(status)
         write(self._health, "" if status is None else health_html(status, text))
 
-    def _name_robot(self, robot: RobotSide) -> str:
+    def _name_robot(self, robot: RobotBackend) -> str:
         return self.text("run.virtual") if robot.name == VIRTUAL else robot.name
 
     def _show_progress(self, status: SupervisorStatus | None, is_moving: bool) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from rcilab.app.planning import Plan
 from rcilab.core.arrays import JointVector
 from rcilab.core.errors import InvalidValueError
-from rcilab.notebook.kernel_reachability import Place, find_place
+from rcilab.notebook.kernel_reachability import KernelReachability, find_place
 from rcilab.notebook.optional_deps import require_installed
 from rcilab.notebook.part import Part
 from rcilab.notebook.preview import Preview, aim_camera
@@ -55,7 +55,7 @@ class Scene(Part):
         view: View = "auto",
         height: int = 420,
         language: str | None = None,
-        place: Place | None = None,
+        place: KernelReachability | None = None,
     ) -> None:
         if view not in VIEWS:
             raise InvalidValueError("view", view, f"is unknown; known: {', '.join(VIEWS)}")

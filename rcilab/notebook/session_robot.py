@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any
 from rcilab.control_process import SupervisorStatus
 from rcilab.core.errors import ConnectionLostError, RcilabError, UsageError
 from rcilab.makers.rokae.driver.commands import SIGNALS
-from rcilab.makers.rokae.driver.configuration import RobotSetup
-from rcilab.makers.rokae.driver.controller_parameters import ControlSettings, give_control
+from rcilab.makers.rokae.driver.configuration import RobotConfiguration
+from rcilab.makers.rokae.driver.controller_parameters import ControllerParameters, give_control
 from rcilab.notebook.browser_watchdog import LEFT_ALONE
 from rcilab.notebook.robot_side import BusyError, Outcome
 
 if TYPE_CHECKING:
     from rcilab.app.planning import Plan
-    from rcilab.execution.motion_progress import UnderWay
+    from rcilab.execution.motion_progress import MotionProgress
     from rcilab.execution.session import RobotSession
     from rcilab.recording.run import Run
 
@@ -41,12 +41,12 @@ class SessionRobot:
         self._worker: threading.Thread | None = None
         self._what = ""
         self._done: list[Outcome] = []
-        self._way: UnderWay | None = None  # Of the running or last motion.
+        self._way: MotionProgress | None = None  # Of the running or last motion.
         self._run: Run | None = None  # What came of the last one that was started here.
         self._is_cells = False
         self._deafen = session.hear_runs(self._hear_run)
         self._powered: bool | None = None
-        self._held = RobotSetup()  # What it was told from here.
+        self._held = RobotConfiguration()  # What it was told from here.
         self._inputs: tuple[bool, ...] | None = None
         self._outputs: tuple[bool | None, ...] = (None,) * len(SIGNALS)  # What was set from here.
         self._power_seen = float("-inf")
@@ -126,12 +126,12 @@ class SessionRobot:
         go, self._way = self._session.execute, None
         self._do("execute", lambda: go(plan.motion, certificate, mode=plan.mode, pace=pace))
 
-    def set_control(self, control: ControlSettings) -> None:
+    def set_control(self, control: ControllerParameters) -> None:
         """Tells the controller parameters of the modes."""
 
         def tell() -> None:
             give_control(self._session, control)
-            self._held = self._held.updated(RobotSetup(control=control))
+            self._held = self._held.updated(RobotConfiguration(control=control))
 
         self._do("control", tell)
 
@@ -222,7 +222,7 @@ class SessionRobot:
             self._power_seen = time.monotonic()
 
 
-def _tell_way(way: UnderWay | None) -> dict[str, Any]:
+def _tell_way(way: MotionProgress | None) -> dict[str, Any]:
     if way is None:
         return {}
     names = {"motion_time": way.time, "motion_duration": way.duration, "motion_place": way.place}

@@ -10,7 +10,7 @@ import ipywidgets
 from rcilab.control_process import SupervisorStatus
 from rcilab.i18n.translator import Text
 from rcilab.makers.rokae.driver.commands import SIGNALS
-from rcilab.notebook.robot_side import RobotSide
+from rcilab.notebook.robot_side import RobotBackend
 from rcilab.notebook.style import block, esc, head, soft, verdict, write
 from rcilab.notebook.widget_sharing import lean
 
@@ -26,7 +26,7 @@ class SignalFields:
         button: Makes a button of the panel.
     """
 
-    def __init__(self, text: Text, robot: Callable[[], RobotSide], button: Callable[..., Any]) -> None:
+    def __init__(self, text: Text, robot: Callable[[], RobotBackend], button: Callable[..., Any]) -> None:
         self._text = text
         self.output: Any = lean(
             ipywidgets.Dropdown, description=text("signals.output"),

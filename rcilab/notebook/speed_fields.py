@@ -11,7 +11,7 @@ from rcilab.control_process.requested_speed import is_running
 from rcilab.i18n.translator import Text
 from rcilab.motion.speed_scaling import SLOWEST_PACE
 from rcilab.notebook.number_field import NumberField
-from rcilab.notebook.speed_override import PaceDesk
+from rcilab.notebook.speed_override import SpeedOverride
 from rcilab.notebook.state import LabState
 from rcilab.notebook.style import block, problem, soft, write
 from rcilab.notebook.subshell_routing import hear_at_once
@@ -20,7 +20,7 @@ from rcilab.notebook.widget_sharing import lean
 _STEP = 5.0  # [%]
 
 
-class PaceFields:
+class SpeedFields:
     """Part of `RunPanel`: `buttons` stand beside Execute, `fields` below it.
 
     Args:
@@ -29,7 +29,7 @@ class PaceFields:
         desk: Tells the robot.
     """
 
-    def __init__(self, state: LabState, text: Text, desk: PaceDesk) -> None:
+    def __init__(self, state: LabState, text: Text, desk: SpeedOverride) -> None:
         self._state, self._text, self._desk = state, text, desk
         self._writing = False
         self.pause = self._button("run.pause", desk.pause, icon="pause", style="warning")

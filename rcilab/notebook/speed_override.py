@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from rcilab.control_process.requested_speed import PaceWish, is_running, tell_pace_refusal
+from rcilab.control_process.requested_speed import RequestedSpeed, is_running, tell_pace_refusal
 from rcilab.core.errors import RcilabError
 from rcilab.i18n.translator import Message
-from rcilab.notebook.robot_side import RobotSide
+from rcilab.notebook.robot_side import RobotBackend
 from rcilab.notebook.state import LabState
 
 
-class PaceDesk:
+class SpeedOverride:
     """Holds a motion under way, goes on with it, slows it down. Used by kernel and watching thread.
 
     Args:
@@ -18,7 +18,7 @@ class PaceDesk:
 
     def __init__(self, state: LabState) -> None:
         self._state = state
-        self._wish = PaceWish()
+        self._wish = RequestedSpeed()
         self._asked: float | None = None  # What the robot was asked for and has not taken yet.
         self._was_running = False
         self.refusal: Message | None = None
@@ -41,7 +41,7 @@ class PaceDesk:
         with self._state.lock:
             self._wish.go_on(self._state.pace)
 
-    def tick(self, robot: RobotSide) -> None:
+    def tick(self, robot: RobotBackend) -> None:
         """Hands over what is wanted now."""
         status = robot.status()
         running, before = is_running(status), self._was_running

@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, Literal, TypeGuard
 from numpy.typing import ArrayLike
 
 from rcilab.app.planning import Plan, PlannableLaw, make_plan, picture
-from rcilab.app.reach import Reach, judge_joints, judge_pose
-from rcilab.core.arrays import JointVector, as_vector, frozen
-from rcilab.core.background_job import Tell
+from rcilab.app.reach import TargetStatus, judge_joints, judge_pose
+from rcilab.core.arrays import JointVector, as_vector, readonly_copy
+from rcilab.core.background_job import ProgressCallback
 from rcilab.core.errors import InvalidValueError, KinematicsError, RcilabError
 from rcilab.core.spatial import Pose
 from rcilab.core.state import Mode, require_mode
@@ -27,13 +27,13 @@ from rcilab.i18n.translator import Message, message
 from rcilab.model.robot_model import RobotModel, require_model
 
 if TYPE_CHECKING:
-    from rcilab.app.fault_lab.demo_motion import Exhibition
+    from rcilab.app.fault_lab.demo_motion import DemoMotion
     from rcilab.control_process import SupervisorStatus
     from rcilab.execution.session import RobotSession
-    from rcilab.makers.rokae.driver.controller_parameters import ControlSettings
+    from rcilab.makers.rokae.driver.controller_parameters import ControllerParameters
     from rcilab.motion.motion import Motion
     from rcilab.notebook.cell_run import CellRun
-    from rcilab.notebook.robot_side import RobotSide
+    from rcilab.notebook.robot_side import RobotBackend
     from rcilab.recording.run import Run
 
 Topic = Literal["goal", "plan", "moment", "robot", "run"]
@@ -56,15 +56,15 @@ class LabState:
         self._model = require_model(model)
         self.session = session
         self.lock = threading.RLock()
-        self.robot: RobotSide | None = None
-        self.goal: JointVector = frozen(model.home)
+        self.robot: RobotBackend | None = None
+        self.goal: JointVector = readonly_copy(model.home)
         self.target: Pose = model.forward(self.goal)
-        self.reach: Reach = judge_joints(model, self.goal)
+        self.reach: TargetStatus = judge_joints(model, self.goal)
         self.plan: Plan | None = None
         self.no_plan: Message | None = None
         self.moment: float | None = None
         """Time of the plan that is looked at, [s]; None looks at the arm as it is."""
-        self.exhibition: Exhibition | CellRun | None = None
+        self.exhibition: DemoMotion | CellRun | None = None
         """A fault, or what a cell did, looked at in place of the plan until somebody plans, poses or executes."""
         self.run: Run | None = None
         """What came of the last execution."""
@@ -80,7 +80,7 @@ class LabState:
         self.way: Way = "joint"
         self.mode: Mode = "joint_position"
         """How a motion is commanded; its conditions judge the plan."""
-        self.control: ControlSettings | None = None
+        self.control: ControllerParameters | None = None
         """Parameters of the modes as somebody wants them; None: nobody has touched them."""
         self.refusal: Message | None = None
         """Why the controller did not take them."""
@@ -115,7 +115,7 @@ class LabState:
     def here(self) -> JointVector:
         """Where a plan begins: at the robot's commanded angles, without a robot where the arm was left, [rad]."""
         status = self.status
-        return self._rest if status is None or status.q_c is None else frozen(status.q_c)
+        return self._rest if status is None or status.q_c is None else readonly_copy(status.q_c)
 
     @property
     def model(self) -> RobotModel:
@@ -142,7 +142,7 @@ class LabState:
     def start_from(self, q: ArrayLike) -> None:
         """Says where the arm stands while no robot is connected, shape (n,), [rad]."""
         with self.lock:
-            self._rest = frozen(as_vector(q, self.model.n, "q", "rad"))
+            self._rest = readonly_copy(as_vector(q, self.model.n, "q", "rad"))
             self.plan, self.no_plan, self.moment, self.exhibition, self._ran = None, None, None, None, None
             self.tell("plan", "moment", "goal")
 
@@ -156,7 +156,7 @@ class LabState:
                     f"q of joint {joint}", float(angle), f"must be from {low:.4f} to {high:.4f} rad"
                 )
         with self.lock:
-            self.goal = frozen(angles)
+            self.goal = readonly_copy(angles)
             self.target = self.model.forward(self.goal)
             self.reach = judge_joints(self.model, self.goal)
             self._look_away()
@@ -191,7 +191,7 @@ class LabState:
         """Plans from where the arm stands to the goal and judges it, collisions too."""
         self.show(self.planning()(lambda part: None))
 
-    def planning(self) -> Callable[[Tell], Plan | Message]:
+    def planning(self) -> Callable[[ProgressCallback], Plan | Message]:
         """Returns what plans from where the arm stands now to the goal of now, and judges it, collisions too.
 
         It takes its time, so it is not for a thread that somebody waits for.
@@ -200,7 +200,7 @@ class LabState:
             make = self._line() if self.way == "line" else self._joint()
             mode = self.mode
 
-        def run(progress: Tell) -> Plan | Message:
+        def run(progress: ProgressCallback) -> Plan | Message:
             made = make()
             progress(_PLANNED)
             return made.completed(mode) if isinstance(made, Plan) else made
@@ -274,7 +274,7 @@ class LabState:
                 self.moment = moment
                 self.tell("moment")
 
-    def exhibit(self, exhibition: Exhibition | CellRun | None) -> None:
+    def exhibit(self, exhibition: DemoMotion | CellRun | None) -> None:
         """Looks at a fault, or at what a cell did, in place of the plan; None looks at the plan again."""
         with self.lock:
             if exhibition is None and self.exhibition is None:
@@ -286,7 +286,7 @@ class LabState:
     def leave_arm(self, q: ArrayLike) -> None:
         """Says where the robot stood when it was disconnected; what is planned stays."""
         with self.lock:
-            self._rest = frozen(as_vector(q, self.model.n, "q", "rad"))
+            self._rest = readonly_copy(as_vector(q, self.model.n, "q", "rad"))
 
     @property
     def is_goal_of_plan(self) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import threading
 
-from rcilab.core.closeable import Closing
+from rcilab.core.closeable import Closeable
 from rcilab.core.errors import UsageError
 from rcilab.i18n.localized_text import chosen_language
 from rcilab.i18n.translator import Text
@@ -24,7 +24,7 @@ _MARKUP = """<p>viser: <a href="{url}" target="_blank">{url}</a></p>
 <iframe src="{url}" style="width: 100%; height: {height}px; border: none"></iframe>"""
 
 
-class PreviewPage(Closing):
+class PreviewPage(Closeable):
     """A page that plays one motion: the arm solid, its goal as a ghost. Nothing on it can move a robot.
 
     Shows itself in a notebook as a link and a frame. Close it, or let it end with the kernel.

@@ -10,7 +10,7 @@ import ipywidgets
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.core.arrays import JointVector, as_vector, frozen
+from rcilab.core.arrays import JointVector, as_vector, readonly_copy
 from rcilab.core.errors import InvalidValueError, KinematicsError
 from rcilab.i18n.localized_text import chosen_language
 from rcilab.i18n.rounding import fixed
@@ -85,7 +85,7 @@ class JointSliders:
 
     def _set(self, q: JointVector) -> None:
         """Takes angles as they are; the sliders show them rounded, and their own news is not listened to."""
-        self._q = frozen(q)
+        self._q = readonly_copy(q)
         self._setting = True
         try:
             for slider, echo, angle in zip(self.sliders, self._echoes, np.degrees(self._q).tolist(), strict=True):
@@ -102,7 +102,7 @@ class JointSliders:
         limits = self._model.limits.joint
         q = self._q.copy()
         q[joint] = np.clip(math.radians(change["new"]), limits.lower[joint], limits.upper[joint])
-        self._q = frozen(q)
+        self._q = readonly_copy(q)
         self._report()
 
     def _report(self) -> None:

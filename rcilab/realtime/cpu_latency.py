@@ -16,7 +16,7 @@ DEVICE = "/dev/cpu_dma_latency"
 _NO_LATENCY = struct.pack("i", 0)  # [us]
 
 
-class AwakeCores:
+class CpuLatencyLock:
     """A hold on every core of this machine, on or off. Where the system does not permit it, nothing happens.
 
     Attributes:
@@ -42,7 +42,7 @@ class AwakeCores:
 @contextmanager
 def awake_cores() -> Iterator[bool]:
     """Keeps every core awake for as long as the body runs; gives whether the system permits it."""
-    cores = AwakeCores()
+    cores = CpuLatencyLock()
     cores.switch(True)
     try:
         yield bool(cores.is_permitted)

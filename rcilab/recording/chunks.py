@@ -24,7 +24,7 @@ _BLOCK = struct.Struct("<4sII")
 
 
 @dataclass(frozen=True, slots=True)
-class Block:
+class Chunk:
     """One whole block."""
 
     kind: str
@@ -42,7 +42,7 @@ def encode_block(kind: str, payload: bytes) -> bytes:
     return _BLOCK.pack(name, len(payload), zlib.crc32(name + payload)) + payload
 
 
-def decode_blocks(content: bytes, name: str) -> tuple[Block, ...]:
+def decode_blocks(content: bytes, name: str) -> tuple[Chunk, ...]:
     """Returns the blocks of a file up to the last whole one.
 
     Args:
@@ -64,13 +64,13 @@ def decode_blocks(content: bytes, name: str) -> tuple[Block, ...]:
     if version != VERSION:
         advice = "read it with the rcilab that wrote it, and export it from there"
         raise VersionMismatchError(f"run file {name!r}", version, VERSION, advice)
-    blocks: list[Block] = []
+    blocks: list[Chunk] = []
     place = _HEADER.size
     while place + _BLOCK.size <= len(content):
         kind, length, checksum = _BLOCK.unpack_from(content, place)
         payload = content[place + _BLOCK.size : place + _BLOCK.size + length]
         if len(payload) < length or zlib.crc32(kind + payload) != checksum:
             break
-        blocks.append(Block(kind.decode("ascii", errors="replace"), payload))
+        blocks.append(Chunk(kind.decode("ascii", errors="replace"), payload))
         place += _BLOCK.size + length
     return tuple(blocks)

@@ -12,7 +12,7 @@ from rcilab.recording.run_file import ENDING
 
 
 @dataclass(frozen=True, slots=True)
-class Stored:
+class FolderStats:
     """What a folder holds of recorded runs."""
 
     count: int
@@ -20,13 +20,13 @@ class Stored:
     """[bytes]."""
 
 
-def stored_runs(folder: str | PathLike[str]) -> Stored:
+def stored_runs(folder: str | PathLike[str]) -> FolderStats:
     """Returns how many runs a folder holds and how large they are together; none where there is no folder."""
     sizes = [size for _, _, size in _runs(Path(folder))]
-    return Stored(len(sizes), sum(sizes))
+    return FolderStats(len(sizes), sum(sizes))
 
 
-def keep_newest(folder: str | PathLike[str], count: int) -> Stored:
+def keep_newest(folder: str | PathLike[str], count: int) -> FolderStats:
     """Deletes all runs of a folder but the newest ones, and returns what was deleted.
 
     Only files that are named as runs are, directly in the folder, are touched.
@@ -45,7 +45,7 @@ def keep_newest(folder: str | PathLike[str], count: int) -> Stored:
         with suppress(OSError):  # It is not ours to delete, or somebody was quicker.
             path.unlink()
             deleted, freed = deleted + 1, freed + size
-    return Stored(deleted, freed)
+    return FolderStats(deleted, freed)
 
 
 def _runs(folder: Path) -> list[tuple[int, Path, int]]:

@@ -41,7 +41,7 @@ from rcilab.core.file_bounds import MOST_ROWS, require_max_rows, require_rows
 from rcilab.core.spatial import Pose
 from rcilab.model.robot_model import load_model
 from rcilab.motion.motion import Motion
-from rcilab.recording.chunks import Block, decode_blocks, encode_block, encode_header
+from rcilab.recording.chunks import Chunk, decode_blocks, encode_block, encode_header
 from rcilab.recording.run import Run
 from rcilab.recording.setup import Setup
 
@@ -265,12 +265,12 @@ def report_facts(report: Report) -> list[dict[str, Any]]:
     ]
 
 
-def _count_cycles(block: Block) -> int:
+def _count_cycles(block: Chunk) -> int:
     """Returns how many cycles a block says that it holds."""
     return _ROWS.unpack_from(block.payload)[0] if block.kind == "CYCL" and len(block.payload) >= _ROWS.size else 0
 
 
-def _build(blocks: tuple[Block, ...], max_rows: int) -> Run:
+def _build(blocks: tuple[Chunk, ...], max_rows: int) -> Run:
     head = json.loads(blocks[0].payload)
     dtype = np.dtype([(name, kind, tuple(shape)) for name, kind, shape in head["fields"]])
     if dtype.itemsize != head["bytes"]:

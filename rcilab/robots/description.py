@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal, TypeAlias
 
-from rcilab.core.arrays import JointVector, Matrix, Vector3, frozen
+from rcilab.core.arrays import JointVector, Matrix, Vector3, readonly_copy
 from rcilab.core.limits import Limits
 
 Interface: TypeAlias = Literal["RCI", "FCI"]
@@ -97,7 +97,7 @@ class Link:
     @property
     def origin(self) -> Vector3:
         """Origin of the link's frame in base when all joint angles are zero, shape (3,), [m]."""
-        return frozen([self.origin_ahead, 0.0, self.origin_height])
+        return readonly_copy([self.origin_ahead, 0.0, self.origin_height])
 
     def __repr__(self) -> str:
         centre = " ".join(f"{x:.4g}" for x in self.center_of_mass.tolist())

@@ -18,7 +18,7 @@ from typing import Literal
 
 import numpy as np
 
-from rcilab.core.arrays import Array, Vector3, frozen
+from rcilab.core.arrays import Array, Vector3, readonly_copy
 from rcilab.robots.description import RobotDescription, Rod
 from rcilab.robots.mesh import Mesh, merge_meshes, mirror_y, revolve
 from rcilab.robots.rod_shapes import cast, flange_plate, foot_plate
@@ -152,7 +152,7 @@ def _in_frame(shape: LinkShape, height: float) -> LinkShape:
     down = np.array([0.0, 0.0, -height])
     return LinkShape(
         tuple(Part(part.mesh.moved(down), part.role) for part in shape.parts),
-        tuple(Capsule(frozen(c.start + down), frozen(c.end + down), c.radius) for c in shape.capsules),
+        tuple(Capsule(readonly_copy(c.start + down), readonly_copy(c.end + down), c.radius) for c in shape.capsules),
     )
 
 
@@ -237,7 +237,7 @@ def _housing_capsules(ends: list[tuple[_Joint, float, float]]) -> list[Capsule]:
 
 def _capsule(start: tuple[float, float, float], end: tuple[float, float, float], radius: float) -> Capsule:
     """Returns a capsule in whole micrometres: nobody needs more, and files stay readable."""
-    return Capsule(frozen(np.round(start, 6)), frozen(np.round(end, 6)), round(radius, 6))
+    return Capsule(readonly_copy(np.round(start, 6)), readonly_copy(np.round(end, 6)), round(radius, 6))
 
 
 def _trim(end: _Joint, side: float, up: float, fine: _Fineness) -> list[Part]:

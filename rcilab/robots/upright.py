@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rcilab.core.arrays import Vector3, frozen
+from rcilab.core.arrays import Vector3, readonly_copy
 from rcilab.core.errors import ModelError
 from rcilab.core.spatial import Pose
 from rcilab.robots.description import RobotDescription
@@ -47,7 +47,7 @@ def upright_joints(description: RobotDescription) -> tuple[UprightJoint, ...]:
                 f"{description.name}: joint {number} does not pass through {ahead}the base axis at "
                 f"{link.origin_height} m at zero pose; the theta offsets must make the arm stand upright"
             )
-        joints.append(UprightJoint(frozen(origin - below), frozen(np.round(axis, 12) + 0.0)))
+        joints.append(UprightJoint(readonly_copy(origin - below), readonly_copy(np.round(axis, 12) + 0.0)))
         below = origin
         T = T @ _dh_matrix(row.a, row.alpha, row.d, row.theta_offset)
     if np.abs(T[:3, 3] - below).max() > _TOLERANCE or not _is_square(T[:3, :3]):

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from rcilab.sim.api import Stall
 
 
-class StallPlan:
+class StallSchedule:
     """The pauses that are still to come. Owned by the thread that runs the controller.
 
     Attributes:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 _CLEARLY = 4.0  # Times nearer, so that an unforeseen jerk does not decide; a choice.
 
 
-class Stream:
+class CommandExtrapolator:
     """The last three commands of a motion, as vectors of numbers. Owned by a motion generator.
 
     Attributes:

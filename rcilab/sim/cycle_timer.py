@@ -13,7 +13,7 @@ from rcilab.core.clock import CYCLE_TIME
 LONGEST_PATIENCE = 250  # [cycles] However long we stood still; a choice: nobody streams commands through more.
 
 
-class Pace:
+class CycleTimer:
     """The grid of milliseconds that cycles are due on. Owned by the controller's loop.
 
     Attributes:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rcilab.core.arrays import JointVector, Matrix, frozen
+from rcilab.core.arrays import JointVector, Matrix, readonly_copy
 from rcilab.model.robot_model import RobotModel
 from rcilab.robots.mjcf import ARMATURE_PER_TORQUE, DAMPING_PER_TORQUE
 
@@ -28,17 +28,17 @@ class DriveModel:
 
     def __init__(self, model: RobotModel) -> None:
         torque = model.limits.joint.torque
-        self.ratio: JointVector = frozen(np.full(model.n, GEAR_RATIO))
+        self.ratio: JointVector = readonly_copy(np.full(model.n, GEAR_RATIO))
         """Motor turns a joint turn, shape (n,)."""
-        self.gear_stiffness: JointVector = frozen(STIFFNESS_PER_TORQUE * torque)
+        self.gear_stiffness: JointVector = readonly_copy(STIFFNESS_PER_TORQUE * torque)
         """Shape (n,), [N m/rad]."""
-        self.rotor_inertia: JointVector = frozen(ARMATURE_PER_TORQUE * torque / GEAR_RATIO**2)
+        self.rotor_inertia: JointVector = readonly_copy(ARMATURE_PER_TORQUE * torque / GEAR_RATIO**2)
         """Of the motor itself, shape (n,), [kg m^2]; N^2 times that is seen at the joint."""
-        self.friction: JointVector = frozen(DAMPING_PER_TORQUE * torque)
+        self.friction: JointVector = readonly_copy(DAMPING_PER_TORQUE * torque)
         """Viscous, seen at the joint, shape (n,), [N m s/rad]."""
         q, dq, tau, ddq, dtau = np.split(np.eye(5 * model.n), 5, axis=1)
         columns = self.theta(q, tau), self.dtheta(dq, dtau), self.motor_tau(tau, dq, ddq)
-        self.matrix: Matrix = frozen(np.concatenate(columns, axis=1).T)
+        self.matrix: Matrix = readonly_copy(np.concatenate(columns, axis=1).T)
         """All three are linear: theta, dtheta and motor_tau from q, dq, tau, ddq and dtau, shape (3 n, 5 n)."""
 
     def theta(self, q: JointVector, tau: JointVector) -> JointVector:

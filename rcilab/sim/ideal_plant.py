@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.core.arrays import JointVector, frozen, scalar, sealed
+from rcilab.core.arrays import JointVector, make_readonly, readonly_copy, scalar
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import UsageError
 from rcilab.core.safety_box import SafetyBox
@@ -37,7 +37,7 @@ class IdealPlant:
     kind = "ideal"
 
     def __init__(self, model: RobotModel) -> None:
-        self._zeros = frozen(np.zeros(model.n))
+        self._zeros = readonly_copy(np.zeros(model.n))
         self._model = model
         self._mounted: Payload | None = None
         self._body = model.rigid_body
@@ -59,7 +59,7 @@ class IdealPlant:
 
     def reset(self, q: JointVector) -> Measurement:
         """Puts the arm at `q`, shape (n,), [rad], at rest."""
-        return self._rest_at(frozen(q))
+        return self._rest_at(readonly_copy(q))
 
     def push(self, wrench: ArrayLike, link: int | None = None, point: ArrayLike | None = None) -> None:
         """Lets something outside press on the arm until told otherwise; see `Plant.push`."""
@@ -110,7 +110,7 @@ class IdealPlant:
     def _measure(self, q: JointVector, dq: JointVector, ddq: JointVector) -> Measurement:
         tau = self._body.shared_torque(q, dq, ddq)
         if self._push.is_active:
-            tau = sealed(tau - self._push.torque(q))
+            tau = make_readonly(tau - self._push.torque(q))
         self._rests = False
         self._measurement = Measurement(q, dq, tau)
         return self._measurement
@@ -130,7 +130,9 @@ class IdealPlant:
         dq = dq + _CYCLE * ddq
         q = q + _CYCLE * dq
         self._rests = False
-        self._measurement = Measurement(sealed(q), sealed(dq), sealed(tau_c + self._model.rigid_body.gravity(q)))
+        self._measurement = Measurement(
+            make_readonly(q), make_readonly(dq), make_readonly(tau_c + self._model.rigid_body.gravity(q))
+        )
         return self._measurement
 
     def _acceleration(self, q: JointVector, dq: JointVector, tau: JointVector) -> JointVector:

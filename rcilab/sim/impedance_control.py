@@ -20,7 +20,7 @@ from rcilab.core.arrays import Array, JointVector, Matrix, scalar
 from rcilab.core.spatial import Pose, turn_between
 from rcilab.model.dynamics.rigid_body import ToolTerms
 from rcilab.model.robot_model import RobotModel
-from rcilab.sim.compliance import DAMPING_RATIO, Damper, design_damping
+from rcilab.sim.compliance import DAMPING_RATIO, ModalDamping, design_damping
 from rcilab.sim.plant import Measurement
 
 NULL_FREQUENCY = 5.0  # [rad/s] of the spring that holds the elbow of a 7-axis arm; soft, a choice
@@ -36,7 +36,7 @@ def joint_impedance(
     ddq_c: JointVector,
     measured: Measurement,
     stiffness: Sequence[float],
-    damper: Damper | None = None,
+    damper: ModalDamping | None = None,
 ) -> JointVector:
     """Returns the torque of a spring at every joint, without gravity, shape (n,), [N m].
 
@@ -51,7 +51,7 @@ def joint_impedance(
     """
     body, q, dq = model.rigid_body, measured.q, measured.dq
     K = np.array(stiffness)
-    tau = (damper or Damper()).torque(
+    tau = (damper or ModalDamping()).torque(
         lambda: design_damping(body.mass_inverse(q), np.diag(K)), K * (q_c - q), dq_c - dq
     )
     tau += body.motion_torque(q, dq, ddq_c)
@@ -68,7 +68,7 @@ def cartesian_impedance(
     stiffness6: Sequence[float],
     desired_wrench6: Sequence[float] = (0.0,) * 6,
     axes: Matrix | None = None,
-    damper: Damper | None = None,
+    damper: ModalDamping | None = None,
 ) -> JointVector:
     """Returns the torque of springs between the commanded and the measured tool, without gravity, shape (n,), [N m].
 
@@ -99,7 +99,7 @@ def cartesian_impedance(
         error = _turned(np.array(error), axes).tolist()
     wrench = np.array([k * e + w for k, e, w in zip(stiffness6, error, desired_wrench6, strict=True)])
     dq_c, ddq_c = _reference(model, terms, twist_c, acc_c, null, measured)
-    tau = (damper or Damper()).torque(
+    tau = (damper or ModalDamping()).torque(
         lambda: design_damping(terms.mass_inverse, along.T * stiffness6 @ along), along.T.dot(wrench), dq_c - dq
     )
     tau += body.motion_torque(q, dq, ddq_c)

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rcilab.core.arrays import Array, JointVector, frozen, scalar, sealed
+from rcilab.core.arrays import Array, JointVector, make_readonly, readonly_copy, scalar
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.model.robot_model import RobotModel
 from rcilab.sim.plant import Measurement
@@ -25,7 +25,7 @@ _NOTHING = 1e-6  # [N m] A residual this small is rounding: it is called zero.
 _DAMPING = 2.5e-5 * np.eye(6)  # [m^2, rad^2] keeps the wrench finite at a singularity
 
 
-class Observer:
+class MomentumObserver:
     """Estimates outside torques cycle by cycle. Owned by the controller's cycle.
 
     Args:
@@ -34,8 +34,8 @@ class Observer:
 
     def __init__(self, model: RobotModel) -> None:
         self._body = model.rigid_body
-        self._zeros = frozen(np.zeros(model.n))
-        self._none = (self._zeros, frozen(np.zeros(6)))
+        self._zeros = readonly_copy(np.zeros(model.n))
+        self._none = (self._zeros, readonly_copy(np.zeros(6)))
         self._last: Measurement | None = None
         self._is_static = True
         self._answer = self._none
@@ -68,19 +68,19 @@ class Observer:
             return self._answer
         step = _GAIN * (self._raw - tau_ext)
         is_there = _is_tiny(step, _SHARE * _NOTHING)
-        self._answer = self._answered(self._raw if is_there else sealed(tau_ext + step), measured)
+        self._answer = self._answered(self._raw if is_there else make_readonly(tau_ext + step), measured)
         return self._answer
 
     def _unexplained(self, measured: Measurement, ddq: JointVector) -> JointVector:
         raw = self._body.full_torque(measured.q, measured.dq, ddq)
         raw -= measured.tau
-        return self._zeros if _is_tiny(raw, _NOTHING) else sealed(raw)
+        return self._zeros if _is_tiny(raw, _NOTHING) else make_readonly(raw)
 
     def _answered(self, tau_ext: JointVector, measured: Measurement) -> tuple[JointVector, Array]:
         if tau_ext is self._zeros:
             return self._none
         J = self._body.tool_terms(measured.q, measured.dq).jacobian
-        return tau_ext, sealed(self._body.tool_solver.solve(J.dot(J.T) + _DAMPING, J.dot(tau_ext)))
+        return tau_ext, make_readonly(self._body.tool_solver.solve(J.dot(J.T) + _DAMPING, J.dot(tau_ext)))
 
 
 def _is_tiny(vector: Array, bound: float) -> bool:

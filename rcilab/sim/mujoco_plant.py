@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.core.arrays import Array, JointVector, scalar, sealed
+from rcilab.core.arrays import Array, JointVector, make_readonly, scalar
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.model.dynamics.payload import Payload
@@ -194,7 +194,7 @@ class MuJoCoPlant:
         return stays and list(setpoint.q) == self._rest_q
 
     def _measure(self, tau: Array) -> Measurement:
-        n, rows = self._n, sealed(np.concatenate((self._q, self._dq, tau)))  # One copy for all three.
+        n, rows = self._n, make_readonly(np.concatenate((self._q, self._dq, tau)))  # One copy for all three.
         return Measurement(rows[:n], rows[n : 2 * n], rows[2 * n :])
 
     def _let_rotors_be_felt(self, are_felt: bool) -> None:

@@ -14,7 +14,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.core.arrays import Array, JointVector, sealed
+from rcilab.core.arrays import Array, JointVector, make_readonly
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.model.dynamics.payload import Payload
@@ -51,7 +51,7 @@ class Setpoint(NamedTuple):
         """Returns q, dq and ddq as read-only arrays."""
         if self.arrays is not None:
             return self.arrays
-        q, dq, ddq = sealed(np.array((self.q, self.dq, self.ddq), dtype=np.float64))
+        q, dq, ddq = make_readonly(np.array((self.q, self.dq, self.ddq), dtype=np.float64))
         return q, dq, ddq
 
 

@@ -17,7 +17,7 @@ from rcilab.motion.stop import plan_stop
 JOIN_SHARE = 2.0  # Of the arm's limits: what a stop starts from at most, however hard the arm was thrown; a choice.
 
 
-class CommandedMotion:
+class ReferenceTrajectory:
     """Commanded joint angles and their backward differences over one cycle. Owned by the controller's cycle.
 
     Attributes:

@@ -30,7 +30,7 @@ _FALLBACK = "127.0.0.1"  # For a controller that listens on an address which oth
 _BYTES_AT_ONCE = 4096
 
 
-class WorldPort:
+class SimulationPort:
     """Owns the listener and its connections. Never waits; owned by the thread that runs the controller.
 
     Args:

@@ -31,7 +31,7 @@ class _Mode(Enum):
     CHASING = "chasing"
 
 
-class Fence:
+class SoftLimitGovernor:
     """Leads commanded joint angles to rest inside soft limits. Pure of clocks and arms; owned by a motion generator.
 
     Args:

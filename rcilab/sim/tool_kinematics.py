@@ -19,7 +19,7 @@ from rcilab.model.robot_model import RobotModel
 _REST: Twist = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-class ToolMotion:
+class ToolKinematics:
     """Follows one motion of the joints, commanded or measured. Owned by the controller's cycle.
 
     The arm angle is undefined where shoulder and wrist are one above the other or the arm is stretched: there its last
@@ -86,7 +86,7 @@ class ToolMotion:
         self._terms, self.matrix, self.twist = motion, motion.matrix, motion.twist
         self.psi = self._arm_angle(q)
 
-    def coincide(self, other: ToolMotion) -> None:
+    def coincide(self, other: ToolKinematics) -> None:
         """Takes over where another one is: the arm is exactly where it was told to be."""
         self._terms, self.matrix, self.twist, self.psi = other._terms, other.matrix, other.twist, other.psi
 

@@ -37,7 +37,7 @@ _FACES = np.array(
 """They look inwards: only far walls are drawn. A near one would hide the translucent arms that are drawn after it."""
 
 
-class SetupView:
+class ConfigurationView:
     """Draws one set-up. Owned by the thread that draws.
 
     Args:

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.core.arrays import Array, as_vector, frozen
+from rcilab.core.arrays import Array, as_vector, readonly_copy
 from rcilab.core.spatial import IDENTITY, Pose
 from rcilab.views.scene import NO_TURN, ORIGIN, Color, line_points, segment_ends, unknown_node
 
@@ -55,19 +55,21 @@ class NullScene:
     def add_mesh(self, name: str, vertices: ArrayLike, faces: ArrayLike, *, color: Color, opacity: float = 1.0) -> None:
         """Keeps a mesh; see `Scene`."""
         count = len(np.asarray(faces))
-        self.nodes[name] = DrawnNode("mesh", color=color, opacity=opacity, points=frozen(vertices), triangles=count)
+        self.nodes[name] = DrawnNode(
+            "mesh", color=color, opacity=opacity, points=readonly_copy(vertices), triangles=count
+        )
 
     def add_polyline(self, name: str, points: ArrayLike, *, color: ArrayLike, thickness: float = 0.004) -> None:
         """Keeps a line; see `Scene`."""
         path, shades = line_points(points, color)
         red, green, blue = (int(value) for value in shades[0])
-        self.nodes[name] = DrawnNode("polyline", color=(red, green, blue), points=frozen(path))
+        self.nodes[name] = DrawnNode("polyline", color=(red, green, blue), points=readonly_copy(path))
 
     def add_segments(self, name: str, segments: ArrayLike, *, color: ArrayLike, thickness: float = 0.004) -> None:
         """Keeps lines; see `Scene`."""
         ends, shades = segment_ends(segments, color)
         red, green, blue = (int(value) for value in shades[0, 0])
-        self.nodes[name] = DrawnNode("segments", color=(red, green, blue), points=frozen(ends.reshape(-1, 3)))
+        self.nodes[name] = DrawnNode("segments", color=(red, green, blue), points=readonly_copy(ends.reshape(-1, 3)))
 
     def set_transform(
         self, name: str, *, wxyz: Sequence[float] | None = None, position: Sequence[float] | None = None

@@ -17,7 +17,7 @@ from http import HTTPStatus
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
-from rcilab.core.closeable import Closing
+from rcilab.core.closeable import Closeable
 from rcilab.views import sendable
 from rcilab.views.access_control import Gate, Guesses, Refusal
 from rcilab.views.arrivals import BACKLOG, Arrivals, watch_loop
@@ -46,7 +46,7 @@ def listen(host: str, port: int) -> socket.socket:
     return bound
 
 
-class GuardedServer(Closing):
+class GuardedServer(Closeable):
     """viser on a socket that is bound already, behind a gate. Owns both.
 
     Args:

@@ -23,7 +23,7 @@ def place_camera(server: viser.ViserServer) -> None:
     camera.position, camera.look_at, camera.fov = _CAMERA, _LOOK_AT, _FIELD_OF_VIEW
 
 
-class HomeView:
+class ViserEnvironment:
     """A page's camera, and where it stands at first: further back as the window, or the panels, leave little room.
 
     A camera that somebody has moved stays, until they bring it back.

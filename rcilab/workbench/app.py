@@ -12,11 +12,11 @@ from urllib.parse import quote
 
 from rcilab.views.access_control import Gate
 from rcilab.views.viser_server import GuardedServer
-from rcilab.views.viser_stage import HomeView
+from rcilab.views.viser_stage import ViserEnvironment
 from rcilab.workbench import requests, security
-from rcilab.workbench.autosave import Keepsake, keepsake_file
-from rcilab.workbench.control_lock import Presence
-from rcilab.workbench.dispatcher import Conductor
+from rcilab.workbench.autosave import Autosave, keepsake_file
+from rcilab.workbench.control_lock import ClientHeartbeat
+from rcilab.workbench.dispatcher import Dispatcher
 from rcilab.workbench.goal.actions import initial_goal
 from rcilab.workbench.live import LIVE_PATH, Heard, LiveChannel
 from rcilab.workbench.page import decorate, introduce, send_file
@@ -90,13 +90,13 @@ class Workbench:
         self.store = Store(replace(state, runs=config.runs))
         self.session = Session(lambda error: self.store.say("bad", tell_error(error, self.session.status())))
         is_own = config.port and replay is None  # Any free port is nobody's own, and whoever replays looks at a run.
-        keepsake = Keepsake(keepsake_file(self.port) if is_own else None)
-        self._presence = Presence()
-        self.conductor = Conductor(self.store, self.session, self._deliver, keepsake, self._presence)
+        keepsake = Autosave(keepsake_file(self.port) if is_own else None)
+        self._presence = ClientHeartbeat()
+        self.conductor = Dispatcher(self.store, self.session, self._deliver, keepsake, self._presence)
         self.server: viser.ViserServer
         self._stopped = threading.Event()
         self._opened = False
-        self._views: dict[int, HomeView] = {}  # By page. Owned by the event loop.
+        self._views: dict[int, ViserEnvironment] = {}  # By page. Owned by the event loop.
 
     @property
     def url(self) -> str:
@@ -107,7 +107,7 @@ class Workbench:
 
     def start(self) -> None:
         """Serves the page, then connects to the robot in the background."""
-        from rcilab.workbench.renderer import Presenter, tab_name
+        from rcilab.workbench.renderer import Renderer, tab_name
 
         ask = self.conductor.ask
         self.live = live = LiveChannel(
@@ -116,8 +116,10 @@ class Workbench:
                 here=self._here,
                 seek=lambda page, share: ask(requests.Seek(page=page, place=self.presenter.place_at(share))),
                 size=lambda page, height: ask(requests.SetView(page=page, name="height", value=height)),
-                peek=lambda page, branch: ask(requests.Peek(page=page, index=branch if branch >= 0 else None)),
-                entered=lambda page: ask(requests.Enter(page=page)),
+                peek=lambda page, branch: ask(
+                    requests.HighlightBranch(page=page, index=branch if branch >= 0 else None)
+                ),
+                entered=lambda page: ask(requests.CommitField(page=page)),
                 tab=lambda page, index: ask(requests.OpenTab(page=page, name=tab_name(index))),
                 take=lambda page: ask(requests.TakeControls(page=page)),
                 answer=lambda page, yes: ask(requests.AnswerControls(page=page, yes=yes)),
@@ -139,7 +141,7 @@ class Workbench:
         self._follow_pages()
         if self._config.replay is None:
             self.conductor.resume(language=self._config.language)
-        self.presenter = Presenter(self.server, self.store, self.session, live, ask)
+        self.presenter = Renderer(self.server, self.store, self.session, live, ask)
         self.presenter.start()
         self.conductor.start()
         if self._config.replay is None:
@@ -169,13 +171,13 @@ class Workbench:
 
         @self.server.on_client_connect
         async def _(client: viser.ClientHandle) -> None:
-            ask(requests.PageCame(page=client.client_id))
-            self._views[client.client_id] = HomeView(client.camera)
+            ask(requests.PageOpened(page=client.client_id))
+            self._views[client.client_id] = ViserEnvironment(client.camera)
             introduce(client, self.live.introduce(client.client_id))
 
         @self.server.on_client_disconnect
         async def _(client: viser.ClientHandle) -> None:
-            ask(requests.PageWent(page=client.client_id))
+            ask(requests.PageClosed(page=client.client_id))
             self.live.forget(client.client_id)
             self._views.pop(client.client_id, None)
 

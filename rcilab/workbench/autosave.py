@@ -10,10 +10,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
-from rcilab.core.arrays import JointVector, as_vector, frozen
+from rcilab.core.arrays import JointVector, as_vector, readonly_copy
 from rcilab.core.atomic_file import write_whole
 from rcilab.core.errors import RcilabError
-from rcilab.makers.rokae.driver.configuration import RobotSetup
+from rcilab.makers.rokae.driver.configuration import RobotConfiguration
 from rcilab.model.robot_model import load_model
 from rcilab.motion.program import Program
 from rcilab.workbench.setup.configuration_json import build_setup, setup_facts
@@ -29,13 +29,13 @@ _PAUSE = 1.0  # [s] A choice: between two writings, while somebody drags.
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Kept:
+class SavedState:
     """What came back of one arm."""
 
     q: JointVector | None
     """The goal, shape (n,), [rad]; None where the workbench was closed."""
     program: Program | None = None
-    setup: RobotSetup = field(default_factory=RobotSetup)
+    setup: RobotConfiguration = field(default_factory=RobotConfiguration)
     """Those parts of the set-up that were edited."""
 
 
@@ -57,7 +57,7 @@ def keepsake_file(port: int) -> Path:
     return folder / "rcilab" / f"workbench-{port}.json"
 
 
-class Keepsake:
+class Autosave:
     """Writes down how the page looks, and goal, program and set-up of every arm, when they have changed.
 
     Owned by the conductor's thread.
@@ -75,7 +75,7 @@ class Keepsake:
         self._written: tuple[object, ...] | None = None
         self._next = 0.0
 
-    def recall(self, model: RobotModel) -> Kept | None:
+    def recall(self, model: RobotModel) -> SavedState | None:
         """Returns what the workbench before kept of an arm, if the file can be understood."""
         if self._file is None:
             return None
@@ -89,10 +89,10 @@ class Keepsake:
             if own is None:
                 return None
             program = None if own["program"] is None else Program.from_json(own["program"])
-            q = None if own.get("q") is None else frozen(as_vector(own["q"], model.n, "q", "rad"))
+            q = None if own.get("q") is None else readonly_copy(as_vector(own["q"], model.n, "q", "rad"))
             setup = build_setup(own.get("setup") or {})
             setup.applied_to(model)  # A load that it cannot bear is not brought back.
-            return Kept(q=q, program=program, setup=setup)
+            return SavedState(q=q, program=program, setup=setup)
         except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError, RcilabError):
             return None
 
@@ -100,9 +100,9 @@ class Keepsake:
         """Returns the settings of the page that were chosen, by their names in `SetView`; after `recall`."""
         return dict(self._looks)
 
-    def recall_setups(self, model: RobotModel) -> dict[str, RobotSetup]:
+    def recall_setups(self, model: RobotModel) -> dict[str, RobotConfiguration]:
         """Returns the edited set-ups of the arms that were chosen before this one, by name; after `recall`."""
-        found: dict[str, RobotSetup] = {}
+        found: dict[str, RobotConfiguration] = {}
         for name, own in self._arms.items():
             with suppress(ValueError, LookupError, TypeError, AttributeError, RcilabError):
                 setup = build_setup(own.get("setup") or {})

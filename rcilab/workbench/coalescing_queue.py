@@ -9,7 +9,7 @@ from typing import Generic, TypeVar
 T = TypeVar("T")
 
 
-class Mailbox(Generic[T]):
+class CoalescingQueue(Generic[T]):
     """A queue in which a newer request can replace an older one that nobody has looked at yet.
 
     While a gizmo is dragged, twenty positions a second arrive; only the newest is worth solving.

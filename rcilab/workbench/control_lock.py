@@ -13,7 +13,7 @@ _LOADING = 20.0  # [s] A choice: a page that has just opened may take so long un
 
 
 @dataclass(frozen=True)
-class Lease:
+class ControlLock:
     """The open pages, in the order they came, and the one whose actions count."""
 
     pages: tuple[int, ...] = ()
@@ -27,41 +27,41 @@ class Lease:
     former: int | None = None
     """Held the controls until it fell silent; gets them back if it speaks before somebody takes them."""
 
-    def arrive(self, page: int) -> Lease:
+    def arrive(self, page: int) -> ControlLock:
         """Returns the lease after a page has opened; it gets the controls when they are free."""
         if page in self.pages:
             return self
         pages = (*self.pages, page)
-        return replace(self, pages=pages) if self.holder is not None else Lease(pages, page)
+        return replace(self, pages=pages) if self.holder is not None else ControlLock(pages, page)
 
-    def leave(self, page: int, now: float = -math.inf) -> Lease:
+    def leave(self, page: int, now: float = -math.inf) -> ControlLock:
         """Returns the lease after a page has gone: its controls pass to the one that has asked, or become free."""
         pages = tuple(other for other in self.pages if other != page)
         former = None if self.former == page else self.former
         if self.holder != page:
             asking = None if self.asking == page else self.asking
             return replace(self, pages=pages, asking=asking, former=former)
-        return Lease(pages, self.asking, since=now, former=former)
+        return ControlLock(pages, self.asking, since=now, former=former)
 
-    def take(self, page: int) -> Lease:
+    def take(self, page: int) -> ControlLock:
         """Returns the lease after an open page has got the controls."""
-        return Lease(self.pages, page) if page in self.pages else self
+        return ControlLock(self.pages, page) if page in self.pages else self
 
-    def ask(self, page: int, now: float) -> Lease:
+    def ask(self, page: int, now: float) -> ControlLock:
         """Returns the lease after a page has asked: free controls are its own at once, else the holder decides."""
         if page not in self.pages or page == self.holder or self.asking is not None:
             return self
         return self.take(page) if self.holder is None else replace(self, asking=page, since=now)
 
-    def answer(self, page: int, yes: bool) -> Lease:
+    def answer(self, page: int, yes: bool) -> ControlLock:
         """Returns the lease after a page has answered; only the holder's answer counts."""
         if page != self.holder or self.asking is None:
             return self
         return self.take(self.asking) if yes else replace(self, asking=None)
 
-    def fall_silent(self, now: float) -> Lease:
+    def fall_silent(self, now: float) -> ControlLock:
         """Returns the lease after the holder's page has stopped answering, though it seems to be open."""
-        return Lease(self.pages, self.asking, since=now, former=self.holder if self.asking is None else None)
+        return ControlLock(self.pages, self.asking, since=now, former=self.holder if self.asking is None else None)
 
     def is_overdue(self, now: float) -> bool:
         """Returns whether the holder has had its time to answer."""
@@ -76,7 +76,7 @@ class Lease:
         return self.pages.index(page) + 1 if page in self.pages else 0
 
 
-class Presence:
+class ClientHeartbeat:
     """When each page was last heard of. Written by the server's event loop, read by anybody."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from rcilab.workbench import requests
-from rcilab.workbench.control_lock import SILENCE, Presence
+from rcilab.workbench.control_lock import SILENCE, ClientHeartbeat
 from rcilab.workbench.run.readiness import is_moving
 from rcilab.workbench.session import Session
 from rcilab.workbench.store import Store
 from rcilab.workbench.text import message
 
 
-class LeaseActions:
+class ControlLockActions:
     """Hands the controls from page to page.
 
     Args:
@@ -19,16 +19,16 @@ class LeaseActions:
         presence: When pages were last heard of.
     """
 
-    def __init__(self, store: Store, session: Session, presence: Presence) -> None:
+    def __init__(self, store: Store, session: Session, presence: ClientHeartbeat) -> None:
         self._store, self._session, self._presence = store, session, presence
 
-    def page_came(self, request: requests.PageCame) -> None:
+    def page_came(self, request: requests.PageOpened) -> None:
         """Notes a page; it gets the controls when nobody has them."""
         if request.page is not None:
             self._presence.came(request.page)
             self._store.update(lease=self._store.state.lease.arrive(request.page))
 
-    def page_went(self, request: requests.PageWent) -> None:
+    def page_went(self, request: requests.PageClosed) -> None:
         """Notes that a page has gone. Without a holder no sign of life reaches the robot: a motion ends after 2 s."""
         if request.page is not None:
             self._presence.went(request.page)

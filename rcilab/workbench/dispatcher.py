@@ -10,11 +10,11 @@ from typing import Any
 
 from rcilab.core.errors import RcilabError
 from rcilab.workbench import requests
-from rcilab.workbench.autosave import Keepsake, Kept
+from rcilab.workbench.autosave import Autosave, SavedState
 from rcilab.workbench.check.actions import CheckActions
-from rcilab.workbench.coalescing_queue import Mailbox
-from rcilab.workbench.control_lock import Presence
-from rcilab.workbench.control_lock_actions import LeaseActions
+from rcilab.workbench.coalescing_queue import CoalescingQueue
+from rcilab.workbench.control_lock import ClientHeartbeat
+from rcilab.workbench.control_lock_actions import ControlLockActions
 from rcilab.workbench.failures import Failures
 from rcilab.workbench.goal.actions import GoalActions
 from rcilab.workbench.jog.actions import JogActions
@@ -42,7 +42,7 @@ _TICK = 0.03  # [s] A choice: about the display's rate; also how often the robot
 _AGAIN = 1.0  # [s] A choice: a page that acts without the controls is told so once in that time.
 
 
-class Conductor:
+class Dispatcher:
     """Owns the state and the session; everything else only reads snapshots.
 
     Args:
@@ -58,11 +58,11 @@ class Conductor:
         store: Store,
         session: Session,
         deliver: Deliver = lambda page, name, stream, is_unwanted: True,
-        keepsake: Keepsake | None = None,
-        presence: Presence | None = None,
+        keepsake: Autosave | None = None,
+        presence: ClientHeartbeat | None = None,
     ) -> None:
         self._store, self._session = store, session
-        self._keepsake = keepsake or Keepsake(None)
+        self._keepsake = keepsake or Autosave(None)
         self._goal = GoalActions(store, session)
         self.robot = RobotActions(store, session)
         self._mode = ModeActions(store, session)
@@ -77,11 +77,11 @@ class Conductor:
         self._check = CheckActions(store, session, self._goal, self._program)
         self._learn = LearnActions(store, session)
         self._view = ViewActions(store)
-        self._lease = LeaseActions(store, session, presence or Presence())
+        self._lease = ControlLockActions(store, session, presence or ClientHeartbeat())
         self._scene = SceneActions(store, self._goal)
         self._export = ExportActions(store, deliver)
         self._folder = FolderActions(store)
-        self._mailbox: Mailbox[requests.Request] = Mailbox()
+        self._mailbox: CoalescingQueue[requests.Request] = CoalescingQueue()
         self._thread: threading.Thread | None = None
         self._ending = threading.Event()
         self._refused_at: dict[tuple[int | None, int | None], float] = {}  # Of page and holder, when: [s].
@@ -96,18 +96,18 @@ class Conductor:
             requests.SetArmAngle: self._goal.set_arm_angle,
             requests.ChooseBranch: self._goal.choose_branch,
             requests.DragElbow: self._scene.drag_elbow,
-            requests.Peek: self._scene.peek,
-            requests.Enter: self._view.enter,
+            requests.HighlightBranch: self._scene.peek,
+            requests.CommitField: self._view.enter,
             requests.DrawInSoftware: self._view.draw_in_software,
             requests.OpenTab: self._setup.open_tab,
-            requests.ShowBead: self._scene.show_bead,
+            requests.ShowViolation: self._scene.show_bead,
             requests.ShowExtra: self._scene.show_extra,
-            requests.SetWay: self._goal.set_way,
+            requests.SetPathType: self._goal.set_way,
             requests.Plan: self._goal.plan,
             requests.PlanRecovery: self._goal.plan_recovery,
             requests.SetSpeed: self._goal.set_speed,
             requests.SetLaw: self._goal.set_law,
-            requests.Drive: self._drive,
+            requests.RobotCommand: self._drive,
             requests.SetDrive: self._mode.set_drive,
             requests.PressControl: self._mode.press,
             requests.SetNetwork: self._world.set_network,
@@ -123,7 +123,7 @@ class Conductor:
             requests.NamedPose: self._poses.act,
             requests.SetPush: self._push.set_push,
             requests.HoldPush: self._push.hold,
-            requests.PullArm: self._push.pull,
+            requests.DragLink: self._push.pull,
             requests.MoveSetup: self._setup.move,
             requests.ResizeBox: self._setup.resize,
             requests.SetSetup: self._setup.set_setup,
@@ -145,8 +145,8 @@ class Conductor:
             requests.Refuse: self._refuse,
             requests.TakeControls: self._lease.take_controls,
             requests.AnswerControls: self._lease.answer,
-            requests.PageCame: self._lease.page_came,
-            requests.PageWent: self._lease.page_went,
+            requests.PageOpened: self._lease.page_came,
+            requests.PageClosed: self._lease.page_went,
         }
 
     def ask(self, request: requests.Request) -> None:
@@ -232,7 +232,7 @@ class Conductor:
         self._scene.tick()
         self._keepsake.keep(self._store.state)
 
-    def _resume(self, kept: Kept) -> None:
+    def _resume(self, kept: SavedState) -> None:
         self._setup.restore(kept.setup)
         if kept.q is not None:
             self._goal.pose(kept.q)
@@ -254,7 +254,7 @@ class Conductor:
         said = message(code, page=lease.number(lease.holder))
         self._store.say("warn", said, page=request.page, trouble="lease")
 
-    def _drive(self, request: requests.Drive) -> None:
+    def _drive(self, request: requests.RobotCommand) -> None:
         if request.what == "pause":
             self._mode.pause()
         elif request.what == "resume":
@@ -305,7 +305,7 @@ def _coalescing_key(request: requests.Request) -> str | None:
         return f"{type(request).__name__}.{request.page}"
     if isinstance(request, requests.DragElbow) and request.phase == "update":
         return f"elbow.{request.page}"
-    if isinstance(request, requests.PullArm) and request.phase == "update":
+    if isinstance(request, requests.DragLink) and request.phase == "update":
         return f"pull.{request.page}"
     if isinstance(request, requests.SetNetwork) and request.name is not None:
         return f"network.{request.name}.{request.page}"
@@ -313,14 +313,19 @@ def _coalescing_key(request: requests.Request) -> str | None:
         return f"pace.{request.page}"
     if isinstance(
         request,
-        requests.Seek | requests.SetSpeed | requests.SetArmAngle | requests.HoldPush | requests.HoldJog | requests.Peek,
+        requests.Seek
+        | requests.SetSpeed
+        | requests.SetArmAngle
+        | requests.HoldPush
+        | requests.HoldJog
+        | requests.HighlightBranch,
     ):
         return f"{type(request).__name__}.{request.page}"
     return None
 
 
 def _is_stop(request: requests.Request) -> bool:
-    return isinstance(request, requests.Drive) and request.what == "stop"
+    return isinstance(request, requests.RobotCommand) and request.what == "stop"
 
 
 def _reloads_pages(request: requests.Request) -> bool:

@@ -7,25 +7,25 @@ import time
 from typing import TYPE_CHECKING, Any
 
 from rcilab.core.clock import CYCLE_TIME
-from rcilab.views.viser_ext.persistent_tab import LastingTab
+from rcilab.views.viser_ext.persistent_tab import PersistentTab
 from rcilab.workbench.failures import Failures
 from rcilab.workbench.learn.state import exhibited
 from rcilab.workbench.live import LiveChannel
 from rcilab.workbench.page import dress
 from rcilab.workbench.panels import Panel
-from rcilab.workbench.panels.arm_state import ArmNowPanel
+from rcilab.workbench.panels.arm_state import ArmStatePanel
 from rcilab.workbench.panels.branches import BranchesPanel
 from rcilab.workbench.panels.check import CheckPanel
 from rcilab.workbench.panels.elbow import ElbowPanel
 from rcilab.workbench.panels.extras import ExtrasPanel
-from rcilab.workbench.panels.fault_injection import LabPanel
+from rcilab.workbench.panels.fault_injection import FaultInjectionPanel
 from rcilab.workbench.panels.health import HealthPanel
 from rcilab.workbench.panels.jog import JogPanel
 from rcilab.workbench.panels.learn import LearnPanel
 from rcilab.workbench.panels.learn_exhibit import LearnExhibitPanel
 from rcilab.workbench.panels.learn_lesson import LearnLessonPanel
 from rcilab.workbench.panels.mode import ModePanel
-from rcilab.workbench.panels.path_type import WayPanel
+from rcilab.workbench.panels.path_type import PathTypePanel
 from rcilab.workbench.panels.poses import PosesPanel
 from rcilab.workbench.panels.program import ProgramPanel
 from rcilab.workbench.panels.program_file import ProgramFilePanel
@@ -40,7 +40,7 @@ from rcilab.workbench.panels.signals import SignalsPanel
 from rcilab.workbench.panels.soft_limits import SoftLimitsPanel
 from rcilab.workbench.panels.status import status_values
 from rcilab.workbench.panels.target import TargetPanel
-from rcilab.workbench.panels.target_robot import WherePanel
+from rcilab.workbench.panels.target_robot import TargetRobotPanel
 from rcilab.workbench.panels.timeline import TimelinePanel
 from rcilab.workbench.panels.tool_jog import ToolJogPanel
 from rcilab.workbench.panels.waypoint import WaypointPanel
@@ -65,8 +65,8 @@ _READ = 0.25
 the arm: a page that draws in software shows the arm once it has applied all that came with it."""
 _MAIN_WIDTH, _TIMELINE_WIDTH = 352, 380  # [px]
 _TABS = (
-    ("tab.jog", "adjustments-horizontal", JogPanel, ToolJogPanel, ArmNowPanel, PosesPanel),
-    ("tab.target", "current-location", TargetPanel, ElbowPanel, BranchesPanel, WayPanel),
+    ("tab.jog", "adjustments-horizontal", JogPanel, ToolJogPanel, ArmStatePanel, PosesPanel),
+    ("tab.target", "current-location", TargetPanel, ElbowPanel, BranchesPanel, PathTypePanel),
     ("tab.program", "list-numbers", ProgramPanel, WaypointPanel, ProgramFilePanel),
     ("tab.setup", "tool", SetupPanel, SetupNumbersPanel, SoftLimitsPanel),
     ("tab.check", "clipboard-check", CheckPanel),
@@ -74,13 +74,13 @@ _TABS = (
         "tab.run",
         "player-play",
         RunPanel,
-        ArmNowPanel,
+        ArmStatePanel,
         RecordingPanel,
-        WherePanel,
+        TargetRobotPanel,
         ModePanel,
         PushPanel,
         SignalsPanel,
-        LabPanel,
+        FaultInjectionPanel,
         HealthPanel,
     ),
     ("tab.learn", "school", LearnLessonPanel, LearnPanel, LearnExhibitPanel),
@@ -93,7 +93,7 @@ def tab_name(index: int) -> str:
     return _TABS[index][0] if index < len(_TABS) else ""
 
 
-class Presenter:
+class Renderer:
     """Owns every handle of the page. It reads snapshots and knows no sockets.
 
     Args:
@@ -110,7 +110,7 @@ class Presenter:
         self._marks = ProgramMarks(server)
         self._text = Text(store.state.language, store.state.units)
         self._panels: list[Panel] = []
-        self._tabs: list[LastingTab] = []  # Of the main panel, then that of the timeline's window.
+        self._tabs: list[PersistentTab] = []  # Of the main panel, then that of the timeline's window.
         self._built: tuple[object, ...] | None = None
         self._theme = ""
         self._shown: tuple[object, ...] = ()
@@ -210,8 +210,8 @@ class Presenter:
         window.set_width(_TIMELINE_WIDTH)
         gui.main_panel.dock_right()
         gui.main_panel.set_width(_MAIN_WIDTH)
-        self._tabs = [LastingTab(group.add_tab, icon) for _, icon, *_ in _TABS]
-        self._tabs.append(LastingTab(window.add_tab, "timeline"))
+        self._tabs = [PersistentTab(group.add_tab, icon) for _, icon, *_ in _TABS]
+        self._tabs.append(PersistentTab(window.add_tab, "timeline"))
 
     def _run(self) -> None:
         while not self._ending.is_set():

@@ -131,7 +131,7 @@ class DragElbow(Request):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Enter(Request):
+class CommitField(Request):
     """Enter was pressed in a field that was typed in, or the field was left: what is typed is complete."""
 
 
@@ -149,7 +149,7 @@ class OpenTab(Request):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Peek(Request):
+class HighlightBranch(Request):
     """A branch of the list is under the mouse or has the focus."""
 
     index: int | None
@@ -157,7 +157,7 @@ class Peek(Request):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SetWay(Request):
+class SetPathType(Request):
     """How the tool is to go to the goal; what is None stays."""
 
     kind: str | None = None
@@ -192,7 +192,7 @@ class SetLaw(Request):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Drive(Moving):
+class RobotCommand(Moving):
     """Something for the robot: what the buttons of the Run tab say."""
 
     what: Literal[
@@ -300,7 +300,7 @@ class HoldPush(Request):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PullArm(Request):
+class DragLink(Request):
     """The mouse drags a link of the arm."""
 
     link: int
@@ -442,7 +442,7 @@ class ShowPlot(Request):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ShowBead(Request):
+class ShowViolation(Request):
     """Go to a violation on the path and say what it is."""
 
     number: int
@@ -504,17 +504,17 @@ class AnswerControls(Request):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PageCame(Request):
+class PageOpened(Request):
     """A page has opened."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PageWent(Request):
+class PageClosed(Request):
     """A page has gone."""
 
 
-Harmless: TypeAlias = PageCame | PageWent | Refuse | TakeControls | AnswerControls | Enter
+Harmless: TypeAlias = PageOpened | PageClosed | Refuse | TakeControls | AnswerControls | CommitField
 """What a watching page may ask for as well: nothing of it changes what other pages show."""
 
-Silent: TypeAlias = OpenTab | DrawInSoftware | Peek
+Silent: TypeAlias = OpenTab | DrawInSoftware | HighlightBranch
 """What a watching page does without pressing anything: it is not told that this does not count."""

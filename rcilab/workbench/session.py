@@ -12,7 +12,7 @@ from rcilab.workbench.status_text import StartingError
 
 if TYPE_CHECKING:
     from rcilab.control_process import Supervisor, SupervisorStatus
-    from rcilab.makers.rokae.driver.configuration import RobotSetup
+    from rcilab.makers.rokae.driver.configuration import RobotConfiguration
     from rcilab.model.robot_model import RobotModel
 
 
@@ -33,7 +33,9 @@ class Session:
         self._worker: threading.Thread | None = None
         self._is_apart = False  # Nobody wants a connection.
 
-    def open(self, model: RobotModel, target: str, plant: str = "ideal", setup: RobotSetup | None = None) -> None:
+    def open(
+        self, model: RobotModel, target: str, plant: str = "ideal", setup: RobotConfiguration | None = None
+    ) -> None:
         """Closes what is open and starts a supervisor for this arm, destination and plant; returns at once."""
         with self._lock:
             self._generation += 1
@@ -135,7 +137,7 @@ class Session:
         model: RobotModel,
         target: str,
         plant: str,
-        setup: RobotSetup | None,
+        setup: RobotConfiguration | None,
     ) -> None:
         if previous is not None:
             previous.join()

@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from rcilab.app.planning import PathKind, Plan, PlannableLaw
-from rcilab.app.reach import Reach, Tone
+from rcilab.app.reach import TargetStatus, Tone
 from rcilab.core.arrays import JointVector
 from rcilab.core.spatial import Pose
 from rcilab.i18n.units import USUAL, Units
 from rcilab.model.robot_model import RobotModel
 from rcilab.workbench.check.state import CheckState
-from rcilab.workbench.control_lock import Lease
+from rcilab.workbench.control_lock import ControlLock
 from rcilab.workbench.jog.jogging import JogState
 from rcilab.workbench.learn.state import LearnState
 from rcilab.workbench.program.draft import ProgramState
@@ -30,7 +30,7 @@ from rcilab.workbench.text import Message
 
 if TYPE_CHECKING:
     from rcilab.motion import Motion
-    from rcilab.motion.speed_scaling import PacedMotion
+    from rcilab.motion.speed_scaling import SpeedScaledMotion
     from rcilab.recording.run import Run
     from rcilab.recording.tracking import Tracking
     from rcilab.workbench.run.export_actions import Export
@@ -42,7 +42,7 @@ _NOTICES = 4  # Kept of each page, and of all pages together; a choice.
 
 
 @dataclass(frozen=True, slots=True)
-class Notice:
+class Toast:
     """Something to say once, over the scene."""
 
     serial: int
@@ -62,7 +62,7 @@ class Goal:
     """Joint angles of the candidate arm, shape (n,), [rad]."""
     target: Pose
     """Where the gizmo stands: what was asked for, reachable or not."""
-    reach: Reach
+    reach: TargetStatus
     psi: float | None = None
     """Arm angle of `q`, [rad]; None where it has none."""
     snapped: Message | None = None
@@ -87,7 +87,7 @@ class Recording:
     """Cycles between a command and the state that shows it: the controller's play-out, and its answer."""
     run: Run | None = None
     """All of it, once the arm stands still."""
-    paced: PacedMotion | None = None
+    paced: SpeedScaledMotion | None = None
     """How the plan was run, where its pace was changed on the way; None: as planned."""
     tracking: Tracking | None = None
     """How far the arm was from its plan, once it stands still."""
@@ -174,8 +174,8 @@ class UiState:
     theme: Theme = "light"
     height: float = 800.0
     """Height of the newest page's window, [px]: the plots fill it."""
-    lease: Lease = field(default_factory=Lease)
-    notices: tuple[Notice, ...] = ()
+    lease: ControlLock = field(default_factory=ControlLock)
+    notices: tuple[Toast, ...] = ()
     """The newest of each page and of all pages together, oldest first: what one is told takes no place of another's."""
     entered: Mapping[int | None, float] = field(default_factory=lambda: MappingProxyType({}))
     """When a page last said that what is typed in it is complete, by page, [s] of the monotonic clock."""
@@ -183,7 +183,7 @@ class UiState:
     """What is wrong with typed numbers, by field."""
 
     @property
-    def notice(self) -> Notice | None:
+    def notice(self) -> Toast | None:
         """The newest notice, whomever it concerns."""
         return self.notices[-1] if self.notices else None
 
@@ -221,7 +221,7 @@ class Store:
         """
         with self._lock:
             self._notices += 1
-            new = Notice(self._notices, tone, text, page, trouble)
+            new = Toast(self._notices, tone, text, page, trouble)
             same = [notice for notice in self._state.notices if notice.page == page]
             gone = same[: -(_NOTICES - 1)]
             kept = (notice for notice in self._state.notices if notice not in gone)

@@ -56,7 +56,7 @@ class ViewActions:
             place = 0.0
         self._store.update(place=min(place, 1.0), playing=place < 1.0)
 
-    def enter(self, request: requests.Enter) -> None:
+    def enter(self, request: requests.CommitField) -> None:
         """Lets what is typed in a page count at once."""
         entered = {**self._store.state.entered, request.page: time.monotonic()}
         self._store.update(entered=MappingProxyType(entered))

@@ -13,7 +13,7 @@ import numpy as np
 from rcilab.core.spatial import Pose
 from rcilab.i18n.rounding import fixed
 from rcilab.i18n.units import Unit
-from rcilab.workbench.control_lock import Lease
+from rcilab.workbench.control_lock import ControlLock
 from rcilab.workbench.requests import Request, TypeField
 from rcilab.workbench.text import Message
 
@@ -39,7 +39,7 @@ def on_press(button: Any, ask: Ask, make: Callable[[int | None], Request]) -> No
         ask(make(event.client_id))
 
 
-class Linked:
+class BoundControl:
     """A slider, dropdown or checkbox that asks when a person moves it and follows the state otherwise.
 
     Args:
@@ -142,7 +142,7 @@ class PageText:
         """Returns what this page has typed, or what stands there of our own doing; "" when another page typed it."""
         return self.handle.value if page is None or self._page in (None, page) else ""
 
-    def show(self, lease: Lease, text: str) -> bool:
+    def show(self, lease: ControlLock, text: str) -> bool:
         """Writes the state's own words in place of those of a page without the controls; returns whether it did."""
         is_over = self._page is not None and lease.holder not in (None, self._page)
         if is_over:

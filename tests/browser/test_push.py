@@ -29,7 +29,7 @@ def physics(page):
 def has_followed(page, start: np.ndarray) -> bool:
     """Whether the arm has moved; guides anew where a busy machine kept the page silent for 2 s, which ends guiding."""
     if page.status.code == "idle.operator":
-        page.bench.conductor.ask(requests.Drive(what="guide"))
+        page.bench.conductor.ask(requests.RobotCommand(what="guide"))
         page.wait(lambda: page.status.code != "idle.operator", "a free arm")
     return bool(np.abs(page.status.q - start).max() > 0.05)
 

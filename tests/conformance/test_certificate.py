@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rcilab.conformance import StartState, check, verify_certificate
-from rcilab.core.clearance import STANDARD_DISTANCE, SafetyDistance
+from rcilab.core.clearance import STANDARD_DISTANCE, ClearanceLimit
 from rcilab.core.errors import CertificateError, InvalidValueError
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
@@ -79,12 +79,12 @@ def test_a_box_that_bounds_nothing_needs_no_cover():
 
 
 def test_a_certificate_covers_the_distances_it_was_judged_with():
-    low_table = SafetyDistance(floor_height=-0.4)
+    low_table = ClearanceLimit(floor_height=-0.4)
     covered = check(MOTION, MODEL, distance=low_table).certificate
     assert covered.digest != CERTIFICATE.digest
     for certificate in (covered, CERTIFICATE):  # Nobody asks for one of his own: any will do.
         certificate.verify(MOTION, MODEL, START)
-    covered.verify(MOTION, MODEL, START, distance=SafetyDistance(floor_height=-0.4))
+    covered.verify(MOTION, MODEL, START, distance=ClearanceLimit(floor_height=-0.4))
     with pytest.raises(CertificateError, match="does not cover the safety distance") as caught:
         covered.verify(MOTION, MODEL, START, distance=STANDARD_DISTANCE)
     assert caught.value.changed == ("safety distance",)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from rcilab.conformance import ClearanceMonitor, JointMonitor, check, clearance_conditions
 from rcilab.conformance.check import HOLD_SAMPLES
 from rcilab.conformance.clearance_path import LONGEST_STEP, MOST_TRAVEL, clearance_path, in_between
-from rcilab.core.clearance import SafetyDistance
+from rcilab.core.clearance import ClearanceLimit
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.spatial import Pose
@@ -23,7 +23,7 @@ from rcilab.robots import ROBOT_NAMES
 
 MODELS = [load_model(name, tool=Pose((0.0, 0.02, 0.1))) for name in ROBOT_NAMES]
 MODEL = MODELS[ROBOT_NAMES.index("xMatePro7")]
-ASKED = SafetyDistance(tool_radius=0.02, floor=0.01)
+ASKED = ClearanceLimit(tool_radius=0.02, floor=0.01)
 ON_THE_FLOOR = np.array([0.0, 2.0, 0.0, 0.3, 0.0, 0.2, 0.0])
 
 
@@ -193,10 +193,10 @@ def test_a_hand_in_the_base_is_refused_and_the_report_says_who_meets_whom():
     folded = load_model("xMate7")
     limits = folded.limits.joint
     table = np.random.default_rng(0).uniform(limits.lower, limits.upper, (4000, 6))
-    found = folded.clearance(table, SafetyDistance(floor_height=None))
+    found = folded.clearance(table, ClearanceLimit(floor_height=None))
     worst = int(found.distance.argmin())
     motion = Motion.from_cycles(np.repeat(table[worst : worst + 1], 5, axis=0))
-    report = check(motion, folded, distance=SafetyDistance(floor_height=None))
+    report = check(motion, folded, distance=ClearanceLimit(floor_height=None))
     [violation] = report.violations
     assert violation.condition.id == "clearance.links"
     assert violation.value == found.distance[worst] < -0.05
@@ -210,12 +210,12 @@ def test_a_hand_in_the_base_is_refused_and_the_report_says_who_meets_whom():
 def test_what_comes_near_is_advice_and_what_is_asked_for_is_a_bound():
     motion = plan_joint(MODEL, MODEL.home, MODEL.home + 0.1)
     nearest = float(MODEL.clearance(motion.q).distance.min())
-    near = check(motion, MODEL, distance=SafetyDistance(advised=nearest + 0.01))
+    near = check(motion, MODEL, distance=ClearanceLimit(advised=nearest + 0.01))
     assert near.ok
     assert "clearance.links.advised" in {violation.condition.id for violation in near.warnings}
-    refused = check(motion, MODEL, distance=SafetyDistance(links=nearest))
+    refused = check(motion, MODEL, distance=ClearanceLimit(links=nearest))
     assert [v.condition.id for v in refused.violations] == ["clearance.links"]
-    kept = check(motion, MODEL, distance=SafetyDistance(links=nearest - 1e-6))
+    kept = check(motion, MODEL, distance=ClearanceLimit(links=nearest - 1e-6))
     row = next(row for row in kept.rows if row.id == "clearance.links")
     assert (kept.ok, row.place, row.value) == (True, "base and link 2", pytest.approx(nearest, abs=MOST_TRAVEL / 2.0))
     assert "clearance.links.advised" not in {row.id for row in kept.rows}  # What is asked for is more than that.
@@ -225,7 +225,7 @@ def test_without_a_distance_nothing_is_looked_for():
     report = check(plan_joint(MODEL, MODEL.home, ON_THE_FLOOR), MODEL, distance=None)
     assert report.ok
     assert not [row for row in report.rows if row.condition.is_clearance]
-    with pytest.raises(InvalidValueError, match=r"distance: 0\.02 is no SafetyDistance"):
+    with pytest.raises(InvalidValueError, match=r"distance: 0\.02 is no ClearanceLimit"):
         check(plan_joint(MODEL, MODEL.home, MODEL.home), MODEL, distance=0.02)
 
 

@@ -11,7 +11,7 @@ from contextlib import ExitStack
 import pytest
 
 from rcilab.control_process.forked import fork_server
-from rcilab.control_process.launch import Child, start_controller
+from rcilab.control_process.launch import ManagedProcess, start_controller
 from rcilab.core.errors import ConnectionLostError
 from tests.control_process.test_supervisor import wait_for
 
@@ -23,8 +23,8 @@ def run():
     """Runs a line of Python in a copy; the standard library's stopwatch takes it, and does so once."""
     with ExitStack() as afterwards:
 
-        def begin(line: str, **options) -> Child:
-            child = Child("timeit", ["-n", "1", "-r", "1", line], "a line of Python", **options)
+        def begin(line: str, **options) -> ManagedProcess:
+            child = ManagedProcess("timeit", ["-n", "1", "-r", "1", line], "a line of Python", **options)
             afterwards.callback(child.end)
             return child
 

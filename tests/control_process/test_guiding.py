@@ -10,7 +10,7 @@ import pytest
 from rcilab.conformance import check
 from rcilab.control_process import Supervisor
 from rcilab.core.errors import CommandRejectedError, ControlError, InvalidValueError, UsageError
-from rcilab.execution.simulation_control import World
+from rcilab.execution.simulation_control import SimulationControl
 from rcilab.model.robot_model import load_model
 from rcilab.motion import plan_joint
 from tests.waiting import SOON, wait_for
@@ -34,7 +34,7 @@ def supervisor(shared):
 @pytest.fixture
 def world(supervisor):
     host, _, port = supervisor.status().world_address.partition(":")
-    with World(host, int(port)) as world:
+    with SimulationControl(host, int(port)) as world:
         yield world
 
 

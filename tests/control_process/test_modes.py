@@ -11,8 +11,8 @@ from rcilab.conformance import check
 from rcilab.control_process import Supervisor
 from rcilab.core.errors import CertificateError, CommandRejectedError, InvalidValueError, UsageError
 from rcilab.core.state import ControllerMode
-from rcilab.makers.rokae.driver.configuration import RobotSetup
-from rcilab.makers.rokae.driver.controller_parameters import ControlSettings
+from rcilab.makers.rokae.driver.configuration import RobotConfiguration
+from rcilab.makers.rokae.driver.controller_parameters import ControllerParameters
 from rcilab.model.robot_model import load_model
 from rcilab.motion import plan_joint
 from tests.waiting import SOON, wait_for
@@ -153,16 +153,16 @@ def test_a_motion_in_torques_is_brought_to_rest_along_a_way(supervisor):
 
 
 def test_parameters_are_acknowledged_and_told_again(supervisor):
-    control = ControlSettings(joint_stiffness=(250.0,) * 7, filters=(50.0, 40.0, 30.0), desired_wrench=(0.0,) * 6)
-    supervisor.set_up(RobotSetup(control=control)).wait(SOON)
+    control = ControllerParameters(joint_stiffness=(250.0,) * 7, filters=(50.0, 40.0, 30.0), desired_wrench=(0.0,) * 6)
+    supervisor.set_up(RobotConfiguration(control=control)).wait(SOON)
     wait_for(lambda: supervisor.status().setup.control is not None)
     assert supervisor.status().setup.control == control
     times = supervisor.status().setup_times
     supervisor.reconnect().wait(SOON)
     wait_for(lambda: supervisor.status().setup_times > times)
     assert supervisor.status().setup.control == control
-    beyond = ControlSettings(joint_stiffness=(3e4,) * 7)
-    ticket = supervisor.set_up(RobotSetup(control=beyond))
+    beyond = ControllerParameters(joint_stiffness=(3e4,) * 7)
+    ticket = supervisor.set_up(RobotConfiguration(control=beyond))
     with pytest.raises((InvalidValueError, CommandRejectedError), match="joint 1"):
         ticket.wait(SOON)
-    supervisor.set_up(RobotSetup(control=ControlSettings(filters=(1000.0,) * 3))).wait(SOON)
+    supervisor.set_up(RobotConfiguration(control=ControllerParameters(filters=(1000.0,) * 3))).wait(SOON)

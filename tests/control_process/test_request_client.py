@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from rcilab.control_process.error_codec import pack_failure
-from rcilab.control_process.layout import MAIL_SLOTS, ControlBlock, Word
-from rcilab.control_process.message_ring import Mailbox
-from rcilab.control_process.request_client import TicketDesk
+from rcilab.control_process.layout import MAIL_SLOTS, ControlBlock, Counter
+from rcilab.control_process.message_ring import MessageRing
+from rcilab.control_process.request_client import RequestClient
 from rcilab.core.errors import ConnectionLostError, UsageError
 
 
@@ -19,9 +19,9 @@ def block():
 
 
 def test_each_reply_settles_the_ticket_it_is_for_and_failures_are_returned(block):
-    desk = TicketDesk(block)
-    inbox = Mailbox(block.requests, block.words, Word.REQUESTS_POSTED, Word.REQUESTS_TAKEN)
-    outbox = Mailbox(block.replies, block.words, Word.REPLIES_POSTED, Word.REPLIES_TAKEN)
+    desk = RequestClient(block)
+    inbox = MessageRing(block.requests, block.words, Counter.REQUESTS_POSTED, Counter.REQUESTS_TAKEN)
+    outbox = MessageRing(block.replies, block.words, Counter.REPLIES_POSTED, Counter.REPLIES_TAKEN)
     tickets = [desk.send(what, {"kind": what}) for what in ("first", "second", "third")]
     letters = [inbox.take() for _ in tickets]
     assert [letter["kind"] for letter in letters] == ["first", "second", "third"]
@@ -35,7 +35,7 @@ def test_each_reply_settles_the_ticket_it_is_for_and_failures_are_returned(block
 
 
 def test_when_nobody_will_answer_any_more_every_ticket_fails_with_the_reason(block):
-    desk = TicketDesk(block)
+    desk = RequestClient(block)
     ticket = desk.send("power on", {"kind": "power"})
     desk.fail_all(ConnectionLostError("it died"))
     with pytest.raises(ConnectionLostError, match="it died"):
@@ -44,7 +44,7 @@ def test_when_nobody_will_answer_any_more_every_ticket_fails_with_the_reason(blo
 
 
 def test_a_full_mailbox_refuses_requests_and_lets_the_end_go_its_way(block):
-    desk = TicketDesk(block)
+    desk = RequestClient(block)
     for _ in range(MAIL_SLOTS):
         desk.send("stop", {"kind": "stop"})
     with pytest.raises(UsageError, match="requests are waiting already"):

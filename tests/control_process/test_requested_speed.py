@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from rcilab.control_process import SupervisorStatus
-from rcilab.control_process.requested_speed import PaceWish, tell_pace_refusal
+from rcilab.control_process.requested_speed import RequestedSpeed, tell_pace_refusal
 from rcilab.core.errors import ConnectionLostError, PlanningError
 
 IDLE = SupervisorStatus(phase="idle", code="idle")
@@ -13,12 +13,12 @@ MOVING = SupervisorStatus(phase="moving", code="moving", motion_duration=3.0, pa
 HELD = replace(MOVING, code="moving.held", pace=0.0)
 
 
-def due(wish: PaceWish, status: SupervisorStatus, *, is_under_way: bool = False) -> float | None:
+def due(wish: RequestedSpeed, status: SupervisorStatus, *, is_under_way: bool = False) -> float | None:
     return wish.due(status, is_under_way=is_under_way)
 
 
 def test_of_many_wishes_only_the_newest_is_handed_over_and_only_once() -> None:
-    wish = PaceWish()
+    wish = RequestedSpeed()
     for pace in (0.9, 0.5, 0.3):
         wish.choose(pace, MOVING)
     assert due(wish, MOVING, is_under_way=True) is None
@@ -27,7 +27,7 @@ def test_of_many_wishes_only_the_newest_is_handed_over_and_only_once() -> None:
 
 
 def test_what_is_chosen_while_nothing_moves_is_no_wish_of_the_next_motion() -> None:
-    wish = PaceWish()
+    wish = RequestedSpeed()
     wish.choose(0.4, IDLE)
     assert due(wish, IDLE) is None
     assert due(wish, MOVING) is None, "it begins at the pace it is executed with"
@@ -36,7 +36,7 @@ def test_what_is_chosen_while_nothing_moves_is_no_wish_of_the_next_motion() -> N
 
 
 def test_a_held_motion_keeps_waiting_while_the_pace_is_chosen() -> None:
-    wish = PaceWish()
+    wish = RequestedSpeed()
     wish.hold()
     assert due(wish, MOVING) == 0.0
     wish.choose(0.5, HELD)
@@ -47,7 +47,7 @@ def test_a_held_motion_keeps_waiting_while_the_pace_is_chosen() -> None:
 
 @pytest.mark.parametrize("status", [IDLE, replace(MOVING, motion_duration=None)])
 def test_nothing_is_asked_of_an_arm_that_no_motion_moves(status: SupervisorStatus) -> None:
-    wish = PaceWish()
+    wish = RequestedSpeed()
     wish.hold()
     assert due(wish, status) is None
     assert due(wish, MOVING) is None, "what was wanted before is forgotten"

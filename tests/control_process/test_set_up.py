@@ -16,7 +16,7 @@ from rcilab.core.errors import CertificateError, ControlError, InvalidValueError
 from rcilab.core.faults import Fault
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
-from rcilab.makers.rokae.driver.configuration import ForceControlFrame, RobotSetup
+from rcilab.makers.rokae.driver.configuration import ForceControlFrame, RobotConfiguration
 from rcilab.makers.rokae.wire import ForceFrame
 from rcilab.model.dynamics.payload import Payload
 from rcilab.model.robot_model import load_model
@@ -41,7 +41,7 @@ def supervisor():
 
 
 def test_a_set_up_survives_the_way_through_json():
-    setup = RobotSetup(tool=TOOL, load=LOAD, box=box_around((0.4, 0.0, 0.5)), force=FORCE)
+    setup = RobotConfiguration(tool=TOOL, load=LOAD, box=box_around((0.4, 0.0, 0.5)), force=FORCE)
     back = parse_setup(json.loads(json.dumps(pack_setup(setup))))
     assert back.parts == setup.parts == ("box", "tool", "load", "force")
     assert back.tool.is_close(TOOL, 0.0)
@@ -53,7 +53,7 @@ def test_a_set_up_survives_the_way_through_json():
 
 
 def test_the_controller_reports_the_tool_it_was_told_and_again_after_a_new_connection(supervisor):
-    supervisor.set_up(RobotSetup(tool=TOOL, load=LOAD, force=FORCE)).wait(SOON)
+    supervisor.set_up(RobotConfiguration(tool=TOOL, load=LOAD, force=FORCE)).wait(SOON)
     wait_for(lambda: (T := supervisor.status().T_flange_tool) is not None and T.is_close(TOOL, 1e-9))
     status = supervisor.status()
     assert status.setup.parts == ("tool", "load", "force")
@@ -64,35 +64,35 @@ def test_the_controller_reports_the_tool_it_was_told_and_again_after_a_new_conne
 
 
 def test_a_motion_that_was_not_checked_with_the_box_of_now_is_refused(supervisor):
-    supervisor.set_up(RobotSetup(tool=TOOL)).wait(SOON)
+    supervisor.set_up(RobotConfiguration(tool=TOOL)).wait(SOON)
     q = supervisor.status().q_c
     motion = plan_joint(MODEL, q, MODEL.home + 0.2, speed=0.5)
     certificate = check(motion, supervisor.model).certificate
     here = supervisor.model.forward(q).position
-    supervisor.set_up(RobotSetup(box=box_around(here, 0.05))).wait(SOON)
+    supervisor.set_up(RobotConfiguration(box=box_around(here, 0.05))).wait(SOON)
     with pytest.raises(CertificateError, match="safety box"):
         supervisor.execute(motion, certificate)
     assert not check(motion, supervisor.model, box=box_around(here, 0.05)).ok
-    supervisor.set_up(RobotSetup(box=SafetyBox(size=(1, 1, 1), T_base_box=Pose(), active=False))).wait(SOON)
+    supervisor.set_up(RobotConfiguration(box=SafetyBox(size=(1, 1, 1), T_base_box=Pose(), active=False))).wait(SOON)
     supervisor.execute(motion, certificate).wait(SOON)
 
 
 def test_a_set_up_that_is_none_or_too_heavy_is_refused_before_it_is_sent(supervisor):
-    with pytest.raises(InvalidValueError, match="RobotSetup"):
+    with pytest.raises(InvalidValueError, match="RobotConfiguration"):
         supervisor.set_up(TOOL)
     with pytest.raises(InvalidValueError, match="rated"):
-        supervisor.set_up(RobotSetup(load=Payload(mass=99.0)))
+        supervisor.set_up(RobotConfiguration(load=Payload(mass=99.0)))
 
 
 def test_what_the_controller_refuses_stands_in_the_way_of_a_motion(supervisor):
     home = plan_joint(MODEL, supervisor.status().q_c, MODEL.home, speed=0.5)
-    far = RobotSetup(force=ForceControlFrame(T_flange_force=Pose((50.0, 0.0, 0.0))))
+    far = RobotConfiguration(force=ForceControlFrame(T_flange_force=Pose((50.0, 0.0, 0.0))))
     ticket = supervisor.set_up(far)
     with pytest.raises(rcilab.RcilabError, match=r"T_flange_force: .* m from the flange"):
         ticket.wait(SOON)
     with pytest.raises(UsageError, match=r"T_flange_force: .* m from the flange"):
         supervisor.execute(home, check(home, supervisor.model).certificate)
-    supervisor.set_up(RobotSetup(force=FORCE)).wait(SOON)
+    supervisor.set_up(RobotConfiguration(force=FORCE)).wait(SOON)
     supervisor.execute(home, check(home, supervisor.model).certificate).wait(SOON)
 
 

@@ -17,9 +17,9 @@ import pytest
 
 from rcilab.control_process import jitter_histogram as lateness
 from rcilab.control_process.error_codec import pack_failure, unpack_failure
-from rcilab.control_process.jitter_histogram import LatenessHistogram, summarise
-from rcilab.control_process.layout import MAIL_SIZE, MAIL_SLOTS, RING_CYCLES, VERSION, ControlBlock, Word
-from rcilab.control_process.message_ring import Mailbox
+from rcilab.control_process.jitter_histogram import JitterHistogram, summarise
+from rcilab.control_process.layout import MAIL_SIZE, MAIL_SLOTS, RING_CYCLES, VERSION, ControlBlock, Counter
+from rcilab.control_process.message_ring import MessageRing
 from rcilab.control_process.ring import RingReader
 from rcilab.control_process.settings import build_settings, parse_settings
 from rcilab.control_process.snapshot import Snapshot, read_snapshot, write_snapshot
@@ -40,8 +40,8 @@ def block():
     block.close()
 
 
-def requests_of(block: ControlBlock) -> Mailbox:
-    return Mailbox(block.requests, block.words, Word.REQUESTS_POSTED, Word.REQUESTS_TAKEN)
+def requests_of(block: ControlBlock) -> MessageRing:
+    return MessageRing(block.requests, block.words, Counter.REQUESTS_POSTED, Counter.REQUESTS_TAKEN)
 
 
 def write_rows(recorder: Recorder, block: ControlBlock, count: int) -> None:
@@ -49,16 +49,16 @@ def write_rows(recorder: Recorder, block: ControlBlock, count: int) -> None:
     for _ in range(count):
         k = recorder.count
         recorder.write(k, k * 1e-3, k, k, 0.0, 1.0, [float(k)] * 7, zeros, zeros, zeros, 0, 0, (1, 5, 0))
-        block.words[Word.CYCLES] = recorder.count
+        block.words[Counter.CYCLES] = recorder.count
 
 
 def test_the_other_side_sees_the_same_block(block):
     other = ControlBlock(os.dup(block.descriptor))
-    block.words[Word.STOPS_ASKED] = 41
+    block.words[Counter.STOPS_ASKED] = 41
     block.motion[2] = range(7)
     assert other.n == 7
     assert other.settings == {"arm": "seven joints"}
-    assert other.words[Word.STOPS_ASKED] == 41
+    assert other.words[Counter.STOPS_ASKED] == 41
     assert other.motion[2].tolist() == list(range(7))
     other.close()
 
@@ -170,7 +170,7 @@ def test_percentiles_of_the_histogram_are_those_of_the_numbers():
     rng = np.random.default_rng(5)
     numbers = 10.0 ** rng.uniform(-5.5, -2.5, 5000)
     words = memoryview(bytearray(8 * lateness.SIZE)).cast("Q")
-    histogram = LatenessHistogram(words)
+    histogram = JitterHistogram(words)
     for number in numbers:
         histogram.add(float(number))
     figures = summarise(words)

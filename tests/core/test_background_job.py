@@ -6,17 +6,17 @@ import threading
 
 import pytest
 
-from rcilab.core.background_job import Background
+from rcilab.core.background_job import BackgroundJob
 from rcilab.core.errors import PlanningError
 from tests.waiting import wait_for
 
 
 @pytest.fixture
-def jobs() -> Background[str, int]:
-    return Background("test")
+def jobs() -> BackgroundJob[str, int]:
+    return BackgroundJob("test")
 
 
-def finished(jobs: Background[str, int]) -> tuple[str, object]:
+def finished(jobs: BackgroundJob[str, int]) -> tuple[str, object]:
     wait_for(lambda: jobs.is_done, 20.0, "the job")
     return jobs.take()
 
@@ -44,7 +44,7 @@ def test_a_job_tells_how_much_is_done(jobs):
     finished(jobs)
 
 
-@pytest.mark.parametrize("drop", [Background.cancel, lambda jobs: jobs.start("next", lambda tell: 7)])
+@pytest.mark.parametrize("drop", [BackgroundJob.cancel, lambda jobs: jobs.start("next", lambda tell: 7)])
 def test_a_job_that_is_dropped_is_gone_at_once_and_its_thread_ends(jobs, drop):
     going, ended = threading.Event(), threading.Event()
 

@@ -9,7 +9,7 @@ import time
 import pytest
 
 from rcilab.core.errors import ConnectionLostError, InvalidValueError
-from rcilab.execution.external_force_hold import HeldPush
+from rcilab.execution.external_force_hold import ExternalForceHold
 from tests.waiting import wait_for
 
 
@@ -42,7 +42,7 @@ def world():
 
 @pytest.fixture
 def push(world):
-    with HeldPush(world) as push:
+    with ExternalForceHold(world) as push:
         yield push
 
 
@@ -92,7 +92,7 @@ def test_a_force_that_is_no_number_is_refused_at_once(push, world):
 
 
 def test_closing_lets_go(world):
-    push = HeldPush(world)
+    push = ExternalForceHold(world)
     push.hold(DOWN)
     wait_for(lambda: len(world.asked) == 1)
     push.close()

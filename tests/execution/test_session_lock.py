@@ -7,12 +7,12 @@ import threading
 import pytest
 
 from rcilab.core.errors import UsageError
-from rcilab.execution.session_lock import Turns
+from rcilab.execution.session_lock import SessionLock
 from tests.waiting import wait_for
 
 
 def test_a_request_waits_for_another_threads_turn() -> None:
-    turns, seen = Turns(lambda: None), []
+    turns, seen = SessionLock(lambda: None), []
 
     def ask() -> None:
         with turns.take("a question"):
@@ -28,7 +28,7 @@ def test_a_request_waits_for_another_threads_turn() -> None:
 
 
 def test_a_request_is_refused_while_a_motion_runs_in_its_own_thread_too() -> None:
-    turns = Turns(lambda: None)
+    turns = SessionLock(lambda: None)
     with turns.set_out("a motion"), turns.move():
         with pytest.raises(UsageError, match="no question meanwhile"), turns.take("question"):
             pass
@@ -37,7 +37,7 @@ def test_a_request_is_refused_while_a_motion_runs_in_its_own_thread_too() -> Non
 
 
 def test_a_stop_counts_from_setting_out_on_and_for_one_motion() -> None:
-    turns = Turns(lambda: None)
+    turns = SessionLock(lambda: None)
     turns.stop("too early")
     with turns.set_out("a motion"):
         assert turns.reason_to_stop(0.0) is None
@@ -51,7 +51,7 @@ def test_a_stop_counts_from_setting_out_on_and_for_one_motion() -> None:
 
 def test_a_motion_that_closes_its_own_connection_comes_to_its_end_first() -> None:
     said: list[str] = []
-    turns = Turns(lambda: said.append("disconnected"))
+    turns = SessionLock(lambda: said.append("disconnected"))
     with turns.set_out("a motion"), turns.move():
         turns.close()
         assert turns.reason_to_stop(0.0) is not None
@@ -63,7 +63,7 @@ def test_a_motion_that_closes_its_own_connection_comes_to_its_end_first() -> Non
 
 def test_another_thread_that_closes_waits_for_the_motion() -> None:
     said: list[str] = []
-    turns = Turns(lambda: said.append("disconnected"))
+    turns = SessionLock(lambda: said.append("disconnected"))
     closer = threading.Thread(target=turns.close)
     with turns.set_out("a motion"):
         with turns.move():

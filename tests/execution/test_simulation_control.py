@@ -21,7 +21,7 @@ from rcilab.core.errors import (
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import IDENTITY, Pose
 from rcilab.execution import connect
-from rcilab.execution.simulation_control import World
+from rcilab.execution.simulation_control import SimulationControl
 from rcilab.makers.rokae.wire import SafetyStop
 from rcilab.model.dynamics.payload import Payload
 from rcilab.model.robot_model import load_model
@@ -278,7 +278,7 @@ def test_a_controller_without_a_world_says_so_in_words():
         controller.end()
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
-        world = World(*free.getsockname())
+        world = SimulationControl(*free.getsockname())
         with pytest.raises(ConnectionLostError, match="does not answer status"):
             world.status()
 
@@ -296,7 +296,7 @@ def test_something_else_at_that_port_is_no_world():
 
         thread = threading.Thread(target=answer)
         thread.start()
-        with World(*listener.getsockname()) as world, pytest.raises(ConnectionLostError, match="no JSON"):
+        with SimulationControl(*listener.getsockname()) as world, pytest.raises(ConnectionLostError, match="no JSON"):
             world.status()
         thread.join()
 

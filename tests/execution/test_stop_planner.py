@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from rcilab.conformance import JointMonitor
 from rcilab.core.command import JointTorque
-from rcilab.execution.stop_planner import StreamBrake, TorqueBrake
+from rcilab.execution.stop_planner import StreamStopPlanner, TorqueStopPlanner
 from rcilab.model.robot_model import load_model
 from rcilab.motion import plan_joint
 
@@ -23,7 +23,7 @@ def test_a_stop_from_anywhere_in_a_motion_breaks_no_condition(seed, share, speed
     start, goal = rng.uniform(0.7 * LIMITS.lower, 0.7 * LIMITS.upper, (2, 7))
     rows = plan_joint(MODEL, start, goal, speed=speed).q
     count = 1 + int(share * (len(rows) - 1))
-    brake = StreamBrake(LIMITS)
+    brake = StreamStopPlanner(LIMITS)
     brake.begin(*((cycle, start) for cycle in (-3, -2, -1)))
     for cycle, row in enumerate(rows[:count]):
         brake.remember(row, cycle)
@@ -35,7 +35,7 @@ def test_a_stop_from_anywhere_in_a_motion_breaks_no_condition(seed, share, speed
 
 
 def test_missing_samples_do_not_look_like_speed():
-    brake = StreamBrake(LIMITS)
+    brake = StreamStopPlanner(LIMITS)
     speed = np.full(7, 0.5)
     brake.begin(*((cycle, speed * cycle * 1e-3) for cycle in (-3, -2, -1)))
     for cycle in (0, 1, 7, 12):
@@ -45,7 +45,7 @@ def test_missing_samples_do_not_look_like_speed():
 
 
 def test_a_repeated_cycle_changes_nothing():
-    brake = StreamBrake(LIMITS)
+    brake = StreamStopPlanner(LIMITS)
     still = np.zeros(7)
     brake.begin(*((cycle, still) for cycle in (-3, -2, -1)))
     brake.remember(still, 0)
@@ -54,7 +54,7 @@ def test_a_repeated_cycle_changes_nothing():
 
 
 def test_torques_go_to_zero_at_the_allowed_rate():
-    brake = TorqueBrake(LIMITS)
+    brake = TorqueStopPlanner(LIMITS)
     tau = np.array([20.0, -20.0, 5.0, 0.0, 1.0, -1.0, 0.3])
     brake.remember(JointTorque(tau), 0, None)
     way = np.array([command.tau for command in brake.plan()])

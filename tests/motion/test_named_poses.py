@@ -11,7 +11,7 @@ import pytest
 
 from rcilab.core.errors import InvalidValueError, VersionMismatchError
 from rcilab.model.robot_model import load_model
-from rcilab.motion.named_poses import PoseBook, default_file
+from rcilab.motion.named_poses import NamedPoseStore, default_file
 
 PRO7, MATE3 = load_model("xMatePro7"), load_model("xMate3")
 
@@ -22,11 +22,11 @@ def file(tmp_path) -> Path:
 
 
 def test_a_stored_pose_comes_back_in_the_order_of_storing_and_goes_when_deleted(file):
-    book = PoseBook(PRO7, file)
+    book = NamedPoseStore(PRO7, file)
     assert book.names() == ()
     assert book.store("  above the table ", PRO7.home) == "above the table"
     book.store("夹爪上方", np.zeros(7))
-    again = PoseBook(PRO7, file)
+    again = NamedPoseStore(PRO7, file)
     assert again.names() == ("above the table", "夹爪上方")
     assert again.recall("above the table") == pytest.approx(PRO7.home, abs=1e-9)
     again.delete("above the table")
@@ -35,23 +35,23 @@ def test_a_stored_pose_comes_back_in_the_order_of_storing_and_goes_when_deleted(
 
 
 def test_poses_belong_to_one_arm(file):
-    PoseBook(PRO7, file).store("here", PRO7.home)
-    other = PoseBook(MATE3, file)
+    NamedPoseStore(PRO7, file).store("here", PRO7.home)
+    other = NamedPoseStore(MATE3, file)
     assert other.names() == ()
     other.store("here", MATE3.home)
     other.delete("here")
-    assert PoseBook(PRO7, file).names() == ("here",)
+    assert NamedPoseStore(PRO7, file).names() == ("here",)
 
 
 @pytest.mark.parametrize("name", ["", "   ", "x" * 41, "two\nlines"])
 def test_what_is_no_name_is_refused(file, name):
     with pytest.raises(InvalidValueError, match="1 to 40"):
-        PoseBook(PRO7, file).store(name, PRO7.home)
+        NamedPoseStore(PRO7, file).store(name, PRO7.home)
     assert not file.exists()
 
 
 def test_a_taken_name_and_an_unknown_one_are_told(file):
-    book = PoseBook(PRO7, file)
+    book = NamedPoseStore(PRO7, file)
     book.store("here", PRO7.home)
     with pytest.raises(InvalidValueError, match="is taken"):
         book.store("here", np.zeros(7))
@@ -63,7 +63,7 @@ def test_a_taken_name_and_an_unknown_one_are_told(file):
 @pytest.mark.parametrize("q", [[0.0] * 6, [float("nan")] * 7])
 def test_what_is_no_pose_is_not_stored(file, q):
     with pytest.raises(InvalidValueError):
-        PoseBook(PRO7, file).store("bad", q)
+        NamedPoseStore(PRO7, file).store("bad", q)
     assert not file.exists()
 
 
@@ -79,7 +79,7 @@ def test_what_is_no_pose_is_not_stored(file, q):
 def test_a_file_that_is_none_is_named_and_left_alone(file, text, said):
     file.parent.mkdir()
     file.write_text(text)
-    book = PoseBook(PRO7, file)
+    book = NamedPoseStore(PRO7, file)
     for act in (book.names, lambda: book.store("a", PRO7.home), lambda: book.delete("a")):
         with pytest.raises(InvalidValueError, match=said):
             act()
@@ -90,7 +90,7 @@ def test_a_file_of_another_version_is_left_alone(file):
     file.parent.mkdir()
     file.write_text('{"format": "rcilab poses", "version": 2, "poses": {}}')
     with pytest.raises(VersionMismatchError, match="found version 2"):
-        PoseBook(PRO7, file).names()
+        NamedPoseStore(PRO7, file).names()
 
 
 @pytest.mark.parametrize(("angles", "said"), [([9.0] + [0.0] * 6, "joint 1"), ([0.0] * 6, "mend"), ("here", "mend")])
@@ -99,11 +99,11 @@ def test_a_pose_that_somebody_has_written_by_hand_is_looked_at(file, angles, sai
     content = {"format": "rcilab poses", "version": 1, "poses": {"xMatePro7": {"bad": angles}}}
     file.write_text(json.dumps(content))
     with pytest.raises(InvalidValueError, match=said):
-        PoseBook(PRO7, file).recall("bad")
+        NamedPoseStore(PRO7, file).recall("bad")
 
 
 def test_a_write_that_fails_leaves_the_old_poses_and_nothing_else(file, monkeypatch):
-    book = PoseBook(PRO7, file)
+    book = NamedPoseStore(PRO7, file)
     book.store("old", PRO7.home)
 
     def fail(*_):

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rcilab.core.spatial import rotation_from_wxyz, turn_between
-from rcilab.motion.orientation_path import SteadyTurn, turn_through, turn_to, turns_between
+from rcilab.motion.orientation_path import Slerp, turn_through, turn_to, turns_between
 from rcilab.motion.path import slerp
 
 EPS = 1e-4  # Share over which differences are formed: their errors are about EPS^2, and 1e-16 / EPS^2 of rounding.
@@ -83,7 +83,7 @@ def test_a_steady_turn_between_two_orientations_is_their_slerp(start, goal, shar
 
 
 def test_a_steady_turn_may_go_round_and_round():
-    turning = SteadyTurn(about(0.3), (0.0, 0.0, 4.0 * math.pi))
+    turning = Slerp(about(0.3), (0.0, 0.0, 4.0 * math.pi))
     assert np.abs(at(turning, 0.5) - at(turning, 0.0)).max() < 1e-12
     assert np.abs(at(turning, 1.0) - at(turning, 0.0)).max() < 1e-12
     assert np.abs(at(turning, 0.25) - at(turning, 0.0)).max() > 1.0
@@ -91,6 +91,6 @@ def test_a_steady_turn_may_go_round_and_round():
 
 @given(rotations, st.tuples(*[st.floats(-0.8, 0.8)] * 3))
 def test_the_turn_from_row_to_row_is_in_base_axes(start, turn):
-    rows = np.stack((np.array(start).reshape(3, 3), at(SteadyTurn(start, turn), 1.0)))
+    rows = np.stack((np.array(start).reshape(3, 3), at(Slerp(start, turn), 1.0)))
     expected = turn_between(start, rows[1].ravel().tolist())
     assert np.abs(turns_between(rows)[0] - expected).max() < 1e-9

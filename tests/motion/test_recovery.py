@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rcilab import SafetyBox, check, load_model, plan_recovery
-from rcilab.core.clearance import SafetyDistance
+from rcilab.core.clearance import ClearanceLimit
 from rcilab.core.errors import PlanningError
 from rcilab.core.spatial import Pose
 from rcilab.motion import Motion, plan_joint, plan_line
@@ -30,7 +30,7 @@ def test_a_joint_outside_is_led_straight_back_and_the_others_stay(name, degrees)
     assert (np.diff(motion.q[:, 0]) <= 0.0).all()
     assert motion.goal[0] == pytest.approx(model.limits.joint.upper[0] - np.radians(1.0))
     assert (motion.q[:, 1:] == q[1:]).all()
-    assert check(motion, model, distance=SafetyDistance()).certificate is not None
+    assert check(motion, model, distance=ClearanceLimit()).certificate is not None
 
 
 def test_an_arm_that_is_inside_stays():

@@ -9,7 +9,7 @@ import pytest
 
 from rcilab.notebook import browser_heartbeat as heart
 from rcilab.notebook import cells
-from rcilab.notebook.browser_heartbeat import PATIENCE, Heart
+from rcilab.notebook.browser_heartbeat import PATIENCE, BrowserHeartbeat
 
 
 @pytest.fixture
@@ -20,12 +20,12 @@ def ear() -> Iterator[asyncio.AbstractEventLoop]:
 
 
 @pytest.fixture
-def asked(monkeypatch: pytest.MonkeyPatch) -> Heart:
+def asked(monkeypatch: pytest.MonkeyPatch) -> BrowserHeartbeat:
     monkeypatch.setattr(heart, "INTERVAL", 0.0)  # Every beat is a question.
-    return Heart()
+    return BrowserHeartbeat()
 
 
-def answer(asked: Heart, ear: asyncio.AbstractEventLoop) -> None:
+def answer(asked: BrowserHeartbeat, ear: asyncio.AbstractEventLoop) -> None:
     async def say() -> None:
         asked._on_answer({})
 
@@ -36,7 +36,7 @@ def listen(ear: asyncio.AbstractEventLoop) -> None:
     ear.run_until_complete(asyncio.sleep(0))
 
 
-def test_a_page_that_never_answered_is_not_missed(asked: Heart) -> None:
+def test_a_page_that_never_answered_is_not_missed(asked: BrowserHeartbeat) -> None:
     for _ in range(2 * PATIENCE):
         asked.beat()
     assert not asked.was_seen
@@ -44,7 +44,7 @@ def test_a_page_that_never_answered_is_not_missed(asked: Heart) -> None:
 
 
 def test_a_page_is_gone_after_as_many_questions_as_patience_has_and_back_with_an_answer(
-    asked: Heart, ear: asyncio.AbstractEventLoop
+    asked: BrowserHeartbeat, ear: asyncio.AbstractEventLoop
 ) -> None:
     answer(asked, ear)
     for count in range(PATIENCE):
@@ -56,7 +56,9 @@ def test_a_page_is_gone_after_as_many_questions_as_patience_has_and_back_with_an
     assert not asked.is_gone
 
 
-def test_what_is_asked_while_nobody_listens_counts_once(asked: Heart, ear: asyncio.AbstractEventLoop) -> None:
+def test_what_is_asked_while_nobody_listens_counts_once(
+    asked: BrowserHeartbeat, ear: asyncio.AbstractEventLoop
+) -> None:
     answer(asked, ear)
     for _ in range(10 * PATIENCE):
         asked.beat()
@@ -64,7 +66,7 @@ def test_what_is_asked_while_nobody_listens_counts_once(asked: Heart, ear: async
     assert not asked.is_gone
 
 
-def test_an_ear_that_the_page_has_taken_along_is_silence(asked: Heart) -> None:
+def test_an_ear_that_the_page_has_taken_along_is_silence(asked: BrowserHeartbeat) -> None:
     ear = asyncio.new_event_loop()
     answer(asked, ear)
     ear.close()
@@ -74,9 +76,9 @@ def test_an_ear_that_the_page_has_taken_along_is_silence(asked: Heart) -> None:
 
 
 def test_the_thread_of_cells_hears_nothing_while_a_cell_runs(
-    asked: Heart, ear: asyncio.AbstractEventLoop, monkeypatch: pytest.MonkeyPatch
+    asked: BrowserHeartbeat, ear: asyncio.AbstractEventLoop, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    running = cells.Cells(None)
+    running = cells.CellRegistry(None)
     running._running.set()
     monkeypatch.setattr(heart, "kernel_cells", lambda: running)
     answer(asked, ear)

@@ -13,19 +13,19 @@ import pytest
 import rcilab
 from rcilab import notebook
 from rcilab.notebook import cells
-from rcilab.notebook.cells import Cells
-from rcilab.notebook.kernel_reachability import Place
+from rcilab.notebook.cells import CellRegistry
+from rcilab.notebook.kernel_reachability import KernelReachability
 from tests.late import Late
 from tests.processes import processes
 
 widget = Late("ipywidgets.widgets.widget")
 
 PRO7 = rcilab.load_model("xMatePro7")
-HERE = Place(way="loopback")
+HERE = KernelReachability(way="loopback")
 
 
 class Shell:
-    """As much of ipykernel's shell as `Cells` needs: a cell at a time, by its id or by its text."""
+    """As much of ipykernel's shell as `CellRegistry` needs: a cell at a time, by its id or by its text."""
 
     def __init__(self) -> None:
         self.events = self
@@ -50,7 +50,7 @@ class Shell:
 class Thing:
     """Something that a cell owns."""
 
-    def __init__(self, owner: Cells) -> None:
+    def __init__(self, owner: CellRegistry) -> None:
         self.closed = self.halted = 0
         owner.adopt(self)
 
@@ -75,25 +75,25 @@ def shell() -> Shell:
 
 
 @pytest.fixture
-def owner(shell: Shell) -> Cells:
-    return Cells(shell)
+def owner(shell: Shell) -> CellRegistry:
+    return CellRegistry(shell)
 
 
-def test_a_cell_that_runs_again_ends_what_it_made_and_nothing_else(shell: Shell, owner: Cells) -> None:
+def test_a_cell_that_runs_again_ends_what_it_made_and_nothing_else(shell: Shell, owner: CellRegistry) -> None:
     first = shell.run(lambda: Thing(owner), "a")
     other = shell.run(lambda: Thing(owner), "b")
     second = shell.run(lambda: Thing(owner), "a")
     assert (first.closed, other.closed, second.closed) == (1, 0, 0)
 
 
-def test_where_nobody_names_cells_their_text_does(shell: Shell, owner: Cells) -> None:
+def test_where_nobody_names_cells_their_text_does(shell: Shell, owner: CellRegistry) -> None:
     first = shell.run(lambda: Thing(owner), None, "Lab(model)")
     other = shell.run(lambda: Thing(owner), None, "Scene(model)")
     shell.run(lambda: Thing(owner), None, "Lab(model)")
     assert (first.closed, other.closed) == (1, 0)
 
 
-def test_an_interrupted_cell_stops_everything_that_moves_and_closes_nothing(shell: Shell, owner: Cells) -> None:
+def test_an_interrupted_cell_stops_everything_that_moves_and_closes_nothing(shell: Shell, owner: CellRegistry) -> None:
     thing = shell.run(lambda: Thing(owner), "a")
     shell.run(lambda: None, "b", error=KeyboardInterrupt())
     assert (thing.halted, thing.closed) == (1, 0)
@@ -101,14 +101,14 @@ def test_an_interrupted_cell_stops_everything_that_moves_and_closes_nothing(shel
     assert thing.halted == 1
 
 
-def test_the_end_of_the_kernel_ends_everything(shell: Shell, owner: Cells) -> None:
+def test_the_end_of_the_kernel_ends_everything(shell: Shell, owner: CellRegistry) -> None:
     things = [shell.run(lambda: Thing(owner), name) for name in "abc"]
     owner.close()
     assert [thing.closed for thing in things] == [1, 1, 1]
 
 
 def test_fifty_re_runs_leave_no_thread_no_socket_no_widget_and_no_process(
-    shell: Shell, owner: Cells, monkeypatch: pytest.MonkeyPatch
+    shell: Shell, owner: CellRegistry, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     before, others = set(threading.enumerate()), processes()  # What other tests have left in this process.
     monkeypatch.setattr("rcilab.notebook.part.kernel_cells", lambda: owner)

@@ -13,11 +13,11 @@ import pytest
 
 import rcilab
 from rcilab import notebook
-from rcilab.app.fault_lab import Exhibit
+from rcilab.app.fault_lab import FaultDemo
 from rcilab.core.faults import Fault
 from rcilab.i18n.locale import LANGUAGES
 from rcilab.i18n.translator import load_face
-from rcilab.notebook.kernel_reachability import Place
+from rcilab.notebook.kernel_reachability import KernelReachability
 from tests.processes import processes
 from tests.waiting import wait_for
 
@@ -31,7 +31,7 @@ def text_of(widget: Any) -> str:
     return html.unescape(re.sub(r"<[^>]*>", "", widget.value))
 
 
-def require_at_moment(exhibit: Exhibit, scene: Scene, timeline: Timeline, plot: MotionPlot) -> None:
+def require_at_moment(exhibit: FaultDemo, scene: Scene, timeline: Timeline, plot: MotionPlot) -> None:
     picture = scene._picture
     assert picture is not None
     assert timeline.moment == pytest.approx(exhibit.time)
@@ -48,7 +48,7 @@ def test_a_fault_is_provoked_on_a_private_controller_looked_at_and_the_session_i
         own = processes()
         with (
             notebook.FaultPanel(robot, language="zh") as panel,
-            notebook.Scene(panel, place=Place(way="loopback")) as scene,
+            notebook.Scene(panel, place=KernelReachability(way="loopback")) as scene,
         ):
             panel.fault.value = Fault.COMMAND_JOINT_ACCELERATION_DISCONTINUITY
             panel.provoke.click()

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from rcilab.notebook.kernel_reachability import Place, Server, Way, find_place
+from rcilab.notebook.kernel_reachability import KernelReachability, Server, Way, find_place
 
 LOCAL = Server(hostname="127.0.0.1", base="/")
 
@@ -76,7 +76,7 @@ def test_code_server_says_where_a_port_is(ports: str, address: str) -> None:
 
 def test_where_ports_are_shown_to_a_login_only_nothing_is_framed() -> None:
     known = {"VSCODE_PROXY_URI": CODE_SERVER["VSCODE_PROXY_URI"], "SSH_CONNECTION": "x", "VSCODE_PID": "7"}
-    assert find_place(known, None, True, CODE_CELL) == Place(way="static", proxy_helps=False)
+    assert find_place(known, None, True, CODE_CELL) == KernelReachability(way="static", proxy_helps=False)
 
 
 def test_the_cell_that_runs_is_asked(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -91,7 +91,9 @@ def test_the_cell_that_runs_is_asked(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_an_address_goes_below_the_notebook_server_behind_a_proxy() -> None:
     place = find_place({"JUPYTERHUB_SERVICE_PREFIX": "/user/ann/"}, None, True)
     assert place.address("http://127.0.0.1:4711/static/?plain") == "/user/ann/proxy/4711/static/?plain"
-    assert Place(way="loopback").address("http://127.0.0.1:4711/static/") == "http://127.0.0.1:4711/static/"
+    assert (
+        KernelReachability(way="loopback").address("http://127.0.0.1:4711/static/") == "http://127.0.0.1:4711/static/"
+    )
 
 
 def test_the_server_that_started_the_kernel_is_known_by_what_it_wrote(
@@ -102,7 +104,7 @@ def test_the_server_that_started_the_kernel_is_known_by_what_it_wrote(
     file = tmp_path / "jpserver-4711.json"
     file.write_text('{"hostname": "0.0.0.0", "base_url": "/arm/", "pid": 4711}', encoding="utf-8")
     started = {"JPY_PARENT_PID": "4711"}
-    assert find_place(started, None, True) == Place(way="proxy", base="/arm/")
+    assert find_place(started, None, True) == KernelReachability(way="proxy", base="/arm/")
     assert find_place({"JPY_PARENT_PID": "1"}, None, True).way == "loopback"  # Some other program started it.
     file.write_text('{"hostname": "0.0', encoding="utf-8")
     assert find_place(started, None, True).way == "loopback"

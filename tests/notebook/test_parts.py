@@ -20,7 +20,7 @@ from rcilab import notebook
 from rcilab.core.errors import InvalidValueError, UsageError
 from rcilab.i18n.locale import LANGUAGES, load_words
 from rcilab.i18n.translator import load_face
-from rcilab.notebook.kernel_reachability import Place
+from rcilab.notebook.kernel_reachability import KernelReachability
 from tests.catalogues import require_equal
 from tests.late import Late
 
@@ -36,7 +36,7 @@ GOAL = PRO7.home + np.array([0.5, -0.4, 0.3, -0.6, 0.4, -0.5, 0.6])
 
 @pytest.fixture(scope="module")
 def lab() -> Iterator[Lab]:
-    with notebook.Lab(PRO7, place=Place(way="loopback")) as made:
+    with notebook.Lab(PRO7, place=KernelReachability(way="loopback")) as made:
         yield made
 
 
@@ -97,7 +97,7 @@ def open_tabs(lab: Lab) -> None:
 
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_no_place_in_a_sentence_is_left_unfilled(language: str) -> None:
-    with notebook.Lab(PRO7, language=language, place=Place(way="loopback")) as made:
+    with notebook.Lab(PRO7, language=language, place=KernelReachability(way="loopback")) as made:
         open_tabs(made)
         made.jog.q = GOAL
         made.plan.plan.click()
@@ -121,14 +121,14 @@ def test_a_part_speaks_as_the_notebook_unless_somebody_says_otherwise(
 
 def test_every_tab_of_a_lab_speaks_as_the_lab(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("JPY_SESSION_NAME", "05_s_curves_and_limits.zh.ipynb")
-    with notebook.Lab(PRO7, place=Place(way="loopback")) as made:
+    with notebook.Lab(PRO7, place=KernelReachability(way="loopback")) as made:
         open_tabs(made)
         assert {part.text.language for part in made._parts} == {"zh"}
         assert "关节 1" in list(said_by(made.widget))
 
 
 def test_what_is_on_a_tab_is_made_once_when_it_is_opened_or_asked_for_and_ends_with_the_lab() -> None:
-    with notebook.Lab(PRO7, place=Place(way="loopback")) as made:
+    with notebook.Lab(PRO7, place=KernelReachability(way="loopback")) as made:
         assert [len(place.children) for place in made.tabs.children] == [1, 0, 0, 0, 0, 0]
         made.tabs.selected_index = 2
         assert made.tabs.children[2].children == (made.plan.widget,)
@@ -142,16 +142,16 @@ def test_what_is_on_a_tab_is_made_once_when_it_is_opened_or_asked_for_and_ends_w
 
 
 def test_a_session_is_looked_after_before_its_tab_is_opened() -> None:
-    with rcilab.simulate(PRO7) as robot, notebook.Lab(robot, place=Place(way="loopback")) as made:
+    with rcilab.simulate(PRO7) as robot, notebook.Lab(robot, place=KernelReachability(way="loopback")) as made:
         assert made.tabs.selected_index == 0
         assert made.state.robot is not None
 
 
 def test_the_lab_opens_with_few_messages() -> None:
     # Each widget is a message to the browser.
-    with notebook.Lab(PRO7, place=Place(way="loopback")):
+    with notebook.Lab(PRO7, place=KernelReachability(way="loopback")):
         before = len(widget._instances)
-        with notebook.Lab(PRO7, place=Place(way="loopback")):
+        with notebook.Lab(PRO7, place=KernelReachability(way="loopback")):
             assert len(widget._instances) - before < 120
 
 
@@ -363,7 +363,7 @@ def test_a_six_axis_arm_has_no_arm_angle() -> None:
 
 
 def test_where_nothing_is_live_a_film_is_shown_and_said() -> None:
-    with notebook.Scene(XMATE3, place=Place(way="static")) as scene:
+    with notebook.Scene(XMATE3, place=KernelReachability(way="static")) as scene:
         assert scene.url is None
         assert "srcdoc=" in scene._frame.value
         assert "jupyter-server-proxy" in text_of(scene._note)
@@ -373,18 +373,18 @@ def test_where_nothing_is_live_a_film_is_shown_and_said() -> None:
 
 
 def test_a_film_advises_nothing_that_does_not_help() -> None:
-    with notebook.Scene(XMATE3, place=Place(way="static", proxy_helps=False)) as scene:
+    with notebook.Scene(XMATE3, place=KernelReachability(way="static", proxy_helps=False)) as scene:
         assert "a film of the plan" in text_of(scene._note)
         assert "jupyter-server-proxy" not in text_of(scene._note)
 
 
 def test_behind_a_proxy_the_frame_goes_through_it() -> None:
-    with notebook.Scene(XMATE3, place=Place(way="proxy", base="/user/ann/")) as scene:
+    with notebook.Scene(XMATE3, place=KernelReachability(way="proxy", base="/user/ann/")) as scene:
         assert 'src="/user/ann/proxy/' in scene._frame.value
 
 
 def test_a_viser_frame_shows_the_same_arm() -> None:
-    with notebook.Scene(XMATE3, view="viser", place=Place(way="loopback")) as scene:
+    with notebook.Scene(XMATE3, view="viser", place=KernelReachability(way="loopback")) as scene:
         assert scene.url is not None
         assert scene.url.startswith("http://127.0.0.1:")
         scene.state.pose(XMATE3.home + 0.1)

@@ -15,7 +15,7 @@ from rcilab.control_process import SupervisorStatus
 from rcilab.core.state import MODES
 from rcilab.i18n.locale import LANGUAGES
 from rcilab.i18n.translator import Text
-from rcilab.makers.rokae.driver.controller_parameters import ControlSettings, standard_control
+from rcilab.makers.rokae.driver.controller_parameters import ControllerParameters, standard_control
 from rcilab.notebook.robot_side import BusyError, Outcome
 from tests.late import Late
 from tests.waiting import wait_for
@@ -31,7 +31,7 @@ def text_of(widget: Any) -> str:
     return re.sub(r"<[^>]*>", "", widget.value)
 
 
-def held(panel: RunPanel) -> ControlSettings | None:
+def held(panel: RunPanel) -> ControllerParameters | None:
     status = panel.state.status
     return None if status is None else status.setup.control
 
@@ -78,10 +78,10 @@ def test_a_session_is_told_only_what_was_typed_and_is_driven_in_every_mode() -> 
         panel.modes.folders["desired_wrench"].selected_index = 0
         panel.modes.fields["desired_wrench"][2].box.value = "-1"
         wait_for(lambda: held(panel) is not None, 30.0, "the answer")
-        assert held(panel) == ControlSettings(desired_wrench=(0.0, 0.0, -1.0, 0.0, 0.0, 0.0))
+        assert held(panel) == ControllerParameters(desired_wrench=(0.0, 0.0, -1.0, 0.0, 0.0, 0.0))
         assert "its own; it cannot be asked" in text_of(panel.modes._held)
         panel.modes.fields["desired_wrench"][2].box.value = "0"
-        wait_for(lambda: held(panel) == ControlSettings(desired_wrench=(0.0,) * 6), 30.0, "the answer")
+        wait_for(lambda: held(panel) == ControllerParameters(desired_wrench=(0.0,) * 6), 30.0, "the answer")
         wait_for(lambda: panel.state.status is not None and panel.state.status.powered, 30.0, "motor power")
         for mode, speed in (("cartesian_position", 0.1), ("torque", 0.03)):
             run = run_in(panel, mode, speed, 0.01)
@@ -96,14 +96,14 @@ class Real:
     name, is_virtual = "rci://192.168.0.160:1337", False
 
     def __init__(self) -> None:
-        self.told: list[ControlSettings] = []
+        self.told: list[ControllerParameters] = []
         q = PRO7.home
         self._status = SupervisorStatus(phase="idle", code="idle", q=q, q_c=q, powered=True)
 
     def status(self) -> SupervisorStatus:
         return self._status
 
-    def set_control(self, control: ControlSettings) -> None:
+    def set_control(self, control: ControllerParameters) -> None:
         self.told.append(control)
 
     def outcomes(self) -> list[Outcome]:

@@ -16,7 +16,7 @@ import rcilab
 from rcilab import notebook
 from rcilab.control_process import SupervisorStatus
 from rcilab.core.errors import PlanningError, RcilabError
-from rcilab.notebook.browser_heartbeat import PATIENCE, Heart
+from rcilab.notebook.browser_heartbeat import PATIENCE, BrowserHeartbeat
 from rcilab.notebook.browser_watchdog import LEFT_ALONE
 from rcilab.notebook.robot_side import Outcome
 
@@ -81,7 +81,7 @@ def test_power_execute_stop_and_what_came_of_it_in_a_process_of_its_own() -> Non
 
 
 def test_a_page_that_falls_silent_stops_the_arm(monkeypatch: pytest.MonkeyPatch) -> None:
-    heart = Heart()
+    heart = BrowserHeartbeat()
     monkeypatch.setattr("rcilab.notebook.run_panel.kernel_heart", lambda: heart)
     with rcilab.simulate(PRO7) as robot, notebook.RunPanel(robot) as panel:
         power_on(panel)

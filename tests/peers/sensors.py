@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rcilab.core.arrays import frozen
+from rcilab.core.arrays import readonly_copy
 from tests.peers import faults
 from tests.peers.faults import H
 from tests.peers.kinematics import Matrix
@@ -59,8 +59,8 @@ class LyingSensors:
             return measured._replace() if self._news >= 0 else measured  # Real sensors repeat no sample.
         here, before = (lie.offsets[min(k, len(lie.offsets) - 1)] for k in (self._cycle, max(self._cycle - 1, 0)))
         self._cycle += 1
-        self._q = frozen(measured.q + here)
-        return measured._replace(q=self._q, dq=frozen(measured.dq + (here - before) / H))
+        self._q = readonly_copy(measured.q + here)
+        return measured._replace(q=self._q, dq=readonly_copy(measured.dq + (here - before) / H))
 
 
 def _offsets(joint: int, second: Matrix) -> Matrix:

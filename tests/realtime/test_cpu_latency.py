@@ -5,7 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from rcilab.realtime.cpu_latency import DEVICE, AwakeCores, awake_cores
+from rcilab.realtime.cpu_latency import DEVICE, CpuLatencyLock, awake_cores
 
 _AS_NOBODY = """
 import os
@@ -30,7 +30,7 @@ def test_the_hold_is_there_while_it_is_wanted_and_not_before_or_after() -> None:
 
 
 def test_a_hold_is_taken_once_and_let_go_once() -> None:
-    cores = AwakeCores()
+    cores = CpuLatencyLock()
     for on in (True, True, False, False, True, False):
         cores.switch(on)
         assert holds() == (on and bool(cores.is_permitted))

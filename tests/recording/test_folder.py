@@ -9,7 +9,7 @@ import pytest
 from rcilab.core.cycle_log import cycle_dtype
 from rcilab.core.errors import InvalidValueError
 from rcilab.model.robot_model import load_model
-from rcilab.recording.folder import Stored, keep_newest, stored_runs
+from rcilab.recording.folder import FolderStats, keep_newest, stored_runs
 from rcilab.recording.live import LiveRecording, RunFacts
 from rcilab.recording.run_file import RunFile
 from rcilab.recording.setup import Setup
@@ -28,17 +28,17 @@ def folder(tmp_path):
 
 
 def test_runs_are_counted_and_nothing_else_is(folder):
-    assert stored_runs(folder) == Stored(5, 15)
-    assert stored_runs(folder / "nowhere") == Stored(0, 0)
+    assert stored_runs(folder) == FolderStats(5, 15)
+    assert stored_runs(folder / "nowhere") == FolderStats(0, 0)
 
 
 def test_the_newest_stay_and_what_is_no_run_is_never_touched(folder):
-    assert keep_newest(folder, 2) == Stored(3, 6)
+    assert keep_newest(folder, 2) == FolderStats(3, 6)
     assert sorted(path.name for path in folder.iterdir()) == [
         "3.rcirun", "4.rcirun", "link.rcirun", "notes.txt", "sub.rcirun",
     ]  # fmt: skip
-    assert keep_newest(folder, 2) == Stored(0, 0)
-    assert keep_newest(folder, 0) == Stored(2, 9)
+    assert keep_newest(folder, 2) == FolderStats(0, 0)
+    assert keep_newest(folder, 0) == FolderStats(2, 9)
     with pytest.raises(InvalidValueError, match="keeps none"):
         keep_newest(folder, -1)
 

@@ -10,7 +10,7 @@ from rcilab.core.spatial import Pose
 from rcilab.model.dynamics.payload import Payload
 from rcilab.model.robot_model import load_model
 from rcilab.views.arm_view import ArmView
-from rcilab.views.configuration_view import SetupView, inertia_ellipsoid, outside_runs
+from rcilab.views.configuration_view import ConfigurationView, inertia_ellipsoid, outside_runs
 from rcilab.views.null_scene import NullScene
 
 BOX = SafetyBox(size=(0.4, 0.2, 0.6), T_base_box=Pose.from_rpy((0.3, 0.1, 0.5), (0.0, 0.0, 0.5)))
@@ -43,7 +43,7 @@ def test_what_is_shown_stands_where_the_set_up_says_and_what_is_hidden_is_hidden
     model = load_model("xMate3")
     arm = ArmView(scene, "live", model, "live", quality="coarse")
     flange = arm.tool_node.rpartition("/")[0]
-    view = SetupView(scene, flange)
+    view = ConfigurationView(scene, flange)
     tool = Pose((0.0, 0.02, 0.15))
     view.show_tool(tool)
     view.show_box(BOX)

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from rcilab.views.viser_stage import HomeView, standing_place
+from rcilab.views.viser_stage import ViserEnvironment, standing_place
 
 LOOK_AT = np.array((0.17, 0.02, 0.49))  # [m] The middle of the arm.
 
@@ -26,7 +26,7 @@ def some_camera(aspect: float = 2.0) -> SimpleNamespace:
 
 def test_the_camera_steps_back_as_the_scene_gets_narrower_and_forward_again():
     camera = some_camera()
-    HomeView(camera)
+    ViserEnvironment(camera)
     distances = []
     for aspect in (2.0, 0.6, 0.3, 2.0):
         camera.aspect = aspect
@@ -39,7 +39,7 @@ def test_the_camera_steps_back_as_the_scene_gets_narrower_and_forward_again():
 
 def test_a_camera_that_was_moved_stays_until_it_is_brought_back():
     camera = some_camera(aspect=0.6)
-    view = HomeView(camera)
+    view = ViserEnvironment(camera)
     camera.tell()
     camera.position, camera.look_at, camera.up_direction = np.array((0.4, 0.1, -1.3)), np.zeros(3), (0.0, 1.0, 0.0)
     camera.aspect = 0.5

@@ -76,7 +76,7 @@ def swing(bench: Workbench) -> None:
     )
     ask(requests.Plan())
     wait(lambda: bench.store.state.plan is not None and bench.store.state.plan.complete, "a judged plan")
-    ask(requests.Drive(what="execute"))
+    ask(requests.RobotCommand(what="execute"))
     wait(lambda: abs(float(status().q_c[0]) - goal) < 1e-6, "the arm to arrive")
 
 

@@ -135,12 +135,12 @@ def test_a_target_out_of_reach_has_no_ways_and_its_plan_says_how_far_short_it_en
     caption = TimelinePanel(Text("en"), lambda request: None)._read(state, bench.session.status())
     assert "▲ stops short of the target" in caption
     ask(requests.SetSpeed(speed=1.0))
-    ask(requests.Drive(what="execute"))
+    ask(requests.RobotCommand(what="execute"))
     wait(lambda: told(bench) == "notice.arrived_short", "the arrival short of the target")
 
 
 def test_labels_in_the_scene_follow_the_language_at_once(bench, ask):
-    ask(requests.SetWay(kind="arc", via=True))
+    ask(requests.SetPathType(kind="arc", via=True))
     label = bench.presenter._stage._goal._via_label
     try:
         for language in ("en", "zh", "en"):
@@ -148,7 +148,7 @@ def test_labels_in_the_scene_follow_the_language_at_once(bench, ask):
             said = Text(language)("target.via_label")
             wait(lambda said=said: label.text == said, f"the label in {language}")
     finally:
-        ask(requests.SetWay(kind="joint"))
+        ask(requests.SetPathType(kind="joint"))
 
 
 def test_a_safety_box_that_is_off_is_drawn_only_while_it_is_edited(bench, ask):
@@ -210,21 +210,21 @@ def is_refused(bench) -> bool:
 
 
 def test_a_watching_page_may_look_but_not_touch(bench, ask):
-    ask(requests.PageCame(page=1))
-    ask(requests.PageCame(page=2))
+    ask(requests.PageOpened(page=1))
+    ask(requests.PageOpened(page=2))
     before = bench.store.state.goal
     ask(requests.MoveJoint(page=2, joint=0, angle=0.1))
     assert bench.store.state.goal is before
     assert told(bench) == "notice.watching"
     assert bench.store.state.notice.page == 2, "the page that holds the controls need not be told"
-    ask(requests.PageWent(page=1))
+    ask(requests.PageClosed(page=1))
     wait(lambda: not is_refused(bench), "what is no longer so to be withdrawn")
     ask(requests.MoveJoint(page=2, joint=0, angle=0.2))
     assert told(bench) == "lease.free"
-    ask(requests.PageWent(page=2))
-    ask(requests.PageCame(page=1))
+    ask(requests.PageClosed(page=2))
+    ask(requests.PageOpened(page=1))
     wait(lambda: not is_refused(bench), "that to be withdrawn, too: now a page has the controls")
-    ask(requests.PageCame(page=2))
+    ask(requests.PageOpened(page=2))
     ask(requests.MoveJoint(page=1, joint=0, angle=0.1))
     assert bench.store.state.goal.q[0] == pytest.approx(0.1)
     ask(requests.TakeControls(page=2))
@@ -234,7 +234,7 @@ def test_a_watching_page_may_look_but_not_touch(bench, ask):
     ask(requests.AnswerControls(page=1, yes=True))
     assert bench.store.state.lease.holder == 2
     for page in (1, 2):
-        ask(requests.PageWent(page=page))
+        ask(requests.PageClosed(page=page))
     assert bench.store.state.lease.holder is None
 
 
@@ -242,7 +242,7 @@ def test_execute_runs_the_plan_records_it_and_then_asks_for_a_new_one(bench, ask
     start = float(bench.session.status().q_c[0])
     ask(requests.MoveJoint(joint=0, angle=start + (0.2 if start < 1.0 else -0.2)))
     goal = np.array(bench.store.state.goal.q)
-    ask(requests.Drive(what="execute"))
+    ask(requests.RobotCommand(what="execute"))
     wait(lambda: told(bench) == "notice.arrived", "the arrival")
     assert np.abs(bench.session.status().q_c - goal).max() < 1e-9
     wait(lambda: bench.store.state.place == 1.0, "the preview to stand where the arm has arrived")
@@ -255,7 +255,7 @@ def test_execute_runs_the_plan_records_it_and_then_asks_for_a_new_one(bench, ask
     assert recording.delay > 1  # The play-out, taken out where plan and actual are compared.
     assert np.median(np.abs(recording.q_c - plan.q[rows])[:, 0]) < 1e-9
     assert obstacle(bench.store.state, bench.session.status()).code == "ready.done"
-    ask(requests.Drive(what="execute"))
+    ask(requests.RobotCommand(what="execute"))
     assert told(bench) == "ready.done"
     ask(requests.PoseGoal(name="start"))
     assert abs(float(bench.store.state.plan.motion.goal[0]) - start) < 1e-9
@@ -269,10 +269,10 @@ def test_a_motion_that_was_seldom_looked_at_leaves_the_preview_where_it_ended(be
     if what == "stop":
         ask(requests.SetSpeed(speed=0.05))
     monkeypatch.setattr(conductor, "_TICK", 1.0)  # [s] A busy machine.
-    ask(requests.Drive(what="execute"))
+    ask(requests.RobotCommand(what="execute"))
     if what == "stop":
         wait(lambda: (bench.session.status().motion_place or 0.0) > 0.3, "a part of the way")
-        ask(requests.Drive(what="stop"))
+        ask(requests.RobotCommand(what="stop"))
     wait(lambda: told(bench) == ("notice.arrived" if what == "execute" else "notice.stopped"), "its end to be told")
     left = bench.session.status().motion_place / bench.store.state.plan.motion.duration
     assert (left == 1.0) is (what == "execute")
@@ -283,12 +283,12 @@ def test_stop_ends_a_motion_and_says_so(bench, ask):
     ask(requests.SetSpeed(speed=0.05))
     start = float(bench.session.status().q_c[0])
     ask(requests.MoveJoint(joint=0, angle=start + (0.8 if start < 0.0 else -0.8)))
-    ask(requests.Drive(what="execute"))
+    ask(requests.RobotCommand(what="execute"))
     wait(lambda: bench.session.status().phase == "moving", "the arm to move")
     ask(requests.ChooseRobot(model="xMate3"))
     assert told(bench) == "notice.moving"
     wait(lambda: (bench.session.status().motion_place or 0.0) > 0.2, "a part of the way")
-    ask(requests.Drive(what="stop"))
+    ask(requests.RobotCommand(what="stop"))
     wait(lambda: told(bench) == "notice.stopped", "the stop to be told")
     assert bench.session.status().phase == "idle"
     assert abs(float(bench.session.status().q_c[0]) - start) < 0.7

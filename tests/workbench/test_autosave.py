@@ -13,14 +13,14 @@ import pytest
 
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
-from rcilab.makers.rokae.driver.configuration import ForceControlFrame, RobotSetup
+from rcilab.makers.rokae.driver.configuration import ForceControlFrame, RobotConfiguration
 from rcilab.makers.rokae.wire import ForceFrame
 from rcilab.model.dynamics.payload import Payload
 from rcilab.model.robot_model import load_model
 from rcilab.motion import Program, Waypoint
 from rcilab.workbench import requests
 from rcilab.workbench.app import Workbench, WorkbenchConfig
-from rcilab.workbench.autosave import Keepsake, keepsake_file
+from rcilab.workbench.autosave import Autosave, keepsake_file
 from rcilab.workbench.goal.actions import initial_goal
 from rcilab.workbench.program.draft import draft_of
 from rcilab.workbench.store import UiState
@@ -32,7 +32,7 @@ GOAL = MODEL.home + 0.1
 PROGRAM = Program(model=MODEL.name, start=MODEL.home, waypoints=(Waypoint.joint(GOAL), Waypoint.joint(MODEL.home)))
 
 
-SETUP = RobotSetup(
+SETUP = RobotConfiguration(
     tool=Pose((0.01, 0.0, 0.12), (0.8, 0.6, 0.0, 0.0)),
     load=Payload(mass=1.5, center_of_mass=(0.0, 0.01, 0.05), inertia=np.diag([0.01, 0.02, 0.015])),
     box=SafetyBox(size=(1.0, 1.2, 0.8), T_base_box=Pose((0.1, 0.0, 0.5)), active=True),
@@ -48,8 +48,8 @@ def state_with_all() -> UiState:
 
 
 def test_what_was_kept_is_recalled(tmp_path):
-    Keepsake(tmp_path / "deep" / "kept.json").keep(state_with_all())
-    keepsake = Keepsake(tmp_path / "deep" / "kept.json")
+    Autosave(tmp_path / "deep" / "kept.json").keep(state_with_all())
+    keepsake = Autosave(tmp_path / "deep" / "kept.json")
     kept = keepsake.recall(MODEL)
     assert np.array_equal(kept.q, GOAL)
     assert [w.type for w in kept.program.waypoints] == ["joint", "joint"]
@@ -60,11 +60,11 @@ def test_what_was_kept_is_recalled(tmp_path):
     other = load_model("xMate3")
     assert keepsake.recall(other) is None
     keepsake.keep(UiState(model=other, goal=initial_goal(other, other.home)))
-    assert np.array_equal(Keepsake(tmp_path / "deep" / "kept.json").recall(MODEL).q, GOAL), "each arm has its own"
+    assert np.array_equal(Autosave(tmp_path / "deep" / "kept.json").recall(MODEL).q, GOAL), "each arm has its own"
 
 
 def test_nothing_is_written_again_while_nothing_has_changed(tmp_path):
-    keepsake, state = Keepsake(tmp_path / "kept.json"), state_with_all()
+    keepsake, state = Autosave(tmp_path / "kept.json"), state_with_all()
     keepsake.keep(state)
     (tmp_path / "kept.json").unlink()
     keepsake.keep(replace(state, speed=0.1))
@@ -77,12 +77,12 @@ SHORT = '{"format": "rcilab workbench", "version": 1, "arms": {"xMatePro7": {"q"
 @pytest.mark.parametrize("text", [SHORT, "", "{", "[]", "{}", '{"format": "rcilab workbench", "version": 2}', "\udcff"])
 def test_a_file_that_nobody_understands_is_as_good_as_none(tmp_path, text):
     (tmp_path / "kept.json").write_text(text, errors="surrogateescape")
-    assert Keepsake(tmp_path / "kept.json").recall(MODEL) is None
+    assert Autosave(tmp_path / "kept.json").recall(MODEL) is None
 
 
 def test_where_nothing_can_be_written_the_page_goes_on(tmp_path):
     (tmp_path / "file").write_text("")
-    keepsake = Keepsake(tmp_path / "file" / "kept.json")
+    keepsake = Autosave(tmp_path / "file" / "kept.json")
     keepsake.keep(state_with_all())
     assert keepsake.recall(MODEL) is None
     keepsake.close(state_with_all())
@@ -125,7 +125,7 @@ def test_an_arm_that_was_exchanged_before_a_crash_has_its_set_up_again_when_it_i
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
     file, other = keepsake_file(port), load_model("xMate3")
-    kept = Keepsake(file)
+    kept = Autosave(file)
     kept.keep(state_with_all())
     kept._next = 0.0
     kept.keep(UiState(model=other, goal=initial_goal(other, other.home)))
@@ -150,7 +150,7 @@ def test_programs_of_other_arms_and_a_look_at_a_recording_lose_nothing():
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
-    keepsake = Keepsake(keepsake_file(port))
+    keepsake = Autosave(keepsake_file(port))
     keepsake.close(state_with_all())
     with Workbench(WorkbenchConfig(port=port, replay=some_run())):
         pass
@@ -159,7 +159,7 @@ def test_programs_of_other_arms_and_a_look_at_a_recording_lose_nothing():
         assert not bench.store.state.program.draft.steps
         bench.conductor.ask(requests.ChooseRobot(model=MODEL.name))
         wait_for(lambda: len(bench.store.state.program.draft.steps) == 2, what="the program of the other arm")
-    assert len(Keepsake(keepsake_file(port)).recall(MODEL).program.waypoints) == 2
+    assert len(Autosave(keepsake_file(port)).recall(MODEL).program.waypoints) == 2
     keepsake_file(port).unlink()
 
 

@@ -14,7 +14,7 @@ import pytest
 from rcilab.conformance import check
 from rcilab.conformance.conditions import find_condition
 from rcilab.conformance.explain import explain_limit
-from rcilab.conformance.limit_violation import Breach, describe_breaches
+from rcilab.conformance.limit_violation import LimitViolation, describe_breaches
 from rcilab.control_process import SupervisorStatus
 from rcilab.control_process.motion_preconditions import require_ready
 from rcilab.core.cycle_log import cycle_dtype
@@ -33,7 +33,7 @@ from rcilab.makers.rokae.wire import RecoveryStatus, StartStatus
 from rcilab.model.dynamics.payload import Payload
 from rcilab.model.robot_model import load_model
 from rcilab.motion import Program, Waypoint, plan_joint, plan_line, plan_program
-from rcilab.motion.named_poses import PoseBook
+from rcilab.motion.named_poses import NamedPoseStore
 from rcilab.motion.program_file import read_program
 from rcilab.motion.samples import load_samples
 from rcilab.recording.chunks import MAGIC
@@ -175,7 +175,7 @@ PROVOKED: dict[str, Callable[[], object]] = {
     "a refusal of the world port": refused_by_the_world,
     "another arm": other_arm,
     "too heavy a load": lambda: MODEL.with_load(Payload(mass=50.0)),
-    "a missing pose": lambda: PoseBook(MODEL, Path("/dev/null/none")).recall("bad"),
+    "a missing pose": lambda: NamedPoseStore(MODEL, Path("/dev/null/none")).recall("bad"),
 }
 
 
@@ -202,11 +202,11 @@ def test_what_goes_wrong_is_said_in_chinese(what):
 
 
 REASONS: dict[str, Remark] = {
-    "a joint too fast": Breach(find_condition("joint.velocity"), 4, 2.3, 2.175).remark,
-    "a tool too fast": Breach(find_condition("cartesian.velocity.translation"), 0, 2.3, 2.0).remark,
-    "a tool outside": Breach(find_condition("cartesian.position"), 0, 0.02, 1e-3).remark,
-    "no pose": Breach(find_condition("cartesian.frame"), 0, 2.0, 1.0).remark,
-    "two at once": describe_breaches([Breach(find_condition("joint.jerk"), 1, 9e3, 8e3)] * 2),
+    "a joint too fast": LimitViolation(find_condition("joint.velocity"), 4, 2.3, 2.175).remark,
+    "a tool too fast": LimitViolation(find_condition("cartesian.velocity.translation"), 0, 2.3, 2.0).remark,
+    "a tool outside": LimitViolation(find_condition("cartesian.position"), 0, 0.02, 1e-3).remark,
+    "no pose": LimitViolation(find_condition("cartesian.frame"), 0, 2.0, 1.0).remark,
+    "two at once": describe_breaches([LimitViolation(find_condition("joint.jerk"), 1, 9e3, 8e3)] * 2),
     "lost commands": lost_motion(Remark("x", "thrown", joint=2, value="9 rad/s^2", bound="8 rad/s^2")).reason,
 }
 

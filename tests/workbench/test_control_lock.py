@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from rcilab.control_process import SupervisorStatus
 from rcilab.model.robot_model import load_model
 from rcilab.workbench import requests
-from rcilab.workbench.control_lock import PATIENCE, SILENCE, Lease, Presence
-from rcilab.workbench.control_lock_actions import LeaseActions
-from rcilab.workbench.dispatcher import Conductor
+from rcilab.workbench.control_lock import PATIENCE, SILENCE, ClientHeartbeat, ControlLock
+from rcilab.workbench.control_lock_actions import ControlLockActions
+from rcilab.workbench.dispatcher import Dispatcher
 from rcilab.workbench.goal.actions import initial_goal
 from rcilab.workbench.store import Store, UiState
 from rcilab.workbench.text import message
@@ -20,7 +20,7 @@ MODEL = load_model("xMatePro7")
 
 
 def test_the_first_page_gets_the_controls_and_they_are_free_when_it_goes():
-    lease = Lease().arrive(7).arrive(9)
+    lease = ControlLock().arrive(7).arrive(9)
     assert lease.holder == 7
     assert lease.allows(7)
     assert not lease.allows(9)
@@ -30,24 +30,24 @@ def test_the_first_page_gets_the_controls_and_they_are_free_when_it_goes():
 
 
 def test_the_holder_decides_and_free_controls_are_taken_at_once():
-    asked = Lease().arrive(1).arrive(2).arrive(3).ask(2, 0.0)
+    asked = ControlLock().arrive(1).arrive(2).arrive(3).ask(2, 0.0)
     assert (asked.holder, asked.asking) == (1, 2)
     assert asked.ask(3, 1.0) == asked
     assert asked.answer(2, yes=True) == asked
     assert asked.answer(1, yes=False).asking is None
     assert asked.answer(1, yes=True).holder == 2
     assert asked.leave(1).holder == 2
-    assert Lease((1, 2), None).ask(2, 0.0).holder == 2
+    assert ControlLock((1, 2), None).ask(2, 0.0).holder == 2
     assert asked.ask(5, 0.0) == asked
 
 
 def test_our_own_doing_is_always_allowed():
-    assert Lease().allows(None)
+    assert ControlLock().allows(None)
 
 
 @given(st.lists(st.tuples(st.sampled_from(["arrive", "leave", "take", "ask", "yes", "silent"]), st.integers(0, 4))))
 def test_holder_and_asker_are_open_pages_and_never_the_same(events):
-    lease = Lease()
+    lease = ControlLock()
     for name, page in events:
         act = {
             "ask": lambda lease, page: lease.ask(page, 0.0),
@@ -77,14 +77,14 @@ class Desk:
         self.time = 100.0
         self.robot = Robot()
         self.store = Store(UiState(model=MODEL, goal=initial_goal(MODEL, MODEL.home)))
-        self.presence = Presence(lambda: self.time)
-        self.actions = LeaseActions(self.store, self.robot, self.presence)
+        self.presence = ClientHeartbeat(lambda: self.time)
+        self.actions = ControlLockActions(self.store, self.robot, self.presence)
         for page in (1, 2):
-            self.actions.page_came(requests.PageCame(page=page))
+            self.actions.page_came(requests.PageOpened(page=page))
         self.wait(0.1, 1, 2)
 
     @property
-    def lease(self) -> Lease:
+    def lease(self) -> ControlLock:
         return self.store.state.lease
 
     def wait(self, seconds: float, *answering: int) -> None:
@@ -144,7 +144,7 @@ def test_who_is_told_no_may_ask_again(desk):
 
 def test_the_only_page_left_gets_the_controls_once_the_arm_stands(desk):
     desk.robot.phase = "moving"
-    desk.actions.page_went(requests.PageWent(page=1))
+    desk.actions.page_went(requests.PageClosed(page=1))
     desk.wait(SILENCE + 1.0, 2)
     assert desk.lease.holder is None
     desk.robot.phase = "idle"
@@ -153,18 +153,18 @@ def test_the_only_page_left_gets_the_controls_once_the_arm_stands(desk):
 
 
 def test_a_page_that_still_loads_is_waited_for(desk):
-    desk.actions.page_went(requests.PageWent(page=1))
-    desk.actions.page_went(requests.PageWent(page=2))
-    desk.actions.page_came(requests.PageCame(page=3))
+    desk.actions.page_went(requests.PageClosed(page=1))
+    desk.actions.page_went(requests.PageClosed(page=2))
+    desk.actions.page_came(requests.PageOpened(page=3))
     desk.wait(10.0)
     assert desk.lease.holder == 3
 
 
 def test_what_one_page_is_told_takes_no_place_of_what_another_is_told(desk):
     """However fast a page without the controls presses."""
-    conductor = Conductor(desk.store, desk.robot)
+    conductor = Dispatcher(desk.store, desk.robot)
     for page in (1, 2):
-        conductor.act(requests.PageCame(page=page))
+        conductor.act(requests.PageOpened(page=page))
     for number in range(3):
         desk.store.say("bad", message("notice.taken", page=number), page=1)
         for _ in range(100):
@@ -174,5 +174,5 @@ def test_what_one_page_is_told_takes_no_place_of_what_another_is_told(desk):
     assert [notice.text.values["page"] for notice in notices if notice.page == 1] == [0, 1, 2]
     assert sum(notice.page == 2 for notice in notices) <= 4
     assert sum(notice.page is None for notice in notices) <= 4
-    desk.actions.page_went(requests.PageWent(page=1))
+    desk.actions.page_went(requests.PageClosed(page=1))
     assert all(notice.page != 1 for notice in desk.store.state.notices)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rcilab.app.mode_parameters import PARTS_OF_MODE, said_ranges
-from rcilab.control_process.jitter_histogram import LatenessHistogram, summarise
+from rcilab.control_process.jitter_histogram import JitterHistogram, summarise
 from rcilab.core.state import MODES
 from rcilab.makers.rokae.controller.settings import default_settings
 from rcilab.makers.rokae.driver.controller_parameters import control_ranges, standard_control
@@ -46,7 +46,7 @@ def settle(bench):
         nonlocal was_faulty
         status = bench.session.status()
         if status.phase == "fault" and not was_faulty:
-            bench.conductor.ask(requests.Drive(what="recover"))
+            bench.conductor.ask(requests.RobotCommand(what="recover"))
         was_faulty = status.phase == "fault"
         return status.phase == "idle" and bool(status.powered)
 
@@ -69,7 +69,7 @@ def plan(bench, speed=0.1, way=0.8):
 
 
 def execute(bench, place=0.3):
-    bench.conductor.ask(requests.Drive(what="execute"))
+    bench.conductor.ask(requests.RobotCommand(what="execute"))
     wait(
         lambda: bench.session.status().code == "moving" and (bench.session.status().motion_time or 0.0) > place,
         "the arm on its way",
@@ -124,7 +124,7 @@ def test_the_plan_is_judged_by_the_conditions_of_the_mode(idle):
     report = idle.store.state.plan.report
     assert {row.condition.id for row in report.rows} >= {"torque.rate", "torque.range"}
     assert not report.ok  # Half of the speed asks for more than the torque rate.
-    idle.conductor.ask(requests.Drive(what="execute"))
+    idle.conductor.ask(requests.RobotCommand(what="execute"))
     wait(lambda: told(idle) == "ready.violations", "the refusal")
     idle.conductor.ask(requests.SetDrive(mode="sideways"))
     idle.conductor.ask(requests.SetDrive(mode="joint_position"))
@@ -138,12 +138,12 @@ def test_paused_gone_on_with_slower_and_recorded_as_it_was(idle):
     plan(idle)
     motion = idle.store.state.plan.motion
     execute(idle)
-    idle.conductor.ask(requests.Drive(what="pause"))
+    idle.conductor.ask(requests.RobotCommand(what="pause"))
     wait(lambda: idle.session.status().code == "moving.held", "the pause")
     idle.conductor.ask(requests.SetDrive(mode="torque"))
     wait(lambda: told(idle) == "notice.moving", "the refusal of another mode in mid-motion")
     idle.conductor.ask(requests.SetDrive(pace=0.7))
-    idle.conductor.ask(requests.Drive(what="resume"))
+    idle.conductor.ask(requests.RobotCommand(what="resume"))
     wait(lambda: idle.session.status().pace == pytest.approx(0.7), "the way on")
     wait(lambda: told(idle) == "notice.arrived", "the arrival")
     wait(lambda: idle.store.state.last_run is not None and idle.store.state.last_run.run is not None, "the run")
@@ -158,13 +158,13 @@ def test_paused_gone_on_with_slower_and_recorded_as_it_was(idle):
 
 
 def test_the_speed_of_the_slider_counts_from_the_start_and_a_pause_needs_a_motion(idle):
-    idle.conductor.ask(requests.Drive(what="pause"))
+    idle.conductor.ask(requests.RobotCommand(what="pause"))
     wait(lambda: told(idle) == "pace.nothing", "the answer")
     idle.conductor.ask(requests.SetDrive(pace=0.2))
     plan(idle)
     execute(idle)
     wait(lambda: idle.session.status().pace == pytest.approx(0.2), "the slow motion")
-    idle.conductor.ask(requests.Drive(what="stop"))
+    idle.conductor.ask(requests.RobotCommand(what="stop"))
     wait(lambda: idle.session.status().phase == "idle", "rest")
 
 
@@ -180,7 +180,7 @@ def test_a_stop_undoes_what_was_pressed_before_it_and_not_yet_looked_at(idle, mo
     monkeypatch.setitem(bench.conductor._actions, requests.ShowPlot, be_busy)
     bench.conductor.ask(requests.ShowPlot(name="q", on=True))
     assert is_busy.wait(10.0)
-    bench.conductor.ask(requests.Drive(what="execute"))
+    bench.conductor.ask(requests.RobotCommand(what="execute"))
     bench.session.stop()
     may_go_on.set()
     wait(lambda: "error.stopped_before" in str(bench.store.state.notice), "the word that it was stopped before")
@@ -202,7 +202,7 @@ def test_the_cable_is_pulled_in_a_motion_and_plugged_in_again(idle):
     wait(lambda: (w := idle.store.state.drive.world) is not None and w.commands.loss == 0.3, "the bound of the slider")
     idle.conductor.ask(requests.SetNetwork(clear=True))
     wait(lambda: (w := idle.store.state.drive.world) is not None and w.commands.spares_datagrams, "a good network")
-    idle.conductor.ask(requests.Drive(what="reconnect"))
+    idle.conductor.ask(requests.RobotCommand(what="reconnect"))
     wait(lambda: idle.session.status().phase in ("idle", "fault"), "the connection")
     settle(idle)
 
@@ -214,7 +214,7 @@ def test_the_emergency_stop_has_a_way_out(idle):
     wait(lambda: idle.store.state.drive.world.button == "estop", "the button to show")
     ask(requests.PressSafety(button="none"))
     wait(lambda: idle.store.state.drive.world.button == "none", "the release")
-    ask(requests.Drive(what="power_on"))
+    ask(requests.RobotCommand(what="power_on"))
     wait(lambda: bool(idle.session.status().powered), "the motors on")
     assert idle.session.status().faults == ()
 
@@ -244,7 +244,7 @@ def test_an_address_is_named_once_more_and_preview_connects_to_nothing(idle):
 
 def test_cycles_that_were_too_late_have_a_word_beside_their_bar():
     words = memoryview(bytearray(8 * 400)).cast("Q")
-    histogram = LatenessHistogram(words)
+    histogram = JitterHistogram(words)
     for lateness in [2e-5] * 900 + [3e-3]:
         histogram.add(lateness)
     said = histogram_html(summarise(words), Text("en"))

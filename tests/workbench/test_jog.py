@@ -14,10 +14,10 @@ from rcilab.control_process import SupervisorStatus
 from rcilab.core.errors import ControlError, UsageError
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
-from rcilab.makers.rokae.driver.configuration import RobotSetup
+from rcilab.makers.rokae.driver.configuration import RobotConfiguration
 from rcilab.model.robot_model import load_model
 from rcilab.workbench import requests
-from rcilab.workbench.control_lock import Lease
+from rcilab.workbench.control_lock import ControlLock
 from rcilab.workbench.goal.actions import GoalActions, initial_goal
 from rcilab.workbench.jog import actions as jog_actions
 from rcilab.workbench.jog.actions import JogActions
@@ -77,7 +77,7 @@ class FakeSession:
 @pytest.fixture
 def store() -> Store:
     store = Store(UiState(model=MODEL, goal=initial_goal(MODEL, MODEL.home)))
-    store.update(lease=Lease((1, 2), 1))
+    store.update(lease=ControlLock((1, 2), 1))
     return store
 
 
@@ -215,7 +215,7 @@ def test_silence_ends_it(jog, robot, monkeypatch):
     assert robot.held is None
 
 
-@pytest.mark.parametrize("lease", [Lease((1, 2), 2), Lease((2,), 2), Lease()])
+@pytest.mark.parametrize("lease", [ControlLock((1, 2), 2), ControlLock((2,), 2), ControlLock()])
 def test_who_loses_the_controls_or_goes_away_lets_go_and_the_switch_is_off_again(jog, store, robot, lease):
     hold(jog)
     store.update(lease=lease)
@@ -407,7 +407,7 @@ def test_a_tool_that_is_jogged_slows_down_before_a_face_of_the_safety_box_and_go
 
 
 def test_a_robot_that_was_not_told_its_set_up_is_neither_jogged_nor_stepped(jog, store, session, robot):
-    wanted = store.state.setup.wanted.updated(RobotSetup(tool=Pose([0.0, 0.0, 0.1])))
+    wanted = store.state.setup.wanted.updated(RobotConfiguration(tool=Pose([0.0, 0.0, 0.1])))
     store.update(
         target="rci://127.0.0.9:1337", setup=replace(store.state.setup, wanted=wanted, touched=frozenset({"tool"}))
     )

@@ -12,7 +12,7 @@ import pytest
 from rcilab.workbench import widgets
 from rcilab.workbench.requests import Request, TypeField
 from rcilab.workbench.text import message
-from rcilab.workbench.widgets import Linked, NumberField
+from rcilab.workbench.widgets import BoundControl, NumberField
 
 
 class Box:
@@ -121,7 +121,7 @@ def test_a_control_that_a_hand_has_just_moved_is_not_written_over_before_its_wor
 ) -> None:
     box = Box()
     box.value = "off"
-    linked = Linked(box, lambda _: None, lambda value, page: None)
+    linked = BoundControl(box, lambda _: None, lambda value, page: None)
     linked.show("off")
     box.value = "on"  # viser keeps the value, then calls us.
     linked.show("off")

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from rcilab.core.spatial import Pose
-from rcilab.makers.rokae.driver.configuration import RobotSetup
+from rcilab.makers.rokae.driver.configuration import RobotConfiguration
 from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, Program, Waypoint
 from rcilab.workbench import requests
@@ -373,7 +373,9 @@ def test_what_no_list_says_is_ignored(said):
 
 def test_a_program_that_was_changed_since_is_not_executed(square):
     square.plan()
-    status = SimpleNamespace(phase="idle", code="idle", powered=True, is_pressed=False, q_c=HOME, setup=RobotSetup())
+    status = SimpleNamespace(
+        phase="idle", code="idle", powered=True, is_pressed=False, q_c=HOME, setup=RobotConfiguration()
+    )
     assert obstacle(square.state, status) is None
     square.edit("delete")
     assert obstacle(square.state, status).code == "ready.program"
@@ -396,7 +398,9 @@ def test_a_program_that_plans_no_longer_is_never_shown_as_passed(square):
     assert changed.code == "ready.program_fails"
     assert text.say(square.program.answer) in text.say(changed)
     assert text("check.passed") not in planned_html(square.state, text)
-    status = SimpleNamespace(phase="idle", code="idle", powered=True, is_pressed=False, q_c=HOME, setup=RobotSetup())
+    status = SimpleNamespace(
+        phase="idle", code="idle", powered=True, is_pressed=False, q_c=HOME, setup=RobotConfiguration()
+    )
     assert obstacle(square.state, status) == changed
     assert may_plan_again(changed)
     square.edit("undo")
@@ -452,7 +456,9 @@ def test_a_program_that_has_run_is_planned_again_or_one_goes_back_to_its_start(s
     square.plan()  # The way to its start comes first.
     end = square.state.plan.motion.goal
     square.status.q_c = end
-    status = SimpleNamespace(phase="idle", code="idle", powered=True, is_pressed=False, q_c=end, setup=RobotSetup())
+    status = SimpleNamespace(
+        phase="idle", code="idle", powered=True, is_pressed=False, q_c=end, setup=RobotConfiguration()
+    )
     reason = obstacle(square.state, status)
     assert reason.code == "ready.done_program"
     assert may_plan_again(reason)
@@ -476,7 +482,9 @@ def test_a_program_for_another_tool_is_planned_and_judged_with_it_and_not_execut
     bench.plan()
     plan = bench.state.plan
     assert plan.model.forward(plan.motion.goal).is_close(line.pose, 1e-9)
-    status = SimpleNamespace(phase="idle", code="idle", powered=True, is_pressed=False, q_c=HOME, setup=RobotSetup())
+    status = SimpleNamespace(
+        phase="idle", code="idle", powered=True, is_pressed=False, q_c=HOME, setup=RobotConfiguration()
+    )
     assert obstacle(bench.state, status).code == "ready.program_tool"
     bench.edit("aim")
     assert bench.state.model.forward(bench.state.goal.q).is_close(

@@ -16,7 +16,7 @@ from rcilab.core.errors import UsageError
 from rcilab.model.robot_model import load_model
 from rcilab.workbench import requests
 from rcilab.workbench.app import Workbench
-from rcilab.workbench.control_lock import Lease
+from rcilab.workbench.control_lock import ControlLock
 from rcilab.workbench.goal.actions import initial_goal
 from rcilab.workbench.run import push_actions
 from rcilab.workbench.run.actions import RobotActions
@@ -66,7 +66,7 @@ class FakeSession:
 @pytest.fixture
 def store():
     store = Store(UiState(model=MODEL, plant="mujoco", goal=initial_goal(MODEL, MODEL.home)))
-    store.update(lease=Lease((1, 2), 1))
+    store.update(lease=ControlLock((1, 2), 1))
     return store
 
 
@@ -96,7 +96,7 @@ def grab(actions, link: int, page: int = 1):
     """Takes hold of the link's origin and pulls it 0.1 m along y; returns where that is."""
     start = place_of(MODEL, MODEL.home, link, np.zeros(3))
     hand = start + (0.0, 0.1, 0.0)
-    actions.pull(requests.PullArm(page=page, link=link, grabbed=tuple(start), hand=tuple(hand), phase="start"))
+    actions.pull(requests.DragLink(page=page, link=link, grabbed=tuple(start), hand=tuple(hand), phase="start"))
     return start
 
 
@@ -133,7 +133,7 @@ def test_the_mouse_pulls_with_a_spring_that_goes_along_with_the_arm(actions, ses
     tick(actions)
     moved = place_of(MODEL, q, 5, np.zeros(3))
     assert held(actions)[0][:3] == pytest.approx(SPRING * (start + (0.0, 0.1, 0.0) - moved))
-    actions.pull(requests.PullArm(page=1, link=5, grabbed=(0, 0, 0), hand=(0, 0, 0), phase="end"))
+    actions.pull(requests.DragLink(page=1, link=5, grabbed=(0, 0, 0), hand=(0, 0, 0), phase="end"))
     tick(actions)
     assert held(actions) is None
 
@@ -142,7 +142,7 @@ def test_a_spring_pulls_no_harder_than_a_hand():
     assert np.linalg.norm(spring_force(np.zeros(3), np.array([3.0, 4.0, 0.0]))) == pytest.approx(STRONGEST)
 
 
-@pytest.mark.parametrize("lease", [Lease((1, 2), 2), Lease((2,), 2), Lease()])
+@pytest.mark.parametrize("lease", [ControlLock((1, 2), 2), ControlLock((2,), 2), ControlLock()])
 def test_who_loses_the_controls_or_goes_away_lets_go(actions, store, lease):
     grab(actions, 3)
     actions.hold(requests.HoldPush(page=1))
@@ -155,7 +155,7 @@ def test_who_loses_the_controls_or_goes_away_lets_go(actions, store, lease):
 
 def test_numbers_that_are_none_take_hold_of_nothing(actions):
     for link, hand in ((3, (math.nan, 0.0, 0.0)), (8, (0.0, 0.0, 0.0)), (0, (0.0, 0.0, 0.0))):
-        actions.pull(requests.PullArm(page=1, link=link, grabbed=(0, 0, 0), hand=hand, phase="start"))
+        actions.pull(requests.DragLink(page=1, link=link, grabbed=(0, 0, 0), hand=hand, phase="start"))
         tick(actions)
         assert held(actions) is None
 
@@ -197,10 +197,10 @@ def test_a_real_arm_is_freed_only_when_asked_twice(store, session, monkeypatch):
     monkeypatch.setattr(session, "supervisor", lambda: supervisor)
     store.update(target="rci://192.168.0.160:1337")
     robot = RobotActions(store, session)
-    robot.drive(requests.Drive(page=1, what="guide"))
+    robot.drive(requests.RobotCommand(page=1, what="guide"))
     assert store.state.notice.text.code == "guide.sure"
     assert freed == []
-    robot.drive(requests.Drive(page=1, what="guide"))
+    robot.drive(requests.RobotCommand(page=1, what="guide"))
     assert freed == [("joint", "free")]
 
 
@@ -232,19 +232,19 @@ def test_another_plant_keeps_goal_and_plan_and_is_refused_in_mid_motion(bench):
     assert bench.store.state.goal is goal
     assert bench.store.state.plan is plan
     ask(requests.Plan())
-    ask(requests.Drive(what="execute"))
+    ask(requests.RobotCommand(what="execute"))
     wait(lambda: bench.session.status().phase == "moving", "the arm to move")
     ask(requests.ChooseRobot(plant="ideal"))
     wait(lambda: told(bench) == "notice.moving", "the refusal")
     assert bench.store.state.plant == "mujoco"
-    ask(requests.Drive(what="stop"))
+    ask(requests.RobotCommand(what="stop"))
     wait(lambda: bench.session.status().phase == "idle", "the arm to rest")
 
 
 def test_a_guided_arm_follows_the_button(bench):
     ask = bench.conductor.ask
     wait(lambda: bench.session.status().phase == "idle" and bool(bench.session.status().powered), "a powered arm")
-    ask(requests.Drive(what="guide"))
+    ask(requests.RobotCommand(what="guide"))
     wait(lambda: bench.session.status().code == "moving.guided", "a free arm")
     start = np.array(bench.session.status().q)
 
@@ -253,7 +253,7 @@ def test_a_guided_arm_follows_the_button(bench):
         return float(np.abs(bench.session.status().q - start).max()) > 0.05
 
     wait(pushed, "the arm to follow")
-    ask(requests.Drive(what="unguide"))
+    ask(requests.RobotCommand(what="unguide"))
     wait(lambda: bench.session.status().code == "idle.guided", "the arm to be held again")
     wait(lambda: bench.store.state.push.acting is None, "the push to end")
 
@@ -280,7 +280,7 @@ def test_an_arm_that_is_pushed_in_a_soft_motion_gives_way_comes_back_arrives_and
 
     wait(planned, "a plan that was judged for the mode")
     motion = bench.store.state.plan.motion
-    ask(requests.Drive(what="execute"))
+    ask(requests.RobotCommand(what="execute"))
     wait(lambda: status().code == "moving" and (status().motion_time or 0.0) > 0.3, "the arm on its way")
 
     def height() -> float:

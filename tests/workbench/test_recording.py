@@ -55,7 +55,7 @@ def execute(bench: Workbench, angle: float, speed: float = 0.5) -> None:
         ),
         "a plan that may be executed",
     )
-    bench.conductor.ask(requests.Drive(what="execute"))
+    bench.conductor.ask(requests.RobotCommand(what="execute"))
 
 
 def finished(bench: Workbench):
@@ -100,7 +100,7 @@ def test_exports_reach_the_page_that_asked_and_problems_are_told(bench, monkeypa
     if bench.store.state.recording is None:
         execute(bench, 0.1)
     run = finished(bench).run
-    bench.conductor.ask(requests.PageCame(page=7))
+    bench.conductor.ask(requests.PageOpened(page=7))
     wait(lambda: bench.store.state.lease.holder == 7, "the controls")
     sent = []
     actions = bench.conductor._export

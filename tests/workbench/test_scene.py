@@ -138,11 +138,11 @@ def test_the_ring_laid_out_flat_tells_its_arcs_in_words_and_patterns(bench, lang
 
 def test_every_goal_has_its_branches_and_one_can_be_looked_at_before_it_is_chosen(bench):
     assert len(bench.state.goal.reach.solutions) >= 1
-    bench.scene.peek(requests.Peek(index=0))
+    bench.scene.peek(requests.HighlightBranch(index=0))
     assert bench.state.scene.peek == 0
-    bench.scene.peek(requests.Peek(index=99))
+    bench.scene.peek(requests.HighlightBranch(index=99))
     assert bench.state.scene.peek is None
-    bench.scene.peek(requests.Peek(index=0))
+    bench.scene.peek(requests.HighlightBranch(index=0))
     bench.aim(0.0, 0.05, 0.0)
     bench.scene.tick()
     assert bench.state.scene.peek is None
@@ -210,7 +210,7 @@ def test_a_plan_that_leaves_the_box_has_a_bead_that_leads_to_its_moment(bench):
     assert ribbon.usage.max() > 1.0
     bead = ribbon.beads[0]
     assert box.excess(bead.position) > 0.0
-    bench.scene.show_bead(requests.ShowBead(number=0))
+    bench.scene.show_bead(requests.ShowViolation(number=0))
     assert bench.state.place == pytest.approx(bead.place)
     assert bench.state.notice.tone == "bad"
     for language in LANGUAGES:
@@ -218,7 +218,7 @@ def test_a_plan_that_leaves_the_box_has_a_bead_that_leads_to_its_moment(bench):
     assert bead_words(bead, Text("en")).startswith("◆ broken: Tool inside the safety box · ")
     assert bead_words(bead, Text("zh")).startswith("◆ 违反：")
     assert "broken: Tool inside the safety box</p>" in planned_html(bench.state, Text("en"))
-    bench.scene.show_bead(requests.ShowBead(number=99))
+    bench.scene.show_bead(requests.ShowViolation(number=99))
     bench.goal.pose_goal(requests.PoseGoal(name="home"))
     bench.scene.tick()
     assert bench.state.scene.ribbon is None
@@ -229,7 +229,7 @@ def test_a_line_is_planned_once_the_goal_stands_still_and_keeps_the_tool_on_it(b
 
     now = [100.0]
     monkeypatch.setattr(actions, "time", SimpleNamespace(monotonic=lambda: now[0]))
-    bench.goal.set_way(requests.SetWay(kind="line"))
+    bench.goal.set_way(requests.SetPathType(kind="line"))
     bench.aim(-0.05, 0.1, 0.05)
     assert bench.state.plan is None
     assert bench.state.no_plan.code == "plan.soon"
@@ -264,19 +264,19 @@ def test_the_arm_is_said_to_be_moved_only_while_it_is(bench):
 
 
 def test_an_arc_needs_a_place_to_lead_over_and_then_does(bench):
-    bench.goal.set_way(requests.SetWay(kind="arc"))
+    bench.goal.set_way(requests.SetPathType(kind="arc"))
     bench.aim(-0.03, 0.08, 0.0)
     bench.goal.plan(requests.Plan())
     assert bench.state.no_plan.code == "plan.no_via"
     said = TimelinePanel(Text("en"), lambda request: None)._read(bench.state, SimpleNamespace(q_c=HOME, code="idle"))
     assert Text("en")("plan.no_via") in said, "not how to begin, but what is missing"
-    bench.goal.set_way(requests.SetWay(via=True))
+    bench.goal.set_way(requests.SetPathType(via=True))
     via = bench.state.via.position
     bench.aim(0.0, 0.08, 0.05)
     bench.goal.plan(requests.Plan())
     assert bench.state.plan.kind == "arc"
     assert np.linalg.norm(bench.state.plan.path - via, axis=1).min() < 5e-3
-    bench.goal.set_way(requests.SetWay(kind="sideways"))
+    bench.goal.set_way(requests.SetPathType(kind="sideways"))
     assert bench.state.way == "arc"
 
 

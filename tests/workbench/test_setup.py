@@ -14,7 +14,7 @@ from rcilab.control_process.launch import start_controller
 from rcilab.core.errors import CommandRejectedError
 from rcilab.core.spatial import Pose
 from rcilab.makers.rokae import wire as rci
-from rcilab.makers.rokae.driver.configuration import SETUP_PARTS, RobotSetup
+from rcilab.makers.rokae.driver.configuration import SETUP_PARTS, RobotConfiguration
 from rcilab.workbench import requests
 from rcilab.workbench.app import Workbench
 from rcilab.workbench.check.freshness import outdated
@@ -71,7 +71,7 @@ def settled(bench: Workbench) -> bool:
     return pending_parts(bench.store.state, bench.session.status()) == ()
 
 
-def wanted(bench: Workbench) -> RobotSetup:
+def wanted(bench: Workbench) -> RobotConfiguration:
     return bench.store.state.setup.wanted
 
 
@@ -106,7 +106,7 @@ def test_an_edit_makes_the_plan_stale_in_words_and_undo_makes_it_good_again(benc
     assert "tool, load" in Text("en").say(reason)
     for language in ("en", "zh"):
         assert Text(language)("check.outdated") in planned_html(state, Text(language))
-    ask(requests.Drive(what="execute"))
+    ask(requests.RobotCommand(what="execute"))
     assert told(bench) == "ready.stale"
     ask(requests.PressSetup(what="undo"))
     ask(requests.PressSetup(what="undo"))
@@ -282,27 +282,27 @@ def test_what_is_no_number_or_no_part_is_ignored(bench, ask):
 
 
 def test_a_watching_page_cannot_change_the_set_up(bench, ask):
-    ask(requests.PageCame(page=1))
-    ask(requests.PageCame(page=2))
+    ask(requests.PageOpened(page=1))
+    ask(requests.PageOpened(page=2))
     before = wanted(bench)
     ask(requests.MoveSetup(page=2, part="tool", position=(0.0, 0.0, 0.1), wxyz=NO_TURN))
     ask(requests.TypeField(page=2, field="setup.load.mass", text="1"))
     assert wanted(bench) is before
     for page in (1, 2):
-        ask(requests.PageWent(page=page))
+        ask(requests.PageClosed(page=page))
 
 
 def test_after_a_new_connection_the_controller_is_told_again_and_the_page_says_so(bench, ask):
     type_in(ask, load_mass="1")
     wait(lambda: settled(bench), "the controller to have the load")
-    ask(requests.Drive(what="reconnect"))
+    ask(requests.RobotCommand(what="reconnect"))
     wait(lambda: told(bench) == "setup.sent_again", "the page to say so")
     assert settled(bench)
 
 
 def test_every_number_comes_back_as_it_was_typed():
     setup = SetupState()
-    setup = replace(setup, wanted=setup.wanted.updated(RobotSetup(tool=Pose((0.1, 0.2, 0.3)))))
+    setup = replace(setup, wanted=setup.wanted.updated(RobotConfiguration(tool=Pose((0.1, 0.2, 0.3)))))
     turned = with_field(setup, "box", "yaw", 30.0)
     assert isinstance(turned, SetupState)
     for part, names in FIELD_NAMES.items():

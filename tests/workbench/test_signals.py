@@ -47,7 +47,7 @@ def test_a_restart_is_asked_about_and_ends_the_connection_until_connect(bench: W
     ask(requests.PressSignals(what="reboot"))
     ask(requests.PressSignals(what="confirm"))
     wait(lambda: status().code == "lost.rebooted", "the end of the connection")
-    ask(requests.Drive(what="reconnect"))
+    ask(requests.RobotCommand(what="reconnect"))
     wait(lambda: status().phase == "idle", "another connection")
     assert status().outputs == (None,) * 6
     assert status().inputs is None

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from rcilab.recording.folder import keep_newest, stored_runs
-from rcilab.workbench.autosave import Keepsake
+from rcilab.workbench.autosave import Autosave
 from tests.workbench import starved
 from tests.workbench.test_autosave import MODEL, state_with_all
 
@@ -55,6 +55,6 @@ def test_links_in_the_folder_of_runs_and_of_what_is_kept_lead_nowhere(tmp_path: 
     assert len(list(runs.iterdir())) == 3
     kept = tmp_path / "kept.json"
     kept.symlink_to(other)
-    Keepsake(kept).keep(state_with_all())
-    assert Keepsake(kept).recall(MODEL) is not None
+    Autosave(kept).keep(state_with_all())
+    assert Autosave(kept).recall(MODEL) is not None
     assert other.read_text() == "mine" or kept.is_symlink()

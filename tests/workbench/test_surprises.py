@@ -36,7 +36,7 @@ def set_out(bench: Workbench) -> float:
     goal = start + (0.8 if start < 0.0 else -0.8)
     bench.conductor.ask(requests.MoveJoint(joint=0, angle=goal))
     wait(lambda: bench.store.state.plan is not None and bench.store.state.plan.motion.goal[0] == goal, "a plan")
-    bench.conductor.ask(requests.Drive(what="execute"))
+    bench.conductor.ask(requests.RobotCommand(what="execute"))
     wait(lambda: bench.session.status().phase == "moving", "the arm to move")
     wait(lambda: abs(float(bench.session.status().q[0]) - start) > 0.01, "the arm to get somewhere")
     return start
@@ -50,14 +50,14 @@ def move_on(bench: Workbench) -> None:
     wait(lambda: is_ready(bench) or bench.session.status().phase == "fault", "an arm that can go on")
     if bench.session.status().phase == "fault":
         assert [fault.name for fault in bench.session.status().faults] == ["INSTABILITY_DETECTION"]
-        bench.conductor.ask(requests.Drive(what="recover"))
+        bench.conductor.ask(requests.RobotCommand(what="recover"))
     wait(lambda: is_ready(bench), "an idle, powered arm")
     bench.conductor.ask(requests.SetSpeed(speed=1.0))
     angle = float(bench.session.status().q_c[1]) - 0.1
     bench.conductor.ask(requests.MoveJoint(joint=1, angle=angle))
     wait(lambda: bench.store.state.plan is not None and bench.store.state.plan.motion.goal[1] == angle, "a plan")
     bench.conductor.ask(requests.Plan())
-    bench.conductor.ask(requests.Drive(what="execute"))
+    bench.conductor.ask(requests.RobotCommand(what="execute"))
     wait(lambda: abs(float(bench.session.status().q_c[1]) - angle) < 1e-9, "the arm to arrive")
 
 
@@ -94,7 +94,7 @@ def test_a_page_that_goes_away_in_mid_motion_means_one_controlled_stop(bench):
     with connect(f"ws://127.0.0.1:{bench.port}/rcilab/live", additional_headers=origin, close_timeout=0.1) as page:
         going = threading.Event()
         page.send(json.dumps({"kind": "hello", "page": 1, "key": bench.live.introduce(1)}))
-        bench.conductor.ask(requests.PageCame(page=1))
+        bench.conductor.ask(requests.PageOpened(page=1))
         wait(lambda: bench.store.state.lease.holder == 1, "the page to hold the controls")
 
         def answer() -> None:
@@ -129,7 +129,7 @@ def test_an_unreachable_robot_is_told_and_the_page_stays_usable(bench):
     assert obstacle(bench.store.state, status).code == "ready.lost"
     assert "无法连接" in Text("zh").say(tell_status(status))
     wait(lambda: told(bench) == "incident.lost.unreachable", "to be told")
-    bench.conductor.ask(requests.Drive(what="power_on"))
+    bench.conductor.ask(requests.RobotCommand(what="power_on"))
     wait(lambda: told(bench) == "ready.lost", "to be told what to press")
     bench.conductor.ask(requests.PoseGoal(name="undo"))
     wait(lambda: math.isclose(bench.store.state.goal.q[0], math.radians(7.0)), "undo to reach behind the connection")
@@ -147,25 +147,25 @@ def test_a_foreign_robot_moves_only_after_a_second_yes_that_knows_what_will_move
         with Workbench(WorkbenchConfig(port=0, quality="light", target=address)) as bench:
             ask = bench.conductor.ask
             wait(lambda: bench.session.status().phase == "idle", "a connection")
-            ask(requests.Drive(what="power_on"))
+            ask(requests.RobotCommand(what="power_on"))
             wait(lambda: is_ready(bench), "motor power")
             start = float(bench.session.status().q_c[0])
             ask(requests.MoveJoint(joint=0, angle=start + 0.1))
             wait(lambda: bench.store.state.plan is not None, "a plan")
-            ask(requests.Drive(what="confirm"))
-            ask(requests.Drive(what="execute"))
+            ask(requests.RobotCommand(what="confirm"))
+            ask(requests.RobotCommand(what="execute"))
             wait(lambda: describe_move(bench.store.state) is not None, "the second question")
             question = Text("en").say(describe_move(bench.store.state))
             assert address in question
             assert "Joints: 1: " in question
             ask(requests.MoveJoint(joint=0, angle=start + 0.2))
             wait(lambda: describe_move(bench.store.state) is None, "another plan to need another yes")
-            ask(requests.Drive(what="execute"))
-            ask(requests.Drive(what="cancel"))
-            ask(requests.Drive(what="execute"))
+            ask(requests.RobotCommand(what="execute"))
+            ask(requests.RobotCommand(what="cancel"))
+            ask(requests.RobotCommand(what="execute"))
             wait(lambda: describe_move(bench.store.state) is not None, "the second question")
             assert float(bench.session.status().q_c[0]) == start
-            ask(requests.Drive(what="confirm"))
+            ask(requests.RobotCommand(what="confirm"))
             wait(lambda: abs(float(bench.session.status().q_c[0]) - start - 0.2) < 1e-9, "the arm to arrive")
             controller.kill()
             wait(lambda: bench.session.status().phase == "lost", "the loss")

@@ -4,7 +4,7 @@
     print(gallery.FAULTS)
     exhibit = gallery.provoke("kCommandJointVelocityLimitsViolation")
     print(exhibit)                                     # what was sent, why it is a fault, what to do, how to leave it
-    with gallery.Booth("xMatePro7") as booth:          # several on one controller
+    with gallery.FaultLab("xMatePro7") as booth:          # several on one controller
         exhibits = [booth.provoke(fault) for fault in gallery.FAULTS]
 
 Nothing is made up: real commands go through the real client to a controller that nobody else is connected to.
@@ -12,16 +12,16 @@ Nothing is made up: real commands go through the real client to a controller tha
 
 from __future__ import annotations
 
-from rcilab.app.fault_lab.fault_demo import Exhibit
-from rcilab.app.fault_lab.lab import Booth
-from rcilab.app.fault_lab.scenario import GROUPS, Group, Recipe
+from rcilab.app.fault_lab.fault_demo import FaultDemo
+from rcilab.app.fault_lab.lab import FaultLab
+from rcilab.app.fault_lab.scenario import GROUPS, FaultScenario, Group
 from rcilab.app.fault_lab.table import FAULTS, FaultTable
 from rcilab.core.faults import Fault
 
-__all__ = ["FAULTS", "GROUPS", "Booth", "Exhibit", "FaultTable", "Group", "Recipe", "provoke"]
+__all__ = ["FAULTS", "GROUPS", "FaultLab", "FaultDemo", "FaultTable", "Group", "FaultScenario", "provoke"]
 
 
-def provoke(fault: Fault | str, model: str = "xMatePro7") -> Exhibit:
+def provoke(fault: Fault | str, model: str = "xMatePro7") -> FaultDemo:
     """Provokes one fault on a private virtual controller and returns what it reported.
 
     Args:
@@ -32,5 +32,5 @@ def provoke(fault: Fault | str, model: str = "xMatePro7") -> Exhibit:
         InvalidValueError: There is no such fault; the message lists those that exist.
         UsageError: This arm cannot have this fault.
     """
-    with Booth(model) as booth:
+    with FaultLab(model) as booth:
         return booth.provoke(fault)

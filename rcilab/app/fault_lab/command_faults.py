@@ -11,8 +11,8 @@ from math import radians
 
 import numpy as np
 
-from rcilab.app.fault_lab.scenario import Recipe, Scene
-from rcilab.core.arrays import Array, frozen
+from rcilab.app.fault_lab.scenario import FaultScenario, Scene
+from rcilab.core.arrays import Array, readonly_copy
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.command import CartesianPosition, Command, JointPosition, JointTorque
 from rcilab.core.faults import Fault
@@ -50,7 +50,7 @@ def joint_stream(start: Array, joint: int, way: Array) -> Callback:
         cycle = round(t / CYCLE_TIME)
         q = np.array(start)
         q[joint] += way[min(cycle, len(way) - 1)]
-        return JointPosition(frozen(q), finished=cycle >= len(way))
+        return JointPosition(readonly_copy(q), finished=cycle >= len(way))
 
     return callback
 
@@ -65,7 +65,7 @@ def tool_stream(start: Pose, offset: Callable[[float], tuple[Array, Array]], way
         T = start.matrix
         T[:3, 3] += shift
         T[:3, :3] = T[:3, :3] @ _rotation(turn)
-        return CartesianPosition(frozen(T), psi=held, finished=cycle >= len(way))
+        return CartesianPosition(readonly_copy(T), psi=held, finished=cycle >= len(way))
 
     return callback
 
@@ -77,7 +77,7 @@ def torque_stream(n: int, joint: int, tau: Array) -> Callback:
         cycle = round(t / CYCLE_TIME)
         wanted = np.zeros(n)
         wanted[joint] = tau[min(cycle, len(tau) - 1)]
-        return JointTorque(frozen(wanted), finished=cycle >= len(tau))
+        return JointTorque(readonly_copy(wanted), finished=cycle >= len(tau))
 
     return callback
 
@@ -194,47 +194,47 @@ def _rotation(turn: Array) -> Array:
 
 
 COMMAND_RECIPES = (
-    Recipe(
+    FaultScenario(
         fault=Fault.COMMAND_JOINT_POSITION_LIMITS_VIOLATION, group="position", mode="joint_position",
         prepare=soften_joint_1, act=_soft_limit,
     ),
-    Recipe(
+    FaultScenario(
         fault=Fault.COMMAND_CARTESIAN_POSITION_LIMITS_VIOLATION, group="position", mode="cartesian_position",
         prepare=box_around_tool, act=_box,
     ),
-    Recipe(
+    FaultScenario(
         fault=Fault.COMMAND_CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION, group="position",
         mode="cartesian_position", act=_elbow, needs_elbow=True,
         pose=LIVELY_ELBOW,
     ),
-    Recipe(
+    FaultScenario(
         fault=Fault.COMMAND_JOINT_VELOCITY_LIMITS_VIOLATION, group="velocity", mode="joint_position",
         act=_joint_velocity,
     ),
-    Recipe(
+    FaultScenario(
         fault=Fault.COMMAND_CARTESIAN_VELOCITY_LIMITS_VIOLATION, group="velocity", mode="cartesian_position",
         act=_tool_velocity,
     ),
-    Recipe(
+    FaultScenario(
         fault=Fault.COMMAND_JOINT_ACCELERATION_LIMITS_VIOLATION, group="acceleration", mode="joint_position",
         act=_joint_acceleration,
     ),
-    Recipe(
+    FaultScenario(
         fault=Fault.COMMAND_CARTESIAN_ACCELERATION_LIMITS_VIOLATION, group="acceleration", mode="cartesian_position",
         act=_tool_acceleration,
     ),
-    Recipe(
+    FaultScenario(
         fault=Fault.COMMAND_JOINT_ACCELERATION_DISCONTINUITY, group="acceleration", mode="joint_position",
         act=_joint_jerk,
     ),
-    Recipe(
+    FaultScenario(
         fault=Fault.CARTESIAN_POSITION_MOTION_GENERATOR_INVALID_FRAME, group="command", mode="cartesian_position",
         act=_singular, pose=(0.1, 0.5, 0.0, 0.05, 0.0, 1.0, 0.0),
     ),
-    Recipe(
+    FaultScenario(
         fault=Fault.COMMAND_TORQUE_DISCONTINUITY, group="command", mode="torque", act=_torque_rate,
     ),
-    Recipe(
+    FaultScenario(
         fault=Fault.COMMAND_TORQUE_RANGE_VIOLATION, group="command", mode="torque", act=_torque_range,
     ),
 )  # fmt: skip

@@ -9,16 +9,16 @@ from rcilab.app.planning import Plan, picture
 from rcilab.core.clock import CYCLE_TIME
 
 if TYPE_CHECKING:
-    from rcilab.app.fault_lab.fault_demo import Exhibit
+    from rcilab.app.fault_lab.fault_demo import FaultDemo
     from rcilab.motion import Motion
     from rcilab.recording.run import Run
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Exhibition:
+class DemoMotion:
     """What is seen in place of the plan while a fault is on show. It is never one to execute."""
 
-    exhibit: Exhibit
+    exhibit: FaultDemo
     plan: Plan
     """What was commanded, the wrong command too, and the controller's way to rest."""
     scene: Plan
@@ -32,7 +32,7 @@ class Exhibition:
         return self.exhibit.sample * CYCLE_TIME
 
 
-def exhibition_of(exhibit: Exhibit) -> Exhibition:
+def exhibition_of(exhibit: FaultDemo) -> DemoMotion:
     """Returns a fault as scene, timeline and curves draw it."""
     from rcilab.conformance.check import check
     from rcilab.motion import Motion
@@ -43,7 +43,7 @@ def exhibition_of(exhibit: Exhibit) -> Exhibition:
         return picture(exhibit.model, motion, check(judged, exhibit.model, distance=None))
 
     commanded = exhibit.commanded
-    return Exhibition(
+    return DemoMotion(
         exhibit=exhibit,
         plan=draw(commanded),
         scene=draw(exhibit.moved),

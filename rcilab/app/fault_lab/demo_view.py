@@ -15,13 +15,13 @@ from rcilab.i18n.error_messages import tell_note
 from rcilab.i18n.shown import unit_name, with_unit
 
 if TYPE_CHECKING:
-    from rcilab.app.fault_lab.fault_demo import Exhibit
+    from rcilab.app.fault_lab.fault_demo import FaultDemo
     from rcilab.i18n.translator import Text
 
 _NEAR = 0.5  # Share of the lower bound from which on it is shown: a far one would press the curve flat. A choice.
 
 
-def head_html(exhibit: Exhibit, text: Text) -> str:
+def head_html(exhibit: FaultDemo, text: Text) -> str:
     """Returns which fault it is, what was done, and what broke which bound."""
     row = exhibit.condition
     others = [fault.manual_name for fault in exhibit.reported if fault is not exhibit.fault]
@@ -43,7 +43,7 @@ def head_html(exhibit: Exhibit, text: Text) -> str:
     )
 
 
-def body_html(exhibit: Exhibit, text: Text) -> str:
+def body_html(exhibit: FaultDemo, text: Text) -> str:
     """Returns legend, cause, remedy, condition and the way out."""
     language, row = text.language, exhibit.condition
     steps = "".join(f"<li>{escape(step)}</li>" for step in exhibit.tell_way_out(language))

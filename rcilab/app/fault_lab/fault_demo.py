@@ -9,15 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rcilab.app.fault_lab.catalogue import say
-from rcilab.app.fault_lab.scenario import Recipe
+from rcilab.app.fault_lab.scenario import FaultScenario
 from rcilab.app.fault_lab.signals import Signal
 from rcilab.conformance.condition import Condition
 from rcilab.conformance.explain import explain_formula, explain_source
-from rcilab.core.arrays import Array, JointVector, frozen
+from rcilab.core.arrays import Array, JointVector, readonly_copy
 from rcilab.core.faults import Fault
 from rcilab.core.limits import Limits
 from rcilab.i18n.locale import Language
-from rcilab.makers.rokae.controller.fault_stop import FAULT_STOP, Offender
+from rcilab.makers.rokae.controller.fault_stop import FAULT_STOP, FaultSource
 from rcilab.model.robot_model import RobotModel
 
 if TYPE_CHECKING:
@@ -31,11 +31,11 @@ SECTION = "4.6"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Exhibit:
+class FaultDemo:
     """A fault that a controller has really reported, with the cycles that led to it."""
 
     fault: Fault
-    recipe: Recipe
+    recipe: FaultScenario
     model: RobotModel
     limits: Limits
     """What the arm was judged by, narrowed limits included."""
@@ -70,7 +70,7 @@ class Exhibit:
     @property
     def q(self) -> JointVector:
         """Where the arm was then, measured, shape (n,), [rad]."""
-        return frozen(self.cycles["q"][-1])
+        return readonly_copy(self.cycles["q"][-1])
 
     @property
     def condition(self) -> Condition:
@@ -123,7 +123,7 @@ class Exhibit:
         """Where to look for the arm: as commanded where a command of a place was wrong, otherwise as measured."""
         from rcilab.motion import Motion
 
-        if FAULT_STOP[self.fault].offender is Offender.COMMAND and self.recipe.mode != "torque":
+        if FAULT_STOP[self.fault].offender is FaultSource.COMMAND and self.recipe.mode != "torque":
             return self.commanded
         return Motion.from_cycles(self._every_cycle("q"))
 

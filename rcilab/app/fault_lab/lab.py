@@ -8,14 +8,14 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from rcilab.app.fault_lab.fault_demo import Exhibit, Step
-from rcilab.app.fault_lab.scenario import Recipe, Scene
+from rcilab.app.fault_lab.fault_demo import FaultDemo, Step
+from rcilab.app.fault_lab.scenario import FaultScenario, Scene
 from rcilab.app.fault_lab.signals import Signals
 from rcilab.app.fault_lab.table import FAULTS
 from rcilab.control_process.simulate import simulate
 from rcilab.core.arrays import Array
 from rcilab.core.clock import CYCLE_TIME
-from rcilab.core.closeable import Closing
+from rcilab.core.closeable import Closeable
 from rcilab.core.command import Command
 from rcilab.core.errors import CommandRejectedError, ControlError, RcilabError, UsageError
 from rcilab.core.faults import Fault, find_fault
@@ -44,7 +44,7 @@ Tell = Callable[[float], None]
 """Told how much is done, 0 to 1. What it raises ends the provocation: the arm is brought to rest, nothing is kept."""
 
 
-class Booth(Closing):
+class FaultLab(Closeable):
     """Provokes faults on a private virtual arm that nobody else sees. Owned by one thread; opens when first used.
 
     Args:
@@ -55,7 +55,7 @@ class Booth(Closing):
         self.model = load_model(model if isinstance(model, str) else model.name)
         self._robot: RobotSession | None = None
 
-    def provoke(self, fault: Fault | str, progress: Tell = lambda share: None) -> Exhibit:
+    def provoke(self, fault: Fault | str, progress: Tell = lambda share: None) -> FaultDemo:
         """Provokes a fault and returns what the controller reported; afterwards the arm stands ready for the next one.
 
         Args:
@@ -86,7 +86,7 @@ class Booth(Closing):
     def __repr__(self) -> str:
         return f"<Booth with a private {self.model.name}{'' if self._robot else ', not opened yet'}>"
 
-    def _provoke(self, recipe: Recipe, progress: Tell) -> Exhibit:
+    def _provoke(self, recipe: FaultScenario, progress: Tell) -> FaultDemo:
         progress(0.02)
         if self._robot is None:
             self._robot = simulate(self.model)
@@ -119,7 +119,7 @@ class Booth(Closing):
             raise RcilabError(
                 f"{recipe.fault.manual_name}: the record does not show what the controller saw: {status.reason}"
             ).coded("no_fault", fault=recipe.fault.manual_name)
-        return Exhibit(
+        return FaultDemo(
             fault=recipe.fault,
             recipe=recipe,
             model=self.model,
@@ -132,7 +132,7 @@ class Booth(Closing):
             way_out=tuple(self._leave(robot, recipe)),
         )
 
-    def _leave(self, robot: RobotSession, recipe: Recipe) -> list[Step]:
+    def _leave(self, robot: RobotSession, recipe: FaultScenario) -> list[Step]:
         """Leads out of a fault and returns what it took."""
         done: list[Step] = []
         if recipe.fault is Fault.INSTABILITY_DETECTION:

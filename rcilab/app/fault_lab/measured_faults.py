@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from rcilab.app.fault_lab.command_faults import LIVELY_ELBOW, box_around_tool, soften_joint_1, torque_stream
-from rcilab.app.fault_lab.scenario import Recipe, Scene
+from rcilab.app.fault_lab.scenario import FaultScenario, Scene
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.command import CartesianPosition, JointPosition
 from rcilab.core.faults import Fault
@@ -134,39 +134,39 @@ def _both(first: Callable[[Scene], Scene], second: Callable[[Scene], Scene]) -> 
 
 
 ARM_RECIPES = (
-    Recipe(
+    FaultScenario(
         fault=Fault.ACTUAL_JOINT_POSITION_LIMITS_VIOLATION, group="position", mode="joint_impedance",
         prepare=_both(_soft_joints, soften_joint_1), act=_sideways,
     ),
-    Recipe(
+    FaultScenario(
         fault=Fault.ACTUAL_CARTESIAN_POSITION_LIMITS_VIOLATION, group="position", mode="joint_impedance",
         prepare=_both(_soft_joints, box_around_tool), act=_down,
     ),
-    Recipe(
+    FaultScenario(
         fault=Fault.ACTUAL_CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION, group="position",
         mode="cartesian_impedance", prepare=_firm_tool, act=_elbow, needs_elbow=True,
         pose=LIVELY_ELBOW,
     ),
-    Recipe(
+    FaultScenario(
         fault=Fault.ACTUAL_JOINT_VELOCITY_LIMITS_VIOLATION, group="velocity", mode="torque", prepare=Scene.yielding,
         act=_swing,
     ),
-    Recipe(
+    FaultScenario(
         fault=Fault.ACTUAL_CARTESIAN_VELOCITY_LIMITS_VIOLATION, group="velocity", mode="cartesian_impedance",
         prepare=_loose_tool, act=_turn,
     ),
-    Recipe(
+    FaultScenario(
         fault=Fault.ACTUAL_JOINT_ACCELERATION_LIMITS_VIOLATION, group="acceleration", mode="torque",
         prepare=Scene.yielding, act=_throw,
     ),
-    Recipe(
+    FaultScenario(
         fault=Fault.ACTUAL_CARTESIAN_ACCELERATION_LIMITS_VIOLATION, group="acceleration", mode="cartesian_impedance",
         prepare=_loose_tool, act=_twist,
     ),
-    Recipe(
+    FaultScenario(
         fault=Fault.COLLISION, group="contact", mode="joint_position", prepare=_touchy, act=_hit,
     ),
-    Recipe(
+    FaultScenario(
         fault=Fault.INSTABILITY_DETECTION, group="contact", mode="joint_position", act=_cut_off,
     ),
 )  # fmt: skip

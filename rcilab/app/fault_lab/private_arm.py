@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import threading
 
-from rcilab.app.fault_lab.fault_demo import Exhibit
-from rcilab.app.fault_lab.lab import Booth
-from rcilab.core.background_job import Tell
+from rcilab.app.fault_lab.fault_demo import FaultDemo
+from rcilab.app.fault_lab.lab import FaultLab
+from rcilab.core.background_job import ProgressCallback
 from rcilab.core.faults import Fault
 
 IDLE_TIME = 60.0  # [s] A tuning value: starting a controller takes two seconds, keeping one 8 % of a core.
@@ -21,17 +21,17 @@ class PrivateArm:
 
     def __init__(self, idle_time: float = IDLE_TIME) -> None:
         self._idle_time = idle_time
-        self._booth: Booth | None = None
+        self._booth: FaultLab | None = None
         self._lock = threading.Lock()  # Held by the thread that uses the booth.
         self._timer: threading.Timer | None = None
 
-    def provoke(self, fault: Fault, model: str, tell: Tell) -> Exhibit:
+    def provoke(self, fault: Fault, model: str, tell: ProgressCallback) -> FaultDemo:
         """Returns what came of provoking a fault; who gives up meanwhile leaves the arm at rest."""
         with self._lock:
             tell(0.0)
             if self._booth is None or self._booth.model.name != model:
                 self._drop()
-                self._booth = Booth(model)
+                self._booth = FaultLab(model)
             try:
                 return self._booth.provoke(fault, tell)
             finally:

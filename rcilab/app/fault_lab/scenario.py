@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 import numpy as np
 
 from rcilab.conformance.measured_conditions import yielding_limits
-from rcilab.core.arrays import JointVector, frozen
+from rcilab.core.arrays import JointVector, readonly_copy
 from rcilab.core.faults import Fault
 from rcilab.core.limits import Limits
 from rcilab.core.safety_box import SafetyBox
@@ -38,12 +38,12 @@ class Scene:
 
     def narrowed(self, upper: JointVector) -> Scene:
         """Returns the scene with soft limits of the joints, `upper` of shape (n,), [rad]."""
-        joint = replace(self.limits.joint, upper=frozen(upper))
+        joint = replace(self.limits.joint, upper=readonly_copy(upper))
         return replace(self, limits=replace(self.limits, joint=joint))
 
     def guarded(self, thresholds: JointVector) -> Scene:
         """Returns the scene with these collision thresholds, shape (n,), [N m]."""
-        joint = replace(self.limits.joint, collision_threshold=frozen(thresholds))
+        joint = replace(self.limits.joint, collision_threshold=readonly_copy(thresholds))
         return replace(self, limits=replace(self.limits, joint=joint))
 
     def yielding(self) -> Scene:
@@ -56,7 +56,7 @@ def _as_it_is(scene: Scene) -> Scene:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Recipe:
+class FaultScenario:
     """One fault, and what makes a controller report it."""
 
     fault: Fault

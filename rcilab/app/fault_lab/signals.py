@@ -22,7 +22,7 @@ from rcilab.core.limits import Limits
 from rcilab.core.safety_box import SafetyBox
 from rcilab.model.kinematics.closed_form import build_closed_form
 from rcilab.model.robot_model import RobotModel
-from rcilab.sim.momentum_observer import Observer
+from rcilab.sim.momentum_observer import MomentumObserver
 from rcilab.sim.plant import Measurement
 
 _BEFORE = 3  # Rows that a third difference looks back to.
@@ -166,7 +166,7 @@ class Signals:
 
     def _external(self) -> Array:
         """Returns outside joint torques, as the controller estimates them."""
-        observer = Observer(self._model)
+        observer = MomentumObserver(self._model)
         found: list[Array] = []
         for index, row in enumerate(self._rows):
             measured = Measurement(row["q"], row["dq"], row["tau"])

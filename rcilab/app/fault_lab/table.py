@@ -6,17 +6,17 @@ from collections.abc import Iterator, Mapping
 
 from rcilab.app.fault_lab.command_faults import COMMAND_RECIPES
 from rcilab.app.fault_lab.measured_faults import ARM_RECIPES
-from rcilab.app.fault_lab.scenario import GROUPS, Group, Recipe
+from rcilab.app.fault_lab.scenario import GROUPS, FaultScenario, Group
 from rcilab.core.faults import Fault
 
 
-class FaultTable(Mapping[Fault, Recipe]):
+class FaultTable(Mapping[Fault, FaultScenario]):
     """Recipes by fault; `print` shows it as a table."""
 
-    def __init__(self, *recipes: Recipe) -> None:
+    def __init__(self, *recipes: FaultScenario) -> None:
         self._recipes = {recipe.fault: recipe for recipe in sorted(recipes, key=lambda recipe: recipe.fault)}
 
-    def __getitem__(self, fault: Fault) -> Recipe:
+    def __getitem__(self, fault: Fault) -> FaultScenario:
         return self._recipes[fault]
 
     def __iter__(self) -> Iterator[Fault]:
@@ -25,7 +25,7 @@ class FaultTable(Mapping[Fault, Recipe]):
     def __len__(self) -> int:
         return len(self._recipes)
 
-    def group(self, group: Group) -> tuple[Recipe, ...]:
+    def group(self, group: Group) -> tuple[FaultScenario, ...]:
         """Returns the recipes of a group, in wire order."""
         return tuple(recipe for recipe in self.values() if recipe.group == group)
 

@@ -18,7 +18,7 @@ from rcilab.core.errors import DeadlineError
 from rcilab.core.spatial import Pose
 from rcilab.core.state import ControllerMode, MotionGeneratorMode, RobotState
 from rcilab.diagnostics.bench.compute import motion_of
-from rcilab.diagnostics.bench.cpu_stall_monitor import CoreWatch
+from rcilab.diagnostics.bench.cpu_stall_monitor import CpuStallMonitor
 from rcilab.diagnostics.bench.machine import ask_realtime
 from rcilab.diagnostics.bench.measure import Measurement, summarise
 from rcilab.makers.rokae import wire as rci
@@ -93,7 +93,7 @@ def bench_state_period(seconds: float = 10.0) -> Measurement:
     try:
         assert controller.address is not None
         place = parse_address(controller.address)
-        with CoreWatch() as watch:
+        with CpuStallMonitor() as watch:
             stamps, is_faulty = _stream(place.host, place.port, commands, round(seconds / CYCLE_TIME))
     finally:
         controller.end()

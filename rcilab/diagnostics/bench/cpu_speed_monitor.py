@@ -15,7 +15,7 @@ _PERIOD = 0.5  # [s] between two looks: 0.2 % of a core.
 SLOW = 1.2  # A choice: from here on it is worth a word.
 
 
-class PaceWatch:
+class CpuSpeedMonitor:
     """Looks again and again from `with` to its end. Use one for several things, one after the other."""
 
     def __init__(self) -> None:
@@ -24,7 +24,7 @@ class PaceWatch:
         self._is_over = threading.Event()
         self._watcher: threading.Thread | None = None
 
-    def __enter__(self) -> PaceWatch:
+    def __enter__(self) -> CpuSpeedMonitor:
         self._looks, self._is_over = [_look()], threading.Event()
         self._watcher = threading.Thread(target=self._watch, name="pace-watch", daemon=True)
         self._watcher.start()

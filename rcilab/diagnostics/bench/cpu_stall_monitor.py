@@ -27,7 +27,7 @@ SHORTEST_PAUSE = 2e-4  # [s] Later than this is a pause; a loop in Python wakes 
 _PRIORITY = 99  # Above everything else, so that only the machine itself can hold it up.
 
 
-class CoreWatch:
+class CpuStallMonitor:
     """One loop a core, from `with` to its end. Owned by one thread.
 
     Attributes:
@@ -42,7 +42,7 @@ class CoreWatch:
         self.stolen = 0.0
         self._loops: list[subprocess.Popen[str]] = []
 
-    def __enter__(self) -> CoreWatch:
+    def __enter__(self) -> CpuStallMonitor:
         self.stolen = -_stolen_time()
         for core in sorted(os.sched_getaffinity(0)):
             command = [sys.executable, "-m", "rcilab.diagnostics.bench.cpu_stall_monitor", str(core)]

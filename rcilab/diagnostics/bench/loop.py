@@ -14,7 +14,7 @@ from rcilab.control_process import Supervisor, SupervisorStatus
 from rcilab.control_process.jitter_histogram import LATE_AFTER
 from rcilab.core.errors import DeadlineError
 from rcilab.diagnostics.bench.compute import motion_of
-from rcilab.diagnostics.bench.cpu_stall_monitor import CoreWatch
+from rcilab.diagnostics.bench.cpu_stall_monitor import CpuStallMonitor
 from rcilab.workbench.app import Workbench
 
 _PATIENCE = 60.0  # [s]
@@ -36,7 +36,7 @@ class Streamed:
     """Fewest pages that were open at any time."""
     rows: NDArray[np.void]
     """Every cycle."""
-    watch: CoreWatch
+    watch: CpuStallMonitor
 
     @property
     def late(self) -> int:
@@ -95,7 +95,7 @@ def stream(bench: Workbench, supervisor: Supervisor, seconds: float) -> Streamed
     reader.drain()
     rows: list[NDArray[np.void]] = []
     success, fewest_pages = 1.0, len(bench.server.get_clients())
-    with CoreWatch() as watch:
+    with CpuStallMonitor() as watch:
         # The bench is at the controls: a page that is drawn in software can be silent for longer than an operator may
         # be. Only said from here on: on a busy machine it may take longer than that until the watch stands.
         supervisor.set_operator_present(True)

@@ -16,7 +16,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from rcilab.core.arrays import Array, frozen
+from rcilab.core.arrays import Array, readonly_copy
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import DeadlineError
 from rcilab.diagnostics.doctor.finding import Finding
@@ -79,7 +79,7 @@ def measure_jitter(seconds: float, progress: Callable[[float, float], None]) -> 
     expected = _cycles(seconds)
     if len(late) < expected:
         raise DeadlineError(f"the measuring loop ended after {len(late)} of {expected} cycles")
-    return frozen(late)
+    return readonly_copy(late)
 
 
 def judge_jitter(late: Array, stolen: float | None, *, is_for_real: bool = False) -> Finding:

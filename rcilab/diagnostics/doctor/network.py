@@ -20,7 +20,7 @@ _OWN_ADDRESS = "192.168.0.22/24"  # RCI manual 2.5, its example for a computer w
 
 
 @dataclass(frozen=True, slots=True)
-class Way:
+class NetworkRoute:
     """The interface that leads to an address, and the gateway in between, if any."""
 
     interface: str
@@ -92,11 +92,11 @@ def is_here(route: Route) -> bool:
     return ipaddress.ip_address(host).is_loopback or host == route.local_tcp[0]
 
 
-def find_way(host: str, system: System) -> Way | None:
+def find_way(host: str, system: System) -> NetworkRoute | None:
     """Returns where the kernel's table of routes sends packets for an IPv4 address; None when it does not say."""
     target = int(ipaddress.IPv4Address(host))
     best: tuple[int, int] | None = None
-    way: Way | None = None
+    way: NetworkRoute | None = None
     for line in (system.read("/proc/net/route").text or "").splitlines()[1:]:
         words = line.split()
         try:
@@ -106,7 +106,7 @@ def find_way(host: str, system: System) -> Way | None:
             continue
         rank = (mask, -metric)  # The longest mask wins, then the lowest metric.
         if target & mask == destination and (best is None or rank > best):
-            best, way = rank, Way(interface, str(ipaddress.IPv4Address(gateway)) if gateway else None)
+            best, way = rank, NetworkRoute(interface, str(ipaddress.IPv4Address(gateway)) if gateway else None)
     return way
 
 

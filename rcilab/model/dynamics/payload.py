@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from rcilab.core.arrays import Matrix, Vector3, as_number, as_vector, frozen
+from rcilab.core.arrays import Matrix, Vector3, as_number, as_vector, readonly_copy
 from rcilab.core.errors import InvalidValueError
 
 _HEAVIEST = 100.0  # [kg] A choice: more than ten times what an xMate can carry. Grams are above it.
@@ -47,7 +47,7 @@ class Payload:
                 "load centre of mass", center.tolist(), f"is farther than {_FARTHEST:g} m; give metres"
             )
         object.__setattr__(self, "center_of_mass", center)
-        object.__setattr__(self, "inertia", frozen(inertia))
+        object.__setattr__(self, "inertia", readonly_copy(inertia))
 
     def __repr__(self) -> str:
         centre = " ".join(f"{x:.4g}" for x in self.center_of_mass.tolist())

@@ -11,7 +11,7 @@ from typing import TypeAlias
 import numpy as np
 import pinocchio as pin  # pyright: ignore[reportMissingImports]  # It lives behind a .pth file.
 
-from rcilab.core.arrays import Array, JointPath, JointVector, Matrix, Vector3, sealed
+from rcilab.core.arrays import Array, JointPath, JointVector, Matrix, Vector3, make_readonly
 from rcilab.core.spatial import IDENTITY, Pose
 from rcilab.model.dynamics.payload import Payload
 from rcilab.model.dynamics.symmetric_solver import SymmetricSolver
@@ -169,7 +169,7 @@ class RigidBody:
         """Returns `full_torque`, read-only and computed once for all who ask for the very same arrays."""
         args = self._shared_args
         if not (args and args[0] is q and args[1] is dq and args[2] is ddq):
-            self._shared_args, self._shared_torque = (q, dq, ddq), sealed(self.full_torque(q, dq, ddq))
+            self._shared_args, self._shared_torque = (q, dq, ddq), make_readonly(self.full_torque(q, dq, ddq))
         return self._shared_torque
 
     def motion_torque(self, q: JointVector, dq: JointVector, ddq: JointVector) -> JointVector:

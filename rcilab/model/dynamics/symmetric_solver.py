@@ -45,7 +45,7 @@ class SymmetricSolver:
         return self._decomposition.info() == _SUCCESS
 
 
-class Modes(NamedTuple):
+class VibrationModes(NamedTuple):
     """How an arm vibrates on springs, slowest mode first."""
 
     squares: Array
@@ -56,7 +56,7 @@ class Modes(NamedTuple):
     """M U, shape (n, n)."""
 
 
-def vibration_modes(mass_inverse: Matrix, stiffness: Matrix) -> Modes:
+def vibration_modes(mass_inverse: Matrix, stiffness: Matrix) -> VibrationModes:
     """Returns the modes of springs on an arm: the solutions of K u = w^2 M u.
 
     Args:
@@ -65,4 +65,4 @@ def vibration_modes(mass_inverse: Matrix, stiffness: Matrix) -> Modes:
     """
     solver = eigenpy.GeneralizedSelfAdjointEigenSolver(stiffness, mass_inverse, _MODES)
     shapes = solver.eigenvectors().copy()
-    return Modes(solver.eigenvalues().copy(), shapes, eigenpy.LLT(mass_inverse).solve(shapes))
+    return VibrationModes(solver.eigenvalues().copy(), shapes, eigenpy.LLT(mass_inverse).solve(shapes))

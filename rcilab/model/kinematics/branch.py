@@ -30,7 +30,7 @@ _BESIDE = 1e-5  # sin of how far beside the axis a path still counts as through 
 
 
 @dataclass(frozen=True, slots=True)
-class Loss:
+class BranchEnd:
     """The first row of a path at which its branch ends."""
 
     row: int
@@ -40,7 +40,7 @@ class Loss:
 
 def follow_branch(
     arm: ArmGeometry, rotations: Array, positions: Array, psi: Column | None, start: JointVector
-) -> tuple[JointPath, Loss | None]:
+) -> tuple[JointPath, BranchEnd | None]:
     """Returns the joint angles along a path of the flange, each row next to the one before; limits are not looked at.
 
     Args:
@@ -141,11 +141,11 @@ class _Tracker:
     """Follows azimuths row by row and keeps the first loss."""
 
     def __init__(self) -> None:
-        self.loss: Loss | None = None
+        self.loss: BranchEnd | None = None
 
     def lose(self, row: int, reason: KinematicsError) -> None:
         if self.loss is None or row < self.loss.row:
-            self.loss = Loss(row, reason)
+            self.loss = BranchEnd(row, reason)
 
     def azimuth(self, x: Column, y: Column, guess: float, axes: str) -> tuple[Column, Column, Column, Column]:
         """Returns the angle about z, continuous, the tilt with the sign that goes with it, and the angle's cos and sin.

@@ -13,7 +13,7 @@ from rcilab.core.arrays import Array, JointPath, JointVector
 from rcilab.core.errors import KinematicsError
 from rcilab.core.spatial import Pose
 from rcilab.model.kinematics.arm_angle import arm_angle, arm_angle_path
-from rcilab.model.kinematics.branch import Loss, follow_branch
+from rcilab.model.kinematics.branch import BranchEnd, follow_branch
 from rcilab.model.kinematics.elbow_ranges import FeasibleArcs, feasible_arcs
 from rcilab.model.kinematics.ik_fixed_elbow import inverse_held, inverse_held_batch
 from rcilab.model.kinematics.inverse import Angles, ArmGeometry, build_geometry, inverse_seven, inverse_six
@@ -82,7 +82,7 @@ class ClosedForm(Protocol):
 
     def follow(
         self, rotations: Array, positions: Array, psi: Array | None, start: JointVector
-    ) -> tuple[JointPath, Loss | None]:
+    ) -> tuple[JointPath, BranchEnd | None]:
         """Returns the joint angles along a path, as `follow_branch` does."""
         ...
 
@@ -148,7 +148,7 @@ class SphericalSeven:
 
     def follow(
         self, rotations: Array, positions: Array, psi: Array | None, start: JointVector
-    ) -> tuple[JointPath, Loss | None]:
+    ) -> tuple[JointPath, BranchEnd | None]:
         """Returns the joint angles along a path."""
         return follow_branch(self.envelope, rotations, positions, psi, start)
 
@@ -229,7 +229,7 @@ class OffsetSeven:
 
     def follow(
         self, rotations: Array, positions: Array, psi: Array | None, start: JointVector
-    ) -> tuple[JointPath, Loss | None]:
+    ) -> tuple[JointPath, BranchEnd | None]:
         """Returns the joint angles along a path."""
         angles = np.full(len(positions), start[ELBOW]) if psi is None else psi
         return follow_offset_branch(self.geometry, rotations, positions, angles, start)

@@ -17,7 +17,7 @@ _HALVINGS = 12  # Steps of the search along the way to the target: 1/4096 of it,
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Reach:
+class ClosestPose:
     """The answer to "go there, or as close as you can"."""
 
     q: JointVector
@@ -37,7 +37,7 @@ def closest_reachable(
     here: Pose,
     q: JointVector,
     target: Pose,
-) -> Reach:
+) -> ClosestPose:
     """Returns joint angles for a target, or for the closest pose to it that the arm can take.
 
     A target beyond the reach is pulled straight back towards the shoulder, keeping its orientation. One that a joint
@@ -54,14 +54,14 @@ def closest_reachable(
     """
     try:
         found = solve(target, True)
-        return Reach(q=found.nearest(q), pose=target, solutions=found, refusal=None)
+        return ClosestPose(q=found.nearest(q), pose=target, solutions=found, refusal=None)
     except UnreachableError as error:
         refusal = error
     goal = _pull_in(arm, T_flange_tool, target)
     if goal is not target:
         try:
             found = solve(goal, True)
-            return Reach(q=found.nearest(q), pose=goal, solutions=found, refusal=refusal)
+            return ClosestPose(q=found.nearest(q), pose=goal, solutions=found, refusal=refusal)
         except UnreachableError:
             pass
     return _approach(solve, here, q, goal, refusal)
@@ -69,9 +69,9 @@ def closest_reachable(
 
 def _approach(
     solve: Callable[[Pose, bool], Solutions], here: Pose, q: JointVector, goal: Pose, refusal: UnreachableError
-) -> Reach:
+) -> ClosestPose:
     """Returns the last reachable pose found on the straight way from here to an unreachable goal, by bisection."""
-    best = Reach(q=q, pose=here, solutions=None, refusal=refusal)
+    best = ClosestPose(q=q, pose=here, solutions=None, refusal=refusal)
     low, high = 0.0, 1.0
     for _ in range(_HALVINGS):
         middle = (low + high) / 2.0
@@ -82,7 +82,7 @@ def _approach(
             high = middle
         else:
             low = middle
-            best = Reach(q=found.nearest(best.q), pose=pose, solutions=found, refusal=refusal)
+            best = ClosestPose(q=found.nearest(best.q), pose=pose, solutions=found, refusal=refusal)
     return best
 
 

@@ -21,7 +21,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from rcilab.core.arrays import Array, JointPath, JointVector, Vector3, frozen
+from rcilab.core.arrays import Array, JointPath, JointVector, Vector3, readonly_copy
 from rcilab.robots.description import RobotDescription
 from rcilab.robots.shapes import Capsule, build_shapes
 from rcilab.robots.upright import upright_flange, upright_joints
@@ -90,7 +90,7 @@ class CollisionGeometry:
         self.links, self.link_pairs = self._compare(apart, None)
         rising = names[_first_rising(description) :] if floor_height is not None else []
         self.floor, self.floor_pairs = self._compare([LinkPair(name, FLOOR) for name in rising], floor_height)
-        self.levers = frozen(_levers(description, self.bodies))
+        self.levers = readonly_copy(_levers(description, self.bodies))
         """How far any point of the arm is from each joint's axis at most, shape (n,), [m]."""
 
     def _compare(self, pairs: list[LinkPair], floor_height: float | None) -> tuple[Any, list[LinkPair]]:
@@ -167,7 +167,7 @@ def collision_geometry(
     capsule = None
     if tool_radius is not None and any(tool):
         end = upright_flange(description).rotation @ np.array(tool)
-        capsule = Capsule(frozen([0.0, 0.0, 0.0]), frozen(end), tool_radius)
+        capsule = Capsule(readonly_copy([0.0, 0.0, 0.0]), readonly_copy(end), tool_radius)
     return CollisionGeometry(description, capsule, floor_height)
 
 

@@ -8,7 +8,7 @@ from math import pi, remainder, tau
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.core.arrays import Array, frozen
+from rcilab.core.arrays import Array, readonly_copy
 from rcilab.core.errors import SingularError
 from rcilab.model.kinematics.arm_angle import reference_frame
 
@@ -90,5 +90,9 @@ def elbow_circle(shoulder: Array, elbow: Array, wrist: Array) -> ElbowCircle:
             "stretched"
         )
     return ElbowCircle(
-        center=frozen(center), radius=radius, axis=frozen(axis), upward=frozen(upward), across=frozen(across)
+        center=readonly_copy(center),
+        radius=radius,
+        axis=readonly_copy(axis),
+        upward=readonly_copy(upward),
+        across=readonly_copy(across),
     )

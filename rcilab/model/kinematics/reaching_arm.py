@@ -12,7 +12,7 @@ from rcilab.core.arrays import as_number, as_vector, described
 from rcilab.core.errors import InvalidValueError, KinematicsError
 from rcilab.core.safety_box import SafetyBox, active_box
 from rcilab.core.spatial import Pose
-from rcilab.model.kinematics.closest_pose import Reach, closest_reachable
+from rcilab.model.kinematics.closest_pose import ClosestPose, closest_reachable
 from rcilab.model.kinematics.elbow_circle import ElbowCircle, elbow_circle
 from rcilab.model.kinematics.elbow_ranges import FeasibleArcs
 from rcilab.model.kinematics.inverse_batch import SolutionBatch, as_pose_batch
@@ -75,7 +75,7 @@ class ReachingArm(MovingArm):
             raise InvalidValueError("psi", psi, problem).coded("six_axes", model=name)
         return self._search.solve(self._flange(pose), psi, guess)
 
-    def closest(self, T: Pose | ArrayLike, near: ArrayLike, psi: float | None = None) -> Reach:
+    def closest(self, T: Pose | ArrayLike, near: ArrayLike, psi: float | None = None) -> ClosestPose:
         """Returns joint angles for a target, or for the closest pose to it that the arm can take.
 
         Args:

@@ -17,7 +17,7 @@ SINGULAR = (
 
 
 @dataclass(frozen=True, slots=True)
-class Dexterity:
+class Manipulability:
     """What the singular values of the Jacobian say about a configuration."""
 
     manipulability: float
@@ -28,32 +28,32 @@ class Dexterity:
     """Largest over smallest singular value; infinite at a singularity."""
 
 
-def dexterity(J: Matrix) -> Dexterity:
+def dexterity(J: Matrix) -> Manipulability:
     """Returns the dexterity measures of a Jacobian, shape (6, n), metres and radians taken as they are."""
     values = np.linalg.svd(J, compute_uv=False)
     smallest, largest = float(values[-1]), float(values[0])
-    return Dexterity(float(np.prod(values)), smallest, largest / smallest if smallest > 0.0 else float("inf"))
+    return Manipulability(float(np.prod(values)), smallest, largest / smallest if smallest > 0.0 else float("inf"))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class DexterityPath:
-    """The measures of `Dexterity` for N configurations, each of shape (N,)."""
+class ManipulabilityPath:
+    """The measures of `Manipulability` for N configurations, each of shape (N,)."""
 
     manipulability: Array
     smallest: Array
     condition: Array
 
     def __repr__(self) -> str:
-        return f"<DexterityPath of {len(self.smallest)} rows: .manipulability, .smallest, .condition>"
+        return f"<ManipulabilityPath of {len(self.smallest)} rows: .manipulability, .smallest, .condition>"
 
 
-def dexterity_path(J: Array) -> DexterityPath:
+def dexterity_path(J: Array) -> ManipulabilityPath:
     """Returns the dexterity measures of many Jacobians, shape (N, 6, n)."""
     values = np.asarray(np.linalg.svd(J, compute_uv=False), dtype=np.float64)
     smallest, largest = values[:, -1], values[:, 0]
     with np.errstate(divide="ignore"):
         condition = np.where(smallest > 0.0, largest / smallest, np.inf)
-    return DexterityPath(np.prod(values, axis=1), smallest, condition)
+    return ManipulabilityPath(np.prod(values, axis=1), smallest, condition)
 
 
 def find_singularity(arm: ArmGeometry, q: Sequence[float]) -> str | None:

@@ -9,7 +9,7 @@ from math import degrees, tau
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.core.arrays import JointVector, as_vector, frozen
+from rcilab.core.arrays import JointVector, as_vector, readonly_copy
 from rcilab.core.errors import UnreachableError
 
 _AT_LIMIT = 1e-3  # [rad] An excess of less than 0.1 deg is not worth a number.
@@ -47,7 +47,7 @@ class Solutions(Sequence[JointVector]):
         self._branches, self._lower, self._upper = branches, lower, upper
         self._all: tuple[Branch, ...] | None = None
         inside = [q for q in branches if _is_inside(q, lower, upper)]
-        self._feasible = frozen(inside) if inside else frozen(np.empty((0, len(lower))))
+        self._feasible = readonly_copy(inside) if inside else readonly_copy(np.empty((0, len(lower))))
 
     @property
     def all(self) -> tuple[Branch, ...]:
@@ -80,7 +80,7 @@ class Solutions(Sequence[JointVector]):
         turned = self._feasible + turns
         inside = (turned > self._lower) & (turned < self._upper)
         candidates = np.where(inside, turned, self._feasible)
-        return frozen(candidates[np.argmin(((candidates - here) ** 2).sum(axis=1))])
+        return readonly_copy(candidates[np.argmin(((candidates - here) ** 2).sum(axis=1))])
 
     def refusal(self, *, everywhere: bool = False) -> UnreachableError:
         """Returns the error that says which joint limit is in the way, for the branch that comes closest.

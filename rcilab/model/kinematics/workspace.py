@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rcilab.core.arrays import Array, JointPath, JointVector, described, frozen
+from rcilab.core.arrays import Array, JointPath, JointVector, described, readonly_copy
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.safety_box import SafetyBox, active_box
 from rcilab.model.kinematics.moving_arm import MovingArm
-from rcilab.model.kinematics.singularity import DexterityPath, dexterity_path
+from rcilab.model.kinematics.singularity import ManipulabilityPath, dexterity_path
 
 _MOST = 1_000_000  # Samples; a choice: some 200 MB while they are made.
 
@@ -23,7 +23,7 @@ class Workspace:
     """Joint angles, shape (N, n), [rad]."""
     position: Array
     """Origin of the tool in base, shape (N, 3), [m]."""
-    dexterity: DexterityPath
+    dexterity: ManipulabilityPath
     """How well the tool can be moved there."""
 
     def __len__(self) -> int:
@@ -63,4 +63,4 @@ def sample_workspace(
         inside = bound.excess_path(position) <= 0.0
         q, position = q[inside], position[inside]
     J = arm.jacobian(q) if len(q) else np.empty((0, 6, arm.n))
-    return Workspace(q=frozen(q), position=frozen(position), dexterity=dexterity_path(J))
+    return Workspace(q=readonly_copy(q), position=readonly_copy(position), dexterity=dexterity_path(J))

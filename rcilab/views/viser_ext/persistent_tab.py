@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from typing import Any
 
 
-class LastingTab:
+class PersistentTab:
     """Keeps its place: a tab that is taken away and comes back is another one, to hands, layout and keyboard.
 
     Args:

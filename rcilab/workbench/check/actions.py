@@ -6,10 +6,10 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from rcilab.core.background_job import Background
+from rcilab.core.background_job import BackgroundJob
 from rcilab.core.errors import RcilabError
 from rcilab.workbench import requests
-from rcilab.workbench.check.slowing import Slower, slow_program, slow_to_goal
+from rcilab.workbench.check.slowing import SlowdownJob, slow_program, slow_to_goal
 from rcilab.workbench.check.state import CheckState, Explained, Slowed
 from rcilab.workbench.goal.actions import GoalActions
 from rcilab.workbench.program.actions import ProgramActions
@@ -29,7 +29,7 @@ class CheckActions:
 
     def __init__(self, store: Store, session: Session, goal: GoalActions, program: ProgramActions) -> None:
         self._store, self._session, self._goal, self._program = store, session, goal, program
-        self._work: Background[Plan, Slower | Explained] = Background("check")
+        self._work: BackgroundJob[Plan, SlowdownJob | Explained] = BackgroundJob("check")
 
     def press(self, request: requests.Check) -> None:
         """Does what a button or a row of the tab says."""
@@ -58,7 +58,7 @@ class CheckActions:
             about, result = self._work.take()
             if isinstance(result, RcilabError):
                 self._answer("bad", tell_error(result))
-            elif isinstance(result, Slower):
+            elif isinstance(result, SlowdownJob):
                 self._finish(about, result)
             else:
                 self._set(explained=result)
@@ -116,7 +116,7 @@ class CheckActions:
         self._work.start(plan, run)
         self._set(doing="slow", progress=0.0, answer=None)
 
-    def _finish(self, before: Plan, result: Slower) -> None:
+    def _finish(self, before: Plan, result: SlowdownJob) -> None:
         state = self._store.state
         if state.plan is None or state.plan.motion is not before.motion:
             self._answer("warn", message("check.overtaken"))

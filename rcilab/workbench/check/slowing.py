@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from rcilab.app.planning import Plan, make_plan, picture
-from rcilab.core.background_job import Tell
+from rcilab.core.background_job import ProgressCallback
 from rcilab.workbench.program.draft import Draft
 from rcilab.workbench.program.planning import PROGRAM_LAW
 
@@ -23,7 +23,7 @@ SLOWEST = 0.01
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Slower:
+class SlowdownJob:
     """What a slow-down came to."""
 
     found: SlowDown
@@ -37,7 +37,7 @@ class Slower:
     """Whether the same curve runs slower as a whole, because no speed is slow enough: speed does not bound the jerk."""
 
 
-def slow_to_goal(plan: Plan, speed: float, law: PlannableLaw, tell: Tell) -> Slower:
+def slow_to_goal(plan: Plan, speed: float, law: PlannableLaw, tell: ProgressCallback) -> SlowdownJob:
     """Returns the plan to the same goal at the largest speed that passes, planned anew."""
 
     def make(scale: float) -> Plan | None:
@@ -47,7 +47,7 @@ def slow_to_goal(plan: Plan, speed: float, law: PlannableLaw, tell: Tell) -> Slo
     return _slower(plan, make, SLOWEST / speed, tell)
 
 
-def slow_program(plan: Plan, draft: Draft, rounds: int, tell: Tell) -> Slower:
+def slow_program(plan: Plan, draft: Draft, rounds: int, tell: ProgressCallback) -> SlowdownJob:
     """Returns the plan of the same program with every speed scaled by the largest factor that passes."""
     from rcilab.conformance import check
     from rcilab.motion import plan_program
@@ -75,22 +75,22 @@ def scaled(draft: Draft, scale: float) -> Draft:
     return replace(draft, steps=steps)
 
 
-def _slower(plan: Plan, make: Callable[[float], Plan | None], least: float, tell: Tell) -> Slower:
+def _slower(plan: Plan, make: Callable[[float], Plan | None], least: float, tell: ProgressCallback) -> SlowdownJob:
     recommended = plan.report.ok
     found = plan.completed().report.slow_down(recommended=recommended, progress=lambda part: tell(_FOUND * part))
     tell(_FOUND)
     if found.factor is None or found.factor <= 1.0:
-        return Slower(found=found)
+        return SlowdownJob(found=found)
     wanted = {row.id for row in found.report.rows if row.ok} if found.report is not None else set[str]()
     scale = 1.0 / found.factor
     for attempt in range(_TRIES):
         made = make(scale) if scale >= least else None
         tell(_FOUND + (1.0 - _FOUND) * (attempt + 1) / _TRIES)
         if made is not None and made.report.ok and all(row.ok for row in made.report.rows if row.id in wanted):
-            return Slower(found=found, plan=made, scale=scale)
+            return SlowdownJob(found=found, plan=made, scale=scale)
         scale *= _FURTHER
     assert found.motion is not None
     assert found.report is not None
     whole = picture(plan.model, found.motion, found.report, plan.box)
     whole = replace(whole, short=plan.short, program=plan.program, complete=True)
-    return Slower(found=found, plan=whole, scale=1.0 / found.factor, is_stretched=True)
+    return SlowdownJob(found=found, plan=whole, scale=1.0 / found.factor, is_stretched=True)

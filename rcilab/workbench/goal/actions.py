@@ -11,7 +11,7 @@ import numpy as np
 from rcilab.app.planning import LAWS, PATH_KINDS, Plan, make_plan, make_recovery
 from rcilab.app.reach import judge_joints, judge_pose
 from rcilab.app.readiness import is_done
-from rcilab.core.arrays import JointVector, frozen
+from rcilab.core.arrays import JointVector, readonly_copy
 from rcilab.core.errors import KinematicsError
 from rcilab.core.spatial import Pose
 from rcilab.i18n.number_parsing import parse_number, parse_quaternion
@@ -52,7 +52,7 @@ class GoalActions:
         limits = model.limits.joint
         self._remember_hand(f"joint {request.joint}")
         q[request.joint] = min(max(request.angle, limits.lower[request.joint]), limits.upper[request.joint])
-        self._pose(frozen(q))
+        self._pose(readonly_copy(q))
 
     def pose_goal(self, request: requests.PoseGoal) -> None:
         """Poses the candidate arm by name."""
@@ -71,7 +71,7 @@ class GoalActions:
             "here": state.goal.q if here is None else here,
             "start": state.goal.q if state.plan is None else _beginning(state.plan),
         }
-        self._pose(frozen(named[request.name]))
+        self._pose(readonly_copy(named[request.name]))
         self._store.clear_problems("")
 
     def move_target(self, request: requests.MoveTarget) -> None:
@@ -173,7 +173,7 @@ class GoalActions:
             self._store.update(law=request.law)
             self.plan()
 
-    def set_way(self, request: requests.SetWay) -> None:
+    def set_way(self, request: requests.SetPathType) -> None:
         """Plans along another kind of path, or over another place."""
         kind = next((kind for kind in PATH_KINDS if kind == request.kind), self._store.state.way)
         via = self._store.state.goal.target if request.via else self._store.state.via
@@ -201,7 +201,7 @@ class GoalActions:
             self._due = time.monotonic() + SETTLED
             self._store.update(plan=None, no_plan=message("plan.soon"), recording=None, place=0.0, playing=False)
             return
-        self._make(state, frozen(status.q_c), is_asked=request is not None)
+        self._make(state, readonly_copy(status.q_c), is_asked=request is not None)
 
     def _make(self, state: UiState, start: JointVector, *, is_asked: bool) -> None:
         box = state.setup.wanted.box
@@ -219,7 +219,7 @@ class GoalActions:
             return
         self._stale, self._due = False, None
         self._planned = time.monotonic()
-        self._show(make_recovery(state.model, frozen(status.q_c), state.setup.wanted.box))
+        self._show(make_recovery(state.model, readonly_copy(status.q_c), state.setup.wanted.box))
 
     def _show(self, made: Plan | Message) -> None:
         if isinstance(made, Plan):

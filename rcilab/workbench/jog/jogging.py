@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from rcilab.core.arrays import Array, JointVector, frozen
+from rcilab.core.arrays import Array, JointVector, readonly_copy
 from rcilab.core.clearance import ADVISED_DISTANCE
 from rcilab.core.safety_box import SafetyBox, active_box
 from rcilab.motion.online import POSITION_MARGIN
@@ -119,7 +119,7 @@ def jog_velocity(model: RobotModel, q: JointVector, jog: JogState, axis: Axis) -
 def inside(model: RobotModel, q: JointVector) -> JointVector:
     """Returns the joint angles nearest to `q` from which a jog can begin, shape (n,), [rad]."""
     limits = model.limits.joint
-    return frozen(np.clip(q, limits.lower + POSITION_MARGIN, limits.upper - POSITION_MARGIN))
+    return readonly_copy(np.clip(q, limits.lower + POSITION_MARGIN, limits.upper - POSITION_MARGIN))
 
 
 def at_limit(model: RobotModel, q: JointVector, axis: Axis) -> Message | None:

@@ -9,7 +9,7 @@ from pathlib import Path
 from rcilab.core.errors import InvalidValueError, RcilabError
 from rcilab.i18n.error_messages import tell
 from rcilab.i18n.translator import Finished
-from rcilab.motion.named_poses import LONGEST_NAME, PoseBook
+from rcilab.motion.named_poses import LONGEST_NAME, NamedPoseStore
 from rcilab.workbench import requests
 from rcilab.workbench.goal.actions import GoalActions
 from rcilab.workbench.store import Store
@@ -74,8 +74,8 @@ class PoseActions:
             self._store.update(jog=replace(jog, pose=name))
 
     @property
-    def _book(self) -> PoseBook:
-        return PoseBook(self._store.state.model, self._file)
+    def _book(self) -> NamedPoseStore:
+        return NamedPoseStore(self._store.state.model, self._file)
 
     def _show(self, chosen: str | None = None) -> None:
         names = self._book.names()

@@ -37,7 +37,7 @@ from rcilab.workbench.store import Goal, Store
 from rcilab.workbench.text import message
 
 if TYPE_CHECKING:
-    from rcilab.control_process import SupervisorStatus, Ticket
+    from rcilab.control_process import PendingRequest, SupervisorStatus
     from rcilab.core.arrays import JointVector
 
 
@@ -52,7 +52,7 @@ class RobotJog:
 
     def __init__(self, store: Store, session: Session, goal: GoalActions) -> None:
         self._store, self._session, self._goal = store, session, goal
-        self._ticket: Ticket | None = None  # On its way, until the arm stands.
+        self._ticket: PendingRequest | None = None  # On its way, until the arm stands.
         self._followed: Goal | None = None  # The goal that was put where the arm was jogged to.
 
     def begin(self) -> bool:
@@ -171,7 +171,7 @@ class RobotJog:
         if self._followed in (None, self._store.state.goal):  # Not when somebody has posed the goal meanwhile.
             self._followed = self._goal.follow(q)
 
-    def _end(self, ticket: Ticket, status: SupervisorStatus) -> None:
+    def _end(self, ticket: PendingRequest, status: SupervisorStatus) -> None:
         if status.q_c is not None and self._followed in (None, self._store.state.goal):
             self._goal.pose(status.q_c)
         self._ticket = self._followed = None

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rcilab.app.reach import judge_pose
-from rcilab.core.arrays import JointVector, frozen
+from rcilab.core.arrays import JointVector, readonly_copy
 from rcilab.core.spatial import Pose
 from rcilab.motion.online import POSITION_MARGIN
 from rcilab.workbench.jog.jogging import AXES, Axis, Frame, JogState, at_limit
@@ -52,7 +52,7 @@ def take_step(model: RobotModel, q: JointVector, jog: JogState, axis: Axis) -> S
     low, high = limits.lower[joint] + POSITION_MARGIN, limits.upper[joint] - POSITION_MARGIN
     moved[joint] = min(max(q[joint] + math.radians(axis.sign * jog.step), low), high)
     is_further = axis.sign * (moved[joint] - q[joint]) > _NOWHERE
-    return Step(frozen(moved) if is_further else None, at_limit(model, frozen(moved), axis))
+    return Step(readonly_copy(moved) if is_further else None, at_limit(model, readonly_copy(moved), axis))
 
 
 def step_pose(T_base_tool: Pose, axis: Axis, step: float, frame: Frame) -> Pose:

@@ -6,9 +6,9 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from rcilab.app.fault_lab import FAULTS, Exhibit
+from rcilab.app.fault_lab import FAULTS, FaultDemo
 from rcilab.app.fault_lab.private_arm import PrivateArm
-from rcilab.core.background_job import Background
+from rcilab.core.background_job import BackgroundJob
 from rcilab.core.errors import RcilabError
 from rcilab.core.faults import Fault
 from rcilab.workbench import requests
@@ -27,7 +27,7 @@ class LearnActions:
     def __init__(self, store: Store, session: Session) -> None:
         self._store, self._session = store, session
         self._arm = PrivateArm()
-        self._work: Background[Fault, Exhibit] = Background("gallery")
+        self._work: BackgroundJob[Fault, FaultDemo] = BackgroundJob("gallery")
         self._watcher = Watcher()
 
     def press(self, request: requests.Learn) -> None:
@@ -88,7 +88,7 @@ class LearnActions:
         self._work.start(recipe.fault, partial(self._arm.provoke, recipe.fault, model.name))
         self._set(provoking=recipe.fault, progress=0.0, problem=None)
 
-    def _finish(self, result: Exhibit | RcilabError) -> None:
+    def _finish(self, result: FaultDemo | RcilabError) -> None:
         if isinstance(result, RcilabError):
             self._set(provoking=None, problem=message("learn.failed", error=tell_error(result)))
             return

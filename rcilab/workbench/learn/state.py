@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rcilab.app.fault_lab import Exhibit
-from rcilab.app.fault_lab.demo_motion import Exhibition, exhibition_of
+from rcilab.app.fault_lab import FaultDemo
+from rcilab.app.fault_lab.demo_motion import DemoMotion, exhibition_of
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.faults import Fault
 from rcilab.workbench.text import Message
@@ -21,14 +21,14 @@ if TYPE_CHECKING:
 class Show:
     """A fault on show, as timeline and scene draw it."""
 
-    exhibition: Exhibition
+    exhibition: DemoMotion
     recording: Recording
     """What the arm did."""
     beside: object
     """The motion that was planned on the page when it opened; another one closes the show."""
 
     @property
-    def exhibit(self) -> Exhibit:
+    def exhibit(self) -> FaultDemo:
         """The fault."""
         return self.exhibition.exhibit
 
@@ -62,7 +62,7 @@ class LearnState:
     lesson: LessonState | None = None
 
 
-def make_show(exhibit: Exhibit, beside: object) -> Show:
+def make_show(exhibit: FaultDemo, beside: object) -> Show:
     """Returns a fault as the page shows it."""
     from rcilab.workbench.store import Recording
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 _PERIOD = 0.2  # [s] A choice: numbers that change faster cannot be read.
 
 
-class ArmNowPanel:
+class ArmStatePanel:
     """A group of the Jog tab and of the Run tab."""
 
     def __init__(self, text: Text, ask: Ask) -> None:

@@ -12,7 +12,7 @@ from rcilab.workbench import requests
 from rcilab.workbench.goal.elbow import LOOKS, Elbow, say_why
 from rcilab.workbench.panels.jog import problems_html
 from rcilab.workbench.text import Text
-from rcilab.workbench.widgets import Ask, Html, Linked, NumberField, esc, shown
+from rcilab.workbench.widgets import Ask, BoundControl, Html, NumberField, esc, shown
 
 if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus
@@ -32,7 +32,7 @@ class ElbowPanel:
     def build(self, gui: Any, state: UiState) -> None:
         """Adds the controls."""
         text, ask = self._text, self._ask
-        self._psi: Linked | None = None
+        self._psi: BoundControl | None = None
         if state.model.n != 7:
             return
         with gui.add_folder(text("target.psi_title")):
@@ -40,7 +40,7 @@ class ElbowPanel:
             factor, _ = text.units.from_si("rad")
             end, step = (180.0, 1.0) if text.units.angle == "deg" else (3.14, 0.01)
             slider = gui.add_slider("ψ", -end, end, step, 0.0, hint=text("target.psi_hint"))
-            self._psi = Linked(slider, ask, lambda v, p: requests.SetArmAngle(page=p, psi=v / factor))
+            self._psi = BoundControl(slider, ask, lambda v, p: requests.SetArmAngle(page=p, psi=v / factor))
             self._field = NumberField(gui.add_text("", ""), ask, "psi", text.unit("deg"))
             self._ring = Html(gui)
         self._said = Html(gui)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from rcilab.workbench import requests
 from rcilab.workbench.scene.extras import EXTRAS, Extra
 from rcilab.workbench.text import Text
-from rcilab.workbench.widgets import Ask, Linked
+from rcilab.workbench.widgets import Ask, BoundControl
 
 if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus
@@ -22,7 +22,7 @@ class ExtrasPanel:
 
     def build(self, gui: Any, state: UiState) -> None:
         """Adds the switches."""
-        self._switches: dict[Extra, Linked] = {}
+        self._switches: dict[Extra, BoundControl] = {}
         with gui.add_folder(self._text("extra.title")):
             gui.add_html('<i class="rl-ticks"></i>')
             for extra in EXTRAS:
@@ -31,7 +31,7 @@ class ExtrasPanel:
                 box = gui.add_checkbox(
                     self._text(f"extra.{extra}"), extra in state.scene.extras, hint=self._text(f"extra.{extra}_hint")
                 )
-                self._switches[extra] = Linked(box, self._ask, _request(extra))
+                self._switches[extra] = BoundControl(box, self._ask, _request(extra))
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows what is switched on."""

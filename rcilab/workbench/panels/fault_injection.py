@@ -11,7 +11,7 @@ from rcilab.sim.api import DIRECTIONS
 from rcilab.workbench import requests
 from rcilab.workbench.run.driving import NETWORK_LAB, is_ours
 from rcilab.workbench.text import Text
-from rcilab.workbench.widgets import Ask, Html, Linked, esc, on_press
+from rcilab.workbench.widgets import Ask, BoundControl, Html, esc, on_press
 
 if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus
@@ -25,7 +25,7 @@ _BUTTONS: tuple[tuple[Any, str, str], ...] = (
 )
 
 
-class LabPanel:
+class FaultInjectionPanel:
     """Two groups of the Run tab; for a controller that is not ours they say why they do nothing."""
 
     def __init__(self, text: Text, ask: Ask) -> None:
@@ -46,15 +46,15 @@ class LabPanel:
             self._button = Html(gui)
         with gui.add_folder(text("network.title"), expand_by_default=False):
             self._note = Html(gui)
-            self._sliders: dict[str, Linked] = {}
+            self._sliders: dict[str, BoundControl] = {}
             for name, (largest, unit) in NETWORK_LAB.items():
                 scale = _SCALE[unit]
                 slider = gui.add_slider(text(f"network.{name}"), 0.0, largest * scale, 0.5, 0.0)
-                self._sliders[name] = Linked(slider, ask, _set(name, scale))
+                self._sliders[name] = BoundControl(slider, ask, _set(name, scale))
             names = {text(f"network.{way}"): way for way in DIRECTIONS}
             self._ways = {way: label for label, way in names.items()}
             way = gui.add_dropdown(text("network.way"), tuple(names), hint=text("network.way_hint"))
-            self._way = Linked(way, ask, lambda v, p: requests.SetNetwork(page=p, direction=names.get(v)))
+            self._way = BoundControl(way, ask, lambda v, p: requests.SetNetwork(page=p, direction=names.get(v)))
             self._pull = gui.add_button(text("network.pull"), icon="plug-connected-x", color="red")
             on_press(self._pull, ask, lambda page: requests.SetNetwork(page=page, pulled=True))
             self._plug = gui.add_button(text("network.plug"), icon="plug-connected", color="blue")

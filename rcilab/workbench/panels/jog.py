@@ -12,7 +12,7 @@ from rcilab.conformance.explain import explain_limit
 from rcilab.workbench import requests
 from rcilab.workbench.jog.jogging import FASTEST_JOINT, FASTEST_TOOL, FASTEST_TURN, STEPS, no_jog
 from rcilab.workbench.text import Text
-from rcilab.workbench.widgets import Ask, Html, Linked, NumberField, esc, on_press, shown
+from rcilab.workbench.widgets import Ask, BoundControl, Html, NumberField, esc, on_press, shown
 
 if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus
@@ -39,15 +39,15 @@ class JogPanel:
         text, ask, jog = self._text, self._ask, state.jog
         gui.add_html('<i class="rl-jogset"></i>')
         robot = gui.add_checkbox(text("jog.robot"), jog.robot, hint=text("jog.robot_hint"))
-        self._robot = Linked(robot, ask, lambda v, p: requests.SetJog(page=p, robot=bool(v)))
+        self._robot = BoundControl(robot, ask, lambda v, p: requests.SetJog(page=p, robot=bool(v)))
         steps = {text("jog.step_of", step=f"{step:g}") if step else text("jog.held"): step for step in STEPS}
         self._steps = {step: label for label, step in steps.items()}
         step = gui.add_dropdown(
             text("jog.step"), tuple(steps), initial_value=self._steps[jog.step], hint=text("jog.step_hint")
         )
-        self._step = Linked(step, ask, lambda v, p: requests.SetJog(page=p, step=steps.get(v)))
+        self._step = BoundControl(step, ask, lambda v, p: requests.SetJog(page=p, step=steps.get(v)))
         speed = gui.add_slider(text("jog.speed"), 1, 100, 1, round(100.0 * jog.speed), hint=text("jog.speed_hint"))
-        self._speed = Linked(speed, ask, lambda v, p: requests.SetJog(page=p, speed=v / 100.0))
+        self._speed = BoundControl(speed, ask, lambda v, p: requests.SetJog(page=p, speed=v / 100.0))
         self._pace, self._note = Html(gui), Html(gui)
         self._agree = gui.add_button(text("jog.confirm"), color="red", icon="hand-move", visible=False)
         on_press(self._agree, ask, lambda page: requests.SetJog(page=page, robot=True, agreed=True))
@@ -56,7 +56,7 @@ class JogPanel:
 
     def _build_joints(self, gui: Any, state: UiState) -> None:
         text, limits = self._text, state.model.limits.joint
-        self._sliders: list[Linked] = []
+        self._sliders: list[BoundControl] = []
         self._fields: list[NumberField] = []
         self._margins: list[Html] = []
         source = explain_limit(state.model.limits.source("joint.lower"), text.language)
@@ -73,7 +73,7 @@ class JogPanel:
             slider = gui.add_slider(
                 f"J{joint + 1}", round(low, digits), round(high, digits), step, value, marks=((0.0, ""),), hint=hint
             )
-            self._sliders.append(Linked(slider, self._ask, _joint_request(joint, factor)))
+            self._sliders.append(BoundControl(slider, self._ask, _joint_request(joint, factor)))
             add_jog_button(gui, self._ask, f"J{joint + 1}", f"joint.{joint}", 1)
             box = gui.add_text("", "", hint=text("jog.type_hint"))
             self._fields.append(NumberField(box, self._ask, f"joint.{joint}", text.unit("deg")))

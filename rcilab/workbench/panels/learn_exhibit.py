@@ -14,7 +14,7 @@ from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, Html, esc, on_press
 
 if TYPE_CHECKING:
-    from rcilab.app.fault_lab import Exhibit
+    from rcilab.app.fault_lab import FaultDemo
     from rcilab.control_process import SupervisorStatus
     from rcilab.workbench.store import Theme, UiState
 
@@ -77,7 +77,7 @@ class LearnExhibitPanel:
         copy += f"{esc(text('program.copy'))}</button>"
         self._script.show(f'<div class="rl-code">{copy}{code}</div>' if learn.is_script_shown else "")
 
-    def _draw(self, exhibit: Exhibit, theme: Theme) -> None:
+    def _draw(self, exhibit: FaultDemo, theme: Theme) -> None:
         signal, t = exhibit.signal, np.array(exhibit.cycles["t"])
         factor = self._text.units.from_si(signal.condition.unit)[0]
         data, series, _ = exhibit_contents(

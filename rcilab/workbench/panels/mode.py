@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 from rcilab.app.mode_parameters import PARTS_OF_MODE, held_rows, name_number, name_part
 from rcilab.core.state import MODES, Mode
 from rcilab.makers.rokae.driver.controller_parameters import (
+    ControllerParameters,
     ControlPart,
-    ControlSettings,
     control_ranges,
     standard_control,
 )
@@ -17,7 +17,7 @@ from rcilab.workbench.panels.jog import problems_html
 from rcilab.workbench.run.driving import is_pending
 from rcilab.workbench.run.readiness import is_moving
 from rcilab.workbench.text import Text, message
-from rcilab.workbench.widgets import Ask, Html, Linked, NumberField, esc, on_press
+from rcilab.workbench.widgets import Ask, BoundControl, Html, NumberField, esc, on_press
 
 if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus
@@ -39,7 +39,7 @@ class ModePanel:
             mode = gui.add_dropdown(
                 text("mode.choose"), tuple(names), initial_value=self._names[state.drive.mode], hint=text("mode.hint")
             )
-            self._mode = Linked(mode, ask, lambda v, p: requests.SetDrive(page=p, mode=names.get(v)))
+            self._mode = BoundControl(mode, ask, lambda v, p: requests.SetDrive(page=p, mode=names.get(v)))
             self._note = Html(gui)
             self._build_parts(gui, state)
             with gui.add_folder(text("control.title"), expand_by_default=False):
@@ -97,7 +97,7 @@ def held_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
     if state.drive.refusal is not None:
         why = text.say(message("ready.control_refused", error=state.drive.refusal))
         return f'<p class="rl-problem" role="alert">{esc(why)}</p>'
-    own = standard_control(state.model.limits) if state.target == "virtual" else ControlSettings()
+    own = standard_control(state.model.limits) if state.target == "virtual" else ControllerParameters()
     rows = "".join(
         f"<tr><th>{esc(name)}</th><td>{esc(said)}</td></tr>"
         for name, said in held_rows(state.drive.mode, status.setup.control, own, text)

@@ -9,14 +9,14 @@ from rcilab.workbench import requests
 from rcilab.workbench.panels.jog import problems_html
 from rcilab.workbench.panels.target import planned_html
 from rcilab.workbench.text import Text
-from rcilab.workbench.widgets import Ask, Html, Linked, NumberField, esc, on_press, shown
+from rcilab.workbench.widgets import Ask, BoundControl, Html, NumberField, esc, on_press, shown
 
 if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus
     from rcilab.workbench.store import UiState
 
 
-class WayPanel:
+class PathTypePanel:
     """The motion from where the arm is to the goal."""
 
     def __init__(self, text: Text, ask: Ask) -> None:
@@ -29,20 +29,20 @@ class WayPanel:
             ways = {text(f"way.{kind}"): kind for kind in PATH_KINDS}
             self._ways = {kind: label for label, kind in ways.items()}
             way = gui.add_dropdown(text("target.way"), tuple(ways), hint=text("target.way_hint"))
-            self._way = Linked(way, ask, lambda v, p: requests.SetWay(page=p, kind=ways.get(v)))
+            self._way = BoundControl(way, ask, lambda v, p: requests.SetPathType(page=p, kind=ways.get(v)))
             self._via = gui.add_button(text("target.via"), icon="map-pin-plus", color="gray", visible=False)
-            on_press(self._via, ask, lambda page: requests.SetWay(page=page, via=True))
+            on_press(self._via, ask, lambda page: requests.SetPathType(page=page, via=True))
             self._note = Html(gui)
             with gui.add_folder(text("target.speed")):
                 gui.add_html('<i class="rl-rows"></i>')
                 speed = gui.add_slider("%", 1, 100, 1, 50, hint=text("target.speed_hint"))
-                self._speed = Linked(speed, ask, lambda v, p: requests.SetSpeed(page=p, speed=v / 100.0))
+                self._speed = BoundControl(speed, ask, lambda v, p: requests.SetSpeed(page=p, speed=v / 100.0))
                 self._field = NumberField(gui.add_text("", "", hint=text("target.speed_hint")), ask, "speed")
             laws = {text(f"law.{law}"): law for law in LAWS}
             self._laws = {law: label for label, law in laws.items()}
             law = gui.add_dropdown(text("target.law"), tuple(laws))
             gui.add_html(f'<p class="rl-note">{esc(text("target.law_hint"))}</p>')  # A tooltip would cover the list.
-            self._law = Linked(law, ask, lambda v, p: requests.SetLaw(page=p, law=laws.get(v, "")))
+            self._law = BoundControl(law, ask, lambda v, p: requests.SetLaw(page=p, law=laws.get(v, "")))
             self._plan = gui.add_button(text("target.plan"), icon="route", hint=text("target.plan_hint"))
             on_press(self._plan, ask, lambda page: requests.Plan(page=page))
             self._problem, self._planned = Html(gui), Html(gui)

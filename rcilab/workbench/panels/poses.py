@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from rcilab.workbench import requests
 from rcilab.workbench.text import Text
-from rcilab.workbench.widgets import Ask, Linked, PageText
+from rcilab.workbench.widgets import Ask, BoundControl, PageText
 
 if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus
@@ -40,7 +40,7 @@ class PosesPanel:
             self._list = gui.add_dropdown(
                 text("poses.stored_ones"), self._options(state), initial_value=self._chosen(state)
             )
-            self._pose = Linked(self._list, ask, lambda v, p: requests.NamedPose(page=p, what="choose", name=v))
+            self._pose = BoundControl(self._list, ask, lambda v, p: requests.NamedPose(page=p, what="choose", name=v))
             acts = gui.add_button_group("  ", [text(f"poses.{act}") for act in _ACTS], hint=text("poses.recall_hint"))
             whats: dict[str, _What] = {text(f"poses.{act}"): act for act in _ACTS}
 

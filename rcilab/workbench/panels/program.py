@@ -15,7 +15,7 @@ from rcilab.workbench.panels.target import planned_html
 from rcilab.workbench.program.draft import FILE_FIELD, Draft, Note, number_at, tell_place
 from rcilab.workbench.run.readiness import is_moving, time_shown
 from rcilab.workbench.text import Text
-from rcilab.workbench.widgets import Ask, Html, Linked, NumberField, esc, on_press
+from rcilab.workbench.widgets import Ask, BoundControl, Html, NumberField, esc, on_press
 
 if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus
@@ -75,7 +75,7 @@ class ProgramPanel:
             )
             on_press(self._upto, ask, lambda page: requests.PlanProgram(page=page, upto=True))
             loop = gui.add_checkbox(text("program.loop"), False, hint=text("program.loop_hint"))
-            self._loop = Linked(loop, ask, lambda v, p: requests.SetView(page=p, name="loop", value=v))
+            self._loop = BoundControl(loop, ask, lambda v, p: requests.SetView(page=p, name="loop", value=v))
             box = gui.add_text(text("program.rounds"), "", hint=text("program.rounds_hint"))
             self._rounds = NumberField(box, ask, "program.0.rounds")
             self._bar = gui.add_progress_bar(0.0, visible=False, animated=True)

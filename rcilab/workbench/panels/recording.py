@@ -8,7 +8,7 @@ from rcilab.recording.tracking_words import error_rows, tracking_notes
 from rcilab.workbench import requests
 from rcilab.workbench.run.export_actions import ENDINGS
 from rcilab.workbench.text import Text
-from rcilab.workbench.widgets import Ask, Html, Linked, esc, on_press
+from rcilab.workbench.widgets import Ask, BoundControl, Html, esc, on_press
 
 if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus
@@ -48,7 +48,7 @@ class RecordingPanel:
             self._cancel = gui.add_button(text("export.cancel"), icon="x", color="gray", visible=False)
             on_press(self._cancel, ask, lambda page: requests.CancelExport(page=page))
             box = gui.add_checkbox(text("record.every"), state.record, hint=text("record.every_hint"))
-            self._record = Linked(box, ask, lambda v, p: requests.SetRecording(page=p, on=bool(v)))
+            self._record = BoundControl(box, ask, lambda v, p: requests.SetRecording(page=p, on=bool(v)))
             self._where = Html(gui)
         self._drawn = None
         self._summary.show(f'<p class="rl-note">{esc(text("record.nothing"))}</p>')

@@ -20,7 +20,7 @@ from rcilab.workbench.run.readiness import (
     obstacle,
 )
 from rcilab.workbench.text import Text
-from rcilab.workbench.widgets import Ask, Html, Linked, esc, on_press
+from rcilab.workbench.widgets import Ask, BoundControl, Html, esc, on_press
 
 if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus
@@ -47,9 +47,9 @@ class RunPanel:
         pace = gui.add_slider(
             text("run.pace"), 100.0 * SLOWEST_PACE, 100.0, 5.0, 100.0 * state.drive.pace, hint=text("run.pace_hint")
         )
-        self._pace = Linked(pace, ask, lambda v, p: requests.SetDrive(page=p, pace=float(v) / 100.0))
+        self._pace = BoundControl(pace, ask, lambda v, p: requests.SetDrive(page=p, pace=float(v) / 100.0))
         self._execute = gui.add_button(text("run.execute"), color=(23, 128, 68), icon="player-play", disabled=True)
-        on_press(self._execute, ask, lambda page: requests.Drive(page=page, what="execute"))
+        on_press(self._execute, ask, lambda page: requests.RobotCommand(page=page, what="execute"))
         self._question = Html(gui)
         self._agree = gui.add_button(text("run.confirm"), color="red", icon="player-play", visible=False)
         on_press(self._agree, ask, _drive("confirm"))
@@ -123,7 +123,7 @@ class RunPanel:
 
 
 def _drive(what: Any):  # type: ignore[no-untyped-def]
-    return lambda page: requests.Drive(page=page, what=what)
+    return lambda page: requests.RobotCommand(page=page, what=what)
 
 
 def faults_html(status: SupervisorStatus, text: Text) -> str:

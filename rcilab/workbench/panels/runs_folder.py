@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from rcilab.workbench import requests
 from rcilab.workbench.run.folder_actions import KEEPS, megabytes
 from rcilab.workbench.text import Text
-from rcilab.workbench.widgets import Ask, Html, Linked, esc, on_press
+from rcilab.workbench.widgets import Ask, BoundControl, Html, esc, on_press
 
 if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus
@@ -29,7 +29,7 @@ class RunsFolderPanel:
             labels = {text("runs.keep_of", count=count) if count else text("runs.keep_none"): count for count in KEEPS}
             self._labels = {count: label for label, count in labels.items()}
             keep = gui.add_dropdown(text("runs.keep"), tuple(labels), initial_value=self._labels[state.folder.keep])
-            self._choice = Linked(
+            self._choice = BoundControl(
                 keep, ask, lambda v, p: requests.ClearRuns(page=p, what="choose", keep=labels.get(v, -1))
             )
             self._clear = gui.add_button(text("runs.clear"), icon="trash", color="gray", hint=text("runs.clear_hint"))

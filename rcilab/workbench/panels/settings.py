@@ -12,7 +12,7 @@ from rcilab.views.message_guard import for_anyone
 from rcilab.workbench import requests
 from rcilab.workbench.text import LANGUAGES, Text
 from rcilab.workbench.view_actions import QUALITIES, THEMES
-from rcilab.workbench.widgets import Ask, Html, Linked, esc, on_press
+from rcilab.workbench.widgets import Ask, BoundControl, Html, esc, on_press
 
 if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus
@@ -39,13 +39,13 @@ class SettingsPanel:
         model = gui.add_dropdown(
             text("settings.model"), RCI_ROBOT_NAMES, initial_value=state.model.name, hint=text("settings.model_hint")
         )
-        self._model = Linked(model, ask, lambda v, p: requests.ChooseRobot(page=p, model=v))
+        self._model = BoundControl(model, ask, lambda v, p: requests.ChooseRobot(page=p, model=v))
         codes = {label: code for code, label in LANGUAGES.items()}
         language = gui.add_dropdown(text("settings.language"), tuple(codes), initial_value=LANGUAGES[state.language])
-        self._language = Linked(
+        self._language = BoundControl(
             language, ask, lambda v, p: requests.SetView(page=p, name="language", value=codes.get(v, ""))
         )
-        self._choices: list[tuple[Linked, Callable[[UiState], str]]] = []
+        self._choices: list[tuple[BoundControl, Callable[[UiState], str]]] = []
         for name, values, begins, chosen in _CHOICES:
             labels = {text(f"{begins}.{value}"): value for value in values}
             self._choices.append((self._choice(gui, name, labels), self._labelled(labels, chosen)))
@@ -74,10 +74,12 @@ class SettingsPanel:
             who = text("settings.who", holder=lease.number(lease.holder), pages=len(lease.pages))
         self._who.show(f'<p class="rl-note">{esc(who)}</p>')
 
-    def _choice(self, gui: Any, name: Any, labels: dict[str, str]) -> Linked:
+    def _choice(self, gui: Any, name: Any, labels: dict[str, str]) -> BoundControl:
         hint = self._text(f"settings.{name}_hint")
         handle = gui.add_dropdown(self._text(f"settings.{name}"), tuple(labels), hint=hint)
-        return Linked(handle, self._ask, lambda v, p: requests.SetView(page=p, name=name, value=labels.get(v, "")))
+        return BoundControl(
+            handle, self._ask, lambda v, p: requests.SetView(page=p, name=name, value=labels.get(v, ""))
+        )
 
     @staticmethod
     def _labelled(labels: dict[str, str], chosen: Callable[[UiState], str]) -> Callable[[UiState], str]:

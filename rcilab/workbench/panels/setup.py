@@ -18,7 +18,7 @@ from rcilab.workbench.setup.configuration_state import (
     tool_outside,
 )
 from rcilab.workbench.text import Text
-from rcilab.workbench.widgets import Ask, Html, Linked, esc, on_press
+from rcilab.workbench.widgets import Ask, BoundControl, Html, esc, on_press
 
 if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus
@@ -56,7 +56,7 @@ class SetupPanel:
             edited = gui.add_dropdown(
                 text("setup.edit"), tuple(choices), initial_value=self._choices[state.setup.edited]
             )
-            self._edited = Linked(
+            self._edited = BoundControl(
                 edited, ask, lambda v, p: requests.SetSetup(page=p, name="edited", value=choices.get(v, ""))
             )
 

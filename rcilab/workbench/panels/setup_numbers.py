@@ -10,7 +10,7 @@ from rcilab.workbench.panels.jog import problems_html
 from rcilab.workbench.setup.configuration_state import FORCE_AXES
 from rcilab.workbench.setup.fields import FIELD_NAMES, INERTIA_NAMES, POSE_NAMES, read_field
 from rcilab.workbench.text import Text
-from rcilab.workbench.widgets import Ask, Html, Linked, NumberField, esc, shown
+from rcilab.workbench.widgets import Ask, BoundControl, Html, NumberField, esc, shown
 
 if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus
@@ -42,7 +42,7 @@ class SetupNumbersPanel:
         self._fields: dict[str, list[NumberField]] = {}
         self._problems: dict[str, Html] = {}
         self._named: dict[str, list[tuple[str, str]]] = {}  # Each field, and what it is called beside a problem.
-        self._seen: dict[str, Linked] = {}
+        self._seen: dict[str, BoundControl] = {}
         for part in SETUP_PARTS:
             title = text(f"setup.part.{part}")
             title = title[:1].upper() + title[1:]
@@ -51,12 +51,12 @@ class SetupNumbersPanel:
                 gui.add_html('<i class="rl-triples"></i>')
                 if part == "box":
                     active = gui.add_checkbox(text("setup.active"), False, hint=text("setup.active_hint"))
-                    self._active = Linked(active, ask, _switch("active"))
+                    self._active = BoundControl(active, ask, _switch("active"))
                 if part == "force":
                     self._build_axes(gui, ask)
                 self._build_numbers(gui, part)
                 see = gui.add_checkbox(text("setup.see"), False, hint=text("setup.see_hint"))
-                self._seen[part] = Linked(see, ask, _switch(part))
+                self._seen[part] = BoundControl(see, ask, _switch(part))
                 gui.add_html(f'<p class="rl-note">{esc(text(f"setup.note.{part}"))}</p>')
             self._folders[part] = folder
 
@@ -98,7 +98,9 @@ class SetupNumbersPanel:
         names = {self._text(f"setup.axes.{name}"): name for name in FORCE_AXES}
         self._labels = {name: label for label, name in names.items()}
         axes = gui.add_dropdown(self._text("setup.axes"), tuple(names), hint=self._text("setup.axes_hint"))
-        self._axes = Linked(axes, ask, lambda v, p: requests.SetSetup(page=p, name="axes", value=names.get(v, "")))
+        self._axes = BoundControl(
+            axes, ask, lambda v, p: requests.SetSetup(page=p, name="axes", value=names.get(v, ""))
+        )
 
     def _label(self, name: str) -> str:
         return self._text(f"setup.field.{name}")

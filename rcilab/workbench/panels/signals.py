@@ -8,7 +8,7 @@ from rcilab.makers.rokae.driver.commands import SIGNALS
 from rcilab.workbench import requests
 from rcilab.workbench.run.driving import is_ours
 from rcilab.workbench.text import Text
-from rcilab.workbench.widgets import Ask, Html, Linked, esc, on_press
+from rcilab.workbench.widgets import Ask, BoundControl, Html, esc, on_press
 
 if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus
@@ -47,7 +47,9 @@ class SignalsPanel:
             self._levels = Html(gui)
             gui.add_html(f'<p class="rl-note">{esc(text("signals.note"))}</p>')
             wired = gui.add_checkbox(text("signals.loop_back"), False, hint=text("signals.loop_back_hint"))
-            self._wired = Linked(wired, ask, lambda v, p: requests.SetWiring(page=p, name="loop_back", on=bool(v)))
+            self._wired = BoundControl(
+                wired, ask, lambda v, p: requests.SetWiring(page=p, name="loop_back", on=bool(v))
+            )
         with gui.add_folder(text("reboot.title"), expand_by_default=False):
             gui.add_html('<i class="rl-buttons"></i>')
             self._reboot = gui.add_button(

@@ -11,7 +11,7 @@ from rcilab.workbench.run.driving import is_ours
 from rcilab.workbench.setup.configuration_state import own_limits, soft_limits
 from rcilab.workbench.setup.fields import JOINT_ENDS
 from rcilab.workbench.text import Text
-from rcilab.workbench.widgets import Ask, Html, Linked, NumberField, esc, on_press, shown
+from rcilab.workbench.widgets import Ask, BoundControl, Html, NumberField, esc, on_press, shown
 
 if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus
@@ -42,7 +42,7 @@ class SoftLimitsPanel:
             on_press(self._whole, ask, lambda page: requests.PressSetup(page=page, what="whole"))
         with gui.add_folder(text("softlimits.beyond"), expand_by_default=False):
             auto = gui.add_checkbox(text("softlimits.auto"), False, hint=text("softlimits.auto_hint"))
-            self._auto = Linked(auto, ask, lambda v, p: requests.SetWiring(page=p, name="auto_limit", on=bool(v)))
+            self._auto = BoundControl(auto, ask, lambda v, p: requests.SetWiring(page=p, name="auto_limit", on=bool(v)))
             gui.add_html(f'<p class="rl-note">{esc(text("softlimits.note"))}</p>')
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from rcilab.core.faults import name_faults
-from rcilab.workbench.control_lock import PATIENCE, Lease
+from rcilab.workbench.control_lock import PATIENCE, ControlLock
 from rcilab.workbench.run.driving import destination
 from rcilab.workbench.run.played import played_at
 from rcilab.workbench.run.readiness import is_moving, time_shown
@@ -82,13 +82,13 @@ def _chips(state: UiState, status: SupervisorStatus, text: Text) -> list[dict[st
     ]
 
 
-def _holder(lease: Lease, text: Text) -> str:
+def _holder(lease: ControlLock, text: Text) -> str:
     if lease.holder is None:
         return text("bar.free", pages=len(lease.pages))
     return text("bar.holder", holder=lease.number(lease.holder), pages=len(lease.pages))
 
 
-def _seen_by_pages(lease: Lease, text: Text) -> dict[int, str]:
+def _seen_by_pages(lease: ControlLock, text: Text) -> dict[int, str]:
     """Returns who holds the controls as each page has to read it, by client id."""
     if lease.holder is None:
         return {}

@@ -9,7 +9,7 @@ from rcilab.workbench.run.driving import DESTINATIONS, destination
 from rcilab.workbench.run.readiness import is_moving
 from rcilab.workbench.status_text import phase_code, tell_status
 from rcilab.workbench.text import Text
-from rcilab.workbench.widgets import Ask, Html, Linked, PageText, esc, on_press
+from rcilab.workbench.widgets import Ask, BoundControl, Html, PageText, esc, on_press
 
 if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus
@@ -25,7 +25,7 @@ _TONES = {
 }
 
 
-class WherePanel:
+class TargetRobotPanel:
     """A group of the Run tab. An address is named once more before anything is sent there."""
 
     def __init__(self, text: Text, ask: Ask) -> None:
@@ -44,7 +44,7 @@ class WherePanel:
             choice = gui.add_dropdown(
                 text("destination.title"), tuple(names), initial_value=self._names[first], hint=text("destination.hint")
             )
-            self._choice = Linked(choice, ask, lambda v, p: self._pick(names.get(v, ""), p))
+            self._choice = BoundControl(choice, ask, lambda v, p: self._pick(names.get(v, ""), p))
             box = gui.add_text(text("run.address"), _address_of(state), hint=text("run.address_hint"))
             self._address = PageText(box)
             self._connect = gui.add_button(text("run.connect"), icon="plug-connected", color="gray")

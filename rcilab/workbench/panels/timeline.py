@@ -14,7 +14,7 @@ from rcilab.workbench.run.played import paced_of, played_at
 from rcilab.workbench.run.readiness import is_moving, time_shown
 from rcilab.workbench.text import Text
 from rcilab.workbench.view_actions import PLOTS, RATES, has_plot
-from rcilab.workbench.widgets import Ask, Html, Linked, esc, on_press
+from rcilab.workbench.widgets import Ask, BoundControl, Html, esc, on_press
 
 if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus
@@ -42,15 +42,17 @@ class TimelinePanel:
         self._play = gui.add_button(text("timeline.play"), icon="player-play", hint=text("timeline.play_hint"))
         on_press(self._play, ask, lambda page: requests.Play(page=page))
         scrub = gui.add_slider(text("timeline.time"), 0.0, 100.0, 0.1, 0.0, marks=(), hint=text("timeline.scrub_hint"))
-        self._scrub = Linked(scrub, ask, lambda v, p: requests.Seek(page=p, place=v / 100.0))
+        self._scrub = BoundControl(scrub, ask, lambda v, p: requests.Seek(page=p, place=v / 100.0))
         rates = {f"{rate:g}×": rate for rate in RATES}
         self._rates = {rate: label for label, rate in rates.items()}
         rate = gui.add_dropdown(text("timeline.rate"), tuple(rates), initial_value="1×")
-        self._rate = Linked(rate, ask, lambda v, p: requests.SetView(page=p, name="rate", value=rates.get(v, 1.0)))
+        self._rate = BoundControl(
+            rate, ask, lambda v, p: requests.SetView(page=p, name="rate", value=rates.get(v, 1.0))
+        )
         joints = {text("timeline.all"): 0, **{f"J{j + 1}": j + 1 for j in range(state.model.n)}}
         self._joints = {joint: label for label, joint in joints.items()}
         choice = gui.add_dropdown(text("timeline.joint"), tuple(joints), hint=text("timeline.joint_hint"))
-        self._joint = Linked(
+        self._joint = BoundControl(
             choice, ask, lambda v, p: requests.SetView(page=p, name="plot_joint", value=joints.get(v, 0))
         )
         with gui.add_folder(text("timeline.show"), expand_by_default=False):
@@ -79,13 +81,13 @@ class TimelinePanel:
     def _build_choices(self, gui: Any, state: UiState) -> None:
         text, ask = self._text, self._ask
         gui.add_html('<i class="rl-choices"></i>')
-        self._choices: dict[str, Linked] = {}
+        self._choices: dict[str, BoundControl] = {}
         for name in PLOTS:
             if has_plot(state.model, name):
                 box = gui.add_checkbox(text(f"plot.{name}"), name in state.plots)
-                self._choices[name] = Linked(box, ask, _choice(name))
+                self._choices[name] = BoundControl(box, ask, _choice(name))
         loop = gui.add_checkbox(text("timeline.loop"), state.loop, hint=text("program.loop_hint"))
-        self._loop = Linked(loop, ask, lambda v, p: requests.SetView(page=p, name="loop", value=bool(v)))
+        self._loop = BoundControl(loop, ask, lambda v, p: requests.SetView(page=p, name="loop", value=bool(v)))
 
     def _read(self, state: UiState, status: SupervisorStatus) -> str:
         """Returns where the preview stands, and what is drawn how."""

@@ -8,7 +8,7 @@ from rcilab.workbench import requests
 from rcilab.workbench.jog.jogging import AXES, FRAMES
 from rcilab.workbench.panels.jog import add_jog_button
 from rcilab.workbench.text import Text
-from rcilab.workbench.widgets import Ask, Linked
+from rcilab.workbench.widgets import Ask, BoundControl
 
 if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus
@@ -32,7 +32,7 @@ class ToolJogPanel:
             frame = gui.add_dropdown(
                 text("jog.frame"), tuple(frames), initial_value=chosen, hint=text("jog.frame_hint")
             )
-            self._frame = Linked(frame, self._ask, lambda v, p: requests.SetJog(page=p, frame=frames.get(v)))
+            self._frame = BoundControl(frame, self._ask, lambda v, p: requests.SetJog(page=p, frame=frames.get(v)))
             for place in range(3):
                 for axis in (AXES[place], AXES[place + 3]):
                     add_jog_button(gui, self._ask, text(f"target.{axis}"), axis, -1)

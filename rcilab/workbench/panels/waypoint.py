@@ -12,7 +12,7 @@ from rcilab.workbench.panels.jog import problems_html
 from rcilab.workbench.program.draft import TYPES, target_of
 from rcilab.workbench.program.fields import VIA_FIELDS, arm_angle_of
 from rcilab.workbench.text import Text
-from rcilab.workbench.widgets import Ask, Html, Linked, NumberField, esc, on_press, shown, shown_pose
+from rcilab.workbench.widgets import Ask, BoundControl, Html, NumberField, esc, on_press, shown, shown_pose
 
 if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus
@@ -39,7 +39,7 @@ class WaypointPanel:
             kinds = {text(f"program.type.{kind}"): kind for kind in TYPES}
             self._kinds = {kind: label for label, kind in kinds.items()}
             choice = gui.add_dropdown(text("program.type"), tuple(kinds), hint=text("program.type_hint"))
-            self._kind = Linked(
+            self._kind = BoundControl(
                 choice, ask, lambda v, p: requests.EditProgram(page=p, what="type", type=kinds.get(v, ""))
             )
             for name in (*_PLAIN, *(("psi",) if state.model.n == 7 else ())):

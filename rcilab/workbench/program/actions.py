@@ -7,8 +7,8 @@ from functools import partial, reduce
 import numpy as np
 
 from rcilab.app.planning import Plan
-from rcilab.core.arrays import frozen
-from rcilab.core.background_job import Background
+from rcilab.core.arrays import readonly_copy
+from rcilab.core.background_job import BackgroundJob
 from rcilab.core.errors import InvalidValueError, PlanningError, RcilabError, VersionMismatchError
 from rcilab.i18n.error_messages import tell
 from rcilab.model.robot_model import load_model
@@ -18,7 +18,7 @@ from rcilab.workbench import requests
 from rcilab.workbench.goal.actions import GoalActions
 from rcilab.workbench.program.draft import FILE_FIELD, Draft, draft_of, is_led_in, notes_of, number_at
 from rcilab.workbench.program.edit_actions import LONGEST_NAME, EditActions
-from rcilab.workbench.program.history import Shelves
+from rcilab.workbench.program.history import ProgramHistory
 from rcilab.workbench.program.planning import Job, plan_job
 from rcilab.workbench.run.readiness import is_moving
 from rcilab.workbench.session import Session
@@ -35,8 +35,8 @@ class ProgramActions:
 
     def __init__(self, store: Store, session: Session, goal: GoalActions) -> None:
         self._store, self._session = store, session
-        self._planner: Background[Job, Plan] = Background("program")
-        self._shelves = Shelves(store, self._drop_planning)
+        self._planner: BackgroundJob[Job, Plan] = BackgroundJob("program")
+        self._shelves = ProgramHistory(store, self._drop_planning)
         self.editing = EditActions(store, session, goal, self._shelves)
 
     def plan(self, request: requests.PlanProgram) -> None:
@@ -58,7 +58,7 @@ class ProgramActions:
             model=self._shelves.draft.arm(state.model),
             draft=self._shelves.draft,
             program=program,
-            here=frozen(status.q_c),
+            here=readonly_copy(status.q_c),
             rounds=self._shelves.state.rounds,
             box=state.setup.wanted.box,
         )

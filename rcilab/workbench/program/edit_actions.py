@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from rcilab.core.arrays import JointVector, frozen
+from rcilab.core.arrays import JointVector, readonly_copy
 from rcilab.i18n.number_parsing import parse_number
 from rcilab.motion.waypoint import Waypoint
 from rcilab.workbench import requests
 from rcilab.workbench.goal.actions import GoalActions
 from rcilab.workbench.program.draft import MOST_ROUNDS, TYPES, Draft, target_of, time_at
 from rcilab.workbench.program.fields import default_via, proposed
-from rcilab.workbench.program.history import Shelves
+from rcilab.workbench.program.history import ProgramHistory
 from rcilab.workbench.session import Session
 from rcilab.workbench.store import Store
 from rcilab.workbench.text import Message, message
@@ -30,7 +30,7 @@ class EditActions:
         shelves: The programs.
     """
 
-    def __init__(self, store: Store, session: Session, goal: GoalActions, shelves: Shelves) -> None:
+    def __init__(self, store: Store, session: Session, goal: GoalActions, shelves: ProgramHistory) -> None:
         self._store, self._session, self._goal, self._shelves = store, session, goal, shelves
         self._edits: dict[str, Callable[[requests.EditProgram, int], None]] = {
             "select": self._select, "teach": self._teach, "via": self._via, "type": self._retype,
@@ -195,4 +195,4 @@ class EditActions:
             return
         if arm is not model:
             target = target @ arm.T_flange_tool.inverse() @ model.T_flange_tool
-        self._goal.lead_to(target, waypoint.psi, None if waypoint.q is None else frozen(waypoint.q))
+        self._goal.lead_to(target, waypoint.psi, None if waypoint.q is None else readonly_copy(waypoint.q))

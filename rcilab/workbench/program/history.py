@@ -22,7 +22,7 @@ class _Shelf:
     future: list[Draft] = field(default_factory=list)
 
 
-class Shelves:
+class ProgramHistory:
     """Exchanges the program that the page shows. Owned by the conductor's thread.
 
     Args:

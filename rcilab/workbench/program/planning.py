@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from rcilab.app.planning import Plan, picture
 from rcilab.control_process.layout import MOTION_ROWS
 from rcilab.core.arrays import JointVector
-from rcilab.core.background_job import Tell
+from rcilab.core.background_job import ProgressCallback
 from rcilab.core.safety_box import SafetyBox
 from rcilab.model.robot_model import RobotModel
 from rcilab.motion.joint import JointLaw
@@ -35,7 +35,7 @@ class Job:
     """The safety box to judge with."""
 
 
-def plan_job(job: Job, tell: Tell) -> Plan:
+def plan_job(job: Job, tell: ProgressCallback) -> Plan:
     """Returns the plan of a program."""
     from rcilab.conformance import check
     from rcilab.motion import plan_program

@@ -24,7 +24,7 @@ from rcilab.workbench import requests
 from rcilab.workbench.goal.actions import initial_goal
 from rcilab.workbench.run.active_force import PLANTS, TOOL, is_guided
 from rcilab.workbench.run.readiness import is_moving, obstacle
-from rcilab.workbench.run.run_recorder import RunKeeper
+from rcilab.workbench.run.run_recorder import RunRecorder
 from rcilab.workbench.session import Session
 from rcilab.workbench.setup.configuration_state import SetupState, name_parts, setup_obstacle
 from rcilab.workbench.status_text import StartingError, tell_error, tell_incident
@@ -32,9 +32,9 @@ from rcilab.workbench.store import Goal, Store, UiState
 from rcilab.workbench.text import Message, message
 
 if TYPE_CHECKING:
-    from rcilab.control_process import SupervisorStatus, Ticket
-    from rcilab.makers.rokae.driver.configuration import RobotSetup, SetupPart
-    from rcilab.motion.speed_scaling import PacedMotion
+    from rcilab.control_process import PendingRequest, SupervisorStatus
+    from rcilab.makers.rokae.driver.configuration import RobotConfiguration, SetupPart
+    from rcilab.motion.speed_scaling import SpeedScaledMotion
 
 _SECOND_THOUGHT = 10.0  # [s] A choice: a second press that comes later asks anew.
 TROUBLE = "robot"
@@ -47,8 +47,8 @@ class RobotActions:
 
     def __init__(self, store: Store, session: Session) -> None:
         self._store, self._session = store, session
-        self._tickets: list[tuple[str, Ticket]] = []
-        self._keeper = RunKeeper(store)
+        self._tickets: list[tuple[str, PendingRequest]] = []
+        self._keeper = RunRecorder(store)
         self._recording = False
         self._stopped: str | None = None  # Why the recorded motion did not reach its end.
         self._is_left_alone = False  # That is because no page answered.
@@ -65,7 +65,7 @@ class RobotActions:
         self._guided = False
         self._asked_to_guide = -math.inf
 
-    def drive(self, request: requests.Drive) -> None:
+    def drive(self, request: requests.RobotCommand) -> None:
         """Passes one button of the Run tab on to the supervisor."""
         if request.what in ("execute", "confirm"):
             self._execute(is_agreed=request.what == "confirm", stops=request.stops)
@@ -99,7 +99,7 @@ class RobotActions:
         if ticket is not None:
             self._tickets.append((request.what, ticket))
 
-    def _guide(self, stops: int | None) -> Ticket | None:
+    def _guide(self, stops: int | None) -> PendingRequest | None:
         """Frees the arm for a hand to guide it; a real one only when that is asked for twice."""
         state, now = self._store.state, time.monotonic()
         unset = setup_obstacle(state, self._session.status())
@@ -183,7 +183,7 @@ class RobotActions:
         self._session.open(model, target, state.plant, _own_setup(state, target) if is_same else None)
         self._store.update(place=0.0, playing=False, **changes)
 
-    def remember_setup(self, name: str, setup: RobotSetup) -> None:
+    def remember_setup(self, name: str, setup: RobotConfiguration) -> None:
         """Takes note of the set-up that an arm had before it was exchanged for another."""
         fresh = SetupState()
         touched: frozenset[SetupPart] = frozenset(setup.parts)
@@ -336,7 +336,7 @@ class RobotActions:
         self._recording = False
         self._keeper.finish(self._stopped, self._paced(), is_left_alone=self._is_left_alone)
 
-    def _paced(self) -> PacedMotion | None:
+    def _paced(self) -> SpeedScaledMotion | None:
         """Returns how the motion under way, or the last one, is run; None as planned."""
         with suppress(RcilabError):  # Its supervisor has gone.
             paced = self._session.supervisor().paced
@@ -366,7 +366,7 @@ def _unasked(state: UiState) -> dict[str, object]:
     }
 
 
-def _own_setup(state: UiState, target: str) -> RobotSetup | None:
+def _own_setup(state: UiState, target: str) -> RobotConfiguration | None:
     """Returns what our own controller is told at once; a foreign one is told nothing that was not agreed to."""
     if target != "virtual":
         return None

@@ -37,7 +37,7 @@ DIRECTIONS = MappingProxyType(
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Acting:
+class ActiveForce:
     """What presses on the arm now."""
 
     link: int
@@ -59,7 +59,7 @@ class PushState:
     """Whether the mouse can take hold of the arm in the scene."""
     way: str = WAYS[0]
     """Space and kind of hand guiding, as "space.kind"."""
-    acting: Acting | None = None
+    acting: ActiveForce | None = None
 
     @property
     def force(self) -> Vector3:

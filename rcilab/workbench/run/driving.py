@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Literal
 from rcilab.app.mode_parameters import control_obstacle, is_control_pending, with_number
 from rcilab.core.state import Mode
 from rcilab.makers.rokae.driver.controller_parameters import (
+    ControllerParameters,
     ControlPart,
-    ControlSettings,
     control_ranges,
     standard_control,
 )
@@ -41,7 +41,7 @@ class DriveState:
     """What the operator has set in the Run tab."""
 
     mode: Mode = "joint_position"
-    control: ControlSettings | None = None
+    control: ControllerParameters | None = None
     """Parameters as the operator wants them, all of them; None: nobody has touched them."""
     refusal: Message | None = None
     """Why the controller did not take them."""
@@ -62,7 +62,7 @@ class DriveState:
     typed_address: str = ""
     """The address that waits for a second yes."""
 
-    def wanted_control(self, model: RobotModel) -> ControlSettings:
+    def wanted_control(self, model: RobotModel) -> ControllerParameters:
         """Returns the parameters to show: those typed, or what a controller wakes up with."""
         return self.control if self.control is not None else standard_control(model.limits)
 

@@ -8,11 +8,11 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, cast
 
 from rcilab.app.mode_parameters import SECOND_THOUGHT, ask_to_send
-from rcilab.control_process.requested_speed import PaceWish, is_running, tell_pace_refusal
+from rcilab.control_process.requested_speed import RequestedSpeed, is_running, tell_pace_refusal
 from rcilab.core.errors import RcilabError
 from rcilab.core.state import MODES, Mode
 from rcilab.i18n.number_parsing import parse_number
-from rcilab.makers.rokae.driver.configuration import RobotSetup
+from rcilab.makers.rokae.driver.configuration import RobotConfiguration
 from rcilab.makers.rokae.driver.controller_parameters import control_ranges, standard_control
 from rcilab.motion.speed_scaling import SLOWEST_PACE
 from rcilab.workbench import requests
@@ -24,7 +24,7 @@ from rcilab.workbench.store import Store
 from rcilab.workbench.text import Message, message
 
 if TYPE_CHECKING:
-    from rcilab.control_process import SupervisorStatus, Ticket
+    from rcilab.control_process import PendingRequest, SupervisorStatus
 
 
 class ModeActions:
@@ -33,8 +33,8 @@ class ModeActions:
     def __init__(self, store: Store, session: Session) -> None:
         self._store, self._session = store, session
         self._post = SetupPost(session, self._refuse)
-        self._wish = PaceWish()
-        self._changing: tuple[float, Ticket] | None = None  # A pace that the robot has not taken yet.
+        self._wish = RequestedSpeed()
+        self._changing: tuple[float, PendingRequest] | None = None  # A pace that the robot has not taken yet.
         self._asked_to_send = -math.inf
         self._arm = store.state.model.name
 
@@ -115,7 +115,7 @@ class ModeActions:
     def _send(self, status: SupervisorStatus) -> None:
         state = self._store.state
         if not self._post.is_underway and is_pending(state, status):
-            self._post.send(RobotSetup(control=state.drive.control))
+            self._post.send(RobotConfiguration(control=state.drive.control))
 
     def _refuse(self, why: Message) -> None:
         self._store.update(drive=replace(self._store.state.drive, refusal=why))

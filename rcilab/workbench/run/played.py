@@ -10,11 +10,11 @@ from rcilab.core.clock import CYCLE_TIME
 
 if TYPE_CHECKING:
     from rcilab.core.arrays import Array, JointPath
-    from rcilab.motion.speed_scaling import PacedMotion
+    from rcilab.motion.speed_scaling import SpeedScaledMotion
     from rcilab.workbench.store import UiState
 
 
-def paced_of(state: UiState) -> PacedMotion | None:
+def paced_of(state: UiState) -> SpeedScaledMotion | None:
     """Returns how the plan on the page was run, or is being run; None as planned, or not at all."""
     paced = None if state.recording is None else state.recording.paced
     return paced if paced is not None and state.plan is not None and paced.motion is state.plan.motion else None

@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rcilab.core.arrays import JointVector, Vector3
-from rcilab.execution.external_force_hold import HOLD_TIMEOUT, HeldPush
-from rcilab.execution.simulation_control import World
+from rcilab.execution.external_force_hold import HOLD_TIMEOUT, ExternalForceHold
+from rcilab.execution.simulation_control import SimulationControl
 from rcilab.workbench import requests
 from rcilab.workbench.run.active_force import (
     DIRECTIONS,
     STRONGEST,
     TOOL,
     WAYS,
-    Acting,
+    ActiveForce,
     can_grab,
     no_push,
     place_of,
@@ -53,7 +53,7 @@ class PushActions:
         self._store, self._session = store, session
         self._grip: _Grip | None = None
         self._button: tuple[int | None, float] | None = None  # Who holds it, and when that was last heard.
-        self._push: HeldPush | None = None
+        self._push: ExternalForceHold | None = None
         self._address: str | None = None
 
     def set_push(self, request: requests.SetPush) -> None:
@@ -80,7 +80,7 @@ class PushActions:
             return
         self._button = request.page, time.monotonic()
 
-    def pull(self, request: requests.PullArm) -> None:
+    def pull(self, request: requests.DragLink) -> None:
         """Takes hold of a link where the mouse is, follows the mouse, lets go."""
         state, status = self._store.state, self._session.status()
         numbers = np.array((request.grabbed, request.hand), dtype=float)
@@ -119,17 +119,17 @@ class PushActions:
         """Lets go of the arm."""
         self._follow(None)
 
-    def _judge(self, q: JointVector) -> tuple[Acting | None, Vector3]:
+    def _judge(self, q: JointVector) -> tuple[ActiveForce | None, Vector3]:
         """Returns what is to press on the arm and at which point of the link's frame; the mouse before the button."""
         state, grip = self._store.state, self._grip
         if grip is not None:
             start = place_of(state.model, q, grip.link, grip.point)
-            return Acting(link=grip.link, start=start, force=spring_force(start, grip.hand)), grip.point
+            return ActiveForce(link=grip.link, start=start, force=spring_force(start, grip.hand)), grip.point
         point = np.zeros(3)
         if self._button is None:
             return None, point
         start = place_of(state.model, q, state.push.link, point)
-        return Acting(link=state.push.link, start=start, force=state.push.force), point
+        return ActiveForce(link=state.push.link, start=start, force=state.push.force), point
 
     def _drop_stale(self) -> None:
         """Lets go for a page that has gone silent or has the controls no more."""
@@ -152,4 +152,4 @@ class PushActions:
         self._grip = self._button = None
         if address is not None:
             host, _, port = address.partition(":")
-            self._push = HeldPush(World(host, int(port)))
+            self._push = ExternalForceHold(SimulationControl(host, int(port)))

@@ -11,7 +11,7 @@ from rcilab.app.planning import picture
 from rcilab.conformance import check
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import UsageError
-from rcilab.makers.rokae.driver.configuration import RobotSetup
+from rcilab.makers.rokae.driver.configuration import RobotConfiguration
 from rcilab.workbench.goal.actions import initial_goal
 from rcilab.workbench.run.run_recorder import whole_recording
 
@@ -42,7 +42,7 @@ def replayed(state: UiState, run: Run) -> UiState:
     report = run.report or check(motion, model)
     plan = replace(picture(model, motion, report), complete=True)
     goal = initial_goal(model, motion.goal)
-    wanted = state.setup.wanted.updated(RobotSetup(tool=model.T_flange_tool, load=model.load))
+    wanted = state.setup.wanted.updated(RobotConfiguration(tool=model.T_flange_tool, load=model.load))
     setup = replace(state.setup, wanted=wanted, touched=frozenset({"tool", "load"}))
     recording = whole_recording(run)
     return replace(

@@ -19,12 +19,12 @@ from rcilab.workbench.text import message
 
 if TYPE_CHECKING:
     from rcilab.app.planning import Plan
-    from rcilab.motion.speed_scaling import PacedMotion
+    from rcilab.motion.speed_scaling import SpeedScaledMotion
     from rcilab.recording.run_file import RunFile
     from rcilab.workbench.store import UiState
 
 
-class RunKeeper:
+class RunRecorder:
     """Owned by the conductor's thread.
 
     Args:
@@ -44,7 +44,7 @@ class RunKeeper:
         facts = RunFacts(plan=plan.motion, model=state.model, setup=setup)
         self._live = LiveRecording(facts, self._open(state, plan, setup))
 
-    def add(self, rows: NDArray[np.void], paced: PacedMotion | None = None) -> None:
+    def add(self, rows: NDArray[np.void], paced: SpeedScaledMotion | None = None) -> None:
         """Adds cycles and shows them; `paced`: how the plan is run, where its pace was changed."""
         if self._live is None:
             return
@@ -57,7 +57,9 @@ class RunKeeper:
         if cycles is not None and (before is None or len(cycles) > len(before)):
             self._store.update(recording=as_recording(cycles, self._live.delay, paced))
 
-    def finish(self, stopped: str | None, paced: PacedMotion | None = None, *, is_left_alone: bool = False) -> None:
+    def finish(
+        self, stopped: str | None, paced: SpeedScaledMotion | None = None, *, is_left_alone: bool = False
+    ) -> None:
         """Ends the recording; from here on it can be exported.
 
         Args:
@@ -106,7 +108,7 @@ class RunKeeper:
         )
 
 
-def as_recording(cycles: NDArray[np.void], delay: int, paced: PacedMotion | None = None) -> Recording:
+def as_recording(cycles: NDArray[np.void], delay: int, paced: SpeedScaledMotion | None = None) -> Recording:
     """Returns what the plots need of a run that goes on."""
     return Recording(
         t=cycles["t"],
@@ -119,7 +121,7 @@ def as_recording(cycles: NDArray[np.void], delay: int, paced: PacedMotion | None
     )
 
 
-def whole_recording(run: Run, file: str = "", paced: PacedMotion | None = None) -> Recording:
+def whole_recording(run: Run, file: str = "", paced: SpeedScaledMotion | None = None) -> Recording:
     """Returns a finished run for plots, table and export."""
     faulty = np.flatnonzero(run.cycles["faults"])
     return Recording(

@@ -12,7 +12,7 @@ from rcilab.workbench.store import Store
 from rcilab.workbench.text import message
 
 if TYPE_CHECKING:
-    from rcilab.control_process import SupervisorStatus, Ticket
+    from rcilab.control_process import PendingRequest, SupervisorStatus
 
 
 class SignalActions:
@@ -20,7 +20,7 @@ class SignalActions:
 
     def __init__(self, store: Store, session: Session) -> None:
         self._store, self._session = store, session
-        self._tickets: list[tuple[str, Ticket]] = []
+        self._tickets: list[tuple[str, PendingRequest]] = []
 
     def set_output(self, request: requests.SetOutput) -> None:
         """Sets a digital output."""

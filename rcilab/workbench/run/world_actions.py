@@ -6,8 +6,8 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from rcilab.execution.simulation_control import World
-from rcilab.execution.simulation_status_poller import WorldWatch
+from rcilab.execution.simulation_control import SimulationControl
+from rcilab.execution.simulation_status_poller import SimulationStatusPoller
 from rcilab.sim.api import DIRECTIONS, AutoLimit, Direction, LoopBack, Network, NetworkFaults, Press
 from rcilab.workbench import requests
 from rcilab.workbench.run.active_force import no_push
@@ -29,7 +29,7 @@ class WorldActions:
 
     def __init__(self, store: Store, session: Session) -> None:
         self._store, self._session = store, session
-        self._watch: WorldWatch | None = None
+        self._watch: SimulationStatusPoller | None = None
         self._address: str | None = None
 
     def set_network(self, request: requests.SetNetwork) -> None:
@@ -74,7 +74,7 @@ class WorldActions:
             self._address = address
             if address is not None:
                 host, _, port = address.partition(":")
-                self._watch = WorldWatch(World(host, int(port)))
+                self._watch = SimulationStatusPoller(SimulationControl(host, int(port)))
             drive = replace(
                 self._store.state.drive,
                 pulled=False,
@@ -99,7 +99,7 @@ class WorldActions:
         if watch is not None:
             watch.close()
 
-    def _tell(self, watch: WorldWatch) -> None:
+    def _tell(self, watch: SimulationStatusPoller) -> None:
         drive = self._store.state.drive
         if drive.pulled:
             watch.ask(Network(CABLE_PULLED))
@@ -108,7 +108,7 @@ class WorldActions:
             watch.ask(Network(NetworkFaults(), "states" if drive.direction == "commands" else "commands"))
         watch.ask(Network(drive.network, drive.direction))
 
-    def _require_watch(self) -> WorldWatch | None:
+    def _require_watch(self) -> SimulationStatusPoller | None:
         if self._watch is None:
             reason = no_push(self._session.status())
             if reason is not None and reason.code == "push.no_world":

@@ -51,13 +51,13 @@ class SceneActions:
         psi = elbow.circle.angle_along(request.eye, request.hand, elbow.psi, OUTWARD)
         self._goal.set_arm_angle(requests.SetArmAngle(page=request.page, psi=psi), elbow.branch)
 
-    def peek(self, request: requests.Peek) -> None:
+    def peek(self, request: requests.HighlightBranch) -> None:
         """Shows a branch before it is chosen."""
         solutions = self._store.state.goal.reach.solutions
         known = solutions is not None and request.index is not None and 0 <= request.index < len(solutions)
         self._change(peek=request.index if known else None)
 
-    def show_bead(self, request: requests.ShowBead) -> None:
+    def show_bead(self, request: requests.ShowViolation) -> None:
         """Takes the preview to a violation and says what it is."""
         state = self._store.state
         ribbon = state.scene.ribbon

@@ -12,7 +12,7 @@ from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.robots.mesh import revolve
 from rcilab.views.arm_view import ArmView
-from rcilab.views.configuration_view import BOX_COLOR, SetupView, outside_runs
+from rcilab.views.configuration_view import BOX_COLOR, ConfigurationView, outside_runs
 from rcilab.views.viser_scene import ViserScene
 from rcilab.workbench import requests
 from rcilab.workbench.setup.configuration_state import ON_FLANGE
@@ -30,7 +30,7 @@ _HANDLE = 0.026  # [m]
 _SIGNS = np.array([(-1, 0, 0), (0, -1, 0), (0, 0, -1), (1, 0, 0), (0, 1, 0), (0, 0, 1)], dtype=float)
 
 
-class SetupStage:
+class ConfigurationSceneView:
     """Owned by the stage, and made anew with its arm.
 
     Args:
@@ -43,7 +43,7 @@ class SetupStage:
     def __init__(self, server: viser.ViserServer, drawing: ViserScene, arm: ArmView, ask: Ask) -> None:
         self._server, self._drawing, self._ask = server, drawing, ask
         self._flange = arm.tool_node.rpartition("/")[0]
-        self._view = SetupView(drawing, self._flange)
+        self._view = ConfigurationView(drawing, self._flange)
         self._gizmo: Any = None
         self._edited = ""
         self._handled: SafetyBox | None = None

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 _COLOR = (214, 66, 160)  # Magenta: no verdict, no axis and no plan has it.
 
 
-class Grip:
+class DragHandle:
     """Owned by the stage, and made anew with its arm.
 
     Args:
@@ -76,7 +76,7 @@ class Grip:
     def _hear(self, link: int) -> Any:
         async def act(event: Any) -> None:
             self._ask(
-                requests.PullArm(
+                requests.DragLink(
                     page=event.client_id,
                     link=link,
                     grabbed=tuple(map(float, event.start_position)),

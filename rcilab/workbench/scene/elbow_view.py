@@ -26,7 +26,7 @@ _RADIUS = 0.034  # [m]
 _COLOR, _SNAPPED_COLOR = (18, 120, 108), (214, 48, 38)
 
 
-class ElbowStage:
+class ElbowSceneView:
     """Owned by the stage, and made anew with its arm.
 
     Args:

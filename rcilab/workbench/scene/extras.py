@@ -12,7 +12,7 @@ from rcilab.model.kinematics.workspace import Workspace
 from rcilab.model.robot_model import RobotModel
 from rcilab.views.swept_volume import swept_mesh
 from rcilab.workbench.goal.elbow import Elbow
-from rcilab.workbench.scene.path_strip import Ribbon
+from rcilab.workbench.scene.path_strip import PathStrip
 
 if TYPE_CHECKING:
     from rcilab.motion import Motion
@@ -48,7 +48,7 @@ class SceneState:
 
     extras: frozenset[Extra] = frozenset(("elbow",))
     elbow: Elbow | None = None
-    ribbon: Ribbon | None = None
+    ribbon: PathStrip | None = None
     peek: int | None = None
     """Which branch of the goal is under the mouse or has the focus, from 0."""
     ellipsoid: Ellipsoid | None = None

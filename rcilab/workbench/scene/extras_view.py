@@ -29,7 +29,7 @@ _POOR_COLOR, _GOOD_COLOR = np.array([240.0, 150.0, 20.0]), np.array([30.0, 140.0
 _GOOD = 0.25  # Smallest singular value from which on a point of the cloud is blue. A choice.
 
 
-class ExtrasStage:
+class ExtrasView:
     """Owned by the stage, and made anew with its arm.
 
     Args:

@@ -22,7 +22,7 @@ _VIA_COLOR = (11, 111, 194)
 _GIZMO_SCALE = 0.26  # [m]
 
 
-class GoalStage:
+class GoalView:
     """Owned by the stage, and made anew with its arm.
 
     Args:

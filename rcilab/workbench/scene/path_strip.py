@@ -19,7 +19,7 @@ _TOGETHER = 0.02  # [s] A choice: violations closer in time than this share a be
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Bead:
+class ViolationMarker:
     """One or more violations at a place of the path."""
 
     place: float
@@ -31,7 +31,7 @@ class Bead:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Ribbon:
+class PathStrip:
     """One path."""
 
     report: Report
@@ -40,17 +40,17 @@ class Ribbon:
     """Positions of the tool, shape (N, 3), [m]."""
     usage: Array
     """The most that is used of a limit between each of these and the next, shape (N,); from 1 on it is broken."""
-    beads: tuple[Bead, ...]
+    beads: tuple[ViolationMarker, ...]
 
 
-def look_at_path(plan: Plan) -> Ribbon:
+def look_at_path(plan: Plan) -> PathStrip:
     """Returns what is to be drawn of a plan's path."""
     rows = sampled_rows(plan.motion)
     usage = plan.report.usage().at_most(rows)
-    return Ribbon(report=plan.report, path=plan.path, usage=usage, beads=_beads(plan))
+    return PathStrip(report=plan.report, path=plan.path, usage=usage, beads=_beads(plan))
 
 
-def _beads(plan: Plan) -> tuple[Bead, ...]:
+def _beads(plan: Plan) -> tuple[ViolationMarker, ...]:
     groups: list[list[Violation]] = []
     for violation in plan.report.violations:  # Worst first.
         near = next((g for g in groups if abs(g[0].worst_time - violation.worst_time) < _TOGETHER), None)
@@ -64,6 +64,6 @@ def _beads(plan: Plan) -> tuple[Bead, ...]:
     times = [min(max(group[0].worst_time, 0.0), plan.motion.duration) for group in groups]
     positions = plan.model.position_path(np.stack([plan.motion.at(t).q for t in times]))
     return tuple(
-        Bead(place=t / duration, position=position, violations=tuple(group))
+        ViolationMarker(place=t / duration, position=position, violations=tuple(group))
         for t, position, group in zip(times, positions, groups, strict=True)
     )

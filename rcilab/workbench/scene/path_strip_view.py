@@ -11,7 +11,7 @@ from rcilab.views.usage_colors import usage_colors
 from rcilab.views.viser_scene import ViserScene
 from rcilab.workbench import requests
 from rcilab.workbench.check.freshness import outdated
-from rcilab.workbench.scene.path_strip import Bead, Ribbon
+from rcilab.workbench.scene.path_strip import PathStrip, ViolationMarker
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask
 
@@ -30,7 +30,7 @@ _BEAD_COLOR = (200, 16, 24)
 _THICK = 0.011  # [m]
 
 
-class RibbonStage:
+class PathStripView:
     """Owned by the stage, and made anew with its arm.
 
     Args:
@@ -41,7 +41,7 @@ class RibbonStage:
 
     def __init__(self, server: viser.ViserServer, drawing: ViserScene, ask: Ask) -> None:
         self._scene, self._drawing, self._ask = server.scene, drawing, ask
-        self._drawn: tuple[Ribbon | None, str, bool] = (None, "", False)
+        self._drawn: tuple[PathStrip | None, str, bool] = (None, "", False)
         self._beads = 0
         self._labels: list[Any] = []
         # There from the beginning: a page that renders in software can take seconds to mount a line that comes later.
@@ -69,7 +69,7 @@ class RibbonStage:
         self._exchange_beads((), None)
         self._drawing.remove("/path")
 
-    def _exchange_beads(self, beads: tuple[Bead, ...], text: Text | None) -> None:
+    def _exchange_beads(self, beads: tuple[ViolationMarker, ...], text: Text | None) -> None:
         for number in range(self._beads):
             self._drawing.remove(f"/bead{number}")
         for label in self._labels:
@@ -95,12 +95,12 @@ class RibbonStage:
 
     def _hear(self, number: int) -> Any:
         async def act(event: Any) -> None:
-            self._ask(requests.ShowBead(page=event.client_id, number=number))
+            self._ask(requests.ShowViolation(page=event.client_id, number=number))
 
         return act
 
 
-def bead_words(bead: Bead, text: Text) -> str:
+def bead_words(bead: ViolationMarker, text: Text) -> str:
     """Returns what is broken there, of which joint and when, in a few words."""
     worst = bead.violations[0]
     joint = f" J{worst.joint}" if worst.joint else ""

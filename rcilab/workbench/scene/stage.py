@@ -12,12 +12,12 @@ from rcilab.views.viser_scene import ViserScene
 from rcilab.views.viser_stage import furnish, place_camera
 from rcilab.workbench.run.readiness import is_connected, is_moving
 from rcilab.workbench.run.replay import replayed_pose
-from rcilab.workbench.scene.configuration_view import SetupStage
-from rcilab.workbench.scene.drag_handle import Grip
-from rcilab.workbench.scene.elbow_view import ElbowStage
-from rcilab.workbench.scene.extras_view import ExtrasStage
-from rcilab.workbench.scene.goal_view import GoalStage
-from rcilab.workbench.scene.path_strip_view import RibbonStage
+from rcilab.workbench.scene.configuration_view import ConfigurationSceneView
+from rcilab.workbench.scene.drag_handle import DragHandle
+from rcilab.workbench.scene.elbow_view import ElbowSceneView
+from rcilab.workbench.scene.extras_view import ExtrasView
+from rcilab.workbench.scene.goal_view import GoalView
+from rcilab.workbench.scene.path_strip_view import PathStripView
 from rcilab.workbench.scene.watchers import Watchers
 from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask
@@ -103,12 +103,12 @@ class Stage:
         self._live = ArmView(drawing, "live", model, "live", quality="fine" if full else "coarse")
         self._ghosts, self._look, self._is_there = {}, "", True
         self._visible.clear()
-        self._grip = Grip(server, drawing, self._live, self._ask)
-        self._setup = SetupStage(server, drawing, self._live, self._ask)
-        self._goal = GoalStage(server, state, self._ask)
-        self._elbow = ElbowStage(server, drawing, self._ask)
-        self._ribbon = RibbonStage(server, drawing, self._ask)
-        self._extras = ExtrasStage(server, drawing, self._live)
+        self._grip = DragHandle(server, drawing, self._live, self._ask)
+        self._setup = ConfigurationSceneView(server, drawing, self._live, self._ask)
+        self._goal = GoalView(server, state, self._ask)
+        self._elbow = ElbowSceneView(server, drawing, self._ask)
+        self._ribbon = PathStripView(server, drawing, self._ask)
+        self._extras = ExtrasView(server, drawing, self._live)
         self._tool = model.T_flange_tool
 
     def _show_presence(self, is_there: bool) -> None:

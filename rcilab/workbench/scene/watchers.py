@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import viser
 
-    from rcilab.workbench.control_lock import Lease
+    from rcilab.workbench.control_lock import ControlLock
 
 _SETTLING = 10.0
 """[s] For so long a change is told again and again: viser replays the scene to a new page, and tells all pages of nodes
@@ -30,7 +30,7 @@ class Watchers:
         self._watching: dict[int, float] = {}  # Since when each watching page sees these handles no more, [s].
         self._told = 0.0
 
-    def show(self, lease: Lease, handles: tuple[str, ...]) -> None:
+    def show(self, lease: ControlLock, handles: tuple[str, ...]) -> None:
         """Tells each page what has changed for it.
 
         Args:

@@ -14,7 +14,7 @@ from rcilab.app.reach import judge_joints, judge_pose
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.i18n.number_parsing import parse_number
-from rcilab.makers.rokae.driver.configuration import SETUP_PARTS, RobotSetup, SetupPart, SoftJointLimits
+from rcilab.makers.rokae.driver.configuration import SETUP_PARTS, RobotConfiguration, SetupPart, SoftJointLimits
 from rcilab.robots import describe_robot
 from rcilab.workbench import requests
 from rcilab.workbench.session import Session
@@ -57,7 +57,9 @@ class SetupActions:
 
     def __init__(self, store: Store, session: Session) -> None:
         self._store, self._session = store, session
-        self._past: list[tuple[RobotSetup, frozenset[SetupPart]]] = []  # What was wanted, what of it was edited.
+        self._past: list[
+            tuple[RobotConfiguration, frozenset[SetupPart]]
+        ] = []  # What was wanted, what of it was edited.
         self._arm = store.state.model.name
         self._drag: tuple[int | None, str] | None = None  # Which page drags which part.
         self._dragged = -math.inf  # When it was last heard to.
@@ -125,9 +127,11 @@ class SetupActions:
     def _limit_joints(self, joints: SoftJointLimits) -> None:
         setup = self._store.state.setup
         if setup.wanted.joints is None:  # What an undo leads back to has to be said, too.
-            setup = replace(setup, wanted=setup.wanted.updated(RobotSetup(joints=own_limits(self._store.state))))
+            setup = replace(
+                setup, wanted=setup.wanted.updated(RobotConfiguration(joints=own_limits(self._store.state)))
+            )
             self._store.update(setup=setup)
-        self._edit(replace(setup, wanted=setup.wanted.updated(RobotSetup(joints=joints))), "joints")
+        self._edit(replace(setup, wanted=setup.wanted.updated(RobotConfiguration(joints=joints))), "joints")
 
     def move(self, request: requests.MoveSetup) -> None:
         """Follows the handles of a part."""
@@ -159,7 +163,7 @@ class SetupActions:
             low = bounds[opposite] + THINNEST
         hand = box.T_base_box.rotation.T @ np.array(request.hand)
         bounds[request.face] = min(max(float(hand[axis]), low), high)
-        wanted = setup.wanted.updated(RobotSetup(box=box_between(box, bounds)))
+        wanted = setup.wanted.updated(RobotConfiguration(box=box_between(box, bounds)))
         self._edit(replace(setup, wanted=wanted), "box", drag=(request.page, "box"))
         self._hear_drag(request.ended)
 
@@ -177,10 +181,10 @@ class SetupActions:
             self._store.update(setup=replace(setup, seen=frozenset(seen)))
         elif request.name == "active" and isinstance(value, bool):
             switched = SafetyBox(size=box.size, T_base_box=box.T_base_box, active=value)
-            self._edit(replace(setup, wanted=setup.wanted.updated(RobotSetup(box=switched))), "box")
+            self._edit(replace(setup, wanted=setup.wanted.updated(RobotConfiguration(box=switched))), "box")
         elif request.name == "axes" and value in FORCE_AXES:
             turned = replace(force, type=FORCE_AXES[str(value)])
-            self._edit(replace(setup, wanted=setup.wanted.updated(RobotSetup(force=turned))), "force")
+            self._edit(replace(setup, wanted=setup.wanted.updated(RobotConfiguration(force=turned))), "force")
 
     def open_tab(self, request: requests.OpenTab) -> None:
         """Ends the edit when its tab is left: handles in the scene are those of the tab that is open."""
@@ -207,7 +211,7 @@ class SetupActions:
             self._store.update(setup=replace(setup, asked=None))
             self._send(self._session.status())
 
-    def restore(self, setup: RobotSetup) -> None:
+    def restore(self, setup: RobotConfiguration) -> None:
         """Takes a set-up over that was edited before; a foreign robot is not told without being asked about."""
         now = self._store.state.setup
         parts: set[SetupPart] = set(setup.parts)

@@ -6,12 +6,12 @@ from typing import Any
 
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
-from rcilab.makers.rokae.driver.configuration import ForceControlFrame, RobotSetup, SoftJointLimits
+from rcilab.makers.rokae.driver.configuration import ForceControlFrame, RobotConfiguration, SoftJointLimits
 from rcilab.makers.rokae.wire import ForceFrame
 from rcilab.model.dynamics.payload import Payload
 
 
-def setup_facts(setup: RobotSetup) -> dict[str, Any]:
+def setup_facts(setup: RobotConfiguration) -> dict[str, Any]:
     """Returns the parts of a set-up that are not None, ready for JSON; lengths in m, poses as x y z w x y z."""
     facts: dict[str, Any] = {}
     if setup.box is not None:
@@ -29,14 +29,14 @@ def setup_facts(setup: RobotSetup) -> dict[str, Any]:
     return facts
 
 
-def build_setup(facts: dict[str, Any]) -> RobotSetup:
+def build_setup(facts: dict[str, Any]) -> RobotConfiguration:
     """Returns the set-up that `setup_facts` was made of.
 
     Raises:
         LookupError, TypeError, ValueError: They are no such facts; numbers out of range raise an InvalidValueError.
     """
     box, load, force, joints = (facts.get(part) for part in ("box", "load", "force", "joints"))
-    return RobotSetup(
+    return RobotConfiguration(
         box=None
         if box is None
         else SafetyBox(size=tuple(box["size"]), T_base_box=_pose(box["pose"]), active=bool(box["active"])),

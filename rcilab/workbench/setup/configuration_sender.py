@@ -11,8 +11,8 @@ from rcilab.workbench.status_text import StartingError, tell_error
 from rcilab.workbench.text import Message
 
 if TYPE_CHECKING:
-    from rcilab.control_process import Ticket
-    from rcilab.makers.rokae.driver.configuration import RobotSetup
+    from rcilab.control_process import PendingRequest
+    from rcilab.makers.rokae.driver.configuration import RobotConfiguration
 
 
 class SetupPost:
@@ -25,14 +25,14 @@ class SetupPost:
 
     def __init__(self, session: Session, refuse: Callable[[Message], None]) -> None:
         self._session, self._refuse = session, refuse
-        self._ticket: Ticket | None = None
+        self._ticket: PendingRequest | None = None
 
     @property
     def is_underway(self) -> bool:
         """Whether an answer is awaited; nothing else is sent until it was collected."""
         return self._ticket is not None
 
-    def send(self, setup: RobotSetup) -> None:
+    def send(self, setup: RobotConfiguration) -> None:
         """Sends a letter; a control process that is still starting gets none."""
         assert self._ticket is None
         try:

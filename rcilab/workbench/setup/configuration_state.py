@@ -12,7 +12,7 @@ from rcilab.core.spatial import IDENTITY, Pose
 from rcilab.makers.rokae.driver.configuration import (
     SETUP_PARTS,
     ForceControlFrame,
-    RobotSetup,
+    RobotConfiguration,
     SetupPart,
     SoftJointLimits,
 )
@@ -32,7 +32,7 @@ FORCE_AXES = {"world": ForceFrame.WORLD, "tool": ForceFrame.TOOL, "path": ForceF
 
 _SAME_PLACE, _SAME_TURN = 1e-4, 1e-3  # [m], elements of a rotation: within these the controller's tool is ours.
 _SEEN = 5e-5  # [m] Closer to a face than this, the tool stands on it: it would be 0.0 mm outside.
-_FIRST_SETUP = RobotSetup(
+_FIRST_SETUP = RobotConfiguration(
     box=SafetyBox(size=(1.6, 1.6, 1.3), T_base_box=Pose((0.0, 0.0, 0.66)), active=False),
     tool=IDENTITY,
     load=NO_LOAD,
@@ -45,7 +45,7 @@ _FIRST_SETUP = RobotSetup(
 class SetupState:
     """Box, tool, load and force-control frame as the operator wants them."""
 
-    wanted: RobotSetup = field(default_factory=lambda: _FIRST_SETUP)
+    wanted: RobotConfiguration = field(default_factory=lambda: _FIRST_SETUP)
     """All four parts."""
     touched: frozenset[SetupPart] = frozenset()
     """Parts that were edited here: those the controller is to be told."""
@@ -55,7 +55,7 @@ class SetupState:
     """The part with handles in the scene; "" for none."""
     seen: frozenset[str] = frozenset()
     """Parts that are drawn."""
-    asked: RobotSetup | None = None
+    asked: RobotConfiguration | None = None
     """The set-up that a foreign robot is to get and that awaits a second yes."""
     refusal: Message | None = None
     """Why the controller did not take it."""
@@ -117,7 +117,7 @@ def name_parts(parts: tuple[str, ...]) -> Message:
     return named
 
 
-def describe_part(setup: RobotSetup, part: str) -> Message:
+def describe_part(setup: RobotConfiguration, part: str) -> Message:
     """Returns one part in a few numbers."""
     value = getattr(setup, part)
     if value is None:

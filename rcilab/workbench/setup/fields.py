@@ -10,7 +10,7 @@ import numpy as np
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
-from rcilab.makers.rokae.driver.configuration import RobotSetup
+from rcilab.makers.rokae.driver.configuration import RobotConfiguration
 from rcilab.makers.rokae.wire.bounds import LONGEST_TOOL
 from rcilab.model.dynamics.payload import Payload
 from rcilab.workbench.setup.configuration_state import SetupState
@@ -190,7 +190,7 @@ def with_inertia(setup: SetupState) -> SetupState | Message:
 
 
 def _with(setup: SetupState, **parts: object) -> SetupState:
-    return replace(setup, wanted=setup.wanted.updated(RobotSetup(**parts)))  # type: ignore[arg-type]  # By their names.
+    return replace(setup, wanted=setup.wanted.updated(RobotConfiguration(**parts)))  # type: ignore[arg-type]  # By their names.
 
 
 def _turned(pose: Pose, name: str, value: float) -> Pose:

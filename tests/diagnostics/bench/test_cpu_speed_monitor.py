@@ -25,7 +25,7 @@ def watch(pace):
 
 
 def test_a_slow_phase_is_seen_and_said_beside_the_row_and_the_best_is_remembered(takes):
-    pace = pace_watch.PaceWatch()
+    pace = pace_watch.CpuSpeedMonitor()
     watch(pace)
     assert pace.slowness == 1.0
     assert _with_pace("a note", pace) == "a note"

@@ -10,11 +10,11 @@ import time
 import numpy as np
 import pytest
 
-from rcilab.diagnostics.bench.cpu_stall_monitor import CoreWatch
+from rcilab.diagnostics.bench.cpu_stall_monitor import CpuStallMonitor
 
 
-def _with_pauses(*pauses: tuple[float, float]) -> CoreWatch:
-    watch = CoreWatch()
+def _with_pauses(*pauses: tuple[float, float]) -> CpuStallMonitor:
+    watch = CpuStallMonitor()
     watch.pauses = np.array(pauses).reshape(-1, 2)
     return watch
 
@@ -47,7 +47,7 @@ while time.monotonic() < end:
 def test_a_core_that_something_else_holds_is_seen() -> None:
     """Real loops on real cores; what holds one has their own priority, so it is not interrupted."""
     core = min(os.sched_getaffinity(0))
-    with CoreWatch() as watch:
+    with CpuStallMonitor() as watch:
         time.sleep(0.5)
         begin = time.monotonic()
         held = subprocess.run([sys.executable, "-c", _HOLD.format(core={core})], check=False).returncode

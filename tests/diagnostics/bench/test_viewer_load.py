@@ -9,7 +9,7 @@ import pytest
 
 from rcilab.control_process import SupervisorStatus
 from rcilab.core.cycle_log import cycle_dtype
-from rcilab.diagnostics.bench.cpu_stall_monitor import CoreWatch
+from rcilab.diagnostics.bench.cpu_stall_monitor import CpuStallMonitor
 from rcilab.diagnostics.bench.loop import Streamed
 from rcilab.diagnostics.bench.viewer_load import _compare
 
@@ -19,7 +19,7 @@ def streamed(late: int, explained: int, pages: int = 4) -> Streamed:
     rows = np.zeros(1000, cycle_dtype(7))
     rows["received_ns"] = rows["sent_ns"] = 1_000_000_000 * np.arange(1000)
     rows["lateness"][1000 - late :] = 2e-3
-    watch = CoreWatch()
+    watch = CpuStallMonitor()
     ends = 1000.0 - late + np.arange(explained)
     watch.pauses = np.stack([ends - 1e-3, ends], axis=1)
     return Streamed(

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from rcilab.diagnostics.doctor import network
-from rcilab.diagnostics.doctor.network import Way
+from rcilab.diagnostics.doctor.network import NetworkRoute
 from rcilab.diagnostics.doctor.system import System
 from rcilab.makers.rokae.driver.address import parse_address
 from rcilab.makers.rokae.driver.transport import RECEIVE_BUFFER
@@ -56,12 +56,12 @@ def test_this_machine_tells_the_policy_of_a_process_where_we_look_for_it() -> No
 @pytest.mark.parametrize(
     ("host", "way"),
     [
-        ("192.168.1.7", Way("eth0", None)),
-        ("192.168.0.160", Way("eth1", None)),
-        ("10.0.0.1", Way("eth0", "192.168.1.1")),
+        ("192.168.1.7", NetworkRoute("eth0", None)),
+        ("192.168.0.160", NetworkRoute("eth1", None)),
+        ("10.0.0.1", NetworkRoute("eth0", "192.168.1.1")),
     ],
 )
-def test_the_longest_mask_leads_then_the_lowest_metric(tree, host: str, way: Way) -> None:
+def test_the_longest_mask_leads_then_the_lowest_metric(tree, host: str, way: NetworkRoute) -> None:
     assert network.find_way(host, tree({"/proc/net/route": ROUTES})) == way
 
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rcilab.core.clearance import SafetyDistance
+from rcilab.core.clearance import ClearanceLimit
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.spatial import Pose
 from rcilab.model.kinematics.collision import FLOOR, TOOL, ClearanceQuery
@@ -21,7 +21,7 @@ from rcilab.robots.urdf import build_urdf
 
 arms = pytest.mark.parametrize("name", ROBOT_NAMES)
 FINGER = Pose((0.03, -0.02, 0.15))
-WITH_TOOL = SafetyDistance(tool_radius=0.03)
+WITH_TOOL = ClearanceLimit(tool_radius=0.03)
 AGREEMENT = 1e-9  # [m] Both are closed forms; only the order of the sums differs.
 
 
@@ -171,8 +171,8 @@ def test_the_floor_can_be_lower_or_away() -> None:
     q = np.array([0.0, 1.9, 0.5, 0.0, 0.0, 0.0])
     floor = model.clearance(q)
     assert floor.links[1] == FLOOR
-    assert model.clearance(q, SafetyDistance(floor_height=-0.1)).distance == pytest.approx(floor.distance + 0.1)
-    away = model.clearance(q, SafetyDistance(floor_height=None))
+    assert model.clearance(q, ClearanceLimit(floor_height=-0.1)).distance == pytest.approx(floor.distance + 0.1)
+    away = model.clearance(q, ClearanceLimit(floor_height=None))
     assert away.links[1] != FLOOR
     assert away.distance > floor.distance
 

@@ -13,7 +13,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from rcilab.core.arrays import frozen
+from rcilab.core.arrays import readonly_copy
 from rcilab.core.limits import ArmAngleLimits, CartesianLimits, JointLimits, Limits
 from rcilab.robots.description import CraigRow, Link, RobotDescription, Rod, rows_from_craig
 
@@ -81,7 +81,7 @@ def _limits() -> Limits:
     }
     velocity, acceleration, jerk = 2.175, 10.0, 5000.0
     return Limits(
-        joint=JointLimits(**{name: frozen(row) for name, row in _TABLE.items()}),
+        joint=JointLimits(**{name: readonly_copy(row) for name, row in _TABLE.items()}),
         cartesian=CartesianLimits(
             translation_velocity=1.7,
             translation_acceleration=13.0,
@@ -125,8 +125,8 @@ def _link(
     inertia = R @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ R.T
     return Link(
         mass=mass,
-        center_of_mass=frozen(R @ np.array(center) + (0.0, 0.0, above)),
-        inertia=frozen((inertia + inertia.T) / 2.0 + 0.0),
+        center_of_mass=readonly_copy(R @ np.array(center) + (0.0, 0.0, above)),
+        inertia=readonly_copy((inertia + inertia.T) / 2.0 + 0.0),
         origin_height=height,
         origin_ahead=ahead,
         source=IDENTIFIED,
@@ -222,7 +222,7 @@ DESCRIPTION = RobotDescription(
         ),
     ),
     limits=_limits(),
-    home=frozen([0.0, -pi / 4, 0.0, -3 * pi / 4, 0.0, pi / 2, pi / 4]),
+    home=readonly_copy([0.0, -pi / 4, 0.0, -3 * pi / 4, 0.0, pi / 2, pi / 4]),
     rated_payload=3.0,
     rated_payload_source="maker's data sheet of the Panda",
     rods=_RODS,

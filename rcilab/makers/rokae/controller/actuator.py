@@ -27,18 +27,18 @@ from rcilab.makers.rokae.controller.force_frame import ForceAxes
 from rcilab.makers.rokae.controller.hand_guiding import guide_torque, wall_torque
 from rcilab.makers.rokae.controller.settings import Settings
 from rcilab.model.robot_model import RobotModel
-from rcilab.sim.compliance import Damper
+from rcilab.sim.compliance import ModalDamping
 from rcilab.sim.impedance_control import cartesian_impedance, joint_impedance
 from rcilab.sim.plant import Drive, Measurement, Setpoint
-from rcilab.sim.reference_trajectory import CommandedMotion
-from rcilab.sim.tool_kinematics import ToolMotion
+from rcilab.sim.reference_trajectory import ReferenceTrajectory
+from rcilab.sim.tool_kinematics import ToolKinematics
 
 # In a cycle: so that the largest wrench there is, 60 N and 30 N m, is reached after 0.5 s. A tuning value.
 _WRENCH_STEP = (0.12,) * 3 + (0.06,) * 3
 _DRIVES = {"position": Drive.POSITION, "braked": Drive.BRAKED}
 
 
-class Law(Enum):
+class ControlLaw(Enum):
     """How a reference becomes a setpoint."""
 
     POSITION = "position"
@@ -73,8 +73,8 @@ class Actuator:
 
     def configure(self, model: RobotModel, settings: Settings) -> None:
         """Takes new settings, and the model with the tool and load that they say."""
-        self._law = Law.BRAKED
-        self._damper = Damper()
+        self._law = ControlLaw.BRAKED
+        self._damper = ModalDamping()
         self._axes.configure(model, settings)
         self._model = model
         self._settings = settings
@@ -87,9 +87,9 @@ class Actuator:
 
     def setpoint(
         self,
-        law: Law,
-        commanded: CommandedMotion,
-        tool_c: ToolMotion,
+        law: ControlLaw,
+        commanded: ReferenceTrajectory,
+        tool_c: ToolKinematics,
         measured: Measurement,
         tau: list[float] | None,
     ) -> Setpoint:
@@ -103,13 +103,13 @@ class Actuator:
             tau: Commanded torques, n plain floats, [N m], for TORQUE; None is none yet.
         """
         if law is not self._law:
-            self._law, self._damper = law, Damper()
+            self._law, self._damper = law, ModalDamping()
             self._axes.begin()
-        if law is not Law.CARTESIAN_IMPEDANCE:
+        if law is not ControlLaw.CARTESIAN_IMPEDANCE:
             self._wrench = (0.0,) * 6
         if not law.yields:
             return Setpoint(law.drive, commanded.q, commanded.dq, commanded.ddq, None, commanded.arrays)
-        if law is Law.TORQUE:
+        if law is ControlLaw.TORQUE:
             torque = [0.0] * len(commanded.q) if tau is None else tau
         else:
             torque = self._compliance(law, commanded, tool_c, measured)
@@ -119,12 +119,12 @@ class Actuator:
         return Setpoint(law.drive, commanded.q, commanded.dq, commanded.ddq, torque)
 
     def _compliance(
-        self, law: Law, commanded: CommandedMotion, tool_c: ToolMotion, measured: Measurement
+        self, law: ControlLaw, commanded: ReferenceTrajectory, tool_c: ToolKinematics, measured: Measurement
     ) -> JointVector:
         model, settings = self._model, self._settings
-        if law is Law.JOINT_IMPEDANCE:
+        if law is ControlLaw.JOINT_IMPEDANCE:
             return joint_impedance(model, *commanded.arrays, measured, settings.joint_stiffness, self._damper)
-        if law is Law.CARTESIAN_IMPEDANCE:
+        if law is ControlLaw.CARTESIAN_IMPEDANCE:
             tool = model.rigid_body.tool_terms(measured.q, measured.dq)
             self._axes.follow(tool_c.twist[:3], tool.pose)
             self._wrench = _approach(self._wrench, settings.desired_wrench)

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from rcilab.core.arrays import JointVector, frozen
+from rcilab.core.arrays import JointVector, readonly_copy
 from rcilab.core.clock import CYCLE_TIME
-from rcilab.makers.rokae.controller.actuator import Actuator, Law
-from rcilab.makers.rokae.controller.measured_state import Watch
-from rcilab.makers.rokae.controller.reporter import Readings
+from rcilab.makers.rokae.controller.actuator import Actuator, ControlLaw
+from rcilab.makers.rokae.controller.measured_state import MeasuredStateMonitor
+from rcilab.makers.rokae.controller.reporter import CycleSignals
 from rcilab.makers.rokae.controller.settings import Settings
 from rcilab.model.robot_model import RobotModel
 from rcilab.sim.plant import Measurement, Plant, Setpoint
-from rcilab.sim.reference_trajectory import CommandedMotion
-from rcilab.sim.tool_kinematics import ToolMotion
+from rcilab.sim.reference_trajectory import ReferenceTrajectory
+from rcilab.sim.tool_kinematics import ToolKinematics
 
 STANDSTILL = 1e-4  # [rad/s] Below it every joint stands, 0.006 deg/s; a choice.
 SETTLE_LIMIT = 300  # [cycles] How long one waits for an arm that something keeps from where it was told; a choice.
@@ -39,13 +39,13 @@ class Arm:
         self.plant = plant
         measured = plant.reset(model.home)
         q = measured.q.tolist()
-        self.commanded = CommandedMotion(model.limits.joint, q)
-        self.tool_c = ToolMotion(model, q)
-        self.watch = Watch(model, measured)
+        self.commanded = ReferenceTrajectory(model.limits.joint, q)
+        self.tool_c = ToolKinematics(model, q)
+        self.watch = MeasuredStateMonitor(model, measured)
         self.actuator = Actuator(model, settings)
         self._tool_version = self.commanded.version
-        self._law = Law.BRAKED
-        self.yielded_as: Law | None = None
+        self._law = ControlLaw.BRAKED
+        self.yielded_as: ControlLaw | None = None
         self._dq_before = measured.dq
         self._standing = 0
         self._setpoint: Setpoint | None = None
@@ -61,13 +61,13 @@ class Arm:
         may_rest = self.commanded.is_at_rest and not self._law.yields
         return may_rest and (self._standing > SETTLE_LIMIT or self.watch.measured.q.tolist() == self.commanded.q)
 
-    def has_settled(self, law: Law) -> bool:
+    def has_settled(self, law: ControlLaw) -> bool:
         """Returns whether nothing here counts time any more, and the law is the one it has stood under."""
         return self._standing > SETTLE_LIMIT and law is self._law
 
     def reset(self, q: JointVector) -> None:
         """Puts the resting arm somewhere else."""
-        measured = self.plant.reset(frozen(q))
+        measured = self.plant.reset(readonly_copy(q))
         self.commanded.place(measured.q.tolist())
         self.tool_c.place(self.commanded.q)
         self._tool_version = self.commanded.version
@@ -81,12 +81,12 @@ class Arm:
             self.model = self.model.with_tool(tool).with_load(load)
             self.plant.configure(self.model)
             measured = self.plant.reset(self.watch.measured.q)
-            self.tool_c = ToolMotion(self.model, self.commanded.q)
+            self.tool_c = ToolKinematics(self.model, self.commanded.q)
             self._dq_before = measured.dq
             self.watch.configure(self.model, measured)
         self.actuator.configure(self.model, settings)
 
-    def move(self, law: Law, tau: list[float] | None, *, has_moved: bool) -> None:
+    def move(self, law: ControlLaw, tau: list[float] | None, *, has_moved: bool) -> None:
         """Lives through one millisecond: the reference goes on, the plant moves, the sensors are read.
 
         Args:
@@ -121,18 +121,18 @@ class Arm:
         self._take(self._law, measured)
         return False
 
-    def read(self, tau: list[float] | None) -> Readings:
+    def read(self, tau: list[float] | None) -> CycleSignals:
         """Returns what this cycle came to; `tau` are commanded torques, [N m], or None."""
         watch = self.watch
-        return Readings(self.commanded, self.tool_c, watch.measured, watch.tool, tau, watch.tau_ext, watch.wrench)
+        return CycleSignals(self.commanded, self.tool_c, watch.measured, watch.tool, tau, watch.tau_ext, watch.wrench)
 
-    def _take(self, law: Law, measured: Measurement) -> None:
+    def _take(self, law: ControlLaw, measured: Measurement) -> None:
         """Takes what the plant has come to in this cycle."""
         commanded, last = self.commanded, self.watch.measured
         if law.leads:
             commanded.move(measured.q.tolist())
             self._move_tool()
-        elif law is Law.BRAKED and measured.q.tolist() != commanded.q:
+        elif law is ControlLaw.BRAKED and measured.q.tolist() != commanded.q:
             commanded.place(measured.q.tolist())
             self._move_tool()
         self._law, self._dq_before = law, last.dq

@@ -8,11 +8,11 @@ from rcilab.conformance import LimitTable
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.faults import Fault
 from rcilab.i18n.translator import Remark
-from rcilab.makers.rokae.controller.actuator import Law
+from rcilab.makers.rokae.controller.actuator import ControlLaw
 from rcilab.makers.rokae.controller.arm import Arm
-from rcilab.makers.rokae.controller.jitter_buffer import FIRST_COMMAND_TIMEOUT, Playout
+from rcilab.makers.rokae.controller.jitter_buffer import FIRST_COMMAND_TIMEOUT, JitterBuffer
 from rcilab.makers.rokae.controller.modes import Mode, build_generator
-from rcilab.makers.rokae.controller.modes.generator import MotionGenerator, Step
+from rcilab.makers.rokae.controller.modes.generator import GeneratorOutput, MotionGenerator
 from rcilab.makers.rokae.controller.modes.motion_limits import build_terms
 from rcilab.makers.rokae.controller.modes.start import start_tolerance
 from rcilab.makers.rokae.controller.settings import Settings
@@ -40,26 +40,26 @@ class ClientMotion:
     """
 
     def __init__(self, arm: Arm, prefill: int, torque_prefill: int | None, lost_limit: int | None) -> None:
-        self.playout = Playout(prefill)
+        self.playout = JitterBuffer(prefill)
         self.is_followed = False
         self.tau: list[float] | None = None
         self._arm = arm
         self._torque_prefill = min(prefill, TORQUE_PREFILL) if torque_prefill is None else torque_prefill
         self._lost_limit = lost_limit
-        self._mode = Mode(Law.POSITION, False)
+        self._mode = Mode(ControlLaw.POSITION, False)
         self._generator: MotionGenerator | None = None
         self._drain: int | None = None  # Cycles that are left for what is queued; None until the motion is ended.
 
     @property
-    def law(self) -> Law:
+    def law(self) -> ControlLaw:
         """How the arm follows."""
         is_over = self._mode.law.leads and self.playout.is_finished  # Nobody holds the arm any more.
-        return Law.POSITION if is_over else self._mode.law
+        return ControlLaw.POSITION if is_over else self._mode.law
 
     def prepare(self, mode: Mode) -> None:
         """Forgets the last motion, ready for one in this mode."""
         self._mode = mode
-        self.playout.begin(most=self._torque_prefill if mode.law is Law.TORQUE else None)
+        self.playout.begin(most=self._torque_prefill if mode.law is ControlLaw.TORQUE else None)
 
     def begin(self, settings: Settings, table: LimitTable) -> None:
         """Follows commands from now on, from where the arm rests.
@@ -84,7 +84,7 @@ class ClientMotion:
             judges_tool=mode.is_cartesian,
             yields=mode.law.yields,
         )
-        self.tau = [0.0] * arm.model.n if mode.law is Law.TORQUE else None
+        self.tau = [0.0] * arm.model.n if mode.law is ControlLaw.TORQUE else None
         self.is_followed, self._drain = True, None
 
     def drain(self) -> None:
@@ -96,7 +96,7 @@ class ClientMotion:
         self.is_followed = False
         self.playout.clear()
 
-    def follow(self) -> Step | None:
+    def follow(self) -> GeneratorOutput | None:
         """Plays what is due in this cycle; None: nothing is. A step that raises faults is not followed."""
         playout = self.playout
         if self._drain is not None:
@@ -116,7 +116,7 @@ class ClientMotion:
             if not playout.is_playing:
                 seconds = f"{FIRST_COMMAND_TIMEOUT * CYCLE_TIME:g}"
                 reason = Remark(f"no command came within {seconds} s of the start", "no_command", seconds=seconds)
-            return Step(faults=(Fault.INSTABILITY_DETECTION,), reason=reason)
+            return GeneratorOutput(faults=(Fault.INSTABILITY_DETECTION,), reason=reason)
         if not step.faults:
             self.tau = step.tau
             if step.q is not None:

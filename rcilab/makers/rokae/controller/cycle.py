@@ -20,7 +20,7 @@ from rcilab.core.faults import Fault
 from rcilab.core.state import ControllerMode, MotionGeneratorMode, RobotState
 from rcilab.i18n.translator import Remark
 from rcilab.makers.rokae import wire as rci
-from rcilab.makers.rokae.controller.actuator import Law
+from rcilab.makers.rokae.controller.actuator import ControlLaw
 from rcilab.makers.rokae.controller.arm import Arm
 from rcilab.makers.rokae.controller.client_motion import LOST_LIMIT, PREFILL, ClientMotion
 from rcilab.makers.rokae.controller.model_download import model_response
@@ -258,7 +258,7 @@ class ControlCycle:
         if step is not None and step.faults:
             self._raise(step.faults, step.reason, is_number=step.is_number)
         law = self._current_law()
-        if law is not Law.TORQUE:
+        if law is not ControlLaw.TORQUE:
             motion.tau = None
         self._arm.move(law, motion.tau, has_moved=has_moved)
         if self.phase in _MOVING:
@@ -294,12 +294,12 @@ class ControlCycle:
         is_limit = is_number and not self.settings.auto_limit and not _JOINT_RANGE.isdisjoint(faults)
         self.happen(Event.JOINT_LIMIT if is_limit else Event.FAULT, *faults)
 
-    def _current_law(self) -> Law:
+    def _current_law(self) -> ControlLaw:
         if self._motion.is_followed:
             return self._motion.law
         if self.phase is Phase.GUIDING:
-            return Law.GUIDE
-        return Law.BRAKED if self.phase in _BRAKED and self._arm.may_be_braked else Law.POSITION
+            return ControlLaw.GUIDE
+        return ControlLaw.BRAKED if self.phase in _BRAKED and self._arm.may_be_braked else ControlLaw.POSITION
 
     def _report(self) -> RobotState:
         controller_mode, motion_mode = self._shown

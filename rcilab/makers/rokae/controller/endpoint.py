@@ -21,14 +21,14 @@ _ATTEMPTS = 20  # At a number that is free for TCP and UDP alike, when any will 
 
 
 @dataclass(frozen=True, slots=True)
-class ClientJoined:
+class ClientConnected:
     """Somebody connected."""
 
     address: str
 
 
 @dataclass(frozen=True, slots=True)
-class ClientLeft:
+class ClientDisconnected:
     """The connection is over."""
 
     reason: str
@@ -66,14 +66,20 @@ class ClientRefused:
 
 
 @dataclass(frozen=True, slots=True)
-class GuestsReady:
+class ExtraSocketsReady:
     """Sockets of somebody else, watched along with ours, have something to read."""
 
     sockets: list[socket.socket]
 
 
 Arrival: TypeAlias = (
-    ClientJoined | ClientLeft | FrameArrived | DatagramArrived | StrangerHeard | ClientRefused | GuestsReady
+    ClientConnected
+    | ClientDisconnected
+    | FrameArrived
+    | DatagramArrived
+    | StrangerHeard
+    | ClientRefused
+    | ExtraSocketsReady
 )
 
 
@@ -140,7 +146,7 @@ class Endpoint:
             self._accept()
         ready_guests = [guest for guest in guests if guest in readable]
         if ready_guests:
-            self._arrivals.append(GuestsReady(ready_guests))
+            self._arrivals.append(ExtraSocketsReady(ready_guests))
         arrivals = list(self._arrivals)
         self._arrivals.clear()
         return arrivals
@@ -173,7 +179,7 @@ class Endpoint:
         self._connection = None
         self._state_port = self._own_port
         self._target = self._fixed_target
-        self._arrivals.append(ClientLeft(reason))
+        self._arrivals.append(ClientDisconnected(reason))
 
     def redirect_states(self, port: int) -> None:
         """Sends states to another UDP port of this client from now on (the RCI's Connect command)."""
@@ -244,7 +250,7 @@ class Endpoint:
         self._reader = FrameReader()
         if self._fixed_target is None:
             self._target = (address, self._state_port)
-        self._arrivals.append(ClientJoined(address))
+        self._arrivals.append(ClientConnected(address))
 
 
 def _open(config: ControllerConfig) -> tuple[socket.socket, socket.socket]:

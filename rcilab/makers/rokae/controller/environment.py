@@ -42,13 +42,13 @@ from rcilab.sim.api import (
     WorldRequest,
     WorldStatus,
 )
-from rcilab.sim.clock_stalls import StallPlan
+from rcilab.sim.clock_stalls import StallSchedule
 
 _NOTHING = Push((0.0,) * 6)
 
 
 @dataclass(frozen=True, slots=True)
-class Mishaps:
+class ServerCounters:
     """What the server counts: cycles left out, datagrams of a wrong size, and those of somebody else."""
 
     missed: int
@@ -56,7 +56,7 @@ class Mishaps:
     strangers: int
 
 
-class Surroundings:
+class Environment:
     """Carries out world requests. Owned by the thread that runs the controller.
 
     Args:
@@ -71,9 +71,9 @@ class Surroundings:
         self,
         cycle: ControlCycle,
         network: FaultyNetwork,
-        stalls: StallPlan,
+        stalls: StallSchedule,
         clock: Clock,
-        mishaps: Callable[[], Mishaps],
+        mishaps: Callable[[], ServerCounters],
     ) -> None:
         self._cycle = cycle
         self._plant = cycle.plant

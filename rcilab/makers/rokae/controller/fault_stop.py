@@ -20,7 +20,7 @@ from typing import Final, NamedTuple
 from rcilab.core.faults import Fault
 
 
-class Offender(Enum):
+class FaultSource(Enum):
     """What broke the condition, and what becomes of it."""
 
     COMMAND = "the command of this cycle is not given to the arm"
@@ -31,7 +31,7 @@ class Offender(Enum):
 class FaultStop(NamedTuple):
     """One row of the table."""
 
-    offender: Offender
+    offender: FaultSource
     modes: str
     """In which controller modes it is judged."""
     recovery: str
@@ -47,7 +47,7 @@ _BACK_BOX = "up to 1 cm outside: as below. Farther: refused (manual recovery nee
 _CLEAR = "refused (reflex) while something still presses harder than the thresholds"
 
 _ALL, _JOINTS, _TOOL, _TORQUES = "all", "all but torque", "both Cartesian modes", "torque"
-_COMMAND, _MEASUREMENT = Offender.COMMAND, Offender.MEASUREMENT
+_COMMAND, _MEASUREMENT = FaultSource.COMMAND, FaultSource.MEASUREMENT
 
 FAULT_STOP: Final = {
     Fault.ACTUAL_JOINT_POSITION_LIMITS_VIOLATION: FaultStop(_MEASUREMENT, _ALL, _BACK),
@@ -81,7 +81,7 @@ FAULT_STOP: Final = {
     Fault.CARTESIAN_POSITION_MOTION_GENERATOR_INVALID_FRAME: FaultStop(_COMMAND, _TOOL, _ANYTIME),
     Fault.COMMAND_TORQUE_DISCONTINUITY: FaultStop(_COMMAND, _TORQUES, _ANYTIME),
     Fault.COMMAND_TORQUE_RANGE_VIOLATION: FaultStop(_COMMAND, _TORQUES, _ANYTIME),
-    Fault.INSTABILITY_DETECTION: FaultStop(Offender.ABSENCE, _ALL, "none; after an emergency stop, its release"),
+    Fault.INSTABILITY_DETECTION: FaultStop(FaultSource.ABSENCE, _ALL, "none; after an emergency stop, its release"),
 }
 """Every fault. While a person guides the arm by hand nothing is judged."""
 

@@ -10,7 +10,13 @@ import socket
 from collections.abc import Sequence
 
 from rcilab.core.clock import Clock
-from rcilab.makers.rokae.controller.endpoint import Arrival, ClientJoined, ClientLeft, DatagramArrived, Endpoint
+from rcilab.makers.rokae.controller.endpoint import (
+    Arrival,
+    ClientConnected,
+    ClientDisconnected,
+    DatagramArrived,
+    Endpoint,
+)
 from rcilab.sim.api import Direction, NetworkFaults
 from rcilab.sim.network_impairment import DelayedDatagrams, SlowStream
 
@@ -115,7 +121,7 @@ class FaultyNetwork:
             if isinstance(arrival, DatagramArrived):
                 self.has_lost |= not self._commands.put(arrival.datagram, now)
                 continue
-            if isinstance(arrival, ClientJoined | ClientLeft):
+            if isinstance(arrival, ClientConnected | ClientDisconnected):
                 self._answers.begin()
                 self._drop_reason = None
             passed.append(arrival)

@@ -55,7 +55,7 @@ _WAITING = Playback(None, 1, False)
 _EMPTY = Playback(None, 1, True)
 
 
-class Playout:
+class JitterBuffer:
     """The queue between network and cycle. Owned by the controller's loop.
 
     Attributes:

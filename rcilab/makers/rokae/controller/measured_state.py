@@ -13,16 +13,16 @@ from rcilab.core.limits import Limits
 from rcilab.core.safety_box import EntryBox, SafetyBox
 from rcilab.i18n.translator import Remark
 from rcilab.model.robot_model import RobotModel
-from rcilab.sim.momentum_observer import Observer
+from rcilab.sim.momentum_observer import MomentumObserver
 from rcilab.sim.plant import Measurement
-from rcilab.sim.reference_trajectory import CommandedMotion
-from rcilab.sim.tool_kinematics import ToolMotion
+from rcilab.sim.reference_trajectory import ReferenceTrajectory
+from rcilab.sim.tool_kinematics import ToolKinematics
 
 _ANYWHERE = (0.0, 0.0, 0.0)
 _NO_REASON = Remark("")
 
 
-class Watch:
+class MeasuredStateMonitor:
     """Follows the measured arm. Owned by the controller's cycle.
 
     Attributes:
@@ -42,8 +42,8 @@ class Watch:
     def configure(self, model: RobotModel, measured: Measurement) -> None:
         """Takes another tool or load, or an arm that was put elsewhere; only at rest."""
         self._model = model
-        self.tool = ToolMotion(model, measured.q.tolist())
-        self._observer = Observer(model)
+        self.tool = ToolKinematics(model, measured.q.tolist())
+        self._observer = MomentumObserver(model)
         self._observer.reset(measured)
         self.measured = measured
         self.tau_ext, self.wrench = self._observer.step(measured)
@@ -77,7 +77,7 @@ class Watch:
         self._thresholds = thresholds
         self._judges_tool = judges_tool
 
-    def observe(self, measured: Measurement, commanded: CommandedMotion, tool_c: ToolMotion) -> None:
+    def observe(self, measured: Measurement, commanded: ReferenceTrajectory, tool_c: ToolKinematics) -> None:
         """Takes the measurement of this cycle; where the arm is exactly where it was told, so is the tool."""
         if measured is not self.measured or commanded.version != self._tool_version:
             self.measured, self._tool_version = measured, commanded.version

@@ -26,7 +26,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rcilab.core.arrays import Array, JointVector, frozen, scalar, sealed
+from rcilab.core.arrays import Array, JointVector, make_readonly, readonly_copy, scalar
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.faults import Fault
 from rcilab.core.reported_pose import ReportedPose
@@ -37,20 +37,20 @@ from rcilab.makers.rokae.controller.settings import Settings
 from rcilab.model.robot_model import RobotModel
 from rcilab.sim.drive_report import DriveReport
 from rcilab.sim.plant import Measurement
-from rcilab.sim.reference_trajectory import CommandedMotion
-from rcilab.sim.tool_kinematics import ToolMotion
+from rcilab.sim.reference_trajectory import ReferenceTrajectory
+from rcilab.sim.tool_kinematics import ToolKinematics
 
 _CYCLE = scalar(CYCLE_TIME)  # [s]
 
 
-class Readings(NamedTuple):
+class CycleSignals(NamedTuple):
     """What one cycle came to, inside the controller."""
 
-    commanded: CommandedMotion
-    tool_c: ToolMotion
+    commanded: ReferenceTrajectory
+    tool_c: ToolKinematics
     """The tool of the commanded motion."""
     measured: Measurement
-    tool: ToolMotion
+    tool: ToolKinematics
     """The tool as measured."""
     tau_c: list[float] | None
     """Commanded torques, [N m]; None while none are commanded."""
@@ -72,7 +72,7 @@ class StateReporter:
     """
 
     def __init__(self, model: RobotModel, settings: Settings) -> None:
-        self._zeros = frozen(np.zeros(model.n))
+        self._zeros = readonly_copy(np.zeros(model.n))
         self._axes = ForceAxes(model, settings)
         self.configure(model, settings)
 
@@ -84,7 +84,7 @@ class StateReporter:
         self._drives = DriveReport(model, settings.torque_report_filter)
         self._body: tuple[Any, ...] | None = None
         self._tau_c = self._zeros
-        self._readings: Readings | None = None
+        self._readings: CycleSignals | None = None
         self._version = -1
         self._is_settled = False
         self.has_repeated = False
@@ -93,7 +93,7 @@ class StateReporter:
     def report(
         self,
         message_id: int,
-        readings: Readings,
+        readings: CycleSignals,
         *,
         faults: tuple[Fault, ...],
         success_rate: float,
@@ -115,7 +115,7 @@ class StateReporter:
         """Returns the state of a cycle that differs from the last one in its number only."""
         return build_state((message_id, *self._rest))
 
-    def _is_same(self, readings: Readings) -> bool:
+    def _is_same(self, readings: CycleSignals) -> bool:
         last = self._readings
         return (
             last is not None
@@ -125,13 +125,13 @@ class StateReporter:
             and readings.commanded.version == self._version
         )
 
-    def _compute(self, readings: Readings) -> tuple[Any, ...]:
+    def _compute(self, readings: CycleSignals) -> tuple[Any, ...]:
         """Returns the fields of a state between its number and its faults, in their order."""
         commanded, tool_c, measured, tool, tau_commanded, _, wrench = readings
         before = self._readings
         q_c, dq_c, ddq_c = commanded.arrays
         if tau_commanded is not None:
-            tau_c = frozen(tau_commanded)
+            tau_c = readonly_copy(tau_commanded)
         else:
             tau_c = self._model.rigid_body.shared_torque(q_c, dq_c, ddq_c)
         dtau_c = self._zeros
@@ -144,7 +144,7 @@ class StateReporter:
         self._is_settled = (
             commanded.is_at_rest and tool_c.is_at_rest and drives.is_settled and not is_new and not dtau_c.any()
         )
-        tool_rates_c = sealed(np.array([*tool_c.twist, *tool_c.acceleration]))
+        tool_rates_c = make_readonly(np.array([*tool_c.twist, *tool_c.acceleration]))
         return (
             measured.q,
             q_c,
@@ -171,7 +171,7 @@ class StateReporter:
             motor_tau_filtered,
         )
 
-    def _in_force_frame(self, wrench: Array, tool: ToolMotion, velocity: Sequence[float]) -> Array:
+    def _in_force_frame(self, wrench: Array, tool: ToolKinematics, velocity: Sequence[float]) -> Array:
         """Returns a wrench on the tool (base axes, tool's origin) at the force frame's origin, in its type's axes."""
         self._axes.follow(velocity, tool.pose)
         fx, fy, fz, mx, my, mz = wrench.tolist()
@@ -183,9 +183,9 @@ class StateReporter:
         ax, ay, az = tx - x, ty - y, tz - z
         mx, my, mz = mx + ay * fz - az * fy, my + az * fx - ax * fz, mz + ax * fy - ay * fx
         if self._axes.is_world:
-            return frozen((fx, fy, fz, mx, my, mz))
+            return readonly_copy((fx, fy, fz, mx, my, mz))
         r = self._axes.rotation(T_base_tool)
-        return frozen((*_inwards(r, fx, fy, fz), *_inwards(r, mx, my, mz)))
+        return readonly_copy((*_inwards(r, fx, fy, fz), *_inwards(r, mx, my, mz)))
 
 
 def _inwards(r: Rotation9, x: float, y: float, z: float) -> tuple[float, float, float]:

@@ -11,7 +11,7 @@ from rcilab.core.state import ControllerMode
 from rcilab.makers.rokae import wire as rci
 from rcilab.makers.rokae.controller.actuator import guiding_box
 from rcilab.makers.rokae.controller.arm import Arm
-from rcilab.makers.rokae.controller.measured_state import Watch
+from rcilab.makers.rokae.controller.measured_state import MeasuredStateMonitor
 from rcilab.makers.rokae.controller.modes import MODES
 from rcilab.makers.rokae.controller.settings import SIGNAL_COUNT, Settings, apply_request
 from rcilab.makers.rokae.controller.state_machine import (
@@ -27,7 +27,7 @@ from rcilab.makers.rokae.wire.bounds import LOWEST_CLIENT_PORT
 from rcilab.model.kinematics.inverse import build_geometry
 from rcilab.model.kinematics.singularity import find_singularity
 from rcilab.model.robot_model import RobotModel
-from rcilab.sim.reference_trajectory import CommandedMotion
+from rcilab.sim.reference_trajectory import ReferenceTrajectory
 
 
 class Reply(NamedTuple):
@@ -90,7 +90,7 @@ def judge_request(request: rci.Request, phase: Phase, settings: Settings, arm: A
     return cell if refusal is None else refusal
 
 
-def _judge_start(request: rci.StartMove, model: RobotModel, commanded: CommandedMotion) -> rci.StartStatus | None:
+def _judge_start(request: rci.StartMove, model: RobotModel, commanded: ReferenceTrajectory) -> rci.StartStatus | None:
     controller_mode, motion_mode = request.controller_mode, request.motion_mode
     if controller_mode >= ControllerMode.OTHER or motion_mode not in tuple(rci.StartMotionMode):
         return rci.StartStatus.INVALID_ARGUMENT
@@ -102,7 +102,7 @@ def _judge_start(request: rci.StartMove, model: RobotModel, commanded: Commanded
     return None
 
 
-def judge_recovery(settings: Settings, watch: Watch) -> rci.RecoveryStatus | None:
+def judge_recovery(settings: Settings, watch: MeasuredStateMonitor) -> rci.RecoveryStatus | None:
     """Returns why a stopped arm cannot recover by itself, or None when it can.
 
     Beyond a soft limit or the safety box by more than a measurement may be, a person has to bring it back (power off

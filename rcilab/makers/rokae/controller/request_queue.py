@@ -15,7 +15,7 @@ from rcilab.makers.rokae.wire import Connect, Request, decode_request, encode_re
 from rcilab.makers.rokae.wire.bounds import LOWEST_CLIENT_PORT
 
 
-class RequestDesk:
+class RequestQueue:
     """Handles requests in order; one whose answer has to wait holds up those behind it. Owned by the server's loop.
 
     Args:

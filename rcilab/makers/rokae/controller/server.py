@@ -25,29 +25,29 @@ from rcilab.makers.rokae.controller.config import ControllerConfig
 from rcilab.makers.rokae.controller.cycle import ControlCycle
 from rcilab.makers.rokae.controller.endpoint import (
     Arrival,
-    ClientJoined,
-    ClientLeft,
+    ClientConnected,
+    ClientDisconnected,
     ClientRefused,
     DatagramArrived,
     Endpoint,
+    ExtraSocketsReady,
     FrameArrived,
-    GuestsReady,
     StrangerHeard,
 )
-from rcilab.makers.rokae.controller.environment import Mishaps, Surroundings
+from rcilab.makers.rokae.controller.environment import Environment, ServerCounters
 from rcilab.makers.rokae.controller.faulty_network import FaultyNetwork
-from rcilab.makers.rokae.controller.request_queue import RequestDesk
+from rcilab.makers.rokae.controller.request_queue import RequestQueue
 from rcilab.makers.rokae.controller.state_machine import Event, Phase
 from rcilab.makers.rokae.wire import COMMAND_SIZE, decode_command
 from rcilab.model.robot_model import load_model, require_rci
-from rcilab.realtime.cpu_latency import AwakeCores
+from rcilab.realtime.cpu_latency import CpuLatencyLock
 from rcilab.realtime.scheduling import enter_realtime, leave_realtime
-from rcilab.sim.clock_stalls import StallPlan
-from rcilab.sim.cycle_timer import Pace
+from rcilab.sim.clock_stalls import StallSchedule
+from rcilab.sim.cycle_timer import CycleTimer
 from rcilab.sim.log_lines import LineHandler, LogLines, SeldomLines
 from rcilab.sim.plant import Plant
 from rcilab.sim.plants import build_plant
-from rcilab.sim.simulation_port import WorldPort
+from rcilab.sim.simulation_port import SimulationPort
 
 PRIORITY = 80  # Under SCHED_FIFO; above the client's process, whose clock this is.
 LEAD_TIME = 0.0005  # [s] Before its state is due a cycle begins: longer than nearly all of them take; a choice.
@@ -109,24 +109,24 @@ class ControllerServer:
             log = self._lines.write
         self._log = log
         self._clock = SystemClock()
-        self._pace = Pace(self._clock.now())
+        self._pace = CycleTimer(self._clock.now())
         self._is_ending = False
         self._next_look = 0.0
-        self._cores = AwakeCores()
+        self._cores = CpuLatencyLock()
         self._missed_before = 0
         self._told: tuple[Fault, ...] = ()
         self._seldom = SeldomLines(log, self._clock.now)
         self._endpoint = Endpoint(config)
         states_network = config.network if config.states_network is None else config.states_network
         self._network = FaultyNetwork(self._endpoint, self._clock, config.network, states_network)
-        self._desk = RequestDesk(self.cycle, self._endpoint, self._network, log)
-        self._stalls = StallPlan()
-        self._surroundings = Surroundings(
+        self._desk = RequestQueue(self.cycle, self._endpoint, self._network, log)
+        self._stalls = StallSchedule()
+        self._surroundings = Environment(
             self.cycle,
             self._network,
             self._stalls,
             self._clock,
-            lambda: Mishaps(self.missed, self.misfits, self._endpoint.strangers),
+            lambda: ServerCounters(self.missed, self.misfits, self._endpoint.strangers),
         )
         self._world = self._open_world()
 
@@ -185,11 +185,11 @@ class ControllerServer:
         if self._world is not None:
             self._world.close()
 
-    def _open_world(self) -> WorldPort | None:
+    def _open_world(self) -> SimulationPort | None:
         if self.config.world_port is None:
             return None
         try:
-            return WorldPort(self._endpoint.host, self.config.world_port, self._surroundings.handle)
+            return SimulationPort(self._endpoint.host, self.config.world_port, self._surroundings.handle)
         except UsageError:
             self._endpoint.close()
             raise
@@ -373,12 +373,12 @@ class ControllerServer:
                         self.misfits += 1
                 case FrameArrived(frame):
                     self._desk.take(frame)
-                case ClientJoined(address):
+                case ClientConnected(address):
                     self._warn_of_other_target(address)
                     self._send_state()  # Before anything else: the vendor's client waits for it a few milliseconds.
-                case ClientLeft(reason):
+                case ClientDisconnected(reason):
                     self._lose_client(reason)
-                case GuestsReady(sockets):
+                case ExtraSocketsReady(sockets):
                     if self._world is not None:
                         self._world.serve(sockets)
                 case StrangerHeard(address, client):

@@ -13,7 +13,7 @@ from math import hypot
 
 import numpy as np
 
-from rcilab.core.arrays import frozen
+from rcilab.core.arrays import readonly_copy
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.limits import JointLimits
 from rcilab.core.safety_box import SafetyBox
@@ -78,7 +78,7 @@ class Settings:
 
     def soft_limits(self, joint: JointLimits) -> JointLimits:
         """Returns the limits of an arm's joints with the soft limits as position bounds."""
-        return replace(joint, lower=frozen(self.joint_lower), upper=frozen(self.joint_upper))
+        return replace(joint, lower=readonly_copy(self.joint_lower), upper=readonly_copy(self.joint_upper))
 
     def with_input(self, signal: int, level: bool) -> Settings:
         """Returns the settings with another level at a digital input.

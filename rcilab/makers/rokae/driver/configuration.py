@@ -1,7 +1,7 @@
 """What is fixed to the arm, where its tool may be, and how it follows: the settings of the RCI that stay for a while.
 
 Tool (`setCoor`), load (`setLoad`), safety box (`setCartesianLimit`), force-control frame (`setFcCoor`), soft joint
-limits (`setJointLimit`), and the parameters of the modes (`ControlSettings`).
+limits (`setJointLimit`), and the parameters of the modes (`ControllerParameters`).
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import IDENTITY, Pose
-from rcilab.makers.rokae.driver.controller_parameters import ControlSettings, give_control
+from rcilab.makers.rokae.driver.controller_parameters import ControllerParameters, give_control
 from rcilab.makers.rokae.wire import ForceFrame
 from rcilab.model.dynamics.payload import Payload
 
@@ -46,7 +46,7 @@ class SoftJointLimits:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class RobotSetup:
+class RobotConfiguration:
     """A set-up, or a part of one: what is None is left as the controller has it."""
 
     box: SafetyBox | None = None
@@ -55,7 +55,7 @@ class RobotSetup:
     load: Payload | None = None
     force: ForceControlFrame | None = None
     joints: SoftJointLimits | None = None
-    control: ControlSettings | None = None
+    control: ControllerParameters | None = None
     """Parameters of the modes."""
 
     @property
@@ -63,15 +63,15 @@ class RobotSetup:
         """Names of what is not None."""
         return tuple(part for part in _ALL_PARTS if getattr(self, part) is not None)
 
-    def only(self, parts: Iterable[str]) -> RobotSetup:
+    def only(self, parts: Iterable[str]) -> RobotConfiguration:
         """Returns a set-up of these parts alone."""
-        return RobotSetup(**{part: getattr(self, part) for part in _ALL_PARTS if part in parts})
+        return RobotConfiguration(**{part: getattr(self, part) for part in _ALL_PARTS if part in parts})
 
-    def without(self, parts: Iterable[str]) -> RobotSetup:
+    def without(self, parts: Iterable[str]) -> RobotConfiguration:
         """Returns a set-up that leaves these parts alone."""
         return self.only(set(_ALL_PARTS) - set(parts))
 
-    def updated(self, newer: RobotSetup) -> RobotSetup:
+    def updated(self, newer: RobotConfiguration) -> RobotConfiguration:
         """Returns this set-up with the parts of a newer one in it."""
         return replace(self, **{part: getattr(newer, part) for part in newer.parts})
 
@@ -86,18 +86,18 @@ class RobotSetup:
         return changed if self.joints is None else changed.with_joint_limits(self.joints.lower, self.joints.upper)
 
 
-def require_setup(setup: object) -> RobotSetup:
+def require_setup(setup: object) -> RobotConfiguration:
     """Returns `setup` if it is one.
 
     Raises:
         InvalidValueError: It is something else.
     """
-    if isinstance(setup, RobotSetup):
+    if isinstance(setup, RobotConfiguration):
         return setup
-    raise InvalidValueError("setup", setup, "is no RobotSetup; RobotSetup(tool=..., box=...) makes one")
+    raise InvalidValueError("setup", setup, "is no RobotConfiguration; RobotConfiguration(tool=..., box=...) makes one")
 
 
-def give_setup(settings: RciSettings, setup: RobotSetup) -> None:
+def give_setup(settings: RciSettings, setup: RobotConfiguration) -> None:
     """Tells a controller; nothing may move meanwhile. A refusal leaves the parts before it in force.
 
     Args:

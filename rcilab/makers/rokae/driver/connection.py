@@ -24,7 +24,7 @@ from rcilab.makers.rokae.wire import (
 _LOOK = 0.05  # [s] Longest wait before the deadline of a request is looked at again.
 
 
-class Link:
+class RciConnection:
     """One connection. Owned by one thread; others may use `request_alongside`.
 
     Args:

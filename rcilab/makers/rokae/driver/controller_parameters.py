@@ -24,7 +24,7 @@ REPORT_FREQUENCY = 100.0  # [Hz] What a controller wakes up with for the torques
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ControlSettings:
+class ControllerParameters:
     """Parameters of the modes; what is None is left as the controller has it. Ranges: `control_ranges`."""
 
     joint_stiffness: tuple[float, ...] | None = None
@@ -46,7 +46,7 @@ class ControlSettings:
         return {name: list(value) for name, value in values.items() if value is not None}
 
     @classmethod
-    def from_letter(cls, letter: dict[str, Any]) -> ControlSettings:
+    def from_letter(cls, letter: dict[str, Any]) -> ControllerParameters:
         """Returns what `as_letter` wrote."""
         return cls(**{name: tuple(float(number) for number in value) for name, value in letter.items()})
 
@@ -74,24 +74,24 @@ def control_ranges(limits: Limits) -> dict[ControlPart, tuple[Range, ...]]:
     }
 
 
-def standard_control(limits: Limits) -> ControlSettings:
+def standard_control(limits: Limits) -> ControllerParameters:
     """Returns what a controller wakes up with: the stiffest springs, the highest thresholds, no filter of commands."""
     top = {name: tuple(item.high for item in ranges) for name, ranges in control_ranges(limits).items()}
-    return ControlSettings(**top | {"desired_wrench": (0.0,) * 6, "report_filter": (REPORT_FREQUENCY,)})
+    return ControllerParameters(**top | {"desired_wrench": (0.0,) * 6, "report_filter": (REPORT_FREQUENCY,)})
 
 
-def require_control(control: object) -> ControlSettings:
+def require_control(control: object) -> ControllerParameters:
     """Returns `control` if these are settings of control.
 
     Raises:
         InvalidValueError: They are not.
     """
-    if isinstance(control, ControlSettings):
+    if isinstance(control, ControllerParameters):
         return control
-    raise InvalidValueError("control", control, "are none; ControlSettings(joint_stiffness=...) makes some")
+    raise InvalidValueError("control", control, "are none; ControllerParameters(joint_stiffness=...) makes some")
 
 
-def give_control(settings: RciSettings, control: ControlSettings) -> None:
+def give_control(settings: RciSettings, control: ControllerParameters) -> None:
     """Tells a controller; nothing may move meanwhile. A refusal leaves what came before it in force.
 
     Args:

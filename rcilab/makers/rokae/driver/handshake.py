@@ -12,7 +12,7 @@ from rcilab.core.errors import CommandRejectedError, ConnectionLostError, Invali
 from rcilab.core.spatial import IDENTITY, as_pose, turn_between
 from rcilab.makers.rokae.driver.address import RobotAddress
 from rcilab.makers.rokae.driver.commands import RciCommands
-from rcilab.makers.rokae.driver.connection import Link
+from rcilab.makers.rokae.driver.connection import RciConnection
 from rcilab.makers.rokae.driver.identify import Lengths, require_same_arm
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ def require_arm_there(commands: RciCommands, name: str, lengths: Lengths, addres
     require_same_arm(dh, name, lengths, address)
 
 
-def await_first_state(link: Link, place: RobotAddress, local: tuple[str, int], timeout: float) -> None:
+def await_first_state(link: RciConnection, place: RobotAddress, local: tuple[str, int], timeout: float) -> None:
     """Returns once a state has arrived.
 
     Raises:
@@ -61,7 +61,7 @@ def await_first_state(link: Link, place: RobotAddress, local: tuple[str, int], t
         ).coded("no_state", address=str(place), seconds=f"{timeout:g}")
 
 
-def with_tool_of(link: Link, model: RobotModel) -> RobotModel:
+def with_tool_of(link: RciConnection, model: RobotModel) -> RobotModel:
     """Returns the model with the tool that the controller's state shows; warns where that is another one.
 
     Poses of a session with another tool than its controller's would be off by the difference.

@@ -7,13 +7,13 @@ import time
 from rcilab.core.errors import DeadlineError
 from rcilab.core.faults import name_faults
 from rcilab.makers.rokae.driver.commands import RciCommands
-from rcilab.makers.rokae.driver.connection import Link
+from rcilab.makers.rokae.driver.connection import RciConnection
 
 RECOVERY_TIMEOUT = 3.0  # [s] for the error bits to go after the controller has agreed to clear them; a choice.
 _FRESH = 0.1  # [s] Longest wait for one state while faults are expected to go.
 
 
-def recover(commands: RciCommands, link: Link) -> None:
+def recover(commands: RciCommands, link: RciConnection) -> None:
     """Clears the controller's faults and returns once no state shows them any more; see `RobotSession.recover`."""
     commands.automatic_error_recovery()
     deadline = time.monotonic() + RECOVERY_TIMEOUT

@@ -19,7 +19,7 @@ from rcilab.core.limits import Limits
 from rcilab.core.safety_box import SafetyBox, require_box
 from rcilab.core.spatial import Pose, as_pose
 from rcilab.makers.rokae import wire as rci
-from rcilab.makers.rokae.driver.connection import Link
+from rcilab.makers.rokae.driver.connection import RciConnection
 from rcilab.makers.rokae.driver.refusal import Refusal, find_refusal
 from rcilab.makers.rokae.wire.bounds import (
     FARTHEST_BOX,
@@ -72,7 +72,7 @@ class RciSettings:
         limits: Bounds of the arm, to check arguments with; None leaves that to the controller.
     """
 
-    def __init__(self, link: Link, limits: Limits | None = None) -> None:
+    def __init__(self, link: RciConnection, limits: Limits | None = None) -> None:
         self._link = link
         self._limits = limits
 

@@ -11,7 +11,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from rcilab.core.arrays import frozen
+from rcilab.core.arrays import readonly_copy
 from rcilab.core.limits import ArmAngleLimits, CartesianLimits, JointLimits, Limits
 from rcilab.robots.description import Link
 
@@ -58,7 +58,7 @@ _SEVEN_AXIS_NOTE = "; the manual prints the 6-axis range, this one is the vendor
 def xmate_limits(n: int) -> Limits:
     """Returns the limits of the 6-axis or the 7-axis arms."""
     axes = range(7) if n == 7 else _MANUAL_AXES_OF_SIX
-    table = {name: frozen([row[axis] for axis in axes]) for name, row in _SEVEN_AXIS.items()}
+    table = {name: readonly_copy([row[axis] for axis in axes]) for name, row in _SEVEN_AXIS.items()}
     upper = table.pop("position")
     arms = "xMatePro3, xMatePro7" if n == 7 else "xMate3, xMate7"
     note = _SEVEN_AXIS_NOTE if n == 7 else ""
@@ -72,7 +72,7 @@ def xmate_limits(n: int) -> Limits:
         for name in ("velocity", "acceleration", "jerk"):
             sources[f"arm_angle.{name}"] = f"{SDK}; the manual gives no figure"
     return Limits(
-        joint=JointLimits(lower=frozen(-upper), upper=upper, **table),
+        joint=JointLimits(lower=readonly_copy(-upper), upper=upper, **table),
         cartesian=CartesianLimits(
             translation_velocity=1.0,
             translation_acceleration=10.0,
@@ -105,8 +105,8 @@ def pro_heights(d1: float, d3: float, d5: float, d7: float) -> tuple[float, ...]
 def tabled_link(mass: float, center: Sequence[float], tensor: Sequence[float], height: float, source: str) -> Link:
     """Returns a link whose tensor is (Ixx, Iyy, Izz) or (Ixx, Iyy, Izz, Iyz), [kg m^2]."""
     ixx, iyy, izz, iyz = (*tensor, 0.0)[:4]
-    inertia = frozen([[ixx, 0.0, 0.0], [0.0, iyy, iyz], [0.0, iyz, izz]])
-    return Link(mass=mass, center_of_mass=frozen(center), inertia=inertia, origin_height=height, source=source)
+    inertia = readonly_copy([[ixx, 0.0, 0.0], [0.0, iyy, iyz], [0.0, iyz, izz]])
+    return Link(mass=mass, center_of_mass=readonly_copy(center), inertia=inertia, origin_height=height, source=source)
 
 
 def solid_link(mass: float, center: Sequence[float], radius: float, length: float, height: float) -> Link:
@@ -116,9 +116,9 @@ def solid_link(mass: float, center: Sequence[float], radius: float, length: floa
     of that radius can have. Masses and centres are real.
     """
     across = mass * (3.0 * radius**2 + length**2) / 12.0
-    inertia = frozen(np.diag([across, across, mass * radius**2 / 2.0]))
+    inertia = readonly_copy(np.diag([across, across, mass * radius**2 / 2.0]))
     source = (
         f"mass and centre: {ROS2}; tensor: computed, solid cylinder of radius {radius} m and length "
         f"{length:.3f} m, because the published one is impossible for a link of that radius"
     )
-    return Link(mass=mass, center_of_mass=frozen(center), inertia=inertia, origin_height=height, source=source)
+    return Link(mass=mass, center_of_mass=readonly_copy(center), inertia=inertia, origin_height=height, source=source)

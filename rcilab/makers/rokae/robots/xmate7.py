@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import pi, radians
 
-from rcilab.core.arrays import frozen
+from rcilab.core.arrays import readonly_copy
 from rcilab.makers.rokae.robots.xmate import MANUAL, ROS2, tabled_link, xmate_limits
 from rcilab.robots.description import DhRow, RobotDescription
 
@@ -37,7 +37,7 @@ DESCRIPTION = RobotDescription(
         tabled_link(0.961, (0.000574, 0.016762, -0.051921), (0.002276, 0.001504, 0.001555, -0.000282), _FLANGE, ROS2),
     ),
     limits=xmate_limits(6),
-    home=frozen([radians(angle) for angle in (0, 30, 60, 0, 90, 0)]),
+    home=readonly_copy([radians(angle) for angle in (0, 30, 60, 0, 90, 0)]),
     rated_payload=7.0,
     rated_payload_source="range the vendor's client accepts for setLoad",
 )

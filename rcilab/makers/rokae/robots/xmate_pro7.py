@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import pi, radians
 
-from rcilab.core.arrays import frozen
+from rcilab.core.arrays import readonly_copy
 from rcilab.makers.rokae.robots.xmate import MANUAL, ROS2, pro_heights, solid_link, tabled_link, xmate_limits
 from rcilab.robots.description import DhRow, RobotDescription
 
@@ -33,7 +33,7 @@ DESCRIPTION = RobotDescription(
         solid_link(1.26834, (0.0, 0.012, -0.052), 0.055, 0.12, _HEIGHTS[6]),
     ),
     limits=xmate_limits(7),
-    home=frozen([radians(angle) for angle in (0, 30, 0, 60, 0, 90, 0)]),
+    home=readonly_copy([radians(angle) for angle in (0, 30, 0, 60, 0, 90, 0)]),
     rated_payload=7.0,
     rated_payload_source="range the vendor's client accepts for setLoad",
 )

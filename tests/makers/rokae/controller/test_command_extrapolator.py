@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rcilab.sim.command_extrapolator import Stream
+from rcilab.sim.command_extrapolator import CommandExtrapolator
 
 
-def fed(rows: np.ndarray) -> Stream:
-    stream = Stream(rows[0].tolist())
+def fed(rows: np.ndarray) -> CommandExtrapolator:
+    stream = CommandExtrapolator(rows[0].tolist())
     for row in rows[1:]:
         stream.take(row.tolist())
     return stream
@@ -45,4 +45,4 @@ def test_a_command_tells_by_itself_how_far_ahead_it_belongs(steps: int) -> None:
 
 
 def test_at_rest_the_same_command_again_is_the_next_one() -> None:
-    assert Stream([1.0, 2.0]).is_next([1.0, 2.0], 5)
+    assert CommandExtrapolator([1.0, 2.0]).is_next([1.0, 2.0], 5)

@@ -17,7 +17,7 @@ import pytest
 
 from rcilab.cli import controller as command
 from rcilab.core.errors import InvalidValueError
-from rcilab.execution.simulation_control import World
+from rcilab.execution.simulation_control import SimulationControl
 from rcilab.sim.api import NetworkFaults, Stall, WorldStatus
 
 # Straight to the command: the command line itself is tested elsewhere.
@@ -72,7 +72,7 @@ def status_of(process: subprocess.Popen[str]) -> WorldStatus:
     first_line(process)
     assert process.stdout is not None
     host, _, port = process.stdout.readline().removeprefix("world ").strip().partition(":")
-    with World(host, int(port)) as world:
+    with SimulationControl(host, int(port)) as world:
         return world.status()
 
 

@@ -200,7 +200,7 @@ def test_a_broken_condition_is_its_bit_in_that_cycle_one_stop_and_a_recovery(mak
     assert hand.cycle.phase is (Phase.CUT_OFF if is_limit else Phase.REFLEX)
     assert hand.cycle.reason
     assert first.robot_mode is RobotMode.REFLEX
-    if fault_stop.FAULT_STOP[fault].offender is fault_stop.Offender.COMMAND and provoke not in (torque_range,):
+    if fault_stop.FAULT_STOP[fault].offender is fault_stop.FaultSource.COMMAND and provoke not in (torque_range,):
         hand.rest()
         if provoke not in (torque_rate, no_torque):
             hand.assert_smooth()

@@ -8,16 +8,16 @@ import pytest
 
 from rcilab.core.clock import CYCLE_TIME, ManualClock
 from rcilab.core.faults import Fault
-from rcilab.sim.cycle_timer import LONGEST_PATIENCE, Pace
+from rcilab.sim.cycle_timer import LONGEST_PATIENCE, CycleTimer
 from tests.makers.rokae.controller.conftest import Hand
 
 START = 0.1  # [s] into the motion, when somebody stops.
 
 
-def run_torques(hand: Hand, *, ours: float, clients: float, seconds: float = 1.0) -> Pace:
+def run_torques(hand: Hand, *, ours: float, clients: float, seconds: float = 1.0) -> CycleTimer:
     """Streams torques on a machine that takes the controller its core for a while, and the client its own."""
     clock, answered = ManualClock(), 0
-    pace, has_stopped = Pace(clock.now()), False
+    pace, has_stopped = CycleTimer(clock.now()), False
     hand.start(4, 0)
     while clock.now() < seconds and not hand.state.faults:
         if clock.now() >= START and not has_stopped:
@@ -59,7 +59,7 @@ def test_a_client_that_does_not_come_back_is_waited_for_as_long_as_we_were_away(
 
 
 def test_cycles_are_put_off_for_the_next_ones_only() -> None:
-    pace = Pace(0.0)
+    pace = CycleTimer(0.0)
     assert pace.next(0.031) == pytest.approx(0.031)
     assert pace.missed == 30
     for k in range(30):
@@ -70,7 +70,7 @@ def test_cycles_are_put_off_for_the_next_ones_only() -> None:
 
 
 def test_patience_has_an_end_and_begins_with_a_pause() -> None:
-    pace = Pace(0.0)
+    pace = CycleTimer(0.0)
     pace.next(0.0)
     assert not pace.puts_off(is_starved=True)
     pace.next(1000.0)

@@ -12,12 +12,12 @@ from rcilab.makers.rokae import wire as rci
 from rcilab.makers.rokae.controller.config import ControllerConfig
 from rcilab.makers.rokae.controller.cycle import ControlCycle
 from rcilab.makers.rokae.controller.endpoint import Endpoint
-from rcilab.makers.rokae.controller.environment import Mishaps, Surroundings
+from rcilab.makers.rokae.controller.environment import Environment, ServerCounters
 from rcilab.makers.rokae.controller.faulty_network import FaultyNetwork
 from rcilab.model.robot_model import load_model
 from rcilab.sim import api as world
 from rcilab.sim.api import NetworkFaults, WorldStatus
-from rcilab.sim.clock_stalls import StallPlan
+from rcilab.sim.clock_stalls import StallSchedule
 from rcilab.sim.plants import build_plant
 from tests.sim.api.test_world_lines import REQUESTS
 
@@ -33,8 +33,8 @@ class Place:
         self.cycle.handle(rci.SetMotorPower(1))
         self.endpoint = Endpoint(ControllerConfig(model=MODEL.name, port=0))
         network = FaultyNetwork(self.endpoint, self.clock, NetworkFaults(), NetworkFaults())
-        self.stalls = StallPlan()
-        self.surroundings = Surroundings(self.cycle, network, self.stalls, self.clock, lambda: Mishaps(3, 4, 5))
+        self.stalls = StallSchedule()
+        self.surroundings = Environment(self.cycle, network, self.stalls, self.clock, lambda: ServerCounters(3, 4, 5))
         self.handle = self.surroundings.handle
 
     def step(self, count: int = 1) -> None:

@@ -13,7 +13,7 @@ from rcilab.core.arrays import Array
 from rcilab.core.spatial import Pose
 from rcilab.model.robot_model import RobotModel, load_model
 from rcilab.motion import plan_joint
-from rcilab.sim.compliance import DESIGN_PERIOD, Damper, design_damping
+from rcilab.sim.compliance import DESIGN_PERIOD, ModalDamping, design_damping
 from rcilab.sim.ideal_plant import IdealPlant
 from rcilab.sim.impedance_control import cartesian_impedance, joint_impedance
 from rcilab.sim.mujoco_plant import MuJoCoPlant
@@ -192,7 +192,7 @@ def test_the_elbow_of_a_seven_axis_arm_is_led_softly_and_the_tool_does_not_feel_
 
 def test_a_damper_keeps_its_design_for_some_cycles_and_then_follows_the_arm() -> None:
     model, rng = load_model("xMatePro7"), np.random.default_rng(3)
-    stiffness, damper = np.diag(np.full(7, 300.0)), Damper()
+    stiffness, damper = np.diag(np.full(7, 300.0)), ModalDamping()
     poses = [model.home + 0.02 * k for k in range(2 * DESIGN_PERIOD)]
     error = rng.normal(size=7)
     design = [design_damping(model.rigid_body.mass_inverse(q), stiffness) for q in poses]

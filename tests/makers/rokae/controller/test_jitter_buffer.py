@@ -4,7 +4,7 @@ import itertools
 
 import pytest
 
-from rcilab.makers.rokae.controller.jitter_buffer import CAPACITY, SLACK, Playback, Playout
+from rcilab.makers.rokae.controller.jitter_buffer import CAPACITY, SLACK, JitterBuffer, Playback
 from rcilab.makers.rokae.wire import CommandPacket
 
 _numbers = itertools.count()
@@ -23,7 +23,7 @@ def by_one_step(packet: CommandPacket, steps: int, in_doubt: bool) -> bool:
     return True
 
 
-def take_ids(playout: Playout, cycles: int) -> list[int | str]:
+def take_ids(playout: JitterBuffer, cycles: int) -> list[int | str]:
     """The id played in each cycle, "wait" or "lost"."""
     found: list[int | str] = []
     for _ in range(cycles):
@@ -38,7 +38,7 @@ def take_ids(playout: Playout, cycles: int) -> list[int | str]:
 
 
 def test_one_command_is_played_a_cycle_in_order() -> None:
-    playout = Playout(prefill=0)
+    playout = JitterBuffer(prefill=0)
     for k in (7, 8, 9):
         playout.push(command(k))
     assert take_ids(playout, 3) == [7, 8, 9]
@@ -46,13 +46,13 @@ def test_one_command_is_played_a_cycle_in_order() -> None:
 
 
 def test_nothing_is_lost_before_the_first_command() -> None:
-    playout = Playout(prefill=0)
+    playout = JitterBuffer(prefill=0)
     assert take_ids(playout, 5) == ["wait"] * 5
     assert (playout.lost, playout.success_rate) == (0, 1.0)
 
 
 def test_the_prefill_delays_the_first_command_and_then_absorbs_a_pause() -> None:
-    playout = Playout(prefill=3)
+    playout = JitterBuffer(prefill=3)
     played = []
     for k in range(10):
         if k not in (5, 6, 7):  # The client sleeps for three cycles and then answers all it missed.
@@ -65,13 +65,13 @@ def test_the_prefill_delays_the_first_command_and_then_absorbs_a_pause() -> None
 
 
 def test_a_prefill_does_not_wait_for_commands_that_never_come() -> None:
-    playout = Playout(prefill=4)
+    playout = JitterBuffer(prefill=4)
     playout.push(command(1))
     assert take_ids(playout, 6) == ["wait"] * 4 + [1, "lost"]
 
 
 def test_a_burst_with_old_ids_is_played_one_a_cycle_and_its_jump_to_live_ids_is_no_loss() -> None:
-    playout = Playout(prefill=4)
+    playout = JitterBuffer(prefill=4)
     for k in range(100, 191):
         playout.push(command(k))
     played = []
@@ -84,7 +84,7 @@ def test_a_burst_with_old_ids_is_played_one_a_cycle_and_its_jump_to_live_ids_is_
 
 
 def test_commands_for_cycles_that_were_lost_are_dropped_when_they_come_late() -> None:
-    playout = Playout(prefill=0)
+    playout = JitterBuffer(prefill=0)
     playout.push(command(10))
     assert take_ids(playout, 4) == [10, "lost", "lost", "lost"]
     for k in range(11, 16):
@@ -95,7 +95,7 @@ def test_commands_for_cycles_that_were_lost_are_dropped_when_they_come_late() ->
 
 
 def test_a_command_that_comes_late_feeds_no_cycle() -> None:
-    playout = Playout(prefill=0)
+    playout = JitterBuffer(prefill=0)
     playout.push(command(10))
     take_ids(playout, 3)
     playout.push(command(12))
@@ -105,7 +105,7 @@ def test_a_command_that_comes_late_feeds_no_cycle() -> None:
 
 
 def test_a_repeated_id_is_the_next_command() -> None:
-    playout = Playout(prefill=0)
+    playout = JitterBuffer(prefill=0)
     for k in (5, 5, 5, 6):
         playout.push(command(k))
     assert take_ids(playout, 4) == [5, 5, 5, 6]
@@ -113,21 +113,21 @@ def test_a_repeated_id_is_the_next_command() -> None:
 
 
 def test_a_repeated_id_explains_the_gap_that_follows() -> None:
-    playout = Playout(prefill=0)
+    playout = JitterBuffer(prefill=0)
     for k in (5, 5, 7):  # The state 6 never reached the client, which answered 5 again instead.
         playout.push(command(k))
     assert take_ids(playout, 3) == [5, 5, 7]
 
 
 def test_a_repeated_id_explains_no_gap_that_comes_later() -> None:
-    playout = Playout(prefill=0)
+    playout = JitterBuffer(prefill=0)
     for k in (5, 5, 6, 7, 9):
         playout.push(command(k))
     assert take_ids(playout, 6) == [5, 5, 6, 7, "lost", 9]
 
 
 def test_a_repeated_id_explains_nothing_where_the_motion_says_otherwise() -> None:
-    playout = Playout(prefill=0)
+    playout = JitterBuffer(prefill=0)
     for k in (5, 5, 7):
         playout.push(command(k))
     played = [playout.take(lambda packet, steps, in_doubt: False) for _ in range(4)]
@@ -137,7 +137,7 @@ def test_a_repeated_id_explains_nothing_where_the_motion_says_otherwise() -> Non
 @pytest.mark.parametrize("prefill", [0, 3])
 def test_answers_with_swapped_ids_are_played_as_the_motion_goes_on(prefill: int) -> None:
     """The states overtook each other, and the client answered in the order in which they came."""
-    playout, played = Playout(prefill), []
+    playout, played = JitterBuffer(prefill), []
     for k in (5, 7, 6, 8, 11, 9, 10, 12, 13, 14, 15):
         playout.push(command(k))
         playback = playout.take(by_one_step)
@@ -149,7 +149,7 @@ def test_answers_with_swapped_ids_are_played_as_the_motion_goes_on(prefill: int)
 
 
 def test_a_lost_command_leaves_a_gap_that_can_be_bridged_to_the_next_one() -> None:
-    playout = Playout(prefill=0)
+    playout = JitterBuffer(prefill=0)
     last, later = command(5), command(8)
     playout.push(last)
     playout.push(later)
@@ -161,7 +161,7 @@ def test_a_lost_command_leaves_a_gap_that_can_be_bridged_to_the_next_one() -> No
 
 
 def test_a_gap_of_ids_without_a_gap_of_the_motion_is_no_loss() -> None:
-    playout = Playout(prefill=0)
+    playout = JitterBuffer(prefill=0)
     for k in (5, 8, 9):
         playout.push(command(k))
     ids = [packet.message_id for _ in range(3) if (packet := playout.take(by_one_step).packet) is not None]
@@ -170,7 +170,7 @@ def test_a_gap_of_ids_without_a_gap_of_the_motion_is_no_loss() -> None:
 
 
 def test_a_command_that_was_overtaken_is_put_back_in_its_place() -> None:
-    playout = Playout(prefill=0)
+    playout = JitterBuffer(prefill=0)
     for k in (5, 6, 9, 8, 7, 10):
         playout.push(command(k))
     assert take_ids(playout, 6) == [5, 6, 7, 8, 9, 10]
@@ -178,7 +178,7 @@ def test_a_command_that_was_overtaken_is_put_back_in_its_place() -> None:
 
 
 def test_an_overtaken_command_whose_cycle_has_passed_is_dropped() -> None:
-    playout = Playout(prefill=0)
+    playout = JitterBuffer(prefill=0)
     for k in (5, 7, 8):
         playout.push(command(k))
     assert take_ids(playout, 2) == [5, "lost"]
@@ -189,7 +189,7 @@ def test_an_overtaken_command_whose_cycle_has_passed_is_dropped() -> None:
 
 @pytest.mark.parametrize("order", [(0, 0, 1, 1, 2, 2), (0, 1, 0, 2, 1, 2), (0, 1, 2, 0, 1, 2)])
 def test_a_copy_made_by_the_network_is_dropped(order: tuple[int, ...]) -> None:
-    playout = Playout(prefill=0)
+    playout = JitterBuffer(prefill=0)
     commands = [command(k) for k in (5, 6, 7)]
     for k in order:
         playout.push(commands[k])
@@ -198,7 +198,7 @@ def test_a_copy_made_by_the_network_is_dropped(order: tuple[int, ...]) -> None:
 
 
 def test_who_says_the_same_again_has_nothing_new_but_is_not_lost() -> None:
-    playout = Playout(prefill=0)
+    playout = JitterBuffer(prefill=0)
     first = command(5)
     playout.push(first)
     playout.take(by_whole_gap)
@@ -211,7 +211,7 @@ def test_who_says_the_same_again_has_nothing_new_but_is_not_lost() -> None:
 
 
 def test_more_commands_than_cycles_are_worked_off_but_jitter_is_not() -> None:
-    playout = Playout(prefill=3)
+    playout = JitterBuffer(prefill=3)
     ids = itertools.count()
 
     def live(commands: list[int]) -> int:
@@ -234,7 +234,7 @@ def test_more_commands_than_cycles_are_worked_off_but_jitter_is_not() -> None:
 
 
 def test_commands_that_close_a_loop_are_fresh() -> None:
-    playout = Playout(prefill=10)
+    playout = JitterBuffer(prefill=10)
     playout.begin(most=2)
     ids, played = itertools.count(), []
     for k in range(20):
@@ -249,14 +249,14 @@ def test_commands_that_close_a_loop_are_fresh() -> None:
 
 
 def test_ids_that_begin_again_are_another_numbering() -> None:
-    playout = Playout(prefill=0)
+    playout = JitterBuffer(prefill=0)
     for k in (5000, 5001, 3, 4):
         playout.push(command(k))
     assert take_ids(playout, 4) == [5000, 5001, 3, 4]
 
 
 def test_the_newest_commands_win_when_the_queue_is_full() -> None:
-    playout = Playout(prefill=0)
+    playout = JitterBuffer(prefill=0)
     for k in range(CAPACITY + 10):
         playout.push(command(k))
     assert (len(playout), playout.dropped) == (CAPACITY, 10)
@@ -264,14 +264,14 @@ def test_the_newest_commands_win_when_the_queue_is_full() -> None:
 
 
 def test_nothing_is_lost_after_the_last_command() -> None:
-    playout = Playout(prefill=0)
+    playout = JitterBuffer(prefill=0)
     playout.push(command(1, finished=True))
     assert take_ids(playout, 4) == [1, "wait", "wait", "wait"]
 
 
 @pytest.mark.parametrize("lost", [1, 100, 400])
 def test_the_success_rate_forgets_what_is_older_than_its_window(lost: int) -> None:
-    playout = Playout(prefill=0)
+    playout = JitterBuffer(prefill=0)
     playout.push(command(0))
     take_ids(playout, 1 + lost)
     assert playout.success_rate == 1 / (1 + lost)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from rcilab.core.arrays import frozen
+from rcilab.core.arrays import readonly_copy
 from rcilab.core.faults import Fault
 from rcilab.makers.rokae import wire as rci
 from rcilab.makers.rokae.controller.cycle import ControlCycle
@@ -29,7 +29,9 @@ class SlippingPlant(IdealPlant):
         measured = super().step(setpoint)
         if not self.q_off.any() and not self.dq_off.any():
             return measured
-        return Measurement(frozen(measured.q + self.q_off), frozen(measured.dq + self.dq_off), measured.tau)
+        return Measurement(
+            readonly_copy(measured.q + self.q_off), readonly_copy(measured.dq + self.dq_off), measured.tau
+        )
 
 
 def slip(joint: int, speed: float) -> Callable[[Hand, SlippingPlant], None]:

@@ -14,7 +14,7 @@ from rcilab.model.robot_model import RobotModel, load_model
 from rcilab.motion import plan_joint
 from rcilab.robots import RCI_ROBOT_NAMES
 from rcilab.sim.ideal_plant import IdealPlant
-from rcilab.sim.momentum_observer import Observer
+from rcilab.sim.momentum_observer import MomentumObserver
 from rcilab.sim.mujoco_plant import MuJoCoPlant
 from rcilab.sim.plant import Drive, Measurement, Plant, Setpoint
 
@@ -30,7 +30,7 @@ def hold(measured: Measurement, drive: Drive = Drive.POSITION) -> Setpoint:
     return Setpoint(drive, measured.q.tolist(), zeros, zeros)
 
 
-def watched(plant: Plant, observer: Observer, setpoint: Setpoint, cycles: int):
+def watched(plant: Plant, observer: MomentumObserver, setpoint: Setpoint, cycles: int):
     for _ in range(cycles):
         answer = observer.step(plant.step(setpoint))
     return answer
@@ -40,7 +40,7 @@ def watched(plant: Plant, observer: Observer, setpoint: Setpoint, cycles: int):
 @arms
 def test_at_rest_nothing_presses_exactly(make: Maker, name: str) -> None:
     model = load_model(name, load=LOAD)
-    plant, observer = make(model), Observer(model)
+    plant, observer = make(model), MomentumObserver(model)
     rest = plant.reset(model.home + 0.2)
     observer.reset(rest)
     for drive in (Drive.POSITION, Drive.BRAKED):
@@ -60,7 +60,7 @@ def test_no_legal_motion_looks_like_a_collision(make: Maker, name: str) -> None:
     motion = plan_joint(model, model.home, goal, speed=1.0)
     dq = np.diff(motion.q, axis=0, prepend=motion.q[:1]) / CYCLE
     ddq = np.diff(dq, axis=0, prepend=dq[:1]) / CYCLE
-    plant, observer = make(model), Observer(model)
+    plant, observer = make(model), MomentumObserver(model)
     observer.reset(plant.reset(model.home))
     largest = np.zeros(model.n)
     for q, v, a in zip(motion.q, dq, ddq, strict=True):
@@ -76,7 +76,7 @@ def test_no_legal_motion_looks_like_a_collision(make: Maker, name: str) -> None:
 @arms
 def test_a_push_on_the_held_tool_is_found_with_its_sign(make: Maker, name: str) -> None:
     model = load_model(name, tool=Pose([0.02, 0.0, 0.1]), load=LOAD)
-    plant, observer = make(model), Observer(model)
+    plant, observer = make(model), MomentumObserver(model)
     rest, wrench = plant.reset(model.home), np.array([5.0, 8.0, -20.0, 0.5, -0.4, 0.3])
     observer.reset(rest)
     plant.push(wrench)
@@ -92,7 +92,7 @@ def test_a_push_on_the_held_tool_is_found_with_its_sign(make: Maker, name: str) 
 @both
 def test_a_push_shows_with_a_time_constant_of_five_milliseconds(make: Maker) -> None:
     model = load_model("xMatePro7")
-    plant, observer = make(model), Observer(model)
+    plant, observer = make(model), MomentumObserver(model)
     rest = plant.reset(model.home)
     observer.reset(rest)
     wrench = np.array([0.0, 0.0, -30.0, 0.0, 0.0, 0.0])
@@ -107,7 +107,7 @@ def test_a_push_shows_with_a_time_constant_of_five_milliseconds(make: Maker) -> 
 @both
 def test_a_push_on_a_link_shows_at_the_joints_before_it_and_at_no_other(make: Maker) -> None:
     model = load_model("xMatePro7")
-    plant, observer = make(model), Observer(model)
+    plant, observer = make(model), MomentumObserver(model)
     rest = plant.reset(model.home)
     observer.reset(rest)
     plant.push([0.0, 25.0, 0.0, 0.0, 0.0, 0.0], link=4)
@@ -119,7 +119,7 @@ def test_a_push_on_a_link_shows_at_the_joints_before_it_and_at_no_other(make: Ma
 @both
 def test_a_load_that_was_not_set_looks_like_a_pull_downwards(make: Maker) -> None:
     model = load_model("xMatePro3")
-    plant, observer = make(model), Observer(model)
+    plant, observer = make(model), MomentumObserver(model)
     rest = plant.reset(model.home)
     observer.reset(rest)
     plant.mount(LOAD)
@@ -132,7 +132,7 @@ def test_a_load_that_was_not_set_looks_like_a_pull_downwards(make: Maker) -> Non
 @both
 def test_a_yielding_arm_feels_what_accelerates_it(make: Maker) -> None:
     model = load_model("xMate3")
-    plant, observer = make(model), Observer(model)
+    plant, observer = make(model), MomentumObserver(model)
     rest = plant.reset(model.home)
     observer.reset(rest)
     wrench = np.array([0.0, 6.0, 0.0, 0.0, 0.0, 0.0])

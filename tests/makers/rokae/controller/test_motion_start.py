@@ -7,7 +7,7 @@ import pytest
 
 from rcilab.core.faults import Fault
 from rcilab.makers.rokae import wire as rci
-from rcilab.makers.rokae.controller.actuator import Law
+from rcilab.makers.rokae.controller.actuator import ControlLaw
 from rcilab.makers.rokae.controller.modes.start import StartOffset, start_tolerance
 from rcilab.makers.rokae.controller.settings import default_settings
 from rcilab.model.robot_model import load_model
@@ -92,16 +92,16 @@ def test_a_motion_that_begins_at_full_jerk_is_no_new_start(make_hand, mode) -> N
 
 def test_a_softer_spring_gives_more_tolerance_up_to_a_bound() -> None:
     settings = default_settings(MODEL.description)
-    stiff = start_tolerance(Law.POSITION, settings)
+    stiff = start_tolerance(ControlLaw.POSITION, settings)
     assert stiff.joint == (1e-3,) * 7
     soft = start_tolerance(
-        Law.CARTESIAN_IMPEDANCE, settings_with(settings, cartesian_stiffness=(1000.0,) * 3 + (100.0,) * 3)
+        ControlLaw.CARTESIAN_IMPEDANCE, settings_with(settings, cartesian_stiffness=(1000.0,) * 3 + (100.0,) * 3)
     )
     assert soft.translation == pytest.approx(5e-3)
     assert soft.rotation == pytest.approx(5e-3)
-    slack = start_tolerance(Law.CARTESIAN_IMPEDANCE, settings_with(settings, cartesian_stiffness=(0.0,) * 6))
+    slack = start_tolerance(ControlLaw.CARTESIAN_IMPEDANCE, settings_with(settings, cartesian_stiffness=(0.0,) * 6))
     assert slack.translation == 0.02
-    joint = start_tolerance(Law.JOINT_IMPEDANCE, settings_with(settings, joint_stiffness=(500.0,) * 7))
+    joint = start_tolerance(ControlLaw.JOINT_IMPEDANCE, settings_with(settings, joint_stiffness=(500.0,) * 7))
     assert joint.joint == pytest.approx((5e-3,) * 7)
 
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from rcilab.core.errors import InvalidValueError
 from rcilab.sim.api import Stall
-from rcilab.sim.clock_stalls import StallPlan
+from rcilab.sim.clock_stalls import StallSchedule
 from rcilab.sim.network_impairment import HOLD_TIME, DelayedDatagrams, Impairment, NetworkFaults, SlowStream
 
 N = 20_000
@@ -164,13 +164,13 @@ def test_a_value_out_of_range_is_refused_by_name(name: str, value: object) -> No
 
 
 def test_a_clock_stalls_once_at_its_time() -> None:
-    plan = StallPlan([Stall(duration=0.05, after=2.0)], now=10.0)
+    plan = StallSchedule([Stall(duration=0.05, after=2.0)], now=10.0)
     assert [plan.take(now) for now in (10.0, 11.999, 12.0, 12.1, 99.0)] == [0.0, 0.0, 0.05, 0.0, 0.0]
     assert plan.count == 1
 
 
 def test_a_periodic_stall_comes_again_and_is_not_made_up_for() -> None:
-    plan = StallPlan([Stall(duration=0.5, period=1.0), Stall(duration=0.1, after=0.7)])
+    plan = StallSchedule([Stall(duration=0.5, period=1.0), Stall(duration=0.1, after=0.7)])
     found = [(now / 10, plan.take(now / 10)) for now in range(40)]
     assert [entry for entry in found if entry[1]] == [(0.0, 0.5), (0.7, 0.1), (1.0, 0.5), (2.0, 0.5), (3.0, 0.5)]
     plan.replace([], 4.0)

@@ -5,15 +5,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rcilab.model.robot_model import load_model
-from rcilab.sim.reference_trajectory import CommandedMotion
+from rcilab.sim.reference_trajectory import ReferenceTrajectory
 
 LIMITS = load_model("xMatePro7").limits.joint
 UNIT = st.lists(st.floats(-1.0, 1.0), min_size=7, max_size=7).map(np.array)
 
 
-def moving(velocity: np.ndarray, acceleration: np.ndarray) -> tuple[CommandedMotion, list[np.ndarray]]:
+def moving(velocity: np.ndarray, acceleration: np.ndarray) -> tuple[ReferenceTrajectory, list[np.ndarray]]:
     """A commanded motion that has had constant acceleration long enough for its differences to be true."""
-    commanded = CommandedMotion(LIMITS, [0.0] * 7)
+    commanded = ReferenceTrajectory(LIMITS, [0.0] * 7)
     t = np.arange(-5, 1)[:, None] * 1e-3
     rows = velocity * t + acceleration * t * t / 2.0
     commanded.place(rows[0].tolist())
@@ -39,7 +39,7 @@ def test_from_any_state_inside_the_limits_it_comes_to_rest_inside_acceleration_a
 
 
 def test_the_end_of_a_decent_motion_is_rest_on_the_spot() -> None:
-    commanded = CommandedMotion(LIMITS, [0.0] * 7)
+    commanded = ReferenceTrajectory(LIMITS, [0.0] * 7)
     commanded.move([1e-6] * 7)
     goal = commanded.q
     for _ in range(3):
@@ -49,7 +49,7 @@ def test_the_end_of_a_decent_motion_is_rest_on_the_spot() -> None:
 
 
 def test_resting_it_stays_at_rest() -> None:
-    commanded = CommandedMotion(LIMITS, [0.5] * 7)
+    commanded = ReferenceTrajectory(LIMITS, [0.5] * 7)
     for _ in range(3):
         commanded.come_to_rest()
     assert commanded.is_at_rest
@@ -59,7 +59,7 @@ def test_resting_it_stays_at_rest() -> None:
 @given(UNIT, UNIT)
 def test_joined_to_a_moving_arm_it_comes_to_rest_inside_acceleration_and_jerk(velocity, acceleration) -> None:
     q, dq, ddq = np.zeros(7), velocity * LIMITS.velocity, 0.95 * acceleration * LIMITS.acceleration
-    commanded = CommandedMotion(LIMITS, [1.0] * 7)
+    commanded = ReferenceTrajectory(LIMITS, [1.0] * 7)
     commanded.join(q.tolist(), dq.tolist(), ddq.tolist())
     rows = [q - 1e-3 * dq + 0.5e-6 * ddq, q]
     while not commanded.is_at_rest:
@@ -71,7 +71,7 @@ def test_joined_to_a_moving_arm_it_comes_to_rest_inside_acceleration_and_jerk(ve
 
 
 def test_an_arm_that_was_thrown_beyond_reason_still_gets_a_stop() -> None:
-    commanded = CommandedMotion(LIMITS, [0.0] * 7)
+    commanded = ReferenceTrajectory(LIMITS, [0.0] * 7)
     commanded.join([0.0] * 7, [500.0] * 7, [1e5] * 7)
     for _ in range(3000):
         commanded.come_to_rest()

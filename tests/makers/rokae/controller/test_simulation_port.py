@@ -15,7 +15,7 @@ import pytest
 
 from rcilab.core.errors import InvalidValueError, UsageError
 from rcilab.core.state import RobotMode
-from rcilab.execution.simulation_control import World
+from rcilab.execution.simulation_control import SimulationControl
 from rcilab.makers.rokae import wire as rci
 from rcilab.sim.api import LONGEST_LINE, NetworkFaults, Stall
 from rcilab.sim.peer_user import is_ours
@@ -135,7 +135,7 @@ def test_who_holds_a_place_and_says_nothing_gives_it_to_the_next_and_comes_back(
     monkeypatch.setattr("rcilab.sim.simulation_port.IDLE", 0.05)
     assert lockstep.server.world_address is not None
     host, _, port = lockstep.server.world_address.partition(":")
-    with World(host, int(port)) as world, ExitStack() as stack:
+    with SimulationControl(host, int(port)) as world, ExitStack() as stack:
         assert world.status().phase == "off"
         idle = [stack.enter_context(Guest(lockstep)) for _ in range(MOST_GUESTS - 1)]
         assert all(guest.ask(request="status")["ok"] for guest in idle)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from rcilab.makers.rokae import wire as rci
 from rcilab.model.robot_model import load_model
 from rcilab.motion.joint import plan_joint
-from rcilab.sim.soft_limit_governor import Fence, plan_fastest_stop
+from rcilab.sim.soft_limit_governor import SoftLimitGovernor, plan_fastest_stop
 
 LIMITS = load_model("xMatePro7").limits.joint
 
@@ -33,7 +33,7 @@ def test_no_command_leads_out_and_every_step_keeps_the_limits(seed: int) -> None
     largest = LIMITS.velocity / (frequency + 1.5), LIMITS.acceleration / (frequency**2 + 3.0 * frequency + 3.5)
     amplitude = np.minimum(*largest) * rng.uniform(0.1, 0.9, 7)
     centre = rng.choice((-1.0, 1.0), 7) * (LIMITS.upper - amplitude * rng.uniform(0.2, 1.2, 7))
-    fence = Fence(LIMITS, centre.tolist())
+    fence = SoftLimitGovernor(LIMITS, centre.tolist())
     rows = [centre] * 3 + [np.array(fence.step(row.tolist())) for row in waves(centre, amplitude, frequency, 3000)]
     rows = np.array(rows)
     assert (rows < LIMITS.upper).all()
@@ -44,7 +44,7 @@ def test_no_command_leads_out_and_every_step_keeps_the_limits(seed: int) -> None
 
 
 def test_what_stays_inside_is_followed_to_the_last_bit() -> None:
-    fence = Fence(LIMITS, [0.0] * 7)
+    fence = SoftLimitGovernor(LIMITS, [0.0] * 7)
     for row in waves(np.zeros(7), np.full(7, 0.3), np.full(7, 2.0), 2000).tolist():
         assert fence.step(row) == row
     assert fence.holds == ()
@@ -52,7 +52,7 @@ def test_what_stays_inside_is_followed_to_the_last_bit() -> None:
 
 def test_a_joint_that_was_held_follows_again_when_its_command_is_back() -> None:
     start = LIMITS.upper - 0.3
-    fence = Fence(LIMITS, start.tolist())
+    fence = SoftLimitGovernor(LIMITS, start.tolist())
     rows = waves(start, np.full(7, 0.5), np.full(7, 1.0), 2800)
     held = [fence.holds for row in rows.tolist() if fence.step(row) is not None]
     assert (1, 2, 3, 4, 5, 6, 7) in held
@@ -97,7 +97,7 @@ def test_with_auto_limit_a_motion_beyond_the_soft_limit_ends_inside_it_without_a
 
 @pytest.mark.parametrize("absurd", [1e3, 1e300, -1e300])
 def test_absurd_commands_are_held_like_any_others(absurd: float) -> None:
-    fence = Fence(LIMITS, [0.0] * 7)
+    fence = SoftLimitGovernor(LIMITS, [0.0] * 7)
     rows = [np.zeros(7)] * 3 + [np.array(fence.step([absurd] * 7)) for _ in range(200)]
     rows += [np.array(fence.step([0.1] * 7)) for _ in range(4000)]
     assert (np.abs(np.diff(rows, 3, axis=0)) * 1e9 < LIMITS.jerk).all()

@@ -22,11 +22,17 @@ from rcilab.core.faults import Fault
 from rcilab.core.spatial import Pose, rotation_from_wxyz, turn_between, wxyz_from_rotation
 from rcilab.i18n.translator import Remark
 from rcilab.makers.rokae.controller.jitter_buffer import Playback
-from rcilab.makers.rokae.controller.modes.generator import Gap, JointReference, Step, Terms, lost_motion
-from rcilab.makers.rokae.controller.modes.ik_tracker import Follower
+from rcilab.makers.rokae.controller.modes.generator import (
+    GeneratorOutput,
+    JointReference,
+    MissedCycles,
+    MotionLimits,
+    lost_motion,
+)
+from rcilab.makers.rokae.controller.modes.ik_tracker import IkTracker
 from rcilab.makers.rokae.controller.modes.start import StartMonitor, find_tool_jump
 from rcilab.makers.rokae.wire import CommandPacket
-from rcilab.sim.command_extrapolator import Stream
+from rcilab.sim.command_extrapolator import CommandExtrapolator
 from rcilab.sim.filters import PoseLowPass
 
 _INVALID = (Fault.CARTESIAN_POSITION_MOTION_GENERATOR_INVALID_FRAME,)
@@ -41,7 +47,7 @@ class CartesianGenerator:
         q: Where the arm stands, n plain floats, [rad]; not at a singularity.
     """
 
-    def __init__(self, terms: Terms, q: list[float]) -> None:
+    def __init__(self, terms: MotionLimits, q: list[float]) -> None:
         model = terms.model
         self._terms = terms
         self._has_begun = False
@@ -53,23 +59,23 @@ class CartesianGenerator:
         self._is_told = False  # Whether this motion's commands have had an arm angle.
         self._smallest_psi = 2.0 * CYCLE_TIME * limits.velocity if limits is not None else 0.0
         pose = model.forward(q)
-        self._follower = Follower(model)
-        self._stream = Stream([*pose.parts[1], *wxyz_from_rotation(pose.parts[0]), self._psi])
+        self._follower = IkTracker(model)
+        self._stream = CommandExtrapolator([*pose.parts[1], *wxyz_from_rotation(pose.parts[0]), self._psi])
         self._filter = PoseLowPass(terms.settings.cartesian_filter, pose, self._psi)
         self._pose = pose
         self._monitor = self._monitor_from(pose, self._psi)
         self._start: StartMonitor[CartesianMonitor] | None = None
-        self._gap = Gap()
+        self._gap = MissedCycles()
         self._reference = JointReference(terms, q, judges_box=False)
         self._reference_has_begun = False
 
     def is_next(self, packet: CommandPacket, steps: int, in_doubt: bool) -> bool:
-        """Returns whether a command continues the motion by one cycle rather than by `steps`; see `Stream.is_next`."""
+        """Returns whether a command continues the motion by one cycle rather than by `steps`; see `CommandExtrapolator.is_next`."""
         if find_frame_error(packet.T_base_tool_c) is not None:
             return True  # It is refused when it is played.
         return self._stream.is_next(self._read(packet), steps, in_doubt)
 
-    def step(self, playback: Playback) -> Step:
+    def step(self, playback: Playback) -> GeneratorOutput:
         """Takes this cycle's pose, or bridges a cycle that has none."""
         packet, is_lost = playback.packet, playback.is_lost
         cycles = self._gap.step(playback)
@@ -78,10 +84,10 @@ class CartesianGenerator:
         else:
             error = find_frame_error(packet.T_base_tool_c)
             if error is not None:
-                return Step(faults=_INVALID, reason=Remark(error, "no_pose"))
+                return GeneratorOutput(faults=_INVALID, reason=Remark(error, "no_pose"))
             if self._has_psi and packet.psi_valid and not abs(packet.psi_c) <= pi + ARM_ANGLE_TOLERANCE:
                 said = f"arm angle: commanded position {packet.psi_c} rad passes +-pi rad"
-                return Step(faults=_ELBOW, reason=Remark(said, "arm_angle", value=f"{packet.psi_c} rad"))
+                return GeneratorOutput(faults=_ELBOW, reason=Remark(said, "arm_angle", value=f"{packet.psi_c} rad"))
             values = self._read(packet)
             if is_lost:
                 values = self._stream.predict(1, values, playback.steps)
@@ -94,22 +100,22 @@ class CartesianGenerator:
             pose = Pose.from_parts(rotation_from_wxyz(values[3:7]), (values[0], values[1], values[2]))
             pose, psi = self._filter.step(pose, self._psi)
         except InvalidValueError as error:  # Numbers so absurd that bridge or filter made no pose of them.
-            return Step(faults=_INVALID, reason=Remark(f"commanded pose: {error}", "no_pose"))
+            return GeneratorOutput(faults=_INVALID, reason=Remark(f"commanded pose: {error}", "no_pose"))
         return self._judge(pose, psi, cycles)
 
-    def _judge(self, pose: Pose, psi: float, cycles: int) -> Step:
+    def _judge(self, pose: Pose, psi: float, cycles: int) -> GeneratorOutput:
         if cycles > 0:
             faults = self._step_monitor(pose, psi if self._has_psi else None, cycles)
             if faults:
                 reason = describe_breaches(self._monitor.broken())
-                return Step(faults=faults, reason=Remark.all((self._jump, reason)) if self._jump else reason)
+                return GeneratorOutput(faults=faults, reason=Remark.all((self._jump, reason)) if self._jump else reason)
             self._jump = None
         try:
             q = self._follower.solve(pose, psi, self._q)
         except KinematicsError as error:
             if cycles == 0:
                 return lost_motion(Remark(f"no joint angles for a pose on its way: {error}", "no_angles"))
-            return Step(faults=_INVALID, reason=Remark(f"commanded pose: {error}", "no_angles"))
+            return GeneratorOutput(faults=_INVALID, reason=Remark(f"commanded pose: {error}", "no_angles"))
         if not self._reference_has_begun:
             self._reference_has_begun = True
             self._reference.begin(q, None)  # Of the tool's, the tolerance has been looked at.
@@ -140,7 +146,7 @@ class CartesianGenerator:
             return
         self._jump = find_tool_jump(translation, turn, lag, self._terms.tolerance)
         if self._jump is None:
-            self._stream = Stream(values)
+            self._stream = CommandExtrapolator(values)
             self._filter = PoseLowPass(self._terms.settings.cartesian_filter, pose, psi)
             self._monitor = self._monitor_from(pose, psi)
 

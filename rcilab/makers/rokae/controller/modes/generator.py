@@ -20,7 +20,7 @@ from rcilab.makers.rokae.controller.settings import Settings
 from rcilab.makers.rokae.wire import CommandPacket
 from rcilab.model.robot_model import RobotModel
 from rcilab.sim.reference_trajectory import JOIN_SHARE
-from rcilab.sim.soft_limit_governor import Fence
+from rcilab.sim.soft_limit_governor import SoftLimitGovernor
 
 NOTHING = Remark("")
 """The reason of what raises no fault."""
@@ -28,7 +28,7 @@ _REACH = 2  # [cycles] that a second difference reaches back, after a gap
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Terms:
+class MotionLimits:
     """What a motion is filtered with and judged by; fixed when it begins."""
 
     model: RobotModel
@@ -48,7 +48,7 @@ class Terms:
         return box_from(self.box, *(pose.parts[1] for pose in self.starts))
 
 
-class Step(NamedTuple):
+class GeneratorOutput(NamedTuple):
     """What one cycle's command comes to."""
 
     q: list[float] | None = None
@@ -72,12 +72,12 @@ class MotionGenerator(Protocol):
         """Returns whether a command continues the motion by one cycle rather than by `steps`; see `Stream.is_next`."""
         ...
 
-    def step(self, playback: Playback) -> Step:
+    def step(self, playback: Playback) -> GeneratorOutput:
         """Takes this cycle's command, or bridges a cycle that has none."""
         ...
 
 
-class Gap:
+class MissedCycles:
     """Counts the cycles that commands are apart. Owned by a motion generator."""
 
     def __init__(self) -> None:
@@ -93,10 +93,10 @@ class Gap:
         return cycles
 
 
-def lost_motion(reason: Remark) -> Step:
+def lost_motion(reason: Remark) -> GeneratorOutput:
     """Returns the step of a motion that could not go on without the commands that were lost."""
     said = Remark(f"lost commands broke the motion: {reason}", "lost_motion", reason=reason)
-    return Step(faults=(Fault.INSTABILITY_DETECTION,), reason=said)
+    return GeneratorOutput(faults=(Fault.INSTABILITY_DETECTION,), reason=said)
 
 
 class JointReference:
@@ -111,12 +111,12 @@ class JointReference:
         judges_box: Whether the safety box is judged here, from the joint angles.
     """
 
-    def __init__(self, terms: Terms, q: list[float], *, judges_box: bool) -> None:
+    def __init__(self, terms: MotionLimits, q: list[float], *, judges_box: bool) -> None:
         joint = terms.limits.joint
         self._model = terms.model
         self._limits = joint
         self._box = BoxMonitor(terms.entry_box() if judges_box else None)
-        self._fence = Fence(joint, q) if terms.settings.auto_limit else None
+        self._fence = SoftLimitGovernor(joint, q) if terms.settings.auto_limit else None
         self._monitor = self._monitor_from(q)
         self._start: StartMonitor[JointMonitor] | None = None
         self._offset: StartOffset | None = None
@@ -148,10 +148,10 @@ class JointReference:
         self._monitor = self._monitor_from(q)
         self._offset = StartOffset(self._limits, offset)
         if self._fence is not None:
-            self._fence = Fence(self._limits, q)
+            self._fence = SoftLimitGovernor(self._limits, q)
         return True
 
-    def step(self, q: list[float], cycles: int) -> Step:
+    def step(self, q: list[float], cycles: int) -> GeneratorOutput:
         """Takes the joint angles of this cycle.
 
         Args:
@@ -170,9 +170,9 @@ class JointReference:
         if reason:
             return lost_motion(reason)
         if cycles == 0:
-            return Step(reference)
+            return GeneratorOutput(reference)
         step = self._judge(q, cycles)
-        return step if reference is q or step.faults else Step(reference)
+        return step if reference is q or step.faults else GeneratorOutput(reference)
 
     def _monitor_from(self, q: list[float]) -> JointMonitor:
         monitor = JointMonitor(self._limits)
@@ -196,7 +196,7 @@ class JointReference:
                 return Remark(said, "beyond", joint=number, value=f"{x:.4g} rad", bound=f"{bound:.4g} rad")
         return NOTHING
 
-    def _judge(self, q: list[float], cycles: int) -> Step:
+    def _judge(self, q: list[float], cycles: int) -> GeneratorOutput:
         faults = self._step_monitor(q, cycles)
         breaches = self._monitor.broken() if faults else []
         if self._box.is_active:
@@ -204,10 +204,14 @@ class JointReference:
             breaches += self._box.broken()
         if faults:
             reason = describe_breaches(breaches)
-            return Step(faults=tuple(sorted(faults)), reason=Remark.all((self._jump, reason)) if self._jump else reason)
+            return GeneratorOutput(
+                faults=tuple(sorted(faults)), reason=Remark.all((self._jump, reason)) if self._jump else reason
+            )
         self._jump = None
         monitor = self._monitor
-        return Step(q, differences=(monitor.dq, monitor.ddq) if monitor.is_even and self._start is None else None)
+        return GeneratorOutput(
+            q, differences=(monitor.dq, monitor.ddq) if monitor.is_even and self._start is None else None
+        )
 
     def _step_monitor(self, q: list[float], cycles: int) -> tuple[Fault, ...]:
         start = self._start

@@ -17,7 +17,7 @@ _FLIPS = [[[list(product(a, b, c)) for c in _SIDES] for b in _SIDES] for a in _S
 _STEP = 0.1  # [rad] What no joint passes in a cycle, by far: an arm bent more than that stays bent to the same side.
 
 
-class Follower:
+class IkTracker:
     """The inverse of one arm with its tool, for poses that follow each other. Owned by a motion generator.
 
     Joint limits are not its business: it stays on the branch that is nearest to the last angles, and whoever judges

@@ -12,9 +12,9 @@ from math import isfinite
 from rcilab.core.faults import Fault
 from rcilab.i18n.translator import Remark
 from rcilab.makers.rokae.controller.jitter_buffer import Playback
-from rcilab.makers.rokae.controller.modes.generator import Gap, JointReference, Step, Terms
+from rcilab.makers.rokae.controller.modes.generator import GeneratorOutput, JointReference, MissedCycles, MotionLimits
 from rcilab.makers.rokae.wire import CommandPacket
-from rcilab.sim.command_extrapolator import Stream
+from rcilab.sim.command_extrapolator import CommandExtrapolator
 from rcilab.sim.filters import LowPass
 
 
@@ -26,20 +26,20 @@ class JointGenerator:
         q: Where the arm stands, n plain floats, [rad].
     """
 
-    def __init__(self, terms: Terms, q: list[float]) -> None:
+    def __init__(self, terms: MotionLimits, q: list[float]) -> None:
         self._n = terms.model.n
         self._terms = terms
         self._has_begun = False
-        self._stream = Stream(q)
+        self._stream = CommandExtrapolator(q)
         self._filter = LowPass(terms.settings.joint_filter, q)
-        self._gap = Gap()
+        self._gap = MissedCycles()
         self._reference = JointReference(terms, q, judges_box=True)
 
     def is_next(self, packet: CommandPacket, steps: int, in_doubt: bool) -> bool:
-        """Returns whether a command continues the motion by one cycle rather than by `steps`; see `Stream.is_next`."""
+        """Returns whether a command continues the motion by one cycle rather than by `steps`; see `CommandExtrapolator.is_next`."""
         return self._stream.is_next(packet.q_c[: self._n], steps, in_doubt)
 
-    def step(self, playback: Playback) -> Step:
+    def step(self, playback: Playback) -> GeneratorOutput:
         """Takes this cycle's angles, or bridges a cycle that has none."""
         packet = playback.packet
         cycles = self._gap.step(playback)
@@ -51,7 +51,9 @@ class JointGenerator:
                 q = self._stream.predict(1, q, playback.steps)
         if not isfinite(sum(q)):  # Not a number is in no range; the derivatives say nothing then.
             reason = Remark(f"commanded positions {q} rad are not all finite numbers", "no_numbers")
-            return Step(faults=(Fault.COMMAND_JOINT_POSITION_LIMITS_VIOLATION,), reason=reason, is_number=False)
+            return GeneratorOutput(
+                faults=(Fault.COMMAND_JOINT_POSITION_LIMITS_VIOLATION,), reason=reason, is_number=False
+            )
         if not self._has_begun:
             self._begin(q)
         self._stream.take(q)
@@ -61,5 +63,5 @@ class JointGenerator:
         """Takes the first command, which filter and prediction start from when the motion begins there."""
         self._has_begun = True
         if self._reference.begin(q, self._terms.tolerance):
-            self._stream = Stream(q)
+            self._stream = CommandExtrapolator(q)
             self._filter = LowPass(self._terms.settings.joint_filter, q)

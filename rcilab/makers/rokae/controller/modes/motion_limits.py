@@ -8,8 +8,8 @@ from rcilab.conformance import LimitTable, cartesian_limits
 from rcilab.core.arrays import JointVector
 from rcilab.core.safety_box import active_box
 from rcilab.core.spatial import Pose
-from rcilab.makers.rokae.controller.actuator import Law, guiding_box
-from rcilab.makers.rokae.controller.modes.generator import Terms
+from rcilab.makers.rokae.controller.actuator import ControlLaw, guiding_box
+from rcilab.makers.rokae.controller.modes.generator import MotionLimits
 from rcilab.makers.rokae.controller.modes.mode import Mode
 from rcilab.makers.rokae.controller.modes.start import StartTolerance
 from rcilab.makers.rokae.controller.settings import Settings
@@ -25,7 +25,7 @@ def build_terms(
     stands: tuple[JointVector, ...],
     tools: tuple[Pose, ...],
     tolerance: StartTolerance,
-) -> Terms:
+) -> MotionLimits:
     """Returns filters and bounds of a motion.
 
     Stops end beyond a soft limit or the safety box when that was what they were for. A motion that begins out there may
@@ -46,6 +46,10 @@ def build_terms(
     for q in stands:
         joint = range_from(joint, q)
     limits = replace(cartesian_limits(model.limits, table), joint=joint)
-    yields_to_walls = mode.law in (Law.JOINT_IMPEDANCE, Law.CARTESIAN_IMPEDANCE) and guiding_box(settings) is not None
+    yields_to_walls = (
+        mode.law in (ControlLaw.JOINT_IMPEDANCE, ControlLaw.CARTESIAN_IMPEDANCE) and guiding_box(settings) is not None
+    )
     box = None if yields_to_walls else settings.safety_box
-    return Terms(model=model, settings=settings, limits=limits, box=active_box(box), tolerance=tolerance, starts=tools)
+    return MotionLimits(
+        model=model, settings=settings, limits=limits, box=active_box(box), tolerance=tolerance, starts=tools
+    )

@@ -20,7 +20,7 @@ from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.faults import Fault
 from rcilab.core.limits import JointLimits
 from rcilab.i18n.translator import Remark
-from rcilab.makers.rokae.controller.actuator import Law
+from rcilab.makers.rokae.controller.actuator import ControlLaw
 from rcilab.makers.rokae.controller.settings import Settings
 
 SERVO_ERROR = 1e-3  # [rad] Static error of a joint on its servo, and rounding; the MuJoCo plant's stays below 0.2 mrad.
@@ -58,7 +58,7 @@ class StartTolerance:
         )
 
 
-def start_tolerance(law: Law, settings: Settings) -> StartTolerance:
+def start_tolerance(law: ControlLaw, settings: Settings) -> StartTolerance:
     """Returns what a control law makes of an arm's position: what a motion in it, or right after it, may be off.
 
     Args:
@@ -68,11 +68,11 @@ def start_tolerance(law: Law, settings: Settings) -> StartTolerance:
     n = len(settings.joint_lower)
     if not law.yields:
         return StartTolerance((SERVO_ERROR,) * n)
-    if law is Law.JOINT_IMPEDANCE:
+    if law is ControlLaw.JOINT_IMPEDANCE:
         joint = tuple(_deflection(FORCE * LEVER, k, SERVO_ERROR, WIDEST_ANGLE) for k in settings.joint_stiffness)
         widest = max(joint)
         return StartTolerance(joint, min(widest * LEVER, WIDEST_LENGTH), widest, widest)
-    if law is Law.CARTESIAN_IMPEDANCE:
+    if law is ControlLaw.CARTESIAN_IMPEDANCE:
         *translations, a, b, c = settings.cartesian_stiffness
         translation = max(_deflection(FORCE, k, SERVO_LENGTH, WIDEST_LENGTH) for k in translations)
         rotation = max(_deflection(FORCE * TURNING_LEVER, k, SERVO_ERROR, WIDEST_ANGLE) for k in (a, b, c))

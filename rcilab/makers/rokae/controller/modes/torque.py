@@ -15,9 +15,9 @@ from rcilab.conformance.torque_monitor import TorqueMonitor
 from rcilab.core.faults import Fault
 from rcilab.i18n.translator import Remark
 from rcilab.makers.rokae.controller.jitter_buffer import Playback
-from rcilab.makers.rokae.controller.modes.generator import Gap, Step, Terms
+from rcilab.makers.rokae.controller.modes.generator import GeneratorOutput, MissedCycles, MotionLimits
 from rcilab.makers.rokae.wire import CommandPacket
-from rcilab.sim.command_extrapolator import Stream
+from rcilab.sim.command_extrapolator import CommandExtrapolator
 from rcilab.sim.filters import LowPass
 
 
@@ -28,21 +28,21 @@ class TorqueGenerator:
         terms: Of the motion.
     """
 
-    def __init__(self, terms: Terms) -> None:
+    def __init__(self, terms: MotionLimits) -> None:
         nothing = [0.0] * terms.model.n
         self._n = terms.model.n
         self._tau = nothing
-        self._gap = Gap()
-        self._stream = Stream(nothing)
+        self._gap = MissedCycles()
+        self._stream = CommandExtrapolator(nothing)
         self._filter = LowPass(terms.settings.torque_filter, nothing)
         self._monitor = TorqueMonitor(terms.limits.joint)
         self._monitor.reset(nothing)
 
     def is_next(self, packet: CommandPacket, steps: int, in_doubt: bool) -> bool:
-        """Returns whether a command continues the motion by one cycle rather than by `steps`; see `Stream.is_next`."""
+        """Returns whether a command continues the motion by one cycle rather than by `steps`; see `CommandExtrapolator.is_next`."""
         return self._stream.is_next(packet.tau_c[: self._n], steps, in_doubt)
 
-    def step(self, playback: Playback) -> Step:
+    def step(self, playback: Playback) -> GeneratorOutput:
         """Takes this cycle's torques, or bridges a cycle that has none."""
         packet, steps, is_lost, _ = playback
         cycles = self._gap.step(playback)
@@ -51,12 +51,12 @@ class TorqueGenerator:
             tau = list(packet.tau_c[: self._n])
             if not isfinite(sum(tau)):
                 reason = Remark(f"commanded torques {tau} N m are not all finite numbers", "no_numbers")
-                return Step(faults=(Fault.COMMAND_TORQUE_RANGE_VIOLATION,), reason=reason)
+                return GeneratorOutput(faults=(Fault.COMMAND_TORQUE_RANGE_VIOLATION,), reason=reason)
             if is_lost:
                 tau = [last + (goal - last) / steps for last, goal in zip(self._tau, tau, strict=True)]
         self._tau = tau
         self._stream.take(tau)
         tau = self._filter.step(tau)
         if cycles > 0 and (faults := self._monitor.step(tau, cycles)):
-            return Step(faults=faults, reason=describe_breaches(self._monitor.broken()))
-        return Step(tau=tau)
+            return GeneratorOutput(faults=faults, reason=describe_breaches(self._monitor.broken()))
+        return GeneratorOutput(tau=tau)

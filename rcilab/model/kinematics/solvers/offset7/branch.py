@@ -11,7 +11,7 @@ import numpy as np
 from rcilab.core.arrays import Array, JointPath, JointVector
 from rcilab.core.errors import KinematicsError, SingularError, UnreachableError
 from rcilab.core.spatial import Pose
-from rcilab.model.kinematics.branch import Loss
+from rcilab.model.kinematics.branch import BranchEnd
 from rcilab.model.kinematics.ik_fixed_elbow import inverse_held
 from rcilab.model.kinematics.solvers.offset7.arm import ELBOW, OffsetGeometry, no_solution
 from rcilab.model.kinematics.solvers.offset7.settle import settle, settle_beside
@@ -23,7 +23,7 @@ _JUMP = 0.6  # [rad] From row to row: beyond it the arm does not follow but chan
 
 def follow_offset_branch(
     arm: OffsetGeometry, rotations: Array, positions: Array, psi: Array, start: JointVector
-) -> tuple[JointPath, Loss | None]:
+) -> tuple[JointPath, BranchEnd | None]:
     """Returns the joint angles along a path of the flange, each row next to the one before; limits are not looked at.
 
     Args:
@@ -53,7 +53,7 @@ def follow_offset_branch(
     if not lost.any():
         return q, None
     row = int(lost.argmax())
-    return q, Loss(row, _reason(arm, rotations[row], positions[row], float(psi[row])))
+    return q, BranchEnd(row, _reason(arm, rotations[row], positions[row], float(psi[row])))
 
 
 class _March:

@@ -9,7 +9,7 @@ import pytest
 
 from rcilab.core.errors import SingularError, UnreachableError
 from rcilab.core.spatial import Pose
-from rcilab.makers.rokae.controller.modes.ik_tracker import Follower
+from rcilab.makers.rokae.controller.modes.ik_tracker import IkTracker
 from rcilab.model.kinematics.inverse import build_geometry
 from rcilab.model.kinematics.singularity import find_singularity
 from rcilab.model.robot_model import load_model
@@ -22,7 +22,7 @@ QUARTER = math.pi / 2.0
 @pytest.mark.parametrize("name", NAMES)
 def test_forward_and_back_is_the_same_branch(name: str) -> None:
     model = load_model(name, tool=TOOL)
-    follower, geometry, rng = Follower(model), build_geometry(model.description), np.random.default_rng(7)
+    follower, geometry, rng = IkTracker(model), build_geometry(model.description), np.random.default_rng(7)
     count = 0
     for q in rng.uniform(model.limits.joint.lower, model.limits.joint.upper, (500, model.n)):
         if find_singularity(geometry, q.tolist()) is not None:
@@ -39,14 +39,14 @@ def test_full_turns_of_the_last_joint_are_counted(turns: int) -> None:
     model = load_model("xMatePro7")
     q = model.home.copy()
     q[6] = turns * math.radians(300.0)
-    found = Follower(model).solve(model.forward(q), model.arm_angle(q), (q - 1e-3).tolist())
+    found = IkTracker(model).solve(model.forward(q), model.arm_angle(q), (q - 1e-3).tolist())
     assert np.allclose(found, q, rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_what_is_out_of_reach_or_singular_is_refused_in_words(name: str) -> None:
     model = load_model(name)
-    follower, home = Follower(model), model.home.tolist()
+    follower, home = IkTracker(model), model.home.tolist()
     with pytest.raises(UnreachableError, match="out of reach"):
         follower.solve(Pose((2.0, 0.0, 0.5)), 0.0, home)
     wrist = 5 if model.n == 7 else 4
