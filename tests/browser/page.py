@@ -194,7 +194,7 @@ class BenchPage:
 
     def type_joint(self, joint: int, text: str) -> None:
         self.joint_field(joint).fill(text)
-        self.joint_field(joint).press("CommitField")
+        self.joint_field(joint).press("Enter")
 
     def plan_to(self, joint: int, degrees: float) -> None:
         """Poses one joint of the goal by typing, and waits for the plan."""

@@ -85,11 +85,11 @@ def test_a_slider_has_its_joints_name_a_folder_opens_by_key_and_the_focus_is_see
     folder = page.tab.get_by_role("button", name="Plots and loop", expanded=False)
     folder.focus()
     assert page.tab.evaluate("getComputedStyle(document.activeElement).outlineStyle") == "solid"
-    page.tab.keyboard.press("CommitField")
+    page.tab.keyboard.press("Enter")
     page.tab.get_by_role("checkbox", name="Torque (with load)").press("Space")
     page.wait(lambda: "tau" in page.state.plots, "the plot of torques to be chosen")
     page.tab.locator(".rl-plot-title", has_text="Torque").wait_for()
     page.tab.get_by_role("checkbox", name="Torque (with load)").press("Space")
     page.wait(lambda: "tau" not in page.state.plots, "and no longer")
-    page.tab.get_by_role("button", name="Plots and loop", expanded=True).press("CommitField")
+    page.tab.get_by_role("button", name="Plots and loop", expanded=True).press("Enter")
     page.tab.get_by_role("button", name="Plots and loop", expanded=False).wait_for()

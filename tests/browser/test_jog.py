@@ -76,7 +76,7 @@ def test_a_held_button_moves_the_robot_until_it_is_let_go_in_any_way(jogging):
     mouse.up()
     press(page, "z +")
     page.tab.get_by_role("tab", name="Check").focus()
-    keyboard.press("CommitField")
+    keyboard.press("Enter")
     require_rest(page)
     require_room(page)
     mouse.up()

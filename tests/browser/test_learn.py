@@ -45,7 +45,7 @@ def test_a_row_leads_to_its_moment_and_a_slow_down_can_be_taken_back(page):
     fast = page.state.plan
     row = page.tab.locator("[data-say='joint.torque_rate']")
     row.focus()
-    page.tab.keyboard.press("CommitField")
+    page.tab.keyboard.press("Enter")
     page.wait(lambda: page.state.check.row == "joint.torque_rate", "the row")
     found = next(row for row in fast.report.rows if row.id == "joint.torque_rate")
     assert np.isclose(page.state.place * fast.motion.duration, min(found.time, fast.motion.duration))
