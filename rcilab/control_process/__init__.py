@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 _HOME = {"Supervisor": "supervisor", "PendingRequest": "pending_request", "SupervisorStatus": "status"}
 
-__all__ = ["Supervisor", "SupervisorStatus", "PendingRequest"]
+__all__ = ["PendingRequest", "Supervisor", "SupervisorStatus"]
 
 
 def __getattr__(name: str) -> object:

@@ -33,7 +33,7 @@ from rcilab.makers.rokae.driver.configuration import RobotConfiguration, require
 if TYPE_CHECKING:
     from rcilab.model.robot_model import RobotModel
 
-__all__ = ["Supervisor", "PendingRequest"]
+__all__ = ["PendingRequest", "Supervisor"]
 
 VIRTUAL = "virtual"
 _TICK = 0.02  # [s] between two looks of the watching thread.
@@ -42,8 +42,8 @@ _TICK = 0.02  # [s] between two looks of the watching thread.
 class Supervisor(ArmRequests, Closeable):
     """Runs motions in a process of its own, so that nothing the page does can disturb a cycle.
 
-    What moves the arm is in `ArmRequests`. All methods may be called from any thread. Requests return a `PendingRequest` at
-    once; nothing here waits for the robot except `start()`, `restart()` and `close()`. The processes belong to a
+    What moves the arm is in `ArmRequests`. All methods may be called from any thread. Requests return a
+    `PendingRequest` at once; nothing here waits for the robot except `start()`, `restart()` and `close()`. The processes belong to a
     `ProcessSupervisor`, the requests under way to a `RequestClient`; a thread of this object looks after both.
 
     Args:

@@ -19,11 +19,11 @@ from rcilab.motion.waypoint import Waypoint
 __all__ = [
     "LIMIT_MARGIN",
     "Jog",
-    "TimeLaw",
     "Motion",
     "MotionSample",
     "PiecewisePolynomial",
     "Program",
+    "TimeLaw",
     "Waypoint",
     "derivatives_from_differences",
     "differences_from_derivatives",

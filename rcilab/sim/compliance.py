@@ -9,7 +9,8 @@ al. (2003).
 The controller computes torques once a millisecond, so a spring must not be much faster than that: modes are slowed
 down to `FASTEST_MODE`. Only light links feel it, such as the last one behind a long tool at full stiffness.
 
-How an arm vibrates changes with its pose, and that takes longer than a cycle: a `ModalDamping` keeps its design for some.
+How an arm vibrates changes with its pose, and that takes longer than a cycle: a `ModalDamping` keeps its design for
+some.
 """
 
 from __future__ import annotations

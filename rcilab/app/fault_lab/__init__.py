@@ -18,7 +18,7 @@ from rcilab.app.fault_lab.scenario import GROUPS, FaultScenario, Group
 from rcilab.app.fault_lab.table import FAULTS, FaultTable
 from rcilab.core.faults import Fault
 
-__all__ = ["FAULTS", "GROUPS", "FaultLab", "FaultDemo", "FaultTable", "Group", "FaultScenario", "provoke"]
+__all__ = ["FAULTS", "GROUPS", "FaultDemo", "FaultLab", "FaultScenario", "FaultTable", "Group", "provoke"]
 
 
 def provoke(fault: Fault | str, model: str = "xMatePro7") -> FaultDemo:

@@ -2,8 +2,10 @@
 
 On every core a loop that does nothing wakes up each millisecond under the highest priority there is. When it wakes up
 late, nothing on that core ran in time: the hypervisor had taken the core away, or the kernel did not let go of it. No
-program can be punctual there, so what a control loop is blamed for is what is left. `python -m rcilab.diagnostics.bench.cpu_stall_monitor
-CORE` is one of those loops; it runs until its standard input ends.
+program can be punctual there, so a control loop is blamed only for what is left.
+
+`python -m rcilab.diagnostics.bench.cpu_stall_monitor CORE` is one of those loops; it runs until its standard input
+ends.
 """
 
 from __future__ import annotations

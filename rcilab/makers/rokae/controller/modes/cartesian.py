@@ -70,7 +70,7 @@ class CartesianGenerator:
         self._reference_has_begun = False
 
     def is_next(self, packet: CommandPacket, steps: int, in_doubt: bool) -> bool:
-        """Returns whether a command continues the motion by one cycle rather than by `steps`; see `CommandExtrapolator.is_next`."""
+        """Returns whether a command continues the motion by one cycle rather than by `steps`."""
         if find_frame_error(packet.T_base_tool_c) is not None:
             return True  # It is refused when it is played.
         return self._stream.is_next(self._read(packet), steps, in_doubt)

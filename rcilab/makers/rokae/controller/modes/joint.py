@@ -36,7 +36,7 @@ class JointGenerator:
         self._reference = JointReference(terms, q, judges_box=True)
 
     def is_next(self, packet: CommandPacket, steps: int, in_doubt: bool) -> bool:
-        """Returns whether a command continues the motion by one cycle rather than by `steps`; see `CommandExtrapolator.is_next`."""
+        """Returns whether a command continues the motion by one cycle rather than by `steps`."""
         return self._stream.is_next(packet.q_c[: self._n], steps, in_doubt)
 
     def step(self, playback: Playback) -> GeneratorOutput:

@@ -39,7 +39,7 @@ class TorqueGenerator:
         self._monitor.reset(nothing)
 
     def is_next(self, packet: CommandPacket, steps: int, in_doubt: bool) -> bool:
-        """Returns whether a command continues the motion by one cycle rather than by `steps`; see `CommandExtrapolator.is_next`."""
+        """Returns whether a command continues the motion by one cycle rather than by `steps`."""
         return self._stream.is_next(packet.tau_c[: self._n], steps, in_doubt)
 
     def step(self, playback: Playback) -> GeneratorOutput:
