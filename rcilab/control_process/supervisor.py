@@ -43,8 +43,9 @@ class Supervisor(ArmRequests, Closeable):
     """Runs motions in a process of its own, so that nothing the page does can disturb a cycle.
 
     What moves the arm is in `ArmRequests`. All methods may be called from any thread. Requests return a
-    `PendingRequest` at once; nothing here waits for the robot except `start()`, `restart()` and `close()`. The processes belong to a
-    `ProcessSupervisor`, the requests under way to a `RequestClient`; a thread of this object looks after both.
+    `PendingRequest` at once; nothing here waits for the robot except `start()`, `restart()` and `close()`. The
+    processes belong to a `ProcessSupervisor`, pending requests to a `RequestClient`; a thread of this object looks
+    after both.
 
     Args:
         model: The arm.
