@@ -24,7 +24,7 @@ def test_a_fault_is_provoked_beside_the_robot_and_shown_at_its_moment(page):
     assert page.tab.get_by_text("kCommandTorqueDiscontinuity").count() >= 1
     page.wait(lambda: page.tab.evaluate(_INK) > 500, lambda: f"its own plot, not {page.tab.evaluate(_LOOK)}")
     page.button("Show as Python").last.click()
-    page.wait(lambda: "gallery.provoke" in page.tab.locator(".rl-code pre:visible").inner_text(), "its script")
+    page.wait(lambda: "fault_lab.provoke" in page.tab.locator(".rl-code pre:visible").inner_text(), "its script")
     page.button("Back to the gallery").click()
     page.wait(lambda: page.button("Torque jumps").is_visible(), "the gallery")
     page.button("First move").click()

@@ -241,12 +241,12 @@ STILLBORN = """
 import os, sys, time
 from rcilab.model.robot_model import load_model
 from rcilab.control_process.forked import fork_server
-from rcilab.control_process.process_supervisor import ProcessKeeper
+from rcilab.control_process.process_supervisor import ProcessSupervisor
 from rcilab.control_process.layout import ControlBlock
 from rcilab.control_process.settings import build_settings
 model = load_model("xMatePro7")
 block = ControlBlock.create(model.n, build_settings(model))
-keeper = ProcessKeeper(block, model.name, "ideal", None, auto_restart=False)
+keeper = ProcessSupervisor(block, model.name, "ideal", None, auto_restart=False)
 keeper.launch()
 while sys.argv[1] == "born" and None in (keeper.worker_pid, keeper.controller_pid):
     time.sleep(0.001)

@@ -78,7 +78,7 @@ def test_a_motion_that_was_not_checked_with_the_box_of_now_is_refused(supervisor
 
 
 def test_a_set_up_that_is_none_or_too_heavy_is_refused_before_it_is_sent(supervisor):
-    with pytest.raises(InvalidValueError, match="RobotSetup"):
+    with pytest.raises(InvalidValueError, match="RobotConfiguration"):
         supervisor.set_up(TOOL)
     with pytest.raises(InvalidValueError, match="rated"):
         supervisor.set_up(RobotConfiguration(load=Payload(mass=99.0)))

@@ -1,11 +1,11 @@
 """The fault gallery: each of the twenty faults, really provoked on a private virtual controller.
 
-    from rcilab import gallery
-    print(gallery.FAULTS)
-    exhibit = gallery.provoke("kCommandJointVelocityLimitsViolation")
+    from rcilab.app import fault_lab
+    print(fault_lab.FAULTS)
+    exhibit = fault_lab.provoke("kCommandJointVelocityLimitsViolation")
     print(exhibit)                                     # what was sent, why it is a fault, what to do, how to leave it
-    with gallery.FaultLab("xMatePro7") as booth:          # several on one controller
-        exhibits = [booth.provoke(fault) for fault in gallery.FAULTS]
+    with fault_lab.FaultLab("xMatePro7") as booth:          # several on one controller
+        exhibits = [booth.provoke(fault) for fault in fault_lab.FAULTS]
 
 Nothing is made up: real commands go through the real client to a controller that nobody else is connected to.
 """

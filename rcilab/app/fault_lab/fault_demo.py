@@ -189,8 +189,8 @@ class FaultDemo:
 def script(fault: Fault, model: str) -> str:
     """Returns Python that provokes a fault on a private virtual controller and prints what came of it."""
     return (
-        "from rcilab import gallery\n\n"
-        f'exhibit = gallery.provoke("{fault.manual_name}", model="{model}")\n'
+        "from rcilab.app import fault_lab\n\n"
+        f'exhibit = fault_lab.provoke("{fault.manual_name}", model="{model}")\n'
         "print(exhibit)\n"
         'print(exhibit.cycles[["t", "q"]][-3:])  # The flight recorder: the last cycles up to the fault.\n'
     )

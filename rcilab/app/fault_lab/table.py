@@ -37,7 +37,7 @@ class FaultTable(Mapping[Fault, FaultScenario]):
         )
 
     def __repr__(self) -> str:
-        return f"<FaultTable of {len(self)} faults: print it, or gallery.provoke(name)>"
+        return f"<FaultTable of {len(self)} faults: print it, or fault_lab.provoke(name)>"
 
 
 FAULTS = FaultTable(*COMMAND_RECIPES, *ARM_RECIPES)

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from rcilab.app import fault_lab as gallery
+from rcilab.app import fault_lab
 from rcilab.app.fault_lab.catalogue import load_catalogue
 from rcilab.app.fault_lab.fault_demo import script
 from rcilab.core.errors import InvalidValueError, UsageError
@@ -16,18 +16,18 @@ from rcilab.core.faults import Fault, find_fault
 from rcilab.i18n.locale import LANGUAGES
 from tests.catalogues import require_equal
 
-BY_POSE = sorted(Fault, key=lambda fault: (gallery.FAULTS[fault].pose or (), fault))
+BY_POSE = sorted(Fault, key=lambda fault: (fault_lab.FAULTS[fault].pose or (), fault))
 """So that the arm need not travel between any two."""
 
 
 @pytest.fixture(scope="module")
-def booth() -> Iterator[gallery.Booth]:
-    with gallery.Booth() as found:
+def booth() -> Iterator[fault_lab.FaultLab]:
+    with fault_lab.FaultLab() as found:
         yield found
 
 
 @pytest.mark.parametrize("fault", BY_POSE, ids=lambda fault: fault.name)
-def test_the_controller_reports_it_and_the_record_shows_why(booth: gallery.Booth, fault: Fault) -> None:
+def test_the_controller_reports_it_and_the_record_shows_why(booth: fault_lab.FaultLab, fault: Fault) -> None:
     exhibit = booth.provoke(fault)
     assert exhibit.reported == (fault,)
     assert exhibit.cycles["faults"][-1] == 1 << fault
@@ -46,9 +46,9 @@ def test_the_controller_reports_it_and_the_record_shows_why(booth: gallery.Booth
 
 
 def test_every_fault_hangs_in_the_gallery_once() -> None:
-    assert list(gallery.FAULTS) == list(Fault)
-    assert sum(len(gallery.FAULTS.group(group)) for group in gallery.GROUPS) == len(Fault)
-    assert str(gallery.FAULTS).count(" k") == len(Fault)
+    assert list(fault_lab.FAULTS) == list(Fault)
+    assert sum(len(fault_lab.FAULTS.group(group)) for group in fault_lab.GROUPS) == len(Fault)
+    assert str(fault_lab.FAULTS).count(" k") == len(Fault)
 
 
 def test_it_speaks_both_languages() -> None:
@@ -62,11 +62,11 @@ def test_a_fault_is_found_by_any_of_its_names() -> None:
 
 
 def test_an_arm_without_an_elbow_has_no_fault_of_it() -> None:
-    with gallery.Booth("xMate7") as booth, pytest.raises(UsageError, match="7 axes"):
+    with fault_lab.FaultLab("xMate7") as booth, pytest.raises(UsageError, match="7 axes"):
         booth.provoke(Fault.COMMAND_CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION)
 
 
-def test_who_wants_it_no_more_ends_it(booth: gallery.Booth) -> None:
+def test_who_wants_it_no_more_ends_it(booth: fault_lab.FaultLab) -> None:
     def tell(share: float) -> None:
         if share >= 0.5:
             raise TimeoutError
