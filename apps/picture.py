@@ -21,8 +21,8 @@ import numpy as np
 from PIL import Image
 from playwright.sync_api import Locator, Page, sync_playwright
 
+from rcilab.app import requests
 from rcilab.views.elbow_view import OUTWARD
-from rcilab.workbench import requests
 from rcilab.workbench.app import Workbench, WorkbenchConfig
 
 FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]

@@ -85,6 +85,26 @@ def test_imports_go_down_only_and_heavy_libraries_stay_fenced(path: Path) -> Non
         assert fence is None or place.startswith(fence), f"{place} imports {library}, fenced to {', '.join(fence)}"
 
 
+def test_the_application_layer_loads_no_user_interface() -> None:
+    modules = sorted(name for name in NAMES if name.startswith("rcilab.app"))
+    libraries = ["viser", "meshcat", "yourdfpy", "ipywidgets", "IPython", "matplotlib"]
+    code = (
+        f"import importlib, sys; [importlib.import_module(name) for name in {modules}];"
+        f"print(*[name for name in {libraries} if name in sys.modules])"
+    )
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
+    assert result.stdout.split() == []
+    drawing = {
+        f"rcilab.views.{path.stem}"
+        for path in (ROOT / "rcilab/views").glob("*.py")
+        if {"viser", "meshcat"} & {module.split(".")[0] for module in imports(path)}
+    }
+    for name in modules:
+        path = ROOT.joinpath(*name.split("."))
+        used = set(imports(path / "__init__.py" if path.is_dir() else path.with_suffix(".py")))
+        assert not used & drawing, f"{name} imports {', '.join(used & drawing)}"
+
+
 def test_no_module_is_outside_the_layers() -> None:
     assert {part_of(name) for name in NAMES} <= HEIGHT.keys()
 

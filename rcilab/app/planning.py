@@ -127,7 +127,7 @@ def make_plan(
     note = None
     if abs(float(motion.goal[away] - goal[away])) > SAME_WAY:
         note = message("plan.other_way", joint=away + 1)
-    return replace(picture(model, motion, report, box), kind=kind, note=note)
+    return replace(build_plan_view(model, motion, report, box), kind=kind, note=note)
 
 
 def make_recovery(model: RobotModel, start: JointVector, box: SafetyBox | None = None) -> Plan | Message:
@@ -140,7 +140,7 @@ def make_recovery(model: RobotModel, start: JointVector, box: SafetyBox | None =
         report = check(motion, model, start=start, box=box, distance=None)
     except RcilabError as error:
         return message("plan.failed", error=tell(error))
-    return picture(model, motion, report, box)
+    return build_plan_view(model, motion, report, box)
 
 
 def find_outside(model: RobotModel, q: JointVector) -> int | None:
@@ -168,7 +168,7 @@ def _go(
     return plan_arc(model, start, via, target, speed=speed, psi=psi, law=law)
 
 
-def picture(model: RobotModel, motion: Motion, report: Report, box: SafetyBox | None = None) -> Plan:
+def build_plan_view(model: RobotModel, motion: Motion, report: Report, box: SafetyBox | None = None) -> Plan:
     """Returns a judged motion with what views draw of it."""
     effort = np.abs(motion.dq[sampled_rows(motion)] / model.limits.joint.velocity).max(axis=1)
     return Plan(motion=motion, report=report, path=tool_path(model, motion), effort=effort, model=model, box=box)

@@ -31,6 +31,6 @@ def require_language(language: str) -> Language:
 
 @lru_cache
 def load_words(package: str, language: Language) -> Mapping[str, str]:
-    """Returns all entries of one language by key: `catalogues/LANGUAGE.json` of a package, such as rcilab.workbench."""
+    """Returns all entries of one language by key: `catalogues/LANGUAGE.json` of a package, such as rcilab.app."""
     path = files(package) / "catalogues" / f"{language}.json"
     return MappingProxyType(json.loads(path.read_text(encoding="utf-8")))

@@ -115,7 +115,7 @@ class Text:
 
     Args:
         language: "en" or "zh".
-        package: Whose own words there are beside the shared ones, such as rcilab.workbench.
+        package: Whose own words there are beside the shared ones, such as rcilab.app.
 
     Raises:
         InvalidValueError: There is no catalogue for this language.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from rcilab.app.planning import Plan, picture
+from rcilab.app.planning import Plan, build_plan_view
 
 if TYPE_CHECKING:
     from rcilab.model.robot_model import RobotModel
@@ -38,7 +38,7 @@ def cell_run_of(run: Run, model: RobotModel) -> CellRun | None:
     if len(run.cycles) < _FEWEST:
         return None
     motion = run.plan or _commanded(run)
-    return CellRun(plan=picture(model, motion, check(motion, model, distance=None)), run=run)
+    return CellRun(plan=build_plan_view(model, motion, check(motion, model, distance=None)), run=run)
 
 
 def _commanded(run: Run) -> Motion:

@@ -7,7 +7,7 @@ from typing import Any
 
 import ipywidgets
 
-from rcilab.app.mode_parameters import (
+from rcilab.app.run.mode_parameters import (
     PARTS_OF_MODE,
     held_rows,
     is_control_pending,

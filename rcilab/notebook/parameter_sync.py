@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 
-from rcilab.app.mode_parameters import SECOND_THOUGHT, ask_to_send, is_control_pending, with_number
+from rcilab.app.run.mode_parameters import SECOND_THOUGHT, ask_to_send, is_control_pending, with_number
 from rcilab.control_process.status_messages import tell_error
 from rcilab.core.errors import RcilabError, UsageError
 from rcilab.i18n.translator import Message

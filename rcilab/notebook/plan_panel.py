@@ -8,7 +8,7 @@ from typing import Any
 
 import ipywidgets
 
-from rcilab.app.planning import LAWS, Plan, picture
+from rcilab.app.planning import LAWS, Plan, build_plan_view
 from rcilab.conformance.time_scaling import SlowDown
 from rcilab.core.background_job import ProgressCallback
 from rcilab.core.errors import RcilabError
@@ -143,7 +143,7 @@ class PlanPanel(Part):
             if found.motion is None or found.report is None:
                 self._slowed = about, found
                 return
-            seen = picture(self.model, found.motion, found.report, about.box)
+            seen = build_plan_view(self.model, found.motion, found.report, about.box)
             slower = replace(seen, mode=about.mode, complete=True, short=about.short)
             self._slowed = slower, found
             self.state.show(slower)

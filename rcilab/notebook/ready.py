@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from rcilab.app.mode_parameters import control_obstacle
-from rcilab.app.readiness import arm_obstacle, plan_obstacle
+from rcilab.app.run.mode_parameters import control_obstacle
+from rcilab.app.run.plan_readiness import arm_obstacle, plan_obstacle
 from rcilab.i18n.translator import Message, message
 from rcilab.notebook.state import LabState
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import ipywidgets
 
-from rcilab.app.readiness import ask_to_move
+from rcilab.app.run.plan_readiness import ask_to_move
 from rcilab.control_process import SupervisorStatus
 from rcilab.control_process.supervisor import VIRTUAL
 from rcilab.core.errors import PlanningError, RcilabError

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Literal, TypeGuard
 
 from numpy.typing import ArrayLike
 
-from rcilab.app.planning import Plan, PlannableLaw, make_plan, picture
-from rcilab.app.reach import TargetStatus, judge_joints, judge_pose
+from rcilab.app.goal.target_status import TargetStatus, evaluate_joints, evaluate_pose
+from rcilab.app.planning import Plan, PlannableLaw, build_plan_view, make_plan
 from rcilab.core.arrays import JointVector, as_vector, readonly_copy
 from rcilab.core.background_job import ProgressCallback
 from rcilab.core.errors import InvalidValueError, KinematicsError, RcilabError
@@ -59,7 +59,7 @@ class LabState:
         self.robot: RobotBackend | None = None
         self.goal: JointVector = readonly_copy(model.home)
         self.target: Pose = model.forward(self.goal)
-        self.reach: TargetStatus = judge_joints(model, self.goal)
+        self.reach: TargetStatus = evaluate_joints(model, self.goal)
         self.plan: Plan | None = None
         self.no_plan: Message | None = None
         self.moment: float | None = None
@@ -158,7 +158,7 @@ class LabState:
         with self.lock:
             self.goal = readonly_copy(angles)
             self.target = self.model.forward(self.goal)
-            self.reach = judge_joints(self.model, self.goal)
+            self.reach = evaluate_joints(self.model, self.goal)
             self._look_away()
             self.tell("goal")
 
@@ -172,7 +172,7 @@ class LabState:
         """
         around = self.goal if near is None else as_vector(near, self.model.n, "near", "rad")
         with self.lock:
-            self.reach = judge_pose(self.model, target, around, psi)
+            self.reach = evaluate_pose(self.model, target, around, psi)
             self.goal, self.target = self.reach.q, target
             self._look_away()
             self.tell("goal")
@@ -214,7 +214,7 @@ class LabState:
 
         require_motion(motion)
         report = check(motion, self.model, mode=self.mode)
-        self.show(replace(picture(self.model, motion, report), mode=self.mode, complete=True))
+        self.show(replace(build_plan_view(self.model, motion, report), mode=self.mode, complete=True))
 
     def follow(self, mode: Mode) -> None:
         """Chooses how motions are commanded; the plan is judged by the conditions of that mode.
@@ -241,7 +241,7 @@ class LabState:
             self.run, self.error, self.is_run_of_plan, before = run, error, True, self._ran
             self._ran = None
             if run is not None and run.paced and run.plan is not None and self.plan is not None:
-                self._ran = picture(self.model, run.plan, self.plan.report, self.plan.box)
+                self._ran = build_plan_view(self.model, run.plan, self.plan.report, self.plan.box)
             if self._ran is not before:  # Its times are others now.
                 self.moment = None
                 self.tell("plan", "moment")
@@ -317,7 +317,7 @@ class LabState:
 
             try:
                 motion = plan_line(self.model, start, self.model.forward(goal), speed=speed)
-                return picture(self.model, motion, check(motion, self.model, start=start, distance=None))
+                return build_plan_view(self.model, motion, check(motion, self.model, start=start, distance=None))
             except RcilabError as error:
                 return message("plan.failed", error=tell(error))
 

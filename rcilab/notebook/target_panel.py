@@ -8,7 +8,7 @@ from typing import Any
 import ipywidgets
 import numpy as np
 
-from rcilab.app.reach import margin, telling_joints
+from rcilab.app.goal.target_status import margin, telling_joints
 from rcilab.core.errors import KinematicsError
 from rcilab.core.spatial import Pose
 from rcilab.model.kinematics.solutions import Solutions

@@ -10,20 +10,21 @@ from types import TracebackType
 from typing import IO, TYPE_CHECKING
 from urllib.parse import quote
 
+from rcilab.app import requests
+from rcilab.app.autosave import Autosave, keepsake_file
+from rcilab.app.control_lock import ClientHeartbeat
+from rcilab.app.dispatcher import Dispatcher
+from rcilab.app.goal.goal_actions import initial_goal
+from rcilab.app.robot_connection import RobotConnection
+from rcilab.app.run.replay import replayed, require_replayable
+from rcilab.app.status_text import tell_error
+from rcilab.app.store import Store, UiState
 from rcilab.views.access_control import Gate
 from rcilab.views.viser_server import GuardedServer
 from rcilab.views.viser_stage import ViserEnvironment
-from rcilab.workbench import requests, security
-from rcilab.workbench.autosave import Autosave, keepsake_file
-from rcilab.workbench.control_lock import ClientHeartbeat
-from rcilab.workbench.dispatcher import Dispatcher
-from rcilab.workbench.goal.actions import initial_goal
+from rcilab.workbench import security
 from rcilab.workbench.live import LIVE_PATH, Heard, LiveChannel
 from rcilab.workbench.page import decorate, introduce, send_file
-from rcilab.workbench.run.replay import replayed, require_replayable
-from rcilab.workbench.session import Session
-from rcilab.workbench.status_text import tell_error
-from rcilab.workbench.store import Store, UiState
 
 if TYPE_CHECKING:
     import viser
@@ -88,7 +89,7 @@ class Workbench:
         if replay is not None:
             state = replayed(state, replay)
         self.store = Store(replace(state, runs=config.runs))
-        self.session = Session(lambda error: self.store.say("bad", tell_error(error, self.session.status())))
+        self.session = RobotConnection(lambda error: self.store.say("bad", tell_error(error, self.session.status())))
         is_own = config.port and replay is None  # Any free port is nobody's own, and whoever replays looks at a run.
         keepsake = Autosave(keepsake_file(self.port) if is_own else None)
         self._presence = ClientHeartbeat()

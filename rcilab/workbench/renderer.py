@@ -6,10 +6,14 @@ import threading
 import time
 from typing import TYPE_CHECKING, Any
 
+from rcilab.app.failures import Failures
+from rcilab.app.learn.learn_state import exhibited
+from rcilab.app.robot_connection import RobotConnection
+from rcilab.app.run.played_motion import moment_played
+from rcilab.app.store import Store
+from rcilab.app.text import Text
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.views.viser_ext.persistent_tab import PersistentTab
-from rcilab.workbench.failures import Failures
-from rcilab.workbench.learn.state import exhibited
 from rcilab.workbench.live import LiveChannel
 from rcilab.workbench.page import dress
 from rcilab.workbench.panels import Panel
@@ -44,19 +48,15 @@ from rcilab.workbench.panels.target_robot import TargetRobotPanel
 from rcilab.workbench.panels.timeline import TimelinePanel
 from rcilab.workbench.panels.tool_jog import ToolJogPanel
 from rcilab.workbench.panels.waypoint import WaypointPanel
-from rcilab.workbench.program.waypoint_markers import ProgramMarks
-from rcilab.workbench.run.played import moment_played
 from rcilab.workbench.scene.stage import Stage
-from rcilab.workbench.session import Session
-from rcilab.workbench.store import Store
-from rcilab.workbench.text import Text
+from rcilab.workbench.scene.waypoint_markers import ProgramMarks
 from rcilab.workbench.widgets import Ask
 
 if TYPE_CHECKING:
     import viser
 
+    from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
-    from rcilab.workbench.store import UiState
 
 _PERIOD = 1.0 / 30.0  # [s] A choice: the display's rate is enough, and it leaves the processor to the robot.
 _AT_REST = 0.25  # [s] A choice: so often counters and clocks are shown while nothing else changes.
@@ -104,7 +104,9 @@ class Renderer:
         ask: Takes requests.
     """
 
-    def __init__(self, server: viser.ViserServer, store: Store, session: Session, live: LiveChannel, ask: Ask) -> None:
+    def __init__(
+        self, server: viser.ViserServer, store: Store, session: RobotConnection, live: LiveChannel, ask: Ask
+    ) -> None:
         self._server, self._store, self._session, self._live, self._ask = server, store, session, live, ask
         self._stage = Stage(server, ask)
         self._marks = ProgramMarks(server)

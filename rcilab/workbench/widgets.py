@@ -10,12 +10,12 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from rcilab.app.control_lock import ControlLock
+from rcilab.app.requests import Request, TypeField
+from rcilab.app.text import Message
 from rcilab.core.spatial import Pose
 from rcilab.i18n.rounding import fixed
 from rcilab.i18n.units import Unit
-from rcilab.workbench.control_lock import ControlLock
-from rcilab.workbench.requests import Request, TypeField
-from rcilab.workbench.text import Message
 
 Ask: TypeAlias = Callable[[Request], None]
 

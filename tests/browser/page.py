@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from rcilab.workbench import requests
+from rcilab.app import requests
 
 _PROJECT = """([name, offset]) => {
   const m = __viserMutable, node = m.nodeRefFromName[name];

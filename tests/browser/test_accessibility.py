@@ -8,7 +8,7 @@ from importlib.util import find_spec
 
 import pytest
 
-from rcilab.workbench import requests
+from rcilab.app import requests
 
 WORST = ("serious", "critical")
 _UNNAMED = """() => [...document.querySelectorAll('#root button, #root input:not([type=hidden]):not([type=file]), '

@@ -7,7 +7,7 @@ import threading
 import pytest
 
 from browser.test_settings import choose
-from rcilab.workbench import requests
+from rcilab.app import requests
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ import time
 import numpy as np
 import pytest
 
-from rcilab.workbench import requests
+from rcilab.app import requests
 from tests.browser.page import BenchPage, wait_for
 
 pytestmark = pytest.mark.browser

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from browser.page import close_toasts
-from rcilab.workbench import requests
+from rcilab.app import requests
 
 
 @pytest.fixture

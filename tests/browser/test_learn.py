@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rcilab.workbench import requests
+from rcilab.app import requests
 
 _INK = """() => {
   const plot = document.querySelector("div:has(> .rl-under) + div canvas, div:has(> div > .rl-under) + div canvas");

@@ -7,8 +7,8 @@ import json
 import pytest
 
 from browser.test_settings import choose
+from rcilab.app import requests
 from rcilab.motion import Program, Waypoint
-from rcilab.workbench import requests
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from browser.test_settings import choose
-from rcilab.workbench import requests
+from rcilab.app import requests
 
 
 @pytest.fixture

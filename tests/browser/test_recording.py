@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rcilab.app import requests
+from rcilab.app.run.run_recorder import whole_recording
 from rcilab.recording.export import export_run
 from rcilab.recording.run import build_run
 from rcilab.recording.setup import Setup
-from rcilab.workbench import requests
-from rcilab.workbench.run.run_recorder import whole_recording
 from tests.recording.runs import MODEL, some_cycles, some_ideal_run, some_long_run, some_run
 
 

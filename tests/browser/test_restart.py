@@ -47,7 +47,7 @@ def test_a_page_loads_itself_again_when_another_workbench_answers_at_its_address
 def test_a_browser_without_a_graphics_card_draws_lightly_and_a_change_of_graphics_loads_the_page_again(
     chromium, tmp_path
 ) -> None:
-    from rcilab.workbench import requests
+    from rcilab.app import requests
     from rcilab.workbench.app import Workbench, WorkbenchConfig
 
     drawn = "document.documentElement.dataset.rlReady !== undefined && document.documentElement.dataset.rlQuality"

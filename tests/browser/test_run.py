@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from browser.page import close_toasts
-from rcilab.workbench import requests
-from rcilab.workbench.text import message
+from rcilab.app import requests
+from rcilab.app.text import message
 
 
 def test_plan_check_execute_and_the_arm_arrives(page):

@@ -9,8 +9,8 @@ import time
 import numpy as np
 
 from browser.page import BenchPage, close_toasts
+from rcilab.app import requests
 from rcilab.i18n.units import USUAL
-from rcilab.workbench import requests
 
 
 def test_the_language_changes_everywhere_and_back(page):

@@ -6,8 +6,8 @@ import numpy as np
 
 from browser.page import BenchPage
 from browser.test_settings import choose
-from rcilab.workbench.setup.configuration_state import pending_parts
-from rcilab.workbench.setup.fields import faces
+from rcilab.app.setup.configuration_state import pending_parts
+from rcilab.app.setup.setup_fields import faces
 
 
 def test_a_tool_is_typed_the_controller_reports_it_and_the_box_is_dragged_and_taken_back(page: BenchPage):

@@ -14,7 +14,7 @@ import viser
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
-from rcilab.workbench import requests
+from rcilab.app import requests
 from rcilab.workbench.app import Workbench
 from tests.fuzz.noise import spoilt
 from tests.makers.rokae.controller.test_server import running

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rcilab.app.text import Text
 from rcilab.i18n.number_parsing import parse_number, parse_quaternion
-from rcilab.workbench.text import Text
 
 
 @pytest.mark.parametrize(

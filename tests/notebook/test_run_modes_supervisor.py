@@ -10,7 +10,7 @@ import pytest
 
 import rcilab
 from rcilab import notebook
-from rcilab.app.mode_parameters import PARTS_OF_MODE
+from rcilab.app.run.mode_parameters import PARTS_OF_MODE
 from rcilab.control_process import SupervisorStatus
 from rcilab.core.state import MODES
 from rcilab.i18n.locale import LANGUAGES

@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import pytest
 
+from rcilab.app.run.run_recorder import whole_recording
+from rcilab.app.text import Text as PageText
 from rcilab.i18n.translator import Text
 from rcilab.recording.export import export_run
 from rcilab.recording.tracking_words import tracking_notes
 from rcilab.workbench.panels.recording import summary_html
-from rcilab.workbench.run.run_recorder import whole_recording
-from rcilab.workbench.text import Text as PageText
 from tests.recording.runs import SETUP, some_ideal_run, some_run, some_stopped_run
 
 

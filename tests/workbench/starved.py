@@ -13,7 +13,7 @@ from pathlib import Path
 
 import msgspec
 
-from rcilab.workbench import requests
+from rcilab.app import requests
 from rcilab.workbench.app import Workbench, WorkbenchConfig
 from tests.fuzz.wires import open_page
 from tests.workbench.opened import told, wait

@@ -9,18 +9,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rcilab.app import dispatcher as conductor
+from rcilab.app import requests
 from rcilab.app.planning import make_plan
+from rcilab.app.run.readiness import obstacle, time_shown
+from rcilab.app.text import Text
 from rcilab.core.errors import InvalidValueError, ModelError, UsageError
 from rcilab.i18n.units import Units
 from rcilab.model.robot_model import load_model
-from rcilab.workbench import dispatcher as conductor
-from rcilab.workbench import requests
 from rcilab.workbench.app import Workbench, WorkbenchConfig
 from rcilab.workbench.panels.arm_state import arm_html
 from rcilab.workbench.panels.target import planned_html
 from rcilab.workbench.panels.timeline import TimelinePanel
-from rcilab.workbench.run.readiness import obstacle, time_shown
-from rcilab.workbench.text import Text
 from tests.workbench.opened import opened, told, wait
 
 

@@ -11,6 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rcilab.app import requests
+from rcilab.app.autosave import Autosave, keepsake_file
+from rcilab.app.goal.goal_actions import initial_goal
+from rcilab.app.program.program_draft import draft_of
+from rcilab.app.store import UiState
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.makers.rokae.driver.configuration import ForceControlFrame, RobotConfiguration
@@ -18,12 +23,7 @@ from rcilab.makers.rokae.wire import ForceFrame
 from rcilab.model.dynamics.payload import Payload
 from rcilab.model.robot_model import load_model
 from rcilab.motion import Program, Waypoint
-from rcilab.workbench import requests
 from rcilab.workbench.app import Workbench, WorkbenchConfig
-from rcilab.workbench.autosave import Autosave, keepsake_file
-from rcilab.workbench.goal.actions import initial_goal
-from rcilab.workbench.program.draft import draft_of
-from rcilab.workbench.store import UiState
 from tests.recording.runs import some_run
 from tests.waiting import wait_for
 

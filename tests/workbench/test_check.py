@@ -10,24 +10,24 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from rcilab.app import requests
+from rcilab.app.check.check_actions import CheckActions, plot_of
+from rcilab.app.check.slowdown_job import scaled, slow_to_goal
+from rcilab.app.goal.goal_actions import GoalActions, initial_goal
 from rcilab.app.planning import Plan
+from rcilab.app.program.program_actions import ProgramActions
+from rcilab.app.program.program_draft import Draft, number_at
+from rcilab.app.store import Store, UiState
+from rcilab.app.text import Text
+from rcilab.app.view_actions import PLOTS
 from rcilab.conformance import CONDITIONS
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.i18n.units import Units
 from rcilab.model.robot_model import load_model
 from rcilab.motion import Program, Waypoint
-from rcilab.workbench import requests
-from rcilab.workbench.check.actions import CheckActions, plot_of
-from rcilab.workbench.check.slowing import scaled, slow_to_goal
-from rcilab.workbench.goal.actions import GoalActions, initial_goal
 from rcilab.workbench.panels.check import CheckPanel
 from rcilab.workbench.panels.check_rows import row_tone, rows_html
-from rcilab.workbench.program.actions import ProgramActions
-from rcilab.workbench.program.draft import Draft, number_at
-from rcilab.workbench.store import Store, UiState
-from rcilab.workbench.text import Text
-from rcilab.workbench.view_actions import PLOTS
 from tests.waiting import wait_for
 
 MODEL = load_model("xMatePro7")
@@ -163,8 +163,11 @@ def planned_program(bench: Bench) -> Draft:
 
 
 def test_a_program_is_slowed_as_a_whole_and_stays_that_program(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in ("program.planning", "check.slowing"):  # By its own law this program conforms to everything.
-        monkeypatch.setattr(f"rcilab.workbench.{module}.PROGRAM_LAW", "jerk_limited")
+    for module in (
+        "program.program_planning",
+        "check.slowdown_job",
+    ):  # By its own law this program conforms to everything.
+        monkeypatch.setattr(f"rcilab.app.{module}.PROGRAM_LAW", "jerk_limited")
     draft, fast = planned_program(bench), bench.plan
     assert broken(fast)
     bench.press("slow")

@@ -8,18 +8,18 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from rcilab.app.mode_parameters import PARTS_OF_MODE, said_ranges
+from rcilab.app import requests
+from rcilab.app.run.drive_state import control_field
+from rcilab.app.run.mode_parameters import PARTS_OF_MODE, said_ranges
+from rcilab.app.run.played_motion import played_path
+from rcilab.app.text import Text, load_catalogue
 from rcilab.control_process.jitter_histogram import JitterHistogram, summarise
 from rcilab.core.state import MODES
 from rcilab.makers.rokae.controller.settings import default_settings
 from rcilab.makers.rokae.driver.controller_parameters import control_ranges, standard_control
 from rcilab.model.robot_model import load_model
-from rcilab.workbench import requests
 from rcilab.workbench.app import Workbench
 from rcilab.workbench.panels.health import histogram_html
-from rcilab.workbench.run.driving import control_field
-from rcilab.workbench.run.played import played_path
-from rcilab.workbench.text import Text, load_catalogue
 from tests.workbench.opened import opened, told, wait
 
 MODEL = load_model("xMatePro7")

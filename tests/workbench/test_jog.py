@@ -10,18 +10,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rcilab.control_process import SupervisorStatus
-from rcilab.core.errors import ControlError, UsageError
-from rcilab.core.safety_box import SafetyBox
-from rcilab.core.spatial import Pose
-from rcilab.makers.rokae.driver.configuration import RobotConfiguration
-from rcilab.model.robot_model import load_model
-from rcilab.workbench import requests
-from rcilab.workbench.control_lock import ControlLock
-from rcilab.workbench.goal.actions import GoalActions, initial_goal
-from rcilab.workbench.jog import actions as jog_actions
-from rcilab.workbench.jog.actions import JogActions
-from rcilab.workbench.jog.jogging import (
+from rcilab.app import requests
+from rcilab.app.control_lock import ControlLock
+from rcilab.app.goal.goal_actions import GoalActions, initial_goal
+from rcilab.app.jog import jog_actions
+from rcilab.app.jog.jog_actions import JogActions
+from rcilab.app.jog.jog_state import (
     AXES,
     FASTEST_TOOL,
     STANDING,
@@ -31,8 +25,14 @@ from rcilab.workbench.jog.jogging import (
     jog_velocity,
     safe_share,
 )
-from rcilab.workbench.jog.step import step_pose, take_step
-from rcilab.workbench.store import Store, UiState
+from rcilab.app.jog.jog_step import step_pose, take_step
+from rcilab.app.store import Store, UiState
+from rcilab.control_process import SupervisorStatus
+from rcilab.core.errors import ControlError, UsageError
+from rcilab.core.safety_box import SafetyBox
+from rcilab.core.spatial import Pose
+from rcilab.makers.rokae.driver.configuration import RobotConfiguration
+from rcilab.model.robot_model import load_model
 from tests.workbench.opened import opened, wait
 
 MODEL = load_model("xMatePro7")

@@ -9,20 +9,20 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from rcilab.app import requests
 from rcilab.app.fault_lab import FAULTS
 from rcilab.app.fault_lab.demo_view import body_html, head_html
+from rcilab.app.goal.goal_actions import GoalActions, initial_goal
+from rcilab.app.learn.learn_actions import LearnActions
+from rcilab.app.learn.learn_state import exhibited
+from rcilab.app.learn.lessons import LESSONS
+from rcilab.app.store import Recording, Store, UiState
+from rcilab.app.text import LANGUAGES, Text, load_catalogue
 from rcilab.core.faults import Fault
 from rcilab.i18n.units import Units
 from rcilab.model.robot_model import load_model
 from rcilab.views.plots import build_frame, mark_moment, plan_curves
-from rcilab.workbench import requests
-from rcilab.workbench.goal.actions import GoalActions, initial_goal
-from rcilab.workbench.learn.actions import LearnActions
-from rcilab.workbench.learn.lessons import LESSONS
-from rcilab.workbench.learn.state import exhibited
 from rcilab.workbench.panels.learn_lesson import steps_html
-from rcilab.workbench.store import Recording, Store, UiState
-from rcilab.workbench.text import LANGUAGES, Text, load_catalogue
 from tests.waiting import wait_for
 
 MODEL = load_model("xMatePro7")

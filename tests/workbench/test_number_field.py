@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
+from rcilab.app.requests import Request, TypeField
+from rcilab.app.text import message
 from rcilab.workbench import widgets
-from rcilab.workbench.requests import Request, TypeField
-from rcilab.workbench.text import message
 from rcilab.workbench.widgets import BoundControl, NumberField
 
 

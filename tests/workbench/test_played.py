@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 
 from rcilab.app.planning import Plan, make_plan
+from rcilab.app.run.played_motion import moment_played, paced_of, played_at, played_path, streamed_rows
+from rcilab.app.run.replay import replayed
+from rcilab.app.run.run_recorder import as_recording
+from rcilab.app.store import UiState
+from rcilab.app.text import Text
 from rcilab.conformance.speed_scaling_check import plan_pace
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.motion.speed_scaling import as_planned
 from rcilab.views.plots import build_frame, plan_curves, recorded_curves, streamed_curves
 from rcilab.workbench.panels.plot_contents import legend_html
 from rcilab.workbench.panels.status import status_values
-from rcilab.workbench.run.played import moment_played, paced_of, played_at, played_path, streamed_rows
-from rcilab.workbench.run.replay import replayed
-from rcilab.workbench.run.run_recorder import as_recording
-from rcilab.workbench.store import UiState
-from rcilab.workbench.text import Text
 from tests.recording.runs import some_cycles, some_run
 from tests.workbench.test_status_text import initial_state, status
 

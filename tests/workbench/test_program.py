@@ -11,25 +11,24 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from rcilab.app import requests
+from rcilab.app.check.check_state import CheckState, Slowed
+from rcilab.app.check.freshness import outdated
+from rcilab.app.goal.goal_actions import GoalActions, initial_goal
+from rcilab.app.program import program_actions, program_planning
+from rcilab.app.program.program_actions import ProgramActions
+from rcilab.app.program.program_draft import draft_of, number_at, tell_place, time_at
+from rcilab.app.run.readiness import may_go_back, may_plan_again, obstacle
+from rcilab.app.store import Store, UiState
+from rcilab.app.text import Text
 from rcilab.core.spatial import Pose
 from rcilab.makers.rokae.driver.configuration import RobotConfiguration
 from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, Program, Waypoint
-from rcilab.workbench import requests
-from rcilab.workbench.check.freshness import outdated
-from rcilab.workbench.check.state import CheckState, Slowed
-from rcilab.workbench.goal.actions import GoalActions, initial_goal
 from rcilab.workbench.panels.program import read_row
 from rcilab.workbench.panels.program_list import list_html, notes_html
 from rcilab.workbench.panels.target import planned_html
-from rcilab.workbench.program import actions as program_actions
-from rcilab.workbench.program import planning as program_planning
-from rcilab.workbench.program.actions import ProgramActions
-from rcilab.workbench.program.draft import draft_of, number_at, tell_place, time_at
-from rcilab.workbench.program.waypoint_markers import label_of, labels_of
-from rcilab.workbench.run.readiness import may_go_back, may_plan_again, obstacle
-from rcilab.workbench.store import Store, UiState
-from rcilab.workbench.text import Text
+from rcilab.workbench.scene.waypoint_markers import label_of, labels_of
 from tests.waiting import wait_for
 
 MODEL = load_model("xMatePro7")

@@ -11,18 +11,18 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from rcilab.app import requests
+from rcilab.app.control_lock import ControlLock
+from rcilab.app.goal.goal_actions import initial_goal
+from rcilab.app.run import push_actions
+from rcilab.app.run.active_force import SPRING, STRONGEST, TOOL, place_of, spring_force
+from rcilab.app.run.push_actions import PushActions
+from rcilab.app.run.run_actions import RunActions
+from rcilab.app.store import Store, UiState
 from rcilab.control_process import SupervisorStatus
 from rcilab.core.errors import UsageError
 from rcilab.model.robot_model import load_model
-from rcilab.workbench import requests
 from rcilab.workbench.app import Workbench
-from rcilab.workbench.control_lock import ControlLock
-from rcilab.workbench.goal.actions import initial_goal
-from rcilab.workbench.run import push_actions
-from rcilab.workbench.run.actions import RobotActions
-from rcilab.workbench.run.active_force import SPRING, STRONGEST, TOOL, place_of, spring_force
-from rcilab.workbench.run.push_actions import PushActions
-from rcilab.workbench.store import Store, UiState
 from tests.workbench.opened import opened, told, wait
 
 MODEL = load_model("xMatePro7")
@@ -181,7 +181,7 @@ def test_an_arm_at_an_address_cannot_be_pushed_and_that_is_said(actions, store, 
 
 
 def test_guiding_that_ends_because_nobody_is_there_is_told(store, session):
-    robot = RobotActions(store, session)
+    robot = RunActions(store, session)
     for phase, code in (("moving", "moving.guided"), ("stopping", "stopping"), ("idle", "idle.operator")):
         session.shown = replace(OWN, phase=phase, code=code)
         robot.watch()
@@ -196,7 +196,7 @@ def test_a_real_arm_is_freed_only_when_asked_twice(store, session, monkeypatch):
     )
     monkeypatch.setattr(session, "supervisor", lambda: supervisor)
     store.update(target="rci://192.168.0.160:1337")
-    robot = RobotActions(store, session)
+    robot = RunActions(store, session)
     robot.drive(requests.RobotCommand(page=1, what="guide"))
     assert store.state.notice.text.code == "guide.sure"
     assert freed == []
@@ -206,7 +206,7 @@ def test_a_real_arm_is_freed_only_when_asked_twice(store, session, monkeypatch):
 
 def test_the_plant_is_not_chosen_for_a_robot_at_an_address(store, session):
     store.update(target="rci://192.168.0.160:1337")
-    RobotActions(store, session).choose_robot(requests.ChooseRobot(page=1, plant="ideal"))
+    RunActions(store, session).choose_robot(requests.ChooseRobot(page=1, plant="ideal"))
     assert store.state.notice.text.code == "plant.address"
     assert store.state.plant == "mujoco"
 

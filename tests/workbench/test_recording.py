@@ -12,24 +12,24 @@ import numpy as np
 import pytest
 
 import rcilab
+from rcilab.app import requests
+from rcilab.app.goal.goal_actions import initial_goal
+from rcilab.app.run.export_actions import ENDINGS
+from rcilab.app.run.readiness import obstacle
+from rcilab.app.run.replay import replayed_pose, require_replayable
+from rcilab.app.run.run_recorder import whole_recording
+from rcilab.app.store import UiState
+from rcilab.app.text import Text
 from rcilab.core.errors import UsageError
 from rcilab.core.faults import Fault
 from rcilab.model.robot_model import load_model
 from rcilab.recording.export import export_run
 from rcilab.recording.run_file import decode_run
 from rcilab.recording.setup import Setup
-from rcilab.workbench import requests
 from rcilab.workbench.app import Workbench, WorkbenchConfig
-from rcilab.workbench.goal.actions import initial_goal
 from rcilab.workbench.panels.outcome import outcome_html, replay_html
 from rcilab.workbench.panels.recording import progress_html, summary_html
 from rcilab.workbench.panels.timeline import TimelinePanel
-from rcilab.workbench.run.export_actions import ENDINGS
-from rcilab.workbench.run.readiness import obstacle
-from rcilab.workbench.run.replay import replayed_pose, require_replayable
-from rcilab.workbench.run.run_recorder import whole_recording
-from rcilab.workbench.store import UiState
-from rcilab.workbench.text import Text
 from tests.recording.runs import PLAN, some_run
 from tests.workbench.opened import told, wait
 

@@ -7,10 +7,10 @@ from collections.abc import Iterator
 import pytest
 
 from rcilab import connect
+from rcilab.app import requests
+from rcilab.app.run.readiness import may_lead_inside
 from rcilab.control_process.launch import start_controller
-from rcilab.workbench import requests
 from rcilab.workbench.app import Workbench, WorkbenchConfig
-from rcilab.workbench.run.readiness import may_lead_inside
 from tests.outside import JOINT, drive_outside
 from tests.workbench.opened import wait
 

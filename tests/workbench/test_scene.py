@@ -11,21 +11,21 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from rcilab.app import requests
+from rcilab.app.goal.elbow import look_at_elbow, nearest_free
+from rcilab.app.goal.goal_actions import SETTLED, GoalActions, initial_goal
+from rcilab.app.scene.scene_actions import SceneActions
+from rcilab.app.store import Store, UiState
+from rcilab.app.text import LANGUAGES, Text
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.model.robot_model import load_model
-from rcilab.workbench import requests
-from rcilab.workbench.goal.actions import SETTLED, GoalActions, initial_goal
-from rcilab.workbench.goal.elbow import look_at_elbow, nearest_free
 from rcilab.workbench.live import Heard, LiveChannel
 from rcilab.workbench.panels.branches import BranchesPanel
 from rcilab.workbench.panels.elbow import ring_html
 from rcilab.workbench.panels.target import planned_html
 from rcilab.workbench.panels.timeline import TimelinePanel
-from rcilab.workbench.scene.actions import SceneActions
 from rcilab.workbench.scene.path_strip_view import bead_words
-from rcilab.workbench.store import Store, UiState
-from rcilab.workbench.text import LANGUAGES, Text
 
 MODEL = load_model("xMatePro7")
 HOME = np.array(MODEL.home)
@@ -225,7 +225,7 @@ def test_a_plan_that_leaves_the_box_has_a_bead_that_leads_to_its_moment(bench):
 
 
 def test_a_line_is_planned_once_the_goal_stands_still_and_keeps_the_tool_on_it(bench, monkeypatch):
-    from rcilab.workbench.goal import actions
+    from rcilab.app.goal import goal_actions as actions
 
     now = [100.0]
     monkeypatch.setattr(actions, "time", SimpleNamespace(monotonic=lambda: now[0]))

@@ -9,31 +9,31 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rcilab.control_process import SupervisorStatus
-from rcilab.control_process.launch import start_controller
-from rcilab.core.errors import CommandRejectedError
-from rcilab.core.spatial import Pose
-from rcilab.makers.rokae import wire as rci
-from rcilab.makers.rokae.driver.configuration import SETUP_PARTS, RobotConfiguration
-from rcilab.workbench import requests
-from rcilab.workbench.app import Workbench
-from rcilab.workbench.check.freshness import outdated
-from rcilab.workbench.panels.check import CheckPanel
-from rcilab.workbench.panels.program_list import list_html
-from rcilab.workbench.panels.setup import SetupPanel
-from rcilab.workbench.panels.target import TargetPanel, planned_html
-from rcilab.workbench.program.draft import target_of
-from rcilab.workbench.run.readiness import obstacle
-from rcilab.workbench.scene.configuration_view import hides_target
-from rcilab.workbench.setup.configuration_state import (
+from rcilab.app import requests
+from rcilab.app.check.freshness import outdated
+from rcilab.app.program.program_draft import target_of
+from rcilab.app.run.readiness import obstacle
+from rcilab.app.setup.configuration_state import (
     SetupState,
     describe_held,
     describe_part,
     pending_parts,
     setup_obstacle,
 )
-from rcilab.workbench.setup.fields import FACE_NAMES, FIELD_NAMES, faces, read_field, with_field
-from rcilab.workbench.text import Message, Text
+from rcilab.app.setup.setup_fields import FACE_NAMES, FIELD_NAMES, faces, read_field, with_field
+from rcilab.app.text import Message, Text
+from rcilab.control_process import SupervisorStatus
+from rcilab.control_process.launch import start_controller
+from rcilab.core.errors import CommandRejectedError
+from rcilab.core.spatial import Pose
+from rcilab.makers.rokae import wire as rci
+from rcilab.makers.rokae.driver.configuration import SETUP_PARTS, RobotConfiguration
+from rcilab.workbench.app import Workbench
+from rcilab.workbench.panels.check import CheckPanel
+from rcilab.workbench.panels.program_list import list_html
+from rcilab.workbench.panels.setup import SetupPanel
+from rcilab.workbench.panels.target import TargetPanel, planned_html
+from rcilab.workbench.scene.configuration_view import hides_target
 from tests.workbench.opened import opened, told, wait
 
 NO_TURN = (1.0, 0.0, 0.0, 0.0)

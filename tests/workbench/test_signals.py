@@ -6,10 +6,10 @@ from collections.abc import Iterator
 
 import pytest
 
-from rcilab.workbench import requests
+from rcilab.app import requests
+from rcilab.app.text import Text
 from rcilab.workbench.app import Workbench
 from rcilab.workbench.panels.signals import levels_html
-from rcilab.workbench.text import Text
 from tests.workbench.opened import opened, wait
 
 

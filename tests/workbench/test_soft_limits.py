@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from rcilab.workbench import requests
+from rcilab.app import requests
 from rcilab.workbench.app import Workbench
 from tests.workbench.opened import opened, wait
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from rcilab.app.autosave import Autosave
 from rcilab.recording.folder import keep_newest, stored_runs
-from rcilab.workbench.autosave import Autosave
 from tests.workbench import starved
 from tests.workbench.test_autosave import MODEL, state_with_all
 

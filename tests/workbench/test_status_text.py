@@ -9,6 +9,12 @@ from typing import cast
 import pytest
 
 from rcilab.app.planning import Plan, make_plan
+from rcilab.app.robot_connection import RobotConnection
+from rcilab.app.run.readiness import obstacle
+from rcilab.app.run.run_actions import RunActions
+from rcilab.app.status_text import StartingError, phase_code, tell_error, tell_incident, tell_status
+from rcilab.app.store import Store
+from rcilab.app.text import Text
 from rcilab.control_process import SupervisorStatus
 from rcilab.control_process.status import MESSAGES, Incident
 from rcilab.core.errors import CertificateError, ConnectionLostError, ControlError, InvalidValueError, RcilabError
@@ -18,12 +24,6 @@ from rcilab.makers.rokae.driver.address import parse_address
 from rcilab.sim.api import WorldStatus
 from rcilab.workbench.panels.health import health_html
 from rcilab.workbench.panels.status import status_values
-from rcilab.workbench.run.actions import RobotActions
-from rcilab.workbench.run.readiness import obstacle
-from rcilab.workbench.session import Session
-from rcilab.workbench.status_text import StartingError, phase_code, tell_error, tell_incident, tell_status
-from rcilab.workbench.store import Store
-from rcilab.workbench.text import Text
 
 CALLS = ("()", "load_model", ".record", "restart", "reconnect", "recover leads", "COMMAND_")
 
@@ -132,8 +132,8 @@ class Power:
 
 def test_the_virtual_arm_is_switched_on_however_late_its_control_process_comes(monkeypatch):
     store, side, now = Store(initial_state()), Power(), [100.0]
-    monkeypatch.setattr("rcilab.workbench.run.actions.time.monotonic", lambda: now[0])
-    robot = RobotActions(store, cast(Session, side))
+    monkeypatch.setattr("rcilab.app.run.run_actions.time.monotonic", lambda: now[0])
+    robot = RunActions(store, cast(RobotConnection, side))
     robot.watch()
     assert (store.state.notice, side.asked) == (None, 0), "nobody asked for anything"
     side.is_there = True
@@ -190,9 +190,9 @@ def test_the_share_of_commands_in_time_is_that_of_a_motion_and_marked_as_past_af
 
 
 def initial_state():
+    from rcilab.app.goal.goal_actions import initial_goal
+    from rcilab.app.store import UiState
     from rcilab.model.robot_model import load_model
-    from rcilab.workbench.goal.actions import initial_goal
-    from rcilab.workbench.store import UiState
 
     model = load_model("xMatePro7")
     return UiState(model=model, goal=initial_goal(model, model.home))

@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 from websockets.sync.client import connect
 
+from rcilab.app import requests
+from rcilab.app.run.readiness import describe_move, obstacle
+from rcilab.app.status_text import tell_status
+from rcilab.app.text import Text
 from rcilab.control_process.launch import start_controller
-from rcilab.workbench import requests
 from rcilab.workbench.app import Workbench, WorkbenchConfig
-from rcilab.workbench.run.readiness import describe_move, obstacle
-from rcilab.workbench.status_text import tell_status
-from rcilab.workbench.text import Text
 from tests.workbench.opened import told, wait
 
 

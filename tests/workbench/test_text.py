@@ -9,19 +9,22 @@ from pathlib import Path
 
 import pytest
 
-import rcilab.workbench
+import rcilab
 from rcilab.app.planning import LAWS
+from rcilab.app.text import LANGUAGES, Text, load_catalogue, message
+from rcilab.app.view_actions import QUALITIES
 from rcilab.conformance import CONDITIONS
 from rcilab.control_process.status import PHASES
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.faults import Fault
 from rcilab.core.state import ControllerMode, RobotMode
 from rcilab.i18n.locale import load_words
-from rcilab.workbench.text import LANGUAGES, Text, load_catalogue, message
-from rcilab.workbench.view_actions import QUALITIES
 from tests.catalogues import require_equal
 
-SOURCES = sorted(Path(rcilab.workbench.__file__).parent.rglob("*.py"))
+_ROOT = Path(rcilab.__file__).parent
+SOURCES = sorted(
+    path for part in ("app", "workbench") for path in (_ROOT / part).rglob("*.py") if path.parent.name != "fault_lab"
+)
 
 
 def test_every_language_has_the_same_keys_and_places_to_fill():
@@ -30,7 +33,7 @@ def test_every_language_has_the_same_keys_and_places_to_fill():
 
 def test_no_key_stands_twice_in_a_catalogue():
     for language in LANGUAGES:
-        text = (files("rcilab.workbench") / "catalogues" / f"{language}.json").read_text(encoding="utf-8")
+        text = (files("rcilab.app") / "catalogues" / f"{language}.json").read_text(encoding="utf-8")
         pairs = json.loads(text, object_pairs_hook=list)
         assert len(pairs) == len(dict(pairs)), language
         assert not dict(pairs).keys() & load_words("rcilab.i18n", language).keys(), "said twice: page and shared"

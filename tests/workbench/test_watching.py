@@ -12,7 +12,7 @@ import pytest
 import viser
 from websockets.sync.client import ClientConnection, connect
 
-from rcilab.workbench import requests
+from rcilab.app import requests
 from rcilab.workbench.app import Workbench
 from tests.workbench.opened import opened, told, wait
 

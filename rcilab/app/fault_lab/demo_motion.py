@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from rcilab.app.planning import Plan, picture
+from rcilab.app.planning import Plan, build_plan_view
 from rcilab.core.clock import CYCLE_TIME
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ def exhibition_of(exhibit: FaultDemo) -> DemoMotion:
 
     def draw(motion: Motion) -> Plan:
         judged = Motion.from_cycles(motion.q[: exhibit.sample + 1])  # From there on the way is the controller's.
-        return picture(exhibit.model, motion, check(judged, exhibit.model, distance=None))
+        return build_plan_view(exhibit.model, motion, check(judged, exhibit.model, distance=None))
 
     commanded = exhibit.commanded
     return DemoMotion(

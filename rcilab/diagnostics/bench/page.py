@@ -8,10 +8,10 @@ from contextlib import nullcontext
 
 import numpy as np
 
+from rcilab.app import requests
 from rcilab.diagnostics.bench.browser import find_chromium, open_page
 from rcilab.diagnostics.bench.loop import Streamed, stream, wait_for
 from rcilab.diagnostics.bench.measure import Measurement, summarise
-from rcilab.workbench import requests
 from rcilab.workbench.app import Workbench, WorkbenchConfig
 
 _DRAGS = 200

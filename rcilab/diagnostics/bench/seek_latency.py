@@ -8,6 +8,7 @@ import time
 import numpy as np
 from websockets.sync.client import connect
 
+from rcilab.app import requests
 from rcilab.core.cycle_log import cycle_dtype
 from rcilab.core.errors import RcilabError
 from rcilab.diagnostics.bench.browser import find_chromium
@@ -17,7 +18,6 @@ from rcilab.diagnostics.bench.measure import Absent, Measurement, summarise
 from rcilab.diagnostics.bench.tab import no_browser, open_tab
 from rcilab.model.robot_model import RobotModel, load_model
 from rcilab.recording.run import Run, build_run
-from rcilab.workbench import requests
 from rcilab.workbench.app import Workbench, WorkbenchConfig
 from rcilab.workbench.live import LIVE_PATH
 

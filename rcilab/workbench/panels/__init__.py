@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Protocol
 
 if TYPE_CHECKING:
+    from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
-    from rcilab.workbench.store import UiState
 
 
 class Panel(Protocol):

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rcilab.workbench.text import Text
+from rcilab.app.text import Text
 from rcilab.workbench.widgets import Ask, Html, esc, shown_pose
 
 if TYPE_CHECKING:
+    from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
     from rcilab.model.robot_model import RobotModel
-    from rcilab.workbench.store import UiState
 
 _PERIOD = 0.2  # [s] A choice: numbers that change faster cannot be read.
 

@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rcilab.app.reach import NEAR_LIMIT, margin, telling_joints
-from rcilab.workbench import requests
-from rcilab.workbench.text import Text
+from rcilab.app import requests
+from rcilab.app.goal.target_status import NEAR_LIMIT, margin, telling_joints
+from rcilab.app.text import Text
 from rcilab.workbench.widgets import Ask, Html, esc
 
 if TYPE_CHECKING:
+    from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
-    from rcilab.workbench.store import UiState
 
 _MOST = 16
 

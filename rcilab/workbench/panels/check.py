@@ -6,17 +6,17 @@ import re
 import time
 from typing import TYPE_CHECKING, Any
 
-from rcilab.workbench import requests
-from rcilab.workbench.check.freshness import beside_program, outdated
+from rcilab.app import requests
+from rcilab.app.check.freshness import beside_program, outdated
+from rcilab.app.run.readiness import is_moving
+from rcilab.app.text import Message, Text
 from rcilab.workbench.panels.check_rows import count_unheeded, rows_html
-from rcilab.workbench.run.readiness import is_moving
-from rcilab.workbench.text import Message, Text
 from rcilab.workbench.widgets import Ask, Html, esc, on_press
 
 if TYPE_CHECKING:
     from rcilab.app.planning import Plan
+    from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
-    from rcilab.workbench.store import UiState
 
 _MOMENT = 0.5  # [s] A choice: what takes longer gets a bar and a way to end it.
 _SAID = re.compile(r"[0-9]+:([a-z_.]{1,60})")

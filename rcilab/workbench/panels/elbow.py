@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rcilab.app import requests
+from rcilab.app.goal.elbow import LOOKS, Elbow, say_why
+from rcilab.app.text import Text
 from rcilab.views.elbow_view import ARC_COLORS, free_colors
-from rcilab.workbench import requests
-from rcilab.workbench.goal.elbow import LOOKS, Elbow, say_why
 from rcilab.workbench.panels.jog import problems_html
-from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, BoundControl, Html, NumberField, esc, shown
 
 if TYPE_CHECKING:
+    from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
-    from rcilab.workbench.store import UiState
 
 _NARROW = math.radians(5.0)  # [rad] A tuning value: in less the elbow hardly moves aside.
 _HEIGHT = {"free": 10, "other": 4}  # Of 14; forbidden arcs are as high as hatched.

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.workbench import requests
-from rcilab.workbench.scene.extras import EXTRAS, Extra
-from rcilab.workbench.text import Text
+from rcilab.app import requests
+from rcilab.app.scene.scene_extras import EXTRAS, Extra
+from rcilab.app.text import Text
 from rcilab.workbench.widgets import Ask, BoundControl
 
 if TYPE_CHECKING:
+    from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
-    from rcilab.workbench.store import UiState
 
 
 class ExtrasPanel:

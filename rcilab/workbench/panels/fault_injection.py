@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from rcilab.app import requests
+from rcilab.app.run.drive_state import NETWORK_LAB, is_ours
+from rcilab.app.text import Text
 from rcilab.control_process.status_messages import tell_success
 from rcilab.core.faults import name_faults
 from rcilab.i18n.error_messages import tell_note
 from rcilab.sim.api import DIRECTIONS
-from rcilab.workbench import requests
-from rcilab.workbench.run.driving import NETWORK_LAB, is_ours
-from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, BoundControl, Html, esc, on_press
 
 if TYPE_CHECKING:
+    from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
-    from rcilab.workbench.store import UiState
 
 _SCALE = {"%": 100.0, "ms": 1000.0}
 _BUTTONS: tuple[tuple[Any, str, str], ...] = (

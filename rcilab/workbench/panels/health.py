@@ -6,14 +6,14 @@ import math
 import time
 from typing import TYPE_CHECKING, Any
 
+from rcilab.app.text import Text
 from rcilab.control_process.status_messages import tell_success
-from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, Html, esc
 
 if TYPE_CHECKING:
+    from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
     from rcilab.control_process.status import Lateness
-    from rcilab.workbench.store import UiState
 
 _PERIOD = 0.3  # [s] between two looks: as fast as one reads, and cheap.
 _LATE = 1000.0  # [us] From here on a cycle counts as late.

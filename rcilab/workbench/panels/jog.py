@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rcilab.app.reach import NEAR_LIMIT
+from rcilab.app import requests
+from rcilab.app.goal.target_status import NEAR_LIMIT
+from rcilab.app.jog.jog_state import FASTEST_JOINT, FASTEST_TOOL, FASTEST_TURN, STEPS, no_jog
+from rcilab.app.text import Text
 from rcilab.conformance.explain import explain_limit
-from rcilab.workbench import requests
-from rcilab.workbench.jog.jogging import FASTEST_JOINT, FASTEST_TOOL, FASTEST_TURN, STEPS, no_jog
-from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, BoundControl, Html, NumberField, esc, on_press, shown
 
 if TYPE_CHECKING:
+    from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
-    from rcilab.workbench.store import UiState
 
 _HOLD_RATE = 10.0  # [1/s] A held button says so this often.
 

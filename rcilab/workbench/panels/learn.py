@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from rcilab.app import requests
 from rcilab.app.fault_lab import FAULTS, GROUPS
-from rcilab.workbench import requests
-from rcilab.workbench.text import Text
+from rcilab.app.text import Text
 from rcilab.workbench.widgets import Ask, Html, esc, on_press
 
 if TYPE_CHECKING:
+    from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
     from rcilab.core.faults import Fault
-    from rcilab.workbench.store import UiState
 
 
 class LearnPanel:

@@ -6,17 +6,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rcilab.app import requests
 from rcilab.app.fault_lab.demo_view import body_html, head_html
-from rcilab.workbench import requests
+from rcilab.app.text import Text
 from rcilab.workbench.panels.learn_plot import exhibit_contents
 from rcilab.workbench.panels.plot_contents import plot_axes
-from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, Html, esc, on_press
 
 if TYPE_CHECKING:
     from rcilab.app.fault_lab import FaultDemo
+    from rcilab.app.store import Theme, UiState
     from rcilab.control_process import SupervisorStatus
-    from rcilab.workbench.store import Theme, UiState
 
 _HEIGHT = 150  # [px]
 _AROUND = 0.06  # Part of the recorded time that the plot goes on behind the fault, so that its mark is whole.

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.workbench import requests
-from rcilab.workbench.learn.lessons import LESSONS
-from rcilab.workbench.text import Text
+from rcilab.app import requests
+from rcilab.app.learn.lessons import LESSONS
+from rcilab.app.text import Text
 from rcilab.workbench.widgets import Ask, Html, esc, on_press
 
 if TYPE_CHECKING:
+    from rcilab.app.learn.learn_state import LessonState
+    from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
-    from rcilab.workbench.learn.state import LessonState
-    from rcilab.workbench.store import UiState
 
 
 class LearnLessonPanel:

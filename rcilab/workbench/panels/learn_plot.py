@@ -12,7 +12,7 @@ from rcilab.core.arrays import Array
 from rcilab.workbench.panels.plot_contents import joint_color
 
 if TYPE_CHECKING:
-    from rcilab.workbench.store import Theme
+    from rcilab.app.store import Theme
 
 _RED = {"light": "#d1392b", "dark": "#ff7b70"}
 

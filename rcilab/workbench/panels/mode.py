@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.app.mode_parameters import PARTS_OF_MODE, held_rows, name_number, name_part
+from rcilab.app import requests
+from rcilab.app.run.drive_state import is_pending
+from rcilab.app.run.mode_parameters import PARTS_OF_MODE, held_rows, name_number, name_part
+from rcilab.app.run.readiness import is_moving
+from rcilab.app.text import Text, message
 from rcilab.core.state import MODES, Mode
 from rcilab.makers.rokae.driver.controller_parameters import (
     ControllerParameters,
@@ -12,16 +16,12 @@ from rcilab.makers.rokae.driver.controller_parameters import (
     control_ranges,
     standard_control,
 )
-from rcilab.workbench import requests
 from rcilab.workbench.panels.jog import problems_html
-from rcilab.workbench.run.driving import is_pending
-from rcilab.workbench.run.readiness import is_moving
-from rcilab.workbench.text import Text, message
 from rcilab.workbench.widgets import Ask, BoundControl, Html, NumberField, esc, on_press
 
 if TYPE_CHECKING:
+    from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
-    from rcilab.workbench.store import UiState
 
 
 class ModePanel:

@@ -5,16 +5,16 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
+from rcilab.app.run.drive_state import destination
+from rcilab.app.text import Text
 from rcilab.core.faults import name_faults
 from rcilab.i18n.translator import Finished
-from rcilab.workbench.run.driving import destination
-from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import esc
 
 if TYPE_CHECKING:
+    from rcilab.app.store import Recording, UiState
     from rcilab.control_process import SupervisorStatus
     from rcilab.recording.run import Run
-    from rcilab.workbench.store import Recording, UiState
 
 
 def way_html(state: UiState, status: SupervisorStatus, text: Text) -> str:

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from rcilab.app import requests
 from rcilab.app.planning import LAWS, PATH_KINDS
-from rcilab.workbench import requests
+from rcilab.app.text import Text
 from rcilab.workbench.panels.jog import problems_html
 from rcilab.workbench.panels.target import planned_html
-from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, BoundControl, Html, NumberField, esc, on_press, shown
 
 if TYPE_CHECKING:
+    from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
-    from rcilab.workbench.store import UiState
 
 
 class PathTypePanel:

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rcilab.workbench.text import Text
+from rcilab.app.text import Text
 from rcilab.workbench.widgets import esc
 
 if TYPE_CHECKING:
+    from rcilab.app.store import Theme
     from rcilab.views.plots import Frame
-    from rcilab.workbench.store import Theme
 
 COLORS = ("#0b6fc2", "#e07b00", "#1a9850", "#c2357a", "#7b52c7", "#8a6d3b", "#008b9a")
 """One colour a joint, told apart on white by people with common colour blindness; the number stands in the legend."""

@@ -6,6 +6,9 @@ import math
 import time
 from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
+from rcilab.app.run.played_motion import played_path, streamed_rows
+from rcilab.app.text import Text
+from rcilab.app.view_actions import PLOTS, has_plot
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.i18n.plot_scale import ERRORS, PlotScale, plot_scale
 from rcilab.views.plot_ticks import axis_ticks
@@ -24,14 +27,11 @@ from rcilab.views.plots import (
 )
 from rcilab.views.tool_curves import TOOL_QUANTITIES, ToolQuantity, tool_curves, tool_limit
 from rcilab.workbench.panels.plot_contents import legend_html, plot_axes, plot_contents
-from rcilab.workbench.run.played import played_path, streamed_rows
-from rcilab.workbench.text import Text
-from rcilab.workbench.view_actions import PLOTS, has_plot
 from rcilab.workbench.widgets import Html, esc
 
 if TYPE_CHECKING:
+    from rcilab.app.store import Recording, UiState
     from rcilab.core.arrays import JointPath
-    from rcilab.workbench.store import Recording, UiState
 
 _REDRAW_TIME = 0.25  # [s] A choice: plots are redrawn at most so often while something is dragged or moves.
 _LEISURE = 8.0  # A choice: and take at most an eighth of the time, however long the motion is.

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Literal
 
-from rcilab.workbench import requests
-from rcilab.workbench.text import Text
+from rcilab.app import requests
+from rcilab.app.text import Text
 from rcilab.workbench.widgets import Ask, BoundControl, PageText
 
 if TYPE_CHECKING:
+    from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
-    from rcilab.workbench.store import UiState
 
 _Name = Literal["zero", "home", "here", "undo"]
 _NAMES: tuple[_Name, ...] = ("zero", "home", "here", "undo")

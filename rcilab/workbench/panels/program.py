@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rcilab.workbench import requests
+from rcilab.app import requests
+from rcilab.app.program.program_draft import FILE_FIELD, Draft, Note, number_at, tell_place
+from rcilab.app.run.readiness import is_moving, time_shown
+from rcilab.app.text import Text
 from rcilab.workbench.panels.jog import problems_html
 from rcilab.workbench.panels.program_list import list_html, notes_html
 from rcilab.workbench.panels.target import planned_html
-from rcilab.workbench.program.draft import FILE_FIELD, Draft, Note, number_at, tell_place
-from rcilab.workbench.run.readiness import is_moving, time_shown
-from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, BoundControl, Html, NumberField, esc, on_press
 
 if TYPE_CHECKING:
+    from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
-    from rcilab.workbench.store import UiState
 
 _TOOLS = (
     ("up", "arrow-up"), ("down", "arrow-down"), ("duplicate", "copy"), ("delete", "trash"), ("undo", "arrow-back-up"),

@@ -5,18 +5,18 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any
 
+from rcilab.app import requests
+from rcilab.app.program.program_draft import FILE_FIELD
+from rcilab.app.text import Text
 from rcilab.motion.program import Program
-from rcilab.workbench import requests
 from rcilab.workbench.panels.jog import problems_html
-from rcilab.workbench.program.draft import FILE_FIELD
-from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, Html, NumberField, esc, on_press
 
 if TYPE_CHECKING:
+    from rcilab.app.program.program_draft import Draft
+    from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
     from rcilab.model.robot_model import RobotModel
-    from rcilab.workbench.program.draft import Draft
-    from rcilab.workbench.store import UiState
 
 
 class ProgramFilePanel:

@@ -6,17 +6,17 @@ import math
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
+from rcilab.app.program.program_draft import Draft, Note, target_of
+from rcilab.app.program.waypoint_fields import arm_angle_of
+from rcilab.app.text import Text
 from rcilab.core.errors import RcilabError
 from rcilab.i18n.error_messages import tell_note
 from rcilab.motion.waypoint import Waypoint
-from rcilab.workbench.program.draft import Draft, Note, target_of
-from rcilab.workbench.program.fields import arm_angle_of
-from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import esc
 
 if TYPE_CHECKING:
+    from rcilab.app.store import UiState
     from rcilab.model.robot_model import RobotModel
-    from rcilab.workbench.store import UiState
 
 _NOTED = "*"
 _HEADS = ("number", "type", "place", "speed", "blend", "psi", "dwell")

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.i18n.rounding import fixed
-from rcilab.workbench import requests
-from rcilab.workbench.run.active_force import (
+from rcilab.app import requests
+from rcilab.app.run.active_force import (
     DIRECTIONS,
     SPRING,
     STRONGEST,
@@ -17,13 +16,14 @@ from rcilab.workbench.run.active_force import (
     is_guided,
     no_push,
 )
-from rcilab.workbench.run.readiness import is_moving
-from rcilab.workbench.text import Text
+from rcilab.app.run.readiness import is_moving
+from rcilab.app.text import Text
+from rcilab.i18n.rounding import fixed
 from rcilab.workbench.widgets import Ask, BoundControl, Html, esc, on_press
 
 if TYPE_CHECKING:
+    from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
-    from rcilab.workbench.store import UiState
 
 _HOLD_RATE = 10.0  # [1/s] A held button says so this often.
 

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from rcilab.app import requests
+from rcilab.app.run.export_actions import ENDINGS
+from rcilab.app.text import Text
 from rcilab.recording.tracking_words import error_rows, tracking_notes
-from rcilab.workbench import requests
-from rcilab.workbench.run.export_actions import ENDINGS
-from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, BoundControl, Html, esc, on_press
 
 if TYPE_CHECKING:
+    from rcilab.app.store import Recording, UiState
     from rcilab.control_process import SupervisorStatus
-    from rcilab.workbench.store import Recording, UiState
 
 _ICONS: dict[str, Any] = {
     ".csv": "file-spreadsheet",

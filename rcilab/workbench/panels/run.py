@@ -4,13 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.core.faults import name_faults
-from rcilab.motion.speed_scaling import SLOWEST_PACE
-from rcilab.workbench import requests
-from rcilab.workbench.check.freshness import outdated
-from rcilab.workbench.panels.outcome import outcome_html, way_html
-from rcilab.workbench.panels.target import planned_html
-from rcilab.workbench.run.readiness import (
+from rcilab.app import requests
+from rcilab.app.check.freshness import outdated
+from rcilab.app.run.readiness import (
     describe_move,
     is_connected,
     is_moving,
@@ -19,12 +15,16 @@ from rcilab.workbench.run.readiness import (
     may_plan_again,
     obstacle,
 )
-from rcilab.workbench.text import Text
+from rcilab.app.text import Text
+from rcilab.core.faults import name_faults
+from rcilab.motion.speed_scaling import SLOWEST_PACE
+from rcilab.workbench.panels.outcome import outcome_html, way_html
+from rcilab.workbench.panels.target import planned_html
 from rcilab.workbench.widgets import Ask, BoundControl, Html, esc, on_press
 
 if TYPE_CHECKING:
+    from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
-    from rcilab.workbench.store import UiState
 
 
 _BUTTONS: tuple[tuple[Any, Any, Any], ...] = (

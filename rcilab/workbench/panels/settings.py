@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+from rcilab.app import requests
+from rcilab.app.text import LANGUAGES, Text
+from rcilab.app.view_actions import QUALITIES, THEMES
 from rcilab.conformance.explain import explain_limit
 from rcilab.i18n.units import ANGLES, LENGTHS
 from rcilab.robots import RCI_ROBOT_NAMES
 from rcilab.views.message_guard import for_anyone
-from rcilab.workbench import requests
-from rcilab.workbench.text import LANGUAGES, Text
-from rcilab.workbench.view_actions import QUALITIES, THEMES
 from rcilab.workbench.widgets import Ask, BoundControl, Html, esc, on_press
 
 if TYPE_CHECKING:
+    from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
-    from rcilab.workbench.store import UiState
 
 _CHOICES: tuple[tuple[Any, tuple[str, ...], str, Callable[[UiState], str]], ...] = (
     ("angle", ANGLES, "unit", lambda state: state.units.angle),

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.makers.rokae.driver.configuration import SETUP_PARTS
-from rcilab.workbench import requests
-from rcilab.workbench.check.freshness import outdated
-from rcilab.workbench.panels.target import planned_html
-from rcilab.workbench.setup.configuration_state import (
+from rcilab.app import requests
+from rcilab.app.check.freshness import outdated
+from rcilab.app.setup.configuration_state import (
     LISTED,
     describe_held,
     describe_part,
@@ -17,12 +15,14 @@ from rcilab.workbench.setup.configuration_state import (
     setup_obstacle,
     tool_outside,
 )
-from rcilab.workbench.text import Text
+from rcilab.app.text import Text
+from rcilab.makers.rokae.driver.configuration import SETUP_PARTS
+from rcilab.workbench.panels.target import planned_html
 from rcilab.workbench.widgets import Ask, BoundControl, Html, esc, on_press
 
 if TYPE_CHECKING:
+    from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
-    from rcilab.workbench.store import UiState
 
 
 class SetupPanel:

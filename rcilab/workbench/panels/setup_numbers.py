@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from rcilab.app import requests
+from rcilab.app.setup.configuration_state import FORCE_AXES
+from rcilab.app.setup.setup_fields import FIELD_NAMES, INERTIA_NAMES, POSE_NAMES, read_field
+from rcilab.app.text import Text
 from rcilab.makers.rokae.driver.configuration import SETUP_PARTS
-from rcilab.workbench import requests
 from rcilab.workbench.panels.jog import problems_html
-from rcilab.workbench.setup.configuration_state import FORCE_AXES
-from rcilab.workbench.setup.fields import FIELD_NAMES, INERTIA_NAMES, POSE_NAMES, read_field
-from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, BoundControl, Html, NumberField, esc, shown
 
 if TYPE_CHECKING:
+    from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
-    from rcilab.workbench.store import UiState
 
 _ROWS: dict[str, tuple[tuple[str, tuple[str, ...]], ...]] = {
     "box": (("low", FIELD_NAMES["box"][:3]), ("high", FIELD_NAMES["box"][3:6]), ("turned", POSE_NAMES[3:])),

@@ -5,17 +5,17 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from rcilab.workbench import requests
+from rcilab.app import requests
+from rcilab.app.run.drive_state import is_ours
+from rcilab.app.setup.configuration_state import own_limits, soft_limits
+from rcilab.app.setup.setup_fields import JOINT_ENDS
+from rcilab.app.text import Text
 from rcilab.workbench.panels.jog import problems_html
-from rcilab.workbench.run.driving import is_ours
-from rcilab.workbench.setup.configuration_state import own_limits, soft_limits
-from rcilab.workbench.setup.fields import JOINT_ENDS
-from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, BoundControl, Html, NumberField, esc, on_press, shown
 
 if TYPE_CHECKING:
+    from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
-    from rcilab.workbench.store import UiState
 
 
 class SoftLimitsPanel:

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from rcilab.app.control_lock import PATIENCE, ControlLock
+from rcilab.app.run.drive_state import destination
+from rcilab.app.run.played_motion import played_at
+from rcilab.app.run.readiness import is_moving, time_shown
+from rcilab.app.status_text import phase_code, tell_status
+from rcilab.app.text import Text
 from rcilab.core.faults import name_faults
-from rcilab.workbench.control_lock import PATIENCE, ControlLock
-from rcilab.workbench.run.driving import destination
-from rcilab.workbench.run.played import played_at
-from rcilab.workbench.run.readiness import is_moving, time_shown
-from rcilab.workbench.status_text import phase_code, tell_status
-from rcilab.workbench.text import Text
 
 if TYPE_CHECKING:
+    from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
-    from rcilab.workbench.store import UiState
 
 _TONES = {
     "idle": "good",

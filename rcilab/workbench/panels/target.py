@@ -6,17 +6,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rcilab.app.check.freshness import beside_program, outdated
+from rcilab.app.goal.goal_actions import POSE_FIELDS, QUATERNION
+from rcilab.app.text import Text
 from rcilab.i18n.rounding import fixed
-from rcilab.workbench.check.freshness import beside_program, outdated
-from rcilab.workbench.goal.actions import POSE_FIELDS, QUATERNION
 from rcilab.workbench.panels.check_rows import count_unheeded
 from rcilab.workbench.panels.jog import problems_html, reach_html
-from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, Html, NumberField, esc, shown_pose
 
 if TYPE_CHECKING:
+    from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
-    from rcilab.workbench.store import UiState
 
 
 class TargetPanel:

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.workbench import requests
-from rcilab.workbench.run.driving import DESTINATIONS, destination
-from rcilab.workbench.run.readiness import is_moving
-from rcilab.workbench.status_text import phase_code, tell_status
-from rcilab.workbench.text import Text
+from rcilab.app import requests
+from rcilab.app.run.drive_state import DESTINATIONS, destination
+from rcilab.app.run.readiness import is_moving
+from rcilab.app.status_text import phase_code, tell_status
+from rcilab.app.text import Text
 from rcilab.workbench.widgets import Ask, BoundControl, Html, PageText, esc, on_press
 
 if TYPE_CHECKING:
+    from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
-    from rcilab.workbench.store import UiState
 
 _TONES = {
     "idle": "good",

@@ -4,21 +4,21 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from rcilab.app import requests
+from rcilab.app.check.freshness import outdated
+from rcilab.app.program.program_draft import tell_place
+from rcilab.app.run.played_motion import paced_of, played_at
+from rcilab.app.run.readiness import is_moving, time_shown
+from rcilab.app.text import Text
+from rcilab.app.view_actions import PLOTS, RATES, has_plot
 from rcilab.core.clock import CYCLE_TIME
-from rcilab.workbench import requests
-from rcilab.workbench.check.freshness import outdated
 from rcilab.workbench.panels.outcome import replay_html
 from rcilab.workbench.panels.plots import Plots
-from rcilab.workbench.program.draft import tell_place
-from rcilab.workbench.run.played import paced_of, played_at
-from rcilab.workbench.run.readiness import is_moving, time_shown
-from rcilab.workbench.text import Text
-from rcilab.workbench.view_actions import PLOTS, RATES, has_plot
 from rcilab.workbench.widgets import Ask, BoundControl, Html, esc, on_press
 
 if TYPE_CHECKING:
+    from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
-    from rcilab.workbench.store import UiState
 
 _BANNER = 72  # [px] What the line about a recorded run takes.
 

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.workbench import requests
-from rcilab.workbench.jog.jogging import AXES, FRAMES
+from rcilab.app import requests
+from rcilab.app.jog.jog_state import AXES, FRAMES
+from rcilab.app.text import Text
 from rcilab.workbench.panels.jog import add_jog_button
-from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, BoundControl
 
 if TYPE_CHECKING:
+    from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
-    from rcilab.workbench.store import UiState
 
 
 class ToolJogPanel:

@@ -5,19 +5,19 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
+from rcilab.app import requests
+from rcilab.app.goal.goal_actions import POSE_FIELDS
+from rcilab.app.program.program_draft import TYPES, target_of
+from rcilab.app.program.waypoint_fields import VIA_FIELDS, arm_angle_of
+from rcilab.app.text import Text
 from rcilab.motion.waypoint import Waypoint
-from rcilab.workbench import requests
-from rcilab.workbench.goal.actions import POSE_FIELDS
 from rcilab.workbench.panels.jog import problems_html
-from rcilab.workbench.program.draft import TYPES, target_of
-from rcilab.workbench.program.fields import VIA_FIELDS, arm_angle_of
-from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask, BoundControl, Html, NumberField, esc, on_press, shown, shown_pose
 
 if TYPE_CHECKING:
+    from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
     from rcilab.model.robot_model import RobotModel
-    from rcilab.workbench.store import UiState
 
 _PLAIN = ("speed", "blend", "dwell")
 

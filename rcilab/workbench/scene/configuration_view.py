@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rcilab.app import requests
+from rcilab.app.setup.configuration_state import ON_FLANGE
+from rcilab.app.text import Text
 from rcilab.core.arrays import Array
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
@@ -14,15 +17,12 @@ from rcilab.robots.mesh import revolve
 from rcilab.views.arm_view import ArmView
 from rcilab.views.configuration_view import BOX_COLOR, ConfigurationView, outside_runs
 from rcilab.views.viser_scene import ViserScene
-from rcilab.workbench import requests
-from rcilab.workbench.setup.configuration_state import ON_FLANGE
-from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import HAND_AWAY, Ask
 
 if TYPE_CHECKING:
     import viser
 
-    from rcilab.workbench.store import UiState
+    from rcilab.app.store import UiState
 
 _OUTSIDE_COLOR = (190, 0, 10)  # Lines are drawn paler than their colour.
 _SCALES = {"box": 0.24, "tool": 0.17, "load": 0.17, "force": 0.17}  # [m]

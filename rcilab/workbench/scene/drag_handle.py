@@ -6,18 +6,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rcilab.app import requests
+from rcilab.app.run.active_force import SPRING, TOOL, can_grab
+from rcilab.app.text import Text
 from rcilab.views.arm_view import ArmView
 from rcilab.views.viser_scene import ViserScene
-from rcilab.workbench import requests
-from rcilab.workbench.run.active_force import SPRING, TOOL, can_grab
-from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask
 
 if TYPE_CHECKING:
     import viser
 
+    from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
-    from rcilab.workbench.store import UiState
 
 _COLOR = (214, 66, 160)  # Magenta: no verdict, no axis and no plan has it.
 

@@ -6,20 +6,20 @@ import math
 import time
 from typing import TYPE_CHECKING, Any
 
+from rcilab.app import requests
+from rcilab.app.goal.elbow import Elbow
+from rcilab.app.run.readiness import is_moving
+from rcilab.app.text import Text
 from rcilab.robots.mesh import revolve
 from rcilab.views.elbow_view import OUTWARD, ElbowView
 from rcilab.views.viser_scene import ViserScene
-from rcilab.workbench import requests
-from rcilab.workbench.goal.elbow import Elbow
-from rcilab.workbench.run.readiness import is_moving
-from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import HAND_AWAY, Ask
 
 if TYPE_CHECKING:
     import viser
 
+    from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
-    from rcilab.workbench.store import UiState
 
 _HANDLE = "/elbow/handle"
 _RADIUS = 0.034  # [m]

@@ -6,20 +6,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rcilab.app.scene.scene_extras import SHARE, Ellipsoid
 from rcilab.core.spatial import Pose
 from rcilab.model.robot_model import RobotModel
 from rcilab.robots.upright import upright_joints
 from rcilab.views.arm_view import ArmView
 from rcilab.views.configuration_view import unit_ball
 from rcilab.views.viser_scene import ViserScene
-from rcilab.workbench.scene.extras import SHARE, Ellipsoid
 
 if TYPE_CHECKING:
     import viser
 
+    from rcilab.app.store import UiState
     from rcilab.model.kinematics.workspace import Workspace
     from rcilab.robots.mesh import Mesh
-    from rcilab.workbench.store import UiState
 
 _AXES = 0.13  # [m]
 _BESIDE = ("bottom-right", "bottom-left")

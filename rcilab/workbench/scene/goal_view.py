@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rcilab.workbench import requests
+from rcilab.app import requests
+from rcilab.app.text import Text
 from rcilab.workbench.scene.configuration_view import hides_target
-from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import HAND_AWAY, Ask
 
 if TYPE_CHECKING:
     import viser
 
-    from rcilab.workbench.store import UiState
+    from rcilab.app.store import UiState
 
 TONE_COLORS = {"good": (38, 166, 91), "warn": (240, 150, 20), "bad": (214, 48, 38)}
 _VIA_COLOR = (11, 111, 194)

@@ -6,19 +6,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rcilab.app import requests
+from rcilab.app.check.freshness import outdated
 from rcilab.app.planning import PATH_POINTS
+from rcilab.app.scene.path_strip import PathStrip, ViolationMarker
+from rcilab.app.text import Text
 from rcilab.views.usage_colors import usage_colors
 from rcilab.views.viser_scene import ViserScene
-from rcilab.workbench import requests
-from rcilab.workbench.check.freshness import outdated
-from rcilab.workbench.scene.path_strip import PathStrip, ViolationMarker
-from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask
 
 if TYPE_CHECKING:
     import viser
 
-    from rcilab.workbench.store import UiState
+    from rcilab.app.store import UiState
 
 _NAMED = 5
 """Beads with words beside them; the others say theirs when they are clicked. A choice."""

@@ -6,12 +6,13 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from rcilab.app.run.readiness import is_connected, is_moving
+from rcilab.app.run.replay import replayed_pose
+from rcilab.app.text import Text
 from rcilab.core.arrays import JointVector
 from rcilab.views.arm_view import ArmView
 from rcilab.views.viser_scene import ViserScene
 from rcilab.views.viser_stage import furnish, place_camera
-from rcilab.workbench.run.readiness import is_connected, is_moving
-from rcilab.workbench.run.replay import replayed_pose
 from rcilab.workbench.scene.configuration_view import ConfigurationSceneView
 from rcilab.workbench.scene.drag_handle import DragHandle
 from rcilab.workbench.scene.elbow_view import ElbowSceneView
@@ -19,14 +20,13 @@ from rcilab.workbench.scene.extras_view import ExtrasView
 from rcilab.workbench.scene.goal_view import GoalView
 from rcilab.workbench.scene.path_strip_view import PathStripView
 from rcilab.workbench.scene.watchers import Watchers
-from rcilab.workbench.text import Text
 from rcilab.workbench.widgets import Ask
 
 if TYPE_CHECKING:
     import viser
 
+    from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
-    from rcilab.workbench.store import UiState
 
 _Ghost = Literal["commanded", "candidate", "plan"]
 _CANDIDATE_COLORS = {"good": (46, 180, 124), "warn": (240, 165, 40), "bad": (225, 62, 52), "peek": (130, 86, 225)}

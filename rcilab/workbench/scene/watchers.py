@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import viser
 
-    from rcilab.workbench.control_lock import ControlLock
+    from rcilab.app.control_lock import ControlLock
 
 _SETTLING = 10.0
 """[s] For so long a change is told again and again: viser replays the scene to a new page, and tells all pages of nodes

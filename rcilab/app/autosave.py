@@ -1,0 +1,164 @@
+"""What a workbench had comes back with the next one: program and looks; after a crash goal and set-up, too."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+
+from rcilab.app.setup.configuration_json import build_setup, setup_facts
+from rcilab.core.arrays import JointVector, as_vector, readonly_copy
+from rcilab.core.atomic_file import write_whole
+from rcilab.core.errors import RcilabError
+from rcilab.makers.rokae.driver.configuration import RobotConfiguration
+from rcilab.model.robot_model import load_model
+from rcilab.motion.program import Program
+
+if TYPE_CHECKING:
+    from rcilab.app.store import UiState
+    from rcilab.model.robot_model import RobotModel
+
+_FORMAT, _VERSION = "rcilab workbench", 1
+Look: TypeAlias = Literal["language", "theme", "angle", "length"]
+_AT_FIRST: dict[Look, str] = {"language": "en", "theme": "light", "angle": "deg", "length": "mm"}
+_PAUSE = 1.0  # [s] A choice: between two writings, while somebody drags.
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class SavedState:
+    """What came back of one arm."""
+
+    q: JointVector | None
+    """The goal, shape (n,), [rad]; None where the workbench was closed."""
+    program: Program | None = None
+    setup: RobotConfiguration = field(default_factory=RobotConfiguration)
+    """Those parts of the set-up that were edited."""
+
+
+def looks_of(state: UiState) -> dict[Look, str]:
+    """Returns what of the page's settings is not as at first, by the names in `SetView`."""
+    looks: dict[Look, str] = {
+        "language": state.language,
+        "theme": state.theme,
+        "angle": state.units.angle,
+        "length": state.units.length,
+    }
+    return {name: value for name, value in looks.items() if value != _AT_FIRST[name]}
+
+
+def keepsake_file(port: int) -> Path:
+    """Returns where the workbench at a port keeps it: in $XDG_STATE_HOME/rcilab, or ~/.local/state/rcilab."""
+    home = os.environ.get("XDG_STATE_HOME", "")
+    folder = Path(home) if os.path.isabs(home) else Path.home() / ".local" / "state"
+    return folder / "rcilab" / f"workbench-{port}.json"
+
+
+class Autosave:
+    """Writes down how the page looks, and goal, program and set-up of every arm, when they have changed.
+
+    Owned by the conductor's thread.
+
+    Nobody asked for this file, so where it cannot be written or read it is done without, silently.
+
+    Args:
+        file: Where; its place belongs to whoever holds the port it is named for. None: nowhere.
+    """
+
+    def __init__(self, file: Path | None) -> None:
+        self._file = file
+        self._arms: dict[str, Any] = {}
+        self._looks: dict[Look, str] = {}
+        self._written: tuple[object, ...] | None = None
+        self._next = 0.0
+
+    def recall(self, model: RobotModel) -> SavedState | None:
+        """Returns what the workbench before kept of an arm, if the file can be understood."""
+        if self._file is None:
+            return None
+        try:
+            content: dict[str, Any] = json.loads(self._file.read_text(encoding="utf-8"))
+            if (content["format"], content["version"]) != (_FORMAT, _VERSION):
+                return None
+            self._arms = dict(content["arms"])
+            self._looks = dict(content.get("looks") or {})
+            own = self._arms.get(model.name)
+            if own is None:
+                return None
+            program = None if own["program"] is None else Program.from_json(own["program"])
+            q = None if own.get("q") is None else readonly_copy(as_vector(own["q"], model.n, "q", "rad"))
+            setup = build_setup(own.get("setup") or {})
+            setup.applied_to(model)  # A load that it cannot bear is not brought back.
+            return SavedState(q=q, program=program, setup=setup)
+        except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError, RcilabError):
+            return None
+
+    def recall_looks(self) -> dict[Look, str]:
+        """Returns the settings of the page that were chosen, by their names in `SetView`; after `recall`."""
+        return dict(self._looks)
+
+    def recall_setups(self, model: RobotModel) -> dict[str, RobotConfiguration]:
+        """Returns the edited set-ups of the arms that were chosen before this one, by name; after `recall`."""
+        found: dict[str, RobotConfiguration] = {}
+        for name, own in self._arms.items():
+            with suppress(ValueError, LookupError, TypeError, AttributeError, RcilabError):
+                setup = build_setup(own.get("setup") or {})
+                if name != model.name and setup.parts:
+                    setup.applied_to(load_model(name))
+                    found[name] = setup
+        return found
+
+    def recall_programs(self, model: RobotModel) -> tuple[Program, ...]:
+        """Returns the programs of the other arms; after `recall`."""
+        found: list[Program] = []
+        for name, own in self._arms.items():
+            with suppress(ValueError, LookupError, TypeError, AttributeError, RecursionError, RcilabError):
+                if name != model.name and own["program"] is not None:
+                    found.append(Program.from_json(own["program"]))
+        return tuple(found)
+
+    def keep(self, state: UiState) -> None:
+        """Writes down what is new, at most once a second."""
+        now = time.monotonic()
+        content = (
+            state.model.name,
+            state.goal.q.tobytes(),
+            state.program.draft,
+            state.setup.wanted,
+            state.setup.touched,
+            (looks := looks_of(state)),
+        )
+        if self._file is None or content == self._written or now < self._next:
+            return
+        self._written, self._next = content, now + _PAUSE
+        draft = state.program.draft
+        program = draft.program(state.model) if draft.model == state.model.name else None
+        self._arms[state.model.name] = {
+            "q": state.goal.q.tolist(),
+            "program": None if program is None else program.to_json(),
+            "setup": setup_facts(state.setup.wanted.only(state.setup.touched)),
+        }
+        self._looks = looks
+        with suppress(OSError):
+            self._write(self._arms)
+
+    def close(self, state: UiState) -> None:
+        """Forgets goals and set-ups: the workbench was closed by somebody who wanted that. Programs and looks stay."""
+        if self._file is None:
+            return
+        self._next = 0.0
+        self.keep(state)
+        programs = {name: {"program": own["program"]} for name, own in self._arms.items() if own.get("program")}
+        with suppress(OSError):
+            if programs or self._looks:
+                self._write(programs)
+            else:
+                self._file.unlink(missing_ok=True)
+
+    def _write(self, arms: dict[str, Any]) -> None:
+        assert self._file is not None
+        text = json.dumps({"format": _FORMAT, "version": _VERSION, "arms": arms, "looks": self._looks})
+        write_whole(self._file, text, survives_power_loss=False)

@@ -1,0 +1,51 @@
+"""The Check tab as a value: what is being worked out, what came of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal, TypeAlias
+
+from rcilab.app.text import Message
+
+if TYPE_CHECKING:
+    from rcilab.app.planning import Plan
+    from rcilab.app.program.program_draft import Draft
+    from rcilab.conformance import Report, SlowDown
+
+Explained: TypeAlias = "tuple[Report, SlowDown | None]"
+"""A report that is told in words, and the slow-down that belongs to them; a report that is ok has none."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Slowed:
+    """A plan that was slowed down, and what brings the fast one back."""
+
+    before: Plan
+    after: Plan
+    speed: float
+    """Speed of the page before."""
+    draft: Draft | None = None
+    """The slowed program; None where no speed of a program was changed."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class CheckState:
+    """Everything of the Check tab but the report itself, which is the plan's."""
+
+    doing: Literal["slow", "explain"] | None = None
+    """What is being worked out."""
+    progress: float = 0.0
+    """How much of it is done, 0 to 1."""
+    answer: Message | None = None
+    """What came of the last slow-down."""
+    tone: Literal["good", "warn", "bad"] = "good"
+    about: Report | None = None
+    """The report that `answer` is about."""
+    found: SlowDown | None = None
+    """What was found where the plan stays as it is: it says why in its own words."""
+    slowed: Slowed | None = None
+    explained: Explained | None = None
+    sought: int = 0
+    """How often somebody went to the moment of a row."""
+    row: str = ""
+    """Id of the condition that somebody went to last."""

@@ -1,0 +1,35 @@
+"""Whether the plan is still what it would be if it were made now, and if not, what has changed."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rcilab.app.setup.configuration_state import name_parts
+from rcilab.app.text import Message, message
+
+if TYPE_CHECKING:
+    from rcilab.app.store import UiState
+
+
+def beside_program(state: UiState) -> Message | None:
+    """Returns that this plan is not the program's, which could not be planned; None where nobody would think so."""
+    plan, program = state.plan, state.program
+    fails = program.planned is None and program.tone == "bad" and program.answer is not None
+    if plan is None or plan.program is not None or not fails:
+        return None
+    return message("plan.not_program", answer=program.answer)
+
+
+def outdated(state: UiState) -> Message | None:
+    """Returns why the plan no longer holds, or None: its program, tool, load or safety box has changed."""
+    plan, program = state.plan, state.program
+    if plan is None:
+        return None
+    if plan.program is not None and program.planned is not program.draft:
+        if program.planned is None and program.tone == "bad" and program.answer is not None:
+            return message("ready.program_fails", answer=program.answer)
+        return message("ready.program")
+    if plan.program is not None and not program.draft.has_tool_of(state.model):
+        return message("ready.program_tool")
+    stale = plan.stale_parts(state.model, state.setup.wanted.box)
+    return message("ready.stale", what=name_parts(stale)) if stale else None

@@ -1,0 +1,96 @@
+"""How a plan is slowed down until it passes: it is judged several times, so this takes a while."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from rcilab.app.planning import Plan, build_plan_view, make_plan
+from rcilab.app.program.program_draft import Draft
+from rcilab.app.program.program_planning import PROGRAM_LAW
+from rcilab.core.background_job import ProgressCallback
+
+if TYPE_CHECKING:
+    from rcilab.app.planning import PlannableLaw
+    from rcilab.conformance import SlowDown
+
+_TRIES = 2
+_FURTHER = 0.9
+"""By how much slower the next try is, where the speed that the factor asks for is not slow enough. Choices."""
+_FOUND = 0.5  # Part of the work when the factor is known; about what was seen.
+SLOWEST = 0.01
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SlowdownJob:
+    """What a slow-down came to."""
+
+    found: SlowDown
+    plan: Plan | None = None
+    """The slowed plan; None when none passes."""
+    scale: float = 1.0
+    """Of the speed, or of every speed of the program."""
+    draft: Draft | None = None
+    """The slowed program."""
+    is_stretched: bool = False
+    """Whether the same curve runs slower as a whole, because no speed is slow enough: speed does not bound the jerk."""
+
+
+def slow_to_goal(plan: Plan, speed: float, law: PlannableLaw, tell: ProgressCallback) -> SlowdownJob:
+    """Returns the plan to the same goal at the largest speed that passes, planned anew."""
+
+    def make(scale: float) -> Plan | None:
+        made = make_plan(plan.model, plan.motion.start, plan.motion.goal, scale * speed, law, plan.box)
+        return replace(made, short=plan.short).completed() if isinstance(made, Plan) else None
+
+    return _slower(plan, make, SLOWEST / speed, tell)
+
+
+def slow_program(plan: Plan, draft: Draft, rounds: int, tell: ProgressCallback) -> SlowdownJob:
+    """Returns the plan of the same program with every speed scaled by the largest factor that passes."""
+    from rcilab.conformance import check
+    from rcilab.motion import plan_program
+
+    drafts: dict[float, Draft] = {}
+
+    def make(scale: float) -> Plan | None:
+        drafts[scale] = slower = scaled(draft, scale)
+        program = slower.program(plan.model)
+        assert program is not None
+        motion = plan_program(plan.model, program, start=plan.motion.start, rounds=rounds, law=PROGRAM_LAW)
+        report = check(motion, plan.model, start=plan.motion.start, box=plan.box, distance=None)
+        return replace(build_plan_view(plan.model, motion, report, plan.box), program=program).completed()
+
+    slowest = min((step.waypoint.speed for step in draft.steps), default=1.0)
+    result = _slower(plan, make, SLOWEST / slowest, tell)
+    return result if result.is_stretched else replace(result, draft=drafts.get(result.scale))
+
+
+def scaled(draft: Draft, scale: float) -> Draft:
+    """Returns a program with every speed scaled."""
+    steps = tuple(
+        replace(step, waypoint=replace(step.waypoint, speed=scale * step.waypoint.speed)) for step in draft.steps
+    )
+    return replace(draft, steps=steps)
+
+
+def _slower(plan: Plan, make: Callable[[float], Plan | None], least: float, tell: ProgressCallback) -> SlowdownJob:
+    recommended = plan.report.ok
+    found = plan.completed().report.slow_down(recommended=recommended, progress=lambda part: tell(_FOUND * part))
+    tell(_FOUND)
+    if found.factor is None or found.factor <= 1.0:
+        return SlowdownJob(found=found)
+    wanted = {row.id for row in found.report.rows if row.ok} if found.report is not None else set[str]()
+    scale = 1.0 / found.factor
+    for attempt in range(_TRIES):
+        made = make(scale) if scale >= least else None
+        tell(_FOUND + (1.0 - _FOUND) * (attempt + 1) / _TRIES)
+        if made is not None and made.report.ok and all(row.ok for row in made.report.rows if row.id in wanted):
+            return SlowdownJob(found=found, plan=made, scale=scale)
+        scale *= _FURTHER
+    assert found.motion is not None
+    assert found.report is not None
+    whole = build_plan_view(plan.model, found.motion, found.report, plan.box)
+    whole = replace(whole, short=plan.short, program=plan.program, complete=True)
+    return SlowdownJob(found=found, plan=whole, scale=1.0 / found.factor, is_stretched=True)

@@ -1,0 +1,143 @@
+"""The arm angles that a goal leaves open: which are free, which are not and why, and how well the tool moves there."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+import numpy as np
+
+from rcilab.app.text import Message, message
+from rcilab.core.arrays import Array
+from rcilab.core.errors import KinematicsError
+from rcilab.core.safety_box import SafetyBox
+from rcilab.core.spatial import Pose
+from rcilab.model.kinematics.elbow_circle import ElbowCircle
+from rcilab.model.kinematics.elbow_ranges import Arc, FeasibleArcs
+from rcilab.model.robot_model import RobotModel
+
+ArcKind: TypeAlias = Literal["free", "other", "limits", "singular", "box", "reach"]
+"""free: in this way of standing; other: in another one only; or what forbids it."""
+
+LOOKS = 36
+"""Arm angles at which dexterity is looked at: every ten degrees. A choice."""
+SAID = math.radians(0.5)  # [rad] A choice: an arm angle that was moved by less is not worth a sentence.
+
+_KINDS: dict[str, ArcKind] = {
+    "joint limits": "limits",
+    "singularity": "singular",
+    "safety box": "box",
+    "reach": "reach",
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ElbowArc:
+    """A range of arm angles that looks the same all along."""
+
+    start: float
+    """[rad]."""
+    end: float
+    """[rad], above start."""
+    kind: ArcKind
+    joints: tuple[int, ...] = ()
+    """Which joints are beyond their limits, from 1."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Elbow:
+    """The circle of a goal's elbow."""
+
+    circle: ElbowCircle
+    psi: float
+    """Where the elbow is, [rad]."""
+    branch: int
+    """In which way the arm stands, as in `Solutions.all`."""
+    arcs: tuple[ElbowArc, ...]
+    """One after the other; together a full turn."""
+    dexterity: Array
+    """Smallest singular value of the Jacobian in this way of standing, at `LOOKS` arm angles from -pi, shape (LOOKS,);
+    not a number where it has none."""
+
+
+def look_at_elbow(model: RobotModel, q: Array, box: SafetyBox | None) -> Elbow | None:
+    """Returns the circle of the elbow at these joint angles; None where there is none.
+
+    Args:
+        model: The arm, with its tool.
+        q: Joint angles, shape (n,), [rad].
+        box: What the tool shall stay in.
+    """
+    if model.n != 7:
+        return None
+    try:
+        circle, psi = model.elbow_circle(q), model.arm_angle(q)
+        target = model.forward(q)
+        arcs = model.feasible_arcs(target, box)
+    except KinematicsError:
+        return None
+    looks = np.append(np.linspace(-math.pi, math.pi, LOOKS, endpoint=False), psi)
+    batch = model.inverse_batch(np.repeat(target.matrix[None], len(looks), axis=0), looks)
+    branch = int(np.abs(np.angle(np.exp(1j * (batch.q[-1] - q)))).max(axis=1).argmin())
+    along = batch.q[:-1, branch]
+    dexterity = model.dexterity_path(along).smallest
+    return Elbow(circle=circle, psi=psi, branch=branch, arcs=_look(arcs, branch), dexterity=dexterity)
+
+
+def nearest_free(
+    model: RobotModel, target: Pose, psi: float, branch: int | None = None
+) -> tuple[float, Message | None]:
+    """Returns the arm angle nearest to one at which the arm can stand, and why it is another one.
+
+    Args:
+        model: A 7-axis arm.
+        target: Pose of the tool in base.
+        psi: Wanted arm angle, [rad].
+        branch: The way of standing to keep, as in `Elbow.branch`; None takes any.
+    """
+    try:
+        arcs = model.feasible_arcs(target)
+    except KinematicsError:
+        return psi, None
+    found = None if branch is None else arcs.nearest(psi, branch)
+    is_kept = found is not None
+    found = arcs.nearest(psi) if found is None else found
+    if found is None or abs(math.remainder(found - psi, math.tau)) < SAID:
+        return psi, None
+    return found, message(
+        "elbow.snapped",
+        wanted=f"{math.degrees(psi):.0f}",
+        why=message("elbow.why.other") if is_kept and arcs.at(psi).ok else say_why(arcs.at(psi).joints),
+        taken=f"{math.degrees(found):.0f}",
+    )
+
+
+def say_why(joints: tuple[int, ...]) -> Message:
+    """Returns why an arm angle is forbidden: joints beyond their limits, or a singularity."""
+    if not joints:
+        return message("elbow.why.singular")
+    return message("elbow.why.limits", joints=", ".join(str(joint) for joint in joints))
+
+
+def _look(found: FeasibleArcs, branch: int) -> tuple[ElbowArc, ...]:
+    """Returns the arcs as one way of standing sees them, neighbours that look alike as one."""
+    looks: list[ElbowArc] = []
+    for arc in found.arcs:
+        kind = _kind(arc, branch)
+        joints = arc.joints if kind == "limits" else ()
+        last = looks[-1] if looks else None
+        if last is not None and (last.kind, last.joints) == (kind, joints):
+            looks[-1] = ElbowArc(start=last.start, end=arc.end, kind=kind, joints=joints)
+        else:
+            looks.append(ElbowArc(start=arc.start, end=arc.end, kind=kind, joints=joints))
+    if len(looks) > 1 and (looks[0].kind, looks[0].joints) == (looks[-1].kind, looks[-1].joints):
+        first, last = looks[0], looks.pop()
+        looks[0] = ElbowArc(start=last.start - math.tau, end=first.end, kind=first.kind, joints=first.joints)
+    return tuple(looks)
+
+
+def _kind(arc: Arc, branch: int) -> ArcKind:
+    if arc.reasons:
+        return _KINDS[arc.reasons[0]]
+    return "free" if branch in arc.branches else "other"

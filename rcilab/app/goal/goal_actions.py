@@ -1,0 +1,305 @@
+"""What happens when somebody poses the goal: solve, plan, judge. Owned by the conductor's thread."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import replace
+
+import numpy as np
+
+from rcilab.app import requests
+from rcilab.app.goal.elbow import nearest_free
+from rcilab.app.goal.target_status import evaluate_joints, evaluate_pose
+from rcilab.app.planning import LAWS, PATH_KINDS, Plan, make_plan, make_recovery
+from rcilab.app.robot_connection import RobotConnection
+from rcilab.app.run.plan_readiness import is_done
+from rcilab.app.run.readiness import is_moving
+from rcilab.app.store import Goal, Store, UiState
+from rcilab.app.text import Message, message
+from rcilab.core.arrays import JointVector, readonly_copy
+from rcilab.core.errors import KinematicsError
+from rcilab.core.spatial import Pose
+from rcilab.i18n.number_parsing import parse_number, parse_quaternion
+
+POSE_FIELDS = ("x", "y", "z", "roll", "pitch", "yaw")
+QUATERNION = "wxyz"
+"""Name of the field that takes all four numbers of the orientation."""
+FURTHEST = 3.0  # [m] A choice: no arm of ours reaches half as far, and the gizmo should stay in sight.
+SLOWEST = 0.01
+SETTLED = 0.15  # [s] A choice: a goal that has not moved for so long has come to rest.
+_ONE_DRAG = 1.0  # [s] A choice: what moves again within that time is one drag, or one turn at a slider's keys.
+RESTED = 0.6  # [s] The same of a target that a hand still holds: it has only paused, and looks at the arm.
+
+
+class GoalActions:
+    """Poses, targets, typed numbers, speed; each ends in a fresh plan."""
+
+    def __init__(self, store: Store, session: RobotConnection) -> None:
+        self._store, self._session = store, session
+        self._stale = False  # The goal has changed while the arm was moving.
+        self._planned = 0.0  # [s] When the last plan was made.
+        self._due: float | None = None  # [s] When a path of the tool is to be planned.
+        self._is_held = False  # A hand has the target and has not let go of it.
+        self._hand, self._moved = "", 0.0  # What a hand moved last, and when, [s].
+
+    def move_joint(self, request: requests.MoveJoint) -> None:
+        """Poses one joint of the candidate arm."""
+        model = self._store.state.model
+        if not (0 <= request.joint < model.n and math.isfinite(request.angle)):
+            return
+        q = np.array(self._store.state.goal.q)
+        limits = model.limits.joint
+        self._remember_hand(f"joint {request.joint}")
+        q[request.joint] = min(max(request.angle, limits.lower[request.joint]), limits.upper[request.joint])
+        self._pose(readonly_copy(q))
+
+    def pose_goal(self, request: requests.PoseGoal) -> None:
+        """Poses the candidate arm by name."""
+        state, self._hand = self._store.state, ""
+        if request.name == "undo":
+            goal = self._store.undo()
+            if goal is not None:
+                self._store.update(goal=goal)
+                self.plan()
+            return
+        self._store.remember()
+        here = self._session.status().q_c
+        named = {
+            "zero": np.zeros(state.model.n),
+            "home": state.model.home,
+            "here": state.goal.q if here is None else here,
+            "start": state.goal.q if state.plan is None else _beginning(state.plan),
+        }
+        self._pose(readonly_copy(named[request.name]))
+        self._store.clear_problems("")
+
+    def move_target(self, request: requests.MoveTarget) -> None:
+        """Follows the gizmo."""
+        numbers = (*request.position, *request.wxyz)
+        if len(numbers) != 7 or not all(math.isfinite(number) for number in numbers):
+            return
+        if math.hypot(*request.wxyz) < 1e-6:
+            return
+        position = [min(max(number, -FURTHEST), FURTHEST) for number in request.position]
+        self._remember_hand("target")
+        self._is_held = not request.ended
+        if request.ended:
+            self._store.clear_problems("pose.")
+        self._aim(Pose(position, request.wxyz))
+
+    def _remember_hand(self, what: str) -> None:
+        """Keeps the goal from before a hand moved something: once for all that one drag asks for."""
+        now = time.monotonic()
+        if what != self._hand or now - self._moved > _ONE_DRAG:
+            self._store.remember()
+        self._hand, self._moved = what, now
+
+    def set_arm_angle(self, request: requests.SetArmAngle, branch: int | None = None) -> None:
+        """Turns the elbow about the shoulder-wrist line while the tool stays, as near as limits allow."""
+        if math.isfinite(request.psi) and self._store.state.model.n == 7:
+            state = self._store.state
+            psi, snapped = nearest_free(state.model, state.goal.target, math.remainder(request.psi, math.tau), branch)
+            self._aim(state.goal.target, psi, snapped=snapped)
+
+    def choose_branch(self, request: requests.ChooseBranch) -> None:
+        """Takes another analytic solution of the same pose."""
+        goal = self._store.state.goal
+        solutions = goal.reach.solutions
+        if solutions is None or not 0 <= request.index < len(solutions):
+            return
+        self._store.remember()
+        self._aim(goal.target, None, near=solutions[request.index])
+
+    def lead_to(self, target: Pose, psi: float | None, q: JointVector | None) -> None:
+        """Poses the goal where a waypoint leads: at joint angles, or at a pose with an arm angle."""
+        self._store.remember()
+        if q is None:
+            self._aim(target, psi)
+        else:
+            self._pose(q)
+        self._store.clear_problems("pose.")
+
+    def type_field(self, request: requests.TypeField) -> None:
+        """Takes a typed number, or says beside the field what is wrong with it."""
+        state = self._store.state
+        kind, _, name = request.field.partition(".")
+        if kind == "joint" and name in map(str, range(state.model.n)):
+            low, high = np.degrees(state.model.limits.joint.lower), np.degrees(state.model.limits.joint.upper)
+            number = int(name)
+            parsed = parse_number(request.text, round(float(low[number]), 6), round(float(high[number]), 6), "deg")
+            value = parsed.value
+            act = None if value is None else lambda: self.move_joint(
+                requests.MoveJoint(joint=number, angle=math.radians(value))
+            )  # fmt: skip
+        elif kind == "pose" and name in POSE_FIELDS:
+            index = POSE_FIELDS.index(name)
+            bound, unit = (FURTHEST * 1000.0, "mm") if index < 3 else (360.0, "deg")
+            parsed = parse_number(request.text, -bound, bound, unit)
+            value = parsed.value
+            act = None if value is None else lambda: self._aim(_with_number(state.goal.target, index, value))
+        elif kind == "pose" and name == QUATERNION:
+            parsed = parse_quaternion(request.text)
+            wxyz = parsed.value
+            act = None if wxyz is None else lambda: self._aim(Pose(state.goal.target.position, wxyz))
+        elif request.field == "speed":
+            parsed = parse_number(request.text, 100.0 * SLOWEST, 100.0, "%")
+            value = parsed.value
+            act = None if value is None else lambda: self.set_speed(requests.SetSpeed(speed=value / 100.0))
+        elif kind == "psi" and state.model.n == 7:
+            parsed = parse_number(request.text, -180.0, 180.0, "deg")
+            value = parsed.value
+            act = None if value is None else lambda: self.set_arm_angle(requests.SetArmAngle(psi=math.radians(value)))
+        else:
+            return
+        if act is None:
+            assert parsed.problem is not None
+            self._store.complain(request.field, parsed.problem)
+            return
+        self._store.remember()
+        self._store.clear_problems(request.field)
+        act()
+
+    def set_speed(self, request: requests.SetSpeed) -> None:
+        """Plans faster or slower."""
+        if math.isfinite(request.speed):
+            self._store.update(speed=min(max(request.speed, SLOWEST), 1.0))
+            self._store.clear_problems("speed")
+            self.plan()
+
+    def set_law(self, request: requests.SetLaw) -> None:
+        """Plans with another law."""
+        if request.law in LAWS:
+            self._store.update(law=request.law)
+            self.plan()
+
+    def set_way(self, request: requests.SetPathType) -> None:
+        """Plans along another kind of path, or over another place."""
+        kind = next((kind for kind in PATH_KINDS if kind == request.kind), self._store.state.way)
+        via = self._store.state.goal.target if request.via else self._store.state.via
+        self._store.update(way=kind, via=via)
+        self.plan()
+
+    def plan(self, request: requests.Plan | None = None) -> None:
+        """Plans from where the arm stands to the goal, unless it is moving: then when it has come to rest.
+
+        A path of the tool takes longer than a drag can wait for: it is planned once the goal stands still.
+        """
+        state, status = self._store.state, self._session.status()
+        self._due = None
+        if is_moving(status):
+            self._stale = True
+            return
+        self._stale = False
+        if status.q_c is None:
+            if request is not None:  # Nothing has changed: what was planned is not lost.
+                self._store.say("warn", message("plan.no_arm"))
+            elif state.recording is None:  # A run that is looked at stays, whatever is posed.
+                self._store.update(plan=None, no_plan=message("plan.no_arm"), recording=None, place=0.0, playing=False)
+            return
+        if state.way != "joint" and request is None:
+            self._due = time.monotonic() + SETTLED
+            self._store.update(plan=None, no_plan=message("plan.soon"), recording=None, place=0.0, playing=False)
+            return
+        self._make(state, readonly_copy(status.q_c), is_asked=request is not None)
+
+    def _make(self, state: UiState, start: JointVector, *, is_asked: bool) -> None:
+        box = state.setup.wanted.box
+        made = make_plan(state.model, start, state.goal.q, state.speed, state.law, box, state.way, state.via)
+        self._planned = time.monotonic()
+        is_program = state.plan is not None and state.plan.program is not None
+        if is_program and not is_asked and state.plan is not None and not is_done(state.plan, start):
+            self._store.say("warn", message("plan.replaced"))
+        self._show(replace(made, short=state.goal.reach.short) if isinstance(made, Plan) else made)
+
+    def plan_recovery(self, request: requests.PlanRecovery) -> None:
+        """Plans from where the arm stands, outside a joint's range, back inside; the goal stays for the next plan."""
+        state, status = self._store.state, self._session.status()
+        if status.q_c is None or is_moving(status):
+            return
+        self._stale, self._due = False, None
+        self._planned = time.monotonic()
+        self._show(make_recovery(state.model, readonly_copy(status.q_c), state.setup.wanted.box))
+
+    def _show(self, made: Plan | Message) -> None:
+        if isinstance(made, Plan):
+            self._store.update(plan=made, no_plan=None, recording=None, place=0.0, playing=False)
+        else:
+            self._store.update(plan=None, no_plan=made, recording=None, place=0.0, playing=False)
+
+    def settle(self) -> None:
+        """Looks for collisions, too, once the goal has stood still for a moment."""
+        state = self._store.state
+        if self._due is not None and time.monotonic() >= self._due:
+            self.plan(requests.Plan())
+            state = self._store.state
+        if state.plan is None or time.monotonic() - self._planned < (RESTED if self._is_held else SETTLED):
+            return
+        judged = state.plan.completed(state.drive.mode)
+        if judged is not state.plan:
+            self._store.update(plan=judged)
+
+    def catch_up(self) -> None:
+        """Plans what was put off while the arm was moving."""
+        if self._stale:
+            self.plan()
+
+    def pose(self, q: JointVector) -> None:
+        """Poses the candidate arm at these joint angles."""
+        self._pose(q)
+
+    def follow(self, q: JointVector) -> Goal:
+        """Puts the goal where the moving arm is and returns it; planned is when the arm has come to rest."""
+        goal = initial_goal(self._store.state.model, q)
+        self._store.update(goal=goal)
+        self._stale = True
+        return goal
+
+    def _pose(self, q: JointVector) -> None:
+        model = self._store.state.model
+        goal = Goal(q=q, target=model.forward(q), reach=evaluate_joints(model, q), psi=self._arm_angle(q))
+        self._store.update(goal=goal)
+        self.plan()
+
+    def _aim(
+        self,
+        target: Pose,
+        psi: float | None = None,
+        near: JointVector | None = None,
+        snapped: Message | None = None,
+    ) -> None:
+        state = self._store.state
+        reach = evaluate_pose(state.model, target, state.goal.q if near is None else near, psi)
+        goal = Goal(q=reach.q, target=target, reach=reach, psi=self._arm_angle(reach.q), snapped=snapped)
+        self._store.update(goal=goal)
+        self.plan()
+
+    def _arm_angle(self, q: JointVector) -> float | None:
+        try:
+            return self._store.state.model.arm_angle(q)
+        except KinematicsError:
+            return None
+
+
+def initial_goal(model, q: JointVector) -> Goal:  # type: ignore[no-untyped-def]
+    """Returns the goal that stands where the arm stands."""
+    try:
+        psi = model.arm_angle(q)
+    except KinematicsError:
+        psi = None
+    return Goal(q=q, target=model.forward(q), reach=evaluate_joints(model, q), psi=psi)
+
+
+def _beginning(plan: Plan) -> JointVector:
+    """Returns where a plan begins; of a program it is the program's start, not the way there, shape (n,), [rad]."""
+    return plan.motion.start if plan.program is None else np.array(plan.program.start)
+
+
+def _with_number(pose: Pose, index: int, value: float) -> Pose:
+    """Returns a pose with one of x, y, z [mm] and roll, pitch, yaw [deg] replaced."""
+    position, rpy = pose.position, pose.rpy
+    if index < 3:
+        position[index] = value / 1000.0
+    else:
+        rpy[index - 3] = math.radians(value)
+    return Pose.from_rpy(position, rpy)

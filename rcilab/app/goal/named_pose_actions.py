@@ -1,0 +1,96 @@
+"""What happens when somebody stores, recalls or deletes a named pose. Owned by the conductor's thread."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+from rcilab.app import requests
+from rcilab.app.goal.goal_actions import GoalActions
+from rcilab.app.store import Store
+from rcilab.app.text import message
+from rcilab.core.errors import InvalidValueError, RcilabError
+from rcilab.i18n.error_messages import tell
+from rcilab.i18n.translator import Finished
+from rcilab.motion.named_poses import LONGEST_NAME, NamedPoseStore
+
+
+class NamedPoseActions:
+    """The stored poses of the arm of now.
+
+    Args:
+        store: The state.
+        goal: Poses the goal.
+        file: Where the poses are; None: in the user's folder.
+    """
+
+    def __init__(self, store: Store, goal: GoalActions, file: Path | None = None) -> None:
+        self._store, self._goal, self._file = store, goal, file
+        self._shown = ""
+
+    def act(self, request: requests.NamedPose) -> None:
+        """Stores the goal under a name, or recalls, deletes or chooses the pose of this name."""
+        {"store": self._keep, "recall": self._recall, "delete": self._delete, "choose": self._choose}[request.what](
+            request.name
+        )
+
+    def tick(self) -> None:
+        """Looks up the poses of another arm."""
+        if self._store.state.model.name != self._shown:
+            self._shown = self._store.state.model.name
+            self._try(self._show)
+
+    def _keep(self, name: str) -> None:
+        name = name.strip()
+        if not name or len(name) > LONGEST_NAME or not name.isprintable():
+            self._store.say("warn", message("poses.no_name", longest=LONGEST_NAME))
+        elif name in self._store.state.jog.poses:
+            self._store.say("warn", message("poses.taken", name=name))
+        elif self._try(lambda: self._book.store(name, self._store.state.goal.q)):
+            self._try(lambda: self._show(name))
+            self._store.say("good", message("poses.stored", name=name))
+
+    def _recall(self, name: str) -> None:
+        def pose() -> None:
+            q = self._book.recall(name)
+            self._store.remember()
+            self._goal.pose(q)
+
+        if not name:
+            self._store.say("warn", message("poses.none"))
+        else:
+            self._try(pose)
+
+    def _delete(self, name: str) -> None:
+        if not name:
+            self._store.say("warn", message("poses.none"))
+        elif self._try(lambda: self._book.delete(name)):
+            self._try(self._show)
+
+    def _choose(self, name: str) -> None:
+        jog = self._store.state.jog
+        if name in jog.poses:
+            self._store.update(jog=replace(jog, pose=name))
+
+    @property
+    def _book(self) -> NamedPoseStore:
+        return NamedPoseStore(self._store.state.model, self._file)
+
+    def _show(self, chosen: str | None = None) -> None:
+        names = self._book.names()
+        wanted = self._store.state.jog.pose if chosen is None else chosen
+        pose = wanted if wanted in names else (names[0] if names else "")
+        self._store.update(jog=replace(self._store.state.jog, poses=names, pose=pose))
+
+    def _try(self, act: Callable[[], object]) -> bool:
+        try:
+            act()
+        except RcilabError as error:
+            plain = error.requirement if isinstance(error, InvalidValueError) else str(error)
+            reason = tell(error) if error.code else Finished(plain)
+            self._store.say("bad", message("poses.file", file=self._book.file, reason=reason))
+            if isinstance(error, InvalidValueError) and error.name == "pose":
+                self._try(self._show)  # Another program has deleted it.
+            return False
+        return True

@@ -1,0 +1,139 @@
+"""Whether the arm can bring its tool to a pose, in words, and what it can do instead."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from rcilab.core.arrays import JointVector
+from rcilab.core.errors import KinematicsError, UnreachableError
+from rcilab.core.spatial import Pose
+from rcilab.i18n.translator import Message, message
+from rcilab.model.kinematics.solutions import Solutions
+from rcilab.model.robot_model import RobotModel
+
+Tone = Literal["good", "warn", "bad"]
+
+NEAR_LIMIT = math.radians(5.0)  # [rad] A choice: closer than this to a limit is worth saying.
+NEAR_SINGULAR = 0.03  # A choice: smallest singular value of the Jacobian below which the arm is as good as singular.
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TargetStatus:
+    """What the inverse says about a target."""
+
+    tone: Tone
+    """good: reachable; warn: reachable, with a limit or a singularity near; bad: not reachable."""
+    reason: Message
+    """Why, in words."""
+    q: JointVector
+    """The configuration at the nearest reachable pose, shape (n,), [rad]."""
+    solutions: Solutions | None
+    """All branches at that pose; None when there is none."""
+    short: Message | None = None
+    """How far that pose is from the target, in words; None when the target is reached."""
+
+
+@dataclass(frozen=True, slots=True)
+class JointLimitMargin:
+    """How far a configuration is from the nearest joint limit."""
+
+    angle: float
+    """[rad]."""
+    joint: int
+    """From 1."""
+
+
+def margin(model: RobotModel, q: JointVector) -> JointLimitMargin:
+    """Returns the smallest distance to a joint limit and the joint it belongs to."""
+    distances = np.minimum(q - model.limits.joint.lower, model.limits.joint.upper - q)
+    worst = int(np.argmin(distances))
+    return JointLimitMargin(float(distances[worst]), worst + 1)
+
+
+def telling_joints(solutions: np.ndarray) -> tuple[int, ...]:
+    """Returns the joints, from 0, whose angles in whole degrees tell the solutions apart; none where there is one.
+
+    Args:
+        solutions: Joint angles, shape (N, n), [rad].
+    """
+    angles = np.degrees(solutions).round()
+    told: list[int] = []
+    for joint in np.argsort(-np.ptp(angles, axis=0), kind="stable").tolist():
+        if len(np.unique(angles[:, told], axis=0)) == len(np.unique(angles, axis=0)):
+            break
+        told.append(joint)
+    return tuple(sorted(told))
+
+
+def evaluate_pose(model: RobotModel, target: Pose, near: JointVector, psi: float | None = None) -> TargetStatus:
+    """Returns the branch nearest to `near` at a target, or at the reachable pose nearest to it.
+
+    Args:
+        model: The arm.
+        target: Pose of the tool in base.
+        near: Where the arm (or the last answer) is, shape (n,), [rad]; decides the branch.
+        psi: Arm angle to hold, [rad]; None keeps that of `near`.
+    """
+    found = model.closest(target, near, psi)
+    if found.refusal is not None:
+        missed, turned = _miss(target, found.pose)
+        return TargetStatus(
+            tone="bad",
+            reason=why_not(found.refusal, missed),
+            q=found.q,
+            solutions=None,
+            short=_how_short(missed, turned),
+        )
+    return _judge_configuration(model, found.q, found.solutions)
+
+
+def evaluate_joints(model: RobotModel, q: JointVector) -> TargetStatus:
+    """Returns what is to be said about a configuration that was posed joint by joint."""
+    try:
+        solutions = model.inverse(model.forward(q), near=q)
+    except KinematicsError:
+        solutions = None
+    return _judge_configuration(model, q, solutions)
+
+
+def why_not(refusal: UnreachableError, missed: float) -> Message:
+    """Returns why a pose is not reachable.
+
+    Args:
+        refusal: What the inverse says.
+        missed: How far the pose that the arm takes instead is from it, [m]: no other distance is shown beside it.
+    """
+    if refusal.distance > 0.0:
+        return message("reach.far", distance=f"{missed * 1000.0:.0f}")
+    if refusal.joint is not None:
+        return message("reach.joint", joint=refusal.joint, excess=f"{math.degrees(refusal.excess):.1f}")
+    return message("reach.no")
+
+
+def _judge_configuration(model: RobotModel, q: JointVector, solutions: Solutions | None) -> TargetStatus:
+    least = margin(model, q)
+    if least.angle <= 0.0:
+        return TargetStatus(tone="warn", reason=message("reach.at_limit", joint=least.joint), q=q, solutions=solutions)
+    if model.dexterity(q).smallest < NEAR_SINGULAR:
+        return TargetStatus(tone="warn", reason=message("reach.singular"), q=q, solutions=solutions)
+    if least.angle < NEAR_LIMIT:
+        reason = message("reach.limit", joint=least.joint, margin=f"{math.degrees(least.angle):.1f}")
+        return TargetStatus(tone="warn", reason=reason, q=q, solutions=solutions)
+    return TargetStatus(tone="good", reason=message("reach.good"), q=q, solutions=solutions)
+
+
+def _miss(target: Pose, reached: Pose) -> tuple[float, float]:
+    """Returns how far a pose is from its target, [m], and how far it is turned from it, [rad]."""
+    turned = 2.0 * math.acos(min(1.0, abs(float(np.asarray(target.wxyz) @ np.asarray(reached.wxyz)))))
+    return float(np.linalg.norm(target.position - reached.position)), turned
+
+
+def _how_short(missed: float, turned: float) -> Message:
+    mm, deg = f"{missed * 1000.0:.0f}", f"{math.degrees(turned):.1f}"
+    if deg == "0.0":
+        return message("reach.short_mm", mm=mm)
+    return message("reach.short_deg", deg=deg) if mm == "0" else message("reach.short", mm=mm, deg=deg)

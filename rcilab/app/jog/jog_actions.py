@@ -1,0 +1,167 @@
+"""What happens when somebody jogs: the goal or the robot moves while a button is held, or by one step a press.
+
+Owned by the conductor's thread; it never waits for the robot.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from rcilab.app import requests
+from rcilab.app.goal.goal_actions import GoalActions
+from rcilab.app.jog.jog_state import FRAMES, SLOWEST, STEPS, STILL, Axis, at_limit, change_jog, inside, jog_velocity
+from rcilab.app.jog.jog_step import take_step
+from rcilab.app.jog.robot_jog import RobotJog
+from rcilab.app.robot_connection import RobotConnection
+from rcilab.app.store import Store
+from rcilab.control_process.jog_command import HOLD_TIMEOUT
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.motion import Jog
+
+_LONGEST_LOOK = 100  # Cycles a preview goes on at most in one tick: a page that stood still does not jump.
+_SAME = 1e-9  # [rad]
+_FORGOTTEN = 2.0  # [s] A choice: so long a button that moves nothing any more is silent before it may move again.
+
+
+@dataclass
+class _Press:
+    """A button from its press to its release."""
+
+    page: int | None
+    axis: Axis
+    heard: float
+    """When it was last said to be held, [s]."""
+    is_robot: bool
+    is_spent: bool = False
+    """Whether it moves nothing any more, though it is still held: it was refused, or something ended the motion."""
+
+    def is_over(self, now: float) -> bool:
+        """Returns whether it was silent for so long that it is not held any more."""
+        return now - self.heard > (_FORGOTTEN if self.is_spent else HOLD_TIMEOUT)
+
+
+class JogActions:
+    """The buttons of the Jog tab.
+
+    Args:
+        store: The state.
+        session: The robot side.
+        goal: Poses the goal.
+    """
+
+    def __init__(self, store: Store, session: RobotConnection, goal: GoalActions) -> None:
+        self._store, self._goal = store, goal
+        self._robot = RobotJog(store, session, goal)
+        self._press: _Press | None = None
+        self._preview: Jog | None = None  # The goal on its way, until it stands.
+        self._who: tuple[object, ...] = ()
+
+    def set_jog(self, request: requests.SetJog) -> None:
+        """Changes how to jog; what does not exist is ignored. A foreign robot is jogged after a second yes only."""
+        state, changes = self._store.state, dict[str, object]()
+        if request.step in STEPS:
+            changes["step"] = request.step
+        if request.frame in FRAMES:
+            changes["frame"] = request.frame
+        if request.speed is not None and math.isfinite(request.speed):
+            changes["speed"] = min(max(request.speed, SLOWEST), 1.0)
+        if request.robot is not None:
+            is_asked = request.robot and state.target != "virtual" and not (request.agreed and state.jog.asked)
+            changes |= {"robot": request.robot and not is_asked, "asked": is_asked, "said": None}
+        self.release()
+        change_jog(self._store, **changes)
+
+    def hold(self, request: requests.HoldJog) -> None:
+        """Goes on with the jog of a button, for as long as it is said again and again."""
+        axis, state, now = Axis(request.axis, request.sign), self._store.state, time.monotonic()
+        if state.jog.step or not axis.exists(state.model):
+            return
+        press = self._press
+        if press is None or (press.page, press.axis) != (request.page, axis) or press.is_over(now):
+            self.release()
+            self._press = press = _Press(request.page, axis, now, state.jog.robot)
+            press.is_spent = not (self._robot.begin() if press.is_robot else self._begin_preview(axis))
+        press.heard = now
+        if press.is_robot and not press.is_spent:
+            press.is_spent = not self._robot.renew(axis, request.stops)
+
+    def press(self, request: requests.PressJog) -> None:
+        """Makes a step, or ends what was held: a button says so when it is released."""
+        axis, state = Axis(request.axis, request.sign), self._store.state
+        if not axis.exists(state.model):
+            return
+        if not state.jog.step:
+            self.release()
+        elif state.jog.robot:
+            self._robot.step(axis, request.stops)
+        else:
+            self._step_goal(axis)
+
+    def release(self) -> None:
+        """Brings to rest what a button moves."""
+        press, self._press = self._press, None
+        if press is not None and press.is_robot:
+            self._robot.let_go()
+        if self._preview is not None:
+            self._preview.stop()
+
+    def tick(self, elapsed: float) -> None:
+        """Lets go for a page that has gone silent or has the controls no more; goal and robot go on."""
+        state = self._store.state
+        who = (state.target, state.model.name, state.plant, state.lease.holder)
+        if who != self._who:
+            self._who = who
+            self._begin_anew()
+        press = self._press
+        is_held = press is not None and press.is_robot and not press.is_spent
+        # First: a jog that has ended stays ended, however long nothing was heard or done meanwhile.
+        if not self._robot.watch(press.axis if press is not None and is_held else None) and press is not None:
+            press.is_spent = True
+        if press is not None and press.is_over(time.monotonic()):
+            self.release()
+        if self._preview is not None:
+            self._advance(self._preview, elapsed)
+
+    def _begin_preview(self, axis: Axis) -> bool:
+        state = self._store.state
+        change_jog(self._store, said=None)
+        self._store.remember()
+        q = inside(state.model, state.goal.q)
+        self._preview = Jog(state.model, q)
+        kind, values = jog_velocity(state.model, q, state.jog, axis)
+        if kind == "joint":
+            self._preview.set_joint_velocity(values)
+        else:
+            self._preview.set_twist(values, frame=kind)
+        return True
+
+    def _advance(self, preview: Jog, elapsed: float) -> None:
+        """Moves the goal on as the robot would go."""
+        for _ in range(min(round(elapsed / CYCLE_TIME), _LONGEST_LOOK)):
+            preview.step()
+        state, press = self._store.state, self._press
+        if float(np.abs(preview.q - state.goal.q).max()) > _SAME:
+            self._goal.pose(preview.q)
+        if press is None:
+            self._preview = None if preview.is_at_rest else preview
+        elif float(np.abs(preview.dq).max()) < STILL:
+            change_jog(self._store, said=at_limit(state.model, preview.q, press.axis))
+
+    def _step_goal(self, axis: Axis) -> None:
+        state = self._store.state
+        led = take_step(state.model, state.goal.q, state.jog, axis)
+        change_jog(self._store, said=led.said)
+        if led.q is not None:
+            self._store.remember()
+            self._goal.pose(led.q)
+
+    def _begin_anew(self) -> None:
+        """Another arm, destination or person: the buttons pose the goal again until somebody wants otherwise."""
+        self.release()
+        self._preview = None
+        self._robot.forget()
+        change_jog(self._store, robot=False, asked=False, said=None)

@@ -1,0 +1,215 @@
+"""What jogging is made of: its settings, how fast and how far one button goes, what stands in the way."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from rcilab.app.setup.configuration_state import setup_obstacle
+from rcilab.app.status_text import tell_status
+from rcilab.app.text import Message, message
+from rcilab.core.arrays import Array, JointVector, readonly_copy
+from rcilab.core.clearance import ADVISED_DISTANCE
+from rcilab.core.safety_box import SafetyBox, active_box
+from rcilab.motion.online import POSITION_MARGIN
+from rcilab.motion.twist import DAMPED_BELOW
+
+if TYPE_CHECKING:
+    from rcilab.app.planning import Plan
+    from rcilab.app.store import Store, UiState
+    from rcilab.control_process import SupervisorStatus
+    from rcilab.control_process.jog_command import JogKind
+    from rcilab.model.robot_model import RobotModel
+
+Frame = Literal["base", "tool"]
+
+FRAMES: tuple[Frame, ...] = ("base", "tool")
+AXES = ("x", "y", "z", "roll", "pitch", "yaw")
+STEPS = (0.0, 0.1, 1.0, 5.0, 10.0)
+"""Millimetres or degrees that one press goes; 0: as long as the button is held."""
+
+FASTEST_TOOL = 0.25  # [m/s] What ISO 10218-1 calls reduced speed; no jog moves the tool tip faster.
+FASTEST_TURN = math.radians(45.0)  # [rad/s] Of the tool. A choice.
+FASTEST_JOINT = math.radians(30.0)  # [rad/s] A choice.
+SLOWEST = 0.01
+STILL = 1e-3  # [rad/s] A choice: below this a jogged joint stands.
+
+_AT_LIMIT = math.radians(0.05)  # [rad] A choice: closer than this to its limit a jogged joint has arrived there.
+_REACTION = 0.5  # [s] A choice: a jog that nobody renews any more, 0.3 s, and the way to rest are shorter.
+_AHEAD = 0.1  # [s] How far ahead distances are looked at.
+_FACE = 1e-3  # [m] A choice: the tool stands so far before a face of the safety box.
+_APPROACH = 1e-4  # [m/s] A choice: slower than this nothing comes nearer.
+STANDING = 0.02  # A choice: a smaller part of a jog than that is none.
+
+_NO_JOG = {
+    "starting": "ready.starting",
+    "connecting": "ready.starting",
+    "stopping": "ready.moving",
+    "fault": "ready.fault",
+    "lost": "ready.lost",
+    "closed": "ready.closed",
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class JogState:
+    """How the page jogs."""
+
+    robot: bool = False
+    """Whether the buttons move the robot; otherwise they pose the goal."""
+    asked: bool = False
+    """Whether a foreign robot was chosen and that awaits a second yes."""
+    step: float = 0.0
+    """One of `STEPS`."""
+    frame: Frame = "base"
+    speed: float = 0.3
+    """Share of the fastest jog, 0 to 1."""
+    said: Message | None = None
+    """What stopped or refused the last jog."""
+    poses: tuple[str, ...] = ()
+    """Names of the stored poses of this arm."""
+    pose: str = ""
+    """The one that is chosen."""
+
+
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """One button: a joint or an axis of the tool, and a direction."""
+
+    name: str
+    """"joint.0" ... "joint.6", or one of `AXES`."""
+    sign: int
+    """1 or -1."""
+
+    @property
+    def joint(self) -> int | None:
+        """Number of the joint from 0; None for an axis of the tool."""
+        return int(self.name[6:]) if self.name.startswith("joint.") else None
+
+    def exists(self, model: RobotModel) -> bool:
+        """Returns whether an arm has it."""
+        names = (*(f"joint.{joint}" for joint in range(model.n)), *AXES)
+        return self.name in names and self.sign in (-1, 1)
+
+
+def jog_velocity(model: RobotModel, q: JointVector, jog: JogState, axis: Axis) -> tuple[JogKind, Array]:
+    """Returns the kind and the values of a jog for `Supervisor.jog`: joint velocities or a twist.
+
+    Args:
+        model: The arm.
+        q: Joint angles now, shape (n,), [rad]; they decide how fast a joint may turn for `FASTEST_TOOL`.
+        jog: Speed and frame.
+        axis: What moves.
+    """
+    joint = axis.joint
+    if joint is None:
+        twist = np.zeros(6)
+        index = AXES.index(axis.name)
+        twist[index] = axis.sign * jog.speed * (FASTEST_TOOL if index < 3 else FASTEST_TURN)
+        return jog.frame, twist
+    lever = float(np.linalg.norm(model.jacobian(q)[:3, joint]))  # [m]
+    values = np.zeros(model.n)
+    values[joint] = axis.sign * jog.speed * min(FASTEST_JOINT, FASTEST_TOOL / max(lever, 1e-3))
+    return "joint", values
+
+
+def inside(model: RobotModel, q: JointVector) -> JointVector:
+    """Returns the joint angles nearest to `q` from which a jog can begin, shape (n,), [rad]."""
+    limits = model.limits.joint
+    return readonly_copy(np.clip(q, limits.lower + POSITION_MARGIN, limits.upper - POSITION_MARGIN))
+
+
+def at_limit(model: RobotModel, q: JointVector, axis: Axis) -> Message | None:
+    """Returns why this button leads no further: a joint at its limit, or the edge of the reach; None for neither."""
+    limits, joint = model.limits.joint, axis.joint
+    for number in range(model.n) if joint is None else (joint,):
+        for end, bound in (("lower", limits.lower[number]), ("upper", limits.upper[number])):
+            is_ahead = joint is None or (end == "upper") == (axis.sign > 0)
+            if is_ahead and abs(q[number] - bound) < _AT_LIMIT:
+                return message(f"jog.at_{end}", joint=number + 1, angle=f"{math.degrees(bound):.0f}")
+    if joint is None and np.linalg.svd(model.jacobian(q), compute_uv=False)[-1] < DAMPED_BELOW:
+        return message("jog.at_edge")
+    return None
+
+
+def safe_share(model: RobotModel, q: JointVector, kind: JogKind, values: Array) -> tuple[float, tuple[int, int]]:
+    """Returns the part of a jog, 0 to 1, that keeps links from each other and the floor, and which come nearest.
+
+    No controller looks for that. The arm may come nearer by what is left to `ADVISED_DISTANCE` within `_REACTION`, so
+    that it slows down on its way there, and stands in time even when nobody looks at it any more meanwhile.
+
+    Args:
+        model: The arm.
+        q: Joint angles now, shape (n,), [rad].
+        kind: As for `Supervisor.jog`.
+        values: Likewise.
+    """
+    dq = _rates(model, q, kind, values)
+    found = model.clearance(np.stack([q, q + _AHEAD * dq]))
+    now, ahead = found.distance
+    closing = float(now - ahead) / _AHEAD  # [m/s]
+    first, second = (int(number) for number in found.links[1])
+    if closing <= _APPROACH:
+        return 1.0, (first, second)
+    return min(max(float(now) - ADVISED_DISTANCE, 0.0) / (closing * _REACTION), 1.0), (first, second)
+
+
+def box_share(model: RobotModel, q: JointVector, kind: JogKind, values: Array, box: SafetyBox | None) -> float:
+    """Returns the part of a jog, 0 to 1, that keeps the tool in the safety box: it slows down on its way to a face.
+
+    Args:
+        model: The arm.
+        q: Joint angles now, shape (n,), [rad].
+        kind: As for `Supervisor.jog`.
+        values: Likewise.
+        box: The safety box; one that is off bounds nothing.
+    """
+    bound = active_box(box)
+    if bound is None:
+        return 1.0
+    ahead = q + _AHEAD * _rates(model, q, kind, values)
+    now, then = (-bound.excess(model.forward(angles).position.tolist()) for angles in (q, ahead))
+    closing = (now - then) / _AHEAD  # [m/s]
+    return 1.0 if closing <= _APPROACH else min(max(now - _FACE, 0.0) / (closing * _REACTION), 1.0)
+
+
+def fastest_tool(plan: Plan) -> float:
+    """Returns the highest speed of the tool in a plan, as far as its path shows it, [m/s]."""
+    steps = np.sqrt(np.square(np.diff(plan.path, axis=0)).sum(axis=1))
+    return float(steps.max()) * (len(plan.path) - 1) / plan.motion.duration
+
+
+def _rates(model: RobotModel, q: JointVector, kind: JogKind, values: Array) -> Array:
+    """Returns the joint velocities of a jog, shape (n,), [rad/s]."""
+    if kind == "joint":
+        return values
+    R = model.forward(q).rotation if kind == "tool" else np.eye(3)
+    return model.joint_velocity(q, np.concatenate([R @ values[:3], R @ values[3:]])).rates
+
+
+def no_jog(state: UiState, status: SupervisorStatus) -> Message | None:
+    """Returns why the buttons cannot move the robot now, or None when they can."""
+    if status.code == "moving.guided":
+        return message("ready.guided")
+    if status.phase == "crashed" or (status.phase == "lost" and state.target == "virtual"):
+        return tell_status(status)
+    if status.phase == "moving" and status.code != "moving.jog":
+        return message("ready.moving")
+    if status.is_pressed and status.phase in ("idle", "fault"):
+        return message("ready.pressed")
+    if status.phase in _NO_JOG:
+        return message(_NO_JOG[status.phase])
+    if not status.powered:
+        return message("ready.power")
+    return setup_obstacle(state, status)
+
+
+def change_jog(store: Store, **changes: Any) -> None:
+    """Exchanges settings and words of the jog."""
+    jog = store.state.jog
+    changed = replace(jog, **changes)
+    if changed != jog:
+        store.update(jog=changed)

@@ -1,0 +1,76 @@
+"""One step of a jog: where a press leads, or why it leads nowhere."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rcilab.app.goal.target_status import evaluate_pose
+from rcilab.app.jog.jog_state import AXES, Axis, Frame, JogState, at_limit
+from rcilab.app.text import Message, message
+from rcilab.core.arrays import JointVector, readonly_copy
+from rcilab.core.spatial import Pose
+from rcilab.motion.online import POSITION_MARGIN
+
+if TYPE_CHECKING:
+    from rcilab.model.robot_model import RobotModel
+
+_NOWHERE = 1e-9  # [rad] Less than that is no step.
+_FARTHEST = math.radians(20.0)  # A choice: a joint that turns more for a step of the tool swings the arm elsewhere.
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """Where a step leads."""
+
+    q: JointVector | None
+    """Shape (n,), [rad]; None: nowhere."""
+    said: Message | None = None
+    """Which limit is in the way, or why there is no step."""
+
+
+def take_step(model: RobotModel, q: JointVector, jog: JogState, axis: Axis) -> Step:
+    """Returns where one press of a button leads from joint angles `q`.
+
+    A joint goes as far as its range lets it; a tool makes a whole step or none.
+    """
+    joint = axis.joint
+    if joint is None:
+        reach = evaluate_pose(model, step_pose(model.forward(q), axis, jog.step, jog.frame), q)
+        if reach.tone == "bad":
+            return Step(None, message("jog.no_way", reason=reach.reason))
+        turns = np.abs(reach.q - q)
+        if turns.max() > _FARTHEST:
+            farthest = int(turns.argmax())
+            angle = f"{math.degrees(turns[farthest]):.0f}"
+            return Step(None, message("jog.far", joint=farthest + 1, angle=angle))
+        return Step(reach.q)
+    limits, moved = model.limits.joint, np.array(q)
+    low, high = limits.lower[joint] + POSITION_MARGIN, limits.upper[joint] - POSITION_MARGIN
+    moved[joint] = min(max(q[joint] + math.radians(axis.sign * jog.step), low), high)
+    is_further = axis.sign * (moved[joint] - q[joint]) > _NOWHERE
+    return Step(readonly_copy(moved) if is_further else None, at_limit(model, readonly_copy(moved), axis))
+
+
+def step_pose(T_base_tool: Pose, axis: Axis, step: float, frame: Frame) -> Pose:
+    """Returns a pose that is moved along, or turned about, one axis of the base or of the tool.
+
+    Args:
+        T_base_tool: The pose.
+        axis: One of `AXES`; a turn leaves the tip where it is.
+        step: How far, [mm] or [deg].
+        frame: Whose axes.
+    """
+    index, amount = AXES.index(axis.name), axis.sign * step
+    along, about = np.zeros(3), np.zeros(3)
+    if index < 3:
+        along[index] = amount / 1000.0
+    else:
+        about[index - 3] = math.radians(amount)
+    turn = Pose.from_rpy(np.zeros(3), about)
+    if frame == "tool":
+        return T_base_tool @ Pose(along) @ turn
+    return Pose(T_base_tool.position + along, (turn @ Pose(wxyz=T_base_tool.wxyz)).wxyz)

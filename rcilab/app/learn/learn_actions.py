@@ -1,0 +1,133 @@
+"""What happens when somebody presses a fault or goes through a lesson. Owned by the conductor's thread."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+from rcilab.app import requests
+from rcilab.app.fault_lab import FAULTS, FaultDemo
+from rcilab.app.fault_lab.private_arm import PrivateArm
+from rcilab.app.learn.learn_state import LearnState, LessonState, make_show
+from rcilab.app.learn.lessons import LESSONS, Watcher
+from rcilab.app.robot_connection import RobotConnection
+from rcilab.app.run.readiness import is_moving
+from rcilab.app.status_text import tell_error
+from rcilab.app.store import Store
+from rcilab.app.text import message
+from rcilab.core.background_job import BackgroundJob
+from rcilab.core.errors import RcilabError
+from rcilab.core.faults import Fault
+
+
+class LearnActions:
+    """The gallery never touches the robot of the page; lessons only watch."""
+
+    def __init__(self, store: Store, session: RobotConnection) -> None:
+        self._store, self._session = store, session
+        self._arm = PrivateArm()
+        self._work: BackgroundJob[Fault, FaultDemo] = BackgroundJob("gallery")
+        self._watcher = Watcher()
+
+    def press(self, request: requests.Learn) -> None:
+        """Does what a button of the tab says."""
+        match request.what:
+            case "provoke":
+                self._provoke(request.fault)
+            case "cancel":
+                self._work.cancel()
+                self._set(provoking=None, progress=0.0)
+            case "close":
+                self._close()
+            case "moment" if self._learn.show is not None:
+                self._store.update(place=self._learn.show.place, playing=False)
+            case "script":
+                self._set(is_script_shown=not self._learn.is_script_shown)
+            case "lesson" if request.name in LESSONS:
+                self._watcher = Watcher()
+                self._set(lesson=LessonState(name=request.name))
+                first = LESSONS[request.name][0].name
+                self._store.say("good", message(f"lesson.{request.name}.{first}"))
+            case "skip":
+                self._step(skipped=True)
+            case "leave":
+                self._set(lesson=None)
+            case _:
+                pass
+
+    def tick(self) -> None:
+        """Shows how far a provocation is and what came of it; closes the show; looks what the learner has done."""
+        learn = self._learn
+        if self._work.is_done:
+            self._finish(self._work.take()[1])
+        elif self._work.progress is not None and self._work.progress != learn.progress:
+            self._set(progress=self._work.progress)
+        self._look_beside()
+        self._watch()
+
+    def close(self) -> None:
+        """Ends the private controller."""
+        self._work.cancel()
+        self._arm.close()
+
+    @property
+    def _learn(self) -> LearnState:
+        return self._store.state.learn
+
+    def _set(self, **changes: Any) -> None:
+        self._store.update(learn=replace(self._learn, **changes))
+
+    def _provoke(self, fault: int) -> None:
+        if fault not in FAULTS:
+            return
+        recipe, model = FAULTS[Fault(fault)], self._store.state.model
+        if recipe.needs_elbow and model.n != 7:
+            self._set(problem=message("learn.no_elbow", model=model.name))
+            return
+        self._work.start(recipe.fault, partial(self._arm.provoke, recipe.fault, model.name))
+        self._set(provoking=recipe.fault, progress=0.0, problem=None)
+
+    def _finish(self, result: FaultDemo | RcilabError) -> None:
+        if isinstance(result, RcilabError):
+            self._set(provoking=None, problem=message("learn.failed", error=tell_error(result)))
+            return
+        state = self._store.state
+        beside = None if state.plan is None else state.plan.motion
+        show = make_show(result, beside)
+        self._set(provoking=None, show=show)
+        self._store.update(place=show.place, playing=False)
+
+    def _close(self) -> None:
+        if self._learn.show is not None:
+            self._set(show=None)
+            self._store.update(place=0.0, playing=False)
+
+    def _look_beside(self) -> None:
+        """Closes the show once something else is to be seen: another plan, another arm, a motion."""
+        state, show = self._store.state, self._learn.show
+        if show is None:
+            return
+        beside = None if state.plan is None else state.plan.motion
+        other = beside is not show.beside or state.model.name != show.exhibit.model.name
+        if other or is_moving(self._session.status()):
+            self._set(show=None)
+
+    def _watch(self) -> None:
+        lesson = self._learn.lesson
+        if lesson is not None and lesson.step < len(LESSONS[lesson.name]):
+            step = LESSONS[lesson.name][lesson.step]
+            if self._watcher.is_done(step, self._store.state, self._session.status()):
+                self._step()
+
+    def _step(self, *, skipped: bool = False) -> None:
+        lesson = self._learn.lesson
+        if lesson is None or lesson.step >= len(LESSONS[lesson.name]):
+            return
+        passed = lesson.skipped | {lesson.step} if skipped else lesson.skipped
+        self._watcher = Watcher()
+        self._set(lesson=replace(lesson, step=lesson.step + 1, skipped=passed))
+        if not skipped:  # Said on every tab: the person is where the step was done.
+            steps = LESSONS[lesson.name][lesson.step + 1 :]
+            last = message("lesson.over") if not steps else message(f"lesson.{lesson.name}.{steps[0].name}")
+            self._store.say("good", message("lesson.ticked", next=last))

@@ -1,0 +1,85 @@
+"""The Learn tab as a value: the fault on show, the one being provoked, the lesson and how far it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rcilab.app.fault_lab import FaultDemo
+from rcilab.app.fault_lab.demo_motion import DemoMotion, exhibition_of
+from rcilab.app.text import Message
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.faults import Fault
+
+if TYPE_CHECKING:
+    from rcilab.app.store import Recording, UiState
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Show:
+    """A fault on show, as timeline and scene draw it."""
+
+    exhibition: DemoMotion
+    recording: Recording
+    """What the arm did."""
+    beside: object
+    """The motion that was planned on the page when it opened; another one closes the show."""
+
+    @property
+    def exhibit(self) -> FaultDemo:
+        """The fault."""
+        return self.exhibition.exhibit
+
+    @property
+    def place(self) -> float:
+        """Where the timeline stands at the fault, 0 to 1; behind it comes the controlled stop."""
+        return self.exhibition.moment / max(self.exhibition.plan.motion.duration, CYCLE_TIME)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class LessonState:
+    """How far somebody is in a lesson."""
+
+    name: str
+    step: int = 0
+    """From 0; the number of steps when it is over."""
+    skipped: frozenset[int] = frozenset()
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class LearnState:
+    """Everything of the Learn tab."""
+
+    provoking: Fault | None = None
+    progress: float = 0.0
+    """Of what is being provoked, 0 to 1."""
+    show: Show | None = None
+    is_script_shown: bool = False
+    problem: Message | None = None
+    """Why the last one did not come."""
+    lesson: LessonState | None = None
+
+
+def make_show(exhibit: FaultDemo, beside: object) -> Show:
+    """Returns a fault as the page shows it."""
+    from rcilab.app.store import Recording
+
+    rows = exhibit.whole
+    return Show(
+        exhibition=exhibition_of(exhibit),
+        recording=Recording(
+            t=np.array(rows["t"]), q=rows["q"], q_c=rows["q_c"], dq=rows["dq"], delay=0, moment=exhibit.time
+        ),
+        beside=beside,
+    )
+
+
+def exhibited(state: UiState, *, scene: bool = False) -> UiState:
+    """Returns what timeline, or scene, are to draw: the fault on show, if there is one, in place of the plan."""
+    show = state.learn.show
+    if show is None:
+        return state
+    seen = show.exhibition.scene if scene else show.exhibition.plan
+    return replace(state, plan=seen, recording=show.recording)

@@ -1,0 +1,165 @@
+"""The guided lessons: steps that watch the state of the page, and are done when the person has done them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
+
+from rcilab.app.run.readiness import is_moving
+
+if TYPE_CHECKING:
+    from rcilab.app.store import UiState
+    from rcilab.control_process import SupervisorStatus
+
+Look: TypeAlias = "Callable[[UiState, UiState, SupervisorStatus], bool]"
+"""Whether it is done, from the state when the step began, the state of now, and how the robot is."""
+
+_POSED = 0.15  # [rad] A choice: so far from the arm a goal was moved on purpose.
+_TURNED = 0.2  # [rad] of arm angle; a choice.
+_FAST = 0.95  # Share of the limits to plan with; a choice.
+_FELT = 3.0  # [N] A choice: more than an arm at rest feels.
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """One thing to do."""
+
+    name: str
+    """Its words are lesson.LESSON.NAME in the catalogues."""
+    is_done: Look
+
+
+def _distance(state: UiState, status: SupervisorStatus) -> float:
+    return 0.0 if status.q_c is None else float(np.abs(state.goal.q - status.q_c).max())
+
+
+def _posed(then: UiState, now: UiState, status: SupervisorStatus) -> bool:
+    return _distance(now, status) > _POSED and now.goal is not then.goal
+
+
+def _checked(then: UiState, now: UiState, status: SupervisorStatus) -> bool:
+    return now.plan is not None and now.plan.complete and now.plan.report.ok
+
+
+def _looked(then: UiState, now: UiState, status: SupervisorStatus) -> bool:
+    return now.plan is not None and (now.playing or now.place != then.place)
+
+
+def _moving(then: UiState, now: UiState, status: SupervisorStatus) -> bool:
+    return is_moving(status)
+
+
+def _arrived(then: UiState, now: UiState, status: SupervisorStatus) -> bool:
+    run = None if now.last_run is None else now.last_run.run
+    return run is not None and run.is_complete and not run.stopped and not run.faults and not is_moving(status)
+
+
+def _fast(then: UiState, now: UiState, status: SupervisorStatus) -> bool:
+    return now.speed >= _FAST
+
+
+def _refused(then: UiState, now: UiState, status: SupervisorStatus) -> bool:
+    return now.plan is not None and any(not row.ok for row in now.plan.report.rows)
+
+
+def _sought(then: UiState, now: UiState, status: SupervisorStatus) -> bool:
+    return now.check.sought != then.check.sought
+
+
+def _slowed(then: UiState, now: UiState, status: SupervisorStatus) -> bool:
+    return now.check.slowed is not None and now.check.slowed is not then.check.slowed
+
+
+def _turned(then: UiState, now: UiState, status: SupervisorStatus) -> bool:
+    if then.goal.psi is None or now.goal.psi is None:
+        return False
+    stays = float(np.abs(then.goal.target.position - now.goal.target.position).max()) < 1e-6
+    return stays and abs(np.remainder(now.goal.psi - then.goal.psi + np.pi, 2.0 * np.pi) - np.pi) > _TURNED
+
+
+def _other_branch(then: UiState, now: UiState, status: SupervisorStatus) -> bool:
+    return now.goal.target is then.goal.target and float(np.abs(now.goal.q - then.goal.q).max()) > _TURNED
+
+
+def _physics(then: UiState, now: UiState, status: SupervisorStatus) -> bool:
+    return now.plant == "mujoco" and status.phase == "idle"
+
+
+def _guided(then: UiState, now: UiState, status: SupervisorStatus) -> bool:
+    return status.code == "moving.guided"
+
+
+def _pushed(then: UiState, now: UiState, status: SupervisorStatus) -> bool:
+    force = status.tau_ext
+    return force is not None and float(np.abs(np.asarray(force)[:3]).max()) > _FELT
+
+
+def _let_go(then: UiState, now: UiState, status: SupervisorStatus) -> bool:
+    return status.phase == "idle" and status.code != "moving.guided"
+
+
+def _provoked(then: UiState, now: UiState, status: SupervisorStatus) -> bool:
+    show = now.learn.show
+    return show is not None and show.exhibit.fault.name == "INSTABILITY_DETECTION"
+
+
+def _script(then: UiState, now: UiState, status: SupervisorStatus) -> bool:
+    return now.learn.is_script_shown
+
+
+def _closed(then: UiState, now: UiState, status: SupervisorStatus) -> bool:
+    return now.learn.show is None
+
+
+LESSONS: Mapping[str, tuple[Step, ...]] = MappingProxyType(
+    {
+        "first": (
+            Step("pose", _posed),
+            Step("look", _looked),
+            Step("check", _checked),
+            Step("execute", _moving),
+            Step("arrive", _arrived),
+        ),
+        "limits": (
+            Step("fast", _fast),
+            Step("far", _refused),
+            Step("row", _sought),
+            Step("slow", _slowed),
+        ),
+        "elbow": (
+            Step("pose", _posed),
+            Step("turn", _turned),
+            Step("branch", _other_branch),
+        ),
+        "push": (
+            Step("mujoco", _physics),
+            Step("guide", _guided),
+            Step("push", _pushed),
+            Step("stop", _let_go),
+        ),
+        "network": (
+            Step("cut", _provoked),
+            Step("script", _script),
+            Step("close", _closed),
+        ),
+    }
+)
+"""Every lesson, in the order of the list."""
+
+
+class Watcher:
+    """Looks at one step: remembers how the page was when it began."""
+
+    def __init__(self) -> None:
+        self._then: UiState | None = None
+
+    def is_done(self, step: Step, state: UiState, status: SupervisorStatus) -> bool:
+        """Returns whether the person has done it; at the first look nothing is done yet."""
+        if self._then is None:
+            self._then = state
+            return step.is_done is _checked and step.is_done(state, state, status)
+        return step.is_done(self._then, state, status)

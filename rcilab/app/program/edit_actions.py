@@ -1,0 +1,198 @@
+"""What happens when somebody edits the program: its list, a step of it, its name. Owned by the conductor's thread."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from rcilab.app import requests
+from rcilab.app.goal.goal_actions import GoalActions
+from rcilab.app.program.program_draft import MOST_ROUNDS, TYPES, Draft, target_of, time_at
+from rcilab.app.program.program_history import ProgramHistory
+from rcilab.app.program.waypoint_fields import default_via, proposed
+from rcilab.app.robot_connection import RobotConnection
+from rcilab.app.store import Store
+from rcilab.app.text import Message, message
+from rcilab.core.arrays import JointVector, readonly_copy
+from rcilab.i18n.number_parsing import parse_number
+from rcilab.motion.waypoint import Waypoint
+
+LONGEST_NAME = 80
+
+
+class EditActions:
+    """Edits, each of which can be undone.
+
+    Args:
+        store: The state.
+        session: The robot side: where the arm stands.
+        goal: Led to a step's target, or where a step comes from.
+        shelves: The programs.
+    """
+
+    def __init__(self, store: Store, session: RobotConnection, goal: GoalActions, shelves: ProgramHistory) -> None:
+        self._store, self._session, self._goal, self._shelves = store, session, goal, shelves
+        self._edits: dict[str, Callable[[requests.EditProgram, int], None]] = {
+            "select": self._select, "teach": self._teach, "via": self._via, "type": self._retype,
+            "delete": self._delete, "duplicate": self._duplicate, "aim": self._aim,
+            "up": lambda request, key: self._move(key, -1), "down": lambda request, key: self._move(key, 1),
+            "move": self._move_to,
+        }  # fmt: skip
+
+    def edit(self, request: requests.EditProgram) -> None:
+        """Changes the program, or what of it is selected; what nobody can do just now is said."""
+        self._shelves.open()
+        whole = {
+            "add": lambda: self._add(request), "start": self._start_here,
+            "undo": self._shelves.undo, "redo": self._shelves.redo,
+            "clear": lambda: self._shelves.change(Draft(model=self._draft.model), None),
+            "tool": lambda: self._shelves.change(replace(self._draft, tool=None), self._shelves.state.selected),
+            "script": lambda: self._shelves.set(is_script_shown=not self._shelves.state.is_script_shown),
+        }  # fmt: skip
+        if request.what in whole:
+            whole[request.what]()
+            return
+        key = self._shelves.state.selected if request.key is None else request.key
+        if key is None or self._draft.place(key) is None:
+            self._store.say("warn", message("program.select"))
+            return
+        self._edits[request.what](request, key)
+
+    def type_field(self, request: requests.TypeField) -> None:
+        """Takes what was typed about a step, the rounds or the name, or says beside the field what is wrong with it."""
+        self._shelves.open()
+        _, key, name = (*request.field.split("."), "", "")[:3]
+        waypoint = self._draft.waypoint(int(key)) if key.isdecimal() else None
+        if name == "name":
+            self._rename(request)
+        elif name == "rounds":
+            parsed = parse_number(request.text, 1, MOST_ROUNDS, "")
+            if parsed.value is not None and parsed.value != round(parsed.value):
+                self._shelves.answer(request.field, message("program.whole", typed=request.text[:40]))
+            elif self._shelves.answer(request.field, parsed.problem) and parsed.value is not None:
+                self._shelves.interrupt()
+                self._shelves.set(rounds=int(parsed.value), planned=None, answer=None)
+        elif waypoint is not None:
+            made = proposed(waypoint, name, request.text, self._draft.arm(self._store.state.model))
+            if made is not None and self._shelves.answer(request.field, made if isinstance(made, Message) else None):
+                assert isinstance(made, Waypoint)
+                self._shelves.change(self._draft.changed(int(key), made), int(key), typed=True)
+
+    @property
+    def _draft(self) -> Draft:
+        return self._shelves.draft
+
+    def _rename(self, request: requests.TypeField) -> None:
+        name = request.text.strip()
+        good = name.isprintable() and len(name) <= LONGEST_NAME
+        if self._shelves.answer(request.field, None if good else message("program.name_bad", most=LONGEST_NAME)):
+            self._shelves.rename(name)
+
+    def _configuration(self, source: str) -> JointVector | None:
+        """Returns the joint angles of the arm or of the goal; what they lack is said."""
+        state, here = self._store.state, self._session.status().q_c
+        if source == "target":
+            if state.goal.reach.short is not None:
+                self._store.say("warn", message("program.short", short=state.goal.reach.short))
+            return state.goal.q
+        if here is None:
+            self._store.say("warn", message("plan.no_arm"))
+        return here
+
+    def _add(self, request: requests.EditProgram) -> None:
+        q = self._configuration(request.source)
+        if q is None:
+            return
+        draft, chosen = self._draft, self._draft.waypoint(self._shelves.state.selected)
+        if draft.start is None:
+            here = self._session.status().q_c
+            draft = replace(draft, start=tuple((q if here is None else here).tolist()))
+        waypoint = Waypoint(type="joint", q=tuple(q.tolist()))
+        if chosen is not None:
+            waypoint = replace(waypoint, speed=chosen.speed, blend=chosen.blend)
+            waypoint = replace(waypoint, type="line" if chosen.type != "joint" else "joint")
+        self._shelves.change(*draft.inserted(waypoint, self._shelves.state.selected))
+
+    def _start_here(self) -> None:
+        q = self._configuration("here")
+        if q is not None and self._draft.steps:
+            self._shelves.change(replace(self._draft, start=tuple(q.tolist())), self._shelves.state.selected)
+
+    def _select(self, request: requests.EditProgram, key: int) -> None:
+        """Chooses a step; while the plan is of this program, the preview goes there."""
+        if key != self._shelves.state.selected:
+            self._store.clear_problems("program.")
+        self._shelves.set(selected=key)
+        state, place = self._store.state, self._draft.place(key)
+        plan = state.plan
+        if plan is None or plan.program is None or place is None or self._shelves.state.planned is not self._draft:
+            return
+        if place < len(plan.program.waypoints):
+            self._store.update(place=time_at(plan, place + 1) / max(plan.motion.duration, 1e-3), playing=False)
+
+    def _teach(self, request: requests.EditProgram, key: int) -> None:
+        q, waypoint = self._configuration(request.source), self._draft.waypoint(key)
+        if q is None or waypoint is None:
+            return
+        if waypoint.type not in TYPES:
+            self._store.say("warn", message("program.no_target"))
+            return
+        taught = replace(waypoint, q=tuple(q.tolist()), position=None, wxyz=None, psi=None)
+        self._shelves.change(self._draft.changed(key, taught), key)
+
+    def _via(self, request: requests.EditProgram, key: int) -> None:
+        q, waypoint = self._configuration(request.source), self._draft.waypoint(key)
+        if q is None or waypoint is None or waypoint.type != "arc":
+            return
+        pose = self._draft.arm(self._store.state.model).forward(q)
+        via = replace(waypoint, via=tuple(pose.position.tolist()), via_wxyz=tuple(pose.wxyz.tolist()))
+        self._shelves.change(self._draft.changed(key, via), key)
+
+    def _retype(self, request: requests.EditProgram, key: int) -> None:
+        waypoint = self._draft.waypoint(key)
+        if waypoint is None or request.type == waypoint.type or request.type not in TYPES:
+            return
+        if waypoint.type not in TYPES:
+            self._store.say("warn", message("program.no_target"))
+            return
+        via = None
+        if request.type == "arc":
+            via = default_via(self._draft, key, self._draft.arm(self._store.state.model))
+            if via is None:
+                self._store.say("warn", message("program.no_way"))
+                return
+            self._store.say("good", message("program.via_made"))
+        self._shelves.change(self._draft.changed(key, waypoint.retyped(request.type, via)), key)
+
+    def _delete(self, request: requests.EditProgram, key: int) -> None:
+        place = self._draft.place(key) or 0
+        draft = self._draft.without(key)
+        left = draft.steps[min(place, len(draft.steps) - 1)].key if draft.steps else None
+        self._shelves.change(draft, left)
+
+    def _duplicate(self, request: requests.EditProgram, key: int) -> None:
+        waypoint = self._draft.waypoint(key)
+        assert waypoint is not None
+        self._shelves.change(*self._draft.inserted(waypoint, key))
+
+    def _move(self, key: int, step: int) -> None:
+        place = self._draft.place(key)
+        if place is not None and 0 <= place + step < len(self._draft.steps):
+            self._shelves.change(self._draft.moved(key, place + step), key)
+
+    def _move_to(self, request: requests.EditProgram, key: int) -> None:
+        if self._draft.place(key) != request.place:
+            self._shelves.change(self._draft.moved(key, request.place), key)
+
+    def _aim(self, request: requests.EditProgram, key: int) -> None:
+        waypoint = self._draft.waypoint(key)
+        assert waypoint is not None
+        model = self._store.state.model
+        arm = self._draft.arm(model)
+        target = target_of(waypoint, arm)
+        if target is None:
+            self._store.say("warn", message("program.no_target"))
+            return
+        if arm is not model:
+            target = target @ arm.T_flange_tool.inverse() @ model.T_flange_tool
+        self._goal.lead_to(target, waypoint.psi, None if waypoint.q is None else readonly_copy(waypoint.q))

@@ -1,0 +1,211 @@
+"""The program that somebody is writing on the page: values, and the edits that make new ones of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from itertools import count
+
+import numpy as np
+
+from rcilab.app.goal.target_status import Tone
+from rcilab.app.planning import Plan
+from rcilab.app.text import Message, message
+from rcilab.core.spatial import Pose
+from rcilab.i18n.translator import Remark
+from rcilab.model.robot_model import RobotModel
+from rcilab.motion.program import Program
+from rcilab.motion.waypoint import Floats, Waypoint, WaypointType
+
+TYPES: tuple[WaypointType, ...] = ("joint", "line", "arc")
+"""What the page makes; circles and elbow moves come from files."""
+FILE_FIELD = "program.0.file"
+"""Names what is wrong with a file among `UiState.problems`."""
+MOST_ROUNDS = 100
+"""A choice: nobody watches more, and the motion stays one that can be looked at."""
+
+_KEYS = count(1)
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """A waypoint that can be told from all others, equal or not."""
+
+    key: int
+    waypoint: Waypoint
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Draft:
+    """A program that may still be empty."""
+
+    model: str = ""
+    """Name of the arm; a draft for none is empty."""
+    start: Floats | None = None
+    """Joint angles at the start, [rad]; None until there is a waypoint."""
+    steps: tuple[Step, ...] = ()
+    name: str = ""
+    tool: Floats | None = None
+    """Pose of the tool in the flange frame, as in `Program`; None is the page's."""
+
+    def place(self, key: int | None) -> int | None:
+        """Returns where a step stands, from 0, or None where there is none with this key."""
+        return next((place for place, step in enumerate(self.steps) if step.key == key), None)
+
+    def waypoint(self, key: int | None) -> Waypoint | None:
+        """Returns the waypoint of a step, or None."""
+        place = self.place(key)
+        return None if place is None else self.steps[place].waypoint
+
+    def inserted(self, waypoint: Waypoint, after: int | None) -> tuple[Draft, int]:
+        """Returns the draft with one more waypoint, after a step or at the end, and its key."""
+        place, step = self.place(after), Step(next(_KEYS), waypoint)
+        at = len(self.steps) if place is None else place + 1
+        return replace(self, steps=(*self.steps[:at], step, *self.steps[at:])), step.key
+
+    def without(self, key: int) -> Draft:
+        """Returns the draft without a step."""
+        return replace(self, steps=tuple(step for step in self.steps if step.key != key))
+
+    def moved(self, key: int, to: int) -> Draft:
+        """Returns the draft with a step at another place, from 0, or at the nearest end."""
+        step = next(step for step in self.steps if step.key == key)
+        others = [other for other in self.steps if other.key != key]
+        others.insert(min(max(to, 0), len(others)), step)
+        return replace(self, steps=tuple(others))
+
+    def changed(self, key: int, waypoint: Waypoint) -> Draft:
+        """Returns the draft with another waypoint in a step."""
+        return replace(self, steps=tuple(Step(key, waypoint) if step.key == key else step for step in self.steps))
+
+    def program(self, model: RobotModel, upto: int | None = None) -> Program | None:
+        """Returns the program, or the part of it up to a step; None while there is nothing in it.
+
+        The tool of the page is written into it, so that file and script mean the same motion anywhere.
+        """
+        last = self.place(upto)
+        steps = self.steps if last is None else self.steps[: last + 1]
+        if not steps or self.start is None:
+            return None
+        waypoints = tuple(step.waypoint for step in steps)
+        return Program(
+            model=self.model, start=self.start, waypoints=waypoints, name=self.name, tool=self.tool or tool_of(model)
+        )
+
+    def has_tool_of(self, model: RobotModel) -> bool:
+        """Returns whether the program is for the tool that the page has."""
+        return self.tool is None or self.arm(model).T_flange_tool.is_close(model.T_flange_tool)
+
+    def arm(self, model: RobotModel) -> RobotModel:
+        """Returns the arm with the tool that this program is for."""
+        return model if self.tool is None else model.with_tool(Pose(self.tool[:3], self.tool[3:]))
+
+
+@dataclass(frozen=True, slots=True)
+class Note:
+    """What the planner remarks, about one step or about all."""
+
+    remark: str
+    """A `Remark` where it has words of its own in the catalogues."""
+    key: int | None
+    """Of the step; None: about the whole program."""
+
+    @property
+    def code(self) -> str:
+        """Names what it says; "" where it is a plain sentence."""
+        return self.remark.code if isinstance(self.remark, Remark) else ""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ProgramState:
+    """The Program tab."""
+
+    draft: Draft = field(default_factory=Draft)
+    selected: int | None = None
+    """Key of a step."""
+    can_undo: bool = False
+    can_redo: bool = False
+    rounds: int = 1
+    """How often to go through it."""
+    is_script_shown: bool = False
+    progress: float | None = None
+    """Of the planning that is under way, 0 to 1."""
+    planned: Draft | None = None
+    """What was planned last."""
+    tone: Tone = "good"
+    answer: Message | None = None
+    """What came of it beside the plan: the way to the start, why there is none."""
+    notes: tuple[Note, ...] = ()
+    """What the planner remarks about the plan."""
+    failed: int | None = None
+    """Key of the step that could not be planned, or that breaks a condition."""
+
+
+def notes_of(plan: Plan, steps: tuple[Step, ...]) -> tuple[Note, ...]:
+    """Returns what the planner remarks about a plan, each once, however many rounds it makes.
+
+    Args:
+        plan: Of a program.
+        steps: What the program was made of.
+    """
+    notes: dict[tuple[str, int | None], Note] = {}
+    for remark in plan.motion.notes:
+        number = remark.facts.get("number") if isinstance(remark, Remark) else None
+        key = steps[number - 1].key if isinstance(number, int) and 0 < number <= len(steps) else None
+        notes.setdefault((remark, key), Note(remark, key))
+    return tuple(notes.values())
+
+
+def draft_of(program: Program, model: RobotModel) -> Draft:
+    """Returns a program to edit; where it is for the tool of the page, it goes with that from here on.
+
+    Args:
+        program: The program.
+        model: The arm of the page, with its tool.
+    """
+    steps = tuple(Step(next(_KEYS), waypoint) for waypoint in program.waypoints)
+    draft = Draft(model=program.model, start=program.start, steps=steps, name=program.name, tool=program.tool)
+    return replace(draft, tool=None) if draft.has_tool_of(model) else draft
+
+
+def tool_of(model: RobotModel) -> Floats:
+    """Returns the page's tool as programs have it."""
+    T = model.T_flange_tool
+    return (*T.position.tolist(), *T.wxyz.tolist())
+
+
+def target_of(waypoint: Waypoint, arm: RobotModel) -> Pose | None:
+    """Returns where a waypoint leads the tool; None where that depends on where it comes from."""
+    return waypoint.pose if waypoint.q is None else arm.forward(waypoint.q)
+
+
+def is_led_in(plan: Plan) -> bool:
+    """Returns whether the plan of a program begins with the way to its start."""
+    assert plan.program is not None
+    return (len(plan.motion.segment_starts) + 1) % (len(plan.program.waypoints) + 1) == 1
+
+
+def number_at(plan: Plan, time: float) -> int | None:
+    """Returns the number of the waypoint that the motion leads to at a time, from 1; 0 on the way to the start."""
+    if plan.program is None:
+        return None
+    segment = int(np.searchsorted(plan.motion.segment_starts, time, side="right")) - 1 - is_led_in(plan)
+    number = segment % (len(plan.program.waypoints) + 1) + 1
+    return 0 if segment < 0 or number > len(plan.program.waypoints) else number
+
+
+def time_at(plan: Plan, number: int) -> float:
+    """Returns when the motion first reaches the end of a waypoint's segment, dwell included, [s]."""
+    segment = number - 1 + is_led_in(plan)
+    starts = plan.motion.segment_starts
+    return float(starts[segment + 1]) if segment + 1 < len(starts) else plan.motion.duration
+
+
+def tell_place(plan: Plan, time: float) -> Message | None:
+    """Returns the name of the segment at a time of a program's plan."""
+    number = number_at(plan, time)
+    if number is None or plan.program is None:
+        return None
+    if number == 0:
+        return message("program.at_start")
+    kind = message(f"program.type.{plan.program.waypoints[number - 1].type}")
+    return message("program.at", number=number, count=len(plan.program.waypoints), kind=kind)

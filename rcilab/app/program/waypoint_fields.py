@@ -1,0 +1,121 @@
+"""Typed numbers of a waypoint: what each field may hold, and the waypoint that comes of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from rcilab.app.goal.goal_actions import FURTHEST, POSE_FIELDS
+from rcilab.app.program.program_draft import Draft, target_of
+from rcilab.app.text import Message
+from rcilab.core.arrays import Array
+from rcilab.core.errors import KinematicsError
+from rcilab.core.spatial import Pose
+from rcilab.i18n.number_parsing import parse_number
+from rcilab.model.robot_model import RobotModel
+from rcilab.motion.joint import MIN_SPEED
+from rcilab.motion.waypoint import LARGEST_BLEND, LONGEST_DWELL, Waypoint
+
+VIA_FIELDS = ("via_x", "via_y", "via_z")
+_BULGE = 0.25  # A choice: how far to the side of a new arc's way its via is, as a part of the way.
+_NO_WAY = 1e-3  # [m] A choice: from here on an arc is worth the name.
+
+_Take = Callable[[Waypoint, float], Waypoint]
+_PLAIN: dict[str, tuple[float, float, str, _Take]] = {
+    "speed": (100.0 * MIN_SPEED, 100.0, "%", lambda waypoint, value: replace(waypoint, speed=value / 100.0)),
+    "blend": (0.0, 1000.0 * LARGEST_BLEND, "mm", lambda waypoint, value: replace(waypoint, blend=value / 1000.0)),
+    "dwell": (0.0, LONGEST_DWELL, "s", lambda waypoint, value: replace(waypoint, dwell=value)),
+}
+
+
+def proposed(waypoint: Waypoint, field: str, typed: str, arm: RobotModel) -> Waypoint | Message | None:
+    """Returns the waypoint with a typed number in it, what is wrong with that, or None for a field it has not.
+
+    Numbers of the pose and the arm angle make a pose of joint angles: they cannot both be kept.
+
+    Args:
+        waypoint: As it is.
+        field: speed, blend, dwell, psi, x ... yaw, via_x, via_y, via_z.
+        typed: As it stands in the field.
+        arm: With the program's tool.
+    """
+    if field in _PLAIN:
+        low, high, unit, take = _PLAIN[field]
+        parsed = parse_number(typed, low, high, unit)
+        return parsed.problem if parsed.value is None else take(waypoint, parsed.value)
+    if field == "psi" and arm.n == 7:
+        if not typed.strip() and waypoint.type != "nullspace":
+            return replace(as_pose(waypoint, arm), psi=None)
+        parsed = parse_number(typed, -180.0, 180.0, "deg")
+        if parsed.value is None:
+            return parsed.problem
+        return replace(as_pose(waypoint, arm), psi=math.radians(parsed.value))
+    if field in VIA_FIELDS and waypoint.via is not None:
+        parsed = parse_number(typed, -1000.0 * FURTHEST, 1000.0 * FURTHEST, "mm")
+        if parsed.value is None:
+            return parsed.problem
+        via = list(waypoint.via)
+        via[VIA_FIELDS.index(field)] = parsed.value / 1000.0
+        return replace(waypoint, via=tuple(via))
+    target = target_of(waypoint, arm)
+    if field not in POSE_FIELDS or target is None:
+        return None
+    index = POSE_FIELDS.index(field)
+    bound, unit = (1000.0 * FURTHEST, "mm") if index < 3 else (360.0, "deg")
+    parsed = parse_number(typed, -bound, bound, unit)
+    if parsed.value is None:
+        return parsed.problem
+    position, rpy = target.position, target.rpy
+    if index < 3:
+        position[index] = parsed.value / 1000.0
+    else:
+        rpy[index - 3] = math.radians(parsed.value)
+    pose = Pose.from_rpy(position, rpy)
+    wxyz = target.wxyz if index < 3 else pose.wxyz
+    return replace(as_pose(waypoint, arm), position=tuple(position.tolist()), wxyz=tuple(wxyz.tolist()))
+
+
+def as_pose(waypoint: Waypoint, arm: RobotModel) -> Waypoint:
+    """Returns a waypoint whose target is a pose, with the arm angle of its joint angles, instead of these."""
+    if waypoint.q is None:
+        return waypoint
+    T = arm.forward(waypoint.q)
+    return replace(
+        waypoint,
+        q=None,
+        position=tuple(T.position.tolist()),
+        wxyz=tuple(T.wxyz.tolist()),
+        psi=arm_angle_of(waypoint, arm),
+    )
+
+
+def arm_angle_of(waypoint: Waypoint, arm: RobotModel) -> float | None:
+    """Returns the arm angle that a waypoint leads to, [rad]; None where it has none, or leaves it open."""
+    if waypoint.q is None or arm.n != 7:
+        return waypoint.psi
+    try:
+        return arm.arm_angle(waypoint.q)
+    except KinematicsError:
+        return None
+
+
+def default_via(draft: Draft, key: int, arm: RobotModel) -> Array | None:
+    """Returns a point beside the straight way to a step, for an arc over it, [m]; None where there is no way."""
+    place = draft.place(key)
+    if place is None or draft.start is None:
+        return None
+    goal = target_of(draft.steps[place].waypoint, arm)
+    start = target_of(draft.steps[place - 1].waypoint, arm) if place else arm.forward(draft.start)
+    if goal is None or start is None:
+        return None
+    way = goal.position - start.position
+    if float(np.linalg.norm(way)) < _NO_WAY:
+        return None
+    aside = np.cross((0.0, 0.0, 1.0), way)
+    if float(np.linalg.norm(aside)) < 0.1 * float(np.linalg.norm(way)):
+        aside = np.cross((0.0, 1.0, 0.0), way)
+    aside *= np.linalg.norm(way) / np.linalg.norm(aside)
+    return start.position + 0.5 * way + _BULGE * aside

@@ -1,0 +1,161 @@
+"""The robot side of the page: one supervisor at a time, exchanged without anybody waiting for it."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from typing import TYPE_CHECKING
+
+from rcilab.app.status_text import StartingError
+from rcilab.core.errors import RcilabError
+
+if TYPE_CHECKING:
+    from rcilab.control_process import Supervisor, SupervisorStatus
+    from rcilab.makers.rokae.driver.configuration import RobotConfiguration
+    from rcilab.model.robot_model import RobotModel
+
+
+class RobotConnection:
+    """Starts, exchanges and closes the supervisor in a thread of its own.
+
+    Args:
+        on_failure: Called with the error when a supervisor could not be started; from a foreign thread.
+    """
+
+    def __init__(self, on_failure: Callable[[RcilabError], None]) -> None:
+        self._on_failure = on_failure
+        self._lock = threading.Lock()
+        self._current: Supervisor | None = None
+        self._shown: Supervisor | None = None  # Whose states belong to the model of now.
+        self._ready: Supervisor | None = None  # Only what start() has built; requests go here.
+        self._generation = 0
+        self._worker: threading.Thread | None = None
+        self._is_apart = False  # Nobody wants a connection.
+
+    def open(
+        self, model: RobotModel, target: str, plant: str = "ideal", setup: RobotConfiguration | None = None
+    ) -> None:
+        """Closes what is open and starts a supervisor for this arm, destination and plant; returns at once."""
+        with self._lock:
+            self._generation += 1
+            generation, previous = self._generation, self._worker
+            self._ready = self._shown = None
+            self._is_apart = False
+            self._worker = threading.Thread(
+                target=self._exchange,
+                args=(generation, previous, model, target, plant, setup),
+                name="session",
+                daemon=True,
+            )
+            self._worker.start()
+
+    def disconnect(self) -> None:
+        """Closes what is open and starts nothing; returns at once, `status` is "closed" from then on."""
+        with self._lock:
+            self._generation += 1
+            previous = self._worker
+            self._ready = self._shown = None
+            self._worker = threading.Thread(target=self._let_go, args=(previous,), name="session", daemon=True)
+            self._is_apart = True
+            self._worker.start()
+
+    def close(self) -> None:
+        """Ends the supervisor and waits for its processes to go."""
+        with self._lock:
+            self._generation += 1
+            worker, self._ready = self._worker, None
+        if worker is not None:
+            worker.join(20.0)
+        with self._lock:
+            current, self._current = self._current, None
+        if current is not None:
+            current.close()
+
+    def status(self) -> SupervisorStatus:
+        """Returns the supervisor's snapshot; "starting" while there is none."""
+        shown = self._shown
+        if shown is not None:
+            return shown.status()
+        from rcilab.control_process import SupervisorStatus
+
+        if self._worker is None or self._is_apart:
+            return SupervisorStatus()  # Nobody has asked for a connection.
+        return SupervisorStatus(phase="starting", code="starting", message="Starting the control process.")
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether `supervisor` has one to ask; its status may show an idle arm a moment earlier."""
+        return self._ready is not None
+
+    def supervisor(self) -> Supervisor:
+        """Returns the supervisor to ask something of.
+
+        Raises:
+            StartingError: It is not there yet.
+        """
+        ready, shown = self._ready, self._shown
+        if ready is None and shown is not None and shown.status().phase == "idle":
+            return shown  # What the page shows as ready is ready, even while start() is about to return.
+        if ready is None:
+            raise StartingError("the control process is still starting; try again in a moment")
+        return ready
+
+    def stop(self) -> None:
+        """Stops a motion. Callable from any thread, never waits: the fast lane of Stop and Esc."""
+        current = self._current
+        if current is not None:
+            with suppress(
+                RcilabError
+            ):  # It is closed or has no connection: nothing of ours moves, and status says why.
+                current.stop()
+
+    @property
+    def stops(self) -> int:
+        """How often the supervisor of now was stopped; 0 where there is none."""
+        current = self._current
+        return 0 if current is None else current.stops
+
+    def heartbeat(self) -> None:
+        """Tells the control process that somebody is at the page; call it several times a second while it is so."""
+        ready = self._ready
+        if ready is not None:
+            with suppress(RcilabError):  # Closed in the meantime.
+                ready.set_operator_present(True)
+
+    def _let_go(self, previous: threading.Thread | None) -> None:
+        if previous is not None:
+            previous.join()
+        old, self._current = self._current, None
+        if old is not None:
+            old.close()
+
+    def _exchange(
+        self,
+        generation: int,
+        previous: threading.Thread | None,
+        model: RobotModel,
+        target: str,
+        plant: str,
+        setup: RobotConfiguration | None,
+    ) -> None:
+        if previous is not None:
+            previous.join()
+        old, self._current = self._current, None
+        if old is not None:
+            old.close()
+        with self._lock:
+            if generation != self._generation:
+                return
+        try:
+            from rcilab.control_process import Supervisor
+
+            supervisor = Supervisor(model, target, plant, setup=setup)
+            self._current = self._shown = supervisor
+            supervisor.start()
+        except RcilabError as error:
+            self._on_failure(error)
+            return
+        with self._lock:
+            if generation == self._generation:
+                self._ready = supervisor

@@ -1,0 +1,112 @@
+"""What can press on the arm from the page: the settings, the push of this moment, the spring in the mouse's hand."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from rcilab.app.text import Message, message
+from rcilab.core.arrays import JointVector, Vector3
+
+if TYPE_CHECKING:
+    from rcilab.app.store import UiState
+    from rcilab.control_process import SupervisorStatus
+    from rcilab.model.robot_model import RobotModel
+
+Plant = Literal["ideal", "mujoco"]
+
+PLANTS: tuple[Plant, ...] = ("ideal", "mujoco")
+STRONGEST = 60.0  # [N] A choice: what one hand does without effort.
+SPRING = 200.0  # [N/m] between the grabbed point and the mouse: 0.3 m of pull is all the force there is; a choice.
+TOOL = 0  # Where a link's number stands: the tool.
+WAYS = ("joint.free", "cartesian.free", "cartesian.translation", "cartesian.rotation")
+DIRECTIONS = MappingProxyType(
+    {
+        "+x": (1.0, 0.0, 0.0),
+        "-x": (-1.0, 0.0, 0.0),
+        "+y": (0.0, 1.0, 0.0),
+        "-y": (0.0, -1.0, 0.0),
+        "+z": (0.0, 0.0, 1.0),
+        "-z": (0.0, 0.0, -1.0),
+    }
+)
+"""Unit vectors, base axes."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ActiveForce:
+    """What presses on the arm now."""
+
+    link: int
+    """From 1; `TOOL`: the tool."""
+    start: Vector3
+    """Where it acts, base axes, shape (3,), [m]."""
+    force: Vector3
+    """Base axes, shape (3,), [N]."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PushState:
+    """How the page pushes the arm, and how it is to be guided."""
+
+    link: int = TOOL
+    direction: str = "+y"
+    newtons: float = 20.0
+    grab: bool = True
+    """Whether the mouse can take hold of the arm in the scene."""
+    way: str = WAYS[0]
+    """Space and kind of hand guiding, as "space.kind"."""
+    acting: ActiveForce | None = None
+
+    @property
+    def force(self) -> Vector3:
+        """What the button does, base axes, shape (3,), [N]."""
+        return self.newtons * np.array(DIRECTIONS[self.direction])
+
+
+def spring_force(grabbed: Vector3, hand: Vector3) -> Vector3:
+    """Returns the pull of the spring between a point of the arm and the mouse, at most `STRONGEST`, shape (3,), [N]."""
+    force = SPRING * (hand - grabbed)
+    size = float(np.linalg.norm(force))
+    return force if size <= STRONGEST else force * (STRONGEST / size)
+
+
+def place_of(model: RobotModel, q: JointVector, link: int, point: Vector3) -> Vector3:
+    """Returns where a point of a link is in base, shape (3,), [m].
+
+    Args:
+        model: The arm.
+        q: Joint angles, shape (n,), [rad].
+        link: Number of the link, from 1; `TOOL`: the tool.
+        point: In the frame of the link or the tool, shape (3,), [m].
+    """
+    T = model.forward(q) if link == TOOL else model.rigid_body.link_pose(q, link)
+    return T.rotation @ point + T.position
+
+
+def no_push(status: SupervisorStatus) -> Message | None:
+    """Returns why nothing on this page can push the arm, or None when it can."""
+    if status.world_address is not None:
+        return None
+    if status.target == "virtual":
+        return message("ready.starting")
+    return message("push.no_world", address=status.target)
+
+
+def is_guided(status: SupervisorStatus) -> bool:
+    """Returns whether the arm is free for a hand to guide it."""
+    return status.code == "moving.guided"
+
+
+def gives_way(status: SupervisorStatus) -> bool:
+    """Returns whether forces move the arm: it is guided, or a motion runs in torques or under an impedance."""
+    is_soft = status.mode in ("joint_impedance", "cartesian_impedance", "torque")
+    return is_guided(status) or (status.code in ("moving", "moving.held") and is_soft)
+
+
+def can_grab(state: UiState, status: SupervisorStatus) -> bool:
+    """Returns whether a drag on the arm pulls it; otherwise it turns the camera."""
+    return state.push.grab and status.world_address is not None and (state.plant == "mujoco" or gives_way(status))

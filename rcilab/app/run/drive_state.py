@@ -1,0 +1,104 @@
+"""How the arm is driven from the page: mode, parameters, pace, and what is done to the virtual controller."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Literal
+
+from rcilab.app.run.mode_parameters import control_obstacle, is_control_pending, with_number
+from rcilab.app.text import Message
+from rcilab.core.state import Mode
+from rcilab.makers.rokae.driver.controller_parameters import (
+    ControllerParameters,
+    ControlPart,
+    control_ranges,
+    standard_control,
+)
+from rcilab.sim.api import Direction, NetworkFaults, WorldStatus
+
+if TYPE_CHECKING:
+    from rcilab.app.store import UiState
+    from rcilab.control_process import SupervisorStatus
+    from rcilab.model.robot_model import RobotModel
+
+Destination = Literal["preview", "ideal", "mujoco", "address"]
+
+DESTINATIONS: tuple[Destination, ...] = ("preview", "ideal", "mujoco", "address")
+CABLE_PULLED = NetworkFaults(loss=1.0, tcp_delay=10.0)
+"""No datagram comes through, and TCP says nothing."""
+NETWORK_LAB: dict[str, tuple[float, str]] = {
+    "loss": (0.3, "%"),
+    "delay": (0.05, "ms"),
+    "jitter": (0.05, "ms"),
+    "reorder": (0.3, "%"),
+    "duplicate": (0.3, "%"),
+}
+"""The sliders: largest value, [1] or [s], and the unit on the page. Choices: what is beyond ends any motion."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class DriveState:
+    """What the operator has set in the Run tab."""
+
+    mode: Mode = "joint_position"
+    control: ControllerParameters | None = None
+    """Parameters as the operator wants them, all of them; None: nobody has touched them."""
+    refusal: Message | None = None
+    """Why the controller did not take them."""
+    pace: float = 1.0
+    """Part of the planned speed to run at."""
+    pulled: bool = False
+    """Whether the cable of the virtual controller is pulled."""
+    network: NetworkFaults = field(default_factory=NetworkFaults)
+    direction: Direction = "both"
+    world: WorldStatus | None = None
+    """What our own controller says of itself; None: it is not ours, or does not answer."""
+    loop_back: bool = False
+    """Whether the outputs of the virtual controller are wired to its inputs."""
+    auto_limit: bool = False
+    """Whether the virtual controller leads commands to rest inside the soft joint limits."""
+    reboot_asked: bool = False
+    """Whether the question about a restart of the controller waits for its answer."""
+    typed_address: str = ""
+    """The address that waits for a second yes."""
+
+    def wanted_control(self, model: RobotModel) -> ControllerParameters:
+        """Returns the parameters to show: those typed, or what a controller wakes up with."""
+        return self.control if self.control is not None else standard_control(model.limits)
+
+    def with_number(self, model: RobotModel, part: ControlPart, place: int, value: float) -> DriveState:
+        """Returns the state with another number among the parameters."""
+        control = with_number(self.wanted_control(model), part, place, value, model.limits)
+        return replace(self, control=control, refusal=None)
+
+
+def control_field(model: RobotModel, name: str) -> tuple[ControlPart, int] | None:
+    """Returns part and place of a typed field, such as control.joint_stiffness.0; None: there is no such field."""
+    _, part, place = (*name.split("."), "", "")[:3]
+    for known, ranges in control_ranges(model.limits).items():
+        if part == known and place in map(str, range(len(ranges))):
+            return known, int(place)
+    return None
+
+
+def is_pending(state: UiState, status: SupervisorStatus) -> bool:
+    """Returns whether the controller has not taken the parameters yet."""
+    return is_control_pending(state.drive.control, status.setup.control)
+
+
+def parameter_obstacle(state: UiState, status: SupervisorStatus) -> Message | None:
+    """Returns why nothing may run with these parameters, or None when the controller has them."""
+    address = None if state.target == "virtual" else state.target
+    return control_obstacle(state.drive.control, status.setup.control, state.drive.refusal, address)
+
+
+def destination(state: UiState, status: SupervisorStatus) -> Destination:
+    """Returns where motions go just now."""
+    if status.phase == "closed":
+        return "preview"
+    return state.plant if state.target == "virtual" else "address"
+
+
+def is_ours(status: SupervisorStatus) -> bool:
+    """Returns whether the controller is our own, which lets the world in."""
+    return status.world_address is not None

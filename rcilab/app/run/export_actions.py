@@ -1,0 +1,137 @@
+"""Taking the last run away: written in a thread of its own, then sent to the page that asked."""
+
+from __future__ import annotations
+
+import sys
+import threading
+import time
+import traceback
+from collections.abc import Callable
+from dataclasses import dataclass
+from tempfile import TemporaryFile
+from typing import IO, TYPE_CHECKING, TypeAlias
+
+from rcilab.app import requests
+from rcilab.app.status_text import tell_error
+from rcilab.app.text import message
+from rcilab.core.errors import RcilabError
+from rcilab.recording.optional_deps import MissingExtraError
+
+if TYPE_CHECKING:
+    from rcilab.app.store import Store
+    from rcilab.recording.run import Run
+
+ENDINGS = (".csv", ".parquet", ".mcap", ".html", ".rcirun")
+"""What the page offers, in the order of its buttons."""
+
+Deliver: TypeAlias = Callable[["int | None", str, "IO[bytes]", Callable[[], bool]], bool]
+"""Sends a file to a page: client id (None: nobody), name, content, whether to give up; returns whether all was sent."""
+
+_STEP = 0.05  # Share between two updates of the progress bar.
+
+
+class _UnwantedError(Exception):
+    """Somebody has cancelled."""
+
+
+@dataclass(frozen=True, slots=True)
+class Export:
+    """An export under way."""
+
+    ending: str
+    share: float
+    """0 to 1."""
+
+
+class ExportActions:
+    """Exports are made one after the other; the conductor's thread starts them and never waits.
+
+    Args:
+        store: Where the run and the progress are.
+        deliver: Sends a file to a page.
+    """
+
+    def __init__(self, store: Store, deliver: Deliver) -> None:
+        self._store, self._deliver = store, deliver
+        self._worker: threading.Thread | None = None
+        self._unwanted = threading.Event()
+
+    def export(self, request: requests.Export) -> None:
+        """Begins an export; refused while another one is under way."""
+        recording = self._store.state.last_run
+        run = None if recording is None else recording.run
+        if request.ending not in ENDINGS:
+            return
+        if run is None:
+            self._store.say("warn", message("export.nothing"))
+        elif self._worker is not None and self._worker.is_alive():
+            self._store.say("warn", message("export.busy"))
+        else:
+            self._unwanted.clear()
+            self._store.update(export=Export(request.ending, 0.0))
+            self._worker = threading.Thread(
+                target=self._write, args=(run, request.ending, request.page), name="export", daemon=True
+            )
+            self._worker.start()
+
+    def cancel(self, request: requests.CancelExport) -> None:
+        """Drops the export under way, at its next report of progress."""
+        self._unwanted.set()
+
+    def close(self) -> None:
+        """Ends an export under way."""
+        self._unwanted.set()
+        if self._worker is not None:
+            self._worker.join(10.0)
+
+    def _write(self, run: Run, ending: str, page: int | None) -> None:
+        try:
+            from rcilab.recording.export import write_export
+
+            with TemporaryFile(prefix="rcilab-") as stream:  # A long run does not fit into memory as text.
+                told = self._store.state
+                write_export(
+                    run, ending, stream, progress=self._follow(ending), language=told.language, units=told.units
+                )
+                size = f"{max(stream.tell() / 1e6, 0.01):.2f}"
+                is_sent = self._deliver(page, file_name(run, ending), stream, self._unwanted.is_set)
+            if self._unwanted.is_set():
+                raise _UnwantedError
+        except _UnwantedError:
+            self._store.say("warn", message("export.cancelled"))
+        except MissingExtraError as error:
+            self._store.say("bad", message("export.missing", library=error.library))
+        except MemoryError:
+            self._store.say("bad", message("export.memory"))
+        except RcilabError as error:
+            self._store.say("bad", tell_error(error))
+        except Exception as error:  # A bug of ours must not pass for a download.
+            traceback.print_exc(file=sys.stderr)
+            self._store.say("bad", message("notice.bug", error=f"{type(error).__name__}: {error}"))
+        else:
+            said = message("export.done" if is_sent else "export.unsent", file=file_name(run, ending), size=size)
+            self._store.say("good" if is_sent else "warn", said)
+        finally:
+            self._store.update(export=None)
+
+    def _follow(self, ending: str) -> Callable[[float], None]:
+        shown = 0.0
+
+        def follow(share: float) -> None:
+            nonlocal shown
+            if self._unwanted.is_set():
+                raise _UnwantedError
+            if share - shown >= _STEP:
+                shown = share
+                self._store.update(export=Export(ending, share))
+
+        return follow
+
+
+def file_name(run: Run, ending: str) -> str:
+    """Returns what the browser saves a run as."""
+    stamp = (
+        time.strftime("%Y%m%d-%H%M%S", time.localtime(run.setup.started_ns * 1e-9)) if run.setup.started_ns else "run"
+    )
+    arm = "arm" if run.model is None else run.model.name
+    return f"{arm}-{stamp}{ending}"

@@ -1,0 +1,67 @@
+"""Clearing away recorded runs, when somebody asks for it twice. Owned by the conductor's thread."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from typing import Any
+
+from rcilab.app import requests
+from rcilab.app.store import Store
+from rcilab.app.text import message
+from rcilab.recording.folder import keep_newest, stored_runs
+
+KEEPS = (100, 20, 5, 0)
+"""How many runs may be kept."""
+
+_LOOK = 5.0  # [s] A choice: between two looks into the folder.
+
+
+class FolderActions:
+    """Looks how large the folder is, and deletes old runs.
+
+    Args:
+        store: Where the folder is named and its size is shown.
+    """
+
+    def __init__(self, store: Store) -> None:
+        self._store = store
+        self._next = float("-inf")
+
+    def clear(self, request: requests.ClearRuns) -> None:
+        """Asks first, then deletes all runs but the newest ones; a run that is being recorded stays."""
+        folder, state = self._store.state.folder, self._store.state
+        if request.keep not in KEEPS or state.runs is None:
+            return
+        if request.what == "choose":
+            self._show(keep=request.keep, asked=False)
+        elif request.what == "cancel":
+            self._show(asked=False)
+        elif request.what == "ask":
+            self._show(asked=True)
+        elif folder.asked and request.keep == folder.keep:
+            is_recording = state.recording is not None and state.recording.run is None
+            gone = keep_newest(state.runs, request.keep + is_recording)
+            self._show(asked=False)
+            self._next = float("-inf")
+            self._store.say("good", message("runs.cleared", count=gone.count, size=megabytes(gone.size)))
+
+    def tick(self) -> None:
+        """Looks into the folder now and then."""
+        runs, now = self._store.state.runs, time.monotonic()
+        if runs is None or now < self._next:
+            return
+        self._next = now + _LOOK
+        found = stored_runs(runs)
+        self._show(count=found.count, size=found.size)
+
+    def _show(self, **changes: Any) -> None:
+        before = self._store.state.folder
+        after = replace(before, **changes)
+        if after != before:
+            self._store.update(folder=after)
+
+
+def megabytes(size: int) -> str:
+    """Returns a size in words, [bytes]."""
+    return f"{size / 1e9:.2f} GB" if size >= 1e9 else f"{size / 1e6:.1f} MB"

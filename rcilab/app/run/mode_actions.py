@@ -1,0 +1,146 @@
+"""What happens when somebody chooses a mode, its parameters or a pace. Owned by the conductor's thread."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import replace
+from typing import TYPE_CHECKING, cast
+
+from rcilab.app import requests
+from rcilab.app.robot_connection import RobotConnection
+from rcilab.app.run.drive_state import control_field, is_pending
+from rcilab.app.run.mode_parameters import SECOND_THOUGHT, ask_to_send
+from rcilab.app.run.readiness import is_moving
+from rcilab.app.setup.configuration_sender import SetupPost
+from rcilab.app.store import Store
+from rcilab.app.text import Message, message
+from rcilab.control_process.requested_speed import RequestedSpeed, is_running, tell_pace_refusal
+from rcilab.core.errors import RcilabError
+from rcilab.core.state import MODES, Mode
+from rcilab.i18n.number_parsing import parse_number
+from rcilab.makers.rokae.driver.configuration import RobotConfiguration
+from rcilab.makers.rokae.driver.controller_parameters import control_ranges, standard_control
+from rcilab.motion.speed_scaling import SLOWEST_PACE
+
+if TYPE_CHECKING:
+    from rcilab.control_process import PendingRequest, SupervisorStatus
+
+
+class ModeActions:
+    """Mode, parameters, pause, pace. Our own controller is told at once, a foreign one when asked for twice."""
+
+    def __init__(self, store: Store, session: RobotConnection) -> None:
+        self._store, self._session = store, session
+        self._post = SetupPost(session, self._refuse)
+        self._wish = RequestedSpeed()
+        self._changing: tuple[float, PendingRequest] | None = None  # A pace that the robot has not taken yet.
+        self._asked_to_send = -math.inf
+        self._arm = store.state.model.name
+
+    def set_drive(self, request: requests.SetDrive) -> None:
+        """Chooses a mode, whose conditions then judge the plan, or a pace; what does not exist is ignored."""
+        state, status = self._store.state, self._session.status()
+        if request.mode in MODES and request.mode != state.drive.mode:
+            if is_moving(status):
+                self._store.say("warn", message("notice.moving"))
+                return
+            mode = cast("Mode", request.mode)
+            plan = None if state.plan is None else state.plan.completed(mode)
+            self._store.update(drive=replace(state.drive, mode=mode), plan=plan, asked=None)
+        if request.pace is not None and math.isfinite(request.pace):
+            pace = min(max(request.pace, SLOWEST_PACE), 1.0)
+            self._store.update(drive=replace(self._store.state.drive, pace=pace))
+            self._wish.choose(pace, status)
+
+    def pause(self) -> None:
+        """Holds the motion under way."""
+        if self._require_motion():
+            self._wish.hold()
+
+    def resume(self) -> None:
+        """Goes on with a motion that is held."""
+        if self._require_motion():
+            self._wish.go_on(self._store.state.drive.pace)
+
+    def type_field(self, request: requests.TypeField) -> None:
+        """Takes a typed parameter, or says beside the field what is wrong with it."""
+        state = self._store.state
+        found = control_field(state.model, request.field)
+        if found is None:
+            return
+        part, place = found
+        bounds = control_ranges(state.model.limits)[part][place]
+        parsed = parse_number(request.text, bounds.low, bounds.high, bounds.unit)
+        if parsed.value is None:
+            assert parsed.problem is not None
+            self._store.complain(request.field, parsed.problem)
+            return
+        drive = state.drive.with_number(state.model, part, place, parsed.value)
+        self._store.clear_problems(request.field)
+        self._store.update(drive=drive)
+
+    def press(self, request: requests.PressControl) -> None:
+        """Sends the parameters, or takes those that a controller wakes up with."""
+        state, now = self._store.state, time.monotonic()
+        if request.what == "reset":
+            control = standard_control(state.model.limits)
+            drive = replace(state.drive, control=control, refusal=None)
+            self._store.clear_problems("control.")
+            self._store.update(drive=drive)
+            return
+        if state.target != "virtual" and now - self._asked_to_send > SECOND_THOUGHT:
+            self._asked_to_send = now
+            self._store.say("warn", ask_to_send(state.target))
+            return
+        self._asked_to_send = -math.inf
+        self._store.update(drive=replace(state.drive, refusal=None))
+        self._send(self._session.status())
+
+    def tick(self, status: SupervisorStatus) -> None:
+        """Looks what became of what was sent, tells our own controller what is new, changes the pace."""
+        name = self._store.state.model.name
+        if name != self._arm:
+            self._arm = name
+            self._wish.forget()
+            self._post.forget()
+        if self._post.is_underway:
+            self._post.collect()
+            status = self._session.status()  # What was acknowledged in the meantime is not sent again.
+        state = self._store.state
+        if state.target == "virtual" and state.drive.refusal is None and status.phase == "idle":
+            self._send(status)
+        self._change_pace(status)
+
+    def _send(self, status: SupervisorStatus) -> None:
+        state = self._store.state
+        if not self._post.is_underway and is_pending(state, status):
+            self._post.send(RobotConfiguration(control=state.drive.control))
+
+    def _refuse(self, why: Message) -> None:
+        self._store.update(drive=replace(self._store.state.drive, refusal=why))
+
+    def _require_motion(self) -> bool:
+        if is_running(self._session.status()):
+            return True
+        self._store.say("warn", message("pace.nothing"))
+        return False
+
+    def _change_pace(self, status: SupervisorStatus) -> None:
+        if self._changing is not None and self._changing[1].done:
+            (pace, ticket), self._changing = self._changing, None
+            self._tell_pace(ticket.error, pace)
+        is_under_way = self._changing is not None
+        wish = self._wish.due(status, is_under_way=is_under_way)
+        if wish is None:
+            return
+        supervisor = self._session.supervisor()
+        try:
+            self._changing = wish, supervisor.set_pace(wish) if wish else supervisor.pause()
+        except RcilabError as error:
+            self._tell_pace(error, wish)
+
+    def _tell_pace(self, error: RcilabError | None, pace: float) -> None:
+        refusal = None if error is None else tell_pace_refusal(error, pace, self._session.status())
+        if refusal is not None:
+            self._store.say("warn", refusal)

@@ -1,0 +1,49 @@
+"""When a motion was where in its plan: it may have been run at another pace than it was planned with."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rcilab.core.clock import CYCLE_TIME
+
+if TYPE_CHECKING:
+    from rcilab.app.store import UiState
+    from rcilab.core.arrays import Array, JointPath
+    from rcilab.motion.speed_scaling import SpeedScaledMotion
+
+
+def paced_of(state: UiState) -> SpeedScaledMotion | None:
+    """Returns how the plan on the page was run, or is being run; None as planned, or not at all."""
+    paced = None if state.recording is None else state.recording.paced
+    return paced if paced is not None and state.plan is not None and paced.motion is state.plan.motion else None
+
+
+def streamed_rows(state: UiState) -> JointPath | None:
+    """Returns what was streamed of the plan on the page, shape (N, n), [rad], where its pace was changed; else None."""
+    paced, run = paced_of(state), None if state.recording is None else state.recording.run
+    if paced is not None:
+        return paced.q
+    is_it = run is not None and run.paced and state.plan is not None and run.plan is state.plan.motion
+    return state.plan.motion.q if is_it and state.plan is not None else None  # Read from a file.
+
+
+def played_path(state: UiState) -> tuple[Array, JointPath] | None:
+    """Returns the rows of the plan, shape (N, n), [rad], and when they were run, shape (N,), [s]; None without one."""
+    paced = paced_of(state)
+    if paced is not None:
+        return np.linspace(0.0, paced.duration, len(paced.q)), paced.q
+    return None if state.plan is None else (state.plan.motion.times, state.plan.motion.q)
+
+
+def played_at(state: UiState, moment: float) -> float:
+    """Returns when a moment of the plan was run, [s] since the first command."""
+    paced = paced_of(state)
+    return moment if paced is None else paced.time_at(moment)
+
+
+def moment_played(state: UiState, t: float) -> float:
+    """Returns which moment of the plan was run at a time, [s]."""
+    paced = paced_of(state)
+    return t if paced is None else paced.place_at(round(t / CYCLE_TIME))

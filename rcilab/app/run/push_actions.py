@@ -1,0 +1,155 @@
+"""What happens when somebody pushes the virtual arm. Owned by the conductor's thread; it never waits for the arm."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rcilab.app import requests
+from rcilab.app.robot_connection import RobotConnection
+from rcilab.app.run.active_force import (
+    DIRECTIONS,
+    STRONGEST,
+    TOOL,
+    WAYS,
+    ActiveForce,
+    can_grab,
+    no_push,
+    place_of,
+    spring_force,
+)
+from rcilab.app.status_text import tell_error
+from rcilab.app.store import Store
+from rcilab.core.arrays import JointVector, Vector3
+from rcilab.execution.external_force_hold import HOLD_TIMEOUT, ExternalForceHold
+from rcilab.execution.simulation_control import SimulationControl
+
+if TYPE_CHECKING:
+    from rcilab.control_process import SupervisorStatus
+
+_NO_MOMENT = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class _Grip:
+    """Where the mouse holds the arm."""
+
+    page: int | None
+    link: int
+    point: Vector3
+    """In the link's frame, [m]."""
+    hand: Vector3
+    """Where the mouse is, base axes, [m]."""
+
+
+class PushActions:
+    """The push button and the hand in the scene; both press on the arm only while they are held."""
+
+    def __init__(self, store: Store, session: RobotConnection) -> None:
+        self._store, self._session = store, session
+        self._grip: _Grip | None = None
+        self._button: tuple[int | None, float] | None = None  # Who holds it, and when that was last heard.
+        self._push: ExternalForceHold | None = None
+        self._address: str | None = None
+
+    def set_push(self, request: requests.SetPush) -> None:
+        """Changes how to push or to guide; what does not exist is ignored, a force is taken at its bound."""
+        state = self._store.state
+        changes: dict[str, object] = {}
+        if request.link is not None and request.link in range(state.model.n + 1):
+            changes["link"] = request.link
+        if request.direction in DIRECTIONS:
+            changes["direction"] = request.direction
+        if request.newtons is not None and math.isfinite(request.newtons):
+            changes["newtons"] = min(max(request.newtons, 0.0), STRONGEST)
+        if request.grab is not None:
+            changes["grab"] = request.grab
+        if request.way in WAYS:
+            changes["way"] = request.way
+        self._store.update(push=replace(state.push, **changes))
+
+    def hold(self, request: requests.HoldPush) -> None:
+        """Goes on with the push of the button, for as long as it is said again and again."""
+        reason = no_push(self._session.status())
+        if reason is not None:
+            self._store.say("warn", reason)
+            return
+        self._button = request.page, time.monotonic()
+
+    def pull(self, request: requests.DragLink) -> None:
+        """Takes hold of a link where the mouse is, follows the mouse, lets go."""
+        state, status = self._store.state, self._session.status()
+        numbers = np.array((request.grabbed, request.hand), dtype=float)
+        if request.phase == "end" or not can_grab(state, status) or status.q is None:
+            self._grip = None
+        elif not np.isfinite(numbers).all() or request.link not in range(1, state.model.n + 1):
+            self._grip = None
+        elif request.phase == "start":
+            T = state.model.rigid_body.link_pose(status.q, request.link)
+            point = T.rotation.T @ (numbers[0] - T.position)
+            self._grip = _Grip(request.page, request.link, point, numbers[1])
+        elif self._grip is not None and self._grip.page == request.page:
+            self._grip = replace(self._grip, hand=numbers[1])
+
+    def tick(self, status: SupervisorStatus) -> None:
+        """Presses on the arm where it is now, or lets go of it; says what went wrong."""
+        state = self._store.state
+        self._follow(status.world_address)
+        self._drop_stale()
+        acting, point = None, np.zeros(3)
+        if status.q is not None and self._push is not None:
+            acting, point = self._judge(status.q)
+        if acting is not None and self._push is not None:
+            link = None if acting.link == TOOL else acting.link
+            self._push.hold((*acting.force.tolist(), *_NO_MOMENT), link, point)
+        elif state.push.acting is not None and self._push is not None:
+            self._push.release()
+        if acting is not None or state.push.acting is not None:
+            self._store.update(push=replace(state.push, acting=acting))
+        error = None if self._push is None else self._push.take_error()
+        if error is not None:
+            self._grip = self._button = None
+            self._store.say("bad", tell_error(error))
+
+    def close(self) -> None:
+        """Lets go of the arm."""
+        self._follow(None)
+
+    def _judge(self, q: JointVector) -> tuple[ActiveForce | None, Vector3]:
+        """Returns what is to press on the arm and at which point of the link's frame; the mouse before the button."""
+        state, grip = self._store.state, self._grip
+        if grip is not None:
+            start = place_of(state.model, q, grip.link, grip.point)
+            return ActiveForce(link=grip.link, start=start, force=spring_force(start, grip.hand)), grip.point
+        point = np.zeros(3)
+        if self._button is None:
+            return None, point
+        start = place_of(state.model, q, state.push.link, point)
+        return ActiveForce(link=state.push.link, start=start, force=state.push.force), point
+
+    def _drop_stale(self) -> None:
+        """Lets go for a page that has gone silent or has the controls no more."""
+        lease = self._store.state.lease
+        if self._grip is not None and not lease.allows(self._grip.page):
+            self._grip = None
+        if self._button is not None:
+            page, heard = self._button
+            if time.monotonic() - heard > HOLD_TIMEOUT or not lease.allows(page):
+                self._button = None
+
+    def _follow(self, address: str | None) -> None:
+        """Turns to the world port of the controller of now; another controller has another one."""
+        if address == self._address:
+            return
+        if self._push is not None:
+            self._push.release()
+            self._push.close()
+        self._push, self._address = None, address
+        self._grip = self._button = None
+        if address is not None:
+            host, _, port = address.partition(":")
+            self._push = ExternalForceHold(SimulationControl(host, int(port)))

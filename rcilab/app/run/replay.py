@@ -1,0 +1,60 @@
+"""A recorded run on the page: its plan and its recording, as if it had just been made, with nothing connected."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rcilab.app.goal.goal_actions import initial_goal
+from rcilab.app.planning import build_plan_view
+from rcilab.app.run.run_recorder import whole_recording
+from rcilab.conformance import check
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.errors import UsageError
+from rcilab.makers.rokae.driver.configuration import RobotConfiguration
+
+if TYPE_CHECKING:
+    from rcilab.app.store import UiState
+    from rcilab.core.arrays import JointVector
+    from rcilab.model.robot_model import RobotModel
+    from rcilab.recording.run import Run
+
+
+def require_replayable(run: Run) -> RobotModel:
+    """Returns the arm of a run that can be shown.
+
+    Raises:
+        UsageError: It has no cycle, or nobody knows which arm it was.
+    """
+    if run.model is None:
+        raise UsageError("this run cannot be replayed: its file does not say which arm made it").coded("run_no_arm")
+    if not len(run.cycles):
+        raise UsageError("this run cannot be replayed: not one cycle was recorded").coded("run_no_cycle")
+    return run.model
+
+
+def replayed(state: UiState, run: Run) -> UiState:
+    """Returns a state that shows a run."""
+    model = require_replayable(run)
+    motion = run.plan or run.commanded()  # A callback has no plan: what it commanded is drawn and checked.
+    report = run.report or check(motion, model)
+    plan = replace(build_plan_view(model, motion, report), complete=True)
+    goal = initial_goal(model, motion.goal)
+    wanted = state.setup.wanted.updated(RobotConfiguration(tool=model.T_flange_tool, load=model.load))
+    setup = replace(state.setup, wanted=wanted, touched=frozenset({"tool", "load"}))
+    recording = whole_recording(run)
+    return replace(
+        state, model=model, setup=setup, plan=plan, goal=goal, recording=recording, last_run=recording, place=0.0
+    )
+
+
+def replayed_pose(state: UiState) -> JointVector | None:
+    """Returns where the recorded arm was at the place that the timeline stands at; None without a finished run."""
+    recording = state.recording
+    if recording is None or recording.run is None or state.plan is None:
+        return None
+    t = state.place * state.plan.motion.duration + recording.delay * CYCLE_TIME
+    row = min(int(np.searchsorted(recording.t, t)), len(recording.t) - 1)
+    return recording.q[row]

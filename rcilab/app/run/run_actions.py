@@ -1,0 +1,377 @@
+"""What happens when somebody drives the robot. Owned by the conductor's thread; it never waits for the robot."""
+
+from __future__ import annotations
+
+import math
+import time
+from contextlib import suppress
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+from rcilab.app import requests
+from rcilab.app.goal.goal_actions import initial_goal
+from rcilab.app.goal.target_status import Tone
+from rcilab.app.robot_connection import RobotConnection
+from rcilab.app.run.active_force import PLANTS, TOOL, is_guided
+from rcilab.app.run.readiness import is_moving, obstacle
+from rcilab.app.run.run_recorder import RunRecorder
+from rcilab.app.setup.configuration_state import SetupState, name_parts, setup_obstacle
+from rcilab.app.status_text import StartingError, tell_error, tell_incident
+from rcilab.app.store import Goal, Store, UiState
+from rcilab.app.text import Message, message
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.errors import (
+    CertificateError,
+    ConnectionLostError,
+    ControlError,
+    PlanningError,
+    RcilabError,
+    UsageError,
+)
+from rcilab.model.robot_model import load_model
+
+if TYPE_CHECKING:
+    from rcilab.control_process import PendingRequest, SupervisorStatus
+    from rcilab.makers.rokae.driver.configuration import RobotConfiguration, SetupPart
+    from rcilab.motion.speed_scaling import SpeedScaledMotion
+
+_SECOND_THOUGHT = 10.0  # [s] A choice: a second press that comes later asks anew.
+TROUBLE = "robot"
+"""Names what is said while the robot side cannot move: see `Store.settle`."""
+_POWER_PAUSE = 2.0  # [s] A choice: between two attempts to switch the virtual arm on.
+
+
+class RunActions:
+    """Execute, stop, power, recover, connect; and the recording of what came of it."""
+
+    def __init__(self, store: Store, session: RobotConnection) -> None:
+        self._store, self._session = store, session
+        self._tickets: list[tuple[str, PendingRequest]] = []
+        self._keeper = RunRecorder(store)
+        self._recording = False
+        self._stopped: str | None = None  # Why the recorded motion did not reach its end.
+        self._is_left_alone = False  # That is because no page answered.
+        self._placed = False  # The goal stands where the arm was first seen.
+        self._powered = False  # The virtual arm's motors have been switched on once.
+        self._power_asked = float("-inf")
+        self._arrival: Message | None = None  # What to say at the end of the motion under way.
+        self._untouched: Goal | None = store.state.goal  # The goal that nobody has posed yet.
+        self._setups: dict[str, SetupState] = {}  # Of the arms that were chosen before, by name.
+        self._incident = 0
+        self._trouble = ""  # The code of the incident that has not ended yet.
+        self._phase = ""
+        self._reached: float | None = None  # [s] How far along the plan the moving arm is.
+        self._guided = False
+        self._asked_to_guide = -math.inf
+
+    def drive(self, request: requests.RobotCommand) -> None:
+        """Passes one button of the Run tab on to the supervisor."""
+        if request.what in ("execute", "confirm"):
+            self._execute(is_agreed=request.what == "confirm", stops=request.stops)
+            return
+        if request.what == "cancel":
+            self._store.update(asked=None)
+            return
+        if request.what == "stop":
+            self._session.stop()
+            return
+        if request.what == "disconnect":
+            if is_moving(self._session.status()):
+                self._store.say("warn", message("notice.moving"))
+            else:
+                self.disconnect()
+            return
+        status = self._session.status()
+        if request.what != "reconnect" and status.phase in ("starting", "connecting", "lost", "crashed"):
+            self._store.say("warn", obstacle(self._store.state, status) or message("ready.starting"))
+            return
+        supervisor = self._session.supervisor()
+        act = {
+            "recover": supervisor.recover,
+            "power_on": supervisor.power_on,
+            "power_off": supervisor.power_off,
+            "reconnect": supervisor.reconnect,
+            "guide": partial(self._guide, request.stops),
+            "unguide": supervisor.stop_guiding,
+        }[request.what]
+        ticket = act()
+        if ticket is not None:
+            self._tickets.append((request.what, ticket))
+
+    def _guide(self, stops: int | None) -> PendingRequest | None:
+        """Frees the arm for a hand to guide it; a real one only when that is asked for twice."""
+        state, now = self._store.state, time.monotonic()
+        unset = setup_obstacle(state, self._session.status())
+        if unset is not None:
+            self._store.say("warn", unset)
+            return None
+        if state.target != "virtual" and now - self._asked_to_guide > _SECOND_THOUGHT:
+            self._asked_to_guide = now
+            self._store.say("warn", message("guide.sure", address=state.target, seconds=f"{_SECOND_THOUGHT:.0f}"))
+            return None
+        self._asked_to_guide = -math.inf
+        space, kind = state.push.way.split(".")
+        return self._session.supervisor().start_guiding(space, kind, stops=stops)  # type: ignore[arg-type]  # One of WAYS.
+
+    def choose_robot(self, request: requests.ChooseRobot) -> None:
+        """Takes another arm, destination or plant; refused while the arm moves."""
+        state = self._store.state
+        if is_moving(self._session.status()):
+            self._store.say("warn", message("notice.moving"))
+            return
+        if request.plant is not None and request.model is None and request.target is None:
+            self._choose_plant(request.plant)
+            return
+        if request.target is not None and not request.target.strip():
+            self._store.say("warn", message("run.address_needed"))
+            return
+        model = state.model if request.model is None else load_model(request.model)
+        target = state.target if request.target is None else request.target.strip()
+        if target != "virtual":
+            from rcilab.makers.rokae.driver.address import parse_address
+
+            parse_address(target)
+        if model.name == state.model.name and target == state.target and request.target is None:
+            return
+        self.open(model.name, target)
+
+    def _choose_plant(self, plant: str) -> None:
+        """Has the virtual controller started again with another plant; goal and plan stay."""
+        state = self._store.state
+        if plant not in PLANTS or plant == state.plant:
+            return
+        if state.target != "virtual":
+            self._store.say("warn", message("plant.address", address=state.target))
+            return
+        self._store.update(plant=plant, playing=False, **_unasked(state))
+        self._powered, self._power_asked = False, float("-inf")
+        self._end_recording()
+        self._tickets, self._incident, self._phase, self._trouble = [], 0, "", ""
+        self._session.open(state.model, state.target, plant, _own_setup(state, state.target))
+
+    def disconnect(self) -> None:
+        """Lets go of the controller, and ends our own; goal and plan stay, for the preview."""
+        state = self._store.state
+        self._end_recording()
+        self._tickets, self._incident, self._phase, self._trouble = [], 0, "", ""
+        self._powered, self._power_asked = False, float("-inf")
+        self._session.disconnect()
+        self._store.update(asked=None, playing=False, **_unasked(state))
+
+    def open(self, name: str, target: str) -> None:
+        """Connects to a destination with an arm; goal, plan and undo stay unless it is another arm."""
+        state = self._store.state
+        model = state.model if state.model.name == name else load_model(name)
+        self._powered, self._power_asked = False, float("-inf")
+        self._end_recording()
+        self._tickets, self._incident, self._phase, self._trouble = [], 0, "", ""
+        changes: dict[str, object] = {"target": target, "recording": None, "asked": None, **_unasked(state)}
+        if model is not state.model:
+            self._store.forget()
+            self._placed = False
+            changes |= {"plan": None, "no_plan": None}
+            changes |= {"plot_joint": 0, "problems": {}}
+            changes |= {"push": replace(state.push, link=TOOL)}  # The other arm may have no such link.
+            setup = self._exchange_setups(state, name)
+            model = setup.wanted.only(setup.touched).applied_to(model)
+            self._untouched = initial_goal(model, model.home)
+            changes |= {"model": model, "goal": self._untouched, "setup": setup}
+            changes |= {"drive": replace(state.drive, control=None, refusal=None, typed_address="", world=None)}
+        is_same = model.name == state.model.name
+        # First: from here on no state of the old arm is shown on the new one.
+        self._session.open(model, target, state.plant, _own_setup(state, target) if is_same else None)
+        self._store.update(place=0.0, playing=False, **changes)
+
+    def remember_setup(self, name: str, setup: RobotConfiguration) -> None:
+        """Takes note of the set-up that an arm had before it was exchanged for another."""
+        fresh = SetupState()
+        touched: frozenset[SetupPart] = frozenset(setup.parts)
+        self._setups[name] = replace(fresh, wanted=fresh.wanted.updated(setup), touched=touched)
+
+    def _exchange_setups(self, state: UiState, name: str) -> SetupState:
+        """Returns the set-up of an arm that is chosen now, and keeps that of the one before."""
+        self._setups[state.model.name] = replace(state.setup, edited="", asked=None, refusal=None, can_undo=False)
+        setup = self._setups.get(name, SetupState())
+        if setup.touched:
+            self._store.say("good", message("setup.back", what=name_parts(tuple(sorted(setup.touched))), model=name))
+        return setup
+
+    def watch(self) -> str | None:
+        """Looks at the supervisor: finished tickets, new incidents, recorded cycles, the arm's first pose.
+
+        Returns:
+            "rested" when the arm has just come to rest, "placed" when it was seen for the first time, else None.
+        """
+        self._collect_tickets()
+        status = self._session.status()  # After them: where a motion has ended, it says so too.
+        if status.incident is not None and status.incident.number > self._incident:
+            self._incident = status.incident.number
+            if status.incident.code == "crashed.controller":
+                self._powered = False  # The one that is started in its place comes up without motor power.
+            self._trouble = status.incident.code
+            said = tell_incident(status.incident.code, status.incident.message, status)
+            self._store.say("bad", said, trouble=TROUBLE)
+        if self._guided and status.code == "idle.operator":
+            self._store.say("warn", message("notice.operator"))
+        self._guided = is_guided(status) or (self._guided and status.phase == "stopping")
+        if status.phase == "idle":
+            self._settle()
+        before, self._phase = self._phase, status.phase
+        self._follow(status)
+        self._record(status)
+        if not self._placed and status.q_c is not None:
+            self._placed = True
+            if self._store.state.goal is self._untouched:
+                self._store.update(goal=initial_goal(self._store.state.model, status.q_c))
+            return "placed"
+        may_power = self._session.is_ready and status.phase == "idle" and self._store.state.target == "virtual"
+        if may_power and not self._powered:
+            self._switch_on(status)
+        return "rested" if before in ("moving", "stopping") and not is_moving(status) else None
+
+    def _settle(self) -> None:
+        """Withdraws what was said of a trouble that is over; the end of one that cut the connection is said."""
+        self._store.settle(TROUBLE)
+        if self._trouble.startswith(("crashed", "lost")):
+            code = "lost" if self._trouble.startswith("lost") else self._trouble
+            self._store.say("good", message(f"incident.over.{code}"))
+        self._trouble = ""
+
+    def _follow(self, status: SupervisorStatus) -> None:
+        """Leaves the preview where the arm has left the plan, however seldom it was looked at on its way."""
+        plan = self._store.state.plan
+        if (is_moving(status) or self._reached is not None) and status.motion_place is not None:
+            self._reached = status.motion_place
+        if is_moving(status):
+            return
+        if self._reached is not None and plan is not None:
+            place = min(self._reached / max(plan.motion.duration, CYCLE_TIME), 1.0)
+            self._reached = None
+            self._store.update(place=place)
+
+    def _switch_on(self, status: SupervisorStatus) -> None:
+        """Has the virtual arm's motors switched on, and tries again until that has succeeded once."""
+        if status.powered:
+            self._powered = True
+            return
+        if time.monotonic() - self._power_asked < _POWER_PAUSE or any(what == "power_on" for what, _ in self._tickets):
+            return
+        with suppress(StartingError):  # The next look will find it there.
+            self._tickets.append(("power_on", self._session.supervisor().power_on()))
+            self._power_asked = time.monotonic()
+
+    def _execute(self, *, is_agreed: bool, stops: int | None) -> None:
+        state = self._store.state
+        mode = state.drive.mode
+        if state.plan is not None and (not state.plan.complete or state.plan.mode != mode):
+            state = self._store.update(plan=state.plan.completed(mode))
+        reason = obstacle(state, self._session.status())
+        if reason is not None:
+            self._store.say("warn", reason)
+            return
+        certificate = None if state.plan is None else state.plan.report.certificate
+        if state.plan is None or certificate is None:
+            return
+        if state.target != "virtual" and not (is_agreed and state.asked is state.plan.motion):
+            self._store.update(asked=state.plan.motion)
+            return
+        supervisor = self._session.supervisor()
+        supervisor.drain()
+        try:
+            ticket = supervisor.execute(state.plan.motion, certificate, mode, pace=state.drive.pace, stops=stops)
+        except (CertificateError, PlanningError, UsageError) as error:
+            self._store.say("warn", tell_error(error))
+            return
+        self._arrival = state.plan.short
+        self._keeper.begin(state.plan)
+        self._recording, self._stopped, self._is_left_alone = True, None, False
+        self._tickets.append(("execute", ticket))
+        self._store.update(recording=None, last_run=None, playing=False, asked=None)
+
+    def _collect_tickets(self) -> None:
+        waiting = []
+        for what, ticket in self._tickets:
+            if not ticket.done:
+                waiting.append((what, ticket))
+            elif ticket.error is not None:
+                self._stopped = str(ticket.error) if what == "execute" else self._stopped
+                if what == "execute" and isinstance(ticket.error, ControlError) and self._reached is None:
+                    self._reached = 0.0  # It had begun, and nobody saw it on its way.
+                trouble = TROUBLE if _is_trouble(ticket.error) else ""
+                self._store.say(*self._tell_failure(what, ticket.error), trouble=trouble)
+            elif what == "power_on":
+                self._powered = True
+            elif what == "execute":
+                self._reached = math.inf  # Even if it was too short to be seen on its way.
+                self._tell_arrival()
+        self._tickets = waiting
+
+    def _tell_arrival(self) -> None:
+        if self._arrival is not None:
+            self._store.say("warn", message("notice.arrived_short", short=self._arrival))
+        else:
+            self._store.say("good", message("notice.arrived"))
+
+    def _tell_failure(self, what: str, error: RcilabError) -> tuple[Tone, Message]:
+        if _is_trouble(error):
+            return "bad", tell_error(error, self._session.status())
+        if isinstance(error, ControlError) and what == "execute":
+            self._is_left_alone = self._session.status().code == "idle.operator"
+            return "warn", message("notice.operator" if self._is_left_alone else _stopped(self._store.state))
+        return "bad", message("notice.refused", what=message(f"drive.{what}"), error=tell_error(error))
+
+    def _record(self, status: SupervisorStatus) -> None:
+        try:
+            rows = self._session.supervisor().drain()
+        except RcilabError:
+            return
+        if not self._recording:
+            return
+        self._keeper.add(rows, self._paced())
+        if not is_moving(status) and not any(what == "execute" for what, _ in self._tickets):
+            self._end_recording()
+
+    def _end_recording(self) -> None:
+        self._recording = False
+        self._keeper.finish(self._stopped, self._paced(), is_left_alone=self._is_left_alone)
+
+    def _paced(self) -> SpeedScaledMotion | None:
+        """Returns how the motion under way, or the last one, is run; None as planned."""
+        with suppress(RcilabError):  # Its supervisor has gone.
+            paced = self._session.supervisor().paced
+            return paced if paced is not None and paced.changed else None
+        return None
+
+    def close(self) -> None:
+        """Ends a recording, so that its file has an end: the arm is about to be stopped where it still moves."""
+        if self._recording:
+            self._record(self._session.status())
+        if self._recording:
+            self._stopped = "the workbench was closed"
+            self._end_recording()
+
+
+def _is_trouble(error: RcilabError) -> bool:
+    """Returns whether an error is a fault or a lost connection: it lasts until the robot side is ready again."""
+    return isinstance(error, ConnectionLostError) or (isinstance(error, ControlError) and bool(error.faults))
+
+
+def _unasked(state: UiState) -> dict[str, object]:
+    """Returns the changes by which nothing that was asked, agreed or refused at one robot goes on at the next."""
+    return {
+        "setup": replace(state.setup, asked=None, refusal=None),
+        "jog": replace(state.jog, robot=False, asked=False, said=None),
+        "drive": replace(state.drive, typed_address="", refusal=None, world=None),
+    }
+
+
+def _own_setup(state: UiState, target: str) -> RobotConfiguration | None:
+    """Returns what our own controller is told at once; a foreign one is told nothing that was not agreed to."""
+    if target != "virtual":
+        return None
+    return replace(state.setup.wanted.only(state.setup.touched), control=state.drive.control)
+
+
+def _stopped(state: UiState) -> str:
+    return "notice.stopped" if state.plan is None or state.plan.program is None else "notice.stopped_program"

@@ -1,0 +1,139 @@
+"""Keeps what became of the last motion: for the plots while it happens, as a run once the arm stands still."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rcilab.app.store import Recording, Store
+from rcilab.app.text import message
+from rcilab.core.errors import InvalidValueError
+from rcilab.i18n.error_messages import tell
+from rcilab.recording.live import LiveRecording, RunFacts
+from rcilab.recording.run import Run
+from rcilab.recording.setup import Setup
+
+if TYPE_CHECKING:
+    from rcilab.app.planning import Plan
+    from rcilab.app.store import UiState
+    from rcilab.motion.speed_scaling import SpeedScaledMotion
+    from rcilab.recording.run_file import RunFile
+
+
+class RunRecorder:
+    """Owned by the conductor's thread.
+
+    Args:
+        store: Where the recording is shown.
+    """
+
+    def __init__(self, store: Store) -> None:
+        self._store = store
+        self._live: LiveRecording | None = None
+        self._file = ""
+
+    def begin(self, plan: Plan) -> None:
+        """Begins a recording; with "record every cycle" also in a file."""
+        state = self._store.state
+        plant = state.plant if state.target == "virtual" else ""
+        setup = Setup(target=state.target, plant=plant, mode=state.drive.mode, started_ns=time.time_ns())
+        facts = RunFacts(plan=plan.motion, model=state.model, setup=setup)
+        self._live = LiveRecording(facts, self._open(state, plan, setup))
+
+    def add(self, rows: NDArray[np.void], paced: SpeedScaledMotion | None = None) -> None:
+        """Adds cycles and shows them; `paced`: how the plan is run, where its pace was changed."""
+        if self._live is None:
+            return
+        before = self._live.cycles
+        try:
+            self._live.add(rows)
+        except InvalidValueError as error:
+            self._complain(error)
+        cycles = self._live.cycles
+        if cycles is not None and (before is None or len(cycles) > len(before)):
+            self._store.update(recording=as_recording(cycles, self._live.delay, paced))
+
+    def finish(
+        self, stopped: str | None, paced: SpeedScaledMotion | None = None, *, is_left_alone: bool = False
+    ) -> None:
+        """Ends the recording; from here on it can be exported.
+
+        Args:
+            stopped: Why the motion did not reach its end; None: it did.
+            paced: How the plan was run, where its pace was changed.
+            is_left_alone: Whether that is because no page answered.
+        """
+        if self._live is None:
+            return
+        live, self._live = self._live, None
+        plan = None if paced is None else paced.as_motion()
+        run: Run | None = None
+        try:
+            run = live.finish(stopped, plan)
+        except InvalidValueError as error:
+            self._complain(error)
+            run = live.finish(stopped, plan)  # Its file is given up now; the run in memory is whole.
+        if run is not None:
+            recording = replace(whole_recording(run, self._file, paced), is_left_alone=is_left_alone)
+            self._store.update(recording=recording, last_run=recording)
+
+    def _open(self, state: UiState, plan: Plan, setup: Setup) -> RunFile | None:
+        self._file = ""
+        if state.runs is None or not state.record:
+            return None
+        from rcilab.core.cycle_log import cycle_dtype
+        from rcilab.recording.run_file import ENDING, RunFile
+
+        stamp = time.strftime("%Y%m%d-%H%M%S", time.localtime(setup.started_ns * 1e-9))
+        path = state.runs / f"{stamp}-{setup.started_ns // 1_000_000 % 1000:03d}-{state.model.name}{ENDING}"
+        try:
+            file = RunFile(
+                path, cycle_dtype(state.model.n), plan=plan.motion, model=state.model, setup=setup, report=plan.report
+            )
+        except InvalidValueError as error:
+            self._complain(error)
+            return None
+        self._file = str(path)
+        return file
+
+    def _complain(self, error: InvalidValueError) -> None:
+        self._file = ""
+        self._store.say(
+            "warn",
+            message("record.unwritable", file=str(error.value), why=tell(error) if error.code else error.requirement),
+        )
+
+
+def as_recording(cycles: NDArray[np.void], delay: int, paced: SpeedScaledMotion | None = None) -> Recording:
+    """Returns what the plots need of a run that goes on."""
+    return Recording(
+        t=cycles["t"],
+        q=cycles["q"],
+        q_c=cycles["q_c"],
+        dq=cycles["dq"],
+        tau=cycles["tau"],
+        delay=delay,
+        paced=paced,
+    )
+
+
+def whole_recording(run: Run, file: str = "", paced: SpeedScaledMotion | None = None) -> Recording:
+    """Returns a finished run for plots, table and export."""
+    faulty = np.flatnonzero(run.cycles["faults"])
+    return Recording(
+        t=run.t,
+        q=run.q,
+        q_c=run.q_c,
+        dq=run.dq,
+        tau=run.tau,
+        delay=run.delay,
+        run=run,
+        paced=paced,
+        tracking=run.tracking,
+        file=file,
+        moment=float(run.t[faulty[0]]) if len(faulty) else None,
+    )

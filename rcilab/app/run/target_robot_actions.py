@@ -1,0 +1,58 @@
+"""What happens when somebody chooses where motions go. Owned by the conductor's thread."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import cast
+
+from rcilab.app import requests
+from rcilab.app.robot_connection import RobotConnection
+from rcilab.app.run.active_force import Plant
+from rcilab.app.run.drive_state import DESTINATIONS
+from rcilab.app.run.readiness import is_moving
+from rcilab.app.run.run_actions import RunActions
+from rcilab.app.store import Store
+from rcilab.app.text import message
+from rcilab.makers.rokae.driver.address import parse_address
+
+
+class TargetRobotActions:
+    """Preview, the virtual controller with one of its arms, or a controller at an address."""
+
+    def __init__(self, store: Store, session: RobotConnection, robot: RunActions) -> None:
+        self._store, self._session, self._robot = store, session, robot
+
+    def choose(self, request: requests.ChooseDestination) -> None:
+        """Connects to a destination; an address is named once more before anything is sent there."""
+        state = self._store.state
+        if request.where not in DESTINATIONS:
+            return
+        if is_moving(self._session.status()):
+            self._store.say("warn", message("notice.moving"))
+            return
+        if request.answer == "no":
+            self._ask("")
+        elif request.where == "preview":
+            self._ask("")
+            self._robot.disconnect()
+        elif request.where == "address":
+            self._choose_address(request)
+        else:
+            self._ask("")
+            self._store.update(plant=cast("Plant", request.where))
+            self._robot.open(state.model.name, "virtual")
+
+    def _choose_address(self, request: requests.ChooseDestination) -> None:
+        asked, address = self._store.state.drive.typed_address, request.address.strip()
+        self._ask("")  # It was about what stood in the field before.
+        if request.answer == "yes" and asked and address == asked:
+            self._robot.open(self._store.state.model.name, asked)
+            return
+        if not address:
+            self._store.say("warn", message("run.address_needed"))
+            return
+        parse_address(address)
+        self._ask(address)
+
+    def _ask(self, address: str) -> None:
+        self._store.update(drive=replace(self._store.state.drive, typed_address=address))

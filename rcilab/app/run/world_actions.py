@@ -1,0 +1,117 @@
+"""What happens when somebody spoils the network of our own controller or presses its safety buttons."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from rcilab.app import requests
+from rcilab.app.robot_connection import RobotConnection
+from rcilab.app.run.active_force import no_push
+from rcilab.app.run.drive_state import CABLE_PULLED, NETWORK_LAB
+from rcilab.app.status_text import tell_error
+from rcilab.app.store import Store
+from rcilab.app.text import message
+from rcilab.execution.simulation_control import SimulationControl
+from rcilab.execution.simulation_status_poller import SimulationStatusPoller
+from rcilab.sim.api import DIRECTIONS, AutoLimit, Direction, LoopBack, Network, NetworkFaults, Press
+
+if TYPE_CHECKING:
+    from rcilab.control_process import SupervisorStatus
+
+
+_WIRING = {"loop_back": LoopBack, "auto_limit": AutoLimit}
+
+
+class WorldActions:
+    """Owned by the conductor's thread; it never waits for the controller."""
+
+    def __init__(self, store: Store, session: RobotConnection) -> None:
+        self._store, self._session = store, session
+        self._watch: SimulationStatusPoller | None = None
+        self._address: str | None = None
+
+    def set_network(self, request: requests.SetNetwork) -> None:
+        """Changes the network, or pulls the cable and plugs it in again; numbers are taken at their bounds."""
+        watch = self._require_watch()
+        if watch is None:
+            return
+        drive = self._store.state.drive
+        network, direction, pulled = drive.network, drive.direction, drive.pulled
+        if request.clear:
+            network, direction, pulled = NetworkFaults(), "both", False
+        if request.name in NETWORK_LAB and math.isfinite(request.value):
+            largest, _ = NETWORK_LAB[request.name]
+            network = replace(network, **{request.name: min(max(request.value, 0.0), largest)})
+        if request.direction in DIRECTIONS:
+            direction: Direction = request.direction  # type: ignore[assignment]  # One of them.
+        if request.pulled is not None:
+            pulled = request.pulled
+        self._store.update(drive=replace(drive, network=network, direction=direction, pulled=pulled))
+        self._tell(watch)
+
+    def press_safety(self, request: requests.PressSafety) -> None:
+        """Presses the emergency stop, opens the safety gate, or puts both right."""
+        watch = self._require_watch()
+        if watch is not None and request.button in ("none", "estop", "gstop"):
+            watch.ask(Press(request.button))
+            self._store.say("warn" if request.button != "none" else "good", message(f"safety.{request.button}_done"))
+
+    def set_wiring(self, request: requests.SetWiring) -> None:
+        """Wires outputs to inputs, or has commands led to rest at the soft limits; or takes that back."""
+        watch = self._require_watch()
+        if watch is None or request.name not in _WIRING:
+            return
+        watch.ask(_WIRING[request.name](request.on))
+        self._store.update(drive=replace(self._store.state.drive, **{request.name: request.on}))
+
+    def tick(self, status: SupervisorStatus) -> None:
+        """Follows the controller of now and what it says of itself; another one has a good network."""
+        address = status.world_address
+        if address != self._address:
+            self.close()
+            self._address = address
+            if address is not None:
+                host, _, port = address.partition(":")
+                self._watch = SimulationStatusPoller(SimulationControl(host, int(port)))
+            drive = replace(
+                self._store.state.drive,
+                pulled=False,
+                network=NetworkFaults(),
+                direction="both",
+                world=None,
+                loop_back=False,
+                auto_limit=False,
+            )
+            self._store.update(drive=drive)
+        if self._watch is None:
+            return
+        error = self._watch.take_error()
+        if error is not None:
+            self._store.say("bad", tell_error(error))
+        if self._watch.status is not self._store.state.drive.world:
+            self._store.update(drive=replace(self._store.state.drive, world=self._watch.status))
+
+    def close(self) -> None:
+        """Ends the connection."""
+        watch, self._watch = self._watch, None
+        if watch is not None:
+            watch.close()
+
+    def _tell(self, watch: SimulationStatusPoller) -> None:
+        drive = self._store.state.drive
+        if drive.pulled:
+            watch.ask(Network(CABLE_PULLED))
+            return
+        if drive.direction != "both":
+            watch.ask(Network(NetworkFaults(), "states" if drive.direction == "commands" else "commands"))
+        watch.ask(Network(drive.network, drive.direction))
+
+    def _require_watch(self) -> SimulationStatusPoller | None:
+        if self._watch is None:
+            reason = no_push(self._session.status())
+            if reason is not None and reason.code == "push.no_world":
+                reason = message("world.not_ours", address=self._session.status().target)
+            self._store.say("warn", reason or message("ready.starting"))
+        return self._watch

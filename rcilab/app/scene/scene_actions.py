@@ -1,0 +1,114 @@
+"""What the scene shows of goal and plan, kept up to date in ticks, and what is asked for in it. Owned by the conductor.
+
+A tick looks at the newest goal and plan only: a drag that comes faster than ticks does not wait for any of this.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import replace
+from typing import Any
+
+from rcilab.app import requests
+from rcilab.app.goal.elbow import look_at_elbow
+from rcilab.app.goal.goal_actions import GoalActions
+from rcilab.app.scene.path_strip import look_at_path
+from rcilab.app.scene.scene_extras import EXTRAS, look_at_dexterity, look_at_reach, look_at_sweep
+from rcilab.app.store import Store
+from rcilab.app.text import message
+from rcilab.views.elbow_view import OUTWARD
+
+
+class SceneActions:
+    """The elbow's circle, the path with its beads, the branch under the mouse, and what is behind switches.
+
+    Args:
+        store: The state.
+        goal: Moves the elbow.
+    """
+
+    def __init__(self, store: Store, goal: GoalActions) -> None:
+        self._store, self._goal = store, goal
+        self._seen: dict[str, tuple[object, ...]] = {}
+        self._beside = ThreadPoolExecutor(1, thread_name_prefix="scene")
+        self._made: dict[str, Future[Any]] = {}
+
+    def close(self) -> None:
+        """Drops what is being computed."""
+        self._beside.shutdown(wait=False, cancel_futures=True)
+
+    def drag_elbow(self, request: requests.DragElbow) -> None:
+        """Turns the elbow to where the mouse sees its circle."""
+        elbow = self._store.state.scene.elbow
+        numbers = (*request.eye, *request.hand)
+        if elbow is None or len(numbers) != 6 or not all(math.isfinite(number) for number in numbers):
+            return
+        if request.phase == "start":
+            self._store.remember()
+            return
+        psi = elbow.circle.angle_along(request.eye, request.hand, elbow.psi, OUTWARD)
+        self._goal.set_arm_angle(requests.SetArmAngle(page=request.page, psi=psi), elbow.branch)
+
+    def peek(self, request: requests.HighlightBranch) -> None:
+        """Shows a branch before it is chosen."""
+        solutions = self._store.state.goal.reach.solutions
+        known = solutions is not None and request.index is not None and 0 <= request.index < len(solutions)
+        self._change(peek=request.index if known else None)
+
+    def show_bead(self, request: requests.ShowViolation) -> None:
+        """Takes the preview to a violation and says what it is."""
+        state = self._store.state
+        ribbon = state.scene.ribbon
+        if ribbon is None or not 0 <= request.number < len(ribbon.beads):
+            return
+        bead = ribbon.beads[request.number]
+        self._store.update(place=bead.place, playing=False)
+        self._store.say("bad", message("notice.plain", text=bead.violations[0]))
+
+    def show_extra(self, request: requests.ShowExtra) -> None:
+        """Turns a switch."""
+        extra = next((name for name in EXTRAS if name == request.name), None)
+        if extra is not None:
+            extras = self._store.state.scene.extras
+            self._change(extras=extras | {extra} if request.on else extras - {extra})
+
+    def tick(self) -> None:
+        """Looks at what has changed since the last tick."""
+        state = self._store.state
+        model, goal, plan, box = state.model, state.goal, state.plan, state.setup.wanted.box
+        extras = state.scene.extras
+        if self._is_new("elbow", model, goal, box):
+            self._change(elbow=look_at_elbow(model, goal.q, box), peek=None)
+        if self._is_new("ribbon", None if plan is None else plan.report):
+            self._change(ribbon=None if plan is None else look_at_path(plan))
+        if self._is_new("ellipsoid", *((model, goal.q) if "ellipsoid" in extras else ())):
+            self._change(ellipsoid=look_at_dexterity(model, goal.q) if "ellipsoid" in extras else None)
+        self._compute("cloud", (model,) if "cloud" in extras else (), lambda: look_at_reach(model))
+        moved = () if plan is None or "swept" not in extras else (model, plan.motion)
+        self._compute("swept", moved, lambda: look_at_sweep(model, plan.motion))  # type: ignore[union-attr]
+
+    def _compute(self, name: str, wanted: tuple[object, ...], work: Callable[[], Any]) -> None:
+        """Has something computed beside the page when it is wanted anew, and shows it once it is there."""
+        running = self._made.get(name)
+        if running is not None and running.done():
+            del self._made[name]
+            self._change(**{name: running.result()})
+        elif running is None and self._is_new(name, *wanted):
+            self._change(**{name: None})
+            if wanted:
+                self._made[name] = self._beside.submit(work)
+
+    def _is_new(self, name: str, *of: object) -> bool:
+        """Returns whether something is to be looked at again: by identity, as all of it is frozen."""
+        before = self._seen.get(name)
+        if before is not None and len(before) == len(of) and all(a is b for a, b in zip(before, of, strict=True)):
+            return False
+        self._seen[name] = of
+        return True
+
+    def _change(self, **changes: Any) -> None:
+        scene = self._store.state.scene
+        if any(getattr(scene, name) is not value for name, value in changes.items()):
+            self._store.update(scene=replace(scene, **changes))

@@ -1,0 +1,172 @@
+"""The set-up on the page: what is wanted of it, what the controller has, and what is said about the difference."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rcilab.app.text import Message, message
+from rcilab.core.safety_box import SafetyBox, active_box
+from rcilab.core.spatial import IDENTITY, Pose
+from rcilab.makers.rokae.driver.configuration import (
+    SETUP_PARTS,
+    ForceControlFrame,
+    RobotConfiguration,
+    SetupPart,
+    SoftJointLimits,
+)
+from rcilab.makers.rokae.wire import ForceFrame
+from rcilab.model.dynamics.payload import NO_LOAD, Payload
+from rcilab.robots import describe_robot
+
+if TYPE_CHECKING:
+    from rcilab.app.store import UiState
+    from rcilab.control_process import SupervisorStatus
+
+LISTED: tuple[SetupPart, ...] = (*SETUP_PARTS, "joints")
+"""The parts of the Setup tab."""
+ON_FLANGE: tuple[SetupPart, ...] = ("tool", "load", "force")
+FORCE_AXES = {"world": ForceFrame.WORLD, "tool": ForceFrame.TOOL, "path": ForceFrame.PATH}
+
+_SAME_PLACE, _SAME_TURN = 1e-4, 1e-3  # [m], elements of a rotation: within these the controller's tool is ours.
+_SEEN = 5e-5  # [m] Closer to a face than this, the tool stands on it: it would be 0.0 mm outside.
+_FIRST_SETUP = RobotConfiguration(
+    box=SafetyBox(size=(1.6, 1.6, 1.3), T_base_box=Pose((0.0, 0.0, 0.66)), active=False),
+    tool=IDENTITY,
+    load=NO_LOAD,
+    force=ForceControlFrame(),
+)
+"""That of an arm that nobody has set up; the box is a first proposal, and off."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SetupState:
+    """Box, tool, load and force-control frame as the operator wants them."""
+
+    wanted: RobotConfiguration = field(default_factory=lambda: _FIRST_SETUP)
+    """All four parts."""
+    touched: frozenset[SetupPart] = frozenset()
+    """Parts that were edited here: those the controller is to be told."""
+    inertia: tuple[float, ...] | None = None
+    """Six typed moments, xx yy zz xy xz yz, [kg m^2], that no body has yet; None: those of the load."""
+    edited: str = ""
+    """The part with handles in the scene; "" for none."""
+    seen: frozenset[str] = frozenset()
+    """Parts that are drawn."""
+    asked: RobotConfiguration | None = None
+    """The set-up that a foreign robot is to get and that awaits a second yes."""
+    refusal: Message | None = None
+    """Why the controller did not take it."""
+    can_undo: bool = False
+
+
+def pending_parts(state: UiState, status: SupervisorStatus) -> tuple[SetupPart, ...]:
+    """Returns the edited parts that the controller has not taken yet."""
+    setup = state.setup
+    return tuple(
+        part
+        for part in LISTED
+        if part in setup.touched and getattr(status.setup, part) is not getattr(setup.wanted, part)
+    )
+
+
+def own_limits(state: UiState) -> SoftJointLimits:
+    """Returns the whole range of the arm's joints."""
+    own = describe_robot(state.model.name).limits.joint
+    return SoftJointLimits(lower=tuple(own.lower.tolist()), upper=tuple(own.upper.tolist()))
+
+
+def soft_limits(state: UiState) -> SoftJointLimits:
+    """Returns the soft limits that are wanted: the whole range as long as none were set."""
+    return state.setup.wanted.joints or own_limits(state)
+
+
+def setup_obstacle(state: UiState, status: SupervisorStatus) -> Message | None:
+    """Returns why nothing may run with this set-up, or None when the controller has it."""
+    parts = pending_parts(state, status)
+    if not parts:
+        return None
+    if state.setup.refusal is not None:
+        return message("ready.setup_refused", error=state.setup.refusal)
+    if state.target == "virtual":
+        return message("ready.setup_pending")
+    return message("ready.setup_unsent", what=name_parts(parts), address=state.target)
+
+
+def tool_outside(state: UiState, position: np.ndarray) -> Message | None:
+    """Returns how far outside the safety box a place of the tool is, and past which face; None inside or without one.
+
+    Args:
+        state: Of the page.
+        position: In base, shape (3,), [m].
+    """
+    box = active_box(state.setup.wanted.box)
+    if box is None:
+        return None
+    face, distance = box.passed_face(position)
+    return message("ready.outside", mm=f"{1000.0 * distance:.1f}", face=face) if distance > _SEEN else None
+
+
+def name_parts(parts: tuple[str, ...]) -> Message:
+    """Returns names of parts as one message."""
+    named = message(f"setup.part.{parts[0]}")
+    for part in parts[1:]:
+        named = message("setup.and", first=named, second=message(f"setup.part.{part}"))
+    return named
+
+
+def describe_part(setup: RobotConfiguration, part: str) -> Message:
+    """Returns one part in a few numbers."""
+    value = getattr(setup, part)
+    if value is None:
+        return message("setup.own")
+    if isinstance(value, SafetyBox):
+        size = " × ".join(f"{1000.0 * edge:.0f}" for edge in value.size)
+        return message("setup.box_on" if value.active else "setup.box_off", size=size)
+    if isinstance(value, Payload):
+        center = _millimetres(value.center_of_mass)
+        return message("setup.load_is" if value.mass else "setup.load_none", mass=f"{value.mass:.2f}", center=center)
+    if isinstance(value, SoftJointLimits):
+        ends = zip(np.degrees(value.lower), np.degrees(value.upper), strict=True)
+        return message("setup.joints_are", ranges=", ".join(f"{low:.0f}…{high:.0f}" for low, high in ends))
+    if isinstance(value, ForceControlFrame):
+        axes = next(name for name, kind in FORCE_AXES.items() if kind == value.type)
+        place = _describe_pose(value.T_flange_force)
+        return message("setup.force_is", pose=place, axes=message(f"setup.axes.{axes}"))
+    return _describe_pose(value)
+
+
+def describe_held(status: SupervisorStatus, part: str) -> Message:
+    """Returns what the controller has: the tool by the poses it reports, the rest by what it has acknowledged."""
+    if part == "tool" and status.T_flange_tool is not None:
+        return _describe_pose(status.T_flange_tool)
+    return describe_part(status.setup, part)
+
+
+def differing_tool(state: UiState, status: SupervisorStatus) -> Message | None:
+    """Returns the tool that the controller reports, where it is not the one that motions are checked with."""
+    held = status.T_flange_tool
+    if held is None or status.phase != "idle":
+        return None
+    wanted = state.setup.wanted.tool
+    assert wanted is not None
+    away = float(np.abs(held.position - wanted.position).max())
+    turned = float(np.abs(held.rotation - wanted.rotation).max())
+    return _describe_pose(held) if away > _SAME_PLACE or turned > _SAME_TURN else None
+
+
+def _describe_pose(pose: Pose) -> Message:
+    turns = np.degrees(pose.rpy)
+    if not np.abs(turns).max() >= 0.05:
+        return message("setup.place", place=_millimetres(pose.position))
+    return message("setup.pose", place=_millimetres(pose.position), turns=_numbers(turns))
+
+
+def _millimetres(vector: np.ndarray) -> str:
+    return _numbers(1000.0 * np.asarray(vector))
+
+
+def _numbers(values: np.ndarray) -> str:
+    return ", ".join(f"{round(float(value), 1) + 0.0:g}" for value in values)

@@ -1,0 +1,302 @@
+"""What happens when somebody edits the set-up: take it over, tell the controller, undo. Owned by the conductor."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import replace
+from typing import TYPE_CHECKING, cast
+
+import numpy as np
+
+from rcilab.app import requests
+from rcilab.app.goal.target_status import evaluate_joints, evaluate_pose
+from rcilab.app.planning import Plan, tool_path
+from rcilab.app.robot_connection import RobotConnection
+from rcilab.app.setup.configuration_sender import SetupPost
+from rcilab.app.setup.configuration_state import (
+    FORCE_AXES,
+    LISTED,
+    SetupState,
+    name_parts,
+    own_limits,
+    pending_parts,
+    soft_limits,
+)
+from rcilab.app.setup.setup_fields import (
+    FARTHEST_FACE,
+    FIELD_NAMES,
+    INERTIA_NAMES,
+    JOINT_ENDS,
+    THINNEST,
+    box_between,
+    faces,
+    field_range,
+    with_field,
+    with_inertia,
+    with_pose,
+)
+from rcilab.app.store import Goal, Store, UiState
+from rcilab.app.text import Message, message
+from rcilab.core.safety_box import SafetyBox
+from rcilab.core.spatial import Pose
+from rcilab.i18n.number_parsing import parse_number
+from rcilab.makers.rokae.driver.configuration import SETUP_PARTS, RobotConfiguration, SetupPart, SoftJointLimits
+from rcilab.robots import describe_robot
+
+if TYPE_CHECKING:
+    from rcilab.control_process import SupervisorStatus
+
+_UNDO_DEPTH = 100
+_ROUNDED = 1e-5  # [rad] Closer than what the page shows of an angle: the arm's own bound is meant.
+_HAND_GONE = 1.0  # [s] A choice: a drag that was not heard of for so long has ended, whatever became of its page.
+
+
+class SetupActions:
+    """Handles in the scene, typed numbers, switches; each edit goes to a virtual controller by itself."""
+
+    def __init__(self, store: Store, session: RobotConnection) -> None:
+        self._store, self._session = store, session
+        self._past: list[
+            tuple[RobotConfiguration, frozenset[SetupPart]]
+        ] = []  # What was wanted, what of it was edited.
+        self._arm = store.state.model.name
+        self._drag: tuple[int | None, str] | None = None  # Which page drags which part.
+        self._dragged = -math.inf  # When it was last heard to.
+        self._post = SetupPost(session, self._refuse)
+        self._told_of: object = None  # The program of which it was said what another tool makes of it.
+        self._told = 0  # At how many connections the controller has taken a set-up, as far as that was said.
+
+    def type_field(self, request: requests.TypeField) -> None:
+        """Takes a typed number, or says beside the field what is wrong with it."""
+        _, _, place = request.field.partition(".")
+        part, _, name = place.partition(".")
+        if part == "joints":
+            self._type_joint_limit(request, name)
+            return
+        if name not in FIELD_NAMES.get(part, ()):
+            return
+        state = self._store.state
+        bounds = field_range(part, name, state.model.description.rated_payload)
+        parsed = parse_number(request.text, bounds.low, bounds.high, bounds.unit)
+        if parsed.value is None:
+            assert parsed.problem is not None
+            self._store.complain(request.field, parsed.problem)
+            return
+        changed = with_field(state.setup, part, name, parsed.value)
+        if isinstance(changed, SetupState) and name in INERTIA_NAMES:
+            self._store.update(setup=changed)  # The moments stand as typed, also while no body has them yet.
+            changed = with_inertia(changed)
+        untaken = None
+        if isinstance(changed, SetupState) and name == "mass":
+            made = with_inertia(changed)
+            changed, untaken = (changed, made) if isinstance(made, Message) else (made, None)
+        if isinstance(changed, Message):
+            self._store.complain(request.field, changed)
+            return
+        related = {name, *INERTIA_NAMES} if name in (*INERTIA_NAMES, "mass") else {name}
+        self._store.clear_problems(*(f"setup.{part}.{other}" for other in related))
+        self._edit(changed, cast("SetupPart", part))
+        if untaken is not None:
+            self._store.complain("setup.load.ixx", untaken)
+
+    def _type_joint_limit(self, request: requests.TypeField, name: str) -> None:
+        end, _, number = name.partition(".")
+        model = self._store.state.model
+        if end not in JOINT_ENDS or number not in map(str, range(model.n)):
+            return
+        joint, own = int(number), describe_robot(model.name).limits.joint
+        least, largest = np.degrees((own.lower[joint], own.upper[joint])).tolist()
+        parsed = parse_number(request.text, least, largest, "deg")
+        if parsed.value is None:
+            assert parsed.problem is not None
+            self._store.complain(request.field, parsed.problem)
+            return
+        now = soft_limits(self._store.state)
+        bounds = {"lower": list(now.lower), "upper": list(now.upper)}
+        exact = {"lower": own.lower, "upper": own.upper}[end][joint]  # What is typed is rounded.
+        typed = math.radians(parsed.value)
+        bounds[end][joint] = float(exact) if abs(typed - exact) < _ROUNDED else typed
+        low, high = (math.degrees(bounds[name][joint]) for name in JOINT_ENDS)
+        if not low < high:
+            self._store.complain(request.field, message("setup.joint_ends", low=f"{low:.1f}", high=f"{high:.1f}"))
+            return
+        self._store.clear_problems(*(f"setup.joints.{name}.{joint}" for name in JOINT_ENDS))
+        self._limit_joints(SoftJointLimits(lower=tuple(bounds["lower"]), upper=tuple(bounds["upper"])))
+
+    def _limit_joints(self, joints: SoftJointLimits) -> None:
+        setup = self._store.state.setup
+        if setup.wanted.joints is None:  # What an undo leads back to has to be said, too.
+            setup = replace(
+                setup, wanted=setup.wanted.updated(RobotConfiguration(joints=own_limits(self._store.state)))
+            )
+            self._store.update(setup=setup)
+        self._edit(replace(setup, wanted=setup.wanted.updated(RobotConfiguration(joints=joints))), "joints")
+
+    def move(self, request: requests.MoveSetup) -> None:
+        """Follows the handles of a part."""
+        numbers = (*request.position, *request.wxyz)
+        if request.part != self._store.state.setup.edited or len(numbers) != 7 or not all(map(math.isfinite, numbers)):
+            return  # A drag that ends after its edit, or nothing of ours.
+        if math.hypot(*request.wxyz) < 1e-6:
+            return
+        changed = with_pose(self._store.state.setup, request.part, Pose(request.position, request.wxyz))
+        if isinstance(changed, Message):
+            self._store.say("warn", changed)
+        else:
+            self._edit(changed, request.part, drag=(request.page, request.part))
+            self._store.clear_problems(f"setup.{request.part}.")
+        self._hear_drag(request.ended)
+
+    def resize(self, request: requests.ResizeBox) -> None:
+        """Follows a handle on a face of the safety box; the other faces stay."""
+        setup = self._store.state.setup
+        box = setup.wanted.box
+        if box is None or setup.edited != "box" or request.face not in range(6) or not np.isfinite(request.hand).all():
+            return
+        bounds = faces(box)
+        axis, opposite = request.face % 3, (request.face + 3) % 6
+        low, high = -FARTHEST_FACE, FARTHEST_FACE
+        if request.face < 3:
+            high = bounds[opposite] - THINNEST
+        else:
+            low = bounds[opposite] + THINNEST
+        hand = box.T_base_box.rotation.T @ np.array(request.hand)
+        bounds[request.face] = min(max(float(hand[axis]), low), high)
+        wanted = setup.wanted.updated(RobotConfiguration(box=box_between(box, bounds)))
+        self._edit(replace(setup, wanted=wanted), "box", drag=(request.page, "box"))
+        self._hear_drag(request.ended)
+
+    def set_setup(self, request: requests.SetSetup) -> None:
+        """Turns a switch; what does not exist is ignored."""
+        setup, value = self._store.state.setup, request.value
+        box, force = setup.wanted.box, setup.wanted.force
+        assert box is not None
+        assert force is not None
+        if request.name == "edited" and value in ("", *SETUP_PARTS):
+            seen = setup.seen | ({value} if value else set())
+            self._store.update(setup=replace(setup, edited=value, seen=frozenset(seen)))
+        elif request.name in SETUP_PARTS and isinstance(value, bool):
+            seen = setup.seen | {request.name} if value else setup.seen - {request.name}
+            self._store.update(setup=replace(setup, seen=frozenset(seen)))
+        elif request.name == "active" and isinstance(value, bool):
+            switched = SafetyBox(size=box.size, T_base_box=box.T_base_box, active=value)
+            self._edit(replace(setup, wanted=setup.wanted.updated(RobotConfiguration(box=switched))), "box")
+        elif request.name == "axes" and value in FORCE_AXES:
+            turned = replace(force, type=FORCE_AXES[str(value)])
+            self._edit(replace(setup, wanted=setup.wanted.updated(RobotConfiguration(force=turned))), "force")
+
+    def open_tab(self, request: requests.OpenTab) -> None:
+        """Ends the edit when its tab is left: handles in the scene are those of the tab that is open."""
+        setup = self._store.state.setup
+        if request.name != "tab.setup" and setup.edited:
+            self._store.update(setup=replace(setup, edited=""))
+
+    def press(self, request: requests.PressSetup) -> None:
+        """Does what one of the buttons says."""
+        state = self._store.state
+        setup = state.setup
+        if request.what == "undo":
+            self._undo()
+        elif request.what == "whole":
+            self._store.clear_problems("setup.joints.")
+            self._limit_joints(own_limits(self._store.state))
+        elif request.what == "cancel":
+            self._store.update(setup=replace(setup, asked=None))
+        elif request.what == "send" and state.target != "virtual":
+            self._store.update(setup=replace(setup, asked=setup.wanted, refusal=None))
+        elif request.what == "send":
+            self._store.update(setup=replace(setup, refusal=None))
+        elif request.what == "confirm" and setup.asked is setup.wanted:
+            self._store.update(setup=replace(setup, asked=None))
+            self._send(self._session.status())
+
+    def restore(self, setup: RobotConfiguration) -> None:
+        """Takes a set-up over that was edited before; a foreign robot is not told without being asked about."""
+        now = self._store.state.setup
+        parts: set[SetupPart] = set(setup.parts)
+        if parts:
+            self._take(replace(now, wanted=now.wanted.updated(setup), touched=now.touched | parts), parts)
+
+    def tick(self, status: SupervisorStatus) -> None:
+        """Looks what became of a set-up that was sent, and tells our own controller what is new."""
+        name = self._store.state.model.name
+        if name != self._arm:
+            self._arm, self._past, self._told = name, [], 0
+            self._post.forget()
+        if self._post.is_underway:
+            self._post.collect()
+            status = self._session.status()  # What was acknowledged in the meantime is not sent again.
+        state = self._store.state
+        told, self._told = self._told, status.setup_times  # Another supervisor counts anew.
+        if self._told > told:
+            self._store.say("good", message("setup.sent_again", what=name_parts(status.setup.parts)))
+        is_held = time.monotonic() - self._dragged < _HAND_GONE
+        if state.target == "virtual" and not is_held and state.setup.refusal is None and status.phase == "idle":
+            self._send(status)
+
+    def _send(self, status: SupervisorStatus) -> None:
+        """Tells the controller every part that it has not taken yet."""
+        state = self._store.state
+        parts = pending_parts(state, status)
+        if parts and not self._post.is_underway:
+            self._post.send(state.setup.wanted.only(parts))
+
+    def _refuse(self, why: Message) -> None:
+        self._store.update(setup=replace(self._store.state.setup, refusal=why))
+
+    def _hear_drag(self, has_ended: bool) -> None:
+        self._dragged = -math.inf if has_ended else time.monotonic()
+        if has_ended:
+            self._drag = None
+
+    def _edit(self, changed: SetupState, part: SetupPart, *, drag: tuple[int | None, str] | None = None) -> None:
+        """Takes over an edit; a drag is one step to undo."""
+        if drag is None or drag != self._drag:
+            now = self._store.state.setup
+            self._past = [*self._past[-_UNDO_DEPTH:], (now.wanted, now.touched)]
+        self._drag = drag
+        self._take(replace(changed, touched=changed.touched | {part}), {part})
+
+    def _undo(self) -> None:
+        if not self._past:
+            return
+        setup, (before, touched) = self._store.state.setup, self._past.pop()
+        touched |= frozenset(self._session.status().setup.parts)  # What it was told it must be told to forget.
+        if self._post.is_underway:
+            touched |= setup.touched
+        parts: set[SetupPart] = {p for p in LISTED if getattr(before, p) is not getattr(setup.wanted, p)}
+        self._store.clear_problems(*(f"setup.{part}." for part in parts))
+        self._take(replace(setup, wanted=before, touched=touched, inertia=None), parts)
+
+    def _tell_program(self, state: UiState) -> None:
+        """Says once of a program that goes with the tool of the page what another tool makes of it."""
+        draft = state.program.draft
+        is_here = draft.model == state.model.name and bool(draft.steps) and draft.tool is None
+        if is_here and draft is not self._told_of:
+            self._told_of = draft
+            self._store.say("warn", message("setup.program_moves"))
+
+    def _take(self, setup: SetupState, parts: set[SetupPart]) -> None:
+        """Exchanges the set-up and what depends on it: the arm's tool and load, goal, path. The plan may go stale."""
+        state = self._store.state
+        changes: dict[str, object] = {}
+        if parts & {"tool", "load", "joints"}:
+            changes["model"] = model = setup.wanted.only(parts).applied_to(state.model)
+            if "tool" in parts:
+                self._tell_program(state)
+                self._store.forget()  # Goals of another tool.
+                target = model.forward(state.goal.q)
+                reach = evaluate_joints(model, state.goal.q)
+                if state.goal.reach.solutions is not None:
+                    reach = replace(evaluate_pose(model, target, state.goal.q, state.goal.psi), q=state.goal.q)
+                changes["goal"] = Goal(q=state.goal.q, target=target, reach=reach, psi=state.goal.psi)
+                if isinstance(state.plan, Plan):
+                    changes["plan"] = replace(state.plan, path=tool_path(model, state.plan.motion), short=None)
+        changes["setup"] = replace(setup, asked=None, refusal=None, can_undo=bool(self._past))
+        self._store.update(**changes)
+
+
+def is_setup_field(field: str) -> bool:
+    """Returns whether a typed field belongs to the set-up."""
+    return field.startswith("setup.")

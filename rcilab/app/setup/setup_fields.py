@@ -1,0 +1,203 @@
+"""The numbers of a set-up by the names of their fields, in mm, deg, kg and kg m^2; what a changed one makes of it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rcilab.app.setup.configuration_state import SetupState
+from rcilab.app.text import Message, message
+from rcilab.core.errors import InvalidValueError
+from rcilab.core.safety_box import SafetyBox
+from rcilab.core.spatial import Pose
+from rcilab.makers.rokae.driver.configuration import RobotConfiguration
+from rcilab.makers.rokae.wire.bounds import LONGEST_TOOL
+from rcilab.model.dynamics.payload import Payload
+
+POSE_NAMES = ("x", "y", "z", "roll", "pitch", "yaw")
+FACE_NAMES = ("xmin", "ymin", "zmin", "xmax", "ymax", "zmax")
+INERTIA_NAMES = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+FIELD_NAMES = {
+    "box": (*FACE_NAMES, *POSE_NAMES[3:]),
+    "tool": POSE_NAMES,
+    "load": ("mass", *POSE_NAMES[:3], *INERTIA_NAMES),
+    "force": POSE_NAMES,
+}
+JOINT_ENDS = ("lower", "upper")
+"""Beside FIELD_NAMES: setup.joints.lower.0 and so on."""
+THINNEST = 0.02  # [m] A choice: a box that the mouse cannot make thinner.
+FARTHEST_FACE = 5.0  # [m] A choice: no arm of ours reaches a third of it, so what is farther is a slip of units.
+
+_LARGEST_INERTIA = 10.0  # [kg m^2] A choice: ten times that of anything an xMate can carry.
+_PLACES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+
+
+@dataclass(frozen=True)
+class Range:
+    """What may be typed into a field."""
+
+    low: float
+    high: float
+    unit: str
+
+
+def field_range(part: str, name: str, rated_payload: float) -> Range:
+    """Returns the range of a field, in the unit of the field.
+
+    Args:
+        part: A key of `FIELD_NAMES`.
+        name: One of its names.
+        rated_payload: Of the arm, [kg].
+    """
+    if name in POSE_NAMES[3:]:
+        return Range(-360.0, 360.0, "deg")
+    if name == "mass":
+        return Range(0.0, rated_payload, "kg")
+    if name in INERTIA_NAMES:
+        return Range(0.0 if name in INERTIA_NAMES[:3] else -_LARGEST_INERTIA, _LARGEST_INERTIA, "kg·m²")
+    farthest = 1000.0 * (FARTHEST_FACE if part == "box" else LONGEST_TOOL)
+    return Range(-farthest, farthest, "mm")
+
+
+def read_field(setup: SetupState, part: str, name: str) -> float:
+    """Returns the number of a field, in its unit."""
+    wanted = setup.wanted
+    assert wanted.box is not None
+    assert wanted.tool is not None
+    assert wanted.load is not None
+    assert wanted.force is not None
+    if part == "box" and name in FACE_NAMES:
+        return 1000.0 * float(faces(wanted.box)[FACE_NAMES.index(name)])
+    if name == "mass":
+        return wanted.load.mass
+    if name in INERTIA_NAMES:
+        return moments(setup)[INERTIA_NAMES.index(name)]
+    if part == "load":
+        return 1000.0 * float(wanted.load.center_of_mass[POSE_NAMES.index(name)])
+    pose = {"box": wanted.box.T_base_box, "tool": wanted.tool, "force": wanted.force.T_flange_force}[part]
+    index = POSE_NAMES.index(name)
+    return 1000.0 * float(pose.position[index]) if index < 3 else math.degrees(float(pose.rpy[index - 3]))
+
+
+def with_field(setup: SetupState, part: str, name: str, value: float) -> SetupState | Message:
+    """Returns the set-up with one number changed, or what is wrong with it.
+
+    Args:
+        setup: The set-up so far.
+        part: A key of `FIELD_NAMES`.
+        name: One of its names.
+        value: In the unit of the field.
+    """
+    wanted = setup.wanted
+    assert wanted.box is not None
+    assert wanted.tool is not None
+    assert wanted.load is not None
+    assert wanted.force is not None
+    if part == "box" and name in FACE_NAMES:
+        bounds = faces(wanted.box)
+        bounds[FACE_NAMES.index(name)] = value / 1000.0
+        axis = FACE_NAMES.index(name) % 3
+        if not bounds[axis] < bounds[axis + 3]:
+            low, high = (f"{1000.0 * bounds[i]:.1f}" for i in (axis, axis + 3))
+            return message("setup.faces", axis="xyz"[axis], low=low, high=high)
+        return _with(setup, box=box_between(wanted.box, bounds))
+    if part == "box":
+        box = wanted.box
+        return _with(setup, box=replace(box, T_base_box=_turned(box.T_base_box, name, value)))
+    if part == "tool":
+        return with_pose(setup, "tool", _turned(wanted.tool, name, value))
+    if part == "force":
+        return with_pose(setup, "force", _turned(wanted.force.T_flange_force, name, value))
+    return _with_load_field(setup, wanted.load, name, value)
+
+
+def with_pose(setup: SetupState, part: str, pose: Pose) -> SetupState | Message:
+    """Returns the set-up with a part put elsewhere, or why it cannot be there."""
+    wanted = setup.wanted
+    length = math.hypot(*pose.parts[1])
+    if part != "box" and length > LONGEST_TOOL:
+        return message("setup.far", length=f"{1000.0 * length:.0f}", bound=f"{1000.0 * LONGEST_TOOL:.0f}")
+    if part == "box":
+        assert wanted.box is not None
+        if float(np.abs(pose.position).max()) > FARTHEST_FACE:
+            return message("setup.far", length=f"{1000.0 * length:.0f}", bound=f"{1000.0 * FARTHEST_FACE:.0f}")
+        return _with(setup, box=replace(wanted.box, T_base_box=pose))
+    if part == "tool":
+        return _with(setup, tool=pose)
+    if part == "force":
+        assert wanted.force is not None
+        return _with(setup, force=replace(wanted.force, T_flange_force=pose))
+    assert wanted.load is not None
+    return _with(setup, load=replace(wanted.load, center_of_mass=pose.position))
+
+
+def faces(box: SafetyBox) -> np.ndarray:
+    """Returns where the faces are along the axes of the box, from the base: low x, y, z, high x, y, z, [m]."""
+    centre = box.T_base_box.rotation.T @ box.T_base_box.position
+    half = 0.5 * np.array(box.size)
+    return np.concatenate((centre - half, centre + half))
+
+
+def box_between(box: SafetyBox, bounds: np.ndarray) -> SafetyBox:
+    """Returns a box with the same directions and other faces, as `faces` counts them."""
+    low, high = bounds[:3], bounds[3:]
+    centre = box.T_base_box.rotation @ (0.5 * (low + high))
+    pose = Pose.from_parts(box.T_base_box.parts[0], (float(centre[0]), float(centre[1]), float(centre[2])))
+    return replace(box, size=tuple((high - low).tolist()), T_base_box=pose)
+
+
+def moments(setup: SetupState) -> tuple[float, ...]:
+    """Returns the six moments of inertia as typed, or those of the load, [kg m^2]."""
+    if setup.inertia is not None:
+        return setup.inertia
+    assert setup.wanted.load is not None
+    return tuple(float(setup.wanted.load.inertia[place]) for place in _PLACES)
+
+
+def _with_load_field(setup: SetupState, load: Payload, name: str, value: float) -> SetupState | Message:
+    if name == "mass":
+        if value == 0.0:
+            return _with(replace(setup, inertia=None), load=Payload(center_of_mass=load.center_of_mass))
+        return _with(setup, load=replace(load, mass=value))
+    if name in INERTIA_NAMES:
+        typed = list(moments(setup))
+        typed[INERTIA_NAMES.index(name)] = value
+        return replace(setup, inertia=tuple(typed))
+    center = np.array(load.center_of_mass)
+    center[POSE_NAMES.index(name)] = value / 1000.0
+    return _with(setup, load=replace(load, center_of_mass=center))
+
+
+def with_inertia(setup: SetupState) -> SetupState | Message:
+    """Returns the set-up with the typed moments of inertia in the load, or why no body has them."""
+    load = setup.wanted.load
+    assert load is not None
+    if setup.inertia is None:
+        return setup
+    if load.mass == 0.0 and any(setup.inertia):
+        return message("setup.massless")
+    inertia = np.zeros((3, 3))
+    for (row, column), value in zip(_PLACES, setup.inertia, strict=True):
+        inertia[row, column] = inertia[column, row] = value
+    try:
+        heavier = replace(load, inertia=inertia)
+    except InvalidValueError:
+        principal = ", ".join(f"{moment:.4g}" for moment in np.linalg.eigvalsh(inertia).tolist())
+        return message("setup.no_body", moments=principal)
+    return _with(replace(setup, inertia=None), load=heavier)
+
+
+def _with(setup: SetupState, **parts: object) -> SetupState:
+    return replace(setup, wanted=setup.wanted.updated(RobotConfiguration(**parts)))  # type: ignore[arg-type]  # By their names.
+
+
+def _turned(pose: Pose, name: str, value: float) -> Pose:
+    position, rpy = pose.position, pose.rpy
+    index = POSE_NAMES.index(name)
+    if index < 3:
+        position[index] = value / 1000.0
+    else:
+        rpy[index - 3] = math.radians(value)
+    return Pose.from_rpy(position, rpy)

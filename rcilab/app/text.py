@@ -1,0 +1,53 @@
+"""Words of the page: its own catalogue and the one it shares with the notebook."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from rcilab.i18n import translator as text
+from rcilab.i18n.locale import LANGUAGES, Language
+from rcilab.i18n.translator import Explains, Message, load_face, message
+from rcilab.i18n.units import USUAL, Unit, Units
+
+__all__ = ["LANGUAGES", "Message", "Text", "load_catalogue", "message"]
+
+_PAGE = "rcilab.app"
+
+
+class Text(text.Text):
+    """The catalogue of the page in one language.
+
+    A value that stands before °, deg or mm in the catalogue is given in degrees or millimetres and shown in the units
+    of the page, as is the name {in_deg} or {in_mm}.
+
+    Args:
+        language: Which.
+        units: What angles and lengths are shown in.
+
+    Raises:
+        InvalidValueError: There is no catalogue for this language.
+    """
+
+    def __init__(self, language: str, units: Units = USUAL) -> None:
+        super().__init__(language, _PAGE)
+        self.units = units
+        self._entries = {code: units.adapt(entry) for code, entry in self._entries.items()}
+
+    def __call__(self, code: str, **values: object) -> str:
+        """Returns the words for a key; the key itself when the catalogues lack it (a test keeps them complete)."""
+        if not values:
+            return self._entries.get(code, code)
+        said = self._embedded(self._entries.get(code, ""), values)
+        return super().__call__(code, **self.units.values(said))
+
+    def _explain(self, said: Explains) -> str:
+        return said.explain(self.language, self.units)
+
+    def unit(self, usual: str) -> Unit:
+        """Returns the unit that numbers of a field are shown and typed in, for "deg" or "mm"."""
+        return self.units.unit(usual)
+
+
+def load_catalogue(language: Language) -> Mapping[str, str]:
+    """Returns all entries of one language that the page has."""
+    return load_face(_PAGE, language)

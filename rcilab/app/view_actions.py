@@ -1,0 +1,103 @@
+"""What only changes how the page looks. Owned by the conductor's thread."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import replace
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+from rcilab.app import requests
+from rcilab.app.learn.learn_state import exhibited
+from rcilab.app.store import Store
+from rcilab.app.text import LANGUAGES, message
+from rcilab.i18n.units import ANGLES, LENGTHS
+
+if TYPE_CHECKING:
+    from rcilab.model.robot_model import RobotModel
+
+QUALITIES = ("full", "light")
+THEMES = ("light", "dark")
+RATES = (0.1, 0.25, 0.5, 1.0, 2.0)
+PLOTS = ("q", "dq", "ddq", "jerk", "tau", "speed", "acceleration", "psi", "error", "tool")
+"""In the order they stand below each other."""
+
+
+class ViewActions:
+    """Timeline and settings."""
+
+    def __init__(self, store: Store) -> None:
+        self._store = store
+
+    def seek(self, request: requests.Seek) -> None:
+        """Holds the preview at a place of the plan."""
+        if math.isfinite(request.place):
+            self._store.update(place=min(max(request.place, 0.0), 1.0), playing=False)
+
+    def play(self, request: requests.Play) -> None:
+        """Starts the preview, from the beginning when it stands at the end, or holds it."""
+        state = exhibited(self._store.state)
+        playing = not state.playing if request.playing is None else request.playing
+        if state.plan is None:
+            self._store.say("warn", message("ready.no_plan"))
+        elif playing:
+            self._store.update(playing=True, place=0.0 if state.place >= 1.0 else state.place)
+        else:
+            self._store.update(playing=False)
+
+    def advance(self, elapsed: float) -> None:
+        """Moves a playing preview on by `elapsed`, [s]."""
+        state = exhibited(self._store.state)
+        if not state.playing or state.plan is None:
+            return
+        place = state.place + elapsed * state.rate / max(state.plan.motion.duration, 1e-3)
+        if state.loop and place >= 1.0:
+            place = 0.0
+        self._store.update(place=min(place, 1.0), playing=place < 1.0)
+
+    def enter(self, request: requests.CommitField) -> None:
+        """Lets what is typed in a page count at once."""
+        entered = {**self._store.state.entered, request.page: time.monotonic()}
+        self._store.update(entered=MappingProxyType(entered))
+
+    def set_view(self, request: requests.SetView) -> None:
+        """Changes a setting; values that do not exist are ignored."""
+        value = request.value
+        known = {
+            "language": value in LANGUAGES,
+            "quality": value in QUALITIES,
+            "theme": value in THEMES,
+            "rate": value in RATES,
+            "height": isinstance(value, float),
+            "loop": isinstance(value, bool),
+            "plot_joint": isinstance(value, int) and 0 <= value <= self._store.state.model.n,
+        }
+        if request.name == "angle" and value in ANGLES:
+            self._store.update(units=replace(self._store.state.units, angle=value))
+        elif request.name == "length" and value in LENGTHS:
+            self._store.update(units=replace(self._store.state.units, length=value))
+        elif known.get(request.name, False):
+            self._store.update(**{request.name: value})
+            if request.name == "quality":
+                self._store.update(is_quality_chosen=True)
+
+    def draw_in_software(self, request: requests.DrawInSoftware) -> None:
+        """Draws lightly for a browser without a graphics card, unless the operator chose otherwise."""
+        if not self._store.state.is_quality_chosen:
+            self._store.update(quality="light")
+
+    def show_plot(self, request: requests.ShowPlot) -> None:
+        """Shows or hides a plot."""
+        plots = self._store.state.plots
+        if request.name in PLOTS:
+            self._store.update(plots=plots | {request.name} if request.on else plots - {request.name})
+
+    def set_recording(self, request: requests.SetRecording) -> None:
+        """Has the next motions written to files, or not."""
+        self._store.update(record=request.on)
+
+
+def has_plot(model: RobotModel, name: str) -> bool:
+    """Returns whether there is anything to plot for an arm: only 7-axis arms have an arm angle."""
+    return name != "psi" or model.n == 7
