@@ -8,8 +8,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from rcilab.control_process.launch import START_TIMEOUT, ManagedProcess, VirtualController, parent_pid
+from rcilab.control_process.launch import START_TIMEOUT, VirtualController
 from rcilab.control_process.layout import ControlBlock, Counter
+from rcilab.control_process.managed_process import ManagedProcess, parent_pid
 from rcilab.control_process.snapshot import read_snapshot
 from rcilab.control_process.status import MESSAGES
 from rcilab.core.errors import ConnectionLostError

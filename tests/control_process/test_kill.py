@@ -240,7 +240,7 @@ def shared_memory():
 STILLBORN = """
 import os, sys, time
 from rcilab.model.robot_model import load_model
-from rcilab.control_process.forked import fork_server
+from rcilab.control_process.fork_server import fork_server_pid
 from rcilab.control_process.process_supervisor import ProcessSupervisor
 from rcilab.control_process.layout import ControlBlock
 from rcilab.control_process.settings import build_settings
@@ -250,7 +250,7 @@ keeper = ProcessSupervisor(block, model.name, "ideal", None, auto_restart=False)
 keeper.launch()
 while sys.argv[1] == "born" and None in (keeper.worker_pid, keeper.controller_pid):
     time.sleep(0.001)
-print(fork_server().pid, flush=True)
+print(fork_server_pid(), flush=True)
 os._exit(0)
 """
 

@@ -10,8 +10,9 @@ from contextlib import ExitStack
 
 import pytest
 
-from rcilab.control_process.forked import fork_server
-from rcilab.control_process.launch import ManagedProcess, start_controller
+from rcilab.control_process.fork_server import fork_server_pid
+from rcilab.control_process.launch import start_controller
+from rcilab.control_process.managed_process import ManagedProcess
 from rcilab.core.errors import ConnectionLostError
 from tests.control_process.test_supervisor import wait_for
 
@@ -35,7 +36,7 @@ def test_a_copy_has_its_own_session_name_output_and_is_our_fork_servers_child(ru
     child = run("import os, sys; print(os.getppid(), os.getsid(0) == os.getpid()); print('oh', file=sys.stderr)")
     assert child.wait(SOON)
     assert child.how_it_ended == "exit code 0"
-    assert child.read_output().startswith(f"{fork_server().pid} True\n")
+    assert child.read_output().startswith(f"{fork_server_pid()} True\n")
     assert child.last_words == "oh"
     with open("/proc/self/comm", encoding="ascii") as ours:
         assert ours.read() != "rcilab timeit\n"
@@ -49,7 +50,7 @@ def test_a_copy_is_called_after_what_it_runs(run):
 
 
 def test_a_copy_works_in_our_environment_and_folder_as_they_are_now(run, monkeypatch, tmp_path):
-    fork_server()
+    fork_server_pid()
     monkeypatch.setenv("OF_TODAY", "gr\udcfcn")  # No UTF-8, as a path may be.
     monkeypatch.delenv("HOME", raising=False)
     monkeypatch.chdir(tmp_path)
@@ -104,8 +105,8 @@ def test_a_copy_is_asked_to_end_even_before_it_exists(run):
 
 
 def test_a_fork_server_that_does_not_answer_is_replaced(run):
-    stuck = fork_server()
-    os.kill(stuck.pid, signal.SIGSTOP)
+    stuck = fork_server_pid()
+    os.kill(stuck, signal.SIGSTOP)
     child = run("pass")
     assert not child.wait(0.1)
     assert child.pid is None
@@ -113,32 +114,32 @@ def test_a_fork_server_that_does_not_answer_is_replaced(run):
     assert not child.is_alive
     assert child.how_it_ended == "nobody saw how"
     assert run("pass").wait(SOON)
-    assert fork_server().pid != stuck.pid
+    assert fork_server_pid() != stuck
 
 
 def test_without_their_fork_server_copies_end_and_the_next_one_has_another():
     controller = start_controller("xMatePro7")
     try:
-        first = fork_server().pid
+        first = fork_server_pid()
         os.kill(first, signal.SIGKILL)
         assert controller.wait(SOON)
         assert controller.how_it_ended == "nobody saw how"
         following = start_controller("xMatePro7")
         following.end()
         assert following.how_it_ended == "exit code 0"
-        assert fork_server().pid != first
+        assert fork_server_pid() != first
     finally:
         controller.end()
 
 
 FORK = """
 import os
-from rcilab.control_process.forked import fork_server
+from rcilab.control_process.fork_server import fork_server_pid
 from rcilab.control_process.launch import start_controller
 controller = start_controller("xMatePro7")
 pid = os.fork()
 if pid == 0:
-    ours = fork_server().pid
+    ours = fork_server_pid()
     start_controller("xMatePro7").end()
     os._exit(ours == controller.pid)
 ended = os.waitpid(pid, 0)[1]
@@ -162,7 +163,7 @@ def test_many_come_and_go_at_once_and_no_file_stays_open(run):
         assert child.how_it_ended == f"exit code {number}"
         child.end()
     assert set(os.listdir("/proc/self/fd")) <= before
-    server = f"/proc/{fork_server().pid}/fd"
+    server = f"/proc/{fork_server_pid()}/fd"
     wait_for(lambda: len(os.listdir(server)) < 10)
 
 
@@ -183,3 +184,86 @@ def test_at_the_interpreters_end_there_are_no_complaints_and_what_is_done_last_s
     command = [sys.executable, "-X", "dev", "-c", LAST]
     done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60.0)
     assert (done.stdout, done.stderr) == ("True\n", "")
+
+
+def test_interrupts_reach_neither_the_fork_server_nor_a_copy(run):
+    os.kill(fork_server_pid(), signal.SIGINT)
+    child = run("import os; os.kill(os.getpid(), 2); print('still here')")
+    assert child.wait(SOON)
+    assert (child.how_it_ended, child.read_output().splitlines()[0]) == ("exit code 0", "still here")
+
+
+UNGUARDED = """
+print("once")
+import rcilab
+with rcilab.simulate(rcilab.load_model("xMatePro7")) as robot:
+    print(robot.state.q.shape)
+"""
+
+
+@pytest.mark.parametrize("how", ["script", "-c", "stdin"])
+def test_a_script_without_a_guard_is_not_run_a_second_time(how, tmp_path):
+    file = tmp_path / "script.py"
+    file.write_text(UNGUARDED)
+    command = {"script": [os.fspath(file)], "-c": ["-c", UNGUARDED], "stdin": ["-"]}[how]
+    done = subprocess.run(
+        [sys.executable, *command], input=UNGUARDED, capture_output=True, text=True, check=True, timeout=60.0
+    )
+    assert (done.stdout, done.stderr) == ("once\n(7,)\n", "")
+
+
+REMOVED = """
+import os, tempfile
+folder = tempfile.mkdtemp()
+os.chdir(folder)
+os.rmdir(folder)
+from rcilab.control_process.launch import start_controller
+controller = start_controller("xMatePro7")
+controller.end()
+print(controller.how_it_ended)
+"""
+
+
+def test_a_removed_working_folder_is_no_obstacle():
+    done = subprocess.run([sys.executable, "-c", REMOVED], capture_output=True, text=True, check=True, timeout=60.0)
+    assert (done.stdout, done.stderr) == ("exit code 0\n", "")
+
+
+REAPED = """
+import os, signal
+from rcilab.control_process.fork_server import fork_server_pid
+from rcilab.control_process.launch import start_controller
+pid = fork_server_pid()
+os.kill(pid, signal.SIGKILL)
+os.waitpid(pid, 0)
+controller = start_controller("xMatePro7")
+controller.end()
+print(controller.how_it_ended)
+"""
+
+
+def test_a_fork_server_that_the_users_code_has_reaped_is_replaced():
+    done = subprocess.run([sys.executable, "-c", REAPED], capture_output=True, text=True, check=True, timeout=60.0)
+    assert (done.stdout, done.stderr) == ("exit code 0\n", "")
+
+
+POOL = """
+import multiprocessing
+
+def move(_):
+    import rcilab
+    with rcilab.simulate(rcilab.load_model("xMatePro7")) as robot:
+        return robot.state.q.shape
+
+if __name__ == "__main__":
+    for method in ("forkserver", "fork"):
+        with multiprocessing.get_context(method).Pool(1) as pool:
+            print(pool.map(move, [0]))
+"""
+
+
+def test_the_users_own_processes_can_simulate_whichever_way_they_start(tmp_path):
+    file = tmp_path / "script.py"
+    file.write_text(POOL)
+    done = subprocess.run([sys.executable, os.fspath(file)], capture_output=True, text=True, check=True, timeout=90.0)
+    assert (done.stdout, done.stderr) == ("[(7,)]\n[(7,)]\n", "")
