@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from rcilab.control_process.configuration_codec import pack_setup
 from rcilab.core.errors import RcilabError, UsageError
 from rcilab.core.spatial import IDENTITY
 from rcilab.makers.rokae.driver.configuration import RobotConfiguration
@@ -30,10 +29,6 @@ class ConfigurationSync:
         """At how many connections it has taken a set-up."""
         self._waiting: list[tuple[PendingRequest, RobotConfiguration, bool]] = []
         self._refusal: RcilabError | None = None
-
-    def letter(self) -> dict[str, Any]:
-        """Returns what a letter that connects says of the set-up."""
-        return pack_setup(self.wanted)
 
     def follow(self, ticket: PendingRequest, setup: RobotConfiguration, *, is_new_connection: bool = False) -> None:
         """Takes note of a request that carries a set-up.

@@ -46,36 +46,36 @@ def build_jog(kind: JogKind, values: ArrayLike, n: int) -> JogCommand:
     return JogCommand(kind, tuple(as_vector(values, size, "values", unit).tolist()))
 
 
-def hold_jog(memory: memoryview, words: memoryview, command: JogCommand) -> None:
+def hold_jog(memory: memoryview, counters: memoryview, command: JogCommand) -> None:
     """Writes the jog that is held now, and when."""
-    write_jog(memory, words, command)
-    words[Counter.JOG_BEAT] = time.monotonic_ns()
+    write_jog(memory, counters, command)
+    counters[Counter.JOG_BEAT] = time.monotonic_ns()
 
 
-def release_jog(words: memoryview) -> None:
+def release_jog(counters: memoryview) -> None:
     """Says that nothing is held any more."""
-    words[Counter.JOG_BEAT] = 0
+    counters[Counter.JOG_BEAT] = 0
 
 
-def is_held(words: memoryview) -> bool:
+def is_held(counters: memoryview) -> bool:
     """Returns whether a jog has been held within the last `HOLD_TIMEOUT`."""
-    return time.monotonic_ns() - words[Counter.JOG_BEAT] <= HOLD_TIMEOUT * 1e9
+    return time.monotonic_ns() - counters[Counter.JOG_BEAT] <= HOLD_TIMEOUT * 1e9
 
 
-def write_jog(memory: memoryview, words: memoryview, command: JogCommand) -> None:
+def write_jog(memory: memoryview, counters: memoryview, command: JogCommand) -> None:
     """Writes the jog; the sequence word is odd meanwhile."""
     numbers = (*command.values, *(0.0,) * (7 - len(command.values)))
-    sequence = words[Counter.JOG] | 1
-    words[Counter.JOG] = sequence
+    sequence = counters[Counter.JOG] | 1
+    counters[Counter.JOG] = sequence
     _RECORD.pack_into(memory, 0, _KINDS.index(command.kind), len(command.values), *numbers)
-    words[Counter.JOG] = sequence + 1
+    counters[Counter.JOG] = sequence + 1
 
 
-def read_jog(memory: memoryview, words: memoryview) -> JogCommand | None:
+def read_jog(memory: memoryview, counters: memoryview) -> JogCommand | None:
     """Returns the jog as a whole, or None when it is just being written."""
     for _ in range(_ATTEMPTS):
-        before = words[Counter.JOG]
+        before = counters[Counter.JOG]
         kind, count, *numbers = _RECORD.unpack_from(memory, 0)
-        if before % 2 == 0 and words[Counter.JOG] == before:
+        if before % 2 == 0 and counters[Counter.JOG] == before:
             return JogCommand(_KINDS[kind], tuple(numbers[:count]))
     return None

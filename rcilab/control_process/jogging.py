@@ -58,13 +58,13 @@ class HeldJog:
 
     def _lead(self) -> None:
         """Takes what is held now."""
-        words = self._block.words
-        if not (self.is_wanted and is_held(words)):
+        counters = self._block.counters
+        if not (self.is_wanted and is_held(counters)):
             if self._command is not None:
                 self._let_go(self._command.kind)
                 self._command = None
             return
-        command = read_jog(self._block.jog, words)
+        command = read_jog(self._block.jog, counters)
         if command is None or command == self._command:
             return
         self._command = command

@@ -1,33 +1,32 @@
 """The block of memory that supervisor and control process share.
 
     header      magic, version and sizes: two builds of rcilab must not misread each other
-    words       counters and heartbeats, 8 bytes each, each written by one side only
-    settings    what the control process needs to know at its start, as JSON; written once
+    counters    counters and heartbeats, 8 bytes each, each written by one side only
+    settings    what the control process needs to know at its start, pickled; written once
     snapshot    phase, message and motion, guarded by a sequence number
     histogram   lateness of cycles
-    requests    mailbox to the control process
-    replies     mailbox back
-    jog         how somebody moves the arm by hand, guarded by a sequence number
+    requests    ring of messages to the control process
+    replies     ring of messages back
+    jog         the jog that is held, guarded by a sequence number
     felt        the controller's newest estimate of the force and moment from outside, and the tool that it has
     cycles      ring of every cycle
     motion      rows of the motion to stream
 
 The block is an unnamed file in memory, handed to the control process as an open descriptor: when both are gone, killed
-or not, nothing is left of it. Words are aligned and stored with one instruction; data is written before the counter
+or not, nothing is left of it. Counters are aligned and stored with one instruction; data is written before the counter
 that announces it. (That order is what x86 guarantees; on other processors the interpreter's own locks between two
 statements have the same effect in practice.)
 """
 
 from __future__ import annotations
 
-import json
 import mmap
 import os
+import pickle
 import struct
 import tempfile
 from enum import IntEnum
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -38,14 +37,14 @@ from rcilab.core.cycle_log import cycle_dtype
 from rcilab.core.errors import UsageError, VersionMismatchError
 
 MAGIC = b"RCILABCP"
-VERSION = 7  # Count up with every change of this file, of the snapshot or of `cycle_dtype`.
+VERSION = 8  # Count up with every change of this file, of the snapshot or of `cycle_dtype`.
 
 RING_CYCLES = 32768  # 33 s of cycles: how long a reader may sleep.
 MOTION_TIME = 300.0  # [s] Longest motion that can be handed over.
 MOTION_ROWS = round(MOTION_TIME / CYCLE_TIME) + 1
 OPERATOR_TIMEOUT = 2.0  # [s] Nobody at the controls for that long ends a motion (workbench: operator lease).
-MAIL_SLOTS = 16
-MAIL_SIZE = 4096  # [bytes] of one letter.
+MESSAGE_SLOTS = 16
+MESSAGE_SIZE = 4096  # [bytes] Of one message; the largest request, a configuration, takes 1300.
 
 _HEADER = struct.Struct("<8sIIIIQ")  # magic, version, n, size of a cycle, ring capacity, total size
 _PAGE = 4096
@@ -55,7 +54,7 @@ _MEMORY = Path("/dev/shm")  # Linux: files there live in memory. Elsewhere, or w
 
 
 class Counter(IntEnum):
-    """Place of each counter among the words, and who writes it."""
+    """Index of each counter, and who writes it."""
 
     SUPERVISOR_BEAT = 0
     """Supervisor: monotonic time of its last sign of life, [ns]."""
@@ -111,27 +110,27 @@ class ControlBlock:
             raise
 
     @classmethod
-    def create(cls, n: int, settings: dict[str, Any]) -> ControlBlock:
+    def create(cls, n: int, settings: object) -> ControlBlock:
         """Returns a new block for an arm with n joints.
 
         Args:
             n: Number of joints.
-            settings: What the control process needs to know at its start; goes through JSON.
+            settings: What the control process needs to know at its start; it is pickled.
         """
-        text = json.dumps(settings).encode()
-        if len(text) > _SETTINGS_SIZE - 4:
-            raise UsageError(f"settings of the control process take {len(text)} bytes, {_SETTINGS_SIZE - 4} fit")
+        data = pickle.dumps(settings)
+        if len(data) > _SETTINGS_SIZE - 4:
+            raise UsageError(f"settings of the control process take {len(data)} bytes, {_SETTINGS_SIZE - 4} fit")
         size = _total_size(n)
         descriptor = _open_memory(size)
         os.pwrite(descriptor, _HEADER.pack(MAGIC, VERSION, n, cycle_dtype(n).itemsize, RING_CYCLES, size), 0)
-        os.pwrite(descriptor, struct.pack("<I", len(text)) + text, 2 * _PAGE)
+        os.pwrite(descriptor, struct.pack("<I", len(data)) + data, 2 * _PAGE)
         return cls(descriptor)
 
     @property
-    def settings(self) -> dict[str, Any]:
+    def settings(self) -> object:
         """What the block was created with."""
         (length,) = struct.unpack_from("<I", self._memory, 2 * _PAGE)
-        return json.loads(bytes(self._memory[2 * _PAGE + 4 : 2 * _PAGE + 4 + length]))
+        return pickle.loads(self._memory[2 * _PAGE + 4 : 2 * _PAGE + 4 + min(length, _SETTINGS_SIZE - 4)])
 
     def close(self) -> None:
         """Lets go of the memory, as far as nobody looks at it any more, and of the descriptor. May be called twice."""
@@ -158,8 +157,10 @@ class ControlBlock:
         for size in _region_sizes(self.n):
             regions.append(self._memory[place : place + size])
             place += size
-        words, _, self.snapshot, histogram, self.requests, self.replies, self.jog, felt, self.cycles, motion = regions
-        self.words = words.cast("Q")
+        counters, _, self.snapshot, histogram, self.requests, self.replies, self.jog, felt, self.cycles, motion = (
+            regions
+        )
+        self.counters = counters.cast("Q")
         self.felt = felt[: 8 * 6].cast("d")
         self.tool = felt[8 * 6 : 8 * (6 + 16)].cast("d")
         self.histogram = histogram[: 8 * HISTOGRAM_WORDS].cast("Q")
@@ -168,14 +169,14 @@ class ControlBlock:
 
 def _region_sizes(n: int) -> tuple[int, ...]:
     """Returns the sizes of all regions but the header, in the order of the list above, [bytes]."""
-    mail = MAIL_SLOTS * MAIL_SIZE
+    messages = MESSAGE_SLOTS * MESSAGE_SIZE
     return (
         _PAGE,
         _SETTINGS_SIZE,
         _SNAPSHOT_SIZE,
         _whole_pages(8 * HISTOGRAM_WORDS),
-        mail,
-        mail,
+        messages,
+        messages,
         _PAGE,
         _PAGE,
         _whole_pages(RING_CYCLES * cycle_dtype(n).itemsize),

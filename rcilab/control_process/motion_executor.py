@@ -6,7 +6,8 @@ import gc
 
 from rcilab.control_process.jogging import HeldJog
 from rcilab.control_process.layout import OPERATOR_TIMEOUT, ControlBlock
-from rcilab.control_process.request_channel import Letter, RequestChannel
+from rcilab.control_process.messages import End, Execute, NumberedRequest, Stop, SwitchRows
+from rcilab.control_process.request_channel import RequestChannel
 from rcilab.control_process.status_writer import StatusWriter
 from rcilab.control_process.stop_conditions import StopConditions
 from rcilab.core.clock import CYCLE_TIME
@@ -38,7 +39,7 @@ class MotionExecutor:
         limits: Bounds that every command keeps.
         publisher: Shows how a motion goes.
         log: Takes every cycle.
-        letters: Requests that come while the arm moves.
+        requests: Requests that come while the arm moves.
         oversight: Whether a motion is to end.
     """
 
@@ -48,18 +49,18 @@ class MotionExecutor:
         limits: Limits,
         publisher: StatusWriter,
         log: CycleLog,
-        letters: RequestChannel,
+        requests: RequestChannel,
         oversight: StopConditions,
     ) -> None:
         self._block, self._limits = block, limits
         self._publisher, self._log = publisher, log
-        self._letters, self._oversight = letters, oversight
+        self._requests, self._oversight = requests, oversight
         self._jog: HeldJog | None = None
         self._stream: MotionStream | None = None
         self._mode: Mode = "joint_position"
         self._softly: str | None = None  # Why a motion in torques is being brought to rest.
 
-    def execute(self, link: RciConnection, commands: RciCommands, model: RobotModel, request: Letter) -> None:
+    def execute(self, link: RciConnection, commands: RciCommands, model: RobotModel, request: Execute) -> None:
         """Streams the rows that lie in the block; returns once the arm stands at their end.
 
         Raises:
@@ -67,14 +68,14 @@ class MotionExecutor:
             StoppedError: Somebody wanted it to end before.
             ControlError: The controller stopped the arm.
         """
-        rows = self._block.motion[: request["rows"]]
-        mode: Mode = request["mode"]
+        rows = self._block.motion[: request.rows]
+        mode = request.mode
         if link.latest is not None:
             mismatch = describe_start_mismatch(rows[0], link.latest.q_c)
             if mismatch is not None:
                 raise UsageError(mismatch).coded("elsewhere")
             model.rigid_body.motion_torque(link.latest.q, link.latest.dq, link.latest.dq)  # Builds it now.
-        self._publisher.begin_motion(request["duration"])
+        self._publisher.begin_motion(request.duration)
         self._publisher.say("moving", "moving")
         self._stream, self._softly = MotionStream(rows, mode, model, self._publisher.on_cycle), None
         try:
@@ -140,7 +141,7 @@ class MotionExecutor:
     def _watch(self, t: float) -> str | None:
         """Looked at in every cycle of a motion: does anybody or anything want it to end?"""
         reason = self._oversight.reason_to_stop()
-        if reason is None and self._letters.has_new:
+        if reason is None and self._requests.has_new:
             reason = self._answer()
         elif reason is None and self._stream is not None and self._stream.held > LONGEST_PAUSE:
             reason = "idle.held"
@@ -154,27 +155,27 @@ class MotionExecutor:
 
     def _answer(self) -> str | None:
         """Looks at a request that has come while the arm moves; returns why the motion is to end for it, or None."""
-        request = self._letters.take_new()
+        request = self._requests.take_new()
         if request is None:
             return None
-        if request["kind"] in ("stop", "end"):
-            self._letters.put_off(request)
+        if isinstance(request.body, Stop | End):
+            self._requests.defer(request)
             return "idle.stopped"
-        if request["kind"] == "pace" and self._stream is not None and self._softly is None:
-            self._change_pace(request, self._stream)
+        if isinstance(request.body, SwitchRows) and self._stream is not None and self._softly is None:
+            self._switch_rows(request, request.body, self._stream)
         elif self._jog is not None:  # It comes to rest at once, and then has no reason to go on.
-            self._letters.put_off(request)
+            self._requests.defer(request)
             self._jog.is_wanted = False
         else:
-            self._letters.answer(request, UsageError("the arm is moving; stop it first, or wait until it has arrived"))
+            self._requests.answer(request, UsageError("the arm is moving; stop it first, or wait until it has arrived"))
         return None
 
-    def _change_pace(self, request: Letter, stream: MotionStream) -> None:
-        """Goes on with rows that lie ready in the block."""
-        rows = self._block.motion[request["place"] : request["place"] + request["rows"]]
-        if stream.switch(request["first"], rows, holds=request["holds"]):
-            self._publisher.update(motion_duration=request["duration"])
-            self._publisher.say("moving", "moving.held" if request["holds"] else "moving")
-            self._letters.answer(request)
+    def _switch_rows(self, request: NumberedRequest, switch: SwitchRows, stream: MotionStream) -> None:
+        """Continues with rows that lie ready in the block."""
+        rows = self._block.motion[switch.start : switch.start + switch.rows]
+        if stream.switch(switch.first, rows, holds=switch.holds):
+            self._publisher.update(motion_duration=switch.duration)
+            self._publisher.say("moving", "moving.held" if switch.holds else "moving")
+            self._requests.answer(request)
         else:
-            self._letters.answer(request, UsageError("the change of pace came too late; ask again"))
+            self._requests.answer(request, UsageError("the change of pace came too late; ask again"))

@@ -1,4 +1,4 @@
-"""A request on its way through the control process, as seen by whoever made it."""
+"""A request that the control process carries out, as its sender sees it."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from rcilab.core.errors import DeadlineError, RcilabError
 
 
 class PendingRequest:
-    """A request on its way through the control process. Safe to look at from any thread.
+    """A request that the control process carries out. Thread-safe.
 
     Args:
-        what: The request, in words.
+        what: Name of the request, for error messages.
     """
 
     def __init__(self, what: str) -> None:
@@ -26,7 +26,7 @@ class PendingRequest:
 
     @property
     def error(self) -> RcilabError | None:
-        """Why it failed; None while it is under way and when it went well.
+        """Why it failed; None while it is in progress and when it succeeded.
 
         An `execute` that was stopped before its end has a `ControlError` without faults.
         """
@@ -39,11 +39,11 @@ class PendingRequest:
             timeout: How long to wait, [s]; None waits as long as it takes.
 
         Raises:
-            DeadlineError: It is still under way after `timeout`; it goes on.
+            DeadlineError: It is still in progress after `timeout`; it goes on.
             RcilabError: It failed; the same object as `.error`.
         """
         if not self._event.wait(timeout):
-            raise DeadlineError(f"{self._what} is still under way after {timeout:g} s; it goes on, wait again")
+            raise DeadlineError(f"{self._what} is still in progress after {timeout:g} s; it goes on, wait again")
         if self._error is not None:
             raise self._error
 
@@ -54,5 +54,5 @@ class PendingRequest:
             self._event.set()
 
     def __repr__(self) -> str:
-        state = "under way" if not self.done else f"failed: {self._error}" if self._error else "done"
-        return f"<Ticket {self._what}, {state}>"
+        state = "in progress" if not self.done else f"failed: {self._error}" if self._error else "done"
+        return f"<PendingRequest {self._what}, {state}>"

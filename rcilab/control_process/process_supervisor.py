@@ -83,7 +83,9 @@ class ProcessSupervisor:
     @property
     def is_ready(self) -> bool:
         """Whether the control process listens and there is a controller to send it to."""
-        return self.address is not None and self._block.words[Counter.WORKER_BEAT] != 0 and self.worker_pid is not None
+        return (
+            self.address is not None and self._block.counters[Counter.WORKER_BEAT] != 0 and self.worker_pid is not None
+        )
 
     def launch(self) -> None:
         """Starts what belongs to us and returns at once; earlier restarts are forgiven.
@@ -116,7 +118,7 @@ class ProcessSupervisor:
         )
 
     def _start_worker(self) -> None:
-        words = self._block.words
+        words = self._block.counters
         # Whatever lay in the mailboxes was for a process that is no more.
         for word in (Counter.REQUESTS_POSTED, Counter.REQUESTS_TAKEN, Counter.REPLIES_POSTED, Counter.REPLIES_TAKEN):
             words[word] = 0
@@ -166,13 +168,13 @@ class ProcessSupervisor:
 
     def _silence_of_worker(self) -> float:
         """Returns how long the control process has given no sign of life, [s]; 0 while that is to be expected."""
-        beat = self._block.words[Counter.WORKER_BEAT]
+        beat = self._block.counters[Counter.WORKER_BEAT]
         if beat == 0:  # It is still loading.
             loading = time.monotonic() - self._worker_started
             return loading if loading > LOAD_TIMEOUT else 0.0
         silence = (time.monotonic_ns() - beat) * 1e-9
         # While it waits for a TCP connection it cannot do anything else.
-        is_connecting = read_snapshot(self._block.snapshot, self._block.words).phase == "connecting"
+        is_connecting = read_snapshot(self._block.snapshot, self._block.counters).phase == "connecting"
         return 0.0 if is_connecting and silence < 3.0 * ANSWER_TIMEOUT else silence
 
     def _succeed(self, code: str, start: Callable[[], None] | None, **facts: Any) -> ProcessExit:

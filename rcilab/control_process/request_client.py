@@ -1,65 +1,67 @@
-"""The desk where requests to the control process are handed in: a ticket for each, settled when the reply comes."""
+"""The supervisor's end of the message rings: requests go out, each has a `PendingRequest` that its reply settles."""
 
 from __future__ import annotations
 
 from contextlib import suppress
-from typing import Any
 
-from rcilab.control_process.error_codec import unpack_failure
 from rcilab.control_process.layout import ControlBlock, Counter
 from rcilab.control_process.message_ring import MessageRing
+from rcilab.control_process.messages import End, NumberedRequest, Reply, Request
 from rcilab.control_process.pending_request import PendingRequest
 from rcilab.core.errors import RcilabError, UsageError
 
 
 class RequestClient:
-    """Owns the supervisor's ends of both mailboxes and the tickets under way; guarded by the lock of its owner.
+    """Sends requests and collects replies; guarded by the lock of its owner.
 
     Args:
-        block: Holds the mailboxes.
+        block: Holds the message rings.
     """
 
     def __init__(self, block: ControlBlock) -> None:
-        self._requests = MessageRing(block.requests, block.words, Counter.REQUESTS_POSTED, Counter.REQUESTS_TAKEN)
-        self._replies = MessageRing(block.replies, block.words, Counter.REPLIES_POSTED, Counter.REPLIES_TAKEN)
-        self._tickets: dict[int, PendingRequest] = {}
+        self._requests: MessageRing[NumberedRequest] = MessageRing(
+            block.requests, block.counters, Counter.REQUESTS_POSTED, Counter.REQUESTS_TAKEN
+        )
+        self._replies: MessageRing[Reply] = MessageRing(
+            block.replies, block.counters, Counter.REPLIES_POSTED, Counter.REPLIES_TAKEN
+        )
+        self._pending: dict[int, PendingRequest] = {}
         self._next_id = 1
 
-    def send(self, what: str, letter: dict[str, Any]) -> PendingRequest:
-        """Sends a request and returns the ticket for it.
+    def send(self, what: str, request: Request) -> PendingRequest:
+        """Sends a request and returns what its reply settles.
 
         Args:
-            what: The request, in words.
-            letter: The request; its number is added.
+            what: Name of the request, for error messages.
+            request: The request.
 
         Raises:
             UsageError: Too many requests wait already.
         """
-        ticket = PendingRequest(what)
-        self._requests.post({"id": self._next_id, **letter})
-        self._tickets[self._next_id] = ticket
+        pending = PendingRequest(what)
+        self._requests.post(NumberedRequest(self._next_id, request))
+        self._pending[self._next_id] = pending
         self._next_id += 1
-        return ticket
+        return pending
 
     def send_end(self) -> None:
-        """Asks the control process to bring the arm to rest and go."""
-        with suppress(UsageError):  # A full mailbox: then it does not listen anyway.
-            self._requests.post({"id": 0, "kind": "end"})
+        """Asks the control process to stop the arm and end."""
+        with suppress(UsageError):  # The ring is full: then the control process does not read it anyway.
+            self._requests.post(NumberedRequest(0, End()))
 
-    def collect(self) -> list[dict[str, Any]]:
-        """Settles the tickets that have been answered and returns what failed, see `pack_failure`; does not wait."""
-        failures: list[dict[str, Any]] = []
+    def collect(self) -> list[RcilabError]:
+        """Settles the requests that were answered and returns the errors among the answers; does not wait."""
+        errors: list[RcilabError] = []
         while (reply := self._replies.take()) is not None:
-            ticket = self._tickets.pop(reply["id"], None)
-            failure = reply.get("failure")
-            if ticket is not None:
-                ticket.settle(unpack_failure(failure) if failure else None)
-            if failure:
-                failures.append(failure)
-        return failures
+            pending = self._pending.pop(reply.id, None)
+            if pending is not None:
+                pending.settle(reply.error)
+            if reply.error is not None:
+                errors.append(reply.error)
+        return errors
 
     def fail_all(self, error: RcilabError) -> None:
-        """Settles every ticket under way: nobody will answer any more."""
-        for ticket in self._tickets.values():
-            ticket.settle(error)
-        self._tickets.clear()
+        """Settles every pending request with an error: no reply will come any more."""
+        for pending in self._pending.values():
+            pending.settle(error)
+        self._pending.clear()

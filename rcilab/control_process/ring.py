@@ -17,7 +17,7 @@ class RingReader:
     """
 
     def __init__(self, block: ControlBlock) -> None:
-        self._words = block.words
+        self._counters = block.counters
         self._rows: NDArray[np.void] = np.frombuffer(block.cycles, cycle_dtype(block.n), RING_CYCLES)
         self._next = 0
         self.overrun = 0
@@ -26,26 +26,26 @@ class RingReader:
     def newest(self) -> NDArray[np.void] | None:
         """Returns a copy of the newest row, shape (1,), or None while there is none; does not move the reader."""
         while True:
-            count = self._words[Counter.CYCLES]
+            count = self._counters[Counter.CYCLES]
             if count == 0:
                 return None
             place = (count - 1) % RING_CYCLES
             row = self._rows[place : place + 1].copy()
-            if self._words[Counter.CYCLES] - (count - 1) < RING_CYCLES:
+            if self._counters[Counter.CYCLES] - (count - 1) < RING_CYCLES:
                 return row
 
     def last(self, count: int) -> NDArray[np.void]:
         """Returns a copy of the newest rows, at most `count`, oldest first; does not move the reader."""
-        end = self._words[Counter.CYCLES]
+        end = self._counters[Counter.CYCLES]
         return self._copy(max(end - count, 0), end)
 
     def drain(self) -> NDArray[np.void]:
         """Returns a copy of every row since the last call, oldest first."""
-        count = self._words[Counter.CYCLES]
+        count = self._counters[Counter.CYCLES]
         first = max(self._next, count - RING_CYCLES)
         rows = self._copy(first, count)
         # What the writer has overwritten while we copied is rubbish; the row it writes just now counts as well.
-        spoiled = max(0, self._words[Counter.CYCLES] + 1 - RING_CYCLES - first)
+        spoiled = max(0, self._counters[Counter.CYCLES] + 1 - RING_CYCLES - first)
         lost = first - self._next + min(spoiled, len(rows))
         rows = rows[spoiled:]
         self.overrun += lost

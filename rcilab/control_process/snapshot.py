@@ -33,10 +33,10 @@ class Snapshot:
     motion_duration: float | None = None
 
 
-def write_snapshot(memory: memoryview, words: memoryview, snapshot: Snapshot) -> None:
+def write_snapshot(memory: memoryview, counters: memoryview, snapshot: Snapshot) -> None:
     """Writes a snapshot; the sequence word is odd meanwhile."""
-    sequence = words[Counter.SNAPSHOT] | 1
-    words[Counter.SNAPSHOT] = sequence
+    sequence = counters[Counter.SNAPSHOT] | 1
+    counters[Counter.SNAPSHOT] = sequence
     _RECORD.pack_into(
         memory,
         0,
@@ -53,16 +53,16 @@ def write_snapshot(memory: memoryview, words: memoryview, snapshot: Snapshot) ->
         snapshot.code.encode(),
         _fitting(snapshot.message, 1024),
     )
-    words[Counter.SNAPSHOT] = sequence + 1
+    counters[Counter.SNAPSHOT] = sequence + 1
 
 
-def read_snapshot(memory: memoryview, words: memoryview) -> Snapshot:
+def read_snapshot(memory: memoryview, counters: memoryview) -> Snapshot:
     """Returns the latest whole snapshot."""
     data = b""
     for _ in range(_ATTEMPTS):
-        before = words[Counter.SNAPSHOT]
+        before = counters[Counter.SNAPSHOT]
         data = bytes(memory[: _RECORD.size])
-        if before % 2 == 0 and words[Counter.SNAPSHOT] == before:
+        if before % 2 == 0 and counters[Counter.SNAPSHOT] == before:
             break
     facts = _RECORD.unpack(data)
     phase, powered, is_fifo, locked, inputs, outputs_known, outputs, rate_hz, time, duration, code, message = facts

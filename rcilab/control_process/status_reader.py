@@ -33,7 +33,7 @@ class StatusReader:
 
     def read_snapshot(self) -> Snapshot:
         """Returns what the control process last said about itself."""
-        return read_snapshot(self._block.snapshot, self._block.words)
+        return read_snapshot(self._block.snapshot, self._block.counters)
 
     def read_fields(self, shown: Snapshot) -> dict[str, Any]:
         """Returns the fields of `SupervisorStatus` that the block knows; those of the arm only once states came.
@@ -51,7 +51,7 @@ class StatusReader:
             "scheduling": "SCHED_FIFO" if shown.is_fifo else "normal",
             "memory_locked": shown.memory_locked,
             "late_cycles": late_cycles(self._block.histogram),
-            "lost_cycles": self._block.words[Counter.LOST],
+            "lost_cycles": self._block.counters[Counter.LOST],
             "lateness": summarise(self._block.histogram),
             "motion_time": shown.motion_time,
             "motion_duration": shown.motion_duration,

@@ -31,9 +31,9 @@ class StatusWriter:
 
     def __init__(self, block: ControlBlock) -> None:
         self._block = block
-        self._words = block.words
+        self._counters = block.counters
         self.recorder = Recorder(block.n, RING_CYCLES, block.cycles)
-        self.recorder.count = self._words[Counter.CYCLES]  # A successor goes on where its predecessor died.
+        self.recorder.count = self._counters[Counter.CYCLES]  # A successor goes on where its predecessor died.
         self.snapshot = Snapshot()
         self._histogram = JitterHistogram(block.histogram)
         self._rate_since = time.monotonic_ns()
@@ -46,12 +46,12 @@ class StatusWriter:
         """Forgets the timing: another connection begins."""
         self._histogram.clear()
         self._block.tool[15] = 0.0
-        self._words[Counter.LOST] = 0
+        self._counters[Counter.LOST] = 0
 
     def beat(self) -> None:
         """Gives a sign of life, and counts states a second."""
         now = time.monotonic_ns()
-        self._words[Counter.WORKER_BEAT] = now
+        self._counters[Counter.WORKER_BEAT] = now
         elapsed = (now - self._rate_since) * 1e-9
         if elapsed >= _RATE_TIME:
             self.update(rate_hz=(self.recorder.count - self._rate_from) / elapsed)
@@ -60,7 +60,7 @@ class StatusWriter:
     def update(self, **changes: Any) -> None:
         """Writes the snapshot with some fields changed."""
         self.snapshot = replace(self.snapshot, **changes)
-        write_snapshot(self._block.snapshot, self._words, self.snapshot)
+        write_snapshot(self._block.snapshot, self._counters, self.snapshot)
 
     def say(self, phase: Phase, code: str, **facts: Any) -> None:
         """Shows another phase, and why; what was said last is not said again."""
@@ -70,8 +70,8 @@ class StatusWriter:
     def on_row(self, log: CycleLog) -> None:
         """Announces a row that was written to the ring."""
         count = self.recorder.count
-        self._words[Counter.CYCLES] = count
-        self._words[Counter.LOST] = log.lost_total
+        self._counters[Counter.CYCLES] = count
+        self._counters[Counter.LOST] = log.lost_total
         if log.lateness == log.lateness:  # NaN where nobody waited for the state.
             self._histogram.add(log.lateness)
         if log.state is not None and log.state.tau_ext_in_base is not self._felt:

@@ -12,13 +12,13 @@ class StopConditions:
     """Looks at stops that were asked for, at the operator's and the supervisor's signs of life.
 
     Args:
-        words: The counters of the shared block.
+        counters: The counters of the shared block.
         parent: Process id of the fork server, which goes with the supervisor. Told: it may be gone before we look.
     """
 
-    def __init__(self, words: memoryview, parent: int) -> None:
-        self._words, self._parent = words, parent
-        self._stops_seen = words[Counter.STOPS_ASKED]
+    def __init__(self, counters: memoryview, parent: int) -> None:
+        self._counters, self._parent = counters, parent
+        self._stops_seen = counters[Counter.STOPS_ASKED]
         self._is_dismissed = False
 
     def dismiss(self) -> None:
@@ -33,16 +33,16 @@ class StopConditions:
     @property
     def is_operator_gone(self) -> bool:
         """Whether somebody was at the controls once, and nobody is."""
-        beat = self._words[Counter.OPERATOR_BEAT]
+        beat = self._counters[Counter.OPERATOR_BEAT]
         if beat == 0:
             return False
         # A supervisor that hangs cannot tell whether anybody is there: that counts as nobody.
-        oldest = min(beat, self._words[Counter.SUPERVISOR_BEAT])
+        oldest = min(beat, self._counters[Counter.SUPERVISOR_BEAT])
         return time.monotonic_ns() - oldest > OPERATOR_TIMEOUT * 1e9
 
     def reason_to_stop(self) -> str | None:
         """Returns the code of the message for why a motion is to end, or None."""
-        if self._words[Counter.STOPS_ASKED] != self._stops_seen:
+        if self._counters[Counter.STOPS_ASKED] != self._stops_seen:
             return "idle.stopped"
         if self.is_operator_gone:
             return "idle.operator"

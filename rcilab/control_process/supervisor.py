@@ -5,33 +5,58 @@ from __future__ import annotations
 import threading
 import time
 from contextlib import suppress
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from rcilab.control_process.arm_requests import ArmRequests
 from rcilab.control_process.configuration_sync import ConfigurationSync, standard_setup
+from rcilab.control_process.jog_command import JogKind, build_jog, hold_jog, release_jog
 from rcilab.control_process.launch import require_plant
 from rcilab.control_process.layout import OPERATOR_TIMEOUT, ControlBlock, Counter
+from rcilab.control_process.messages import (
+    Configure,
+    Connect,
+    Execute,
+    Jog,
+    ReadInputs,
+    Reboot,
+    Recover,
+    Request,
+    SetOutput,
+    SetPower,
+    Settings,
+    StartGuiding,
+    Stop,
+    StopGuiding,
+    SwitchRows,
+)
+from rcilab.control_process.motion_preconditions import require_admissible, require_ready
 from rcilab.control_process.pending_request import PendingRequest
 from rcilab.control_process.process_supervisor import ANSWER_TIMEOUT, ProcessSupervisor
 from rcilab.control_process.request_client import RequestClient
 from rcilab.control_process.ring import RingReader
 from rcilab.control_process.round_trip import RoundTrip
-from rcilab.control_process.settings import build_settings
 from rcilab.control_process.snapshot import Snapshot
-from rcilab.control_process.speed_override import SpeedOverride
+from rcilab.control_process.speed_override import LEADS, SpeedOverride
 from rcilab.control_process.status import MESSAGES, Incident, Phase, SupervisorStatus
 from rcilab.control_process.status_reader import StatusReader
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.closeable import Closeable
-from rcilab.core.errors import ConnectionLostError, RcilabError, UsageError
+from rcilab.core.errors import ConnectionLostError, ControlError, ModelError, RcilabError, UsageError
+from rcilab.core.state import Mode
+from rcilab.execution.guiding import GuideKind, GuideSpace, require_guidable
 from rcilab.makers.rokae.driver.address import parse_address
+from rcilab.makers.rokae.driver.commands import require_signal
 from rcilab.makers.rokae.driver.configuration import RobotConfiguration, require_setup
+from rcilab.makers.rokae.driver.identify import dh_lengths
+from rcilab.motion.speed_scaling import SpeedScaledMotion, require_pace
 
 if TYPE_CHECKING:
+    from rcilab.conformance import Certificate
     from rcilab.model.robot_model import RobotModel
+    from rcilab.motion import Motion
 
 __all__ = ["PendingRequest", "Supervisor"]
 
@@ -39,10 +64,10 @@ VIRTUAL = "virtual"
 _TICK = 0.02  # [s] between two looks of the watching thread.
 
 
-class Supervisor(ArmRequests, Closeable):
+class Supervisor(Closeable):
     """Runs motions in a process of its own, so that nothing the page does can disturb a cycle.
 
-    What moves the arm is in `ArmRequests`. All methods may be called from any thread. Requests return a
+    All methods may be called from any thread. Requests return a
     `PendingRequest` at once; nothing here waits for the robot except `start()`, `restart()` and `close()`. The
     processes belong to a `ProcessSupervisor`, pending requests to a `RequestClient`; a thread of this object looks
     after both.
@@ -184,10 +209,10 @@ class Supervisor(ArmRequests, Closeable):
                 raise UsageError("there is no controller to connect to; restart() starts the virtual one again").coded(
                     "not_connected"
                 )
-            letter = self._setup.letter()
-            ticket = self._ask("reconnect", kind="connect", address=address, timeout=ANSWER_TIMEOUT, setup=letter)
-            self._setup.follow(ticket, self._setup.wanted, is_new_connection=True)
-            return ticket
+            wanted = self._setup.wanted
+            pending = self._ask("reconnect", Connect(address=address, timeout=ANSWER_TIMEOUT, configuration=wanted))
+            self._setup.follow(pending, wanted, is_new_connection=True)
+            return pending
 
     def set_operator_present(self, present: bool) -> None:
         """Tells that somebody is at the controls; call with True at least once a second while that is so.
@@ -199,9 +224,9 @@ class Supervisor(ArmRequests, Closeable):
         with self._lock:
             if self._block is None or not self._stop_without_operator:
                 return
-            words = self._block.words
-            if present or words[Counter.OPERATOR_BEAT] == 0:
-                words[Counter.OPERATOR_BEAT] = time.monotonic_ns()
+            counters = self._block.counters
+            if present or counters[Counter.OPERATOR_BEAT] == 0:
+                counters[Counter.OPERATOR_BEAT] = time.monotonic_ns()
 
     def drain(self) -> NDArray[np.void]:
         """Returns every cycle recorded since the last call, oldest first.
@@ -219,11 +244,269 @@ class Supervisor(ArmRequests, Closeable):
         with self._lock:
             return RingReader(self._require_block())
 
+    def power_on(self) -> PendingRequest:
+        """Asks for motor power."""
+        return self._ask("power on", SetPower(True))
+
+    def power_off(self) -> PendingRequest:
+        """Asks for motor power to be taken away."""
+        return self._ask("power off", SetPower(False))
+
+    @property
+    def stops(self) -> int:
+        """How often `stop` has been called since `start`; what was wanted before the last one moves nothing."""
+        with self._lock:
+            return 0 if self._block is None else self._block.counters[Counter.STOPS_ASKED]
+
+    def execute(
+        self,
+        motion: Motion,
+        certificate: Certificate,
+        mode: Mode = "joint_position",
+        *,
+        pace: float = 1.0,
+        stops: int | None = None,
+    ) -> PendingRequest:
+        """Streams a checked motion; the request is done when the arm stands still again.
+
+        It is judged once more before it is handed over, which takes up to some 0.2 s; a `stop` meanwhile counts.
+
+        Args:
+            motion: The motion.
+            certificate: From `check(motion, model, mode=mode).certificate`.
+            mode: How the arm is commanded: the same way as joint angles, as poses of the tool, or as torques; see
+                `rcilab.execution.command_builder`.
+            pace: Part of its planned speed that it runs at from the beginning, 0.1 to 1; `set_pace` changes it later.
+            stops: What `stops` was when somebody wanted this; None: they want it now.
+
+        Raises:
+            InvalidValueError: The pace is out of range.
+            PlanningError: At this pace it would break a condition, or last too long.
+            CertificateError: The certificate is missing, or does not fit the motion, the model, or where the arm is.
+            UsageError: The arm is moving, no controller is connected, nobody is at the controls, the motion takes more
+                than 300 s, the controller has not taken the set-up it was told last, or a stop has come meanwhile.
+        """
+        from rcilab.conformance.speed_scaling_check import plan_start
+
+        stops = self.stops if stops is None else stops
+        require_admissible(
+            motion,
+            certificate,
+            self.model,
+            self.status(),
+            is_operator_overdue=self._is_operator_overdue(),
+            box=self._setup.wanted.box,
+            mode=mode,
+        )
+        paced = plan_start(motion, pace, self.model, mode)
+        with self._lock:
+            self._require_unstopped(stops)
+            self._setup.require_given()
+            self._pace.begin(paced, self.model, mode)
+            duration = paced.duration if paced.changed else motion.duration  # As planned it may end within a cycle.
+            return self._ask("execute", Execute(rows=len(paced.q), duration=duration, mode=mode))
+
+    def pause(self) -> PendingRequest:
+        """Holds the motion under way, along its way and within all limits; done once that is handed over.
+
+        `resume` goes on; a motion that is held for more than 120 s is given up.
+
+        Raises:
+            UsageError: No motion of `execute` is under way.
+            PlanningError: It arrives before it could be held.
+        """
+        return self._change_pace(0.0)
+
+    def resume(self, pace: float = 1.0) -> PendingRequest:
+        """Goes on with a motion that is held; see `set_pace`."""
+        return self.set_pace(pace)
+
+    def set_pace(self, pace: float) -> PendingRequest:
+        """Runs the motion under way at part of its planned speed; done once that is handed over.
+
+        The change is planned here, along the way, and judged by the conditions of the motion's mode before any of it
+        is sent; that takes some 10 to 100 ms.
+
+        Args:
+            pace: 0.1 to 1.
+
+        Raises:
+            InvalidValueError: The pace is out of range.
+            UsageError: No motion of `execute` is under way, or this machine is too busy.
+            PlanningError: There is no way within the limits to change from here; the motion goes on as it is.
+        """
+        return self._change_pace(require_pace(pace))
+
+    @property
+    def paced(self) -> SpeedScaledMotion | None:
+        """The motion of the last `execute` as it was really commanded, with every change of pace; None before."""
+        with self._lock:
+            self._require_block()
+            return self._pace.paced
+
+    def _change_pace(self, pace: float) -> PendingRequest:
+        for lead in LEADS:
+            changed = self._pace.plan(pace, lead, self._require_cycle())
+            with self._lock:
+                handed = self._pace.hand_over(changed, self._require_cycle())
+                if handed is not None:
+                    request = SwitchRows(
+                        first=handed.first, start=handed.place, rows=handed.count, holds=changed.holds,
+                        duration=changed.duration,
+                    )  # fmt: skip
+                    pending = self._ask("change of speed", request)
+                    self._pace.follow(pending, changed, handed)
+                    return pending
+        raise UsageError(
+            "this machine is too busy to change the pace of the motion in time; it goes on as it is"
+        ).coded("too_busy")
+
+    def _require_cycle(self) -> int:
+        cycle = self._motion_cycle()
+        if cycle is None:
+            raise UsageError("no motion runs whose pace could change").coded("no_pace")
+        return cycle
+
+    def jog(
+        self, kind: JogKind, values: ArrayLike, *, goes_on: PendingRequest | None = None, stops: int | None = None
+    ) -> PendingRequest:
+        """Moves the arm as long as it is held: call it at least five times a second, and `release_jog` at the end.
+
+        The first call begins a jog, the next ones go on with it, whatever direction they ask for: on-line re-planning
+        inside every limit of the joints. A jog that is not renewed for 0.3 s comes to rest. It is a motion like any
+        other, so the first movement comes when the controller shows its mode, 0.2 to 1 s after the first call; at rest
+        it listens for another second.
+
+        Args:
+            kind: "joint", or "base" or "tool" for a twist of the tool in these axes.
+            values: n joint velocities, [rad/s], or a twist of six numbers, linear first, [m/s, rad/s]; lowered to
+                what the limits allow.
+            goes_on: Request of the jog to go on with: where that has ended meanwhile, as by `stop`, none is begun.
+            stops: What `stops` was when somebody wanted to begin a jog; None: they want it now.
+
+        Returns:
+            The request of the jog; it is done when the arm stands still and no jog is held any more.
+
+        Raises:
+            InvalidValueError: The kind is unknown, or the values are not as many finite numbers as it needs.
+            UsageError: Another motion is under way, no controller is connected, nobody is at the controls, or a stop
+                has come meanwhile.
+        """
+        command = build_jog(kind, values, self.model.n)
+        with self._lock:
+            block = self._require_block()
+            is_under_way = self._jogging is not None and not self._jogging.done
+            if goes_on is not None and goes_on.done:
+                raise UsageError("this jog has ended; begin another one").coded("jog_ended")
+            if not is_under_way:
+                self._require_unstopped(stops)
+                self._setup.require_given()
+                require_ready(self.status(), is_operator_overdue=self._is_operator_overdue())
+            hold_jog(block.jog, block.counters, command)
+            if self._jogging is None or not is_under_way:
+                self._jogging = self._ask("jog", Jog())
+            return self._jogging
+
+    def release_jog(self) -> None:
+        """Brings a jog to rest at once."""
+        with self._lock:
+            if self._block is not None:
+                release_jog(self._block.counters)
+
+    def start_guiding(
+        self, space: GuideSpace = "joint", kind: GuideKind = "free", *, stops: int | None = None
+    ) -> PendingRequest:
+        """Frees the arm for a hand to guide it (startDrag), until `stop_guiding` or `stop`; done once it is free.
+
+        The phase is "moving" meanwhile and the code "moving.guided". It ends like a motion when nobody is at the
+        controls any more, and by itself when the controller leaves it, as on a fault.
+
+        Args:
+            space: In joint space every joint is free, and `kind` has no effect.
+            kind: What stays free in Cartesian space.
+            stops: What `stops` was when somebody wanted this; None: they want it now.
+
+        Raises:
+            InvalidValueError: There is no such space or kind.
+            UsageError: The arm is moving, no controller is connected, nobody is at the controls, or a stop has come
+                meanwhile.
+        """
+        require_guidable(space, kind)
+        with self._lock:
+            self._require_unstopped(stops)
+            require_ready(self.status(), is_operator_overdue=self._is_operator_overdue())
+            self._setup.require_given()
+            return self._ask("start guiding", StartGuiding(space, kind))
+
+    def stop_guiding(self) -> PendingRequest:
+        """Ends hand guiding (stopDrag); done once the arm stands still."""
+        return self._ask("stop guiding", StopGuiding())
+
+    def stop(self) -> PendingRequest:
+        """Brings a running motion to rest within the limits, or ends guiding; done when the arm stands still."""
+        with self._lock:
+            block = self._require_block()
+            release_jog(block.counters)
+            block.counters[Counter.STOPS_ASKED] += 1
+            return self._ask("stop", Stop(block.counters[Counter.STOPS_ASKED]))
+
+    def _require_unstopped(self, stops: int | None) -> None:
+        """Refuses what was wanted before the last stop, and all while not running; call with the lock."""
+        self._require_block()
+        if stops is not None and self.stops > stops:
+            raise UsageError("a stop came before the arm had begun to move; ask again if it is to move").coded(
+                "stopped_before"
+            )
+
+    def set_up(self, setup: RobotConfiguration) -> PendingRequest:
+        """Tells the controller a tool, a load, a safety box, a force-control frame; done once it has taken all of it.
+
+        From now on motions are checked with it, and it is told again at every new connection.
+
+        Args:
+            setup: What to tell; parts that are None stay.
+
+        Raises:
+            InvalidValueError: It is no set-up, or the load is heavier than the arm is rated for.
+            UsageError: The arm is moving, or no controller is connected.
+        """
+        model = require_setup(setup).applied_to(self.model)
+        with self._lock:
+            self._require_block()
+            require_ready(self.status(), is_operator_overdue=False)
+            pending = self._ask("set up", Configure(setup))
+            self._setup.follow(pending, setup)
+            self.model = model
+            return pending
+
+    def set_output(self, signal: int, level: bool) -> PendingRequest:
+        """Sets a digital output, 0 to 5, and reads the inputs again; the status shows both."""
+        return self._ask("set output", SetOutput(require_signal(signal), bool(level)))
+
+    def read_inputs(self) -> PendingRequest:
+        """Reads the digital inputs; the status shows them."""
+        return self._ask("read inputs", ReadInputs())
+
+    def reboot(self) -> PendingRequest:
+        """Restarts the controller, which ends the connection; `reconnect` makes the next one, and sets all up again.
+
+        Raises:
+            UsageError: The arm is moving, or no controller is connected.
+        """
+        with self._lock:
+            self._require_block()
+            require_ready(self.status(), is_operator_overdue=False)
+            return self._ask("reboot", Reboot())
+
+    def recover(self) -> PendingRequest:
+        """Asks the controller to clear its faults (automatic error recovery)."""
+        return self._ask("recover", Recover())
+
     def __enter__(self) -> Supervisor:
         self.start()
         return self
 
-    def _ask(self, what: str, **letter: Any) -> PendingRequest:
+    def _ask(self, what: str, request: Request) -> PendingRequest:
         """Sends a request to the control process."""
         with self._lock:
             self._require_block()
@@ -231,14 +514,14 @@ class Supervisor(ArmRequests, Closeable):
                 raise UsageError(
                     f"the control process is not running; restart() starts it again (asked: {what})"
                 ).coded("not_connected")
-            return self._desk.send(what, letter)
+            return self._client.send(what, request)
 
     def _open(self) -> None:
         """Makes the shared block and what works on it, and starts the processes."""
         block = ControlBlock.create(self.model.n, build_settings(self.model))
         address = None if self._target == VIRTUAL else self._target
         self._keeper = ProcessSupervisor(block, self.model.name, self._plant, address, auto_restart=self._auto_restart)
-        self._desk = RequestClient(block)
+        self._client = RequestClient(block)
         self._pace, self._round_trip = SpeedOverride(block), RoundTrip(block)
         self._reader, self._ring = StatusReader(block), RingReader(block)
         self._is_closing.clear()
@@ -266,7 +549,7 @@ class Supervisor(ArmRequests, Closeable):
             with self._lock:
                 if self._block is None:
                     return
-                self._block.words[Counter.SUPERVISOR_BEAT] = time.monotonic_ns()
+                self._block.counters[Counter.SUPERVISOR_BEAT] = time.monotonic_ns()
                 self._collect_replies()
                 self._bear_deaths()
                 if self._connecting is None and self._keeper.is_ready:
@@ -274,13 +557,13 @@ class Supervisor(ArmRequests, Closeable):
                         self._connecting = self.reconnect()
 
     def _collect_replies(self) -> None:
-        failures = self._desk.collect()
+        errors = self._client.collect()
         self._setup.look()
-        for failure in failures:
-            if self._crash is None and failure["kind"] in ("ConnectionLostError", "ControlError", "ModelError"):
+        for error in errors:
+            if self._crash is None and isinstance(error, ConnectionLostError | ControlError | ModelError):
                 shown = self._reader.read_snapshot()
                 if shown.phase in ("lost", "fault"):
-                    self._note(shown.code, failure["message"])
+                    self._note(shown.code, str(error))
 
     def _bear_deaths(self) -> None:
         for death in self._keeper.look():
@@ -288,7 +571,7 @@ class Supervisor(ArmRequests, Closeable):
             self._crash = death.code, death.message
             self._note(*self._crash)
             if death.is_worker:
-                self._desk.fail_all(ConnectionLostError(death.message))
+                self._client.fail_all(ConnectionLostError(death.message))
 
     def _judge(self, shown: Snapshot) -> tuple[Phase, str, str]:
         """Returns phase, code and message: what we know of the processes goes before what one of them says."""
@@ -312,9 +595,9 @@ class Supervisor(ArmRequests, Closeable):
     def _end_processes(self, reason: RcilabError) -> None:
         """Has the arm brought to rest, ends our processes, and fails what was under way."""
         if self._keeper.worker_pid is not None:
-            self._desk.send_end()
+            self._client.send_end()
         self._keeper.end()
-        self._desk.fail_all(reason)
+        self._client.fail_all(reason)
         self._connecting, self._crash = None, None
 
     def _motion_cycle(self) -> int | None:
@@ -334,10 +617,21 @@ class Supervisor(ArmRequests, Closeable):
 
     def _is_operator_overdue(self) -> bool:
         with self._lock:
-            beat = self._block.words[Counter.OPERATOR_BEAT] if self._block is not None else 0
+            beat = self._block.counters[Counter.OPERATOR_BEAT] if self._block is not None else 0
         return beat != 0 and time.monotonic_ns() - beat > OPERATOR_TIMEOUT * 1e9
 
     def _require_block(self) -> ControlBlock:
         if self._block is None:
             raise UsageError("the supervisor is not running: start() it first").coded("not_connected")
         return self._block
+
+
+def build_settings(model: RobotModel) -> Settings:
+    """Returns what the control process needs to know of an arm when it starts."""
+    return Settings(
+        name=model.name,
+        lengths=tuple(dh_lengths(model.description.dh)),
+        n=model.n,
+        limits=replace(model.limits, sources={}),
+        T_flange_tool=model.T_flange_tool,
+    )

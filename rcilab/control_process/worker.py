@@ -10,18 +10,34 @@ import argparse
 import signal
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from typing import Any
 
 import numpy as np
 
-from rcilab.control_process.configuration_codec import parse_setup
-from rcilab.control_process.guiding import HandGuide
 from rcilab.control_process.layout import OPERATOR_TIMEOUT, ControlBlock
+from rcilab.control_process.messages import (
+    Configure,
+    Connect,
+    End,
+    Execute,
+    Jog,
+    NumberedRequest,
+    ReadInputs,
+    Reboot,
+    Recover,
+    Request,
+    SetOutput,
+    SetPower,
+    Settings,
+    StartGuiding,
+    Stop,
+    StopGuiding,
+    SwitchRows,
+)
 from rcilab.control_process.motion_executor import MotionExecutor, StoppedError
-from rcilab.control_process.request_channel import Letter, RequestChannel
-from rcilab.control_process.settings import parse_settings
+from rcilab.control_process.request_channel import RequestChannel
 from rcilab.control_process.status_writer import StatusWriter
 from rcilab.control_process.stop_conditions import StopConditions
 from rcilab.core.arrays import JointVector
@@ -29,10 +45,11 @@ from rcilab.core.errors import ConnectionLostError, ControlError, InvalidValueEr
 from rcilab.core.faults import name_faults
 from rcilab.core.spatial import Pose, as_pose
 from rcilab.core.state import RobotMode, RobotState
+from rcilab.execution.guiding import HandGuide
 from rcilab.execution.recorder import CycleLog
 from rcilab.makers.rokae.driver.address import parse_address
 from rcilab.makers.rokae.driver.commands import SIGNALS, RciCommands
-from rcilab.makers.rokae.driver.configuration import give_setup
+from rcilab.makers.rokae.driver.configuration import RobotConfiguration, give_setup
 from rcilab.makers.rokae.driver.connection import RciConnection
 from rcilab.makers.rokae.driver.handshake import await_first_state, require_arm_there
 from rcilab.makers.rokae.driver.recovery import recover
@@ -57,13 +74,15 @@ class ControlProcess:
     """
 
     def __init__(self, block: ControlBlock, parent: int) -> None:
-        self._settings = parse_settings(block.settings)
-        self._letters = RequestChannel(block)
-        self._oversight = StopConditions(block.words, parent)
+        settings = block.settings
+        assert isinstance(settings, Settings)  # The supervisor has put it there.
+        self._settings = settings
+        self._requests = RequestChannel(block)
+        self._oversight = StopConditions(block.counters, parent)
         self._publisher = StatusWriter(block)
         self._log = CycleLog(self._publisher.recorder, self._publisher.on_row)
         self._mover = MotionExecutor(
-            block, self._settings.limits, self._publisher, self._log, self._letters, self._oversight
+            block, self._settings.limits, self._publisher, self._log, self._requests, self._oversight
         )
         self._link: RciConnection | None = None
         self._address = ""
@@ -159,22 +178,58 @@ class ControlProcess:
             self._publisher.show_tool(flange.inverse() @ as_pose(state.T_base_tool_c.matrix))
 
     def _serve(self) -> None:
-        while (request := self._letters.take()) is not None:
-            handler: Callable[[Letter], None] = getattr(self, f"_do_{request['kind']}")
+        while (request := self._requests.take()) is not None:
             try:
-                handler(request)
+                self._handle(request.body)
             except RcilabError as error:
                 self._fail(request, error)
             except Exception as error:
                 self._fail(request, error)
                 raise
             else:
-                self._letters.answer(request)
+                self._requests.answer(request)
 
-    def _fail(self, request: Letter, error: Exception) -> None:
+    def _handle(self, request: Request) -> None:
+        match request:
+            case Connect():
+                self._connect(request)
+            case Configure():
+                self._configure(request.configuration)
+            case SetPower():
+                self._set_power(request.on)
+            case SetOutput():
+                self._set_output(request.signal, request.level)
+            case ReadInputs():
+                self._require_link()
+                self._read_inputs()
+            case Reboot():
+                self._reboot()
+            case Recover():
+                self._recover()
+            case Stop():
+                self._oversight.see_stop(request.number)  # In its turn: what it was meant for stands still by now.
+                self._end_guiding("idle.stopped")
+            case StartGuiding():
+                self._start_guiding(request)
+            case StopGuiding():
+                self._end_guiding("idle.guided")
+            case Execute():
+                link = self._require_link()
+                self._record(link.poll(_LOOK))
+                self._mover.execute(link, self._commands, self._model, request)
+            case Jog():
+                link = self._require_link()
+                self._record(link.poll(_LOOK))
+                self._mover.jog(link, self._commands, self._model)
+            case SwitchRows():
+                raise UsageError("no motion runs whose pace could change").coded("no_pace")
+            case End():
+                self._is_ending = True
+
+    def _fail(self, request: NumberedRequest, error: Exception) -> None:
         if isinstance(error, StoppedError):
             pass  # Said already.
-        elif isinstance(error, ConnectionLostError) or (request["kind"] == "connect" and self._link is None):
+        elif isinstance(error, ConnectionLostError) or (isinstance(request.body, Connect) and self._link is None):
             self._disconnect()
             code = "lost.other_arm" if isinstance(error, ModelError) else "lost.unreachable"
             self._publisher.say("lost", code, error=str(error))
@@ -182,18 +237,18 @@ class ControlProcess:
             self._say_fault(error.faults)
         elif self._link is not None and self._guide is None:
             self._publisher.say("idle", "idle.failed", error=str(error))
-        self._letters.answer(request, error)
+        self._requests.answer(request, error)
 
-    def _do_connect(self, request: Letter) -> None:
+    def _connect(self, request: Connect) -> None:
         self._disconnect()
-        self._address = request["address"]
+        self._address = request.address
         self._publisher.say("connecting", "connecting", address=self._address)
         place = parse_address(self._address)
-        transport = SocketTransport(place, STATE_SIZE, request["timeout"])
+        transport = SocketTransport(place, STATE_SIZE, request.timeout)
         try:
-            link = RciConnection(transport, self._settings.n, str(place), request["timeout"])
+            link = RciConnection(transport, self._settings.n, str(place), request.timeout)
             require_arm_there(RciCommands(link), self._settings.name, self._settings.lengths, str(place))
-            await_first_state(link, place, transport.local_address, request["timeout"])
+            await_first_state(link, place, transport.local_address, request.timeout)
         except BaseException:
             transport.close()
             raise
@@ -206,62 +261,50 @@ class ControlProcess:
         self._told = None
         self._commands = RciCommands(link, self._settings.limits)
         self._learn_power()
-        self._do_set_up(request)
+        self._configure(request.configuration)
 
-    def _do_set_up(self, request: Letter) -> None:
+    def _configure(self, configuration: RobotConfiguration) -> None:
         self._require_link()
-        setup = parse_setup(request["setup"])
-        self._model = setup.applied_to(self._model)
-        give_setup(self._commands, setup)
+        self._model = configuration.applied_to(self._model)
+        give_setup(self._commands, configuration)
         self._say_ready()
 
-    def _do_power(self, request: Letter) -> None:
+    def _set_power(self, on: bool) -> None:
         self._require_link()
-        self._commands.set_motor_power(request["on"])
+        self._commands.set_motor_power(on)
         self._learn_power()
         self._say_ready()
 
-    def _do_output(self, request: Letter) -> None:
+    def _set_output(self, signal: int, level: bool) -> None:
         self._require_link()
-        bit = 1 << request["signal"]
-        self._commands.set_do(request["signal"], request["level"])
+        bit = 1 << signal
+        self._commands.set_do(signal, level)
         shown = self._publisher.snapshot
-        outputs = shown.outputs | bit if request["level"] else shown.outputs & ~bit
+        outputs = shown.outputs | bit if level else shown.outputs & ~bit
         self._publisher.update(outputs_known=shown.outputs_known | bit, outputs=outputs)
         self._read_inputs()  # What an output is wired to may have changed.
-
-    def _do_inputs(self, request: Letter) -> None:
-        self._require_link()
-        self._read_inputs()
 
     def _read_inputs(self) -> None:
         self._publisher.update(inputs=sum(self._commands.get_di(signal) << signal for signal in SIGNALS))
 
-    def _do_reboot(self, request: Letter) -> None:
+    def _reboot(self) -> None:
         self._require_link()
         self._commands.reboot()
         self._disconnect()
         self._publisher.say("lost", "lost.rebooted", address=self._address)
 
-    def _do_recover(self, request: Letter) -> None:
+    def _recover(self) -> None:
         recover(self._commands, self._require_link())
         self._learn_power()
         self._say_ready()
 
-    def _do_stop(self, request: Letter) -> None:
-        self._oversight.see_stop(request["number"])  # Served in its turn: what it was meant for stands still by now.
-        self._end_guiding("idle.stopped")
-
-    def _do_start_guiding(self, request: Letter) -> None:
+    def _start_guiding(self, request: StartGuiding) -> None:
         self._require_link()
         guide = HandGuide(self._commands)
-        guide.start(request["space"], request["type"])
+        guide.start(request.space, request.kind)
         self._guide = guide
         self._publisher.begin_motion(None)
         self._publisher.say("moving", "moving.guided")
-
-    def _do_stop_guiding(self, request: Letter) -> None:
-        self._end_guiding("idle.guided")
 
     def _mind_guiding(self) -> None:
         """Ends hand guiding once nobody is at the controls any more."""
@@ -279,22 +322,6 @@ class ControlProcess:
             self._publisher.say("stopping", "stopping")
             guide.stop()
             self._publisher.say("idle", code, **facts)
-
-    def _do_end(self, request: Letter) -> None:
-        self._is_ending = True
-
-    def _do_execute(self, request: Letter) -> None:
-        link = self._require_link()
-        self._record(link.poll(_LOOK))
-        self._mover.execute(link, self._commands, self._model, request)
-
-    def _do_jog(self, request: Letter) -> None:
-        link = self._require_link()
-        self._record(link.poll(_LOOK))
-        self._mover.jog(link, self._commands, self._model)
-
-    def _do_pace(self, request: Letter) -> None:
-        raise UsageError("no motion runs whose pace could change").coded("no_pace")
 
     def _learn_power(self) -> None:
         self._publisher.update(powered=self._commands.motor_state())

@@ -57,10 +57,21 @@ class RcilabError(Exception):
     code: str = ""
     facts: Mapping[str, object] = MappingProxyType({})
 
+    def __reduce__(self) -> tuple[object, ...]:
+        """Pickles sentence and attributes: a constructor takes facts, not the sentence that it made of them."""
+        return _restore, (type(self), self.args, self.__dict__)
+
     def coded(self, code: str, **facts: object) -> Self:
         """Returns this error with a name for what went wrong; its words are `error.CODE` of the catalogues of words."""
         self.code, self.facts = code, facts
         return self
+
+
+def _restore(kind: type[RcilabError], args: tuple[object, ...], attributes: Mapping[str, object]) -> RcilabError:
+    error: RcilabError = kind.__new__(kind, *args)
+    error.args = args
+    error.__dict__.update(attributes)
+    return error
 
 
 class ModelError(RcilabError):

@@ -243,7 +243,7 @@ from rcilab.model.robot_model import load_model
 from rcilab.control_process.fork_server import fork_server_pid
 from rcilab.control_process.process_supervisor import ProcessSupervisor
 from rcilab.control_process.layout import ControlBlock
-from rcilab.control_process.settings import build_settings
+from rcilab.control_process.supervisor import build_settings
 model = load_model("xMatePro7")
 block = ControlBlock.create(model.n, build_settings(model))
 keeper = ProcessSupervisor(block, model.name, "ideal", None, auto_restart=False)

@@ -1,12 +1,12 @@
-"""Requests and their tickets over the real shared block; the test plays the control process."""
+"""Requests and their replies over the real shared block; the test plays the control process."""
 
 from __future__ import annotations
 
 import pytest
 
-from rcilab.control_process.error_codec import pack_failure
-from rcilab.control_process.layout import MAIL_SLOTS, ControlBlock, Counter
+from rcilab.control_process.layout import MESSAGE_SLOTS, ControlBlock, Counter
 from rcilab.control_process.message_ring import MessageRing
+from rcilab.control_process.messages import NumberedRequest, Recover, Reply, SetPower, Stop
 from rcilab.control_process.request_client import RequestClient
 from rcilab.core.errors import ConnectionLostError, UsageError
 
@@ -18,35 +18,38 @@ def block():
     block.close()
 
 
-def test_each_reply_settles_the_ticket_it_is_for_and_failures_are_returned(block):
-    desk = RequestClient(block)
-    inbox = MessageRing(block.requests, block.words, Counter.REQUESTS_POSTED, Counter.REQUESTS_TAKEN)
-    outbox = MessageRing(block.replies, block.words, Counter.REPLIES_POSTED, Counter.REPLIES_TAKEN)
-    tickets = [desk.send(what, {"kind": what}) for what in ("first", "second", "third")]
-    letters = [inbox.take() for _ in tickets]
-    assert [letter["kind"] for letter in letters] == ["first", "second", "third"]
-    outbox.post({"id": letters[2]["id"]})
-    outbox.post({"id": letters[0]["id"], "failure": pack_failure(UsageError("not now"))})
-    assert [failure["message"] for failure in desk.collect()] == ["not now"]
-    assert [ticket.done for ticket in tickets] == [True, False, True]
-    assert tickets[2].error is None
+def test_each_reply_settles_the_request_it_is_for_and_errors_are_returned(block):
+    client = RequestClient(block)
+    inbox = MessageRing[NumberedRequest](
+        block.requests, block.counters, Counter.REQUESTS_POSTED, Counter.REQUESTS_TAKEN
+    )
+    outbox = MessageRing[Reply](block.replies, block.counters, Counter.REPLIES_POSTED, Counter.REPLIES_TAKEN)
+    bodies = [SetPower(True), Recover(), Stop(3)]
+    pending = [client.send("a request", body) for body in bodies]
+    received = [inbox.take() for _ in pending]
+    assert [request.body for request in received] == bodies
+    outbox.post(Reply(received[2].id))
+    outbox.post(Reply(received[0].id, UsageError("not now")))
+    assert [str(error) for error in client.collect()] == ["not now"]
+    assert [request.done for request in pending] == [True, False, True]
+    assert pending[2].error is None
     with pytest.raises(UsageError, match="not now"):
-        tickets[0].wait(0.0)
+        pending[0].wait(0.0)
 
 
-def test_when_nobody_will_answer_any_more_every_ticket_fails_with_the_reason(block):
-    desk = RequestClient(block)
-    ticket = desk.send("power on", {"kind": "power"})
-    desk.fail_all(ConnectionLostError("it died"))
+def test_when_no_reply_will_come_any_more_every_request_fails_with_the_reason(block):
+    client = RequestClient(block)
+    pending = client.send("power on", SetPower(True))
+    client.fail_all(ConnectionLostError("it died"))
     with pytest.raises(ConnectionLostError, match="it died"):
-        ticket.wait(0.0)
-    assert desk.collect() == []
+        pending.wait(0.0)
+    assert client.collect() == []
 
 
-def test_a_full_mailbox_refuses_requests_and_lets_the_end_go_its_way(block):
-    desk = RequestClient(block)
-    for _ in range(MAIL_SLOTS):
-        desk.send("stop", {"kind": "stop"})
+def test_a_full_ring_refuses_requests_and_accepts_the_end(block):
+    client = RequestClient(block)
+    for number in range(MESSAGE_SLOTS):
+        client.send("stop", Stop(number))
     with pytest.raises(UsageError, match="requests are waiting already"):
-        desk.send("stop", {"kind": "stop"})
-    desk.send_end()
+        client.send("stop", Stop(99))
+    client.send_end()

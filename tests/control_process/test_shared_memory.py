@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import math
 import os
+import pickle
 import struct
 import subprocess
 import sys
@@ -16,16 +16,26 @@ import numpy as np
 import pytest
 
 from rcilab.control_process import jitter_histogram as lateness
-from rcilab.control_process.error_codec import pack_failure, unpack_failure
 from rcilab.control_process.jitter_histogram import JitterHistogram, summarise
-from rcilab.control_process.layout import MAIL_SIZE, MAIL_SLOTS, RING_CYCLES, VERSION, ControlBlock, Counter
+from rcilab.control_process.layout import MESSAGE_SIZE, MESSAGE_SLOTS, RING_CYCLES, VERSION, ControlBlock, Counter
 from rcilab.control_process.message_ring import MessageRing
+from rcilab.control_process.messages import Reply, Settings, as_sendable
 from rcilab.control_process.ring import RingReader
-from rcilab.control_process.settings import build_settings, parse_settings
 from rcilab.control_process.snapshot import Snapshot, read_snapshot, write_snapshot
+from rcilab.control_process.supervisor import build_settings
+from rcilab.core import errors
 from rcilab.core.command import JointPosition
 from rcilab.core.cycle_log import cycle_dtype
-from rcilab.core.errors import ConnectionLostError, ControlError, UsageError, VersionMismatchError
+from rcilab.core.errors import (
+    CommandRejectedError,
+    ConnectionLostError,
+    ControlError,
+    InvalidValueError,
+    PlanningError,
+    RcilabError,
+    UsageError,
+    VersionMismatchError,
+)
 from rcilab.core.faults import Fault
 from rcilab.core.spatial import Pose
 from rcilab.execution.recorder import CycleLog, Recorder
@@ -41,7 +51,7 @@ def block():
 
 
 def requests_of(block: ControlBlock) -> MessageRing:
-    return MessageRing(block.requests, block.words, Counter.REQUESTS_POSTED, Counter.REQUESTS_TAKEN)
+    return MessageRing(block.requests, block.counters, Counter.REQUESTS_POSTED, Counter.REQUESTS_TAKEN)
 
 
 def write_rows(recorder: Recorder, block: ControlBlock, count: int) -> None:
@@ -49,16 +59,16 @@ def write_rows(recorder: Recorder, block: ControlBlock, count: int) -> None:
     for _ in range(count):
         k = recorder.count
         recorder.write(k, k * 1e-3, k, k, 0.0, 1.0, [float(k)] * 7, zeros, zeros, zeros, 0, 0, (1, 5, 0))
-        block.words[Counter.CYCLES] = recorder.count
+        block.counters[Counter.CYCLES] = recorder.count
 
 
 def test_the_other_side_sees_the_same_block(block):
     other = ControlBlock(os.dup(block.descriptor))
-    block.words[Counter.STOPS_ASKED] = 41
+    block.counters[Counter.STOPS_ASKED] = 41
     block.motion[2] = range(7)
     assert other.n == 7
     assert other.settings == {"arm": "seven joints"}
-    assert other.words[Counter.STOPS_ASKED] == 41
+    assert other.counters[Counter.STOPS_ASKED] == 41
     assert other.motion[2].tolist() == list(range(7))
     other.close()
 
@@ -87,19 +97,19 @@ def test_the_block_has_no_name_that_could_be_left_behind():
     block.close()
 
 
-def test_letters_come_out_in_order_and_a_full_box_says_so(block):
+def test_messages_come_out_in_order_and_a_full_ring_is_an_error(block):
     box = requests_of(block)
-    for number in range(3 * MAIL_SLOTS):
+    for number in range(3 * MESSAGE_SLOTS):
         box.post({"id": number})
-        assert box.waiting
+        assert box.has_message
         assert box.take() == {"id": number}
     assert box.take() is None
-    for number in range(MAIL_SLOTS):
+    for number in range(MESSAGE_SLOTS):
         box.post({"id": number})
     with pytest.raises(UsageError, match="does not keep up"):
         box.post({"id": 99})
     with pytest.raises(UsageError, match="does not fit"):
-        box.post({"id": "x" * MAIL_SIZE})
+        box.post({"id": "x" * MESSAGE_SIZE})
 
 
 def test_the_ring_is_drained_once_and_in_order(block):
@@ -134,15 +144,15 @@ def test_a_snapshot_is_never_seen_half_written(block):
         while not stop.is_set():
             k += 1
             write_snapshot(
-                block.snapshot, block.words, Snapshot(message=f"{k}", rate_hz=float(k), motion_time=float(k))
+                block.snapshot, block.counters, Snapshot(message=f"{k}", rate_hz=float(k), motion_time=float(k))
             )
 
-    write_snapshot(block.snapshot, block.words, Snapshot(message="0", rate_hz=0.0, motion_time=0.0))
+    write_snapshot(block.snapshot, block.counters, Snapshot(message="0", rate_hz=0.0, motion_time=0.0))
     writer = threading.Thread(target=write)
     writer.start()
     try:
         for _ in range(3000):
-            seen = read_snapshot(block.snapshot, block.words)
+            seen = read_snapshot(block.snapshot, block.counters)
             assert float(seen.message) == seen.rate_hz == seen.motion_time
     finally:
         stop.set()
@@ -153,8 +163,8 @@ def test_a_snapshot_comes_back_as_it_went_in_and_a_long_message_is_cut_at_a_char
     snapshot = Snapshot(
         phase="moving", code="moving", message="臂" * 500, powered=True, is_fifo=True, memory_locked=True
     )
-    write_snapshot(block.snapshot, block.words, snapshot)
-    seen = read_snapshot(block.snapshot, block.words)
+    write_snapshot(block.snapshot, block.counters, snapshot)
+    seen = read_snapshot(block.snapshot, block.counters)
     assert (seen.phase, seen.code, seen.powered, seen.is_fifo, seen.memory_locked) == (
         "moving",
         "moving",
@@ -186,22 +196,88 @@ def test_percentiles_of_the_histogram_are_those_of_the_numbers():
     assert summarise(words).cycles == 0
 
 
-def test_settings_survive_the_way_through_json():
+def test_settings_pass_through_the_block():
     model = load_model("xMate3", tool=Pose((0.0, 0.0, 0.1)))
-    settings = parse_settings(json.loads(json.dumps(build_settings(model))))
-    assert settings.n == 6
+    block = ControlBlock.create(6, build_settings(model))
+    settings = ControlBlock(os.dup(block.descriptor)).settings
+    block.close()
+    assert isinstance(settings, Settings)
+    assert (settings.n, settings.name) == (6, "xMate3")
     assert settings.T_flange_tool.is_close(model.T_flange_tool, 0.0)
     assert np.array_equal(settings.limits.joint.jerk, model.limits.joint.jerk)
     assert settings.limits.cartesian == model.limits.cartesian
 
 
-def test_an_error_keeps_its_kind_its_sentence_and_its_faults():
-    error = ControlError("joint 4 was too fast", (Fault.COLLISION,), None)
-    back = unpack_failure(json.loads(json.dumps(pack_failure(error))))
-    assert isinstance(back, ControlError)
-    assert (str(back), back.faults) == ("joint 4 was too fast", (Fault.COLLISION,))
-    assert isinstance(unpack_failure(pack_failure(ConnectionLostError("gone"))), ConnectionLostError)
-    assert "ZeroDivisionError" in str(unpack_failure(pack_failure(ZeroDivisionError("x"))))
+def send(block: ControlBlock, error: Exception) -> RcilabError:
+    box = MessageRing[Reply](block.replies, block.counters, Counter.REPLIES_POSTED, Counter.REPLIES_TAKEN)
+    box.post(Reply(1, as_sendable(error)))
+    reply = box.take()
+    assert reply is not None
+    assert reply.error is not None
+    return reply.error
+
+
+def test_an_error_keeps_its_class_its_sentence_and_its_faults(block):
+    error = ControlError("joint 4 was too fast", (Fault.COLLISION,), np.zeros(50, cycle_dtype(7)))
+    error.stop = np.zeros(500, cycle_dtype(7))
+    back = send(block, error.coded("fast", joint=4))
+    assert type(back) is ControlError
+    assert (str(back), back.faults, back.code, back.facts) == (str(error), (Fault.COLLISION,), "fast", {"joint": 4})
+    assert (back.record, back.stop) == (None, None)  # The cycles are in the ring.
+    assert len(error.record) == 50
+    assert isinstance(send(block, ConnectionLostError("gone")), ConnectionLostError)
+    assert "ZeroDivisionError" in str(send(block, ZeroDivisionError("x")))
+    refused = send(block, CommandRejectedError("StartMove", rci.StartStatus.REFLEX, "recover()", reason="fault"))
+    assert isinstance(refused, CommandRejectedError)
+    assert (refused.command, refused.status) == ("StartMove", rci.StartStatus.REFLEX)
+
+
+def test_an_error_that_does_not_fit_or_cannot_be_pickled_keeps_its_class_and_the_beginning_of_its_sentence(block):
+    back = send(block, PlanningError("x" * 10 * MESSAGE_SIZE))
+    assert (type(back), set(str(back))) == (PlanningError, {"x"})
+    back = send(block, InvalidValueError("callback", lambda: None, "is not a number"))
+    assert isinstance(back, InvalidValueError)
+    assert "is not a number" in str(back)
+
+
+FAMILY = (
+    errors.RcilabError("root"),
+    errors.ModelError("m"),
+    errors.KinematicsError("k"),
+    errors.UnreachableError("u", distance=0.1, joint=2, excess=0.3),
+    errors.SingularError("s"),
+    errors.PlanningError("p", share=0.5, waypoint=3),
+    errors.ConformanceError("c", ["one", "two"]),
+    errors.CertificateError("c", ["tool"]),
+    errors.ProtocolError("p"),
+    errors.DecodeError("d", 12),
+    errors.VersionMismatchError("file", 1, 2),
+    errors.RecordedError("r", np.zeros(2)),
+    errors.ConnectionLostError("gone"),
+    errors.CommandRejectedError("StartMove", rci.StartStatus.REFLEX, "recover()", reason="fault"),
+    errors.ControlError("stopped", (Fault.COLLISION,), np.ones(3)),
+    errors.DeadlineError("late"),
+    errors.UsageError("wrong order"),
+    errors.InvalidValueError("q", [1.0], "must have 7 numbers"),
+)
+
+
+def kinds_of(kind: type) -> set[type]:
+    return {kind}.union(*(kinds_of(other) for other in kind.__subclasses__() if other.__module__ == errors.__name__))
+
+
+def test_every_class_of_the_family_passes_through_pickle_whole():
+    assert {type(error) for error in FAMILY} == kinds_of(errors.RcilabError)
+    for error in FAMILY:
+        inner = errors.UsageError("inner").coded("moving")
+        error.coded(error.code or "outer", **{**error.facts, "reason": inner}).add_note("a note")
+        back = pickle.loads(pickle.dumps(error))
+        assert (type(back), str(back), back.args) == (type(error), str(error), error.args)
+        assert back.__dict__.keys() == error.__dict__.keys()
+        assert (back.code, back.__notes__) == (error.code, ["a note"])
+        assert back.facts["reason"].code == "moving"
+        for name, value in error.__dict__.items():
+            assert name == "facts" or np.array_equal(back.__dict__[name], value), name
 
 
 def test_a_row_takes_what_was_written():

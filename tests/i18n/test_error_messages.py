@@ -12,7 +12,7 @@ from string import Formatter
 import pytest
 
 import rcilab
-from rcilab.control_process.error_codec import pack_failure, unpack_failure
+from rcilab.control_process.messages import as_sendable
 from rcilab.core.errors import CommandRejectedError, PlanningError, RcilabError, UnreachableError, UsageError
 from rcilab.i18n.error_messages import _ADVISING, tell, tell_note
 from rcilab.i18n.locale import LANGUAGES, load_words
@@ -90,7 +90,7 @@ def test_the_english_sentence_stays_and_facts_come_along():
         "waypoint", number=2, kind="line", reason=inner
     )
     assert str(error) == "waypoint 2: the arm is moving"
-    for same in (error, unpack_failure(pack_failure(error)), pickle.loads(pickle.dumps(error))):
+    for same in (error, pickle.loads(pickle.dumps(as_sendable(error))), pickle.loads(pickle.dumps(error))):
         said = tell(same)
         assert isinstance(said, Message)
         assert (said.code, said.values["number"]) == ("error.waypoint", 2)

@@ -6,8 +6,8 @@ The settings of the RCI that belong to the five modes: `setJointImpedance`, `set
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal, NamedTuple, TypeAlias
 
 from rcilab.core.errors import InvalidValueError
 from rcilab.makers.rokae.wire.bounds import FILTER_OFF, LOWEST_FREQUENCY
@@ -39,16 +39,6 @@ class ControllerParameters:
     """Cut-off frequencies for commanded angles, poses and torques, [Hz]; 1000 switches one off."""
     report_filter: tuple[float, ...] | None = None
     """Cut-off frequency for reported torques, one number, [Hz]."""
-
-    def as_letter(self) -> dict[str, list[float]]:
-        """Returns what is not None, as JSON takes it."""
-        values = {item.name: getattr(self, item.name) for item in fields(self)}
-        return {name: list(value) for name, value in values.items() if value is not None}
-
-    @classmethod
-    def from_letter(cls, letter: dict[str, Any]) -> ControllerParameters:
-        """Returns what `as_letter` wrote."""
-        return cls(**{name: tuple(float(number) for number in value) for name, value in letter.items()})
 
 
 class Range(NamedTuple):
