@@ -21,7 +21,11 @@ import numpy as np
 from PIL import Image
 from playwright.sync_api import Locator, Page, sync_playwright
 
-from rcilab.app import requests
+from rcilab.app.goal.goal_actions import MoveJoint, PoseGoal, SetSpeed
+from rcilab.app.request import TypeField
+from rcilab.app.run.run_actions import ChooseRobot, RobotCommand
+from rcilab.app.setup.setup_actions import SetSetup
+from rcilab.app.view_actions import Seek
 from rcilab.views.elbow_view import OUTWARD
 from rcilab.workbench.app import Workbench, WorkbenchConfig
 
@@ -146,15 +150,15 @@ class Camera:
     def go(self, degrees: tuple[float, ...]) -> None:
         """Brings the arm to where the film begins."""
         self.pose(degrees)
-        self.ask(requests.RobotCommand(what="execute", page=self.bench.store.state.lease.holder))
+        self.ask(RobotCommand(what="execute", page=self.bench.store.state.lease.holder))
         self.wait(lambda: self.bench.store.state.recording is not None and self.idle)
-        self.ask(requests.PoseGoal(name="here"))
+        self.ask(PoseGoal(name="here"))
         self.wait(lambda: self.bench.store.state.plan is None)
 
     def pose(self, degrees: tuple[float, ...]) -> None:
         """Sets the goal, and waits for its plan."""
         for joint, angle in enumerate(degrees):
-            self.ask(requests.MoveJoint(joint=joint, angle=angle / 57.29577951308232))
+            self.ask(MoveJoint(joint=joint, angle=angle / 57.29577951308232))
         self.wait(lambda: self._reached(degrees))
 
     def _reached(self, degrees: tuple[float, ...]) -> bool:
@@ -171,13 +175,13 @@ class Camera:
 def still(camera: Camera, path: Path) -> None:
     """The arm, its goal, a path that leaves the safety box, and what the check says about it."""
     ask, state = camera.ask, camera.bench.store
-    ask(requests.SetSetup(name="box", value=True))
-    ask(requests.SetSetup(name="active", value=True))
+    ask(SetSetup(name="box", value=True))
+    ask(SetSetup(name="active", value=True))
     for face, place in BOX.items():
-        ask(requests.TypeField(field=f"setup.box.{face}", text=str(place)))
+        ask(TypeField(field=f"setup.box.{face}", text=str(place)))
     camera.pose(GOAL)
     camera.wait(lambda: state.state.plan is not None and not state.state.plan.report.ok)
-    ask(requests.Seek(place=0.45))
+    ask(Seek(place=0.45))
     camera.tab_named("Check").click()
     camera.tab.wait_for_timeout(1500)
     camera.settle(4)
@@ -238,7 +242,7 @@ def scrub(camera: Camera) -> None:
 def run(camera: Camera) -> None:
     """Check, Execute, plan against actual."""
     bench = camera.bench
-    camera.ask(requests.SetSpeed(speed=0.02))  # So slow that frames are drawn on the way.
+    camera.ask(SetSpeed(speed=0.02))  # So slow that frames are drawn on the way.
     camera.press(camera.tab_named("Check"))
     camera.say("The check: every condition with its bound and its source")
     camera.take(1800)
@@ -280,7 +284,7 @@ def film(camera: Camera, path: Path) -> None:
 
 def begin(camera: Camera) -> None:
     """Brings arm and page to where the film begins."""
-    camera.ask(requests.ChooseRobot(plant="mujoco"))
+    camera.ask(ChooseRobot(plant="mujoco"))
     camera.wait(lambda: camera.bench.store.state.plant == "mujoco" and camera.idle)
     camera.go(START)
     camera.tab.evaluate(DRESS)

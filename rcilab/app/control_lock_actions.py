@@ -2,12 +2,52 @@
 
 from __future__ import annotations
 
-from rcilab.app import requests
+from dataclasses import dataclass
+from typing import ClassVar
+
 from rcilab.app.control_lock import SILENCE, ClientHeartbeat
+from rcilab.app.request import Handlers, Request
 from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.readiness import is_moving
 from rcilab.app.store import Store
 from rcilab.app.text import message
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TakeControls(Request):
+    """This page wants the controls."""
+
+    needs_control: ClassVar[bool] = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Refuse(Request):
+    """A page without the controls has tried to use one."""
+
+    needs_control: ClassVar[bool] = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AnswerControls(Request):
+    """The page that holds the controls was asked for them."""
+
+    needs_control: ClassVar[bool] = False
+
+    yes: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PageOpened(Request):
+    """A page has opened."""
+
+    needs_control: ClassVar[bool] = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PageClosed(Request):
+    """A page has gone."""
+
+    needs_control: ClassVar[bool] = False
 
 
 class ControlLockActions:
@@ -22,20 +62,30 @@ class ControlLockActions:
     def __init__(self, store: Store, session: RobotConnection, presence: ClientHeartbeat) -> None:
         self._store, self._session, self._presence = store, session, presence
 
-    def page_came(self, request: requests.PageOpened) -> None:
+    @property
+    def handlers(self) -> Handlers:
+        """What it does for each of its requests."""
+        return {
+            TakeControls: self.take_controls,
+            AnswerControls: self.answer,
+            PageOpened: self.page_came,
+            PageClosed: self.page_went,
+        }
+
+    def page_came(self, request: PageOpened) -> None:
         """Notes a page; it gets the controls when nobody has them."""
         if request.page is not None:
             self._presence.came(request.page)
             self._store.update(lease=self._store.state.lease.arrive(request.page))
 
-    def page_went(self, request: requests.PageClosed) -> None:
+    def page_went(self, request: PageClosed) -> None:
         """Notes that a page has gone. Without a holder no sign of life reaches the robot: a motion ends after 2 s."""
         if request.page is not None:
             self._presence.went(request.page)
             self._store.update(lease=self._store.state.lease.leave(request.page, self._presence.now()))
             self._store.forget_page(request.page)
 
-    def take_controls(self, request: requests.TakeControls) -> None:
+    def take_controls(self, request: TakeControls) -> None:
         """Gives a page free controls, or asks their holder."""
         page, lease = request.page, self._store.state.lease
         if page is None or lease.allows(page) or lease.asking == page:
@@ -49,7 +99,7 @@ class ControlLockActions:
         else:
             self._store.say("warn", message("lease.busy", page=lease.number(lease.asking)), page=page)
 
-    def answer(self, request: requests.AnswerControls) -> None:
+    def answer(self, request: AnswerControls) -> None:
         """Hears whether the holder hands over."""
         lease = self._store.state.lease
         if request.page is None or request.page != lease.holder or lease.asking is None:

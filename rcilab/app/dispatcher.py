@@ -6,27 +6,26 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
-from rcilab.app import requests
 from rcilab.app.autosave import Autosave, SavedState
 from rcilab.app.check.check_actions import CheckActions
 from rcilab.app.coalescing_queue import CoalescingQueue
 from rcilab.app.control_lock import ClientHeartbeat
-from rcilab.app.control_lock_actions import ControlLockActions
+from rcilab.app.control_lock_actions import ControlLockActions, Refuse
 from rcilab.app.failures import Failures
 from rcilab.app.goal.goal_actions import GoalActions
 from rcilab.app.goal.named_pose_actions import NamedPoseActions
 from rcilab.app.jog.jog_actions import JogActions
 from rcilab.app.learn.learn_actions import LearnActions
 from rcilab.app.program.program_actions import ProgramActions
+from rcilab.app.request import Moving, Request, TypeField
 from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.export_actions import Deliver, ExportActions
 from rcilab.app.run.folder_actions import FolderActions
 from rcilab.app.run.mode_actions import ModeActions
 from rcilab.app.run.push_actions import PushActions
 from rcilab.app.run.readiness import is_moving
-from rcilab.app.run.run_actions import RunActions
+from rcilab.app.run.run_actions import RobotCommand, RunActions
 from rcilab.app.run.signal_actions import SignalActions
 from rcilab.app.run.target_robot_actions import TargetRobotActions
 from rcilab.app.run.world_actions import WorldActions
@@ -35,7 +34,7 @@ from rcilab.app.setup.setup_actions import SetupActions, is_setup_field
 from rcilab.app.status_text import tell_error
 from rcilab.app.store import Store
 from rcilab.app.text import message
-from rcilab.app.view_actions import ViewActions
+from rcilab.app.view_actions import DrawInSoftware, SetView, ViewActions
 from rcilab.core.errors import RcilabError
 
 _TICK = 0.03  # [s] A choice: about the display's rate; also how often the robot is looked at.
@@ -81,79 +80,26 @@ class Dispatcher:
         self._scene = SceneActions(store, self._goal)
         self._export = ExportActions(store, deliver)
         self._folder = FolderActions(store)
-        self._mailbox: CoalescingQueue[requests.Request] = CoalescingQueue()
+        self._mailbox: CoalescingQueue[Request] = CoalescingQueue()
         self._thread: threading.Thread | None = None
         self._ending = threading.Event()
         self._refused_at: dict[tuple[int | None, int | None], float] = {}  # Of page and holder, when: [s].
         self._refused_for: int | None = None  # Who held the controls when another page was last refused.
         self.errors = Failures()
         """Failures of our own code; one a second at most is printed and shown on the page."""
-        self._actions: dict[type, Callable[[Any], None]] = {
-            requests.MoveJoint: self._goal.move_joint,
-            requests.PoseGoal: self._goal.pose_goal,
-            requests.MoveTarget: self._goal.move_target,
-            requests.TypeField: self._type_field,
-            requests.SetArmAngle: self._goal.set_arm_angle,
-            requests.ChooseBranch: self._goal.choose_branch,
-            requests.DragElbow: self._scene.drag_elbow,
-            requests.HighlightBranch: self._scene.peek,
-            requests.CommitField: self._view.enter,
-            requests.DrawInSoftware: self._view.draw_in_software,
-            requests.OpenTab: self._setup.open_tab,
-            requests.ShowViolation: self._scene.show_bead,
-            requests.ShowExtra: self._scene.show_extra,
-            requests.SetPathType: self._goal.set_way,
-            requests.Plan: self._goal.plan,
-            requests.PlanRecovery: self._goal.plan_recovery,
-            requests.SetSpeed: self._goal.set_speed,
-            requests.SetLaw: self._goal.set_law,
-            requests.RobotCommand: self._drive,
-            requests.SetDrive: self._mode.set_drive,
-            requests.PressControl: self._mode.press,
-            requests.SetNetwork: self._world.set_network,
-            requests.PressSafety: self._world.press_safety,
-            requests.SetWiring: self._world.set_wiring,
-            requests.SetOutput: self._signals.set_output,
-            requests.PressSignals: self._signals.press,
-            requests.ChooseDestination: self._where.choose,
-            requests.ChooseRobot: self.robot.choose_robot,
-            requests.SetJog: self._jog.set_jog,
-            requests.HoldJog: self._jog.hold,
-            requests.PressJog: self._jog.press,
-            requests.NamedPose: self._poses.act,
-            requests.SetPush: self._push.set_push,
-            requests.HoldPush: self._push.hold,
-            requests.DragLink: self._push.pull,
-            requests.MoveSetup: self._setup.move,
-            requests.ResizeBox: self._setup.resize,
-            requests.SetSetup: self._setup.set_setup,
-            requests.PressSetup: self._setup.press,
-            requests.EditProgram: self._program.editing.edit,
-            requests.PlanProgram: self._program.plan,
-            requests.CancelProgram: self._program.cancel,
-            requests.LoadProgram: self._program.load,
-            requests.Check: self._check.press,
-            requests.Learn: self._learn.press,
-            requests.Seek: self._view.seek,
-            requests.Play: self._view.play,
-            requests.SetView: self._view.set_view,
-            requests.ShowPlot: self._view.show_plot,
-            requests.Export: self._export.export,
-            requests.CancelExport: self._export.cancel,
-            requests.ClearRuns: self._folder.clear,
-            requests.SetRecording: self._view.set_recording,
-            requests.Refuse: self._refuse,
-            requests.TakeControls: self._lease.take_controls,
-            requests.AnswerControls: self._lease.answer,
-            requests.PageOpened: self._lease.page_came,
-            requests.PageClosed: self._lease.page_went,
-        }
+        features = (
+            self._goal, self._poses, self._scene, self._setup, self._jog, self._push, self._program,
+            self._program.editing, self._check, self._learn, self.robot, self._where, self._mode, self._world,
+            self._signals, self._view, self._export, self._folder, self._lease,
+        )  # fmt: skip
+        self._handlers = {kind: act for feature in features for kind, act in feature.handlers.items()}
+        self._handlers |= {TypeField: self._type_field, RobotCommand: self._drive, Refuse: self._refuse}
 
-    def ask(self, request: requests.Request) -> None:
+    def ask(self, request: Request) -> None:
         """Takes a request and returns at once; callable from any thread."""
-        if isinstance(request, requests.Moving):
+        if isinstance(request, Moving):
             request = replace(request, stops=self._session.stops)
-        self._mailbox.put(request, _coalescing_key(request))
+        self._mailbox.put(request, request.replaces)
 
     def resume(self, *, language: str | None = None) -> None:
         """Brings back what the workbench before this one had; before `start`.
@@ -164,7 +110,7 @@ class Dispatcher:
         kept = self._keepsake.recall(self._store.state.model)
         for name, value in self._keepsake.recall_looks().items():
             if name != "language" or language is None:
-                self._view.set_view(requests.SetView(page=None, name=name, value=value))
+                self._view.set_view(SetView(page=None, name=name, value=value))
         if kept is not None:
             self._guard(lambda: self._resume(kept))
         for name, setup in self._keepsake.recall_setups(self._store.state.model).items():
@@ -193,17 +139,17 @@ class Dispatcher:
         self._export.close()
         self._keepsake.close(self._store.state)
 
-    def act(self, request: requests.Request) -> None:
+    def act(self, request: Request) -> None:
         """Carries out one request; what goes wrong becomes a sentence on the page."""
         lease = self._store.state.lease
-        if not isinstance(request, requests.Harmless) and not lease.allows(request.page) and not _is_stop(request):
-            if not isinstance(request, requests.Silent):
+        if request.needs_control and not lease.allows(request.page) and not _is_stop(request):
+            if not request.is_silent:
                 self._refuse(request)
             return
         if _reloads_pages(request) and is_moving(self._session.status()):
             self._store.say("warn", message("ready.moving"), page=request.page)
             return
-        self._guard(lambda: self._actions[type(request)](request))
+        self._guard(lambda: self._handlers[type(request)](request))
 
     def tick(self, elapsed: float) -> None:
         """Does what time asks for: the preview plays on, the robot is looked at, a plan completed."""
@@ -240,7 +186,7 @@ class Dispatcher:
             self._program.restore(kept.program)
         self._store.say("good", message("notice.program_back" if kept.q is None else "notice.resumed"))
 
-    def _refuse(self, request: requests.Request) -> None:
+    def _refuse(self, request: Request) -> None:
         """Tells a page that it only watches, unless it has got the controls meanwhile."""
         lease = self._store.state.lease
         now = time.monotonic()
@@ -254,7 +200,7 @@ class Dispatcher:
         said = message(code, page=lease.number(lease.holder))
         self._store.say("warn", said, page=request.page, trouble="lease")
 
-    def _drive(self, request: requests.RobotCommand) -> None:
+    def _drive(self, request: RobotCommand) -> None:
         if request.what == "pause":
             self._mode.pause()
         elif request.what == "resume":
@@ -262,7 +208,7 @@ class Dispatcher:
         else:
             self.robot.drive(request)
 
-    def _type_field(self, request: requests.TypeField) -> None:
+    def _type_field(self, request: TypeField) -> None:
         if is_setup_field(request.field):
             self._setup.type_field(request)
         elif request.field.startswith("control."):
@@ -295,40 +241,11 @@ class Dispatcher:
                 self._store.say("bad", message("notice.bug", error=f"{type(error).__name__}: {error}"))
 
 
-def _coalescing_key(request: requests.Request) -> str | None:
-    """Returns what a newer request replaces an older one by: drags and sliders, nothing that is pressed once."""
-    if isinstance(request, requests.MoveTarget) and not request.ended:
-        return f"target.{request.page}"
-    if isinstance(request, requests.MoveJoint):
-        return f"joint.{request.joint}.{request.page}"
-    if isinstance(request, requests.MoveSetup | requests.ResizeBox) and not request.ended:
-        return f"{type(request).__name__}.{request.page}"
-    if isinstance(request, requests.DragElbow) and request.phase == "update":
-        return f"elbow.{request.page}"
-    if isinstance(request, requests.DragLink) and request.phase == "update":
-        return f"pull.{request.page}"
-    if isinstance(request, requests.SetNetwork) and request.name is not None:
-        return f"network.{request.name}.{request.page}"
-    if isinstance(request, requests.SetDrive) and request.pace is not None:
-        return f"pace.{request.page}"
-    if isinstance(
-        request,
-        requests.Seek
-        | requests.SetSpeed
-        | requests.SetArmAngle
-        | requests.HoldPush
-        | requests.HoldJog
-        | requests.HighlightBranch,
-    ):
-        return f"{type(request).__name__}.{request.page}"
-    return None
+def _is_stop(request: Request) -> bool:
+    return isinstance(request, RobotCommand) and request.what == "stop"
 
 
-def _is_stop(request: requests.Request) -> bool:
-    return isinstance(request, requests.RobotCommand) and request.what == "stop"
-
-
-def _reloads_pages(request: requests.Request) -> bool:
+def _reloads_pages(request: Request) -> bool:
     """Returns whether pages load themselves again for a request; a motion would stop for want of a page."""
-    is_graphics = isinstance(request, requests.SetView) and request.name == "quality"
-    return is_graphics or isinstance(request, requests.DrawInSoftware)
+    is_graphics = isinstance(request, SetView) and request.name == "quality"
+    return is_graphics or isinstance(request, DrawInSoftware)

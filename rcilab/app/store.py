@@ -9,21 +9,20 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
 
-import numpy as np
-
 from rcilab.app.check.check_state import CheckState
 from rcilab.app.control_lock import ControlLock
-from rcilab.app.goal.target_status import TargetStatus, Tone
+from rcilab.app.goal.goal import Goal
+from rcilab.app.goal.target_status import Tone
 from rcilab.app.jog.jog_state import JogState
 from rcilab.app.learn.learn_state import LearnState
 from rcilab.app.planning import PathKind, Plan, PlannableLaw
 from rcilab.app.program.program_draft import ProgramState
 from rcilab.app.run.active_force import Plant, PushState
 from rcilab.app.run.drive_state import DriveState
+from rcilab.app.run.recording import Recording
 from rcilab.app.scene.scene_extras import SceneState
 from rcilab.app.setup.configuration_state import SetupState
 from rcilab.app.text import Message
-from rcilab.core.arrays import JointVector
 from rcilab.core.spatial import Pose
 from rcilab.i18n.units import USUAL, Units
 from rcilab.model.robot_model import RobotModel
@@ -31,9 +30,6 @@ from rcilab.model.robot_model import RobotModel
 if TYPE_CHECKING:
     from rcilab.app.run.export_actions import Export
     from rcilab.motion import Motion
-    from rcilab.motion.speed_scaling import SpeedScaledMotion
-    from rcilab.recording.run import Run
-    from rcilab.recording.tracking import Tracking
 
 Theme = Literal["light", "dark"]
 
@@ -52,51 +48,6 @@ class Toast:
     """Client id of the only page it concerns; None: all of them."""
     trouble: str = ""
     """Names a trouble that it reports and that can end: then it is withdrawn."""
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Goal:
-    """Where the operator wants the arm to go."""
-
-    q: JointVector
-    """Joint angles of the candidate arm, shape (n,), [rad]."""
-    target: Pose
-    """Where the gizmo stands: what was asked for, reachable or not."""
-    reach: TargetStatus
-    psi: float | None = None
-    """Arm angle of `q`, [rad]; None where it has none."""
-    snapped: Message | None = None
-    """Why it is another arm angle than was asked for; None where it is that one."""
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Recording:
-    """The last executed motion as the controller reported it."""
-
-    t: np.ndarray
-    """[s], shape (N,)."""
-    q: np.ndarray
-    """Measured, [rad], shape (N, n)."""
-    q_c: np.ndarray
-    """Commanded, [rad], shape (N, n)."""
-    dq: np.ndarray
-    """Measured, [rad/s], shape (N, n)."""
-    tau: np.ndarray | None = None
-    """Measured, [N m], shape (N, n); None where it was not kept."""
-    delay: int
-    """Cycles between a command and the state that shows it: the controller's play-out, and its answer."""
-    run: Run | None = None
-    """All of it, once the arm stands still."""
-    paced: SpeedScaledMotion | None = None
-    """How the plan was run, where its pace was changed on the way; None: as planned."""
-    tracking: Tracking | None = None
-    """How far the arm was from its plan, once it stands still."""
-    file: str = ""
-    """Where it is on disk; "" where it is not."""
-    is_left_alone: bool = False
-    """Whether it was stopped because no page answered."""
-    moment: float | None = None
-    """When a fault was reported, as in `t`, [s]; None for a motion without one."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar, Literal
 
-from rcilab.app import requests
 from rcilab.app.learn.learn_state import exhibited
+from rcilab.app.request import Handlers, Request
 from rcilab.app.store import Store
 from rcilab.app.text import LANGUAGES, message
 from rcilab.i18n.units import ANGLES, LENGTHS
@@ -24,18 +24,88 @@ PLOTS = ("q", "dq", "ddq", "jerk", "tau", "speed", "acceleration", "psi", "error
 """In the order they stand below each other."""
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CommitField(Request):
+    """Enter was pressed in a field that was typed in, or the field was left: what is typed is complete."""
+
+    needs_control: ClassVar[bool] = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DrawInSoftware(Request):
+    """The browser has no graphics card to draw with."""
+
+    is_silent: ClassVar[bool] = True
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Seek(Request):
+    """Go to a place in the planned motion."""
+
+    place: float
+    """0 to 1."""
+
+    @property
+    def replaces(self) -> str | None:  # noqa: D102
+        return f"Seek.{self.page}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Play(Request):
+    """Start or hold the preview."""
+
+    playing: bool | None = None
+    """None turns it over."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetView(Request):
+    """Settings of the page."""
+
+    name: Literal["language", "angle", "length", "theme", "quality", "plot_joint", "rate", "height", "loop"]
+    value: str | float | int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ShowPlot(Request):
+    """Show or hide one of the plots."""
+
+    name: str
+    on: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetRecording(Request):
+    """Whether every cycle of a motion is written to a file."""
+
+    on: bool
+
+
 class ViewActions:
     """Timeline and settings."""
 
     def __init__(self, store: Store) -> None:
         self._store = store
 
-    def seek(self, request: requests.Seek) -> None:
+    @property
+    def handlers(self) -> Handlers:
+        """What it does for each of its requests."""
+        return {
+            CommitField: self.enter,
+            DrawInSoftware: self.draw_in_software,
+            Seek: self.seek,
+            Play: self.play,
+            SetView: self.set_view,
+            ShowPlot: self.show_plot,
+            SetRecording: self.set_recording,
+        }
+
+    def seek(self, request: Seek) -> None:
         """Holds the preview at a place of the plan."""
         if math.isfinite(request.place):
             self._store.update(place=min(max(request.place, 0.0), 1.0), playing=False)
 
-    def play(self, request: requests.Play) -> None:
+    def play(self, request: Play) -> None:
         """Starts the preview, from the beginning when it stands at the end, or holds it."""
         state = exhibited(self._store.state)
         playing = not state.playing if request.playing is None else request.playing
@@ -56,12 +126,12 @@ class ViewActions:
             place = 0.0
         self._store.update(place=min(place, 1.0), playing=place < 1.0)
 
-    def enter(self, request: requests.CommitField) -> None:
+    def enter(self, request: CommitField) -> None:
         """Lets what is typed in a page count at once."""
         entered = {**self._store.state.entered, request.page: time.monotonic()}
         self._store.update(entered=MappingProxyType(entered))
 
-    def set_view(self, request: requests.SetView) -> None:
+    def set_view(self, request: SetView) -> None:
         """Changes a setting; values that do not exist are ignored."""
         value = request.value
         known = {
@@ -82,18 +152,18 @@ class ViewActions:
             if request.name == "quality":
                 self._store.update(is_quality_chosen=True)
 
-    def draw_in_software(self, request: requests.DrawInSoftware) -> None:
+    def draw_in_software(self, request: DrawInSoftware) -> None:
         """Draws lightly for a browser without a graphics card, unless the operator chose otherwise."""
         if not self._store.state.is_quality_chosen:
             self._store.update(quality="light")
 
-    def show_plot(self, request: requests.ShowPlot) -> None:
+    def show_plot(self, request: ShowPlot) -> None:
         """Shows or hides a plot."""
         plots = self._store.state.plots
         if request.name in PLOTS:
             self._store.update(plots=plots | {request.name} if request.on else plots - {request.name})
 
-    def set_recording(self, request: requests.SetRecording) -> None:
+    def set_recording(self, request: SetRecording) -> None:
         """Has the next motions written to files, or not."""
         self._store.update(record=request.on)
 

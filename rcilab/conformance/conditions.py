@@ -22,12 +22,7 @@ from rcilab.conformance.start_end_conditions import (
     start_pose,
     tool_rest,
 )
-from rcilab.conformance.tool_conditions import (
-    CARTESIAN_FRAME,
-    CARTESIAN_POSITION,
-    TOOL_CONDITIONS,
-    TORQUE_CONDITIONS,
-)
+from rcilab.conformance.tool_conditions import CARTESIAN_FRAME, CARTESIAN_POSITION, TOOL_CONDITIONS, TORQUE_CONDITIONS
 from rcilab.core.arrays import JointVector
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.faults import Fault

@@ -14,14 +14,7 @@ import time
 from collections.abc import Callable, Sequence
 
 from rcilab.core.errors import DecodeError, UsageError
-from rcilab.sim.api import (
-    LineReader,
-    Refused,
-    WorldAnswer,
-    WorldRequest,
-    decode_world_request,
-    encode_world_answer,
-)
+from rcilab.sim.api import LineReader, Refused, WorldAnswer, WorldRequest, decode_world_request, encode_world_answer
 from rcilab.sim.peer_user import is_ours
 
 MOST_GUESTS = 8  # At once; a choice. One script and one page need two.

@@ -10,15 +10,18 @@ from types import TracebackType
 from typing import IO, TYPE_CHECKING
 from urllib.parse import quote
 
-from rcilab.app import requests
 from rcilab.app.autosave import Autosave, keepsake_file
 from rcilab.app.control_lock import ClientHeartbeat
+from rcilab.app.control_lock_actions import AnswerControls, PageClosed, PageOpened, Refuse, TakeControls
 from rcilab.app.dispatcher import Dispatcher
-from rcilab.app.goal.goal_actions import initial_goal
+from rcilab.app.goal.goal import goal_at
 from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.replay import replayed, require_replayable
+from rcilab.app.scene.scene_actions import HighlightBranch
+from rcilab.app.setup.setup_actions import OpenTab
 from rcilab.app.status_text import tell_error
 from rcilab.app.store import Store, UiState
+from rcilab.app.view_actions import CommitField, DrawInSoftware, Seek, SetView
 from rcilab.views.access_control import Gate
 from rcilab.views.viser_server import GuardedServer
 from rcilab.views.viser_stage import ViserEnvironment
@@ -77,7 +80,7 @@ class Workbench:
         self._bound = security.bind(config.host, config.port, config.token)
         self.port: int = self._bound.getsockname()[1]
         """Port the page is served on."""
-        goal = initial_goal(model, model.home)
+        goal = goal_at(model, model.home)
         state = UiState(
             model=model,
             target=config.target,
@@ -115,17 +118,15 @@ class Workbench:
             Heard(
                 stop=self.session.stop,
                 here=self._here,
-                seek=lambda page, share: ask(requests.Seek(page=page, place=self.presenter.place_at(share))),
-                size=lambda page, height: ask(requests.SetView(page=page, name="height", value=height)),
-                peek=lambda page, branch: ask(
-                    requests.HighlightBranch(page=page, index=branch if branch >= 0 else None)
-                ),
-                entered=lambda page: ask(requests.CommitField(page=page)),
-                tab=lambda page, index: ask(requests.OpenTab(page=page, name=tab_name(index))),
-                take=lambda page: ask(requests.TakeControls(page=page)),
-                answer=lambda page, yes: ask(requests.AnswerControls(page=page, yes=yes)),
+                seek=lambda page, share: ask(Seek(page=page, place=self.presenter.place_at(share))),
+                size=lambda page, height: ask(SetView(page=page, name="height", value=height)),
+                peek=lambda page, branch: ask(HighlightBranch(page=page, index=branch if branch >= 0 else None)),
+                entered=lambda page: ask(CommitField(page=page)),
+                tab=lambda page, index: ask(OpenTab(page=page, name=tab_name(index))),
+                take=lambda page: ask(TakeControls(page=page)),
+                answer=lambda page, yes: ask(AnswerControls(page=page, yes=yes)),
                 home=self._bring_back,
-                software=lambda page: ask(requests.DrawInSoftware(page=page)),
+                software=lambda page: ask(DrawInSoftware(page=page)),
             )
         )
         gate = Gate(host=self._config.host, port=self.port, token=self._config.token, title="this workbench")
@@ -135,7 +136,7 @@ class Workbench:
             decorate=self._decorate,
             routes={LIVE_PATH: live.serve},
             may_act=lambda page: self.store.state.lease.allows(page),
-            refuse=lambda page: ask(requests.Refuse(page=page)),
+            refuse=lambda page: ask(Refuse(page=page)),
         )
         self.server = self._door.viser
         self._opened = True
@@ -172,13 +173,13 @@ class Workbench:
 
         @self.server.on_client_connect
         async def _(client: viser.ClientHandle) -> None:
-            ask(requests.PageOpened(page=client.client_id))
+            ask(PageOpened(page=client.client_id))
             self._views[client.client_id] = ViserEnvironment(client.camera)
             introduce(client, self.live.introduce(client.client_id))
 
         @self.server.on_client_disconnect
         async def _(client: viser.ClientHandle) -> None:
-            ask(requests.PageClosed(page=client.client_id))
+            ask(PageClosed(page=client.client_id))
             self.live.forget(client.client_id)
             self._views.pop(client.client_id, None)
 

@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from rcilab.app.control_lock import ControlLock
-from rcilab.app.requests import Request, TypeField
+from rcilab.app.request import Request, TypeField
 from rcilab.app.text import Message
 from rcilab.core.spatial import Pose
 from rcilab.i18n.rounding import fixed

@@ -6,13 +6,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rcilab.app import requests
 from rcilab.app.control_lock import PATIENCE, SILENCE, ClientHeartbeat, ControlLock
-from rcilab.app.control_lock_actions import ControlLockActions
+from rcilab.app.control_lock_actions import AnswerControls, ControlLockActions, PageClosed, PageOpened, TakeControls
 from rcilab.app.dispatcher import Dispatcher
-from rcilab.app.goal.goal_actions import initial_goal
+from rcilab.app.goal.goal import goal_at
 from rcilab.app.store import Store, UiState
 from rcilab.app.text import message
+from rcilab.app.view_actions import Seek
 from rcilab.control_process import SupervisorStatus
 from rcilab.model.robot_model import load_model
 
@@ -76,11 +76,11 @@ class Desk:
     def __init__(self) -> None:
         self.time = 100.0
         self.robot = Robot()
-        self.store = Store(UiState(model=MODEL, goal=initial_goal(MODEL, MODEL.home)))
+        self.store = Store(UiState(model=MODEL, goal=goal_at(MODEL, MODEL.home)))
         self.presence = ClientHeartbeat(lambda: self.time)
         self.actions = ControlLockActions(self.store, self.robot, self.presence)
         for page in (1, 2):
-            self.actions.page_came(requests.PageOpened(page=page))
+            self.actions.page_came(PageOpened(page=page))
         self.wait(0.1, 1, 2)
 
     @property
@@ -113,14 +113,14 @@ def test_a_frozen_tab_loses_the_controls_and_gets_them_back_unless_somebody_took
     desk.wait(0.3, 1, 2)
     assert desk.lease.holder == 1
     desk.wait(SILENCE + 0.2, 2)
-    desk.actions.take_controls(requests.TakeControls(page=2))
+    desk.actions.take_controls(TakeControls(page=2))
     desk.wait(0.3, 1, 2)
     assert desk.lease.holder == 2
 
 
 def test_a_question_without_an_answer_is_a_yes_but_not_while_the_arm_moves(desk):
     desk.robot.phase = "moving"
-    desk.actions.take_controls(requests.TakeControls(page=2))
+    desk.actions.take_controls(TakeControls(page=2))
     assert desk.told == "lease.asked"
     desk.wait(PATIENCE + 1.0, 1, 2)
     assert desk.lease.holder == 1
@@ -131,20 +131,20 @@ def test_a_question_without_an_answer_is_a_yes_but_not_while_the_arm_moves(desk)
 
 
 def test_who_is_told_no_may_ask_again(desk):
-    desk.actions.take_controls(requests.TakeControls(page=2))
-    desk.actions.answer(requests.AnswerControls(page=2, yes=True))
+    desk.actions.take_controls(TakeControls(page=2))
+    desk.actions.answer(AnswerControls(page=2, yes=True))
     assert desk.lease.holder == 1
-    desk.actions.answer(requests.AnswerControls(page=1, yes=False))
+    desk.actions.answer(AnswerControls(page=1, yes=False))
     assert desk.told == "lease.kept"
     assert desk.lease.asking is None
-    desk.actions.take_controls(requests.TakeControls(page=2))
-    desk.actions.answer(requests.AnswerControls(page=1, yes=True))
+    desk.actions.take_controls(TakeControls(page=2))
+    desk.actions.answer(AnswerControls(page=1, yes=True))
     assert desk.lease.holder == 2
 
 
 def test_the_only_page_left_gets_the_controls_once_the_arm_stands(desk):
     desk.robot.phase = "moving"
-    desk.actions.page_went(requests.PageClosed(page=1))
+    desk.actions.page_went(PageClosed(page=1))
     desk.wait(SILENCE + 1.0, 2)
     assert desk.lease.holder is None
     desk.robot.phase = "idle"
@@ -153,9 +153,9 @@ def test_the_only_page_left_gets_the_controls_once_the_arm_stands(desk):
 
 
 def test_a_page_that_still_loads_is_waited_for(desk):
-    desk.actions.page_went(requests.PageClosed(page=1))
-    desk.actions.page_went(requests.PageClosed(page=2))
-    desk.actions.page_came(requests.PageOpened(page=3))
+    desk.actions.page_went(PageClosed(page=1))
+    desk.actions.page_went(PageClosed(page=2))
+    desk.actions.page_came(PageOpened(page=3))
     desk.wait(10.0)
     assert desk.lease.holder == 3
 
@@ -164,15 +164,15 @@ def test_what_one_page_is_told_takes_no_place_of_what_another_is_told(desk):
     """However fast a page without the controls presses."""
     conductor = Dispatcher(desk.store, desk.robot)
     for page in (1, 2):
-        conductor.act(requests.PageOpened(page=page))
+        conductor.act(PageOpened(page=page))
     for number in range(3):
         desk.store.say("bad", message("notice.taken", page=number), page=1)
         for _ in range(100):
-            conductor.act(requests.Seek(page=2, place=0.5))
-            conductor.act(requests.TakeControls(page=2))
+            conductor.act(Seek(page=2, place=0.5))
+            conductor.act(TakeControls(page=2))
     notices = desk.store.state.notices
     assert [notice.text.values["page"] for notice in notices if notice.page == 1] == [0, 1, 2]
     assert sum(notice.page == 2 for notice in notices) <= 4
     assert sum(notice.page is None for notice in notices) <= 4
-    desk.actions.page_went(requests.PageClosed(page=1))
+    desk.actions.page_went(PageClosed(page=1))
     assert all(notice.page != 1 for notice in desk.store.state.notices)

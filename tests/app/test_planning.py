@@ -7,9 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rcilab.app import requests
 from rcilab.app.goal import goal_actions
-from rcilab.app.goal.goal_actions import GoalActions, initial_goal
+from rcilab.app.goal.goal import goal_at
+from rcilab.app.goal.goal_actions import GoalActions, MoveTarget
 from rcilab.app.planning import Plan, make_plan
 from rcilab.app.store import Store, UiState
 from rcilab.core.errors import CertificateError
@@ -48,7 +48,7 @@ def test_only_a_completed_plan_has_a_certificate_to_run_with():
 def test_a_goal_that_rests_is_looked_at_for_collisions_and_one_that_is_dragged_is_not(monkeypatch):
     now = [100.0]
     monkeypatch.setattr(goal_actions, "time", SimpleNamespace(monotonic=lambda: now[0]))
-    store = Store(UiState(model=MODEL, goal=initial_goal(MODEL, ON_THE_FLOOR)))
+    store = Store(UiState(model=MODEL, goal=goal_at(MODEL, ON_THE_FLOOR)))
     actions = GoalActions(store, SimpleNamespace(status=lambda: SimpleNamespace(phase="idle", q_c=HOME)))
     actions.plan()
     dragged = store.state.plan
@@ -67,12 +67,12 @@ def test_a_goal_that_rests_is_looked_at_for_collisions_and_one_that_is_dragged_i
 def test_a_target_in_a_hand_has_come_to_rest_when_it_is_let_go_or_after_a_longer_pause(monkeypatch):
     now = [100.0]
     monkeypatch.setattr(goal_actions, "time", SimpleNamespace(monotonic=lambda: now[0]))
-    store = Store(UiState(model=MODEL, goal=initial_goal(MODEL, HOME)))
+    store = Store(UiState(model=MODEL, goal=goal_at(MODEL, HOME)))
     actions = GoalActions(store, SimpleNamespace(status=lambda: SimpleNamespace(phase="idle", q_c=HOME)))
     position, wxyz = tuple(store.state.goal.target.position - (0.0, 0.05, 0.05)), tuple(store.state.goal.target.wxyz)
 
     def is_looked_at(ended: bool, after: float) -> bool:
-        actions.move_target(requests.MoveTarget(position=position, wxyz=wxyz, ended=ended))
+        actions.move_target(MoveTarget(position=position, wxyz=wxyz, ended=ended))
         now[0] += after
         actions.settle()
         return store.state.plan.complete

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from rcilab.app import requests
-from rcilab.app.goal.goal_actions import initial_goal
-from rcilab.app.run.folder_actions import FolderActions, megabytes
+from rcilab.app.goal.goal import goal_at
+from rcilab.app.run.folder_actions import ClearRuns, FolderActions, megabytes
 from rcilab.app.store import Store, UiState
 from rcilab.model.robot_model import load_model
 
@@ -14,11 +13,11 @@ MODEL = load_model("xMatePro7")
 def test_runs_are_deleted_after_a_second_yes_for_as_many_as_were_asked_about(tmp_path):
     for number in range(8):
         (tmp_path / f"{number}.rcirun").write_bytes(b"x" * 1000)
-    store = Store(UiState(model=MODEL, goal=initial_goal(MODEL, MODEL.home), runs=tmp_path))
+    store = Store(UiState(model=MODEL, goal=goal_at(MODEL, MODEL.home), runs=tmp_path))
     actions = FolderActions(store)
 
     def clear(what, keep=5) -> int:
-        actions.clear(requests.ClearRuns(what=what, keep=keep))
+        actions.clear(ClearRuns(what=what, keep=keep))
         return len(list(tmp_path.iterdir()))
 
     actions.tick()

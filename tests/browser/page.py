@@ -8,7 +8,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from rcilab.app import requests
+from rcilab.app.goal.goal_actions import PoseGoal, SetLaw, SetSpeed
+from rcilab.app.view_actions import SetView
 
 _PROJECT = """([name, offset]) => {
   const m = __viserMutable, node = m.nodeRefFromName[name];
@@ -78,13 +79,13 @@ class BenchPage:
         if self.status.phase == "fault":
             self.bench.session.recover().wait(10.0)
         self.wait(lambda: self.status.phase == "idle" and bool(self.status.powered), "a powered, idle arm", 30.0)
-        ask(requests.SetView(name="language", value="en"))
-        ask(requests.SetSpeed(speed=0.5))
-        ask(requests.SetLaw(law="torque_rate_limited"))
+        ask(SetView(name="language", value="en"))
+        ask(SetSpeed(speed=0.5))
+        ask(SetLaw(law="torque_rate_limited"))
 
         while True:  # Again when a slider of the last test has only now told what it had to.
             before = self.state.goal
-            ask(requests.PoseGoal(name="here"))
+            ask(PoseGoal(name="here"))
             self.wait(lambda before=before: self.state.goal is not before, "the goal to be posed")
             if self.state.plan is None:
                 break

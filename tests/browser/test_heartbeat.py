@@ -7,7 +7,8 @@ import time
 import numpy as np
 import pytest
 
-from rcilab.app import requests
+from rcilab.app.goal.goal_actions import SetSpeed
+from rcilab.app.run.run_actions import RobotCommand
 from tests.browser.page import BenchPage, wait_for
 
 pytestmark = pytest.mark.browser
@@ -50,9 +51,9 @@ def test_a_moving_arm_stops_when_the_page_that_holds_the_controls_is_gone(chromi
             page.wait_until_drawn()
             page.wait(lambda: page.status.phase == "idle" and bool(page.status.powered), "a powered, idle arm", 30.0)
             page.wait(lambda: page.state.lease.holder is not None, "a holder", 20.0)
-            bench.conductor.ask(requests.SetSpeed(speed=0.01))
+            bench.conductor.ask(SetSpeed(speed=0.01))
             page.plan_to(1, 50.0)
-            bench.conductor.ask(requests.RobotCommand(what="execute"))
+            bench.conductor.ask(RobotCommand(what="execute"))
             page.wait(lambda: page.status.code == "moving" and (page.status.motion_time or 0.0) > 0.1, "a moving arm")
             if way == "closed":
                 tab.close()

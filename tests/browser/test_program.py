@@ -7,14 +7,16 @@ import json
 import pytest
 
 from browser.test_settings import choose
-from rcilab.app import requests
+from rcilab.app.program.edit_actions import EditProgram
+from rcilab.app.program.program_actions import LoadProgram
+from rcilab.app.view_actions import SetView
 from rcilab.motion import Program, Waypoint
 
 
 @pytest.fixture
 def writing(page):
     """The Program tab with two waypoints, added by hand."""
-    page.bench.conductor.ask(requests.EditProgram(what="clear"))
+    page.bench.conductor.ask(EditProgram(what="clear"))
     page.type_joint(1, "12")
     page.wait(lambda: page.state.plan is not None, "a target to add")
     page.open_tab("Program")
@@ -23,8 +25,8 @@ def writing(page):
     page.button("Add from arm").click()
     page.wait(lambda: page.tab.get_by_role("option").count() == 2, "two rows")
     yield page
-    page.bench.conductor.ask(requests.EditProgram(what="clear"))
-    page.bench.conductor.ask(requests.SetView(name="loop", value=False))
+    page.bench.conductor.ask(EditProgram(what="clear"))
+    page.bench.conductor.ask(SetView(name="loop", value=False))
 
 
 def field(page, name: str):
@@ -80,9 +82,9 @@ def test_a_program_is_written_by_keyboard_planned_saved_and_loaded(writing, tmp_
 def test_a_waypoint_of_a_file_has_its_own_type_in_the_editor(writing):
     page, home = writing, writing.state.model.home
     program = Program(model=page.state.model.name, start=home, waypoints=(Waypoint.nullspace(0.3),))
-    page.bench.conductor.ask(requests.LoadProgram(name="elbow.json", content=program.to_json().encode()))
+    page.bench.conductor.ask(LoadProgram(name="elbow.json", content=program.to_json().encode()))
     page.wait(lambda: len(page.state.program.draft.steps) == 1, "the program")
     page.wait(lambda: field(page, "Type").input_value() == "Elbow", "the type that the list shows")
     assert field(page, "Type").is_disabled()
-    page.bench.conductor.ask(requests.EditProgram(what="add", source="here"))
+    page.bench.conductor.ask(EditProgram(what="add", source="here"))
     page.wait(lambda: field(page, "Type").input_value() == "MoveJ", "the type of the new waypoint")

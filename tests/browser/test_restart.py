@@ -47,7 +47,7 @@ def test_a_page_loads_itself_again_when_another_workbench_answers_at_its_address
 def test_a_browser_without_a_graphics_card_draws_lightly_and_a_change_of_graphics_loads_the_page_again(
     chromium, tmp_path
 ) -> None:
-    from rcilab.app import requests
+    from rcilab.app.view_actions import SetView
     from rcilab.workbench.app import Workbench, WorkbenchConfig
 
     drawn = "document.documentElement.dataset.rlReady !== undefined && document.documentElement.dataset.rlQuality"
@@ -58,7 +58,7 @@ def test_a_browser_without_a_graphics_card_draws_lightly_and_a_change_of_graphic
             tab.goto(f"{bench.url}?fixedDpr=0.2")
             wait_for(lambda: look(tab, drawn) == "light", "light graphics", 60.0, tab)
             for quality in ("full", "light"):
-                bench.conductor.ask(requests.SetView(name="quality", value=quality))
+                bench.conductor.ask(SetView(name="quality", value=quality))
                 wait_for(lambda wanted=quality: look(tab, drawn) == wanted, f"{quality} graphics", 60.0, tab)
             wait_for(lambda: look(tab, _OPACITY) == 1.0, "a solid arm", 60.0, tab)
             bench.session.disconnect()

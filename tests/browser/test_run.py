@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from browser.page import close_toasts
-from rcilab.app import requests
+from rcilab.app.goal.goal_actions import SetSpeed
 from rcilab.app.text import message
 
 
@@ -58,7 +58,7 @@ def is_open(page, name: str) -> bool:
 
 def stop_in_mid_motion(page, press) -> None:
     start = np.array(page.status.q_c)
-    page.bench.conductor.ask(requests.SetSpeed(speed=0.05))
+    page.bench.conductor.ask(SetSpeed(speed=0.05))
     page.plan_to(1, 60.0 if start[0] <= 0 else -60.0)
     goal = np.array(page.state.goal.q)
     page.open_tab("Run")

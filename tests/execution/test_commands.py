@@ -8,13 +8,7 @@ import numpy as np
 import pytest
 
 from rcilab.conformance import check
-from rcilab.core.errors import (
-    CertificateError,
-    CommandRejectedError,
-    DeadlineError,
-    InvalidValueError,
-    UsageError,
-)
+from rcilab.core.errors import CertificateError, CommandRejectedError, DeadlineError, InvalidValueError, UsageError
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.makers.rokae import wire as rci

@@ -11,13 +11,7 @@ import pytest
 from rcilab.control_process.launch import start_controller
 from rcilab.control_process.simulate import simulate
 from rcilab.core.command import CartesianPosition, JointPosition
-from rcilab.core.errors import (
-    CommandRejectedError,
-    ConnectionLostError,
-    ControlError,
-    InvalidValueError,
-    UsageError,
-)
+from rcilab.core.errors import CommandRejectedError, ConnectionLostError, ControlError, InvalidValueError, UsageError
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import IDENTITY, Pose
 from rcilab.execution import connect

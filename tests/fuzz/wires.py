@@ -14,7 +14,7 @@ import viser
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
-from rcilab.app import requests
+from rcilab.app.view_actions import SetView
 from rcilab.workbench.app import Workbench
 from tests.fuzz.noise import spoilt
 from tests.makers.rokae.controller.test_server import running
@@ -163,7 +163,7 @@ def fuzz_page(count: int, seed: int) -> None:
         bar.close()
         assert sent > count // 2
         height = bench.store.state.height + 1.0
-        bench.conductor.ask(requests.SetView(name="height", value=height))
+        bench.conductor.ask(SetView(name="height", value=height))
         wait(lambda: bench.store.state.height == height, "the conductor to go on")
         assert bench.session.status().phase == "idle"
         with _enter(bench) as fresh:

@@ -17,13 +17,7 @@ from rcilab.core.errors import CommandRejectedError, PlanningError, RcilabError,
 from rcilab.i18n.error_messages import _ADVISING, tell, tell_note
 from rcilab.i18n.locale import LANGUAGES, load_words
 from rcilab.i18n.translator import Finished, Message, Remark, Text
-from rcilab.makers.rokae.wire import (
-    GuideStatus,
-    RecoveryStatus,
-    SettingStatus,
-    StartStatus,
-    StopStatus,
-)
+from rcilab.makers.rokae.wire import GuideStatus, RecoveryStatus, SettingStatus, StartStatus, StopStatus
 
 
 def coded() -> Iterator[tuple[str, set[str | None]]]:

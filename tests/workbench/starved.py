@@ -13,7 +13,9 @@ from pathlib import Path
 
 import msgspec
 
-from rcilab.app import requests
+from rcilab.app.goal.goal_actions import MoveJoint, PlanGoal, SetSpeed
+from rcilab.app.run.run_actions import ChooseRobot, RobotCommand
+from rcilab.app.view_actions import SetRecording
 from rcilab.workbench.app import Workbench, WorkbenchConfig
 from tests.fuzz.wires import open_page
 from tests.workbench.opened import told, wait
@@ -29,7 +31,7 @@ def workbench(plant: str, runs: Path | None = None) -> Iterator[Workbench]:
         wait(lambda: is_ready(bench), "an idle arm")
         if plant == "mujoco":
             pid = bench.session.status().controller_pid
-            bench.conductor.ask(requests.ChooseRobot(plant="mujoco"))
+            bench.conductor.ask(ChooseRobot(plant="mujoco"))
             wait(lambda: bench.session.status().controller_pid not in (None, pid), "another controller")
             wait(lambda: is_ready(bench), "a powered arm")
         yield bench
@@ -69,14 +71,14 @@ def swing(bench: Workbench) -> None:
     ask, status = bench.conductor.ask, bench.session.status
     wait(lambda: is_ready(bench), "an idle arm")
     goal = -0.4 if status().q_c[0] > 0.0 else 0.4
-    ask(requests.SetSpeed(speed=0.5))
-    ask(requests.MoveJoint(joint=0, angle=goal))
+    ask(SetSpeed(speed=0.5))
+    ask(MoveJoint(joint=0, angle=goal))
     wait(
         lambda: bench.store.state.plan is not None and abs(bench.store.state.plan.motion.goal[0] - goal) < 1e-9, "plan"
     )
-    ask(requests.Plan())
+    ask(PlanGoal())
     wait(lambda: bench.store.state.plan is not None and bench.store.state.plan.complete, "a judged plan")
-    ask(requests.RobotCommand(what="execute"))
+    ask(RobotCommand(what="execute"))
     wait(lambda: abs(float(status().q_c[0]) - goal) < 1e-6, "the arm to arrive")
 
 
@@ -94,7 +96,7 @@ def stop_everything(plant: str, seconds: float) -> None:
         wait(lambda: bench.session.status().phase in ("idle", "fault", "lost"), "the arm to rest", 60.0)
         wait(lambda: told(bench) is not None, "to be told")
         if bench.session.status().phase == "lost":  # The controller slept for longer than it is waited for.
-            bench.conductor.ask(requests.ChooseRobot(target="virtual"))  # "Start it again".
+            bench.conductor.ask(ChooseRobot(target="virtual"))  # "Start it again".
             wait(lambda: is_ready(bench), "another controller", 60.0)
             start = float(bench.session.status().q_c[0])
         assert abs(float(bench.session.status().q_c[0]) - start) < 0.79, "it did not go on as if nothing had been"
@@ -139,7 +141,7 @@ def fill_the_disk(plant: str, folder: Path) -> None:
     subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "none", str(folder)], check=True)
     try:
         with workbench(plant, folder) as bench:
-            bench.conductor.ask(requests.SetRecording(on=True))
+            bench.conductor.ask(SetRecording(on=True))
             swing(bench)
             wait(lambda: bench.store.state.recording is not None, "the run")
             wait(lambda: told(bench) == "record.unwritable", "to be told")

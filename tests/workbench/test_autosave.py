@@ -11,11 +11,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rcilab.app import requests
 from rcilab.app.autosave import Autosave, keepsake_file
-from rcilab.app.goal.goal_actions import initial_goal
+from rcilab.app.goal.goal import goal_at
+from rcilab.app.goal.goal_actions import MoveJoint
+from rcilab.app.program.edit_actions import EditProgram
+from rcilab.app.program.program_actions import LoadProgram
 from rcilab.app.program.program_draft import draft_of
+from rcilab.app.request import TypeField
+from rcilab.app.run.run_actions import ChooseRobot
 from rcilab.app.store import UiState
+from rcilab.app.view_actions import SetView
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.makers.rokae.driver.configuration import ForceControlFrame, RobotConfiguration
@@ -41,7 +46,7 @@ SETUP = RobotConfiguration(
 
 
 def state_with_all() -> UiState:
-    state = UiState(model=MODEL, goal=initial_goal(MODEL, GOAL))
+    state = UiState(model=MODEL, goal=goal_at(MODEL, GOAL))
     wanted = state.setup.wanted.updated(SETUP)
     state = replace(state, setup=replace(state.setup, wanted=wanted, touched=frozenset(SETUP.parts)))
     return replace(state, program=replace(state.program, draft=draft_of(PROGRAM, MODEL)))
@@ -59,7 +64,7 @@ def test_what_was_kept_is_recalled(tmp_path):
     assert kept.setup.force.type is ForceFrame.TOOL
     other = load_model("xMate3")
     assert keepsake.recall(other) is None
-    keepsake.keep(UiState(model=other, goal=initial_goal(other, other.home)))
+    keepsake.keep(UiState(model=other, goal=goal_at(other, other.home)))
     assert np.array_equal(Autosave(tmp_path / "deep" / "kept.json").recall(MODEL).q, GOAL), "each arm has its own"
 
 
@@ -96,9 +101,9 @@ def test_the_next_workbench_at_the_port_has_goal_plan_and_program():
     with Workbench(WorkbenchConfig(port=port)) as bench:
         wait_for(lambda: bench.session.status().phase == "idle", what="an idle arm")
         for joint, angle in enumerate(GOAL.tolist()):
-            bench.conductor.ask(requests.MoveJoint(joint=joint, angle=angle))
-        bench.conductor.ask(requests.TypeField(field="setup.tool.z", text="120"))
-        bench.conductor.ask(requests.LoadProgram(name="mine.json", content=PROGRAM.to_json().encode()))
+            bench.conductor.ask(MoveJoint(joint=joint, angle=angle))
+        bench.conductor.ask(TypeField(field="setup.tool.z", text="120"))
+        bench.conductor.ask(LoadProgram(name="mine.json", content=PROGRAM.to_json().encode()))
         wait_for(lambda: is_kept(file), what="the goal and the program to be written down")
         left = file.read_text()
     with Workbench(WorkbenchConfig(port=port)) as bench:
@@ -106,7 +111,7 @@ def test_the_next_workbench_at_the_port_has_goal_plan_and_program():
         assert len(bench.store.state.program.draft.steps) == 2
         assert not np.allclose(bench.store.state.goal.q, GOAL, atol=1e-3)
         assert bench.store.state.setup.touched == frozenset()
-        bench.conductor.ask(requests.EditProgram(what="clear"))
+        bench.conductor.ask(EditProgram(what="clear"))
         wait_for(lambda: not bench.store.state.program.draft.steps, what="an empty program")
     assert not file.exists()
     file.write_text(left)  # As if it had been killed.
@@ -128,11 +133,11 @@ def test_an_arm_that_was_exchanged_before_a_crash_has_its_set_up_again_when_it_i
     kept = Autosave(file)
     kept.keep(state_with_all())
     kept._next = 0.0
-    kept.keep(UiState(model=other, goal=initial_goal(other, other.home)))
+    kept.keep(UiState(model=other, goal=goal_at(other, other.home)))
     with Workbench(WorkbenchConfig(port=port, model="xMate3")) as bench:
         wait_for(lambda: bench.session.status().phase == "idle", what="an idle arm")
         assert bench.store.state.model.name == "xMate3"
-        bench.conductor.ask(requests.ChooseRobot(model=MODEL.name))
+        bench.conductor.ask(ChooseRobot(model=MODEL.name))
         wait_for(lambda: bench.store.state.model.name == MODEL.name, what="the other arm")
         assert bench.store.state.model.T_flange_tool.is_close(SETUP.tool, 1e-12)
         assert bench.store.state.setup.wanted.load.mass == SETUP.load.mass
@@ -157,7 +162,7 @@ def test_programs_of_other_arms_and_a_look_at_a_recording_lose_nothing():
     with Workbench(WorkbenchConfig(port=port, model="xMate3")) as bench:
         wait_for(lambda: bench.session.status().phase == "idle", what="an idle arm")
         assert not bench.store.state.program.draft.steps
-        bench.conductor.ask(requests.ChooseRobot(model=MODEL.name))
+        bench.conductor.ask(ChooseRobot(model=MODEL.name))
         wait_for(lambda: len(bench.store.state.program.draft.steps) == 2, what="the program of the other arm")
     assert len(Autosave(keepsake_file(port)).recall(MODEL).program.waypoints) == 2
     keepsake_file(port).unlink()
@@ -170,7 +175,7 @@ def test_how_the_page_looks_comes_back_and_a_language_that_is_asked_for_wins(mon
         port = free.getsockname()[1]
     with Workbench(WorkbenchConfig(port=port)) as bench:
         for name, value in (("language", "zh"), ("theme", "dark"), ("angle", "rad"), ("length", "m")):
-            bench.conductor.ask(requests.SetView(page=None, name=name, value=value))
+            bench.conductor.ask(SetView(page=None, name=name, value=value))
         wait_for(lambda: bench.store.state.units.length == "m", what="the settings")
     with Workbench(WorkbenchConfig(port=port)) as bench:
         state = bench.store.state

@@ -10,12 +10,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rcilab.app import requests
-from rcilab.app.check.check_actions import CheckActions, plot_of
+from rcilab.app.check.check_actions import CheckActions, PressCheck, plot_of
 from rcilab.app.check.slowdown_job import scaled, slow_to_goal
-from rcilab.app.goal.goal_actions import GoalActions, initial_goal
+from rcilab.app.goal.goal import goal_at
+from rcilab.app.goal.goal_actions import GoalActions
 from rcilab.app.planning import Plan
-from rcilab.app.program.program_actions import ProgramActions
+from rcilab.app.program.edit_actions import EditProgram
+from rcilab.app.program.program_actions import PlanProgram, ProgramActions
 from rcilab.app.program.program_draft import Draft, number_at
 from rcilab.app.store import Store, UiState
 from rcilab.app.text import Text
@@ -39,7 +40,7 @@ class Bench:
 
     def __init__(self, model=MODEL) -> None:
         session = SimpleNamespace(status=lambda: SimpleNamespace(phase="idle", q_c=HOME))
-        self.store = Store(UiState(model=model, goal=initial_goal(model, HOME)))
+        self.store = Store(UiState(model=model, goal=goal_at(model, HOME)))
         self.goal = GoalActions(self.store, session)
         self.program = ProgramActions(self.store, session, self.goal)
         self.program.tick()
@@ -63,7 +64,7 @@ class Bench:
         assert broken(self.plan)
 
     def press(self, what, row: str = "") -> None:
-        self.check.press(requests.Check(what=what, row=row))
+        self.check.press(PressCheck(what=what, row=row))
 
     def settle(self) -> None:
         def done() -> bool:
@@ -152,7 +153,7 @@ def planned_program(bench: Bench) -> Draft:
         Waypoint.line(Pose(place.position, place.wxyz), speed=0.5),
     )
     bench.program.restore(Program(model=MODEL.name, start=MODEL.home, waypoints=waypoints))
-    bench.program.plan(requests.PlanProgram())
+    bench.program.plan(PlanProgram())
 
     def planned() -> bool:
         bench.program.tick()
@@ -186,7 +187,7 @@ def test_a_program_that_is_exchanged_for_a_slower_one_can_be_had_back(bench: Ben
     assert [step.waypoint.speed for step in slow.steps] == [0.5, 0.25]
     bench.program.exchange(slow, fast)
     assert bench.state.program.planned is bench.state.program.draft is slow
-    bench.program.editing.edit(requests.EditProgram(what="undo"))
+    bench.program.editing.edit(EditProgram(what="undo"))
     assert bench.state.program.draft is draft
 
 

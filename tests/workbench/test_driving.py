@@ -8,11 +8,17 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from rcilab.app import requests
+from rcilab.app.goal.goal_actions import MoveJoint, SetLaw, SetSpeed
+from rcilab.app.request import TypeField
 from rcilab.app.run.drive_state import control_field
+from rcilab.app.run.mode_actions import PressControl, SetDrive
 from rcilab.app.run.mode_parameters import PARTS_OF_MODE, said_ranges
 from rcilab.app.run.played_motion import played_path
+from rcilab.app.run.run_actions import RobotCommand
+from rcilab.app.run.target_robot_actions import ChooseDestination
+from rcilab.app.run.world_actions import PressSafety, SetNetwork
 from rcilab.app.text import Text, load_catalogue
+from rcilab.app.view_actions import ShowPlot
 from rcilab.control_process.jitter_histogram import JitterHistogram, summarise
 from rcilab.core.state import MODES
 from rcilab.makers.rokae.controller.settings import default_settings
@@ -33,7 +39,7 @@ def bench() -> Iterator[Workbench]:
 
 @pytest.fixture
 def idle(bench):
-    bench.conductor.ask(requests.SetDrive(mode="joint_position", pace=1.0))
+    bench.conductor.ask(SetDrive(mode="joint_position", pace=1.0))
     settle(bench)
     return bench
 
@@ -46,7 +52,7 @@ def settle(bench):
         nonlocal was_faulty
         status = bench.session.status()
         if status.phase == "fault" and not was_faulty:
-            bench.conductor.ask(requests.RobotCommand(what="recover"))
+            bench.conductor.ask(RobotCommand(what="recover"))
         was_faulty = status.phase == "fault"
         return status.phase == "idle" and bool(status.powered)
 
@@ -57,8 +63,8 @@ def plan(bench, speed=0.1, way=0.8):
     """Poses the goal, so that a motion of some seconds is planned and judged."""
     ask, q = bench.conductor.ask, bench.session.status().q_c
     before = bench.store.state.plan
-    ask(requests.SetSpeed(speed=speed))
-    ask(requests.MoveJoint(joint=0, angle=float(q[0]) + (way if q[0] < 0.1 else -way)))
+    ask(SetSpeed(speed=speed))
+    ask(MoveJoint(joint=0, angle=float(q[0]) + (way if q[0] < 0.1 else -way)))
 
     def planned() -> bool:
         state = bench.store.state
@@ -69,7 +75,7 @@ def plan(bench, speed=0.1, way=0.8):
 
 
 def execute(bench, place=0.3):
-    bench.conductor.ask(requests.RobotCommand(what="execute"))
+    bench.conductor.ask(RobotCommand(what="execute"))
     wait(
         lambda: bench.session.status().code == "moving" and (bench.session.status().motion_time or 0.0) > place,
         "the arm on its way",
@@ -103,47 +109,47 @@ def test_fields_that_do_not_exist_are_none(name):
 
 def test_a_typed_parameter_is_told_acknowledged_and_read_back(idle):
     ask = idle.conductor.ask
-    ask(requests.TypeField(field="control.joint_stiffness.2", text="1234 N·m/rad"))
+    ask(TypeField(field="control.joint_stiffness.2", text="1234 N·m/rad"))
     wait(
         lambda: (c := idle.session.status().setup.control) is not None and c.joint_stiffness[2] == 1234.0, "the answer"
     )
-    ask(requests.TypeField(field="control.joint_stiffness.2", text="30000"))
+    ask(TypeField(field="control.joint_stiffness.2", text="30000"))
     wait(lambda: "control.joint_stiffness.2" in idle.store.state.problems, "the complaint")
     assert idle.store.state.drive.control.joint_stiffness[2] == 1234.0
-    ask(requests.PressControl(what="reset"))
+    ask(PressControl(what="reset"))
     wait(lambda: idle.session.status().setup.control == standard_control(MODEL.limits), "the defaults")
     assert "control.joint_stiffness.2" not in idle.store.state.problems
 
 
 def test_the_plan_is_judged_by_the_conditions_of_the_mode(idle):
-    idle.conductor.ask(requests.SetLaw(law="jerk_limited"))
+    idle.conductor.ask(SetLaw(law="jerk_limited"))
     plan(idle, speed=0.5)
     assert idle.store.state.plan.report.ok
-    idle.conductor.ask(requests.SetDrive(mode="torque"))
+    idle.conductor.ask(SetDrive(mode="torque"))
     wait(lambda: idle.store.state.plan.mode == "torque", "another judgement")
     report = idle.store.state.plan.report
     assert {row.condition.id for row in report.rows} >= {"torque.rate", "torque.range"}
     assert not report.ok  # Half of the speed asks for more than the torque rate.
-    idle.conductor.ask(requests.RobotCommand(what="execute"))
+    idle.conductor.ask(RobotCommand(what="execute"))
     wait(lambda: told(idle) == "ready.violations", "the refusal")
-    idle.conductor.ask(requests.SetDrive(mode="sideways"))
-    idle.conductor.ask(requests.SetDrive(mode="joint_position"))
+    idle.conductor.ask(SetDrive(mode="sideways"))
+    idle.conductor.ask(SetDrive(mode="joint_position"))
     wait(lambda: idle.store.state.plan.report.ok, "the first judgement again")
-    idle.conductor.ask(requests.SetLaw(law="torque_rate_limited"))
+    idle.conductor.ask(SetLaw(law="torque_rate_limited"))
 
 
 def test_paused_gone_on_with_slower_and_recorded_as_it_was(idle):
-    idle.conductor.ask(requests.SetDrive(mode="joint_impedance"))
+    idle.conductor.ask(SetDrive(mode="joint_impedance"))
     wait(lambda: idle.store.state.drive.mode == "joint_impedance", "the mode")
     plan(idle)
     motion = idle.store.state.plan.motion
     execute(idle)
-    idle.conductor.ask(requests.RobotCommand(what="pause"))
+    idle.conductor.ask(RobotCommand(what="pause"))
     wait(lambda: idle.session.status().code == "moving.held", "the pause")
-    idle.conductor.ask(requests.SetDrive(mode="torque"))
+    idle.conductor.ask(SetDrive(mode="torque"))
     wait(lambda: told(idle) == "notice.moving", "the refusal of another mode in mid-motion")
-    idle.conductor.ask(requests.SetDrive(pace=0.7))
-    idle.conductor.ask(requests.RobotCommand(what="resume"))
+    idle.conductor.ask(SetDrive(pace=0.7))
+    idle.conductor.ask(RobotCommand(what="resume"))
     wait(lambda: idle.session.status().pace == pytest.approx(0.7), "the way on")
     wait(lambda: told(idle) == "notice.arrived", "the arrival")
     wait(lambda: idle.store.state.last_run is not None and idle.store.state.last_run.run is not None, "the run")
@@ -158,13 +164,13 @@ def test_paused_gone_on_with_slower_and_recorded_as_it_was(idle):
 
 
 def test_the_speed_of_the_slider_counts_from_the_start_and_a_pause_needs_a_motion(idle):
-    idle.conductor.ask(requests.RobotCommand(what="pause"))
+    idle.conductor.ask(RobotCommand(what="pause"))
     wait(lambda: told(idle) == "pace.nothing", "the answer")
-    idle.conductor.ask(requests.SetDrive(pace=0.2))
+    idle.conductor.ask(SetDrive(pace=0.2))
     plan(idle)
     execute(idle)
     wait(lambda: idle.session.status().pace == pytest.approx(0.2), "the slow motion")
-    idle.conductor.ask(requests.RobotCommand(what="stop"))
+    idle.conductor.ask(RobotCommand(what="stop"))
     wait(lambda: idle.session.status().phase == "idle", "rest")
 
 
@@ -177,10 +183,10 @@ def test_a_stop_undoes_what_was_pressed_before_it_and_not_yet_looked_at(idle, mo
         is_busy.set()
         may_go_on.wait(10.0)
 
-    monkeypatch.setitem(bench.conductor._actions, requests.ShowPlot, be_busy)
-    bench.conductor.ask(requests.ShowPlot(name="q", on=True))
+    monkeypatch.setitem(bench.conductor._handlers, ShowPlot, be_busy)
+    bench.conductor.ask(ShowPlot(name="q", on=True))
     assert is_busy.wait(10.0)
-    bench.conductor.ask(requests.RobotCommand(what="execute"))
+    bench.conductor.ask(RobotCommand(what="execute"))
     bench.session.stop()
     may_go_on.set()
     wait(lambda: "error.stopped_before" in str(bench.store.state.notice), "the word that it was stopped before")
@@ -194,51 +200,51 @@ def test_a_stop_undoes_what_was_pressed_before_it_and_not_yet_looked_at(idle, mo
 def test_the_cable_is_pulled_in_a_motion_and_plugged_in_again(idle):
     plan(idle)
     execute(idle, 0.1)
-    idle.conductor.ask(requests.SetNetwork(pulled=True))
+    idle.conductor.ask(SetNetwork(pulled=True))
     wait(lambda: idle.session.status().phase == "lost", "the loss to be noticed")
-    idle.conductor.ask(requests.SetNetwork(pulled=False))
+    idle.conductor.ask(SetNetwork(pulled=False))
     wait(lambda: not idle.store.state.drive.pulled, "the cable in")
-    idle.conductor.ask(requests.SetNetwork(name="loss", value=9.0))
+    idle.conductor.ask(SetNetwork(name="loss", value=9.0))
     wait(lambda: (w := idle.store.state.drive.world) is not None and w.commands.loss == 0.3, "the bound of the slider")
-    idle.conductor.ask(requests.SetNetwork(clear=True))
+    idle.conductor.ask(SetNetwork(clear=True))
     wait(lambda: (w := idle.store.state.drive.world) is not None and w.commands.spares_datagrams, "a good network")
-    idle.conductor.ask(requests.RobotCommand(what="reconnect"))
+    idle.conductor.ask(RobotCommand(what="reconnect"))
     wait(lambda: idle.session.status().phase in ("idle", "fault"), "the connection")
     settle(idle)
 
 
 def test_the_emergency_stop_has_a_way_out(idle):
     ask = idle.conductor.ask
-    ask(requests.PressSafety(button="estop"))
+    ask(PressSafety(button="estop"))
     wait(lambda: idle.session.status().powered is False, "the motors off")
     wait(lambda: idle.store.state.drive.world.button == "estop", "the button to show")
-    ask(requests.PressSafety(button="none"))
+    ask(PressSafety(button="none"))
     wait(lambda: idle.store.state.drive.world.button == "none", "the release")
-    ask(requests.RobotCommand(what="power_on"))
+    ask(RobotCommand(what="power_on"))
     wait(lambda: bool(idle.session.status().powered), "the motors on")
     assert idle.session.status().faults == ()
 
 
 def test_an_address_is_named_once_more_and_preview_connects_to_nothing(idle):
     ask = idle.conductor.ask
-    ask(requests.ChooseDestination(where="address", address=" rci://127.0.0.1:9 "))
+    ask(ChooseDestination(where="address", address=" rci://127.0.0.1:9 "))
     wait(lambda: idle.store.state.drive.typed_address == "rci://127.0.0.1:9", "the question")
     assert idle.store.state.target == "virtual"
-    ask(requests.ChooseDestination(where="address", answer="no"))
+    ask(ChooseDestination(where="address", answer="no"))
     wait(lambda: idle.store.state.drive.typed_address == "", "the end of it")
-    ask(requests.ChooseDestination(where="address", address="rci://127.0.0.1:9"))
+    ask(ChooseDestination(where="address", address="rci://127.0.0.1:9"))
     wait(lambda: idle.store.state.drive.typed_address == "rci://127.0.0.1:9", "the question again")
-    ask(requests.ChooseDestination(where="address", address="999.1.1.1"))
+    ask(ChooseDestination(where="address", address="999.1.1.1"))
     wait(lambda: told(idle) == "address.bad", "the complaint")
     assert idle.store.state.drive.typed_address == "", "the question was about another address"
-    ask(requests.ChooseDestination(where="address", address="rci://127.0.0.1:9"))
+    ask(ChooseDestination(where="address", address="rci://127.0.0.1:9"))
     wait(lambda: idle.store.state.drive.typed_address == "rci://127.0.0.1:9", "the question again")
-    ask(requests.ChooseDestination(where="address", address="rci://127.0.0.1:10", answer="yes"))
+    ask(ChooseDestination(where="address", address="rci://127.0.0.1:10", answer="yes"))
     wait(lambda: idle.store.state.drive.typed_address == "rci://127.0.0.1:10", "the question about the other one")
     assert idle.store.state.target == "virtual", "a yes to one address connects to no other"
-    ask(requests.ChooseDestination(where="preview"))
+    ask(ChooseDestination(where="preview"))
     wait(lambda: idle.session.status().phase == "closed", "nothing connected")
-    ask(requests.ChooseDestination(where="ideal"))
+    ask(ChooseDestination(where="ideal"))
     wait(lambda: idle.session.status().phase == "idle", "the virtual controller again")
 
 

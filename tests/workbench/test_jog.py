@@ -10,17 +10,20 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rcilab.app import requests
 from rcilab.app.control_lock import ControlLock
-from rcilab.app.goal.goal_actions import GoalActions, initial_goal
+from rcilab.app.goal.goal import goal_at
+from rcilab.app.goal.goal_actions import GoalActions, PoseGoal
+from rcilab.app.goal.named_pose_actions import NamedPose
 from rcilab.app.jog import jog_actions
-from rcilab.app.jog.jog_actions import JogActions
+from rcilab.app.jog.jog_actions import JogActions, SetJog
 from rcilab.app.jog.jog_state import (
     AXES,
     FASTEST_TOOL,
     STANDING,
     Axis,
+    HoldJog,
     JogState,
+    PressJog,
     box_share,
     jog_velocity,
     safe_share,
@@ -76,7 +79,7 @@ class FakeSession:
 
 @pytest.fixture
 def store() -> Store:
-    store = Store(UiState(model=MODEL, goal=initial_goal(MODEL, MODEL.home)))
+    store = Store(UiState(model=MODEL, goal=goal_at(MODEL, MODEL.home)))
     store.update(lease=ControlLock((1, 2), 1))
     return store
 
@@ -97,12 +100,12 @@ def jog(store, session, monkeypatch) -> JogActions:
 @pytest.fixture
 def robot(jog, session):
     """The robot under the buttons; returns what is held of it."""
-    jog.set_jog(requests.SetJog(page=1, robot=True))
+    jog.set_jog(SetJog(page=1, robot=True))
     return session.fake
 
 
 def hold(jog, axis="joint.1", sign=1, page=1) -> None:
-    jog.hold(requests.HoldJog(page=page, axis=axis, sign=sign))
+    jog.hold(HoldJog(page=page, axis=axis, sign=sign))
 
 
 def said(store) -> str | None:
@@ -148,20 +151,20 @@ def test_a_held_button_moves_the_goal_as_the_robot_would_go_and_undo_brings_it_b
         jog.tick(0.03)
     held = store.state.goal.q[0]
     assert held < -0.01
-    jog.press(requests.PressJog(page=1, axis="joint.0", sign=-1))
+    jog.press(PressJog(page=1, axis="joint.0", sign=-1))
     for _ in range(10):
         jog.tick(0.03)
     rest = store.state.goal.q[0]
     jog.tick(0.03)
     assert store.state.goal.q[0] == rest < held
     assert store.state.plan is not None
-    GoalActions(store, session).pose_goal(requests.PoseGoal(name="undo"))
+    GoalActions(store, session).pose_goal(PoseGoal(name="undo"))
     assert np.array_equal(store.state.goal.q, MODEL.home)
     assert session.fake.held is None
 
 
 def test_a_goal_that_is_held_against_a_limit_stands_there_and_says_so(jog, store):
-    jog.set_jog(requests.SetJog(speed=1.0))
+    jog.set_jog(SetJog(speed=1.0))
     hold(jog, "joint.5")
     for _ in range(50):
         hold(jog, "joint.5")
@@ -173,7 +176,7 @@ def test_a_goal_that_is_held_against_a_limit_stands_there_and_says_so(jog, store
 @pytest.mark.parametrize(("axis", "sign"), [("joint.7", 1), ("joint.-1", 1), ("w", 1), ("x", 0), ("x", 9), ("", 1)])
 def test_what_is_no_button_moves_nothing(jog, store, robot, axis, sign):
     hold(jog, axis, sign)
-    jog.press(requests.PressJog(page=1, axis=axis, sign=sign))
+    jog.press(PressJog(page=1, axis=axis, sign=sign))
     assert robot.held is None
     assert np.array_equal(store.state.goal.q, MODEL.home)
 
@@ -181,12 +184,12 @@ def test_what_is_no_button_moves_nothing(jog, store, robot, axis, sign):
 @pytest.mark.parametrize(
     ("request_", "field", "value"),
     [
-        (requests.SetJog(speed=math.nan), "speed", 0.3),
-        (requests.SetJog(speed=7.0), "speed", 1.0),
-        (requests.SetJog(speed=-1.0), "speed", 0.01),
-        (requests.SetJog(step=3.3), "step", 0.0),
-        (requests.SetJog(step=math.nan), "step", 0.0),
-        (requests.SetJog(frame="world"), "frame", "base"),
+        (SetJog(speed=math.nan), "speed", 0.3),
+        (SetJog(speed=7.0), "speed", 1.0),
+        (SetJog(speed=-1.0), "speed", 0.01),
+        (SetJog(step=3.3), "step", 0.0),
+        (SetJog(step=math.nan), "step", 0.0),
+        (SetJog(frame="world"), "frame", "base"),
     ],
 )
 def test_settings_that_do_not_exist_are_ignored(jog, store, request_, field, value):
@@ -199,9 +202,9 @@ def test_a_held_button_jogs_the_robot_and_its_release_ends_that_at_once(jog, rob
     kind, values = robot.held
     assert (kind, np.flatnonzero(values).tolist()) == ("joint", [1])
     assert values[1] < 0.0
-    jog.press(requests.PressJog(page=1, axis="joint.1", sign=-1))
+    jog.press(PressJog(page=1, axis="joint.1", sign=-1))
     assert robot.held is None
-    jog.set_jog(requests.SetJog(frame="tool"))
+    jog.set_jog(SetJog(frame="tool"))
     hold(jog, "z", 1)
     assert robot.held[0] == "tool"
 
@@ -233,11 +236,11 @@ def test_another_robot_is_not_under_the_buttons(jog, store, robot):
 def test_a_foreign_robot_is_jogged_only_after_a_second_yes(jog, store, session):
     store.update(target="rci://192.168.0.160:1337")
     jog.tick(0.03)
-    jog.set_jog(requests.SetJog(robot=True, agreed=True))  # A yes to a question that nobody has seen.
+    jog.set_jog(SetJog(robot=True, agreed=True))  # A yes to a question that nobody has seen.
     assert (store.state.jog.robot, store.state.jog.asked) == (False, True)
     hold(jog)
     assert session.fake.held is None
-    jog.set_jog(requests.SetJog(robot=True, agreed=True))
+    jog.set_jog(SetJog(robot=True, agreed=True))
     assert (store.state.jog.robot, store.state.jog.asked) == (True, False)
     hold(jog, "joint.2")
     assert session.fake.held is not None
@@ -256,9 +259,9 @@ def test_a_foreign_robot_is_jogged_only_after_a_second_yes(jog, store, session):
 @pytest.mark.parametrize("step", [0.0, 1.0])
 def test_a_robot_that_cannot_be_jogged_says_why(jog, store, session, robot, status, code, step):
     session.shown = status
-    jog.set_jog(requests.SetJog(step=step))
+    jog.set_jog(SetJog(step=step))
     hold(jog)
-    jog.press(requests.PressJog(page=1, axis="joint.1", sign=1)) if step else None
+    jog.press(PressJog(page=1, axis="joint.1", sign=1)) if step else None
     assert said(store) == code
     session.shown = IDLE
     hold(jog)  # Still held: it stays refused until it is pressed anew.
@@ -278,7 +281,7 @@ def test_a_jog_that_was_stopped_stays_stopped_though_the_button_is_still_held(jo
     assert robot.held is None
     assert said(store) == "jog.stopped"
     robot.ticket = SimpleNamespace(done=False, error=None)
-    jog.press(requests.PressJog(page=1, axis="joint.1", sign=1))
+    jog.press(PressJog(page=1, axis="joint.1", sign=1))
     hold(jog)
     assert robot.held is not None
 
@@ -319,17 +322,17 @@ def test_a_step_that_would_touch_the_floor_is_refused(jog, store, session, robot
     while MODEL.clearance(low).distance > 0.005:
         low[1] += 1e-3
     session.shown = replace(IDLE, q_c=low)
-    jog.set_jog(requests.SetJog(step=10.0))
-    jog.press(requests.PressJog(page=1, axis="joint.1", sign=1))
+    jog.set_jog(SetJog(step=10.0))
+    jog.press(PressJog(page=1, axis="joint.1", sign=1))
     assert said(store) == "jog.unsafe"
     assert robot.motion is None
 
 
 def test_a_step_of_the_robot_is_a_judged_motion_that_ends_where_it_shall(jog, robot):
-    jog.set_jog(requests.SetJog(step=1.0))
+    jog.set_jog(SetJog(step=1.0))
     hold(jog, "z", -1)
     assert robot.held is None
-    jog.press(requests.PressJog(page=1, axis="z", sign=-1))
+    jog.press(PressJog(page=1, axis="z", sign=-1))
     way = MODEL.forward(robot.motion.goal).position - MODEL.forward(MODEL.home).position
     assert way == pytest.approx([0.0, 0.0, -0.001], abs=1e-7)
 
@@ -340,33 +343,33 @@ def test_with_the_real_controller_the_goal_follows_the_arm_and_undo_brings_it_ba
         ask, store, status = bench.conductor.ask, bench.store, bench.session.status
         wait(lambda: store.state.plan is None and np.array_equal(store.state.goal.q, status().q_c), "the first look")
         start = np.array(store.state.goal.q)
-        ask(requests.SetJog(robot=True, speed=0.5))
+        ask(SetJog(robot=True, speed=0.5))
 
         def moved() -> bool:
-            ask(requests.HoldJog(axis="joint.3", sign=-1))
+            ask(HoldJog(axis="joint.3", sign=-1))
             time.sleep(0.05)
             return status().q_c[3] < start[3] - 0.05
 
         wait(moved, "the arm to move")
-        ask(requests.PressJog(axis="joint.3", sign=-1))
+        ask(PressJog(axis="joint.3", sign=-1))
         wait(lambda: status().code == "idle.jogged", "the arm to rest")
         wait(lambda: np.array_equal(store.state.goal.q, status().q_c), "the goal where the arm is")
         assert store.state.no_plan.code == "plan.here"
         assert np.delete(status().q_c, 3) == pytest.approx(np.delete(start, 3), abs=1e-12)
-        ask(requests.PoseGoal(name="undo"))
+        ask(PoseGoal(name="undo"))
         wait(lambda: np.array_equal(store.state.goal.q, start) and store.state.plan is not None, "the goal of before")
-        ask(requests.NamedPose(what="store", name="start"))
+        ask(NamedPose(what="store", name="start"))
         wait(lambda: store.state.jog.poses == ("start",), "the pose to be stored")
-        ask(requests.PoseGoal(name="zero"))
-        ask(requests.NamedPose(what="recall", name="start"))
+        ask(PoseGoal(name="zero"))
+        ask(NamedPose(what="recall", name="start"))
         wait(lambda: np.allclose(store.state.goal.q, start, atol=1e-8), "the pose to come back")
         for what, name, code in (("store", " ", "poses.no_name"), ("store", "start", "poses.taken")):
-            ask(requests.NamedPose(what=what, name=name))
+            ask(NamedPose(what=what, name=name))
             wait(lambda code=code: store.state.notice.text.code == code, code)
-        ask(requests.NamedPose(what="delete", name="start"))
+        ask(NamedPose(what="delete", name="start"))
         wait(lambda: store.state.jog.poses == (), "the pose to be gone")
         (tmp_path / "rcilab" / "poses.json").write_text("{")
-        ask(requests.NamedPose(what="store", name="start"))
+        ask(NamedPose(what="store", name="start"))
         wait(lambda: store.state.notice.text.code == "poses.file", "the bad file to be told")
         assert (tmp_path / "rcilab" / "poses.json").read_text() == "{"
 
@@ -385,8 +388,8 @@ def test_a_step_that_would_swing_the_arm_is_refused(store):
 def test_no_step_moves_the_tool_faster_than_the_reduced_speed(jog, store, session, robot, axis):
     stretched = np.radians([0.0, 60.0, 0.0, 20.0, 0.0, 60.0, 0.0])
     session.shown = replace(IDLE, q_c=stretched, q=stretched)
-    jog.set_jog(requests.SetJog(step=10.0, speed=1.0))
-    jog.press(requests.PressJog(page=1, axis=axis, sign=1))
+    jog.set_jog(SetJog(step=10.0, speed=1.0))
+    jog.press(PressJog(page=1, axis=axis, sign=1))
     motion = robot.motion
     assert motion is not None, said(store)
     tool = MODEL.forward_path(motion.q)[:, :3, 3]

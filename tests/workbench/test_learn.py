@@ -9,14 +9,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rcilab.app import requests
 from rcilab.app.fault_lab import FAULTS
 from rcilab.app.fault_lab.demo_view import body_html, head_html
-from rcilab.app.goal.goal_actions import GoalActions, initial_goal
-from rcilab.app.learn.learn_actions import LearnActions
+from rcilab.app.goal.goal import goal_at
+from rcilab.app.goal.goal_actions import ChooseBranch, GoalActions, SetArmAngle
+from rcilab.app.learn.learn_actions import LearnActions, PressLearn
 from rcilab.app.learn.learn_state import exhibited
 from rcilab.app.learn.lessons import LESSONS
-from rcilab.app.store import Recording, Store, UiState
+from rcilab.app.run.recording import Recording
+from rcilab.app.store import Store, UiState
 from rcilab.app.text import LANGUAGES, Text, load_catalogue
 from rcilab.core.faults import Fault
 from rcilab.i18n.units import Units
@@ -36,7 +37,7 @@ class Bench:
         q = np.array(model.home)
         self.status = SimpleNamespace(phase="idle", code="idle", q_c=q, tau_ext=None)
         session = SimpleNamespace(status=lambda: self.status)
-        self.store = Store(UiState(model=model, goal=initial_goal(model, q)))
+        self.store = Store(UiState(model=model, goal=goal_at(model, q)))
         self.goal = GoalActions(self.store, session)
         self.learn = LearnActions(self.store, session)
 
@@ -45,7 +46,7 @@ class Bench:
         return self.store.state
 
     def press(self, what, **values) -> None:
-        self.learn.press(requests.Learn(what=what, **values))
+        self.learn.press(PressLearn(what=what, **values))
 
     def provoke(self, fault: Fault) -> None:
         self.press("provoke", fault=int(fault))
@@ -186,10 +187,10 @@ def test_the_elbow_lesson_sees_the_elbow_turn(bench: Bench) -> None:
     bench.press("skip")
     assert bench.step() == 1
     assert bench.state.goal.psi is not None
-    bench.goal.set_arm_angle(requests.SetArmAngle(psi=bench.state.goal.psi + 0.25))
+    bench.goal.set_arm_angle(SetArmAngle(psi=bench.state.goal.psi + 0.25))
     assert bench.step() == 2
     bench.step()
     others = bench.state.goal.reach.solutions
     far = next(k for k, q in enumerate(others) if np.abs(q - bench.state.goal.q).max() > 0.5)
-    bench.goal.choose_branch(requests.ChooseBranch(index=far))
+    bench.goal.choose_branch(ChooseBranch(index=far))
     assert bench.step() == 3

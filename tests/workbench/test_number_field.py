@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from rcilab.app.requests import Request, TypeField
+from rcilab.app.request import Request, TypeField
 from rcilab.app.text import message
 from rcilab.workbench import widgets
 from rcilab.workbench.widgets import BoundControl, NumberField

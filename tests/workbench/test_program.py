@@ -11,13 +11,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rcilab.app import requests
 from rcilab.app.check.check_state import CheckState, Slowed
 from rcilab.app.check.freshness import outdated
-from rcilab.app.goal.goal_actions import GoalActions, initial_goal
+from rcilab.app.goal.goal import goal_at
+from rcilab.app.goal.goal_actions import GoalActions, MoveJoint, MoveTarget, PoseGoal
 from rcilab.app.program import program_actions, program_planning
-from rcilab.app.program.program_actions import ProgramActions
+from rcilab.app.program.edit_actions import EditProgram
+from rcilab.app.program.program_actions import CancelProgram, LoadProgram, PlanProgram, ProgramActions
 from rcilab.app.program.program_draft import draft_of, number_at, tell_place, time_at
+from rcilab.app.request import TypeField
 from rcilab.app.run.readiness import may_go_back, may_plan_again, obstacle
 from rcilab.app.store import Store, UiState
 from rcilab.app.text import Text
@@ -34,7 +36,7 @@ from tests.waiting import wait_for
 MODEL = load_model("xMatePro7")
 HOME = np.array(MODEL.home)
 PLACE = MODEL.forward(HOME)
-Edit = requests.EditProgram
+Edit = EditProgram
 
 
 def beside(*step: float) -> Pose:
@@ -59,7 +61,7 @@ class Bench:
     def __init__(self, model=MODEL, q=HOME) -> None:
         self.status = SimpleNamespace(phase="idle", q_c=q)
         session = SimpleNamespace(status=lambda: self.status)
-        self.store = Store(UiState(model=model, goal=initial_goal(model, q)))
+        self.store = Store(UiState(model=model, goal=goal_at(model, q)))
         self.goal = GoalActions(self.store, session)
         self.actions = ProgramActions(self.store, session, self.goal)
         self.actions.tick()
@@ -86,15 +88,15 @@ class Bench:
     def type(self, name: str, text: str, key: int | None = None) -> str | None:
         """Types into a field of a step, and returns what is answered beside it."""
         field = f"program.{self.program.selected if key is None else key}.{name}"
-        self.actions.editing.type_field(requests.TypeField(field=field, text=text))
+        self.actions.editing.type_field(TypeField(field=field, text=text))
         problem = self.state.problems.get(field)
         return None if problem is None else problem.code
 
     def load(self, program: Program) -> None:
-        self.actions.load(requests.LoadProgram(name="square.json", content=program.to_json().encode()))
+        self.actions.load(LoadProgram(name="square.json", content=program.to_json().encode()))
 
     def plan(self, **values) -> None:
-        self.actions.plan(requests.PlanProgram(**values))
+        self.actions.plan(PlanProgram(**values))
         wait_for(self.is_done, 20.0, "the planning to end")
 
     def is_done(self) -> bool:
@@ -115,7 +117,7 @@ def square(bench) -> Bench:
 
 def test_waypoints_are_added_after_the_selected_one_moved_copied_and_deleted_and_undo_brings_all_back(bench):
     bench.edit("add", source="here")
-    bench.goal.move_target(requests.MoveTarget(position=tuple(beside(0.0, 0.1, 0.0).position), wxyz=tuple(PLACE.wxyz)))
+    bench.goal.move_target(MoveTarget(position=tuple(beside(0.0, 0.1, 0.0).position), wxyz=tuple(PLACE.wxyz)))
     bench.edit("add", source="target")
     assert bench.program.draft.start == tuple(HOME.tolist())
     assert np.allclose(MODEL.forward(bench.program.draft.steps[1].waypoint.q).position, beside(0.0, 0.1, 0.0).position)
@@ -146,9 +148,7 @@ def test_a_retyped_arc_has_a_via_that_can_be_planned_and_taught(square):
     assert square.told == "program.via_made"
     square.plan()
     assert square.state.plan.report.ok
-    square.goal.move_target(
-        requests.MoveTarget(position=tuple(beside(0.03, 0.05, 0.02).position), wxyz=tuple(PLACE.wxyz))
-    )
+    square.goal.move_target(MoveTarget(position=tuple(beside(0.03, 0.05, 0.02).position), wxyz=tuple(PLACE.wxyz)))
     square.edit("via", key=key, source="target")
     assert np.allclose(square.program.draft.waypoint(key).via, beside(0.03, 0.05, 0.02).position)
     assert square.type("via_x", "600", key) is None
@@ -283,10 +283,10 @@ def test_planning_can_be_cancelled_at_once_and_an_edit_drops_it(square, monkeypa
         return program_planning.plan_job(job, tell_late)
 
     monkeypatch.setattr(program_actions, "plan_job", slowly)
-    for give_up in (lambda: square.actions.cancel(requests.CancelProgram()), lambda: square.edit("delete")):
+    for give_up in (lambda: square.actions.cancel(CancelProgram()), lambda: square.edit("delete")):
         going.clear()
         ended.clear()
-        square.actions.plan(requests.PlanProgram())
+        square.actions.plan(PlanProgram())
         assert square.program.progress == 0.0
         assert square.state.busy is not None
         give_up()
@@ -301,19 +301,19 @@ def test_planning_can_be_cancelled_at_once_and_an_edit_drops_it(square, monkeypa
 def test_a_bad_file_is_answered_by_line_and_another_arms_by_name_and_nothing_is_lost(square):
     before = square.program.draft
     text = SQUARE.to_json().replace('"speed": 0.8', '"speed": 8', 1)
-    square.actions.load(requests.LoadProgram(name="bad.json", content=text.encode()))
+    square.actions.load(LoadProgram(name="bad.json", content=text.encode()))
     problem = Text("en").say(square.state.problems["program.0.file"])
     assert "bad.json, line 9" in problem
     assert "waypoint 2" in problem
     assert square.told == "program.not_loaded"
     assert problem in Text("en").say(square.state.notice.text)
     far = SQUARE.to_json().replace(str(list(SQUARE.waypoints[1].position)), "[55.0, 10.0, 4.0]")
-    square.actions.load(requests.LoadProgram(name="far.json", content=far.encode()))
+    square.actions.load(LoadProgram(name="far.json", content=far.encode()))
     problem = Text("en").say(square.state.problems["program.0.file"])
     assert "(55.0, 10.0, 4.0) is farther than 10 m" in problem, "one message, one unit"
     assert "mm" not in problem
     for content in (b"", b"\xff\xfe", b"[" * 1000):
-        square.actions.load(requests.LoadProgram(name="bad.json", content=content))
+        square.actions.load(LoadProgram(name="bad.json", content=content))
         assert square.state.problems["program.0.file"].code == "program.file_bad"
     other = Program(model="xMate7", start=load_model("xMate7").home, waypoints=SQUARE.waypoints[1:])
     square.load(other)
@@ -328,13 +328,13 @@ def test_a_bad_file_is_answered_by_line_and_another_arms_by_name_and_nothing_is_
 def test_another_arm_has_its_own_program_and_the_first_one_comes_back(square):
     kept = square.program.draft
     other = load_model("xMate7")
-    square.store.update(model=other, goal=initial_goal(other, np.array(other.home)))
+    square.store.update(model=other, goal=goal_at(other, np.array(other.home)))
     square.status.q_c = np.array(other.home)
     square.actions.tick()
     assert square.program.draft.steps == ()
     assert square.told == "program.kept"
     square.edit("add", source="here")
-    square.store.update(model=MODEL, goal=initial_goal(MODEL, HOME))
+    square.store.update(model=MODEL, goal=goal_at(MODEL, HOME))
     square.actions.tick()
     assert square.program.draft is kept
     assert square.program.can_undo
@@ -417,15 +417,15 @@ def test_a_bad_number_stays_complained_about_while_a_good_one_is_typed_beside_it
 
 def test_whoever_poses_the_goal_is_told_once_that_this_takes_the_place_of_the_programs_plan(square):
     square.plan()
-    square.goal.move_joint(requests.MoveJoint(joint=0, angle=0.2))
+    square.goal.move_joint(MoveJoint(joint=0, angle=0.2))
     assert square.state.plan.program is None
     assert square.told == "plan.replaced"
     serial = square.state.notice.serial
-    square.goal.move_joint(requests.MoveJoint(joint=0, angle=0.3))
+    square.goal.move_joint(MoveJoint(joint=0, angle=0.3))
     assert square.state.notice.serial == serial
     square.plan()
     square.status.q_c = square.state.plan.motion.goal  # It has been carried out: nothing is lost.
-    square.goal.move_joint(requests.MoveJoint(joint=0, angle=0.4))
+    square.goal.move_joint(MoveJoint(joint=0, angle=0.4))
     assert square.state.notice.serial == serial
 
 
@@ -462,7 +462,7 @@ def test_a_program_that_has_run_is_planned_again_or_one_goes_back_to_its_start(s
     assert reason.code == "ready.done_program"
     assert may_plan_again(reason)
     assert may_go_back(square.state, reason)
-    square.goal.pose_goal(requests.PoseGoal(name="start"))
+    square.goal.pose_goal(PoseGoal(name="start"))
     plan = square.state.plan
     assert plan.program is None
     assert plan.motion.start == pytest.approx(end, abs=1e-12)
@@ -516,7 +516,7 @@ def test_another_name_leaves_the_plan_as_it_is(square):
     square.plan()
     planned = square.program.planned
     assert planned is square.program.draft
-    square.actions.editing.type_field(requests.TypeField(field="program.0.name", text="abc"))
+    square.actions.editing.type_field(TypeField(field="program.0.name", text="abc"))
     assert square.program.draft.name == "abc"
     assert square.program.planned is square.program.draft
     assert outdated(square.state) is None

@@ -11,13 +11,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rcilab.app import requests
 from rcilab.app.control_lock import ControlLock
-from rcilab.app.goal.goal_actions import initial_goal
+from rcilab.app.goal.goal import goal_at
+from rcilab.app.goal.goal_actions import MoveJoint, PlanGoal, SetSpeed
 from rcilab.app.run import push_actions
 from rcilab.app.run.active_force import SPRING, STRONGEST, TOOL, place_of, spring_force
-from rcilab.app.run.push_actions import PushActions
-from rcilab.app.run.run_actions import RunActions
+from rcilab.app.run.mode_actions import SetDrive
+from rcilab.app.run.push_actions import DragLink, HoldPush, PushActions, SetPush
+from rcilab.app.run.run_actions import ChooseRobot, RobotCommand, RunActions
 from rcilab.app.store import Store, UiState
 from rcilab.control_process import SupervisorStatus
 from rcilab.core.errors import UsageError
@@ -65,7 +66,7 @@ class FakeSession:
 
 @pytest.fixture
 def store():
-    store = Store(UiState(model=MODEL, plant="mujoco", goal=initial_goal(MODEL, MODEL.home)))
+    store = Store(UiState(model=MODEL, plant="mujoco", goal=goal_at(MODEL, MODEL.home)))
     store.update(lease=ControlLock((1, 2), 1))
     return store
 
@@ -96,13 +97,13 @@ def grab(actions, link: int, page: int = 1):
     """Takes hold of the link's origin and pulls it 0.1 m along y; returns where that is."""
     start = place_of(MODEL, MODEL.home, link, np.zeros(3))
     hand = start + (0.0, 0.1, 0.0)
-    actions.pull(requests.DragLink(page=page, link=link, grabbed=tuple(start), hand=tuple(hand), phase="start"))
+    actions.pull(DragLink(page=page, link=link, grabbed=tuple(start), hand=tuple(hand), phase="start"))
     return start
 
 
 def test_a_held_button_pushes_where_and_as_hard_as_is_set_and_silence_ends_it(actions, store):
-    actions.set_push(requests.SetPush(link=4, direction="-z", newtons=33.0))
-    actions.hold(requests.HoldPush(page=1))
+    actions.set_push(SetPush(link=4, direction="-z", newtons=33.0))
+    actions.hold(HoldPush(page=1))
     tick(actions)
     wrench, link, point = held(actions)
     assert wrench == pytest.approx([0.0, 0.0, -33.0, 0.0, 0.0, 0.0])
@@ -116,7 +117,7 @@ def test_a_held_button_pushes_where_and_as_hard_as_is_set_and_silence_ends_it(ac
 
 @pytest.mark.parametrize(("newtons", "taken"), [(77.0, STRONGEST), (-5.0, 0.0), (math.nan, 20.0), (math.inf, 20.0)])
 def test_a_force_beyond_its_range_is_taken_at_the_bound_and_no_number_is_ignored(actions, store, newtons, taken):
-    actions.set_push(requests.SetPush(newtons=newtons, link=9, direction="up", way="joint.sideways"))
+    actions.set_push(SetPush(newtons=newtons, link=9, direction="up", way="joint.sideways"))
     push = store.state.push
     assert (push.newtons, push.link, push.direction, push.way) == (taken, 0, "+y", "joint.free")
 
@@ -133,7 +134,7 @@ def test_the_mouse_pulls_with_a_spring_that_goes_along_with_the_arm(actions, ses
     tick(actions)
     moved = place_of(MODEL, q, 5, np.zeros(3))
     assert held(actions)[0][:3] == pytest.approx(SPRING * (start + (0.0, 0.1, 0.0) - moved))
-    actions.pull(requests.DragLink(page=1, link=5, grabbed=(0, 0, 0), hand=(0, 0, 0), phase="end"))
+    actions.pull(DragLink(page=1, link=5, grabbed=(0, 0, 0), hand=(0, 0, 0), phase="end"))
     tick(actions)
     assert held(actions) is None
 
@@ -145,7 +146,7 @@ def test_a_spring_pulls_no_harder_than_a_hand():
 @pytest.mark.parametrize("lease", [ControlLock((1, 2), 2), ControlLock((2,), 2), ControlLock()])
 def test_who_loses_the_controls_or_goes_away_lets_go(actions, store, lease):
     grab(actions, 3)
-    actions.hold(requests.HoldPush(page=1))
+    actions.hold(HoldPush(page=1))
     tick(actions)
     assert held(actions) is not None
     store.update(lease=lease)
@@ -155,7 +156,7 @@ def test_who_loses_the_controls_or_goes_away_lets_go(actions, store, lease):
 
 def test_numbers_that_are_none_take_hold_of_nothing(actions):
     for link, hand in ((3, (math.nan, 0.0, 0.0)), (8, (0.0, 0.0, 0.0)), (0, (0.0, 0.0, 0.0))):
-        actions.pull(requests.DragLink(page=1, link=link, grabbed=(0, 0, 0), hand=hand, phase="start"))
+        actions.pull(DragLink(page=1, link=link, grabbed=(0, 0, 0), hand=hand, phase="start"))
         tick(actions)
         assert held(actions) is None
 
@@ -174,7 +175,7 @@ def test_in_the_ideal_plant_a_drag_turns_the_camera_unless_the_arm_is_guided(act
 def test_an_arm_at_an_address_cannot_be_pushed_and_that_is_said(actions, store, session):
     session.shown = replace(OWN, target="rci://192.168.0.160:1337", world_address=None)
     tick(actions)
-    actions.hold(requests.HoldPush(page=1))
+    actions.hold(HoldPush(page=1))
     tick(actions)
     assert store.state.notice.text.code == "push.no_world"
     assert store.state.push.acting is None
@@ -197,16 +198,16 @@ def test_a_real_arm_is_freed_only_when_asked_twice(store, session, monkeypatch):
     monkeypatch.setattr(session, "supervisor", lambda: supervisor)
     store.update(target="rci://192.168.0.160:1337")
     robot = RunActions(store, session)
-    robot.drive(requests.RobotCommand(page=1, what="guide"))
+    robot.drive(RobotCommand(page=1, what="guide"))
     assert store.state.notice.text.code == "guide.sure"
     assert freed == []
-    robot.drive(requests.RobotCommand(page=1, what="guide"))
+    robot.drive(RobotCommand(page=1, what="guide"))
     assert freed == [("joint", "free")]
 
 
 def test_the_plant_is_not_chosen_for_a_robot_at_an_address(store, session):
     store.update(target="rci://192.168.0.160:1337")
-    RunActions(store, session).choose_robot(requests.ChooseRobot(page=1, plant="ideal"))
+    RunActions(store, session).choose_robot(ChooseRobot(page=1, plant="ideal"))
     assert store.state.notice.text.code == "plant.address"
     assert store.state.plant == "mujoco"
 
@@ -221,39 +222,39 @@ def test_another_plant_keeps_goal_and_plan_and_is_refused_in_mid_motion(bench):
     ask = bench.conductor.ask
     wait(lambda: bench.store.state.plan is None and bench.session.status().q_c is not None, "the first look")
     angle = float(bench.session.status().q_c[0]) + 0.4
-    ask(requests.MoveJoint(joint=0, angle=angle))
+    ask(MoveJoint(joint=0, angle=angle))
     wait(lambda: bench.store.state.plan is not None and bench.store.state.plan.complete, "a plan")
     goal, plan = bench.store.state.goal, bench.store.state.plan
     pid = bench.session.status().controller_pid
-    ask(requests.ChooseRobot(plant="mujoco"))
+    ask(ChooseRobot(plant="mujoco"))
     wait(lambda: bench.session.status().controller_pid not in (None, pid), "another controller")
     wait(lambda: bench.session.status().phase == "idle" and bool(bench.session.status().powered), "a powered arm")
     assert bench.store.state.plant == "mujoco"
     assert bench.store.state.goal is goal
     assert bench.store.state.plan is plan
-    ask(requests.Plan())
-    ask(requests.RobotCommand(what="execute"))
+    ask(PlanGoal())
+    ask(RobotCommand(what="execute"))
     wait(lambda: bench.session.status().phase == "moving", "the arm to move")
-    ask(requests.ChooseRobot(plant="ideal"))
+    ask(ChooseRobot(plant="ideal"))
     wait(lambda: told(bench) == "notice.moving", "the refusal")
     assert bench.store.state.plant == "mujoco"
-    ask(requests.RobotCommand(what="stop"))
+    ask(RobotCommand(what="stop"))
     wait(lambda: bench.session.status().phase == "idle", "the arm to rest")
 
 
 def test_a_guided_arm_follows_the_button(bench):
     ask = bench.conductor.ask
     wait(lambda: bench.session.status().phase == "idle" and bool(bench.session.status().powered), "a powered arm")
-    ask(requests.RobotCommand(what="guide"))
+    ask(RobotCommand(what="guide"))
     wait(lambda: bench.session.status().code == "moving.guided", "a free arm")
     start = np.array(bench.session.status().q)
 
     def pushed() -> bool:
-        ask(requests.HoldPush())
+        ask(HoldPush())
         return float(np.abs(bench.session.status().q - start).max()) > 0.05
 
     wait(pushed, "the arm to follow")
-    ask(requests.RobotCommand(what="unguide"))
+    ask(RobotCommand(what="unguide"))
     wait(lambda: bench.session.status().code == "idle.guided", "the arm to be held again")
     wait(lambda: bench.store.state.push.acting is None, "the push to end")
 
@@ -264,15 +265,15 @@ def test_an_arm_that_is_pushed_in_a_soft_motion_gives_way_comes_back_arrives_and
     wait(lambda: status().phase == "idle" and bool(status().powered) and told(bench) != "notice.moving", "a rest")
     if bench.store.state.plant != "mujoco":
         pid = status().controller_pid
-        ask(requests.ChooseRobot(plant="mujoco"))
+        ask(ChooseRobot(plant="mujoco"))
         wait(lambda: status().controller_pid not in (None, pid), "another controller")
         wait(lambda: status().phase == "idle" and bool(status().powered), "a powered arm")
-    ask(requests.SetDrive(mode=mode))
-    ask(requests.SetPush(link=TOOL, direction="+z", newtons=40.0))
-    ask(requests.SetSpeed(speed=0.08))
+    ask(SetDrive(mode=mode))
+    ask(SetPush(link=TOOL, direction="+z", newtons=40.0))
+    ask(SetSpeed(speed=0.08))
     last, q = bench.store.state.last_run, status().q_c
     angle = float(q[0]) + (0.5 if q[0] < 0.1 else -0.5)
-    ask(requests.MoveJoint(joint=0, angle=angle))
+    ask(MoveJoint(joint=0, angle=angle))
 
     def planned() -> bool:
         plan = bench.store.state.plan
@@ -280,7 +281,7 @@ def test_an_arm_that_is_pushed_in_a_soft_motion_gives_way_comes_back_arrives_and
 
     wait(planned, "a plan that was judged for the mode")
     motion = bench.store.state.plan.motion
-    ask(requests.RobotCommand(what="execute"))
+    ask(RobotCommand(what="execute"))
     wait(lambda: status().code == "moving" and (status().motion_time or 0.0) > 0.3, "the arm on its way")
 
     def height() -> float:
@@ -291,7 +292,7 @@ def test_an_arm_that_is_pushed_in_a_soft_motion_gives_way_comes_back_arrives_and
     still = height()
 
     def given_way() -> bool:
-        ask(requests.HoldPush())
+        ask(HoldPush())
         return height() > still + 0.003
 
     wait(given_way, "the arm to give way")
@@ -309,4 +310,4 @@ def test_an_arm_that_is_pushed_in_a_soft_motion_gives_way_comes_back_arrives_and
         for q, q_c in zip(run.cycles["q"][::20], run.cycles["q_c"][::20], strict=True)
     ]
     assert max(away) > still + 0.002, "the recording shows the push"
-    ask(requests.SetDrive(mode="joint_position"))
+    ask(SetDrive(mode="joint_position"))

@@ -12,14 +12,17 @@ import numpy as np
 import pytest
 
 import rcilab
-from rcilab.app import requests
-from rcilab.app.goal.goal_actions import initial_goal
-from rcilab.app.run.export_actions import ENDINGS
+from rcilab.app.control_lock_actions import PageOpened
+from rcilab.app.goal.goal import goal_at
+from rcilab.app.goal.goal_actions import MoveJoint, SetSpeed
+from rcilab.app.run.export_actions import ENDINGS, CancelExport, ExportRun
 from rcilab.app.run.readiness import obstacle
 from rcilab.app.run.replay import replayed_pose, require_replayable
+from rcilab.app.run.run_actions import ChooseRobot, RobotCommand
 from rcilab.app.run.run_recorder import whole_recording
 from rcilab.app.store import UiState
 from rcilab.app.text import Text
+from rcilab.app.view_actions import Seek
 from rcilab.core.errors import UsageError
 from rcilab.core.faults import Fault
 from rcilab.model.robot_model import load_model
@@ -45,8 +48,8 @@ def bench(tmp_path_factory) -> Iterator[Workbench]:
 
 
 def execute(bench: Workbench, angle: float, speed: float = 0.5) -> None:
-    bench.conductor.ask(requests.SetSpeed(speed=speed))
-    bench.conductor.ask(requests.MoveJoint(joint=0, angle=angle))
+    bench.conductor.ask(SetSpeed(speed=speed))
+    bench.conductor.ask(MoveJoint(joint=0, angle=angle))
     wait(
         lambda: (
             (plan := bench.store.state.plan) is not None
@@ -55,7 +58,7 @@ def execute(bench: Workbench, angle: float, speed: float = 0.5) -> None:
         ),
         "a plan that may be executed",
     )
-    bench.conductor.ask(requests.RobotCommand(what="execute"))
+    bench.conductor.ask(RobotCommand(what="execute"))
 
 
 def finished(bench: Workbench):
@@ -100,7 +103,7 @@ def test_exports_reach_the_page_that_asked_and_problems_are_told(bench, monkeypa
     if bench.store.state.recording is None:
         execute(bench, 0.1)
     run = finished(bench).run
-    bench.conductor.ask(requests.PageOpened(page=7))
+    bench.conductor.ask(PageOpened(page=7))
     wait(lambda: bench.store.state.lease.holder == 7, "the controls")
     sent = []
     actions = bench.conductor._export
@@ -111,9 +114,9 @@ def test_exports_reach_the_page_that_asked_and_problems_are_told(bench, monkeypa
         return not is_unwanted()
 
     monkeypatch.setattr(actions, "_deliver", deliver)
-    bench.conductor.ask(requests.Export(page=8, ending=".csv"))  # A page that only watches gets none.
+    bench.conductor.ask(ExportRun(page=8, ending=".csv"))  # A page that only watches gets none.
     for ending in (".csv", ".html", ".rcirun"):
-        bench.conductor.ask(requests.Export(page=7, ending=ending))
+        bench.conductor.ask(ExportRun(page=7, ending=ending))
         wait(lambda ending=ending: bool(sent) and sent[-1][1].endswith(ending), f"the {ending}")
         wait(lambda: bench.store.state.export is None, "the end of the export")
     assert {page for page, _, _ in sent} == {7}
@@ -122,33 +125,33 @@ def test_exports_reach_the_page_that_asked_and_problems_are_told(bench, monkeypa
     import sys
 
     monkeypatch.setitem(sys.modules, "mcap.writer", None)
-    bench.conductor.ask(requests.Export(page=7, ending=".mcap"))
+    bench.conductor.ask(ExportRun(page=7, ending=".mcap"))
     wait(lambda: told(bench) == "export.missing", "what is missing")
     wait(lambda: bench.store.state.export is None, "the end of the export")
     monkeypatch.setattr(
         actions, "_deliver", lambda page, name, stream, is_unwanted: bool(wait(is_unwanted, "a cancel"))
     )
-    bench.conductor.ask(requests.Export(page=7, ending=".csv"))
+    bench.conductor.ask(ExportRun(page=7, ending=".csv"))
     wait(lambda: bench.store.state.export is not None, "an export")
-    bench.conductor.ask(requests.CancelExport(page=7))
+    bench.conductor.ask(CancelExport(page=7))
     wait(lambda: told(bench) == "export.cancelled", "that it was cancelled")
     wait(lambda: bench.store.state.export is None, "the end of the export")
     monkeypatch.setattr(actions, "_deliver", deliver)
-    bench.conductor.ask(requests.Export(page=7, ending="../../etc/passwd"))
+    bench.conductor.ask(ExportRun(page=7, ending="../../etc/passwd"))
     bench.store.update(recording=None)
-    bench.conductor.ask(requests.Export(page=7, ending=".csv"))
+    bench.conductor.ask(ExportRun(page=7, ending=".csv"))
     wait(lambda: len(sent) == 4, "the run, which no other plan takes away")
     assert sent[3][1].endswith(".csv")
     wait(lambda: bench.store.state.export is None, "the end of the export")
     bench.store.update(last_run=None)
-    bench.conductor.ask(requests.Export(page=7, ending=".csv"))
+    bench.conductor.ask(ExportRun(page=7, ending=".csv"))
     wait(lambda: told(bench) == "export.nothing", "that there is nothing")
     assert len(sent) == 4
 
 
 def test_what_became_of_a_run_is_said_of_the_robot_that_made_it():
     run = replace(some_run(), setup=Setup(target="virtual", plant="ideal"))
-    made = UiState(model=run.model, goal=initial_goal(run.model, run.model.home), last_run=whole_recording(run))
+    made = UiState(model=run.model, goal=goal_at(run.model, run.model.home), last_run=whole_recording(run))
     idle, text = SimpleNamespace(phase="idle"), Text("en")
     assert "Last run: <b>Ran to its end" in outcome_html(made, idle, text)
     assert "rl-good" in outcome_html(made, idle, text)
@@ -156,7 +159,7 @@ def test_what_became_of_a_run_is_said_of_the_robot_that_made_it():
     for elsewhere, status in (
         (replace(made, plant="mujoco"), idle),
         (replace(made, target="rci://192.168.0.160:1337"), idle),
-        (replace(made, model=other, goal=initial_goal(other, other.home)), idle),
+        (replace(made, model=other, goal=goal_at(other, other.home)), idle),
         (made, SimpleNamespace(phase="closed")),
     ):
         said = outcome_html(elsewhere, status, text)
@@ -169,12 +172,12 @@ def test_a_run_is_replayed_with_nothing_connected_until_it_is_asked_for(monkeypa
     with Workbench(WorkbenchConfig(port=0, quality="light", replay=run)) as bench:
         assert bench.store.state.model is run.model
         assert bench.store.state.recording.run is run
-        bench.conductor.ask(requests.Seek(place=0.5))
+        bench.conductor.ask(Seek(place=0.5))
         wait(lambda: bench.store.state.place == 0.5, "the middle of the run")
         middle = replayed_pose(bench.store.state)
         row = int(np.searchsorted(run.t, 0.5 * run.plan.duration + 1e-3))
         assert np.array_equal(middle, run.q[row])
-        bench.conductor.ask(requests.MoveJoint(joint=0, angle=0.5))
+        bench.conductor.ask(MoveJoint(joint=0, angle=0.5))
         wait(lambda: abs(bench.store.state.goal.q[0] - 0.5) < 1e-9, "a goal that was posed")
         assert bench.store.state.recording.run is run, "posing a goal loses nothing of the run"
         assert bench.store.state.plan.motion is run.plan
@@ -191,7 +194,7 @@ def test_a_run_is_replayed_with_nothing_connected_until_it_is_asked_for(monkeypa
         assert obstacle(bench.store.state, status).code == "ready.closed"
         opened = []
         monkeypatch.setattr(bench.session, "open", lambda *what: opened.append(what[:2]))
-        bench.conductor.ask(requests.ChooseRobot(target="virtual"))
+        bench.conductor.ask(ChooseRobot(target="virtual"))
         wait(lambda: opened == [(run.model, "virtual")], "a virtual controller, once it is asked for")
         assert bench.conductor.errors == []
         assert bench.presenter.errors == []
@@ -204,7 +207,7 @@ def test_a_fault_is_marked_and_told_at_the_moment_it_was_reported():
     recording = whole_recording(replace(run, cycles=cycles))
     assert recording.moment == run.t[40]
     assert whole_recording(run).moment is None
-    goal = initial_goal(run.model, np.array(run.model.home))
+    goal = goal_at(run.model, np.array(run.model.home))
     state = UiState(model=run.model, goal=goal, recording=recording)
     banner = replay_html(state, SimpleNamespace(phase="closed"), Text("en"))
     assert f"Ended by a fault at {run.t[40]:.3f} s: {Fault.COLLISION.manual_name}." in banner

@@ -7,8 +7,9 @@ from collections.abc import Iterator
 import pytest
 
 from rcilab import connect
-from rcilab.app import requests
+from rcilab.app.goal.goal_actions import PlanRecovery, PoseGoal
 from rcilab.app.run.readiness import may_lead_inside
+from rcilab.app.run.run_actions import RobotCommand
 from rcilab.control_process.launch import start_controller
 from rcilab.workbench.app import Workbench, WorkbenchConfig
 from tests.outside import JOINT, drive_outside
@@ -39,13 +40,13 @@ def test_the_arm_is_led_back_inside_and_plans_start_there_again(bench):
     wait(lambda: session.status().phase == "idle" and bool(session.status().powered), "an idle arm")
     assert may_lead_inside(store.state, session.status())
     wait(lambda: store.state.no_plan is not None and store.state.no_plan.code == "plan.start_limit", "a refusal")
-    ask(requests.PlanRecovery())
+    ask(PlanRecovery())
     wait(lambda: store.state.plan is not None and store.state.plan.complete, "a plan")
-    ask(requests.RobotCommand(what="execute"))
+    ask(RobotCommand(what="execute"))
     wait(lambda: store.state.asked is not None, "the question")
-    ask(requests.RobotCommand(what="confirm"))
+    ask(RobotCommand(what="confirm"))
     wait(lambda: session.status().q_c[JOINT] < upper - 0.017, "the arm inside")
     wait(lambda: session.status().phase == "idle", "the arm to stop")
-    ask(requests.PoseGoal(name="home"))
+    ask(PoseGoal(name="home"))
     wait(lambda: store.state.plan is not None and store.state.plan.motion.start[JOINT] < upper, "a plan from inside")
     assert not may_lead_inside(store.state, session.status())

@@ -11,10 +11,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rcilab.app import requests
 from rcilab.app.goal.elbow import look_at_elbow, nearest_free
-from rcilab.app.goal.goal_actions import SETTLED, GoalActions, initial_goal
-from rcilab.app.scene.scene_actions import SceneActions
+from rcilab.app.goal.goal import goal_at
+from rcilab.app.goal.goal_actions import SETTLED, GoalActions, MoveTarget, PlanGoal, PoseGoal, SetArmAngle, SetPathType
+from rcilab.app.request import TypeField
+from rcilab.app.scene.scene_actions import DragElbow, HighlightBranch, SceneActions, ShowExtra, ShowViolation
 from rcilab.app.store import Store, UiState
 from rcilab.app.text import LANGUAGES, Text
 from rcilab.core.safety_box import SafetyBox
@@ -35,7 +36,7 @@ class Bench:
     """Goal and scene as the conductor has them, with an arm that stands at home."""
 
     def __init__(self, q_c: np.ndarray | None = HOME, model=MODEL) -> None:
-        self.store = Store(UiState(model=model, goal=initial_goal(model, np.array(model.home))))
+        self.store = Store(UiState(model=model, goal=goal_at(model, np.array(model.home))))
         self.goal = GoalActions(self.store, SimpleNamespace(status=lambda: SimpleNamespace(phase="idle", q_c=q_c)))
         self.scene = SceneActions(self.store, self.goal)
         self.scene.tick()
@@ -46,7 +47,7 @@ class Bench:
 
     def aim(self, *step: float) -> None:
         target = self.state.goal.target
-        self.goal.move_target(requests.MoveTarget(position=tuple(target.position + step), wxyz=tuple(target.wxyz)))
+        self.goal.move_target(MoveTarget(position=tuple(target.position + step), wxyz=tuple(target.wxyz)))
 
 
 @pytest.fixture
@@ -78,7 +79,7 @@ def test_arms_without_a_circle_have_none(bench):
     assert look_at_elbow(load_model("xMate3"), np.zeros(6), None) is None
     assert look_at_elbow(MODEL, np.zeros(7), None) is None
     six = Bench(None, load_model("xMate3"))
-    six.scene.drag_elbow(requests.DragElbow(eye=(2.0, 0.0, 1.0), hand=(0.0, 0.0, 1.0), phase="update"))
+    six.scene.drag_elbow(DragElbow(eye=(2.0, 0.0, 1.0), hand=(0.0, 0.0, 1.0), phase="update"))
     assert six.state.scene.elbow is None
 
 
@@ -86,28 +87,28 @@ def test_dragging_the_handle_turns_the_elbow_and_holds_the_tool(bench):
     elbow = bench.state.scene.elbow
     eye = (2.0, -2.1, 1.45)
     hand = tuple(elbow.circle.points(0.8, 0.105)[0])
-    bench.scene.drag_elbow(requests.DragElbow(eye=eye, hand=hand, phase="start"))
+    bench.scene.drag_elbow(DragElbow(eye=eye, hand=hand, phase="start"))
     assert bench.state.goal.psi == pytest.approx(0.0, abs=1e-9)
-    bench.scene.drag_elbow(requests.DragElbow(eye=eye, hand=hand, phase="update"))
+    bench.scene.drag_elbow(DragElbow(eye=eye, hand=hand, phase="update"))
     goal = bench.state.goal
     assert goal.psi == pytest.approx(0.8, abs=math.radians(0.5))
     assert goal.snapped is None
     assert MODEL.forward(goal.q).is_close(goal.target, 1e-9)
-    bench.goal.pose_goal(requests.PoseGoal(name="undo"))
+    bench.goal.pose_goal(PoseGoal(name="undo"))
     assert bench.state.goal.psi == pytest.approx(0.0, abs=1e-9)
 
 
 @pytest.mark.parametrize("number", [math.nan, math.inf])
 def test_a_drag_that_is_no_place_changes_nothing(bench, number):
     before = bench.state.goal
-    bench.scene.drag_elbow(requests.DragElbow(eye=(number, 0.0, 0.0), hand=(0.0, 0.0, 0.0), phase="update"))
-    bench.scene.drag_elbow(requests.DragElbow(eye=(), hand=(), phase="update"))
+    bench.scene.drag_elbow(DragElbow(eye=(number, 0.0, 0.0), hand=(0.0, 0.0, 0.0), phase="update"))
+    bench.scene.drag_elbow(DragElbow(eye=(), hand=(), phase="update"))
     assert bench.state.goal is before
 
 
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_a_forbidden_arm_angle_is_left_for_the_nearest_free_one_and_told_why(bench, language):
-    bench.goal.set_arm_angle(requests.SetArmAngle(psi=2.5))
+    bench.goal.set_arm_angle(SetArmAngle(psi=2.5))
     goal = bench.state.goal
     assert goal.reach.tone != "bad"
     assert goal.psi is not None
@@ -138,11 +139,11 @@ def test_the_ring_laid_out_flat_tells_its_arcs_in_words_and_patterns(bench, lang
 
 def test_every_goal_has_its_branches_and_one_can_be_looked_at_before_it_is_chosen(bench):
     assert len(bench.state.goal.reach.solutions) >= 1
-    bench.scene.peek(requests.HighlightBranch(index=0))
+    bench.scene.peek(HighlightBranch(index=0))
     assert bench.state.scene.peek == 0
-    bench.scene.peek(requests.HighlightBranch(index=99))
+    bench.scene.peek(HighlightBranch(index=99))
     assert bench.state.scene.peek is None
-    bench.scene.peek(requests.HighlightBranch(index=0))
+    bench.scene.peek(HighlightBranch(index=0))
     bench.aim(0.0, 0.05, 0.0)
     bench.scene.tick()
     assert bench.state.scene.peek is None
@@ -150,7 +151,7 @@ def test_every_goal_has_its_branches_and_one_can_be_looked_at_before_it_is_chose
 
 def test_the_ways_to_reach_a_target_are_listed_nearest_first_and_lead_where_they_say(bench):
     target = MODEL.forward(np.radians((100.0, 40.0, 95.0, 60.0, 80.0, 50.0, 20.0)))
-    bench.goal.move_target(requests.MoveTarget(position=tuple(target.position), wxyz=tuple(target.wxyz)))
+    bench.goal.move_target(MoveTarget(position=tuple(target.position), wxyz=tuple(target.wxyz)))
     solutions = np.array(list(bench.state.goal.reach.solutions))
     panel, shown = BranchesPanel(Text("en"), lambda request: None), []
     panel._rows = SimpleNamespace(show=shown.append)
@@ -210,7 +211,7 @@ def test_a_plan_that_leaves_the_box_has_a_bead_that_leads_to_its_moment(bench):
     assert ribbon.usage.max() > 1.0
     bead = ribbon.beads[0]
     assert box.excess(bead.position) > 0.0
-    bench.scene.show_bead(requests.ShowViolation(number=0))
+    bench.scene.show_bead(ShowViolation(number=0))
     assert bench.state.place == pytest.approx(bead.place)
     assert bench.state.notice.tone == "bad"
     for language in LANGUAGES:
@@ -218,8 +219,8 @@ def test_a_plan_that_leaves_the_box_has_a_bead_that_leads_to_its_moment(bench):
     assert bead_words(bead, Text("en")).startswith("◆ broken: Tool inside the safety box · ")
     assert bead_words(bead, Text("zh")).startswith("◆ 违反：")
     assert "broken: Tool inside the safety box</p>" in planned_html(bench.state, Text("en"))
-    bench.scene.show_bead(requests.ShowViolation(number=99))
-    bench.goal.pose_goal(requests.PoseGoal(name="home"))
+    bench.scene.show_bead(ShowViolation(number=99))
+    bench.goal.pose_goal(PoseGoal(name="home"))
     bench.scene.tick()
     assert bench.state.scene.ribbon is None
 
@@ -229,7 +230,7 @@ def test_a_line_is_planned_once_the_goal_stands_still_and_keeps_the_tool_on_it(b
 
     now = [100.0]
     monkeypatch.setattr(actions, "time", SimpleNamespace(monotonic=lambda: now[0]))
-    bench.goal.set_way(requests.SetPathType(kind="line"))
+    bench.goal.set_way(SetPathType(kind="line"))
     bench.aim(-0.05, 0.1, 0.05)
     assert bench.state.plan is None
     assert bench.state.no_plan.code == "plan.soon"
@@ -264,29 +265,29 @@ def test_the_arm_is_said_to_be_moved_only_while_it_is(bench):
 
 
 def test_an_arc_needs_a_place_to_lead_over_and_then_does(bench):
-    bench.goal.set_way(requests.SetPathType(kind="arc"))
+    bench.goal.set_way(SetPathType(kind="arc"))
     bench.aim(-0.03, 0.08, 0.0)
-    bench.goal.plan(requests.Plan())
+    bench.goal.plan(PlanGoal())
     assert bench.state.no_plan.code == "plan.no_via"
     said = TimelinePanel(Text("en"), lambda request: None)._read(bench.state, SimpleNamespace(q_c=HOME, code="idle"))
     assert Text("en")("plan.no_via") in said, "not how to begin, but what is missing"
-    bench.goal.set_way(requests.SetPathType(via=True))
+    bench.goal.set_way(SetPathType(via=True))
     via = bench.state.via.position
     bench.aim(0.0, 0.08, 0.05)
-    bench.goal.plan(requests.Plan())
+    bench.goal.plan(PlanGoal())
     assert bench.state.plan.kind == "arc"
     assert np.linalg.norm(bench.state.plan.path - via, axis=1).min() < 5e-3
-    bench.goal.set_way(requests.SetPathType(kind="sideways"))
+    bench.goal.set_way(SetPathType(kind="sideways"))
     assert bench.state.way == "arc"
 
 
 def test_a_typed_quaternion_turns_the_target_and_a_bad_one_is_answered(bench):
     position = bench.state.goal.target.position
-    bench.goal.type_field(requests.TypeField(field="pose.wxyz", text="0 0.2 0.97 0"))
+    bench.goal.type_field(TypeField(field="pose.wxyz", text="0 0.2 0.97 0"))
     target = bench.state.goal.target
     assert np.allclose(target.position, position)
     assert abs(float(target.wxyz @ (0.0, 0.2, 0.97, 0.0))) == pytest.approx(math.hypot(0.2, 0.97))
-    bench.goal.type_field(requests.TypeField(field="pose.wxyz", text="0 0 0 0"))
+    bench.goal.type_field(TypeField(field="pose.wxyz", text="0 0 0 0"))
     assert bench.state.problems["pose.wxyz"].code == "parse.no_turn"
     assert bench.state.goal.target is target
 
@@ -294,7 +295,7 @@ def test_a_typed_quaternion_turns_the_target_and_a_bad_one_is_answered(bench):
 def test_extras_are_computed_when_they_are_switched_on_and_gone_when_off(bench):
     bench.aim(0.0, 0.1, 0.0)
     for name in ("ellipsoid", "cloud", "swept", "nonsense"):
-        bench.scene.show_extra(requests.ShowExtra(name=name, on=True))
+        bench.scene.show_extra(ShowExtra(name=name, on=True))
     assert "nonsense" not in bench.state.scene.extras
     bench.scene.tick()
     for made in dict(bench.scene._made).values():
@@ -306,6 +307,6 @@ def test_extras_are_computed_when_they_are_switched_on_and_gone_when_off(bench):
     assert len(seen.cloud) > 1000
     assert len(seen.swept.faces) > 1000
     for name in ("ellipsoid", "cloud", "swept"):
-        bench.scene.show_extra(requests.ShowExtra(name=name, on=False))
+        bench.scene.show_extra(ShowExtra(name=name, on=False))
     bench.scene.tick()
     assert (bench.state.scene.ellipsoid, bench.state.scene.cloud, bench.state.scene.swept) == (None, None, None)

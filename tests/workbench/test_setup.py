@@ -9,19 +9,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rcilab.app import requests
+from rcilab.app.check.check_actions import PressCheck
 from rcilab.app.check.freshness import outdated
+from rcilab.app.control_lock_actions import PageClosed, PageOpened
+from rcilab.app.goal.goal_actions import MoveJoint, PlanGoal, PoseGoal
+from rcilab.app.program.edit_actions import EditProgram
 from rcilab.app.program.program_draft import target_of
+from rcilab.app.request import Request, TypeField
 from rcilab.app.run.readiness import obstacle
-from rcilab.app.setup.configuration_state import (
-    SetupState,
-    describe_held,
-    describe_part,
-    pending_parts,
-    setup_obstacle,
-)
+from rcilab.app.run.run_actions import ChooseRobot, RobotCommand
+from rcilab.app.setup.configuration_state import SetupState, describe_held, describe_part, pending_parts, setup_obstacle
+from rcilab.app.setup.setup_actions import MoveSetup, OpenTab, PressSetup, ResizeBox, SetSetup
 from rcilab.app.setup.setup_fields import FACE_NAMES, FIELD_NAMES, faces, read_field, with_field
 from rcilab.app.text import Message, Text
+from rcilab.app.view_actions import SetView
 from rcilab.control_process import SupervisorStatus
 from rcilab.control_process.launch import start_controller
 from rcilab.core.errors import CommandRejectedError
@@ -46,25 +47,25 @@ def bench() -> Iterator[Workbench]:
 
 
 @pytest.fixture
-def ask(bench) -> Callable[[requests.Request], None]:
+def ask(bench) -> Callable[[Request], None]:
     """Asks, and returns once it has been dealt with."""
 
-    def act(request: requests.Request) -> None:
+    def act(request: Request) -> None:
         height = bench.store.state.height + 1.0
         bench.conductor.ask(request)
-        bench.conductor.ask(requests.SetView(name="height", value=height))
+        bench.conductor.ask(SetView(name="height", value=height))
         wait(lambda: bench.store.state.height == height, f"an answer to {request}")
 
     while bench.store.state.setup.can_undo:
-        act(requests.PressSetup(what="undo"))
-    act(requests.PoseGoal(name="here"))
+        act(PressSetup(what="undo"))
+    act(PoseGoal(name="here"))
     wait(lambda: settled(bench), "the controller to have the first set-up")
     return act
 
 
 def type_in(ask, **numbers: str) -> None:
     for name, text in numbers.items():
-        ask(requests.TypeField(field="setup." + name.replace("_", "."), text=text))
+        ask(TypeField(field="setup." + name.replace("_", "."), text=text))
 
 
 def settled(bench: Workbench) -> bool:
@@ -93,7 +94,7 @@ def test_a_typed_tool_is_what_the_controller_reports_and_what_the_goal_is_solved
 
 
 def test_an_edit_makes_the_plan_stale_in_words_and_undo_makes_it_good_again(bench, ask):
-    ask(requests.MoveJoint(joint=0, angle=float(bench.session.status().q_c[0]) + 0.3))
+    ask(MoveJoint(joint=0, angle=float(bench.session.status().q_c[0]) + 0.3))
     plan = bench.store.state.plan
     wait(lambda: bench.store.state.plan.complete, "a complete check")
     type_in(ask, load_mass="1.5", tool_z="100")
@@ -106,14 +107,14 @@ def test_an_edit_makes_the_plan_stale_in_words_and_undo_makes_it_good_again(benc
     assert "tool, load" in Text("en").say(reason)
     for language in ("en", "zh"):
         assert Text(language)("check.outdated") in planned_html(state, Text(language))
-    ask(requests.RobotCommand(what="execute"))
+    ask(RobotCommand(what="execute"))
     assert told(bench) == "ready.stale"
-    ask(requests.PressSetup(what="undo"))
-    ask(requests.PressSetup(what="undo"))
+    ask(PressSetup(what="undo"))
+    ask(PressSetup(what="undo"))
     wait(lambda: settled(bench), "the controller to have the first set-up")
     assert obstacle(bench.store.state, bench.session.status()) is None
     type_in(ask, load_mass="1.5")
-    ask(requests.Plan())
+    ask(PlanGoal())
     wait(lambda: settled(bench), "the controller to have the load")
     assert obstacle(bench.store.state, bench.session.status()) is None
 
@@ -123,8 +124,8 @@ def test_a_motion_out_of_the_box_is_refused_before_it_runs(bench, ask):
     x, y, z = 1000.0 * model.forward(q).position
     for name, value in zip(FACE_NAMES, (x - 60, y - 60, z - 60, x + 60, y + 60, z + 60), strict=True):
         type_in(ask, **{f"box_{name}": f"{value:.2f}"})
-    ask(requests.SetSetup(name="active", value=True))
-    ask(requests.MoveJoint(joint=0, angle=float(q[0]) + 0.3))
+    ask(SetSetup(name="active", value=True))
+    ask(MoveJoint(joint=0, angle=float(q[0]) + 0.3))
     wait(lambda: settled(bench), "the controller to have the box")
     state = bench.store.state
     assert not state.plan.report.ok
@@ -134,54 +135,54 @@ def test_a_motion_out_of_the_box_is_refused_before_it_runs(bench, ask):
     target = next(panel for panel in bench.presenter._panels if isinstance(panel, TargetPanel))
     wait(lambda: "broken: Tool inside the safety box" in target._reach._shown, "the target's verdict to say so")
     wait(lambda: bench.presenter._stage._ribbon._beads > 0, "a bead where it is broken")
-    ask(requests.SetSetup(name="active", value=False))
+    ask(SetSetup(name="active", value=False))
     wait(lambda: bench.presenter._stage._ribbon._beads == 0, "the bead to go")
     gone = outdated(bench.store.state)
     assert gone is not None
     assert "safety box" in Text("en").say(gone)  # What broke the box is no verdict on an arm without one.
-    ask(requests.Plan())
+    ask(PlanGoal())
     assert outdated(bench.store.state) is None
     wait(lambda: settled(bench), "the controller to have switched the box off")
     assert obstacle(bench.store.state, bench.session.status()) is None
 
 
 def test_an_arm_that_stands_outside_the_box_is_told_so_in_setup_and_beside_execute(bench, ask):
-    ask(requests.MoveJoint(joint=0, angle=float(bench.session.status().q_c[0]) + 0.3))
+    ask(MoveJoint(joint=0, angle=float(bench.session.status().q_c[0]) + 0.3))
     x = 1000.0 * bench.store.state.model.forward(bench.session.status().q_c).position[0]
     panel = next(panel for panel in bench.presenter._panels if isinstance(panel, SetupPanel))
-    ask(requests.SetSetup(name="active", value=True))
+    ask(SetSetup(name="active", value=True))
     type_in(ask, box_xmax=f"{x + 0.5:.2f}")
     assert obstacle(bench.store.state, bench.session.status()).code == "ready.stale"
     wait(lambda: "Out of date" in panel._planned._shown, "Setup to look")
     assert "Outside" not in panel._verdict._shown
     type_in(ask, box_xmax=f"{x - 74.03:.2f}")
     wait(lambda: "74.0 mm outside the safety box, past its +x face" in panel._verdict._shown, "Setup to say so")
-    ask(requests.Check(what="again"))
+    ask(PressCheck(what="again"))
     wait(lambda: obstacle(bench.store.state, bench.session.status()) is None, "a motion that leads in to be allowed")
     arrived = replace(bench.session.status(), q_c=bench.store.state.plan.motion.goal)
     assert obstacle(bench.store.state, arrived).code == "ready.done", "the arm stands inside now"
-    ask(requests.MoveJoint(joint=0, angle=float(bench.session.status().q_c[0])))
-    ask(requests.MoveJoint(joint=1, angle=float(bench.session.status().q_c[1]) + 0.2))
+    ask(MoveJoint(joint=0, angle=float(bench.session.status().q_c[0])))
+    ask(MoveJoint(joint=1, angle=float(bench.session.status().q_c[1]) + 0.2))
     reason = obstacle(bench.store.state, bench.session.status())
     assert (reason.code, dict(reason.values)) == ("ready.outside", {"mm": "74.0", "face": "+x"})
     assert "74.0 mm" in Text("zh").say(reason)
-    ask(requests.SetSetup(name="active", value=False))
+    ask(SetSetup(name="active", value=False))
     wait(lambda: "Outside" not in panel._verdict._shown, "Setup to take it back")
 
 
 def test_another_tool_says_once_what_it_makes_of_a_program_and_that_is_what_it_does(bench, ask):
-    ask(requests.EditProgram(what="clear"))
+    ask(EditProgram(what="clear"))
     for _ in range(2):
-        ask(requests.EditProgram(what="add", source="here"))
+        ask(EditProgram(what="add", source="here"))
     typed = bench.store.state.program.draft.steps[1].key
-    ask(requests.TypeField(field=f"program.{typed}.z", text="500"))
+    ask(TypeField(field=f"program.{typed}.z", text="500"))
     before = bench.store.state
     taught, posed = before.program.draft.steps
-    ask(requests.SetSetup(name="edited", value="tool"))
-    ask(requests.MoveSetup(part="tool", position=(0.0, 0.0, 0.05), wxyz=NO_TURN))
+    ask(SetSetup(name="edited", value="tool"))
+    ask(MoveSetup(part="tool", position=(0.0, 0.0, 0.05), wxyz=NO_TURN))
     said = bench.store.state.notice
     assert said.text.code == "setup.program_moves"
-    ask(requests.MoveSetup(part="tool", position=(0.0, 0.0, 0.1), wxyz=NO_TURN, ended=True))
+    ask(MoveSetup(part="tool", position=(0.0, 0.0, 0.1), wxyz=NO_TURN, ended=True))
     after = bench.store.state
     assert after.notice is said
     assert after.program.draft.steps == (taught, posed)
@@ -194,44 +195,44 @@ def test_another_tool_says_once_what_it_makes_of_a_program_and_that_is_what_it_d
     shown = list_html(after, after.program.draft, None, Text("en"))
     assert f"<b>{1000.0 * led[0].position[2]:.0f}</b>" in shown
     assert "<b>500</b>" in shown
-    ask(requests.EditProgram(what="clear"))
+    ask(EditProgram(what="clear"))
 
 
 def test_a_drag_is_one_step_to_undo_and_is_sent_when_it_has_ended(bench, ask):
     before = wanted(bench).tool
-    ask(requests.SetSetup(name="edited", value="tool"))
+    ask(SetSetup(name="edited", value="tool"))
     for step in range(1, 4):
-        ask(requests.MoveSetup(part="tool", position=(0.0, 0.0, 0.03 * step), wxyz=NO_TURN))
+        ask(MoveSetup(part="tool", position=(0.0, 0.0, 0.03 * step), wxyz=NO_TURN))
     assert pending_parts(bench.store.state, bench.session.status()) == ("tool",)
-    ask(requests.MoveSetup(part="tool", position=(0.0, 0.0, 0.1), wxyz=NO_TURN, ended=True))
+    ask(MoveSetup(part="tool", position=(0.0, 0.0, 0.1), wxyz=NO_TURN, ended=True))
     assert wanted(bench).tool.position[2] == pytest.approx(0.1)
     wait(lambda: settled(bench), "the controller to have the tool")
-    ask(requests.PressSetup(what="undo"))
+    ask(PressSetup(what="undo"))
     assert wanted(bench).tool is before
     assert bench.store.state.model.T_flange_tool is before
 
 
 def test_handles_belong_to_the_tab_that_is_open(bench, ask):
-    ask(requests.SetSetup(name="edited", value="load"))
+    ask(SetSetup(name="edited", value="load"))
     before = wanted(bench).load
-    ask(requests.OpenTab(name="tab.setup"))
+    ask(OpenTab(name="tab.setup"))
     assert bench.store.state.setup.edited == "load"
-    ask(requests.OpenTab(name="tab.target"))
+    ask(OpenTab(name="tab.target"))
     assert bench.store.state.setup.edited == ""
     assert not hides_target(bench.store.state)
-    ask(requests.MoveSetup(part="load", position=(0.0, 0.0, 0.05), wxyz=NO_TURN, ended=True))
+    ask(MoveSetup(part="load", position=(0.0, 0.0, 0.05), wxyz=NO_TURN, ended=True))
     assert wanted(bench).load is before
 
 
 def test_a_face_of_the_box_follows_its_handle_and_cannot_pass_the_other(bench, ask):
-    ask(requests.SetSetup(name="edited", value="box"))
+    ask(SetSetup(name="edited", value="box"))
     low = faces(wanted(bench).box)
-    ask(requests.ResizeBox(face=3, hand=(0.5, 9.0, 9.0), ended=True))
+    ask(ResizeBox(face=3, hand=(0.5, 9.0, 9.0), ended=True))
     assert faces(wanted(bench).box) == pytest.approx([*low[:3], 0.5, *low[4:]])
-    ask(requests.ResizeBox(face=3, hand=(-7.0, 0.0, 0.0), ended=True))
+    ask(ResizeBox(face=3, hand=(-7.0, 0.0, 0.0), ended=True))
     assert 0.0 < wanted(bench).box.size[0] < 0.05
-    ask(requests.ResizeBox(face=1, hand=(math.nan, 0.0, 0.0)))
-    ask(requests.ResizeBox(face=6, hand=(0.0, 0.0, 0.0)))
+    ask(ResizeBox(face=1, hand=(math.nan, 0.0, 0.0)))
+    ask(ResizeBox(face=6, hand=(0.0, 0.0, 0.0)))
     assert faces(wanted(bench).box)[1] == low[1]
 
 
@@ -268,34 +269,34 @@ def test_an_inertia_is_taken_once_some_body_has_it(bench, ask):
 
 
 def test_what_is_no_number_or_no_part_is_ignored(bench, ask):
-    ask(requests.SetSetup(name="edited", value="tool"))
+    ask(SetSetup(name="edited", value="tool"))
     before = bench.store.state.setup
-    ask(requests.MoveSetup(part="tool", position=(math.nan, 0.0, 0.0), wxyz=NO_TURN))
-    ask(requests.MoveSetup(part="tool", position=(0.0, 0.0, 0.1), wxyz=(0.0,) * 4))
-    ask(requests.MoveSetup(part="lamp", position=(0.0, 0.0, 0.1), wxyz=NO_TURN))
-    ask(requests.MoveSetup(part="tool", position=(0.0, 0.0, 7.0), wxyz=NO_TURN))
-    ask(requests.SetSetup(name="edited", value="lamp"))
-    ask(requests.SetSetup(name="axes", value="moon"))
+    ask(MoveSetup(part="tool", position=(math.nan, 0.0, 0.0), wxyz=NO_TURN))
+    ask(MoveSetup(part="tool", position=(0.0, 0.0, 0.1), wxyz=(0.0,) * 4))
+    ask(MoveSetup(part="lamp", position=(0.0, 0.0, 0.1), wxyz=NO_TURN))
+    ask(MoveSetup(part="tool", position=(0.0, 0.0, 7.0), wxyz=NO_TURN))
+    ask(SetSetup(name="edited", value="lamp"))
+    ask(SetSetup(name="axes", value="moon"))
     type_in(ask, lamp_x="1", tool_w="1")
     assert bench.store.state.setup.wanted is before.wanted
     assert told(bench) == "setup.far"
 
 
 def test_a_watching_page_cannot_change_the_set_up(bench, ask):
-    ask(requests.PageOpened(page=1))
-    ask(requests.PageOpened(page=2))
+    ask(PageOpened(page=1))
+    ask(PageOpened(page=2))
     before = wanted(bench)
-    ask(requests.MoveSetup(page=2, part="tool", position=(0.0, 0.0, 0.1), wxyz=NO_TURN))
-    ask(requests.TypeField(page=2, field="setup.load.mass", text="1"))
+    ask(MoveSetup(page=2, part="tool", position=(0.0, 0.0, 0.1), wxyz=NO_TURN))
+    ask(TypeField(page=2, field="setup.load.mass", text="1"))
     assert wanted(bench) is before
     for page in (1, 2):
-        ask(requests.PageClosed(page=page))
+        ask(PageClosed(page=page))
 
 
 def test_after_a_new_connection_the_controller_is_told_again_and_the_page_says_so(bench, ask):
     type_in(ask, load_mass="1")
     wait(lambda: settled(bench), "the controller to have the load")
-    ask(requests.RobotCommand(what="reconnect"))
+    ask(RobotCommand(what="reconnect"))
     wait(lambda: told(bench) == "setup.sent_again", "the page to say so")
     assert settled(bench)
 
@@ -325,7 +326,7 @@ def test_a_foreign_robot_is_told_nothing_before_a_second_yes(bench, ask):
 
 
 def test_the_check_tab_says_that_its_report_is_out_of_date(bench, ask):
-    ask(requests.MoveJoint(joint=0, angle=float(bench.session.status().q_c[0]) + 0.3))
+    ask(MoveJoint(joint=0, angle=float(bench.session.status().q_c[0]) + 0.3))
     type_in(ask, tool_z="100")
     panel = next(panel for panel in bench.presenter._panels if isinstance(panel, CheckPanel))
     wait(lambda: "Out of date" in panel._verdict._shown, "the tab to say so")
@@ -333,11 +334,11 @@ def test_the_check_tab_says_that_its_report_is_out_of_date(bench, ask):
 
 
 def test_after_check_again_the_setup_tab_has_a_verdict_on_the_plan(bench, ask):
-    ask(requests.MoveJoint(joint=0, angle=float(bench.session.status().q_c[0]) + 0.3))
+    ask(MoveJoint(joint=0, angle=float(bench.session.status().q_c[0]) + 0.3))
     type_in(ask, tool_z="100")
     panel = next(panel for panel in bench.presenter._panels if isinstance(panel, SetupPanel))
     wait(lambda: "Out of date" in panel._planned._shown, "the tab to say so")
-    ask(requests.Check(what="again"))
+    ask(PressCheck(what="again"))
     wait(lambda: "Passed" in panel._planned._shown, "a verdict")
     assert panel._planned._shown == planned_html(bench.store.state, Text("en"))
     assert panel._again.disabled
@@ -346,30 +347,30 @@ def test_after_check_again_the_setup_tab_has_a_verdict_on_the_plan(bench, ask):
 def test_a_robot_that_is_not_ours_is_changed_only_after_a_second_yes(bench, ask):
     controller = start_controller("xMatePro7")
     try:
-        ask(requests.ChooseRobot(target=controller.address))
+        ask(ChooseRobot(target=controller.address))
         wait(lambda: bench.session.status().phase == "idle" and bench.session.is_ready, "the other controller")
         told_before = setup_obstacle(bench.store.state, bench.session.status())
         type_in(ask, load_mass="1.5")
         assert setup_obstacle(bench.store.state, bench.session.status()).code == "ready.setup_unsent"
-        ask(requests.PressSetup(what="undo"))
+        ask(PressSetup(what="undo"))
         assert setup_obstacle(bench.store.state, bench.session.status()) == told_before
         type_in(ask, load_mass="1.5")
-        ask(requests.PressSetup(what="confirm"))
-        ask(requests.PressSetup(what="send"))
-        ask(requests.PressSetup(what="cancel"))
-        ask(requests.PressSetup(what="confirm"))
-        ask(requests.PressSetup(what="send"))
+        ask(PressSetup(what="confirm"))
+        ask(PressSetup(what="send"))
+        ask(PressSetup(what="cancel"))
+        ask(PressSetup(what="confirm"))
+        ask(PressSetup(what="send"))
         type_in(ask, load_mass="1.6")  # Not what was asked about.
-        ask(requests.PressSetup(what="confirm"))
+        ask(PressSetup(what="confirm"))
         assert bench.session.status().setup.parts == ()
-        ask(requests.PressSetup(what="send"))
-        ask(requests.PressSetup(what="confirm"))
+        ask(PressSetup(what="send"))
+        ask(PressSetup(what="confirm"))
         wait(lambda: bench.session.status().setup.load is wanted(bench).load, "the robot to have the load")
         assert bench.session.status().setup.parts == tuple(
             sorted(bench.store.state.setup.touched, key=SETUP_PARTS.index)
         )
     finally:
-        ask(requests.ChooseRobot(target="virtual"))
+        ask(ChooseRobot(target="virtual"))
         controller.end()
     wait(lambda: bench.session.status().phase == "idle" and bench.session.is_ready, "our own controller")
     wait(lambda: settled(bench), "our own controller to have the set-up")
@@ -377,14 +378,14 @@ def test_a_robot_that_is_not_ours_is_changed_only_after_a_second_yes(bench, ask)
 
 def test_what_belongs_to_an_arm_comes_back_with_it(bench, ask):
     type_in(ask, tool_z="80", load_mass="1.5")
-    ask(requests.SetSetup(name="active", value=True))
+    ask(SetSetup(name="active", value=True))
     wait(lambda: settled(bench), "the controller to have it")
     before = wanted(bench)
     name = bench.store.state.model.name
-    ask(requests.ChooseRobot(model="xMate3"))
+    ask(ChooseRobot(model="xMate3"))
     wait(lambda: bench.store.state.model.name == "xMate3", "the other arm")
     assert wanted(bench).tool.is_close(Pose(), 1e-12)
-    ask(requests.ChooseRobot(model=name))
+    ask(ChooseRobot(model=name))
     wait(lambda: bench.store.state.model.name == name, "the first arm again")
     assert bench.store.state.model.T_flange_tool.is_close(before.tool, 1e-12)
     assert (wanted(bench).tool, wanted(bench).load, wanted(bench).box) == (before.tool, before.load, before.box)

@@ -6,7 +6,9 @@ from collections.abc import Iterator
 
 import pytest
 
-from rcilab.app import requests
+from rcilab.app.run.run_actions import RobotCommand
+from rcilab.app.run.signal_actions import PressSignals, SetOutput
+from rcilab.app.run.world_actions import SetWiring
 from rcilab.app.text import Text
 from rcilab.workbench.app import Workbench
 from rcilab.workbench.panels.signals import levels_html
@@ -23,31 +25,31 @@ def test_an_output_is_set_and_the_input_it_is_wired_to_is_shown(bench: Workbench
     ask, status = bench.conductor.ask, bench.session.status
     assert status().inputs is None
     assert status().outputs == (None,) * 6
-    ask(requests.SetWiring(name="loop_back", on=True))
-    ask(requests.SetOutput(signal=2, level=True))
+    ask(SetWiring(name="loop_back", on=True))
+    ask(SetOutput(signal=2, level=True))
     wait(lambda: status().outputs[2] is True, "the output")
-    ask(requests.PressSignals(what="read"))
+    ask(PressSignals(what="read"))
     wait(lambda: status().inputs == (False, False, True, False, False, False), "the input")
     shown = levels_html(status(), Text("zh"))
     assert "<th>DO0_2</th><td>开</td><th>DI0_2</th><td>开</td>" in shown
-    ask(requests.SetOutput(signal=2, level=False))
+    ask(SetOutput(signal=2, level=False))
     wait(lambda: status().outputs[2] is False and status().inputs == (False,) * 6, "the output taken back")
 
 
 def test_a_restart_is_asked_about_and_ends_the_connection_until_connect(bench: Workbench) -> None:
     ask, status, state = bench.conductor.ask, bench.session.status, lambda: bench.store.state.drive
-    ask(requests.PressSignals(what="confirm"))  # Nothing was asked: nothing happens.
-    ask(requests.PressSignals(what="reboot"))
+    ask(PressSignals(what="confirm"))  # Nothing was asked: nothing happens.
+    ask(PressSignals(what="reboot"))
     wait(lambda: state().reboot_asked, "the question")
     assert status().phase == "idle"
-    ask(requests.PressSignals(what="cancel"))
+    ask(PressSignals(what="cancel"))
     wait(lambda: not state().reboot_asked, "the question withdrawn")
-    ask(requests.SetOutput(signal=0, level=True))
+    ask(SetOutput(signal=0, level=True))
     wait(lambda: status().outputs[0] is True, "an output")
-    ask(requests.PressSignals(what="reboot"))
-    ask(requests.PressSignals(what="confirm"))
+    ask(PressSignals(what="reboot"))
+    ask(PressSignals(what="confirm"))
     wait(lambda: status().code == "lost.rebooted", "the end of the connection")
-    ask(requests.RobotCommand(what="reconnect"))
+    ask(RobotCommand(what="reconnect"))
     wait(lambda: status().phase == "idle", "another connection")
     assert status().outputs == (None,) * 6
     assert status().inputs is None

@@ -7,7 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from rcilab.app import requests
+from rcilab.app.request import TypeField
+from rcilab.app.run.world_actions import SetWiring
+from rcilab.app.setup.setup_actions import PressSetup
 from rcilab.workbench.app import Workbench
 from tests.workbench.opened import opened, wait
 
@@ -21,11 +23,11 @@ def bench() -> Iterator[Workbench]:
 def test_a_typed_limit_reaches_controller_and_plans_and_undo_takes_it_back(bench: Workbench) -> None:
     ask, state, status = bench.conductor.ask, lambda: bench.store.state, bench.session.status
     own = state().model.limits.joint.upper[0]
-    ask(requests.TypeField(field="setup.joints.upper.0", text="30"))
+    ask(TypeField(field="setup.joints.upper.0", text="30"))
     wait(lambda: status().setup.joints is not None and status().phase == "idle", "the controller's yes")
     assert status().setup.joints.upper[0] == pytest.approx(np.radians(30.0))
     assert state().model.limits.joint.upper[0] == pytest.approx(np.radians(30.0))
-    ask(requests.PressSetup(what="undo"))
+    ask(PressSetup(what="undo"))
     wait(lambda: status().setup.joints.upper[0] == own, "the whole range at the controller")
     assert state().model.limits.joint.upper[0] == own
 
@@ -34,14 +36,14 @@ def test_a_limit_outside_the_arm_or_past_the_other_end_is_refused_beside_the_fie
     ask, state = bench.conductor.ask, lambda: bench.store.state
     for field, text in (("setup.joints.upper.1", "400"), ("setup.joints.lower.2", "170")):
         before = state().setup.wanted.joints
-        ask(requests.TypeField(field="setup.joints.upper.2", text="160"))
+        ask(TypeField(field="setup.joints.upper.2", text="160"))
         wait(lambda before=before: state().setup.wanted.joints is not before, "an edit")
-        ask(requests.TypeField(field=field, text=text))
+        ask(TypeField(field=field, text=text))
         wait(lambda field=field: field in state().problems, "a complaint")
-    ask(requests.PressSetup(what="whole"))
+    ask(PressSetup(what="whole"))
     wait(lambda: not state().problems, "no complaint")
 
 
 def test_auto_limit_goes_to_our_own_controller(bench: Workbench) -> None:
-    bench.conductor.ask(requests.SetWiring(name="auto_limit", on=True))
+    bench.conductor.ask(SetWiring(name="auto_limit", on=True))
     wait(lambda: bench.store.state.drive.auto_limit, "the switch")

@@ -190,9 +190,9 @@ def test_the_share_of_commands_in_time_is_that_of_a_motion_and_marked_as_past_af
 
 
 def initial_state():
-    from rcilab.app.goal.goal_actions import initial_goal
+    from rcilab.app.goal.goal import goal_at
     from rcilab.app.store import UiState
     from rcilab.model.robot_model import load_model
 
     model = load_model("xMatePro7")
-    return UiState(model=model, goal=initial_goal(model, model.home))
+    return UiState(model=model, goal=goal_at(model, model.home))

@@ -14,8 +14,11 @@ import numpy as np
 import pytest
 from websockets.sync.client import connect
 
-from rcilab.app import requests
+from rcilab.app.control_lock_actions import PageOpened
+from rcilab.app.goal.goal_actions import MoveJoint, PlanGoal, PoseGoal, SetSpeed
+from rcilab.app.request import TypeField
 from rcilab.app.run.readiness import describe_move, obstacle
+from rcilab.app.run.run_actions import ChooseRobot, RobotCommand
 from rcilab.app.status_text import tell_status
 from rcilab.app.text import Text
 from rcilab.control_process.launch import start_controller
@@ -32,11 +35,11 @@ def set_out(bench: Workbench) -> float:
     """Executes a slow motion of joint 1 and returns where it started, once it is under way."""
     wait(lambda: is_ready(bench), "an idle arm")
     start = float(bench.session.status().q_c[0])
-    bench.conductor.ask(requests.SetSpeed(speed=0.05))
+    bench.conductor.ask(SetSpeed(speed=0.05))
     goal = start + (0.8 if start < 0.0 else -0.8)
-    bench.conductor.ask(requests.MoveJoint(joint=0, angle=goal))
+    bench.conductor.ask(MoveJoint(joint=0, angle=goal))
     wait(lambda: bench.store.state.plan is not None and bench.store.state.plan.motion.goal[0] == goal, "a plan")
-    bench.conductor.ask(requests.RobotCommand(what="execute"))
+    bench.conductor.ask(RobotCommand(what="execute"))
     wait(lambda: bench.session.status().phase == "moving", "the arm to move")
     wait(lambda: abs(float(bench.session.status().q[0]) - start) > 0.01, "the arm to get somewhere")
     return start
@@ -50,14 +53,14 @@ def move_on(bench: Workbench) -> None:
     wait(lambda: is_ready(bench) or bench.session.status().phase == "fault", "an arm that can go on")
     if bench.session.status().phase == "fault":
         assert [fault.name for fault in bench.session.status().faults] == ["INSTABILITY_DETECTION"]
-        bench.conductor.ask(requests.RobotCommand(what="recover"))
+        bench.conductor.ask(RobotCommand(what="recover"))
     wait(lambda: is_ready(bench), "an idle, powered arm")
-    bench.conductor.ask(requests.SetSpeed(speed=1.0))
+    bench.conductor.ask(SetSpeed(speed=1.0))
     angle = float(bench.session.status().q_c[1]) - 0.1
-    bench.conductor.ask(requests.MoveJoint(joint=1, angle=angle))
+    bench.conductor.ask(MoveJoint(joint=1, angle=angle))
     wait(lambda: bench.store.state.plan is not None and bench.store.state.plan.motion.goal[1] == angle, "a plan")
-    bench.conductor.ask(requests.Plan())
-    bench.conductor.ask(requests.RobotCommand(what="execute"))
+    bench.conductor.ask(PlanGoal())
+    bench.conductor.ask(RobotCommand(what="execute"))
     wait(lambda: abs(float(bench.session.status().q_c[1]) - angle) < 1e-9, "the arm to arrive")
 
 
@@ -94,7 +97,7 @@ def test_a_page_that_goes_away_in_mid_motion_means_one_controlled_stop(bench):
     with connect(f"ws://127.0.0.1:{bench.port}/rcilab/live", additional_headers=origin, close_timeout=0.1) as page:
         going = threading.Event()
         page.send(json.dumps({"kind": "hello", "page": 1, "key": bench.live.introduce(1)}))
-        bench.conductor.ask(requests.PageOpened(page=1))
+        bench.conductor.ask(PageOpened(page=1))
         wait(lambda: bench.store.state.lease.holder == 1, "the page to hold the controls")
 
         def answer() -> None:
@@ -116,11 +119,11 @@ def test_a_page_that_goes_away_in_mid_motion_means_one_controlled_stop(bench):
 def test_an_unreachable_robot_is_told_and_the_page_stays_usable(bench):
     wait(lambda: is_ready(bench), "an idle arm")
     for typed in ("7", "12"):
-        bench.conductor.ask(requests.TypeField(field="joint.0", text=typed))
+        bench.conductor.ask(TypeField(field="joint.0", text=typed))
     wait(lambda: math.isclose(bench.store.state.goal.q[0], math.radians(12.0)), "a goal")
     wait(lambda: bench.store.state.plan is not None and bench.store.state.plan.complete, "a plan")
     goal, plan = bench.store.state.goal, bench.store.state.plan
-    bench.conductor.ask(requests.ChooseRobot(target="rci://127.0.0.9:9"))
+    bench.conductor.ask(ChooseRobot(target="rci://127.0.0.9:9"))
     wait(lambda: bench.session.status().phase == "lost", "no connection")
     status = bench.session.status()
     assert "127.0.0.9" in status.message
@@ -129,14 +132,14 @@ def test_an_unreachable_robot_is_told_and_the_page_stays_usable(bench):
     assert obstacle(bench.store.state, status).code == "ready.lost"
     assert "无法连接" in Text("zh").say(tell_status(status))
     wait(lambda: told(bench) == "incident.lost.unreachable", "to be told")
-    bench.conductor.ask(requests.RobotCommand(what="power_on"))
+    bench.conductor.ask(RobotCommand(what="power_on"))
     wait(lambda: told(bench) == "ready.lost", "to be told what to press")
-    bench.conductor.ask(requests.PoseGoal(name="undo"))
+    bench.conductor.ask(PoseGoal(name="undo"))
     wait(lambda: math.isclose(bench.store.state.goal.q[0], math.radians(7.0)), "undo to reach behind the connection")
-    bench.conductor.ask(requests.MoveJoint(joint=0, angle=0.3))
+    bench.conductor.ask(MoveJoint(joint=0, angle=0.3))
     wait(lambda: bench.store.state.goal.q[0] == 0.3, "the candidate to be posed all the same")
     assert bench.store.state.no_plan.code == "plan.no_arm"
-    bench.conductor.ask(requests.ChooseRobot(target="virtual"))
+    bench.conductor.ask(ChooseRobot(target="virtual"))
     move_on(bench)
 
 
@@ -147,25 +150,25 @@ def test_a_foreign_robot_moves_only_after_a_second_yes_that_knows_what_will_move
         with Workbench(WorkbenchConfig(port=0, quality="light", target=address)) as bench:
             ask = bench.conductor.ask
             wait(lambda: bench.session.status().phase == "idle", "a connection")
-            ask(requests.RobotCommand(what="power_on"))
+            ask(RobotCommand(what="power_on"))
             wait(lambda: is_ready(bench), "motor power")
             start = float(bench.session.status().q_c[0])
-            ask(requests.MoveJoint(joint=0, angle=start + 0.1))
+            ask(MoveJoint(joint=0, angle=start + 0.1))
             wait(lambda: bench.store.state.plan is not None, "a plan")
-            ask(requests.RobotCommand(what="confirm"))
-            ask(requests.RobotCommand(what="execute"))
+            ask(RobotCommand(what="confirm"))
+            ask(RobotCommand(what="execute"))
             wait(lambda: describe_move(bench.store.state) is not None, "the second question")
             question = Text("en").say(describe_move(bench.store.state))
             assert address in question
             assert "Joints: 1: " in question
-            ask(requests.MoveJoint(joint=0, angle=start + 0.2))
+            ask(MoveJoint(joint=0, angle=start + 0.2))
             wait(lambda: describe_move(bench.store.state) is None, "another plan to need another yes")
-            ask(requests.RobotCommand(what="execute"))
-            ask(requests.RobotCommand(what="cancel"))
-            ask(requests.RobotCommand(what="execute"))
+            ask(RobotCommand(what="execute"))
+            ask(RobotCommand(what="cancel"))
+            ask(RobotCommand(what="execute"))
             wait(lambda: describe_move(bench.store.state) is not None, "the second question")
             assert float(bench.session.status().q_c[0]) == start
-            ask(requests.RobotCommand(what="confirm"))
+            ask(RobotCommand(what="confirm"))
             wait(lambda: abs(float(bench.session.status().q_c[0]) - start - 0.2) < 1e-9, "the arm to arrive")
             controller.kill()
             wait(lambda: bench.session.status().phase == "lost", "the loss")

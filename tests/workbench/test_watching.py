@@ -12,7 +12,7 @@ import pytest
 import viser
 from websockets.sync.client import ClientConnection, connect
 
-from rcilab.app import requests
+from rcilab.app.run.target_robot_actions import ChooseDestination
 from rcilab.workbench.app import Workbench
 from tests.workbench.opened import opened, told, wait
 
@@ -107,9 +107,7 @@ def test_no_control_of_a_watching_page_leads_anywhere(bench):
 
 def test_what_a_page_typed_goes_with_its_controls(bench):
     with script(bench) as first, script(bench) as second:
-        bench.conductor.ask(
-            requests.ChooseDestination(page=first.page, where="address", address="rci://192.0.2.7:1337")
-        )
+        bench.conductor.ask(ChooseDestination(page=first.page, where="address", address="rci://192.0.2.7:1337"))
         wait(lambda: bench.store.state.drive.typed_address != "", "the question")
         address = next(handle for name, handle in controls(bench).items() if name.startswith("Address"))
         name = next(handle for label, handle in controls(bench).items() if label.startswith("Name"))

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
-from rcilab.app import requests
 from rcilab.app.check.check_state import CheckState, Explained, Slowed
 from rcilab.app.check.slowdown_job import SlowdownJob, slow_program, slow_to_goal
-from rcilab.app.goal.goal_actions import GoalActions
-from rcilab.app.program.program_actions import ProgramActions
+from rcilab.app.goal.goal_actions import GoalActions, PlanGoal
+from rcilab.app.program.edit_actions import EditProgram
+from rcilab.app.program.program_actions import CancelProgram, PlanProgram, ProgramActions
+from rcilab.app.request import Handlers, Request
 from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.readiness import is_moving
 from rcilab.app.status_text import tell_error
@@ -24,6 +25,15 @@ if TYPE_CHECKING:
     from rcilab.conformance import Condition, Report
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PressCheck(Request):
+    """Something for the Check tab."""
+
+    what: Literal["row", "slow", "undo", "explain", "again", "cancel"]
+    row: str = ""
+    """Id of a condition."""
+
+
 class CheckActions:
     """Leads to a row's moment, slows the plan down, explains the report, checks anew."""
 
@@ -31,13 +41,20 @@ class CheckActions:
         self._store, self._session, self._goal, self._program = store, session, goal, program
         self._work: BackgroundJob[Plan, SlowdownJob | Explained] = BackgroundJob("check")
 
-    def press(self, request: requests.Check) -> None:
+    @property
+    def handlers(self) -> Handlers:
+        """What it does for each of its requests."""
+        return {
+            PressCheck: self.press,
+        }
+
+    def press(self, request: PressCheck) -> None:
         """Does what a button or a row of the tab says."""
         plan = self._store.state.plan
         if request.what == "cancel":
             self._work.cancel()
             self._set(doing=None)
-            self._program.cancel(requests.CancelProgram())
+            self._program.cancel(CancelProgram())
         elif request.what == "undo":
             self._undo()
         elif request.what == "again":
@@ -97,9 +114,9 @@ class CheckActions:
     def _plan_again(self, plan: Plan | None) -> None:
         """Plans what the plan was of: the program, or the way to the goal."""
         if plan is None or plan.program is None:
-            self._goal.plan(requests.Plan())
+            self._goal.plan(PlanGoal())
         else:
-            self._program.plan(requests.PlanProgram())
+            self._program.plan(PlanProgram())
 
     def _slow_down(self, plan: Plan) -> None:
         state = self._store.state
@@ -150,7 +167,7 @@ class CheckActions:
         if slowed is None:
             return
         if slowed.draft is not None:
-            self._program.editing.edit(requests.EditProgram(what="undo"))
+            self._program.editing.edit(EditProgram(what="undo"))
             self._program.keep_plan(slowed.before)
         else:
             self._store.update(plan=slowed.before, speed=slowed.speed, recording=None, place=0.0, playing=False)

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
-from rcilab.app import requests
 from rcilab.app.goal.elbow import nearest_free
+from rcilab.app.goal.goal import Goal, goal_at
 from rcilab.app.goal.target_status import evaluate_joints, evaluate_pose
 from rcilab.app.planning import LAWS, PATH_KINDS, Plan, make_plan, make_recovery
+from rcilab.app.request import Handlers, Request, TypeField
 from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.plan_readiness import is_done
 from rcilab.app.run.readiness import is_moving
-from rcilab.app.store import Goal, Store, UiState
+from rcilab.app.store import Store, UiState
 from rcilab.app.text import Message, message
 from rcilab.core.arrays import JointVector, readonly_copy
 from rcilab.core.errors import KinematicsError
@@ -32,6 +34,102 @@ _ONE_DRAG = 1.0  # [s] A choice: what moves again within that time is one drag, 
 RESTED = 0.6  # [s] The same of a target that a hand still holds: it has only paused, and looks at the arm.
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MoveJoint(Request):
+    """Pose one joint of the goal."""
+
+    joint: int
+    """From 0."""
+    angle: float
+    """[rad]."""
+
+    @property
+    def replaces(self) -> str | None:  # noqa: D102
+        return f"joint.{self.joint}.{self.page}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PoseGoal(Request):
+    """Pose the goal in a named way."""
+
+    name: Literal["zero", "home", "here", "start", "undo"]
+    """"start" is where the plan begins, or its program."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MoveTarget(Request):
+    """The gizmo was moved."""
+
+    position: tuple[float, ...]
+    """[m]."""
+    wxyz: tuple[float, ...]
+    ended: bool = False
+    """Whether the mouse was released."""
+
+    @property
+    def replaces(self) -> str | None:  # noqa: D102
+        return None if self.ended else f"target.{self.page}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetArmAngle(Request):
+    """Turn the elbow of a 7-axis arm."""
+
+    psi: float
+    """[rad]."""
+
+    @property
+    def replaces(self) -> str | None:  # noqa: D102
+        return f"SetArmAngle.{self.page}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ChooseBranch(Request):
+    """Take another analytic solution for the same pose."""
+
+    index: int
+    """From 0, in the order of the list."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetPathType(Request):
+    """How the tool is to go to the goal; what is None stays."""
+
+    kind: str | None = None
+    """"joint", "line" or "arc"."""
+    via: bool = False
+    """Whether the arc shall lead over where the target is now."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlanGoal(Request):
+    """Plan from where the arm is to the goal, and check it."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlanRecovery(Request):
+    """Plan from where the arm is, outside a joint's range, back inside."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetSpeed(Request):
+    """Share of the velocity and acceleration limits to plan with."""
+
+    speed: float
+    """0 to 1."""
+
+    @property
+    def replaces(self) -> str | None:  # noqa: D102
+        return f"SetSpeed.{self.page}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetLaw(Request):
+    """Which planner."""
+
+    law: str
+
+
 class GoalActions:
     """Poses, targets, typed numbers, speed; each ends in a fresh plan."""
 
@@ -43,7 +141,23 @@ class GoalActions:
         self._is_held = False  # A hand has the target and has not let go of it.
         self._hand, self._moved = "", 0.0  # What a hand moved last, and when, [s].
 
-    def move_joint(self, request: requests.MoveJoint) -> None:
+    @property
+    def handlers(self) -> Handlers:
+        """What it does for each of its requests."""
+        return {
+            MoveJoint: self.move_joint,
+            PoseGoal: self.pose_goal,
+            MoveTarget: self.move_target,
+            SetArmAngle: self.set_arm_angle,
+            ChooseBranch: self.choose_branch,
+            SetPathType: self.set_way,
+            PlanGoal: self.plan,
+            PlanRecovery: self.plan_recovery,
+            SetSpeed: self.set_speed,
+            SetLaw: self.set_law,
+        }
+
+    def move_joint(self, request: MoveJoint) -> None:
         """Poses one joint of the candidate arm."""
         model = self._store.state.model
         if not (0 <= request.joint < model.n and math.isfinite(request.angle)):
@@ -54,7 +168,7 @@ class GoalActions:
         q[request.joint] = min(max(request.angle, limits.lower[request.joint]), limits.upper[request.joint])
         self._pose(readonly_copy(q))
 
-    def pose_goal(self, request: requests.PoseGoal) -> None:
+    def pose_goal(self, request: PoseGoal) -> None:
         """Poses the candidate arm by name."""
         state, self._hand = self._store.state, ""
         if request.name == "undo":
@@ -74,7 +188,7 @@ class GoalActions:
         self._pose(readonly_copy(named[request.name]))
         self._store.clear_problems("")
 
-    def move_target(self, request: requests.MoveTarget) -> None:
+    def move_target(self, request: MoveTarget) -> None:
         """Follows the gizmo."""
         numbers = (*request.position, *request.wxyz)
         if len(numbers) != 7 or not all(math.isfinite(number) for number in numbers):
@@ -95,14 +209,14 @@ class GoalActions:
             self._store.remember()
         self._hand, self._moved = what, now
 
-    def set_arm_angle(self, request: requests.SetArmAngle, branch: int | None = None) -> None:
+    def set_arm_angle(self, request: SetArmAngle, branch: int | None = None) -> None:
         """Turns the elbow about the shoulder-wrist line while the tool stays, as near as limits allow."""
         if math.isfinite(request.psi) and self._store.state.model.n == 7:
             state = self._store.state
             psi, snapped = nearest_free(state.model, state.goal.target, math.remainder(request.psi, math.tau), branch)
             self._aim(state.goal.target, psi, snapped=snapped)
 
-    def choose_branch(self, request: requests.ChooseBranch) -> None:
+    def choose_branch(self, request: ChooseBranch) -> None:
         """Takes another analytic solution of the same pose."""
         goal = self._store.state.goal
         solutions = goal.reach.solutions
@@ -120,7 +234,7 @@ class GoalActions:
             self._pose(q)
         self._store.clear_problems("pose.")
 
-    def type_field(self, request: requests.TypeField) -> None:
+    def type_field(self, request: TypeField) -> None:
         """Takes a typed number, or says beside the field what is wrong with it."""
         state = self._store.state
         kind, _, name = request.field.partition(".")
@@ -130,7 +244,7 @@ class GoalActions:
             parsed = parse_number(request.text, round(float(low[number]), 6), round(float(high[number]), 6), "deg")
             value = parsed.value
             act = None if value is None else lambda: self.move_joint(
-                requests.MoveJoint(joint=number, angle=math.radians(value))
+                MoveJoint(joint=number, angle=math.radians(value))
             )  # fmt: skip
         elif kind == "pose" and name in POSE_FIELDS:
             index = POSE_FIELDS.index(name)
@@ -145,11 +259,11 @@ class GoalActions:
         elif request.field == "speed":
             parsed = parse_number(request.text, 100.0 * SLOWEST, 100.0, "%")
             value = parsed.value
-            act = None if value is None else lambda: self.set_speed(requests.SetSpeed(speed=value / 100.0))
+            act = None if value is None else lambda: self.set_speed(SetSpeed(speed=value / 100.0))
         elif kind == "psi" and state.model.n == 7:
             parsed = parse_number(request.text, -180.0, 180.0, "deg")
             value = parsed.value
-            act = None if value is None else lambda: self.set_arm_angle(requests.SetArmAngle(psi=math.radians(value)))
+            act = None if value is None else lambda: self.set_arm_angle(SetArmAngle(psi=math.radians(value)))
         else:
             return
         if act is None:
@@ -160,27 +274,27 @@ class GoalActions:
         self._store.clear_problems(request.field)
         act()
 
-    def set_speed(self, request: requests.SetSpeed) -> None:
+    def set_speed(self, request: SetSpeed) -> None:
         """Plans faster or slower."""
         if math.isfinite(request.speed):
             self._store.update(speed=min(max(request.speed, SLOWEST), 1.0))
             self._store.clear_problems("speed")
             self.plan()
 
-    def set_law(self, request: requests.SetLaw) -> None:
+    def set_law(self, request: SetLaw) -> None:
         """Plans with another law."""
         if request.law in LAWS:
             self._store.update(law=request.law)
             self.plan()
 
-    def set_way(self, request: requests.SetPathType) -> None:
+    def set_way(self, request: SetPathType) -> None:
         """Plans along another kind of path, or over another place."""
         kind = next((kind for kind in PATH_KINDS if kind == request.kind), self._store.state.way)
         via = self._store.state.goal.target if request.via else self._store.state.via
         self._store.update(way=kind, via=via)
         self.plan()
 
-    def plan(self, request: requests.Plan | None = None) -> None:
+    def plan(self, request: PlanGoal | None = None) -> None:
         """Plans from where the arm stands to the goal, unless it is moving: then when it has come to rest.
 
         A path of the tool takes longer than a drag can wait for: it is planned once the goal stands still.
@@ -212,7 +326,7 @@ class GoalActions:
             self._store.say("warn", message("plan.replaced"))
         self._show(replace(made, short=state.goal.reach.short) if isinstance(made, Plan) else made)
 
-    def plan_recovery(self, request: requests.PlanRecovery) -> None:
+    def plan_recovery(self, request: PlanRecovery) -> None:
         """Plans from where the arm stands, outside a joint's range, back inside; the goal stays for the next plan."""
         state, status = self._store.state, self._session.status()
         if status.q_c is None or is_moving(status):
@@ -231,7 +345,7 @@ class GoalActions:
         """Looks for collisions, too, once the goal has stood still for a moment."""
         state = self._store.state
         if self._due is not None and time.monotonic() >= self._due:
-            self.plan(requests.Plan())
+            self.plan(PlanGoal())
             state = self._store.state
         if state.plan is None or time.monotonic() - self._planned < (RESTED if self._is_held else SETTLED):
             return
@@ -250,7 +364,7 @@ class GoalActions:
 
     def follow(self, q: JointVector) -> Goal:
         """Puts the goal where the moving arm is and returns it; planned is when the arm has come to rest."""
-        goal = initial_goal(self._store.state.model, q)
+        goal = goal_at(self._store.state.model, q)
         self._store.update(goal=goal)
         self._stale = True
         return goal
@@ -279,15 +393,6 @@ class GoalActions:
             return self._store.state.model.arm_angle(q)
         except KinematicsError:
             return None
-
-
-def initial_goal(model, q: JointVector) -> Goal:  # type: ignore[no-untyped-def]
-    """Returns the goal that stands where the arm stands."""
-    try:
-        psi = model.arm_angle(q)
-    except KinematicsError:
-        psi = None
-    return Goal(q=q, target=model.forward(q), reach=evaluate_joints(model, q), psi=psi)
 
 
 def _beginning(plan: Plan) -> JointVector:

@@ -3,17 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal
 
-from rcilab.app import requests
 from rcilab.app.goal.goal_actions import GoalActions
+from rcilab.app.request import Handlers, Request
 from rcilab.app.store import Store
 from rcilab.app.text import message
 from rcilab.core.errors import InvalidValueError, RcilabError
 from rcilab.i18n.error_messages import tell
 from rcilab.i18n.translator import Finished
 from rcilab.motion.named_poses import LONGEST_NAME, NamedPoseStore
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NamedPose(Request):
+    """Something with a stored pose."""
+
+    what: Literal["store", "recall", "delete", "choose"]
+    name: str
 
 
 class NamedPoseActions:
@@ -29,7 +38,14 @@ class NamedPoseActions:
         self._store, self._goal, self._file = store, goal, file
         self._shown = ""
 
-    def act(self, request: requests.NamedPose) -> None:
+    @property
+    def handlers(self) -> Handlers:
+        """What it does for each of its requests."""
+        return {
+            NamedPose: self.act,
+        }
+
+    def act(self, request: NamedPose) -> None:
         """Stores the goal under a name, or recalls, deletes or chooses the pose of this name."""
         {"store": self._keep, "recall": self._recall, "delete": self._delete, "choose": self._choose}[request.what](
             request.name

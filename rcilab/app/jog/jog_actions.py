@@ -11,11 +11,23 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rcilab.app import requests
 from rcilab.app.goal.goal_actions import GoalActions
-from rcilab.app.jog.jog_state import FRAMES, SLOWEST, STEPS, STILL, Axis, at_limit, change_jog, inside, jog_velocity
+from rcilab.app.jog.jog_state import (
+    FRAMES,
+    SLOWEST,
+    STEPS,
+    STILL,
+    Axis,
+    HoldJog,
+    PressJog,
+    at_limit,
+    change_jog,
+    inside,
+    jog_velocity,
+)
 from rcilab.app.jog.jog_step import take_step
 from rcilab.app.jog.robot_jog import RobotJog
+from rcilab.app.request import Handlers, Request
 from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.store import Store
 from rcilab.control_process.jog_command import HOLD_TIMEOUT
@@ -25,6 +37,21 @@ from rcilab.motion import Jog
 _LONGEST_LOOK = 100  # Cycles a preview goes on at most in one tick: a page that stood still does not jump.
 _SAME = 1e-9  # [rad]
 _FORGOTTEN = 2.0  # [s] A choice: so long a button that moves nothing any more is silent before it may move again.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetJog(Request):
+    """How to jog; what is None stays."""
+
+    robot: bool | None = None
+    """Whether the buttons move the robot, not the goal."""
+    agreed: bool = False
+    """Whether this is the second yes for a foreign robot."""
+    step: float | None = None
+    """[mm, deg]; 0: as long as a button is held."""
+    frame: str | None = None
+    speed: float | None = None
+    """Share of the fastest jog, 0 to 1."""
 
 
 @dataclass
@@ -60,7 +87,16 @@ class JogActions:
         self._preview: Jog | None = None  # The goal on its way, until it stands.
         self._who: tuple[object, ...] = ()
 
-    def set_jog(self, request: requests.SetJog) -> None:
+    @property
+    def handlers(self) -> Handlers:
+        """What it does for each of its requests."""
+        return {
+            SetJog: self.set_jog,
+            HoldJog: self.hold,
+            PressJog: self.press,
+        }
+
+    def set_jog(self, request: SetJog) -> None:
         """Changes how to jog; what does not exist is ignored. A foreign robot is jogged after a second yes only."""
         state, changes = self._store.state, dict[str, object]()
         if request.step in STEPS:
@@ -75,7 +111,7 @@ class JogActions:
         self.release()
         change_jog(self._store, **changes)
 
-    def hold(self, request: requests.HoldJog) -> None:
+    def hold(self, request: HoldJog) -> None:
         """Goes on with the jog of a button, for as long as it is said again and again."""
         axis, state, now = Axis(request.axis, request.sign), self._store.state, time.monotonic()
         if state.jog.step or not axis.exists(state.model):
@@ -89,7 +125,7 @@ class JogActions:
         if press.is_robot and not press.is_spent:
             press.is_spent = not self._robot.renew(axis, request.stops)
 
-    def press(self, request: requests.PressJog) -> None:
+    def press(self, request: PressJog) -> None:
         """Makes a step, or ends what was held: a button says so when it is released."""
         axis, state = Axis(request.axis, request.sign), self._store.state
         if not axis.exists(state.model):

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from rcilab.app.request import Moving
 from rcilab.app.setup.configuration_state import setup_obstacle
 from rcilab.app.status_text import tell_status
 from rcilab.app.text import Message, message
@@ -52,6 +53,30 @@ _NO_JOG = {
     "lost": "ready.lost",
     "closed": "ready.closed",
 }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JogButton(Moving):
+    """One of the buttons of the Jog tab."""
+
+    axis: str
+    """"joint.0" ... "joint.6", or "x", "y", "z", "roll", "pitch", "yaw"."""
+    sign: int
+    """1 or -1."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HoldJog(JogButton):
+    """It is held; said ten times a second."""
+
+    @property
+    def replaces(self) -> str | None:  # noqa: D102
+        return f"HoldJog.{self.page}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PressJog(JogButton):
+    """It was pressed and released."""
 
 
 @dataclass(frozen=True, kw_only=True)

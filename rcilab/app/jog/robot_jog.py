@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rcilab.app.goal.goal import Goal
 from rcilab.app.goal.goal_actions import GoalActions
 from rcilab.app.jog.jog_state import (
     FASTEST_JOINT,
@@ -30,7 +31,7 @@ from rcilab.app.planning import Plan, make_plan
 from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.readiness import is_moving
 from rcilab.app.status_text import tell_error
-from rcilab.app.store import Goal, Store
+from rcilab.app.store import Store
 from rcilab.app.text import message
 from rcilab.core.clearance import ADVISED_DISTANCE
 from rcilab.core.errors import RcilabError

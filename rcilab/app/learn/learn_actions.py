@@ -2,23 +2,38 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import Any, Literal
 
-from rcilab.app import requests
+import numpy as np
+
 from rcilab.app.fault_lab import FAULTS, FaultDemo
+from rcilab.app.fault_lab.demo_motion import exhibition_of
 from rcilab.app.fault_lab.private_arm import PrivateArm
-from rcilab.app.learn.learn_state import LearnState, LessonState, make_show
+from rcilab.app.learn.learn_state import LearnState, LessonState, Show
 from rcilab.app.learn.lessons import LESSONS, Watcher
+from rcilab.app.request import Handlers, Request
 from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.readiness import is_moving
+from rcilab.app.run.recording import Recording
 from rcilab.app.status_text import tell_error
 from rcilab.app.store import Store
 from rcilab.app.text import message
 from rcilab.core.background_job import BackgroundJob
 from rcilab.core.errors import RcilabError
 from rcilab.core.faults import Fault
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PressLearn(Request):
+    """Something for the Learn tab."""
+
+    what: Literal["provoke", "cancel", "close", "moment", "script", "lesson", "skip", "leave"]
+    fault: int = -1
+    """Number of a fault."""
+    name: str = ""
+    """Of a lesson."""
 
 
 class LearnActions:
@@ -30,7 +45,14 @@ class LearnActions:
         self._work: BackgroundJob[Fault, FaultDemo] = BackgroundJob("gallery")
         self._watcher = Watcher()
 
-    def press(self, request: requests.Learn) -> None:
+    @property
+    def handlers(self) -> Handlers:
+        """What it does for each of its requests."""
+        return {
+            PressLearn: self.press,
+        }
+
+    def press(self, request: PressLearn) -> None:
         """Does what a button of the tab says."""
         match request.what:
             case "provoke":
@@ -131,3 +153,15 @@ class LearnActions:
             steps = LESSONS[lesson.name][lesson.step + 1 :]
             last = message("lesson.over") if not steps else message(f"lesson.{lesson.name}.{steps[0].name}")
             self._store.say("good", message("lesson.ticked", next=last))
+
+
+def make_show(exhibit: FaultDemo, beside: object) -> Show:
+    """Returns a fault as the page shows it."""
+    rows = exhibit.whole
+    return Show(
+        exhibition=exhibition_of(exhibit),
+        recording=Recording(
+            t=np.array(rows["t"]), q=rows["q"], q_c=rows["q_c"], dq=rows["dq"], delay=0, moment=exhibit.time
+        ),
+        beside=beside,
+    )

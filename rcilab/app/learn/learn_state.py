@@ -5,16 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from rcilab.app.fault_lab import FaultDemo
-from rcilab.app.fault_lab.demo_motion import DemoMotion, exhibition_of
+from rcilab.app.run.recording import Recording
 from rcilab.app.text import Message
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.faults import Fault
 
 if TYPE_CHECKING:
-    from rcilab.app.store import Recording, UiState
+    from rcilab.app.fault_lab.demo_motion import DemoMotion
+    from rcilab.app.fault_lab.fault_demo import FaultDemo
+    from rcilab.app.store import UiState
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -60,20 +59,6 @@ class LearnState:
     problem: Message | None = None
     """Why the last one did not come."""
     lesson: LessonState | None = None
-
-
-def make_show(exhibit: FaultDemo, beside: object) -> Show:
-    """Returns a fault as the page shows it."""
-    from rcilab.app.store import Recording
-
-    rows = exhibit.whole
-    return Show(
-        exhibition=exhibition_of(exhibit),
-        recording=Recording(
-            t=np.array(rows["t"]), q=rows["q"], q_c=rows["q_c"], dq=rows["dq"], delay=0, moment=exhibit.time
-        ),
-        beside=beside,
-    )
 
 
 def exhibited(state: UiState, *, scene: bool = False) -> UiState:

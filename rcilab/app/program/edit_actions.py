@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Literal
 
-from rcilab.app import requests
 from rcilab.app.goal.goal_actions import GoalActions
 from rcilab.app.program.program_draft import MOST_ROUNDS, TYPES, Draft, target_of, time_at
 from rcilab.app.program.program_history import ProgramHistory
 from rcilab.app.program.waypoint_fields import default_via, proposed
+from rcilab.app.request import Handlers, Request, TypeField
 from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.store import Store
 from rcilab.app.text import Message, message
@@ -18,6 +19,23 @@ from rcilab.i18n.number_parsing import parse_number
 from rcilab.motion.waypoint import Waypoint
 
 LONGEST_NAME = 80
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EditProgram(Request):
+    """Change the program of the Program tab, or what of it is selected."""
+
+    what: Literal[
+        "select", "add", "teach", "via", "type", "delete", "duplicate", "up", "down", "move", "start", "aim", "undo",
+        "redo", "clear", "script", "tool",
+    ]  # fmt: skip
+    key: int | None = None
+    """Key of a step; None is the selected one."""
+    source: Literal["here", "target"] = "here"
+    """Where a waypoint, or its via, comes from: the arm, or the goal."""
+    type: str = ""
+    place: int = 0
+    """Where to move a step, from 0."""
 
 
 class EditActions:
@@ -32,14 +50,21 @@ class EditActions:
 
     def __init__(self, store: Store, session: RobotConnection, goal: GoalActions, shelves: ProgramHistory) -> None:
         self._store, self._session, self._goal, self._shelves = store, session, goal, shelves
-        self._edits: dict[str, Callable[[requests.EditProgram, int], None]] = {
+        self._edits: dict[str, Callable[[EditProgram, int], None]] = {
             "select": self._select, "teach": self._teach, "via": self._via, "type": self._retype,
             "delete": self._delete, "duplicate": self._duplicate, "aim": self._aim,
             "up": lambda request, key: self._move(key, -1), "down": lambda request, key: self._move(key, 1),
             "move": self._move_to,
         }  # fmt: skip
 
-    def edit(self, request: requests.EditProgram) -> None:
+    @property
+    def handlers(self) -> Handlers:
+        """What it does for each of its requests."""
+        return {
+            EditProgram: self.edit,
+        }
+
+    def edit(self, request: EditProgram) -> None:
         """Changes the program, or what of it is selected; what nobody can do just now is said."""
         self._shelves.open()
         whole = {
@@ -58,7 +83,7 @@ class EditActions:
             return
         self._edits[request.what](request, key)
 
-    def type_field(self, request: requests.TypeField) -> None:
+    def type_field(self, request: TypeField) -> None:
         """Takes what was typed about a step, the rounds or the name, or says beside the field what is wrong with it."""
         self._shelves.open()
         _, key, name = (*request.field.split("."), "", "")[:3]
@@ -82,7 +107,7 @@ class EditActions:
     def _draft(self) -> Draft:
         return self._shelves.draft
 
-    def _rename(self, request: requests.TypeField) -> None:
+    def _rename(self, request: TypeField) -> None:
         name = request.text.strip()
         good = name.isprintable() and len(name) <= LONGEST_NAME
         if self._shelves.answer(request.field, None if good else message("program.name_bad", most=LONGEST_NAME)):
@@ -99,7 +124,7 @@ class EditActions:
             self._store.say("warn", message("plan.no_arm"))
         return here
 
-    def _add(self, request: requests.EditProgram) -> None:
+    def _add(self, request: EditProgram) -> None:
         q = self._configuration(request.source)
         if q is None:
             return
@@ -118,7 +143,7 @@ class EditActions:
         if q is not None and self._draft.steps:
             self._shelves.change(replace(self._draft, start=tuple(q.tolist())), self._shelves.state.selected)
 
-    def _select(self, request: requests.EditProgram, key: int) -> None:
+    def _select(self, request: EditProgram, key: int) -> None:
         """Chooses a step; while the plan is of this program, the preview goes there."""
         if key != self._shelves.state.selected:
             self._store.clear_problems("program.")
@@ -130,7 +155,7 @@ class EditActions:
         if place < len(plan.program.waypoints):
             self._store.update(place=time_at(plan, place + 1) / max(plan.motion.duration, 1e-3), playing=False)
 
-    def _teach(self, request: requests.EditProgram, key: int) -> None:
+    def _teach(self, request: EditProgram, key: int) -> None:
         q, waypoint = self._configuration(request.source), self._draft.waypoint(key)
         if q is None or waypoint is None:
             return
@@ -140,7 +165,7 @@ class EditActions:
         taught = replace(waypoint, q=tuple(q.tolist()), position=None, wxyz=None, psi=None)
         self._shelves.change(self._draft.changed(key, taught), key)
 
-    def _via(self, request: requests.EditProgram, key: int) -> None:
+    def _via(self, request: EditProgram, key: int) -> None:
         q, waypoint = self._configuration(request.source), self._draft.waypoint(key)
         if q is None or waypoint is None or waypoint.type != "arc":
             return
@@ -148,7 +173,7 @@ class EditActions:
         via = replace(waypoint, via=tuple(pose.position.tolist()), via_wxyz=tuple(pose.wxyz.tolist()))
         self._shelves.change(self._draft.changed(key, via), key)
 
-    def _retype(self, request: requests.EditProgram, key: int) -> None:
+    def _retype(self, request: EditProgram, key: int) -> None:
         waypoint = self._draft.waypoint(key)
         if waypoint is None or request.type == waypoint.type or request.type not in TYPES:
             return
@@ -164,13 +189,13 @@ class EditActions:
             self._store.say("good", message("program.via_made"))
         self._shelves.change(self._draft.changed(key, waypoint.retyped(request.type, via)), key)
 
-    def _delete(self, request: requests.EditProgram, key: int) -> None:
+    def _delete(self, request: EditProgram, key: int) -> None:
         place = self._draft.place(key) or 0
         draft = self._draft.without(key)
         left = draft.steps[min(place, len(draft.steps) - 1)].key if draft.steps else None
         self._shelves.change(draft, left)
 
-    def _duplicate(self, request: requests.EditProgram, key: int) -> None:
+    def _duplicate(self, request: EditProgram, key: int) -> None:
         waypoint = self._draft.waypoint(key)
         assert waypoint is not None
         self._shelves.change(*self._draft.inserted(waypoint, key))
@@ -180,11 +205,11 @@ class EditActions:
         if place is not None and 0 <= place + step < len(self._draft.steps):
             self._shelves.change(self._draft.moved(key, place + step), key)
 
-    def _move_to(self, request: requests.EditProgram, key: int) -> None:
+    def _move_to(self, request: EditProgram, key: int) -> None:
         if self._draft.place(key) != request.place:
             self._shelves.change(self._draft.moved(key, request.place), key)
 
-    def _aim(self, request: requests.EditProgram, key: int) -> None:
+    def _aim(self, request: EditProgram, key: int) -> None:
         waypoint = self._draft.waypoint(key)
         assert waypoint is not None
         model = self._store.state.model

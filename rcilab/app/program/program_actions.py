@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import partial, reduce
 
 import numpy as np
 
-from rcilab.app import requests
 from rcilab.app.goal.goal_actions import GoalActions
 from rcilab.app.planning import Plan
 from rcilab.app.program.edit_actions import LONGEST_NAME, EditActions
 from rcilab.app.program.program_draft import FILE_FIELD, Draft, draft_of, is_led_in, notes_of, number_at
 from rcilab.app.program.program_history import ProgramHistory
 from rcilab.app.program.program_planning import Job, plan_job
+from rcilab.app.request import Handlers, Request
 from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.readiness import is_moving
 from rcilab.app.store import Store
@@ -24,6 +25,27 @@ from rcilab.i18n.error_messages import tell
 from rcilab.model.robot_model import load_model
 from rcilab.motion.program import Program
 from rcilab.motion.program_file import read_program
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlanProgram(Request):
+    """Plan the program and check it."""
+
+    upto: bool = False
+    """Only to the selected waypoint."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CancelProgram(Request):
+    """Drop the planning that is under way."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoadProgram(Request):
+    """A file was chosen in the browser."""
+
+    name: str
+    content: bytes
 
 
 class ProgramActions:
@@ -39,7 +61,16 @@ class ProgramActions:
         self._shelves = ProgramHistory(store, self._drop_planning)
         self.editing = EditActions(store, session, goal, self._shelves)
 
-    def plan(self, request: requests.PlanProgram) -> None:
+    @property
+    def handlers(self) -> Handlers:
+        """What it does for each of its requests."""
+        return {
+            PlanProgram: self.plan,
+            CancelProgram: self.cancel,
+            LoadProgram: self.load,
+        }
+
+    def plan(self, request: PlanProgram) -> None:
         """Plans the program, or the part of it up to the selected step, from where the arm stands."""
         self._shelves.open()
         state, status = self._store.state, self._session.status()
@@ -67,13 +98,13 @@ class ProgramActions:
         self._store.clear_problems(FILE_FIELD)
         self._shelves.set(progress=0.0, answer=None, failed=None, notes=())
 
-    def cancel(self, request: requests.CancelProgram) -> None:
+    def cancel(self, request: CancelProgram) -> None:
         """Drops the planning that is under way; the plan there was before stays."""
         if self._planner.progress is not None:
             self._drop_planning()
             self._shelves.set(tone="warn", answer=message("program.cancelled"))
 
-    def load(self, request: requests.LoadProgram) -> None:
+    def load(self, request: LoadProgram) -> None:
         """Takes a program from a file, or says beside the button what is wrong; undo brings the old one back."""
         self._shelves.open()
         try:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from tempfile import TemporaryFile
 from typing import IO, TYPE_CHECKING, TypeAlias
 
-from rcilab.app import requests
+from rcilab.app.request import Handlers, Request
 from rcilab.app.status_text import tell_error
 from rcilab.app.text import message
 from rcilab.core.errors import RcilabError
@@ -28,6 +28,19 @@ Deliver: TypeAlias = Callable[["int | None", str, "IO[bytes]", Callable[[], bool
 """Sends a file to a page: client id (None: nobody), name, content, whether to give up; returns whether all was sent."""
 
 _STEP = 0.05  # Share between two updates of the progress bar.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ExportRun(Request):
+    """The last run as a file, through the browser."""
+
+    ending: str
+    """.csv, .parquet, .mcap, .html or .rcirun."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CancelExport(Request):
+    """Drop the export that is under way."""
 
 
 class _UnwantedError(Exception):
@@ -56,7 +69,15 @@ class ExportActions:
         self._worker: threading.Thread | None = None
         self._unwanted = threading.Event()
 
-    def export(self, request: requests.Export) -> None:
+    @property
+    def handlers(self) -> Handlers:
+        """What it does for each of its requests."""
+        return {
+            ExportRun: self.export,
+            CancelExport: self.cancel,
+        }
+
+    def export(self, request: ExportRun) -> None:
         """Begins an export; refused while another one is under way."""
         recording = self._store.state.last_run
         run = None if recording is None else recording.run
@@ -74,7 +95,7 @@ class ExportActions:
             )
             self._worker.start()
 
-    def cancel(self, request: requests.CancelExport) -> None:
+    def cancel(self, request: CancelExport) -> None:
         """Drops the export under way, at its next report of progress."""
         self._unwanted.set()
 

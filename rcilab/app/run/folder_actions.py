@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import time
-from dataclasses import replace
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, Literal
 
-from rcilab.app import requests
+from rcilab.app.request import Handlers, Request
 from rcilab.app.store import Store
 from rcilab.app.text import message
 from rcilab.recording.folder import keep_newest, stored_runs
@@ -15,6 +15,15 @@ KEEPS = (100, 20, 5, 0)
 """How many runs may be kept."""
 
 _LOOK = 5.0  # [s] A choice: between two looks into the folder.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClearRuns(Request):
+    """Delete recorded runs but for the newest ones."""
+
+    what: Literal["choose", "ask", "confirm", "cancel"]
+    keep: int
+    """How many stay."""
 
 
 class FolderActions:
@@ -28,7 +37,14 @@ class FolderActions:
         self._store = store
         self._next = float("-inf")
 
-    def clear(self, request: requests.ClearRuns) -> None:
+    @property
+    def handlers(self) -> Handlers:
+        """What it does for each of its requests."""
+        return {
+            ClearRuns: self.clear,
+        }
+
+    def clear(self, request: ClearRuns) -> None:
         """Asks first, then deletes all runs but the newest ones; a run that is being recorded stays."""
         folder, state = self._store.state.folder, self._store.state
         if request.keep not in KEEPS or state.runs is None:

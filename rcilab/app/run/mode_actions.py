@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import replace
-from typing import TYPE_CHECKING, cast
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal, cast
 
-from rcilab.app import requests
+from rcilab.app.request import Handlers, Request, TypeField
 from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.drive_state import control_field, is_pending
 from rcilab.app.run.mode_parameters import SECOND_THOUGHT, ask_to_send
@@ -27,6 +27,27 @@ if TYPE_CHECKING:
     from rcilab.control_process import PendingRequest, SupervisorStatus
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetDrive(Request):
+    """How to drive the arm; what is None stays."""
+
+    mode: str | None = None
+    """One of `rcilab.core.state.MODES`."""
+    pace: float | None = None
+    """Part of the planned speed, 0.1 to 1."""
+
+    @property
+    def replaces(self) -> str | None:  # noqa: D102
+        return None if self.pace is None else f"pace.{self.page}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PressControl(Request):
+    """A button of the modes' parameters."""
+
+    what: Literal["send", "reset"]
+
+
 class ModeActions:
     """Mode, parameters, pause, pace. Our own controller is told at once, a foreign one when asked for twice."""
 
@@ -38,7 +59,15 @@ class ModeActions:
         self._asked_to_send = -math.inf
         self._arm = store.state.model.name
 
-    def set_drive(self, request: requests.SetDrive) -> None:
+    @property
+    def handlers(self) -> Handlers:
+        """What it does for each of its requests."""
+        return {
+            SetDrive: self.set_drive,
+            PressControl: self.press,
+        }
+
+    def set_drive(self, request: SetDrive) -> None:
         """Chooses a mode, whose conditions then judge the plan, or a pace; what does not exist is ignored."""
         state, status = self._store.state, self._session.status()
         if request.mode in MODES and request.mode != state.drive.mode:
@@ -63,7 +92,7 @@ class ModeActions:
         if self._require_motion():
             self._wish.go_on(self._store.state.drive.pace)
 
-    def type_field(self, request: requests.TypeField) -> None:
+    def type_field(self, request: TypeField) -> None:
         """Takes a typed parameter, or says beside the field what is wrong with it."""
         state = self._store.state
         found = control_field(state.model, request.field)
@@ -80,7 +109,7 @@ class ModeActions:
         self._store.clear_problems(request.field)
         self._store.update(drive=drive)
 
-    def press(self, request: requests.PressControl) -> None:
+    def press(self, request: PressControl) -> None:
         """Sends the parameters, or takes those that a controller wakes up with."""
         state, now = self._store.state, time.monotonic()
         if request.what == "reset":

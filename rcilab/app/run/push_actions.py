@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from rcilab.app import requests
+from rcilab.app.request import Handlers, Request
 from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.active_force import (
     DIRECTIONS,
@@ -34,6 +34,44 @@ if TYPE_CHECKING:
 _NO_MOMENT = (0.0, 0.0, 0.0)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetPush(Request):
+    """How to push the arm and how to guide it; what is None stays."""
+
+    link: int | None = None
+    """From 1; 0: the tool."""
+    direction: str | None = None
+    newtons: float | None = None
+    grab: bool | None = None
+    way: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HoldPush(Request):
+    """The push button is held; said ten times a second."""
+
+    @property
+    def replaces(self) -> str | None:  # noqa: D102
+        return f"HoldPush.{self.page}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DragLink(Request):
+    """The mouse drags a link of the arm."""
+
+    link: int
+    """From 1."""
+    grabbed: tuple[float, ...]
+    """Where it was taken hold of, base axes, [m]."""
+    hand: tuple[float, ...]
+    """Where the mouse is, base axes, [m]."""
+    phase: Literal["start", "update", "end"]
+
+    @property
+    def replaces(self) -> str | None:  # noqa: D102
+        return f"pull.{self.page}" if self.phase == "update" else None
+
+
 @dataclass(frozen=True, eq=False)
 class _Grip:
     """Where the mouse holds the arm."""
@@ -56,7 +94,16 @@ class PushActions:
         self._push: ExternalForceHold | None = None
         self._address: str | None = None
 
-    def set_push(self, request: requests.SetPush) -> None:
+    @property
+    def handlers(self) -> Handlers:
+        """What it does for each of its requests."""
+        return {
+            SetPush: self.set_push,
+            HoldPush: self.hold,
+            DragLink: self.pull,
+        }
+
+    def set_push(self, request: SetPush) -> None:
         """Changes how to push or to guide; what does not exist is ignored, a force is taken at its bound."""
         state = self._store.state
         changes: dict[str, object] = {}
@@ -72,7 +119,7 @@ class PushActions:
             changes["way"] = request.way
         self._store.update(push=replace(state.push, **changes))
 
-    def hold(self, request: requests.HoldPush) -> None:
+    def hold(self, request: HoldPush) -> None:
         """Goes on with the push of the button, for as long as it is said again and again."""
         reason = no_push(self._session.status())
         if reason is not None:
@@ -80,7 +127,7 @@ class PushActions:
             return
         self._button = request.page, time.monotonic()
 
-    def pull(self, request: requests.DragLink) -> None:
+    def pull(self, request: DragLink) -> None:
         """Takes hold of a link where the mouse is, follows the mouse, lets go."""
         state, status = self._store.state, self._session.status()
         numbers = np.array((request.grabbed, request.hand), dtype=float)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rcilab.app.goal.goal_actions import initial_goal
+from rcilab.app.goal.goal import goal_at
 from rcilab.app.planning import build_plan_view
 from rcilab.app.run.run_recorder import whole_recording
 from rcilab.conformance import check
@@ -41,7 +41,7 @@ def replayed(state: UiState, run: Run) -> UiState:
     motion = run.plan or run.commanded()  # A callback has no plan: what it commanded is drawn and checked.
     report = run.report or check(motion, model)
     plan = replace(build_plan_view(model, motion, report), complete=True)
-    goal = initial_goal(model, motion.goal)
+    goal = goal_at(model, motion.goal)
     wanted = state.setup.wanted.updated(RobotConfiguration(tool=model.T_flange_tool, load=model.load))
     setup = replace(state.setup, wanted=wanted, touched=frozenset({"tool", "load"}))
     recording = whole_recording(run)

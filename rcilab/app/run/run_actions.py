@@ -5,20 +5,20 @@ from __future__ import annotations
 import math
 import time
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
-from rcilab.app import requests
-from rcilab.app.goal.goal_actions import initial_goal
+from rcilab.app.goal.goal import Goal, goal_at
 from rcilab.app.goal.target_status import Tone
+from rcilab.app.request import Handlers, Moving, Request
 from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.active_force import PLANTS, TOOL, is_guided
 from rcilab.app.run.readiness import is_moving, obstacle
 from rcilab.app.run.run_recorder import RunRecorder
 from rcilab.app.setup.configuration_state import SetupState, name_parts, setup_obstacle
 from rcilab.app.status_text import StartingError, tell_error, tell_incident
-from rcilab.app.store import Goal, Store, UiState
+from rcilab.app.store import Store, UiState
 from rcilab.app.text import Message, message
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import (
@@ -40,6 +40,26 @@ _SECOND_THOUGHT = 10.0  # [s] A choice: a second press that comes later asks ane
 TROUBLE = "robot"
 """Names what is said while the robot side cannot move: see `Store.settle`."""
 _POWER_PAUSE = 2.0  # [s] A choice: between two attempts to switch the virtual arm on.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RobotCommand(Moving):
+    """Something for the robot: what the buttons of the Run tab say."""
+
+    what: Literal[
+        "execute", "confirm", "cancel", "stop", "recover", "power_on", "power_off", "reconnect", "guide", "unguide",
+        "pause", "resume", "disconnect",
+    ]  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ChooseRobot(Request):
+    """Another arm, another destination, or another plant for the virtual controller."""
+
+    model: str | None = None
+    target: str | None = None
+    plant: str | None = None
+    """"ideal" or "mujoco"."""
 
 
 class RunActions:
@@ -65,7 +85,14 @@ class RunActions:
         self._guided = False
         self._asked_to_guide = -math.inf
 
-    def drive(self, request: requests.RobotCommand) -> None:
+    @property
+    def handlers(self) -> Handlers:
+        """What it does for each of its requests."""
+        return {
+            ChooseRobot: self.choose_robot,
+        }
+
+    def drive(self, request: RobotCommand) -> None:
         """Passes one button of the Run tab on to the supervisor."""
         if request.what in ("execute", "confirm"):
             self._execute(is_agreed=request.what == "confirm", stops=request.stops)
@@ -114,7 +141,7 @@ class RunActions:
         space, kind = state.push.way.split(".")
         return self._session.supervisor().start_guiding(space, kind, stops=stops)  # type: ignore[arg-type]  # One of WAYS.
 
-    def choose_robot(self, request: requests.ChooseRobot) -> None:
+    def choose_robot(self, request: ChooseRobot) -> None:
         """Takes another arm, destination or plant; refused while the arm moves."""
         state = self._store.state
         if is_moving(self._session.status()):
@@ -175,7 +202,7 @@ class RunActions:
             changes |= {"push": replace(state.push, link=TOOL)}  # The other arm may have no such link.
             setup = self._exchange_setups(state, name)
             model = setup.wanted.only(setup.touched).applied_to(model)
-            self._untouched = initial_goal(model, model.home)
+            self._untouched = goal_at(model, model.home)
             changes |= {"model": model, "goal": self._untouched, "setup": setup}
             changes |= {"drive": replace(state.drive, control=None, refusal=None, typed_address="", world=None)}
         is_same = model.name == state.model.name
@@ -223,7 +250,7 @@ class RunActions:
         if not self._placed and status.q_c is not None:
             self._placed = True
             if self._store.state.goal is self._untouched:
-                self._store.update(goal=initial_goal(self._store.state.model, status.q_c))
+                self._store.update(goal=goal_at(self._store.state.model, status.q_c))
             return "placed"
         may_power = self._session.is_ready and status.phase == "idle" and self._store.state.target == "virtual"
         if may_power and not self._powered:

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rcilab.app.store import Recording, Store
+from rcilab.app.run.recording import Recording
+from rcilab.app.store import Store
 from rcilab.app.text import message
 from rcilab.core.errors import InvalidValueError
 from rcilab.i18n.error_messages import tell

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal
 
-from rcilab.app import requests
+from rcilab.app.request import Handlers, Request
 from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.status_text import tell_error
 from rcilab.app.store import Store
@@ -15,6 +15,21 @@ if TYPE_CHECKING:
     from rcilab.control_process import PendingRequest, SupervisorStatus
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetOutput(Request):
+    """A digital output, 0 to 5, on or off."""
+
+    signal: int
+    level: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PressSignals(Request):
+    """Reads the digital inputs; or restarts the controller, once that is confirmed."""
+
+    what: Literal["read", "reboot", "confirm", "cancel"]
+
+
 class SignalActions:
     """Owned by the conductor's thread; it never waits for the controller."""
 
@@ -22,12 +37,20 @@ class SignalActions:
         self._store, self._session = store, session
         self._tickets: list[tuple[str, PendingRequest]] = []
 
-    def set_output(self, request: requests.SetOutput) -> None:
+    @property
+    def handlers(self) -> Handlers:
+        """What it does for each of its requests."""
+        return {
+            SetOutput: self.set_output,
+            PressSignals: self.press,
+        }
+
+    def set_output(self, request: SetOutput) -> None:
         """Sets a digital output."""
         ticket = self._session.supervisor().set_output(request.signal, request.level)
         self._tickets.append(("output", ticket))
 
-    def press(self, request: requests.PressSignals) -> None:
+    def press(self, request: PressSignals) -> None:
         """Reads the inputs; restarts the controller when that was confirmed."""
         if request.what == "read":
             self._tickets.append(("inputs", self._session.supervisor().read_inputs()))

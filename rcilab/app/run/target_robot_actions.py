@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import cast
+from dataclasses import dataclass, replace
+from typing import Literal, cast
 
-from rcilab.app import requests
+from rcilab.app.request import Handlers, Request
 from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.active_force import Plant
 from rcilab.app.run.drive_state import DESTINATIONS
@@ -16,13 +16,30 @@ from rcilab.app.text import message
 from rcilab.makers.rokae.driver.address import parse_address
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ChooseDestination(Request):
+    """Where motions go; an address is asked for once more."""
+
+    where: str
+    """One of `DESTINATIONS`."""
+    address: str = ""
+    answer: Literal["", "yes", "no"] = ""
+
+
 class TargetRobotActions:
     """Preview, the virtual controller with one of its arms, or a controller at an address."""
 
     def __init__(self, store: Store, session: RobotConnection, robot: RunActions) -> None:
         self._store, self._session, self._robot = store, session, robot
 
-    def choose(self, request: requests.ChooseDestination) -> None:
+    @property
+    def handlers(self) -> Handlers:
+        """What it does for each of its requests."""
+        return {
+            ChooseDestination: self.choose,
+        }
+
+    def choose(self, request: ChooseDestination) -> None:
         """Connects to a destination; an address is named once more before anything is sent there."""
         state = self._store.state
         if request.where not in DESTINATIONS:
@@ -42,7 +59,7 @@ class TargetRobotActions:
             self._store.update(plant=cast("Plant", request.where))
             self._robot.open(state.model.name, "virtual")
 
-    def _choose_address(self, request: requests.ChooseDestination) -> None:
+    def _choose_address(self, request: ChooseDestination) -> None:
         asked, address = self._store.state.drive.typed_address, request.address.strip()
         self._ask("")  # It was about what stood in the field before.
         if request.answer == "yes" and asked and address == asked:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal
 
-from rcilab.app import requests
+from rcilab.app.request import Handlers, Request
 from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.active_force import no_push
 from rcilab.app.run.drive_state import CABLE_PULLED, NETWORK_LAB
@@ -24,6 +24,39 @@ if TYPE_CHECKING:
 _WIRING = {"loop_back": LoopBack, "auto_limit": AutoLimit}
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetNetwork(Request):
+    """The network of our own controller; what is None stays."""
+
+    name: str | None = None
+    """One of `NETWORK_LAB`."""
+    value: float = 0.0
+    """[1] or [s]."""
+    direction: str | None = None
+    pulled: bool | None = None
+    """Whether the cable is out."""
+    clear: bool = False
+
+    @property
+    def replaces(self) -> str | None:  # noqa: D102
+        return None if self.name is None else f"network.{self.name}.{self.page}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PressSafety(Request):
+    """A safety button of our own controller."""
+
+    button: Literal["none", "estop", "gstop"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetWiring(Request):
+    """Has our own controller's outputs wired to its inputs, or commands led to rest inside the soft limits."""
+
+    name: Literal["loop_back", "auto_limit"]
+    on: bool
+
+
 class WorldActions:
     """Owned by the conductor's thread; it never waits for the controller."""
 
@@ -32,7 +65,16 @@ class WorldActions:
         self._watch: SimulationStatusPoller | None = None
         self._address: str | None = None
 
-    def set_network(self, request: requests.SetNetwork) -> None:
+    @property
+    def handlers(self) -> Handlers:
+        """What it does for each of its requests."""
+        return {
+            SetNetwork: self.set_network,
+            PressSafety: self.press_safety,
+            SetWiring: self.set_wiring,
+        }
+
+    def set_network(self, request: SetNetwork) -> None:
         """Changes the network, or pulls the cable and plugs it in again; numbers are taken at their bounds."""
         watch = self._require_watch()
         if watch is None:
@@ -51,14 +93,14 @@ class WorldActions:
         self._store.update(drive=replace(drive, network=network, direction=direction, pulled=pulled))
         self._tell(watch)
 
-    def press_safety(self, request: requests.PressSafety) -> None:
+    def press_safety(self, request: PressSafety) -> None:
         """Presses the emergency stop, opens the safety gate, or puts both right."""
         watch = self._require_watch()
         if watch is not None and request.button in ("none", "estop", "gstop"):
             watch.ask(Press(request.button))
             self._store.say("warn" if request.button != "none" else "good", message(f"safety.{request.button}_done"))
 
-    def set_wiring(self, request: requests.SetWiring) -> None:
+    def set_wiring(self, request: SetWiring) -> None:
         """Wires outputs to inputs, or has commands led to rest at the soft limits; or takes that back."""
         watch = self._require_watch()
         if watch is None or request.name not in _WIRING:

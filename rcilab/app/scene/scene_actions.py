@@ -8,17 +8,62 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import replace
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Literal
 
-from rcilab.app import requests
 from rcilab.app.goal.elbow import look_at_elbow
-from rcilab.app.goal.goal_actions import GoalActions
+from rcilab.app.goal.goal_actions import GoalActions, SetArmAngle
+from rcilab.app.request import Handlers, Request
 from rcilab.app.scene.path_strip import look_at_path
 from rcilab.app.scene.scene_extras import EXTRAS, look_at_dexterity, look_at_reach, look_at_sweep
 from rcilab.app.store import Store
 from rcilab.app.text import message
 from rcilab.views.elbow_view import OUTWARD
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DragElbow(Request):
+    """The handle on the elbow's circle was dragged."""
+
+    eye: tuple[float, ...]
+    """Where the page's camera is, base axes, [m]."""
+    hand: tuple[float, ...]
+    """A point under the mouse, base axes, [m]."""
+    phase: Literal["start", "update", "end"]
+
+    @property
+    def replaces(self) -> str | None:  # noqa: D102
+        return f"elbow.{self.page}" if self.phase == "update" else None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HighlightBranch(Request):
+    """A branch of the list is under the mouse or has the focus."""
+
+    is_silent: ClassVar[bool] = True
+
+    index: int | None
+    """From 0, in the order of the list; None when it is left."""
+
+    @property
+    def replaces(self) -> str | None:  # noqa: D102
+        return f"HighlightBranch.{self.page}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ShowViolation(Request):
+    """Go to a violation on the path and say what it is."""
+
+    number: int
+    """From 0, worst first."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ShowExtra(Request):
+    """Show or hide one of the things that the scene has switches for."""
+
+    name: str
+    on: bool
 
 
 class SceneActions:
@@ -35,11 +80,21 @@ class SceneActions:
         self._beside = ThreadPoolExecutor(1, thread_name_prefix="scene")
         self._made: dict[str, Future[Any]] = {}
 
+    @property
+    def handlers(self) -> Handlers:
+        """What it does for each of its requests."""
+        return {
+            DragElbow: self.drag_elbow,
+            HighlightBranch: self.peek,
+            ShowViolation: self.show_bead,
+            ShowExtra: self.show_extra,
+        }
+
     def close(self) -> None:
         """Drops what is being computed."""
         self._beside.shutdown(wait=False, cancel_futures=True)
 
-    def drag_elbow(self, request: requests.DragElbow) -> None:
+    def drag_elbow(self, request: DragElbow) -> None:
         """Turns the elbow to where the mouse sees its circle."""
         elbow = self._store.state.scene.elbow
         numbers = (*request.eye, *request.hand)
@@ -49,15 +104,15 @@ class SceneActions:
             self._store.remember()
             return
         psi = elbow.circle.angle_along(request.eye, request.hand, elbow.psi, OUTWARD)
-        self._goal.set_arm_angle(requests.SetArmAngle(page=request.page, psi=psi), elbow.branch)
+        self._goal.set_arm_angle(SetArmAngle(page=request.page, psi=psi), elbow.branch)
 
-    def peek(self, request: requests.HighlightBranch) -> None:
+    def peek(self, request: HighlightBranch) -> None:
         """Shows a branch before it is chosen."""
         solutions = self._store.state.goal.reach.solutions
         known = solutions is not None and request.index is not None and 0 <= request.index < len(solutions)
         self._change(peek=request.index if known else None)
 
-    def show_bead(self, request: requests.ShowViolation) -> None:
+    def show_bead(self, request: ShowViolation) -> None:
         """Takes the preview to a violation and says what it is."""
         state = self._store.state
         ribbon = state.scene.ribbon
@@ -67,7 +122,7 @@ class SceneActions:
         self._store.update(place=bead.place, playing=False)
         self._store.say("bad", message("notice.plain", text=bead.violations[0]))
 
-    def show_extra(self, request: requests.ShowExtra) -> None:
+    def show_extra(self, request: ShowExtra) -> None:
         """Turns a switch."""
         extra = next((name for name in EXTRAS if name == request.name), None)
         if extra is not None:

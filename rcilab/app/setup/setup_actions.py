@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import replace
-from typing import TYPE_CHECKING, cast
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, ClassVar, Literal, cast
 
 import numpy as np
 
-from rcilab.app import requests
+from rcilab.app.goal.goal import Goal
 from rcilab.app.goal.target_status import evaluate_joints, evaluate_pose
 from rcilab.app.planning import Plan, tool_path
+from rcilab.app.request import Handlers, Request, TypeField
 from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.setup.configuration_sender import SetupPost
 from rcilab.app.setup.configuration_state import (
@@ -36,7 +37,7 @@ from rcilab.app.setup.setup_fields import (
     with_inertia,
     with_pose,
 )
-from rcilab.app.store import Goal, Store, UiState
+from rcilab.app.store import Store, UiState
 from rcilab.app.text import Message, message
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
@@ -50,6 +51,63 @@ if TYPE_CHECKING:
 _UNDO_DEPTH = 100
 _ROUNDED = 1e-5  # [rad] Closer than what the page shows of an angle: the arm's own bound is meant.
 _HAND_GONE = 1.0  # [s] A choice: a drag that was not heard of for so long has ended, whatever became of its page.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OpenTab(Request):
+    """Another tab was opened."""
+
+    is_silent: ClassVar[bool] = True
+
+    name: str
+    """Key of its label, such as "tab.setup"; "" for one that does not exist."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MoveSetup(Request):
+    """The handles of a part of the set-up were moved."""
+
+    part: Literal["box", "tool", "load", "force"]
+    position: tuple[float, ...]
+    """Of the box in base; of the others in the flange frame, [m]."""
+    wxyz: tuple[float, ...]
+    ended: bool = False
+    """Whether the mouse was released."""
+
+    @property
+    def replaces(self) -> str | None:  # noqa: D102
+        return None if self.ended else f"MoveSetup.{self.page}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ResizeBox(Request):
+    """A handle on a face of the safety box was dragged."""
+
+    face: int
+    """0 to 2: the low faces along x, y, z of the box; 3 to 5: the high ones."""
+    hand: tuple[float, ...]
+    """Where the mouse is, base axes, [m]."""
+    ended: bool = False
+
+    @property
+    def replaces(self) -> str | None:  # noqa: D102
+        return None if self.ended else f"ResizeBox.{self.page}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetSetup(Request):
+    """A switch of the set-up."""
+
+    name: Literal["edited", "box", "tool", "load", "force", "active", "axes"]
+    """What has handles; whether a part is drawn; whether the box bounds; what the force-control frame follows."""
+    value: str | bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PressSetup(Request):
+    """A button of the set-up."""
+
+    what: Literal["whole", "undo", "send", "confirm", "cancel"]
 
 
 class SetupActions:
@@ -67,7 +125,18 @@ class SetupActions:
         self._told_of: object = None  # The program of which it was said what another tool makes of it.
         self._told = 0  # At how many connections the controller has taken a set-up, as far as that was said.
 
-    def type_field(self, request: requests.TypeField) -> None:
+    @property
+    def handlers(self) -> Handlers:
+        """What it does for each of its requests."""
+        return {
+            OpenTab: self.open_tab,
+            MoveSetup: self.move,
+            ResizeBox: self.resize,
+            SetSetup: self.set_setup,
+            PressSetup: self.press,
+        }
+
+    def type_field(self, request: TypeField) -> None:
         """Takes a typed number, or says beside the field what is wrong with it."""
         _, _, place = request.field.partition(".")
         part, _, name = place.partition(".")
@@ -100,7 +169,7 @@ class SetupActions:
         if untaken is not None:
             self._store.complain("setup.load.ixx", untaken)
 
-    def _type_joint_limit(self, request: requests.TypeField, name: str) -> None:
+    def _type_joint_limit(self, request: TypeField, name: str) -> None:
         end, _, number = name.partition(".")
         model = self._store.state.model
         if end not in JOINT_ENDS or number not in map(str, range(model.n)):
@@ -133,7 +202,7 @@ class SetupActions:
             self._store.update(setup=setup)
         self._edit(replace(setup, wanted=setup.wanted.updated(RobotConfiguration(joints=joints))), "joints")
 
-    def move(self, request: requests.MoveSetup) -> None:
+    def move(self, request: MoveSetup) -> None:
         """Follows the handles of a part."""
         numbers = (*request.position, *request.wxyz)
         if request.part != self._store.state.setup.edited or len(numbers) != 7 or not all(map(math.isfinite, numbers)):
@@ -148,7 +217,7 @@ class SetupActions:
             self._store.clear_problems(f"setup.{request.part}.")
         self._hear_drag(request.ended)
 
-    def resize(self, request: requests.ResizeBox) -> None:
+    def resize(self, request: ResizeBox) -> None:
         """Follows a handle on a face of the safety box; the other faces stay."""
         setup = self._store.state.setup
         box = setup.wanted.box
@@ -167,7 +236,7 @@ class SetupActions:
         self._edit(replace(setup, wanted=wanted), "box", drag=(request.page, "box"))
         self._hear_drag(request.ended)
 
-    def set_setup(self, request: requests.SetSetup) -> None:
+    def set_setup(self, request: SetSetup) -> None:
         """Turns a switch; what does not exist is ignored."""
         setup, value = self._store.state.setup, request.value
         box, force = setup.wanted.box, setup.wanted.force
@@ -186,13 +255,13 @@ class SetupActions:
             turned = replace(force, type=FORCE_AXES[str(value)])
             self._edit(replace(setup, wanted=setup.wanted.updated(RobotConfiguration(force=turned))), "force")
 
-    def open_tab(self, request: requests.OpenTab) -> None:
+    def open_tab(self, request: OpenTab) -> None:
         """Ends the edit when its tab is left: handles in the scene are those of the tab that is open."""
         setup = self._store.state.setup
         if request.name != "tab.setup" and setup.edited:
             self._store.update(setup=replace(setup, edited=""))
 
-    def press(self, request: requests.PressSetup) -> None:
+    def press(self, request: PressSetup) -> None:
         """Does what one of the buttons says."""
         state = self._store.state
         setup = state.setup

@@ -8,7 +8,7 @@ from contextlib import nullcontext
 
 import numpy as np
 
-from rcilab.app import requests
+from rcilab.app.goal.goal_actions import MoveTarget
 from rcilab.diagnostics.bench.browser import find_chromium, open_page
 from rcilab.diagnostics.bench.loop import Streamed, stream, wait_for
 from rcilab.diagnostics.bench.measure import Measurement, summarise
@@ -31,9 +31,7 @@ def bench_drag() -> Measurement:
             angle = math.tau * step / 50
             offset = (0.0, _RADIUS * math.cos(angle), _RADIUS * math.sin(angle))
             before = bench.store.state
-            request = requests.MoveTarget(
-                position=tuple((centre.position + offset).tolist()), wxyz=tuple(centre.wxyz.tolist())
-            )
+            request = MoveTarget(position=tuple((centre.position + offset).tolist()), wxyz=tuple(centre.wxyz.tolist()))
             start = time.perf_counter()
             bench.conductor.ask(request)
             wait_for("the new pose", lambda before=before: bench.store.state.goal is not before.goal, look=_LOOK)

@@ -8,7 +8,7 @@ import time
 import numpy as np
 from websockets.sync.client import connect
 
-from rcilab.app import requests
+from rcilab.app.control_lock_actions import PageOpened
 from rcilab.core.cycle_log import cycle_dtype
 from rcilab.core.errors import RcilabError
 from rcilab.diagnostics.bench.browser import find_chromium
@@ -53,7 +53,7 @@ def bench_scrub() -> Measurement:
     with Workbench(WorkbenchConfig(port=0, quality="light", replay=run)) as bench:
         origin = {"Origin": f"http://127.0.0.1:{bench.port}"}
         with connect(f"ws://127.0.0.1:{bench.port}{LIVE_PATH}", additional_headers=origin, compression=None) as link:
-            bench.conductor.ask(requests.PageOpened(page=_PAGE))
+            bench.conductor.ask(PageOpened(page=_PAGE))
             link.send(json.dumps({"kind": "hello", "page": _PAGE, "key": bench.live.introduce(_PAGE)}))
             wait_for("the controls", lambda: bench.store.state.lease.holder == _PAGE, 30.0)
             for place in np.random.default_rng(1).uniform(0.02, 0.98, _SEEKS).tolist():

@@ -15,14 +15,7 @@ from dataclasses import MISSING, fields
 from typing import Any, NoReturn, cast
 
 from rcilab.core.errors import DecodeError, InvalidValueError
-from rcilab.sim.api.answers import (
-    Done,
-    Refused,
-    WorldAnswer,
-    WorldStatus,
-    status_as_dict,
-    status_from_dict,
-)
+from rcilab.sim.api.answers import Done, Refused, WorldAnswer, WorldStatus, status_as_dict, status_from_dict
 from rcilab.sim.api.faults import NetworkFaults
 from rcilab.sim.api.requests import REQUESTS, WorldRequest
 

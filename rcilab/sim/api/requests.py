@@ -6,14 +6,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, TypeAlias, get_args
 
 from rcilab.core.errors import InvalidValueError
-from rcilab.sim.api.faults import (
-    DIRECTIONS,
-    LONGEST_STALL,
-    LONGEST_TIME,
-    Direction,
-    NetworkFaults,
-    Stall,
-)
+from rcilab.sim.api.faults import DIRECTIONS, LONGEST_STALL, LONGEST_TIME, Direction, NetworkFaults, Stall
 from rcilab.sim.api.fields import as_flag, as_float, as_floats, as_integer, as_name, as_word
 
 Floats: TypeAlias = tuple[float, ...]

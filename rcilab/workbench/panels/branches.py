@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rcilab.app import requests
+from rcilab.app.goal.goal_actions import ChooseBranch
 from rcilab.app.goal.target_status import NEAR_LIMIT, margin, telling_joints
 from rcilab.app.text import Text
 from rcilab.workbench.widgets import Ask, Html, esc
@@ -35,7 +35,7 @@ class BranchesPanel:
 
             @choice.on_click
             async def _(event: Any) -> None:
-                ask(requests.ChooseBranch(page=event.client_id, index=int(event.target.value) - 1))
+                ask(ChooseBranch(page=event.client_id, index=int(event.target.value) - 1))
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows goal and arm."""

@@ -6,7 +6,7 @@ import re
 import time
 from typing import TYPE_CHECKING, Any
 
-from rcilab.app import requests
+from rcilab.app.check.check_actions import PressCheck
 from rcilab.app.check.freshness import beside_program, outdated
 from rcilab.app.run.readiness import is_moving
 from rcilab.app.text import Message, Text
@@ -35,22 +35,22 @@ class CheckPanel:
         text, ask = self._text, self._ask
         self._verdict = Html(gui)
         self._again = gui.add_button(text("check.again"), icon="refresh", visible=False, hint=text("setup.check_hint"))
-        on_press(self._again, ask, lambda page: requests.Check(page=page, what="again"))
+        on_press(self._again, ask, lambda page: PressCheck(page=page, what="again"))
         self._tools = gui.add_folder(text("check.tools"))
         with self._tools:
             gui.add_html('<i class="rl-buttons rl-bare"></i>')
             self._slow = gui.add_button(text("check.slow"), icon="gauge", hint=text("check.slow_hint"))
-            on_press(self._slow, ask, lambda page: requests.Check(page=page, what="slow"))
+            on_press(self._slow, ask, lambda page: PressCheck(page=page, what="slow"))
             self._undo = gui.add_button(
                 text("check.undo"), icon="arrow-back-up", color="gray", hint=text("check.undo_hint"), disabled=True
             )
-            on_press(self._undo, ask, lambda page: requests.Check(page=page, what="undo"))
+            on_press(self._undo, ask, lambda page: PressCheck(page=page, what="undo"))
             self._explain = gui.add_button(
                 text("check.explain"), icon="message-2", color="gray", hint=text("check.explain_hint")
             )
-            on_press(self._explain, ask, lambda page: requests.Check(page=page, what="explain"))
+            on_press(self._explain, ask, lambda page: PressCheck(page=page, what="explain"))
             self._cancel = gui.add_button(text("check.cancel"), icon="x", color="gray", visible=False)
-            on_press(self._cancel, ask, lambda page: requests.Check(page=page, what="cancel"))
+            on_press(self._cancel, ask, lambda page: PressCheck(page=page, what="cancel"))
         self._bar = gui.add_progress_bar(0.0, visible=False, animated=True)
         self._answer = Html(gui)
         gui.add_html('<i class="rl-saybridge"></i>')
@@ -60,7 +60,7 @@ class CheckPanel:
         async def _(event: Any) -> None:
             found = _SAID.fullmatch(event.target.value)
             if event.client_id is not None and found is not None:
-                ask(requests.Check(page=event.client_id, what="row", row=found[1]))
+                ask(PressCheck(page=event.client_id, what="row", row=found[1]))
 
         self._table = Html(gui)
 

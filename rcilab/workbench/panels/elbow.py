@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rcilab.app import requests
 from rcilab.app.goal.elbow import LOOKS, Elbow, say_why
+from rcilab.app.goal.goal_actions import SetArmAngle
 from rcilab.app.text import Text
 from rcilab.views.elbow_view import ARC_COLORS, free_colors
 from rcilab.workbench.panels.jog import problems_html
@@ -40,7 +40,7 @@ class ElbowPanel:
             factor, _ = text.units.from_si("rad")
             end, step = (180.0, 1.0) if text.units.angle == "deg" else (3.14, 0.01)
             slider = gui.add_slider("ψ", -end, end, step, 0.0, hint=text("target.psi_hint"))
-            self._psi = BoundControl(slider, ask, lambda v, p: requests.SetArmAngle(page=p, psi=v / factor))
+            self._psi = BoundControl(slider, ask, lambda v, p: SetArmAngle(page=p, psi=v / factor))
             self._field = NumberField(gui.add_text("", ""), ask, "psi", text.unit("deg"))
             self._ring = Html(gui)
         self._said = Html(gui)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.app import requests
+from rcilab.app.request import Request
+from rcilab.app.scene.scene_actions import ShowExtra
 from rcilab.app.scene.scene_extras import EXTRAS, Extra
 from rcilab.app.text import Text
 from rcilab.workbench.widgets import Ask, BoundControl
@@ -40,7 +41,7 @@ class ExtrasPanel:
 
 
 def _request(extra: Extra):  # type: ignore[no-untyped-def]
-    def make(on: bool, page: int | None) -> requests.Request:
-        return requests.ShowExtra(page=page, name=extra, on=bool(on))
+    def make(on: bool, page: int | None) -> Request:
+        return ShowExtra(page=page, name=extra, on=bool(on))
 
     return make

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.app import requests
 from rcilab.app.run.drive_state import NETWORK_LAB, is_ours
+from rcilab.app.run.world_actions import PressSafety, SetNetwork
 from rcilab.app.text import Text
 from rcilab.control_process.status_messages import tell_success
 from rcilab.core.faults import name_faults
@@ -41,7 +41,7 @@ class FaultInjectionPanel:
                 button = gui.add_button(
                     text(f"safety.{name}"), icon=icon, color=color, hint=text(f"safety.{name}_hint")
                 )
-                on_press(button, ask, lambda page, name=name: requests.PressSafety(page=page, button=name))
+                on_press(button, ask, lambda page, name=name: PressSafety(page=page, button=name))
                 self._buttons[name] = button
             self._button = Html(gui)
         with gui.add_folder(text("network.title"), expand_by_default=False):
@@ -54,13 +54,13 @@ class FaultInjectionPanel:
             names = {text(f"network.{way}"): way for way in DIRECTIONS}
             self._ways = {way: label for label, way in names.items()}
             way = gui.add_dropdown(text("network.way"), tuple(names), hint=text("network.way_hint"))
-            self._way = BoundControl(way, ask, lambda v, p: requests.SetNetwork(page=p, direction=names.get(v)))
+            self._way = BoundControl(way, ask, lambda v, p: SetNetwork(page=p, direction=names.get(v)))
             self._pull = gui.add_button(text("network.pull"), icon="plug-connected-x", color="red")
-            on_press(self._pull, ask, lambda page: requests.SetNetwork(page=page, pulled=True))
+            on_press(self._pull, ask, lambda page: SetNetwork(page=page, pulled=True))
             self._plug = gui.add_button(text("network.plug"), icon="plug-connected", color="blue")
-            on_press(self._plug, ask, lambda page: requests.SetNetwork(page=page, pulled=False))
+            on_press(self._plug, ask, lambda page: SetNetwork(page=page, pulled=False))
             clear = gui.add_button(text("network.clear"), icon="restore", color="gray")
-            on_press(clear, ask, lambda page: requests.SetNetwork(page=page, clear=True))
+            on_press(clear, ask, lambda page: SetNetwork(page=page, clear=True))
             self._noticed = Html(gui)
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:
@@ -109,4 +109,4 @@ def _row(name: str, value: str, text: Text) -> str:
 
 
 def _set(name: str, scale: float):  # type: ignore[no-untyped-def]
-    return lambda value, page: requests.SetNetwork(page=page, name=name, value=float(value) / scale)
+    return lambda value, page: SetNetwork(page=page, name=name, value=float(value) / scale)

@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rcilab.app import requests
+from rcilab.app.goal.goal_actions import MoveJoint
 from rcilab.app.goal.target_status import NEAR_LIMIT
-from rcilab.app.jog.jog_state import FASTEST_JOINT, FASTEST_TOOL, FASTEST_TURN, STEPS, no_jog
+from rcilab.app.jog.jog_actions import SetJog
+from rcilab.app.jog.jog_state import FASTEST_JOINT, FASTEST_TOOL, FASTEST_TURN, STEPS, HoldJog, PressJog, no_jog
+from rcilab.app.request import Request
 from rcilab.app.text import Text
 from rcilab.conformance.explain import explain_limit
 from rcilab.workbench.widgets import Ask, BoundControl, Html, NumberField, esc, on_press, shown
@@ -39,20 +41,20 @@ class JogPanel:
         text, ask, jog = self._text, self._ask, state.jog
         gui.add_html('<i class="rl-jogset"></i>')
         robot = gui.add_checkbox(text("jog.robot"), jog.robot, hint=text("jog.robot_hint"))
-        self._robot = BoundControl(robot, ask, lambda v, p: requests.SetJog(page=p, robot=bool(v)))
+        self._robot = BoundControl(robot, ask, lambda v, p: SetJog(page=p, robot=bool(v)))
         steps = {text("jog.step_of", step=f"{step:g}") if step else text("jog.held"): step for step in STEPS}
         self._steps = {step: label for label, step in steps.items()}
         step = gui.add_dropdown(
             text("jog.step"), tuple(steps), initial_value=self._steps[jog.step], hint=text("jog.step_hint")
         )
-        self._step = BoundControl(step, ask, lambda v, p: requests.SetJog(page=p, step=steps.get(v)))
+        self._step = BoundControl(step, ask, lambda v, p: SetJog(page=p, step=steps.get(v)))
         speed = gui.add_slider(text("jog.speed"), 1, 100, 1, round(100.0 * jog.speed), hint=text("jog.speed_hint"))
-        self._speed = BoundControl(speed, ask, lambda v, p: requests.SetJog(page=p, speed=v / 100.0))
+        self._speed = BoundControl(speed, ask, lambda v, p: SetJog(page=p, speed=v / 100.0))
         self._pace, self._note = Html(gui), Html(gui)
         self._agree = gui.add_button(text("jog.confirm"), color="red", icon="hand-move", visible=False)
-        on_press(self._agree, ask, lambda page: requests.SetJog(page=page, robot=True, agreed=True))
+        on_press(self._agree, ask, lambda page: SetJog(page=page, robot=True, agreed=True))
         self._cancel = gui.add_button(text("run.cancel"), color="gray", visible=False)
-        on_press(self._cancel, ask, lambda page: requests.SetJog(page=page, robot=False))
+        on_press(self._cancel, ask, lambda page: SetJog(page=page, robot=False))
 
     def _build_joints(self, gui: Any, state: UiState) -> None:
         text, limits = self._text, state.model.limits.joint
@@ -106,9 +108,9 @@ def add_jog_button(gui: Any, ask: Ask, label: str, axis: str, sign: int) -> None
 
     @button.on_hold(callback_hz=_HOLD_RATE)
     async def _(event: Any) -> None:
-        ask(requests.HoldJog(page=event.client_id, axis=axis, sign=sign))
+        ask(HoldJog(page=event.client_id, axis=axis, sign=sign))
 
-    on_press(button, ask, lambda page: requests.PressJog(page=page, axis=axis, sign=sign))
+    on_press(button, ask, lambda page: PressJog(page=page, axis=axis, sign=sign))
 
 
 def note_html(state: UiState, text: Text) -> str:
@@ -169,7 +171,7 @@ def reach_html(state: UiState, text: Text) -> str:
 
 
 def _joint_request(joint: int, factor: float):  # type: ignore[no-untyped-def]
-    def make(angle: float, page: int | None) -> requests.Request:
-        return requests.MoveJoint(page=page, joint=joint, angle=angle / factor)
+    def make(angle: float, page: int | None) -> Request:
+        return MoveJoint(page=page, joint=joint, angle=angle / factor)
 
     return make

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.app import requests
 from rcilab.app.fault_lab import FAULTS, GROUPS
+from rcilab.app.learn.learn_actions import PressLearn
 from rcilab.app.text import Text
 from rcilab.workbench.widgets import Ask, Html, esc, on_press
 
@@ -27,7 +27,7 @@ class LearnPanel:
         self._head = Html(gui)
         self._bar = gui.add_progress_bar(0.0, visible=False, animated=True)
         self._cancel = gui.add_button(text("learn.cancel"), icon="x", color="gray", visible=False)
-        on_press(self._cancel, ask, lambda page: requests.Learn(page=page, what="cancel"))
+        on_press(self._cancel, ask, lambda page: PressLearn(page=page, what="cancel"))
         self._folders: list[Any] = []
         self._buttons: dict[Fault, Any] = {}
         for group in GROUPS:
@@ -64,4 +64,4 @@ class LearnPanel:
 
 
 def _provoke(fault: Fault):  # type: ignore[no-untyped-def]
-    return lambda page: requests.Learn(page=page, what="provoke", fault=int(fault))
+    return lambda page: PressLearn(page=page, what="provoke", fault=int(fault))

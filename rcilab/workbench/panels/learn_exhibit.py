@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rcilab.app import requests
 from rcilab.app.fault_lab.demo_view import body_html, head_html
+from rcilab.app.learn.learn_actions import PressLearn
 from rcilab.app.text import Text
 from rcilab.workbench.panels.learn_plot import exhibit_contents
 from rcilab.workbench.panels.plot_contents import plot_axes
@@ -33,7 +33,7 @@ class LearnExhibitPanel:
         """Adds controls and an empty plot."""
         text, ask = self._text, self._ask
         self._back = gui.add_button(text("learn.close"), icon="arrow-left", color="gray", visible=False)
-        on_press(self._back, ask, lambda page: requests.Learn(page=page, what="close"))
+        on_press(self._back, ask, lambda page: PressLearn(page=page, what="close"))
         self._head = Html(gui)
         data, series, bands = exhibit_contents(np.array([0.0, 1.0]), np.zeros(2), -1.0, 1.0, state.theme)
         self._plot = gui.add_uplot(
@@ -50,9 +50,9 @@ class LearnExhibitPanel:
             hint=text("learn.moment_hint"),
             visible=False,
         )
-        on_press(self._moment, ask, lambda page: requests.Learn(page=page, what="moment"))
+        on_press(self._moment, ask, lambda page: PressLearn(page=page, what="moment"))
         self._python = gui.add_button(text("learn.script"), icon="brand-python", color="gray", visible=False)
-        on_press(self._python, ask, lambda page: requests.Learn(page=page, what="script"))
+        on_press(self._python, ask, lambda page: PressLearn(page=page, what="script"))
         self._script = Html(gui)
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.app import requests
+from rcilab.app.learn.learn_actions import PressLearn
 from rcilab.app.learn.lessons import LESSONS
 from rcilab.app.text import Text
 from rcilab.workbench.widgets import Ask, Html, esc, on_press
@@ -32,9 +32,9 @@ class LearnLessonPanel:
                 on_press(button, ask, _begin(name))
         self._steps = Html(gui)
         self._skip = gui.add_button(text("lesson.skip"), icon="player-track-next", color="gray", visible=False)
-        on_press(self._skip, ask, lambda page: requests.Learn(page=page, what="skip"))
+        on_press(self._skip, ask, lambda page: PressLearn(page=page, what="skip"))
         self._leave = gui.add_button(text("lesson.leave"), icon="x", color="gray", visible=False)
-        on_press(self._leave, ask, lambda page: requests.Learn(page=page, what="leave"))
+        on_press(self._leave, ask, lambda page: PressLearn(page=page, what="leave"))
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows the lesson."""
@@ -70,4 +70,4 @@ def steps_html(lesson: LessonState, text: Text) -> str:
 
 
 def _begin(name: str):  # type: ignore[no-untyped-def]
-    return lambda page: requests.Learn(page=page, what="lesson", name=name)
+    return lambda page: PressLearn(page=page, what="lesson", name=name)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.app import requests
 from rcilab.app.run.drive_state import is_pending
+from rcilab.app.run.mode_actions import PressControl, SetDrive
 from rcilab.app.run.mode_parameters import PARTS_OF_MODE, held_rows, name_number, name_part
 from rcilab.app.run.readiness import is_moving
 from rcilab.app.text import Text, message
@@ -39,18 +39,18 @@ class ModePanel:
             mode = gui.add_dropdown(
                 text("mode.choose"), tuple(names), initial_value=self._names[state.drive.mode], hint=text("mode.hint")
             )
-            self._mode = BoundControl(mode, ask, lambda v, p: requests.SetDrive(page=p, mode=names.get(v)))
+            self._mode = BoundControl(mode, ask, lambda v, p: SetDrive(page=p, mode=names.get(v)))
             self._note = Html(gui)
             self._build_parts(gui, state)
             with gui.add_folder(text("control.title"), expand_by_default=False):
                 self._held = Html(gui)
                 send = gui.add_button(text("control.send"), icon="send", color="blue", hint=text("control.send_hint"))
-                on_press(send, ask, lambda page: requests.PressControl(page=page, what="send"))
+                on_press(send, ask, lambda page: PressControl(page=page, what="send"))
                 self._send = send
                 reset = gui.add_button(
                     text("control.reset"), icon="restore", color="gray", hint=text("control.reset_hint")
                 )
-                on_press(reset, ask, lambda page: requests.PressControl(page=page, what="reset"))
+                on_press(reset, ask, lambda page: PressControl(page=page, what="reset"))
 
     def _build_parts(self, gui: Any, state: UiState) -> None:
         self._folders: dict[ControlPart, Any] = {}

@@ -12,7 +12,8 @@ from rcilab.i18n.translator import Finished
 from rcilab.workbench.widgets import esc
 
 if TYPE_CHECKING:
-    from rcilab.app.store import Recording, UiState
+    from rcilab.app.run.recording import Recording
+    from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
     from rcilab.recording.run import Run
 

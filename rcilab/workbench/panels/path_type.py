@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.app import requests
+from rcilab.app.goal.goal_actions import PlanGoal, SetLaw, SetPathType, SetSpeed
 from rcilab.app.planning import LAWS, PATH_KINDS
 from rcilab.app.text import Text
 from rcilab.workbench.panels.jog import problems_html
@@ -29,22 +29,22 @@ class PathTypePanel:
             ways = {text(f"way.{kind}"): kind for kind in PATH_KINDS}
             self._ways = {kind: label for label, kind in ways.items()}
             way = gui.add_dropdown(text("target.way"), tuple(ways), hint=text("target.way_hint"))
-            self._way = BoundControl(way, ask, lambda v, p: requests.SetPathType(page=p, kind=ways.get(v)))
+            self._way = BoundControl(way, ask, lambda v, p: SetPathType(page=p, kind=ways.get(v)))
             self._via = gui.add_button(text("target.via"), icon="map-pin-plus", color="gray", visible=False)
-            on_press(self._via, ask, lambda page: requests.SetPathType(page=page, via=True))
+            on_press(self._via, ask, lambda page: SetPathType(page=page, via=True))
             self._note = Html(gui)
             with gui.add_folder(text("target.speed")):
                 gui.add_html('<i class="rl-rows"></i>')
                 speed = gui.add_slider("%", 1, 100, 1, 50, hint=text("target.speed_hint"))
-                self._speed = BoundControl(speed, ask, lambda v, p: requests.SetSpeed(page=p, speed=v / 100.0))
+                self._speed = BoundControl(speed, ask, lambda v, p: SetSpeed(page=p, speed=v / 100.0))
                 self._field = NumberField(gui.add_text("", "", hint=text("target.speed_hint")), ask, "speed")
             laws = {text(f"law.{law}"): law for law in LAWS}
             self._laws = {law: label for label, law in laws.items()}
             law = gui.add_dropdown(text("target.law"), tuple(laws))
             gui.add_html(f'<p class="rl-note">{esc(text("target.law_hint"))}</p>')  # A tooltip would cover the list.
-            self._law = BoundControl(law, ask, lambda v, p: requests.SetLaw(page=p, law=laws.get(v, "")))
+            self._law = BoundControl(law, ask, lambda v, p: SetLaw(page=p, law=laws.get(v, "")))
             self._plan = gui.add_button(text("target.plan"), icon="route", hint=text("target.plan_hint"))
-            on_press(self._plan, ask, lambda page: requests.Plan(page=page))
+            on_press(self._plan, ask, lambda page: PlanGoal(page=page))
             self._problem, self._planned = Html(gui), Html(gui)
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:

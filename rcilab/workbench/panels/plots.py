@@ -30,7 +30,8 @@ from rcilab.workbench.panels.plot_contents import legend_html, plot_axes, plot_c
 from rcilab.workbench.widgets import Html, esc
 
 if TYPE_CHECKING:
-    from rcilab.app.store import Recording, UiState
+    from rcilab.app.run.recording import Recording
+    from rcilab.app.store import UiState
     from rcilab.core.arrays import JointPath
 
 _REDRAW_TIME = 0.25  # [s] A choice: plots are redrawn at most so often while something is dragged or moves.

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Literal
 
-from rcilab.app import requests
+from rcilab.app.goal.goal_actions import PoseGoal
+from rcilab.app.goal.named_pose_actions import NamedPose
 from rcilab.app.text import Text
 from rcilab.workbench.widgets import Ask, BoundControl, PageText
 
@@ -34,27 +35,27 @@ class PosesPanel:
 
             @named.on_click
             async def _(event: Any) -> None:
-                ask(requests.PoseGoal(page=event.client_id, name=names[event.target.value]))
+                ask(PoseGoal(page=event.client_id, name=names[event.target.value]))
 
             self._nothing = text("poses.nothing")
             self._list = gui.add_dropdown(
                 text("poses.stored_ones"), self._options(state), initial_value=self._chosen(state)
             )
-            self._pose = BoundControl(self._list, ask, lambda v, p: requests.NamedPose(page=p, what="choose", name=v))
+            self._pose = BoundControl(self._list, ask, lambda v, p: NamedPose(page=p, what="choose", name=v))
             acts = gui.add_button_group("  ", [text(f"poses.{act}") for act in _ACTS], hint=text("poses.recall_hint"))
             whats: dict[str, _What] = {text(f"poses.{act}"): act for act in _ACTS}
 
             @acts.on_click
             async def _(event: Any) -> None:
                 what = whats[event.target.value]
-                ask(requests.NamedPose(page=event.client_id, what=what, name=self._shown.jog.pose))
+                ask(NamedPose(page=event.client_id, what=what, name=self._shown.jog.pose))
 
             self._name = PageText(gui.add_text(text("poses.name"), "", hint=text("poses.store_hint")))
             store = gui.add_button_group("   ", [text("poses.store")], hint=text("poses.store_hint"))
 
             @store.on_click
             async def _(event: Any) -> None:
-                ask(requests.NamedPose(page=event.client_id, what="store", name=self._name.of(event.client_id)))
+                ask(NamedPose(page=event.client_id, what="store", name=self._name.of(event.client_id)))
 
         self._shown = state
 

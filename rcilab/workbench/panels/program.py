@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rcilab.app import requests
+from rcilab.app.program.edit_actions import EditProgram
+from rcilab.app.program.program_actions import CancelProgram, PlanProgram
 from rcilab.app.program.program_draft import FILE_FIELD, Draft, Note, number_at, tell_place
 from rcilab.app.run.readiness import is_moving, time_shown
 from rcilab.app.text import Text
+from rcilab.app.view_actions import SetView
 from rcilab.workbench.panels.jog import problems_html
 from rcilab.workbench.panels.program_list import list_html, notes_html
 from rcilab.workbench.panels.target import planned_html
@@ -69,18 +71,18 @@ class ProgramPanel:
         with gui.add_folder(text("program.plan_title")):
             gui.add_html('<i class="rl-buttons"></i>')
             self._plan = gui.add_button(text("program.plan"), icon="route", hint=text("program.plan_hint"))
-            on_press(self._plan, ask, lambda page: requests.PlanProgram(page=page))
+            on_press(self._plan, ask, lambda page: PlanProgram(page=page))
             self._upto = gui.add_button(
                 text("program.upto"), icon="route", color="gray", hint=text("program.upto_hint")
             )
-            on_press(self._upto, ask, lambda page: requests.PlanProgram(page=page, upto=True))
+            on_press(self._upto, ask, lambda page: PlanProgram(page=page, upto=True))
             loop = gui.add_checkbox(text("program.loop"), False, hint=text("program.loop_hint"))
-            self._loop = BoundControl(loop, ask, lambda v, p: requests.SetView(page=p, name="loop", value=v))
+            self._loop = BoundControl(loop, ask, lambda v, p: SetView(page=p, name="loop", value=v))
             box = gui.add_text(text("program.rounds"), "", hint=text("program.rounds_hint"))
             self._rounds = NumberField(box, ask, "program.0.rounds")
             self._bar = gui.add_progress_bar(0.0, visible=False, animated=True)
             self._cancel = gui.add_button(text("program.cancel"), icon="x", color="gray", visible=False)
-            on_press(self._cancel, ask, lambda page: requests.CancelProgram(page=page))
+            on_press(self._cancel, ask, lambda page: CancelProgram(page=page))
             self._answer = Html(gui)
             self._notes = Html(gui)
 
@@ -142,14 +144,14 @@ class ProgramPanel:
         return self._text("program.elsewhere", joint=joint + 1, angle=f"{travel[joint]:.1f}")
 
 
-def read_row(said: str, page: int | None) -> requests.EditProgram | None:
+def read_row(said: str, page: int | None) -> EditProgram | None:
     """Returns what somebody did in the list: NUMBER:WHAT:KEY:PLACE; None for anything else."""
     found = _SAID.fullmatch(said)
     if page is None or found is None:
         return None
     what: Any = found[1]
-    return requests.EditProgram(page=page, what=what, key=int(found[2]), place=int(found[3]))
+    return EditProgram(page=page, what=what, key=int(found[2]), place=int(found[3]))
 
 
 def _edit(what: Any, **values: Any):  # type: ignore[no-untyped-def]
-    return lambda page: requests.EditProgram(page=page, what=what, **values)
+    return lambda page: EditProgram(page=page, what=what, **values)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any
 
-from rcilab.app import requests
+from rcilab.app.program.edit_actions import EditProgram
+from rcilab.app.program.program_actions import LoadProgram
 from rcilab.app.program.program_draft import FILE_FIELD
 from rcilab.app.text import Text
 from rcilab.motion.program import Program
@@ -41,7 +42,7 @@ class ProgramFilePanel:
             @load.on_upload
             async def _(event: Any) -> None:
                 file = event.target.value
-                ask(requests.LoadProgram(page=event.client_id, name=file.name, content=file.content))
+                ask(LoadProgram(page=event.client_id, name=file.name, content=file.content))
 
             self._save = gui.add_button(
                 text("program.save"), icon="download", color="gray", hint=text("program.save_hint")
@@ -50,18 +51,18 @@ class ProgramFilePanel:
             self._clear = gui.add_button(
                 text("program.clear"), icon="file-plus", color="gray", hint=text("program.clear_hint")
             )
-            on_press(self._clear, ask, lambda page: requests.EditProgram(page=page, what="clear"))
+            on_press(self._clear, ask, lambda page: EditProgram(page=page, what="clear"))
             self._python = gui.add_button(
                 text("program.script"), icon="brand-python", color="gray", hint=text("program.script_hint")
             )
-            on_press(self._python, ask, lambda page: requests.EditProgram(page=page, what="script"))
+            on_press(self._python, ask, lambda page: EditProgram(page=page, what="script"))
             self._name = NumberField(
                 gui.add_text(text("program.name"), "", hint=text("program.name_hint")), ask, "program.0.name"
             )
             self._tool = gui.add_button(
                 text("program.take_tool"), icon="tool", color="gray", hint=text("program.take_tool_hint"), visible=False
             )
-            on_press(self._tool, ask, lambda page: requests.EditProgram(page=page, what="tool"))
+            on_press(self._tool, ask, lambda page: EditProgram(page=page, what="tool"))
             self._problems = Html(gui)
             self._script = Html(gui)
             self._fetch = gui.add_button(text("program.script_save"), icon="download", color="gray", visible=False)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.app import requests
 from rcilab.app.run.active_force import (
     DIRECTIONS,
     SPRING,
@@ -16,7 +15,9 @@ from rcilab.app.run.active_force import (
     is_guided,
     no_push,
 )
+from rcilab.app.run.push_actions import HoldPush, SetPush
 from rcilab.app.run.readiness import is_moving
+from rcilab.app.run.run_actions import RobotCommand
 from rcilab.app.text import Text
 from rcilab.i18n.rounding import fixed
 from rcilab.workbench.widgets import Ask, BoundControl, Html, esc, on_press
@@ -48,11 +49,11 @@ class PushPanel:
         way = gui.add_dropdown(
             text("guide.way"), tuple(ways), initial_value=self._ways[state.push.way], hint=text("guide.way_hint")
         )
-        self._way = BoundControl(way, ask, lambda v, p: requests.SetPush(page=p, way=ways.get(v)))
+        self._way = BoundControl(way, ask, lambda v, p: SetPush(page=p, way=ways.get(v)))
         self._guide = gui.add_button(text("drive.guide"), icon="hand-move", color="blue", hint=text("guide.hint"))
-        on_press(self._guide, ask, lambda page: requests.RobotCommand(page=page, what="guide"))
+        on_press(self._guide, ask, lambda page: RobotCommand(page=page, what="guide"))
         self._unguide = gui.add_button(text("drive.unguide"), icon="hand-stop", color="gray")
-        on_press(self._unguide, ask, lambda page: requests.RobotCommand(page=page, what="unguide"))
+        on_press(self._unguide, ask, lambda page: RobotCommand(page=page, what="unguide"))
 
     def _build_push(self, gui: Any, state: UiState) -> None:
         text, ask, push = self._text, self._ask, state.push
@@ -61,21 +62,21 @@ class PushPanel:
         places |= {text("push.link", number=number): number for number in range(1, state.model.n + 1)}
         self._places = {link: label for label, link in places.items()}
         link = gui.add_dropdown(text("push.where"), tuple(places), initial_value=self._places[push.link])
-        self._link = BoundControl(link, ask, lambda v, p: requests.SetPush(page=p, link=places.get(v)))
+        self._link = BoundControl(link, ask, lambda v, p: SetPush(page=p, link=places.get(v)))
         direction = gui.add_dropdown(
             text("push.direction"), tuple(DIRECTIONS), initial_value=push.direction, hint=text("push.direction_hint")
         )
-        self._direction = BoundControl(direction, ask, lambda v, p: requests.SetPush(page=p, direction=v))
+        self._direction = BoundControl(direction, ask, lambda v, p: SetPush(page=p, direction=v))
         force = gui.add_slider(text("push.force"), 0.0, STRONGEST, 1.0, push.newtons)
-        self._force = BoundControl(force, ask, lambda v, p: requests.SetPush(page=p, newtons=v))
+        self._force = BoundControl(force, ask, lambda v, p: SetPush(page=p, newtons=v))
         self._button = gui.add_button(text("push.hold"), icon="hand-finger", color="grape", hint=text("push.hold_hint"))
 
         @self._button.on_hold(callback_hz=_HOLD_RATE)
         async def _(event: Any) -> None:
-            ask(requests.HoldPush(page=event.client_id))
+            ask(HoldPush(page=event.client_id))
 
         grab = gui.add_checkbox(text("push.grab"), push.grab, hint=text("push.grab_hint", stiffness=f"{SPRING:.0f}"))
-        self._grab = BoundControl(grab, ask, lambda v, p: requests.SetPush(page=p, grab=v))
+        self._grab = BoundControl(grab, ask, lambda v, p: SetPush(page=p, grab=v))
         self._felt = Html(gui)
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:

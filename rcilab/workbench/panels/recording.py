@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.app import requests
-from rcilab.app.run.export_actions import ENDINGS
+from rcilab.app.run.export_actions import ENDINGS, CancelExport, ExportRun
 from rcilab.app.text import Text
+from rcilab.app.view_actions import SetRecording
 from rcilab.recording.tracking_words import error_rows, tracking_notes
 from rcilab.workbench.widgets import Ask, BoundControl, Html, esc, on_press
 
 if TYPE_CHECKING:
-    from rcilab.app.store import Recording, UiState
+    from rcilab.app.run.recording import Recording
+    from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
 
 _ICONS: dict[str, Any] = {
@@ -46,9 +47,9 @@ class RecordingPanel:
                 self._buttons[ending] = button
             self._progress = Html(gui)
             self._cancel = gui.add_button(text("export.cancel"), icon="x", color="gray", visible=False)
-            on_press(self._cancel, ask, lambda page: requests.CancelExport(page=page))
+            on_press(self._cancel, ask, lambda page: CancelExport(page=page))
             box = gui.add_checkbox(text("record.every"), state.record, hint=text("record.every_hint"))
-            self._record = BoundControl(box, ask, lambda v, p: requests.SetRecording(page=p, on=bool(v)))
+            self._record = BoundControl(box, ask, lambda v, p: SetRecording(page=p, on=bool(v)))
             self._where = Html(gui)
         self._drawn = None
         self._summary.show(f'<p class="rl-note">{esc(text("record.nothing"))}</p>')
@@ -96,4 +97,4 @@ def progress_html(ending: str, share: float, text: Text) -> str:
 
 
 def _export(ending: str):  # type: ignore[no-untyped-def]
-    return lambda page: requests.Export(page=page, ending=ending)
+    return lambda page: ExportRun(page=page, ending=ending)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.app import requests
 from rcilab.app.check.freshness import outdated
+from rcilab.app.goal.goal_actions import PlanGoal, PlanRecovery, PoseGoal
+from rcilab.app.program.program_actions import PlanProgram
+from rcilab.app.run.mode_actions import SetDrive
 from rcilab.app.run.readiness import (
     describe_move,
     is_connected,
@@ -15,6 +17,7 @@ from rcilab.app.run.readiness import (
     may_plan_again,
     obstacle,
 )
+from rcilab.app.run.run_actions import RobotCommand
 from rcilab.app.text import Text
 from rcilab.core.faults import name_faults
 from rcilab.motion.speed_scaling import SLOWEST_PACE
@@ -47,9 +50,9 @@ class RunPanel:
         pace = gui.add_slider(
             text("run.pace"), 100.0 * SLOWEST_PACE, 100.0, 5.0, 100.0 * state.drive.pace, hint=text("run.pace_hint")
         )
-        self._pace = BoundControl(pace, ask, lambda v, p: requests.SetDrive(page=p, pace=float(v) / 100.0))
+        self._pace = BoundControl(pace, ask, lambda v, p: SetDrive(page=p, pace=float(v) / 100.0))
         self._execute = gui.add_button(text("run.execute"), color=(23, 128, 68), icon="player-play", disabled=True)
-        on_press(self._execute, ask, lambda page: requests.RobotCommand(page=page, what="execute"))
+        on_press(self._execute, ask, lambda page: RobotCommand(page=page, what="execute"))
         self._question = Html(gui)
         self._agree = gui.add_button(text("run.confirm"), color="red", icon="player-play", visible=False)
         on_press(self._agree, ask, _drive("confirm"))
@@ -64,20 +67,20 @@ class RunPanel:
         self._way, self._outcome = Html(gui), Html(gui)
         self._reason = Html(gui)
         self._again = gui.add_button(text("run.again"), icon="route", visible=False, hint=text("program.plan_hint"))
-        on_press(self._again, ask, lambda page: requests.PlanProgram(page=page))
+        on_press(self._again, ask, lambda page: PlanProgram(page=page))
         self._back = gui.add_button(
             text("run.back"), icon="arrow-back-up", color="gray", visible=False, hint=text("run.back_hint")
         )
-        on_press(self._back, ask, lambda page: requests.PoseGoal(page=page, name="start"))
+        on_press(self._back, ask, lambda page: PoseGoal(page=page, name="start"))
         self._inside = gui.add_button(
             text("run.inside"), icon="arrow-bar-to-right", color="orange", visible=False, hint=text("run.inside_hint")
         )
-        on_press(self._inside, ask, lambda page: requests.PlanRecovery(page=page))
+        on_press(self._inside, ask, lambda page: PlanRecovery(page=page))
         self._buttons: dict[str, Any] = {}
         with gui.add_folder(text("run.robot")):
             gui.add_html('<i class="rl-buttons"></i>')
             self._plan = gui.add_button(text("run.plan"), icon="route", color="gray", hint=text("target.plan_hint"))
-            on_press(self._plan, ask, lambda page: requests.Plan(page=page))
+            on_press(self._plan, ask, lambda page: PlanGoal(page=page))
             self._to_target = gui.add_button(
                 text("run.to_target"),
                 icon="current-location",
@@ -85,7 +88,7 @@ class RunPanel:
                 visible=False,
                 hint=text("run.to_target_hint"),
             )
-            on_press(self._to_target, ask, lambda page: requests.Plan(page=page))
+            on_press(self._to_target, ask, lambda page: PlanGoal(page=page))
             for what, icon, color in _BUTTONS:
                 button = gui.add_button(text(f"run.{what}"), icon=icon, color=color, hint=text(f"run.{what}_hint"))
                 on_press(button, ask, _drive(what))
@@ -123,7 +126,7 @@ class RunPanel:
 
 
 def _drive(what: Any):  # type: ignore[no-untyped-def]
-    return lambda page: requests.RobotCommand(page=page, what=what)
+    return lambda page: RobotCommand(page=page, what=what)
 
 
 def faults_html(status: SupervisorStatus, text: Text) -> str:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.app import requests
-from rcilab.app.run.folder_actions import KEEPS, megabytes
+from rcilab.app.run.folder_actions import KEEPS, ClearRuns, megabytes
 from rcilab.app.text import Text
 from rcilab.workbench.widgets import Ask, BoundControl, Html, esc, on_press
 
@@ -30,15 +29,15 @@ class RunsFolderPanel:
             self._labels = {count: label for label, count in labels.items()}
             keep = gui.add_dropdown(text("runs.keep"), tuple(labels), initial_value=self._labels[state.folder.keep])
             self._choice = BoundControl(
-                keep, ask, lambda v, p: requests.ClearRuns(page=p, what="choose", keep=labels.get(v, -1))
+                keep, ask, lambda v, p: ClearRuns(page=p, what="choose", keep=labels.get(v, -1))
             )
             self._clear = gui.add_button(text("runs.clear"), icon="trash", color="gray", hint=text("runs.clear_hint"))
-            on_press(self._clear, ask, lambda page: requests.ClearRuns(page=page, what="ask", keep=self._keep))
+            on_press(self._clear, ask, lambda page: ClearRuns(page=page, what="ask", keep=self._keep))
             self._question = Html(gui)
             self._yes = gui.add_button(text("runs.yes"), icon="trash", color="red", visible=False)
-            on_press(self._yes, ask, lambda page: requests.ClearRuns(page=page, what="confirm", keep=self._keep))
+            on_press(self._yes, ask, lambda page: ClearRuns(page=page, what="confirm", keep=self._keep))
             self._no = gui.add_button(text("run.cancel"), color="gray", visible=False)
-            on_press(self._no, ask, lambda page: requests.ClearRuns(page=page, what="cancel", keep=self._keep))
+            on_press(self._no, ask, lambda page: ClearRuns(page=page, what="cancel", keep=self._keep))
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows the folder."""

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from rcilab.app import requests
+from rcilab.app.control_lock_actions import TakeControls
+from rcilab.app.run.run_actions import ChooseRobot
 from rcilab.app.text import LANGUAGES, Text
-from rcilab.app.view_actions import QUALITIES, THEMES
+from rcilab.app.view_actions import QUALITIES, THEMES, SetView
 from rcilab.conformance.explain import explain_limit
 from rcilab.i18n.units import ANGLES, LENGTHS
 from rcilab.robots import RCI_ROBOT_NAMES
@@ -39,11 +40,11 @@ class SettingsPanel:
         model = gui.add_dropdown(
             text("settings.model"), RCI_ROBOT_NAMES, initial_value=state.model.name, hint=text("settings.model_hint")
         )
-        self._model = BoundControl(model, ask, lambda v, p: requests.ChooseRobot(page=p, model=v))
+        self._model = BoundControl(model, ask, lambda v, p: ChooseRobot(page=p, model=v))
         codes = {label: code for code, label in LANGUAGES.items()}
         language = gui.add_dropdown(text("settings.language"), tuple(codes), initial_value=LANGUAGES[state.language])
         self._language = BoundControl(
-            language, ask, lambda v, p: requests.SetView(page=p, name="language", value=codes.get(v, ""))
+            language, ask, lambda v, p: SetView(page=p, name="language", value=codes.get(v, ""))
         )
         self._choices: list[tuple[BoundControl, Callable[[UiState], str]]] = []
         for name, values, begins, chosen in _CHOICES:
@@ -55,7 +56,7 @@ class SettingsPanel:
             self._take = gui.add_button(
                 text("lease.ask"), icon="hand-grab", color="gray", hint=text("settings.take_hint")
             )
-            on_press(self._take, ask, lambda page: requests.TakeControls(page=page))
+            on_press(self._take, ask, lambda page: TakeControls(page=page))
             for_anyone(self._take)
         source = explain_limit(state.model.limits.source("joint.velocity"), text.language)
         gui.add_html(f'<p class="rl-note">{esc(text("settings.limits", source=source))}</p>')
@@ -77,9 +78,7 @@ class SettingsPanel:
     def _choice(self, gui: Any, name: Any, labels: dict[str, str]) -> BoundControl:
         hint = self._text(f"settings.{name}_hint")
         handle = gui.add_dropdown(self._text(f"settings.{name}"), tuple(labels), hint=hint)
-        return BoundControl(
-            handle, self._ask, lambda v, p: requests.SetView(page=p, name=name, value=labels.get(v, ""))
-        )
+        return BoundControl(handle, self._ask, lambda v, p: SetView(page=p, name=name, value=labels.get(v, "")))
 
     @staticmethod
     def _labelled(labels: dict[str, str], chosen: Callable[[UiState], str]) -> Callable[[UiState], str]:

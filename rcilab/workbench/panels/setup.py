@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.app import requests
+from rcilab.app.check.check_actions import PressCheck
 from rcilab.app.check.freshness import outdated
 from rcilab.app.setup.configuration_state import (
     LISTED,
@@ -15,6 +15,7 @@ from rcilab.app.setup.configuration_state import (
     setup_obstacle,
     tool_outside,
 )
+from rcilab.app.setup.setup_actions import PressSetup, SetSetup
 from rcilab.app.text import Text
 from rcilab.makers.rokae.driver.configuration import SETUP_PARTS
 from rcilab.workbench.panels.target import planned_html
@@ -50,14 +51,14 @@ class SetupPanel:
             )
             on_press(self._undo, ask, _press("undo"))
             self._again = gui.add_button(text("setup.check"), icon="clipboard-check", hint=text("setup.check_hint"))
-            on_press(self._again, ask, lambda page: requests.Check(page=page, what="again"))
+            on_press(self._again, ask, lambda page: PressCheck(page=page, what="again"))
             choices = {text("setup.nothing"): "", **{text(f"setup.part.{part}"): part for part in SETUP_PARTS}}
             self._choices = {part: label for label, part in choices.items()}
             edited = gui.add_dropdown(
                 text("setup.edit"), tuple(choices), initial_value=self._choices[state.setup.edited]
             )
             self._edited = BoundControl(
-                edited, ask, lambda v, p: requests.SetSetup(page=p, name="edited", value=choices.get(v, ""))
+                edited, ask, lambda v, p: SetSetup(page=p, name="edited", value=choices.get(v, ""))
             )
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:
@@ -119,7 +120,7 @@ class SetupPanel:
 
 
 def _press(what: Any):  # type: ignore[no-untyped-def]
-    return lambda page: requests.PressSetup(page=page, what=what)
+    return lambda page: PressSetup(page=page, what=what)
 
 
 def _verdict(tone: str, word: str, rest: str) -> str:

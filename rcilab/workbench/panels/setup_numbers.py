@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.app import requests
 from rcilab.app.setup.configuration_state import FORCE_AXES
+from rcilab.app.setup.setup_actions import SetSetup
 from rcilab.app.setup.setup_fields import FIELD_NAMES, INERTIA_NAMES, POSE_NAMES, read_field
 from rcilab.app.text import Text
 from rcilab.makers.rokae.driver.configuration import SETUP_PARTS
@@ -98,13 +98,11 @@ class SetupNumbersPanel:
         names = {self._text(f"setup.axes.{name}"): name for name in FORCE_AXES}
         self._labels = {name: label for label, name in names.items()}
         axes = gui.add_dropdown(self._text("setup.axes"), tuple(names), hint=self._text("setup.axes_hint"))
-        self._axes = BoundControl(
-            axes, ask, lambda v, p: requests.SetSetup(page=p, name="axes", value=names.get(v, ""))
-        )
+        self._axes = BoundControl(axes, ask, lambda v, p: SetSetup(page=p, name="axes", value=names.get(v, "")))
 
     def _label(self, name: str) -> str:
         return self._text(f"setup.field.{name}")
 
 
 def _switch(name: Any):  # type: ignore[no-untyped-def]
-    return lambda value, page: requests.SetSetup(page=page, name=name, value=bool(value))
+    return lambda value, page: SetSetup(page=page, name=name, value=bool(value))

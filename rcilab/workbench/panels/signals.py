@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.app import requests
 from rcilab.app.run.drive_state import is_ours
+from rcilab.app.run.signal_actions import PressSignals, SetOutput
+from rcilab.app.run.world_actions import SetWiring
 from rcilab.app.text import Text
 from rcilab.makers.rokae.driver.commands import SIGNALS
 from rcilab.workbench.widgets import Ask, BoundControl, Html, esc, on_press
@@ -36,20 +37,16 @@ class SignalsPanel:
                 on_press(
                     button,
                     ask,
-                    lambda page, level=level: requests.SetOutput(
-                        page=page, signal=names.index(output.value), level=level
-                    ),
+                    lambda page, level=level: SetOutput(page=page, signal=names.index(output.value), level=level),
                 )
                 self._buttons.append(button)
             read = gui.add_button(text("signals.read"), icon="refresh", color="gray", hint=text("signals.read_hint"))
-            on_press(read, ask, lambda page: requests.PressSignals(page=page, what="read"))
+            on_press(read, ask, lambda page: PressSignals(page=page, what="read"))
             self._buttons.append(read)
             self._levels = Html(gui)
             gui.add_html(f'<p class="rl-note">{esc(text("signals.note"))}</p>')
             wired = gui.add_checkbox(text("signals.loop_back"), False, hint=text("signals.loop_back_hint"))
-            self._wired = BoundControl(
-                wired, ask, lambda v, p: requests.SetWiring(page=p, name="loop_back", on=bool(v))
-            )
+            self._wired = BoundControl(wired, ask, lambda v, p: SetWiring(page=p, name="loop_back", on=bool(v)))
         with gui.add_folder(text("reboot.title"), expand_by_default=False):
             gui.add_html('<i class="rl-buttons"></i>')
             self._reboot = gui.add_button(
@@ -93,4 +90,4 @@ def _level(level: bool | None, text: Text) -> str:
 
 
 def _press(what: Any):  # type: ignore[no-untyped-def]
-    return lambda page: requests.PressSignals(page=page, what=what)
+    return lambda page: PressSignals(page=page, what=what)

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from rcilab.app import requests
 from rcilab.app.run.drive_state import is_ours
+from rcilab.app.run.world_actions import SetWiring
 from rcilab.app.setup.configuration_state import own_limits, soft_limits
+from rcilab.app.setup.setup_actions import PressSetup
 from rcilab.app.setup.setup_fields import JOINT_ENDS
 from rcilab.app.text import Text
 from rcilab.workbench.panels.jog import problems_html
@@ -39,10 +40,10 @@ class SoftLimitsPanel:
                     self._named.append((field, label))
             self._problems = Html(gui)
             self._whole = gui.add_button(text("softlimits.whole"), icon="restore", color="gray")
-            on_press(self._whole, ask, lambda page: requests.PressSetup(page=page, what="whole"))
+            on_press(self._whole, ask, lambda page: PressSetup(page=page, what="whole"))
         with gui.add_folder(text("softlimits.beyond"), expand_by_default=False):
             auto = gui.add_checkbox(text("softlimits.auto"), False, hint=text("softlimits.auto_hint"))
-            self._auto = BoundControl(auto, ask, lambda v, p: requests.SetWiring(page=p, name="auto_limit", on=bool(v)))
+            self._auto = BoundControl(auto, ask, lambda v, p: SetWiring(page=p, name="auto_limit", on=bool(v)))
             gui.add_html(f'<p class="rl-note">{esc(text("softlimits.note"))}</p>')
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.app import requests
+from rcilab.app.request import Request
 from rcilab.app.run.drive_state import DESTINATIONS, destination
 from rcilab.app.run.readiness import is_moving
+from rcilab.app.run.run_actions import ChooseRobot
+from rcilab.app.run.target_robot_actions import ChooseDestination
 from rcilab.app.status_text import phase_code, tell_status
 from rcilab.app.text import Text
 from rcilab.workbench.widgets import Ask, BoundControl, Html, PageText, esc, on_press
@@ -61,7 +63,7 @@ class TargetRobotPanel:
             self._no = gui.add_button(text("destination.no"), color="gray", visible=False)
             on_press(self._no, ask, lambda page: _choose(page, "address", answer="no"))
             self._again = gui.add_button(text("destination.again"), icon="refresh", color="gray", visible=False)
-            on_press(self._again, ask, lambda page: requests.ChooseRobot(page=page, target="virtual"))
+            on_press(self._again, ask, lambda page: ChooseRobot(page=page, target="virtual"))
             self._leave = gui.add_button(text("destination.leave"), icon="plug-connected-x", color="gray")
             on_press(self._leave, ask, lambda page: _choose(page, "preview"))
 
@@ -94,7 +96,7 @@ class TargetRobotPanel:
             + (f'<p class="rl-note">{esc(note)}</p>' if note else "")
         )
 
-    def _pick(self, name: str, page: int | None) -> requests.Request | None:
+    def _pick(self, name: str, page: int | None) -> Request | None:
         self._picked = "address" if name == "address" else None
         return None if name in ("", "address") else _choose(page, name)
 
@@ -103,5 +105,5 @@ def _address_of(state: UiState) -> str:
     return state.target if state.target != "virtual" else ""
 
 
-def _choose(page: int | None, where: str, address: str = "", answer: Any = "") -> requests.Request:
-    return requests.ChooseDestination(page=page, where=where, address=address, answer=answer)
+def _choose(page: int | None, where: str, address: str = "", answer: Any = "") -> Request:
+    return ChooseDestination(page=page, where=where, address=address, answer=answer)

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.app import requests
 from rcilab.app.check.freshness import outdated
 from rcilab.app.program.program_draft import tell_place
 from rcilab.app.run.played_motion import paced_of, played_at
 from rcilab.app.run.readiness import is_moving, time_shown
 from rcilab.app.text import Text
-from rcilab.app.view_actions import PLOTS, RATES, has_plot
+from rcilab.app.view_actions import PLOTS, RATES, Play, Seek, SetView, ShowPlot, has_plot
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.workbench.panels.outcome import replay_html
 from rcilab.workbench.panels.plots import Plots
@@ -40,21 +39,17 @@ class TimelinePanel:
         text, ask = self._text, self._ask
         gui.add_html('<i class="rl-strip"></i>')
         self._play = gui.add_button(text("timeline.play"), icon="player-play", hint=text("timeline.play_hint"))
-        on_press(self._play, ask, lambda page: requests.Play(page=page))
+        on_press(self._play, ask, lambda page: Play(page=page))
         scrub = gui.add_slider(text("timeline.time"), 0.0, 100.0, 0.1, 0.0, marks=(), hint=text("timeline.scrub_hint"))
-        self._scrub = BoundControl(scrub, ask, lambda v, p: requests.Seek(page=p, place=v / 100.0))
+        self._scrub = BoundControl(scrub, ask, lambda v, p: Seek(page=p, place=v / 100.0))
         rates = {f"{rate:g}×": rate for rate in RATES}
         self._rates = {rate: label for label, rate in rates.items()}
         rate = gui.add_dropdown(text("timeline.rate"), tuple(rates), initial_value="1×")
-        self._rate = BoundControl(
-            rate, ask, lambda v, p: requests.SetView(page=p, name="rate", value=rates.get(v, 1.0))
-        )
+        self._rate = BoundControl(rate, ask, lambda v, p: SetView(page=p, name="rate", value=rates.get(v, 1.0)))
         joints = {text("timeline.all"): 0, **{f"J{j + 1}": j + 1 for j in range(state.model.n)}}
         self._joints = {joint: label for label, joint in joints.items()}
         choice = gui.add_dropdown(text("timeline.joint"), tuple(joints), hint=text("timeline.joint_hint"))
-        self._joint = BoundControl(
-            choice, ask, lambda v, p: requests.SetView(page=p, name="plot_joint", value=joints.get(v, 0))
-        )
+        self._joint = BoundControl(choice, ask, lambda v, p: SetView(page=p, name="plot_joint", value=joints.get(v, 0)))
         with gui.add_folder(text("timeline.show"), expand_by_default=False):
             self._build_choices(gui, state)
         self._banner = Html(gui)
@@ -87,7 +82,7 @@ class TimelinePanel:
                 box = gui.add_checkbox(text(f"plot.{name}"), name in state.plots)
                 self._choices[name] = BoundControl(box, ask, _choice(name))
         loop = gui.add_checkbox(text("timeline.loop"), state.loop, hint=text("program.loop_hint"))
-        self._loop = BoundControl(loop, ask, lambda v, p: requests.SetView(page=p, name="loop", value=bool(v)))
+        self._loop = BoundControl(loop, ask, lambda v, p: SetView(page=p, name="loop", value=bool(v)))
 
     def _read(self, state: UiState, status: SupervisorStatus) -> str:
         """Returns where the preview stands, and what is drawn how."""
@@ -121,7 +116,7 @@ class TimelinePanel:
 
 
 def _choice(name: str):  # type: ignore[no-untyped-def]
-    return lambda value, page: requests.ShowPlot(page=page, name=name, on=bool(value))
+    return lambda value, page: ShowPlot(page=page, name=name, on=bool(value))
 
 
 def _exhibit_html(state: UiState, text: Text) -> str:

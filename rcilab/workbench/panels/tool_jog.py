@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.app import requests
+from rcilab.app.jog.jog_actions import SetJog
 from rcilab.app.jog.jog_state import AXES, FRAMES
 from rcilab.app.text import Text
 from rcilab.workbench.panels.jog import add_jog_button
@@ -32,7 +32,7 @@ class ToolJogPanel:
             frame = gui.add_dropdown(
                 text("jog.frame"), tuple(frames), initial_value=chosen, hint=text("jog.frame_hint")
             )
-            self._frame = BoundControl(frame, self._ask, lambda v, p: requests.SetJog(page=p, frame=frames.get(v)))
+            self._frame = BoundControl(frame, self._ask, lambda v, p: SetJog(page=p, frame=frames.get(v)))
             for place in range(3):
                 for axis in (AXES[place], AXES[place + 3]):
                     add_jog_button(gui, self._ask, text(f"target.{axis}"), axis, -1)

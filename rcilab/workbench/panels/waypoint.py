@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from rcilab.app import requests
 from rcilab.app.goal.goal_actions import POSE_FIELDS
+from rcilab.app.program.edit_actions import EditProgram
 from rcilab.app.program.program_draft import TYPES, target_of
 from rcilab.app.program.waypoint_fields import VIA_FIELDS, arm_angle_of
 from rcilab.app.text import Text
@@ -39,9 +39,7 @@ class WaypointPanel:
             kinds = {text(f"program.type.{kind}"): kind for kind in TYPES}
             self._kinds = {kind: label for label, kind in kinds.items()}
             choice = gui.add_dropdown(text("program.type"), tuple(kinds), hint=text("program.type_hint"))
-            self._kind = BoundControl(
-                choice, ask, lambda v, p: requests.EditProgram(page=p, what="type", type=kinds.get(v, ""))
-            )
+            self._kind = BoundControl(choice, ask, lambda v, p: EditProgram(page=p, what="type", type=kinds.get(v, "")))
             for name in (*_PLAIN, *(("psi",) if state.model.n == 7 else ())):
                 self._field(gui, name)
         self._pose = gui.add_folder(text("program.pose"))
@@ -109,7 +107,7 @@ class WaypointPanel:
     def _button(self, gui: Any, what: Any, source: Any, icon: str) -> None:
         name = self._text(f"program.{what}_{source}")
         button = gui.add_button(name, icon=icon, color="gray", hint=self._text(f"program.{what}_{source}_hint"))
-        on_press(button, self._ask, lambda page: requests.EditProgram(page=page, what=what, source=source))
+        on_press(button, self._ask, lambda page: EditProgram(page=page, what=what, source=source))
 
     def _note(self, waypoint: Waypoint) -> str:
         if waypoint.type in TYPES:

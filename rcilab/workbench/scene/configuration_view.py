@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rcilab.app import requests
 from rcilab.app.setup.configuration_state import ON_FLANGE
+from rcilab.app.setup.setup_actions import MoveSetup, ResizeBox
 from rcilab.app.text import Text
 from rcilab.core.arrays import Array
 from rcilab.core.safety_box import SafetyBox
@@ -122,7 +122,7 @@ class ConfigurationSceneView:
         async def _(event: Any) -> None:
             self._touched = time.monotonic()
             self._ask(
-                requests.MoveSetup(
+                MoveSetup(
                     page=event.client_id,
                     part=part,  # type: ignore[arg-type]  # One of the four.
                     position=tuple(map(float, event.target.position)),
@@ -203,7 +203,7 @@ class ConfigurationSceneView:
     def _hear(self, face: int) -> Any:
         async def act(event: Any) -> None:
             hand = tuple(map(float, event.end_position))
-            self._ask(requests.ResizeBox(page=event.client_id, face=face, hand=hand, ended=event.phase == "end"))
+            self._ask(ResizeBox(page=event.client_id, face=face, hand=hand, ended=event.phase == "end"))
 
         return act
 

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rcilab.app import requests
 from rcilab.app.run.active_force import SPRING, TOOL, can_grab
+from rcilab.app.run.push_actions import DragLink
 from rcilab.app.text import Text
 from rcilab.views.arm_view import ArmView
 from rcilab.views.viser_scene import ViserScene
@@ -76,7 +76,7 @@ class DragHandle:
     def _hear(self, link: int) -> Any:
         async def act(event: Any) -> None:
             self._ask(
-                requests.DragLink(
+                DragLink(
                     page=event.client_id,
                     link=link,
                     grabbed=tuple(map(float, event.start_position)),

@@ -6,9 +6,9 @@ import math
 import time
 from typing import TYPE_CHECKING, Any
 
-from rcilab.app import requests
 from rcilab.app.goal.elbow import Elbow
 from rcilab.app.run.readiness import is_moving
+from rcilab.app.scene.scene_actions import DragElbow
 from rcilab.app.text import Text
 from rcilab.robots.mesh import revolve
 from rcilab.views.elbow_view import OUTWARD, ElbowView
@@ -91,7 +91,7 @@ class ElbowSceneView:
     async def _hear(self, event: Any) -> None:
         self._touched = time.monotonic()
         self._ask(
-            requests.DragElbow(
+            DragElbow(
                 page=event.client_id,
                 eye=tuple(map(float, event.client.camera.position)),
                 hand=tuple(map(float, event.end_position)),

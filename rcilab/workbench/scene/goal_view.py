@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rcilab.app import requests
+from rcilab.app.goal.goal_actions import MoveTarget
 from rcilab.app.text import Text
 from rcilab.workbench.scene.configuration_view import hides_target
 from rcilab.workbench.widgets import HAND_AWAY, Ask
@@ -59,7 +59,7 @@ class GoalView:
         async def _(event: Any) -> None:
             self._touched = time.monotonic()
             ask(
-                requests.MoveTarget(
+                MoveTarget(
                     page=event.client_id,
                     position=tuple(map(float, event.target.position)),
                     wxyz=tuple(map(float, event.target.wxyz)),

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rcilab.app import requests
 from rcilab.app.check.freshness import outdated
 from rcilab.app.planning import PATH_POINTS
 from rcilab.app.scene.path_strip import PathStrip, ViolationMarker
+from rcilab.app.scene.scene_actions import ShowViolation
 from rcilab.app.text import Text
 from rcilab.views.usage_colors import usage_colors
 from rcilab.views.viser_scene import ViserScene
@@ -95,7 +95,7 @@ class PathStripView:
 
     def _hear(self, number: int) -> Any:
         async def act(event: Any) -> None:
-            self._ask(requests.ShowViolation(page=event.client_id, number=number))
+            self._ask(ShowViolation(page=event.client_id, number=number))
 
         return act
 
