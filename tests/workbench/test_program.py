@@ -505,7 +505,7 @@ def test_a_bug_in_the_planning_leaves_the_page_usable(square, monkeypatch):
     def fail(*args, **kwargs):
         raise MemoryError
 
-    monkeypatch.setattr(program_planning, "picture", fail)
+    monkeypatch.setattr(program_planning, "build_plan_view", fail)
     with pytest.raises(MemoryError):
         square.plan()
     assert square.state.busy is None
