@@ -30,6 +30,7 @@ from rcilab.app.run.signal_actions import SignalActions
 from rcilab.app.run.target_robot_actions import TargetRobotActions
 from rcilab.app.run.world_actions import WorldActions
 from rcilab.app.scene.scene_actions import SceneActions
+from rcilab.app.setup.configuration_state import name_parts
 from rcilab.app.setup.setup_actions import SetupActions, is_setup_field
 from rcilab.app.status_text import tell_error
 from rcilab.app.store import Store
@@ -120,8 +121,9 @@ class Dispatcher:
 
     def start(self) -> None:
         """Starts the thread."""
-        self._thread = threading.Thread(target=self._run, name="conductor", daemon=True)
-        self._thread.start()
+        thread = threading.Thread(target=self._run, name="conductor", daemon=True)
+        thread.start()
+        self._thread = thread
 
     def close(self) -> None:
         """Ends the thread."""
@@ -179,12 +181,18 @@ class Dispatcher:
         self._keepsake.keep(self._store.state)
 
     def _resume(self, kept: SavedState) -> None:
+        back: list[str] = [] if kept.program is None else ["program"]
+        back += kept.setup.parts
         self._setup.restore(kept.setup)
         if kept.q is not None:
             self._goal.pose(kept.q)
         if kept.program is not None and kept.program.model == self._store.state.model.name:
             self._program.restore(kept.program)
-        self._store.say("good", message("notice.program_back" if kept.q is None else "notice.resumed"))
+        if kept.q is not None:
+            self._store.say("good", message("notice.resumed"))
+        elif back:
+            name = self._store.state.model.name
+            self._store.say("good", message("setup.back", what=name_parts(tuple(back)), model=name))
 
     def _refuse(self, request: Request) -> None:
         """Tells a page that it only watches, unless it has got the controls meanwhile."""

@@ -45,6 +45,7 @@ from rcilab.control_process.status_reader import StatusReader
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.closeable import Closeable
 from rcilab.core.errors import ConnectionLostError, ControlError, ModelError, RcilabError, UsageError
+from rcilab.core.memory import memory_needed
 from rcilab.core.state import Mode
 from rcilab.execution.guiding import GuideKind, GuideSpace, require_guidable
 from rcilab.makers.rokae.driver.address import parse_address
@@ -127,16 +128,19 @@ class Supervisor(Closeable):
 
         Raises:
             ConnectionLostError: A process of ours could not be started; the message carries what it said.
-            UsageError: It was started before.
+            UsageError: It was started before, or memory is short.
         """
         with self._lock:
             if self._block is not None:
                 raise UsageError("the supervisor has been started already; use restart(), or make a new one")
-            self._open()
-            self._watcher = threading.Thread(target=self._watch, name="rcilab-supervisor", daemon=True)
-            self._watcher.start()
         try:
-            self._await_connection(timeout)
+            with memory_needed():
+                with self._lock:
+                    self._open()
+                    watcher = threading.Thread(target=self._watch, name="rcilab-supervisor", daemon=True)
+                    watcher.start()
+                    self._watcher = watcher
+                self._await_connection(timeout)
         except BaseException:
             self.close()
             raise
@@ -520,10 +524,16 @@ class Supervisor(Closeable):
         """Makes the shared block and what works on it, and starts the processes."""
         block = ControlBlock.create(self.model.n, build_settings(self.model))
         address = None if self._target == VIRTUAL else self._target
-        self._keeper = ProcessSupervisor(block, self.model.name, self._plant, address, auto_restart=self._auto_restart)
-        self._client = RequestClient(block)
-        self._pace, self._round_trip = SpeedOverride(block), RoundTrip(block)
-        self._reader, self._ring = StatusReader(block), RingReader(block)
+        try:
+            self._keeper = ProcessSupervisor(
+                block, self.model.name, self._plant, address, auto_restart=self._auto_restart
+            )
+            self._client = RequestClient(block)
+            self._pace, self._round_trip = SpeedOverride(block), RoundTrip(block)
+            self._reader, self._ring = StatusReader(block), RingReader(block)
+        except BaseException:
+            block.close()
+            raise
         self._is_closing.clear()
         self._block = block
         try:

@@ -48,7 +48,7 @@ def test_what_a_waypoint_asks_for_is_not_said_of_a_target():
     reason = UnreachableError("out of reach", distance=0.02).coded("too_far", distance="20.0")
     place = "900, 0, 300"
     for language, target, waypoint in (("en", "target", "waypoint"), ("zh", "目标", "路点")):
-        text = Text(language, "rcilab.workbench")
+        text = Text(language, "rcilab.app")
         said = {"": text.say(tell(reason))}
         for code, facts in (("waypoint", {}), ("way", {"place": place}), ("blend", {"place": place})):
             error = PlanningError("waypoint 2").coded(code, number=2, kind="line", reason=reason, **facts)

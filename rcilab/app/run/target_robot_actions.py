@@ -11,9 +11,14 @@ from rcilab.app.run.active_force import Plant
 from rcilab.app.run.drive_state import DESTINATIONS
 from rcilab.app.run.readiness import is_moving
 from rcilab.app.run.run_actions import RunActions
+from rcilab.app.status_text import tell_error
 from rcilab.app.store import Store
 from rcilab.app.text import message
+from rcilab.core.errors import RcilabError
 from rcilab.makers.rokae.driver.address import parse_address
+
+_ADDRESS = "address"
+"""Names the trouble that what stands in the field is no address."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,6 +49,7 @@ class TargetRobotActions:
         state = self._store.state
         if request.where not in DESTINATIONS:
             return
+        self._store.settle(_ADDRESS)
         if is_moving(self._session.status()):
             self._store.say("warn", message("notice.moving"))
             return
@@ -66,9 +72,13 @@ class TargetRobotActions:
             self._robot.open(self._store.state.model.name, asked)
             return
         if not address:
-            self._store.say("warn", message("run.address_needed"))
+            self._store.say("warn", message("run.address_needed"), trouble=_ADDRESS)
             return
-        parse_address(address)
+        try:
+            parse_address(address)
+        except RcilabError as error:
+            self._store.say("bad", tell_error(error), trouble=_ADDRESS)
+            return
         self._ask(address)
 
     def _ask(self, address: str) -> None:
