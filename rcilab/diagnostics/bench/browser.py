@@ -1,51 +1,84 @@
-"""A real browser with the page open, because that is what a control loop shares its machine with."""
+"""A page in a real headless browser, driven by playwright: what a control loop shares its machine with."""
 
 from __future__ import annotations
 
-import shutil
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
+from typing import TYPE_CHECKING, Any
 
-from rcilab.diagnostics.bench.child_guard import keeper, launch
+from rcilab.core.errors import DeadlineError, RcilabError
+from rcilab.diagnostics.host import find_chromium
 
-BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "firefox", "microsoft-edge")
-"""Names a browser may have on the path."""
+if TYPE_CHECKING:
+    from playwright.sync_api import Page
 
-_CHROMIUM = BROWSERS[:4]
-CHROMIUM_FLAGS = (
-    "--headless",
+PAGE_TIMEOUT = 60.0  # [s] For anything on a page: software rendering on a busy machine takes several seconds.
+
+_FLAGS = (
     "--no-sandbox",
     "--no-first-run",
-    "--window-size=1280,800",
     "--use-gl=angle",
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
-    "--disable-gpu-rasterization",  # Off wherever there is no such processor; Debian's launcher switches it on.
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--disable-default-apps",
-    "--disable-background-timer-throttling",
-    "--disable-renderer-backgrounding",
-    "--remote-debugging-port=0",  # Keeps a headless Chromium open after the page has loaded.
+    "--disable-gpu-rasterization",  # Off where there is no graphics processor; Debian's launcher switches it on.
 )
+_VIEW = {"width": 1280, "height": 800}
 
 
-def find_browser(names: tuple[str, ...] = BROWSERS) -> str | None:
-    """Returns the path of the first browser that is installed, or None."""
-    return next((path for name in names if (path := shutil.which(name))), None)
-
-
-def find_chromium() -> str | None:
-    """Returns the path of a browser that can run without a display and draw in software, or None."""
-    return find_browser(_CHROMIUM)
+def why_no_page() -> str | None:
+    """Returns why no page can be opened here and what to install, or None when one can."""
+    if find_spec("playwright") is None:
+        return "PLAYWRIGHT IS NOT INSTALLED: pip install 'rcilab[bench]'"
+    if find_chromium() is None:
+        return "NO BROWSER FOUND: install Chromium (apt install chromium)"
+    return None
 
 
 @contextmanager
-def open_page(url: str, browser: str) -> Iterator[None]:
-    """Keeps a page open in a headless Chromium of our own; it and its profile are gone afterwards, and when we die."""
-    profile = tempfile.mkdtemp(prefix="rcilab-bench-")
-    with keeper([browser, *CHROMIUM_FLAGS, f"--user-data-dir={profile}", url], directory=profile) as process:
-        launch(process)
-        yield
+def open_page(url: str) -> Iterator[Page]:
+    """Opens an address in a browser of its own and waits until that is loaded; closes the browser afterwards.
+
+    Raises:
+        DeadlineError: The browser did not respond.
+        RcilabError: The browser could not be started, or the page's script failed.
+    """
+    from playwright.sync_api import Error, TimeoutError, sync_playwright
+
+    try:
+        with sync_playwright() as driver:
+            browser = driver.chromium.launch(executable_path=find_chromium(), args=_FLAGS)
+            yield open_window(browser, url)
+            browser.close()
+    except TimeoutError as error:
+        raise DeadlineError(f"bench: {_first_line(error)}; look at `rcilab doctor`, then try again") from error
+    except Error as error:
+        raise RcilabError(f"bench: the browser failed: {_first_line(error)}") from error
+
+
+def open_window(browser: Any, url: str) -> Page:
+    """Opens an address in another window of the same browser; all windows draw."""
+    page = browser.new_page(viewport=_VIEW)
+    page.set_default_timeout(1e3 * PAGE_TIMEOUT)
+    page.goto(url)
+    return page
+
+
+def wait_on_page(page: Page, what: str, script: str) -> Any:
+    """Waits until an expression is true on a page and returns it.
+
+    Raises:
+        DeadlineError: It did not become true.
+    """
+    from playwright.sync_api import TimeoutError
+
+    try:
+        return page.wait_for_function(script, polling=50).json_value()
+    except TimeoutError as error:
+        raise DeadlineError(
+            f"bench: waited {PAGE_TIMEOUT:g} s for {what}; look at `rcilab doctor`, then try again"
+        ) from error
+
+
+def _first_line(error: Exception) -> str:
+    return next(iter(str(error).splitlines()), type(error).__name__)

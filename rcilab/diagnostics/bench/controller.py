@@ -19,8 +19,8 @@ from rcilab.core.spatial import Pose
 from rcilab.core.state import ControllerMode, MotionGeneratorMode, RobotState
 from rcilab.diagnostics.bench.compute import motion_of
 from rcilab.diagnostics.bench.cpu_stall_monitor import CpuStallMonitor
-from rcilab.diagnostics.bench.machine import ask_realtime
 from rcilab.diagnostics.bench.measure import Measurement, summarise
+from rcilab.diagnostics.host import probe_realtime
 from rcilab.makers.rokae import wire as rci
 from rcilab.makers.rokae.controller.config import PLANT_KINDS, PlantKind
 from rcilab.makers.rokae.controller.cycle import ControlCycle
@@ -100,7 +100,7 @@ def bench_state_period(seconds: float = 10.0) -> Measurement:
     off = np.abs(np.diff(stamps) - CYCLE_TIME)
     found = summarise("state_period", off, "us", _EVENNESS)
     p999, largest = 1e6 * float(np.quantile(off, 0.999)), 1e6 * float(off.max())
-    has_fifo = ask_realtime()[0]
+    has_fifo = probe_realtime()[0]
     uneven = stamps[1:][1e6 * off > _EVENNESS]
     note = (
         f"|period - 1 ms| of {len(stamps)} states while moving; p99.9 {p999:.0f}, max {largest:.0f} us; "

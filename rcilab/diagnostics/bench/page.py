@@ -9,9 +9,10 @@ from contextlib import nullcontext
 import numpy as np
 
 from rcilab.app.goal.goal_actions import MoveTarget
-from rcilab.diagnostics.bench.browser import find_chromium, open_page
+from rcilab.diagnostics.bench.browser import open_page, why_no_page
 from rcilab.diagnostics.bench.loop import Streamed, stream, wait_for
 from rcilab.diagnostics.bench.measure import Measurement, summarise
+from rcilab.diagnostics.host import find_chromium
 from rcilab.workbench.app import Workbench, WorkbenchConfig
 
 _DRAGS = 200
@@ -47,28 +48,28 @@ def bench_control_loop(seconds: float = 30.0) -> Measurement:
 
     The number is the lateness of a cycle. The promise: no cycle later than 1 ms, none lost, success rate 1.
     """
-    browser = find_chromium()
+    reason = why_no_page()
     with Workbench(WorkbenchConfig(port=0)) as bench:
         wait_for("the control process", lambda: bench.session.status().phase == "idle")
-        with open_page(bench.url, browser) if browser else nullcontext():
-            if browser:
+        with open_page(bench.url) if reason is None else nullcontext():
+            if reason is None:
                 wait_for("the page to open", lambda: bool(bench.server.get_clients()))
                 time.sleep(min(10.0, seconds))  # The browser compiles shaders and uploads meshes: let it draw.
-            return _judge(stream(bench, bench.session.supervisor(), seconds), browser)
+            return _evaluate(stream(bench, bench.session.supervisor(), seconds), reason)
 
 
-def _judge(found: Streamed, browser: str | None) -> Measurement:
+def _evaluate(found: Streamed, reason: str | None) -> Measurement:
     lateness, after = found.after.lateness, found.after
     locked = ", memory locked" if after.memory_locked else ""
-    if browser is None:
-        page = "NO BROWSER FOUND, so no page was open and nothing is promised"
+    if reason is not None:
+        page = f"no page was open and nothing is promised; {reason}"
     else:
-        page = f"page open in {browser}" + ("" if found.pages else "; THE PAGE WENT AWAY")
+        page = f"page open in {find_chromium()}" + ("" if found.pages else "; THE PAGE WENT AWAY")
     note = (
         f"{found.duration:.1f} s, {lateness.cycles} cycles, {after.scheduling}{locked}; {found.tell_loop()}; {page}; "
         f"{found.tell_machine()}"
     )
     return Measurement(
         name="control_loop", median=lateness.p50, p99=lateness.p99, unit="us", target=1000.0,
-        ok=None if browser is None else found.is_clean and found.pages > 0, note=note,
+        ok=None if reason is not None else found.is_clean and found.pages > 0, note=note,
     )  # fmt: skip

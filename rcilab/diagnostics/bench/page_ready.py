@@ -5,9 +5,9 @@ from __future__ import annotations
 import statistics
 
 from rcilab.diagnostics.bench.bare import bare_page
-from rcilab.diagnostics.bench.browser import find_chromium
+from rcilab.diagnostics.bench.browser import open_page, wait_on_page, why_no_page
 from rcilab.diagnostics.bench.measure import Absent, Measurement, summarise
-from rcilab.diagnostics.bench.tab import no_browser, open_tab
+from rcilab.diagnostics.host import find_chromium
 from rcilab.workbench.app import Workbench, WorkbenchConfig
 
 _LOADS = 3
@@ -26,23 +26,21 @@ _WATCH = """(() => {
 
 def bench_page_ready() -> Measurement | Absent:
     """From the browser's load event until the page can be used: arm drawn, controls and status there."""
-    browser = find_chromium()
-    if browser is None:
-        return no_browser("page_ready")
+    if (reason := why_no_page()) is not None:
+        return Absent(name="page_ready", note=reason)
     ours: list[float] = []
     empty: list[float] = []
     with Workbench(WorkbenchConfig(port=0, quality="light")) as bench, bare_page() as (_, url):
         for _ in range(_LOADS):
-            ours.append(_load(browser, bench.url, _USABLE))
-            empty.append(_load(browser, url, _DRAWN))
-    note = f"{_LOADS} loads in fresh browsers, light graphics, in {browser}, drawn in software; "
+            ours.append(_load(bench.url, _USABLE))
+            empty.append(_load(url, _DRAWN))
+    note = f"{_LOADS} loads in fresh browsers, light graphics, in {find_chromium()}, drawn in software; "
     note += f"viser's own page without arm and controls, in turns with it: {statistics.median(empty):.2f} s"
     return summarise("page_ready", ours, "s", 2.0, note)
 
 
-def _load(browser: str, url: str, usable: str) -> float:
+def _load(url: str, usable: str) -> float:
     """Returns the time from a fresh browser's load event until an expression is true, [s]."""
-    with open_tab(browser) as tab:
-        tab.open(url)
-        tab.evaluate(_WATCH.replace("USABLE", usable))
-        return 1e-3 * float(tab.wait("the page to be usable", "window.__usable"))
+    with open_page(url) as page:
+        page.evaluate(_WATCH.replace("USABLE", usable))
+        return 1e-3 * float(wait_on_page(page, "the page to be usable", "window.__usable"))

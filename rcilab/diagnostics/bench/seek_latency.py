@@ -11,11 +11,10 @@ from websockets.sync.client import connect
 from rcilab.app.control_lock_actions import PageOpened
 from rcilab.core.cycle_log import cycle_dtype
 from rcilab.core.errors import RcilabError
-from rcilab.diagnostics.bench.browser import find_chromium
+from rcilab.diagnostics.bench.browser import open_page, wait_on_page, why_no_page
 from rcilab.diagnostics.bench.compute import motion_of
 from rcilab.diagnostics.bench.loop import wait_for
 from rcilab.diagnostics.bench.measure import Absent, Measurement, summarise
-from rcilab.diagnostics.bench.tab import no_browser, open_tab
 from rcilab.model.robot_model import RobotModel, load_model
 from rcilab.recording.run import Run, build_run
 from rcilab.workbench.app import Workbench, WorkbenchConfig
@@ -72,25 +71,23 @@ def bench_page_scrub() -> Measurement | Absent:
 
     The number is the time from one new picture of the arm to the next; the promise is about the longest.
     """
-    browser = find_chromium()
-    if browser is None:
-        return no_browser("page_scrub")
+    if (reason := why_no_page()) is not None:
+        return Absent(name="page_scrub", note=reason)
     run = recorded(load_model(_ROBOT), _RECORDED)
-    with Workbench(WorkbenchConfig(port=0, quality="light", replay=run)) as bench, open_tab(browser) as tab:
-        tab.open(bench.url)
-        tab.wait("the recording on the page", _READY)
+    with Workbench(WorkbenchConfig(port=0, quality="light", replay=run)) as bench, open_page(bench.url) as page:
+        wait_on_page(page, "the recording on the page", _READY)
         time.sleep(3.0)  # Shaders are compiled and meshes uploaded while the first frames are drawn.
-        left, right, y = tab.wait("the slider of the timeline", _SLIDER)
-        tab.mouse("mouseMoved", left, y)
-        tab.mouse("mousePressed", left, y)
-        tab.evaluate(_WATCH)
+        left, right, y = wait_on_page(page, "the slider of the timeline", _SLIDER)
+        page.mouse.move(left, y)
+        page.mouse.down()
+        page.evaluate(_WATCH)
         start = time.monotonic()
         while (share := (time.monotonic() - start) / _SCRUB_TIME) < 1.0:
             x = left + (right - left) * (1.0 - abs(1.0 - 2.0 * share))
-            tab.mouse("mouseMoved", x, y)
+            page.mouse.move(x, y)
             time.sleep(_MOVE_TIME)
-        tab.mouse("mouseReleased", left, y)
-        changes = tab.evaluate("__changes")
+        page.mouse.up()
+        changes = page.evaluate("__changes")
     arm, cursor = (1e-3 * np.diff(changes[what]) for what in ("arm", "cursor"))
     if len(arm) < 2 or len(cursor) < 2:
         raise RcilabError("bench: nothing followed the slider of the timeline")

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import time
 
-from rcilab.diagnostics.bench.browser import find_chromium
+from rcilab.diagnostics.bench.browser import open_page, open_window, why_no_page
 from rcilab.diagnostics.bench.loop import Streamed, stream, wait_for
 from rcilab.diagnostics.bench.measure import Absent, Measurement
-from rcilab.diagnostics.bench.tab import no_browser, open_tab
 from rcilab.workbench.app import Workbench, WorkbenchConfig
 
 _SPECTATORS = 3
@@ -20,18 +19,16 @@ def bench_spectators(seconds: float = 30.0) -> Measurement | Absent:
     The number is the lateness of a cycle with spectators. The promise: they add no late cycle, but for those that fall
     together with a pause of the machine itself, and no lost one.
     """
-    browser = find_chromium()
-    if browser is None:
-        return no_browser("spectators")
-    with Workbench(WorkbenchConfig(port=0, quality="light")) as bench, open_tab(browser) as tab:
+    if (reason := why_no_page()) is not None:
+        return Absent(name="spectators", note=reason)
+    with Workbench(WorkbenchConfig(port=0, quality="light")) as bench, open_page(bench.url) as page:
         wait_for("the control process", lambda: bench.session.status().phase == "idle")
-        tab.open(bench.url)
         wait_for("the page to open", lambda: bool(bench.server.get_clients()))
         settle = min(10.0, seconds)  # [s] The browser compiles shaders and uploads meshes: let it draw.
         time.sleep(settle)
         alone = stream(bench, bench.session.supervisor(), seconds)
         for _ in range(_SPECTATORS):
-            tab.open_window(bench.url)
+            open_window(page.context.browser, bench.url)
         wait_for("the spectators", lambda: len(bench.server.get_clients()) == 1 + _SPECTATORS, _PATIENCE)
         time.sleep(settle)
         watched = stream(bench, bench.session.supervisor(), seconds)

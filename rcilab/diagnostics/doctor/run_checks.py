@@ -6,13 +6,12 @@ import os
 import sys
 from collections.abc import Callable, Iterator
 
-from rcilab.diagnostics.bench.browser import BROWSERS
-from rcilab.diagnostics.bench.machine import ask_realtime
 from rcilab.diagnostics.doctor import kernel, network, processor, software
 from rcilab.diagnostics.doctor.finding import Finding
 from rcilab.diagnostics.doctor.jitter import check_jitter
 from rcilab.diagnostics.doctor.round_trip import check_controller, check_round_trip
 from rcilab.diagnostics.doctor.system import System
+from rcilab.diagnostics.host import BROWSERS, probe_realtime
 from rcilab.makers.rokae.driver.address import RobotAddress
 
 
@@ -39,7 +38,7 @@ def examine(
     yield software.check_port(software.CONTROLLER_ADDRESS, software.CONTROLLER_PORT)
     yield kernel.check_kernel(system)
     yield kernel.check_preemption(system)
-    fifo, locked = ask_realtime()
+    fifo, locked = probe_realtime()
     yield kernel.check_fifo(fifo, system)
     yield kernel.check_memory_lock(locked, system)
     yield kernel.check_throttling(system)

@@ -6,8 +6,8 @@ import re
 import socket
 from importlib import metadata
 
-from rcilab.diagnostics.bench.browser import find_browser
 from rcilab.diagnostics.doctor.finding import Finding
+from rcilab.diagnostics.host import find_browser
 
 OLDEST_PYTHON = (3, 11)
 CONTROLLER_ADDRESS = "127.0.0.2"  # Where `rcilab controller` listens unless told otherwise.

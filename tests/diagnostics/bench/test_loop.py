@@ -54,7 +54,7 @@ def test_a_watch_that_is_long_in_coming_leaves_the_controls_in_hand(monkeypatch:
 
         def __exit__(self, *_: object) -> None: ...
 
-    monkeypatch.setattr(loop, "CoreWatch", SlowWatch)
+    monkeypatch.setattr(loop, "CpuStallMonitor", SlowWatch)
     bench: Any = SimpleNamespace(
         store=SimpleNamespace(state=SimpleNamespace(model=MODEL)), server=SimpleNamespace(get_clients=dict)
     )

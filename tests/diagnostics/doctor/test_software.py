@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import socket
+import subprocess
+import sys
 
 import pytest
 
@@ -61,3 +63,9 @@ def test_every_runtime_package_of_ours_is_looked_at() -> None:
 
 def test_no_browser_is_noted() -> None:
     assert software.check_browser(("no-such-browser-at-all",)).verdict == "note"
+
+
+def test_doctor_needs_nothing_of_the_bench():
+    code = "import sys, rcilab.diagnostics.doctor.run_checks; print([m for m in sys.modules if 'bench' in m])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"
