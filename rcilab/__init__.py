@@ -18,11 +18,11 @@ if TYPE_CHECKING:
     from rcilab.core.command import JointPosition as JointPosition
     from rcilab.core.command import JointTorque as JointTorque
     from rcilab.core.errors import RcilabError as RcilabError
-    from rcilab.core.faults import Fault as Fault
     from rcilab.core.safety_box import SafetyBox as SafetyBox
     from rcilab.core.spatial import Pose as Pose
     from rcilab.execution.session import RobotSession as RobotSession
     from rcilab.execution.session import connect as connect
+    from rcilab.makers.rokae.faults import Fault as Fault
     from rcilab.model.dynamics.payload import Payload as Payload
     from rcilab.model.robot_model import RobotModel as RobotModel
     from rcilab.model.robot_model import load_model as load_model
@@ -45,7 +45,7 @@ __version__ = "0.2.0"
 
 _HOMES = {
     "CartesianPosition": "rcilab.core.command",
-    "Fault": "rcilab.core.faults",
+    "Fault": "rcilab.makers.rokae.faults",
     "JointPosition": "rcilab.core.command",
     "JointTorque": "rcilab.core.command",
     "Monitor": "rcilab.conformance.motion_monitor",

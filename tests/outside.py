@@ -7,7 +7,7 @@ import pytest
 
 from rcilab import JointPosition, RobotSession, plan_joint
 from rcilab.core.errors import ControlError
-from rcilab.core.faults import Fault
+from rcilab.makers.rokae.faults import Fault
 
 JOINT = 4
 """Index of the joint that goes out."""

@@ -19,7 +19,7 @@ from rcilab.i18n.translator import Message, message
 from rcilab.model.robot_model import RobotModel
 
 if TYPE_CHECKING:
-    from rcilab.conformance import Report
+    from rcilab.conformance.report import Report
     from rcilab.motion import Motion, Program
 
 PathKind = Literal["joint", "line", "arc"]
@@ -66,7 +66,7 @@ class Plan:
 
     def completed(self, mode: Mode = "joint_position") -> Plan:
         """Returns this plan with a report on all conditions of a mode, collisions too: what may be executed."""
-        from rcilab.conformance import check
+        from rcilab.conformance.check import check
 
         if self.complete and self.mode == mode:
             return self
@@ -108,7 +108,7 @@ def make_plan(
     via: Pose | None = None,
 ) -> Plan | Message:
     """Returns a motion from start to goal that is judged but for collisions, or why there is none."""
-    from rcilab.conformance import check
+    from rcilab.conformance.check import check
 
     for name, q in (("plan.start_limit", start), ("plan.at_limit", goal)):
         joint = find_outside(model, q)
@@ -132,7 +132,7 @@ def make_plan(
 
 def make_recovery(model: RobotModel, start: JointVector, box: SafetyBox | None = None) -> Plan | Message:
     """Returns the motion that leads joints and tool back inside, checked but for collisions, or why none does."""
-    from rcilab.conformance import check
+    from rcilab.conformance.check import check
     from rcilab.motion import plan_recovery
 
     try:

@@ -8,7 +8,7 @@ from rcilab.app.text import Message, message
 from rcilab.control_process import status_messages as telling
 from rcilab.control_process.status_messages import phase_code, tell_incident, tell_status
 from rcilab.core.errors import RcilabError, UsageError
-from rcilab.core.faults import name_faults
+from rcilab.core.fault import name_faults
 
 if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus

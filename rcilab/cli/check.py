@@ -54,7 +54,7 @@ def run(args: Namespace) -> int:
         RcilabError: Bad input; the caller prints it and exits with 2.
     """
     from rcilab.cli.report_json import as_json_text, report_as_json
-    from rcilab.conformance import check
+    from rcilab.conformance.check import check
     from rcilab.model.robot_model import load_model
     from rcilab.motion import Program
 

@@ -7,7 +7,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from rcilab.conformance import ConditionResult, Report, Violation
+    from rcilab.conformance.report import ConditionResult, Report, Violation
     from rcilab.motion import Motion
     from rcilab.recording.run import Run
 

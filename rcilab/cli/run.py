@@ -17,10 +17,11 @@ from typing import TYPE_CHECKING, Any, Literal, TextIO
 from rcilab.cli.motion_file import HELP, add_max_rows, as_motion, read_file
 from rcilab.cli.output import drop_output, show
 from rcilab.core.errors import UsageError
-from rcilab.core.faults import name_faults
+from rcilab.core.fault import name_faults
 
 if TYPE_CHECKING:
-    from rcilab.conformance import Certificate, Report
+    from rcilab.conformance.certificate import Certificate
+    from rcilab.conformance.report import Report
     from rcilab.core.arrays import JointVector
     from rcilab.core.state import RobotState
     from rcilab.execution import RobotSession, Run
@@ -187,7 +188,7 @@ class _Move:
 
 def _move(motion: Motion, robot: RobotSession, stopper: _Stopper, args: Namespace) -> _Move:
     """Checks a motion, shows the report, asks, and runs the motion."""
-    from rcilab.conformance import check
+    from rcilab.conformance.check import check
 
     out = _reader(args)
     report = check(motion, robot.model, start=robot.state.q_c)

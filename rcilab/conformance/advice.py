@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import ceil, degrees, floor, isfinite
 
 from rcilab.conformance.catalogue import Phrase
-from rcilab.conformance.condition import Condition, Signal
+from rcilab.core.condition import Condition, Signal
 from rcilab.motion.motion import Motion, TimeLaw
 
 

@@ -1,19 +1,18 @@
-"""Conditions as a monitor asks them in every cycle: one value and two bounds for each axis, side by side."""
+"""Conditions as a monitor evaluates them in every cycle: one value and two bounds for each axis."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from rcilab.conformance.condition import AnyLimits, Condition
-from rcilab.conformance.limit_violation import LimitViolation, faults_of
-from rcilab.core.faults import Fault
+from rcilab.conformance.limit_violation import LimitViolation
+from rcilab.core.condition import AnyLimits, Condition
 
 
 class BoundsTable:
-    """Conditions with their bounds, spread over the axes that each of them judges.
+    """Conditions with their bounds, one entry for each axis of each condition.
 
     Args:
-        rows: The conditions, in the order of the values that `judge` is given.
+        rows: The conditions, in the order of the values that `evaluate` gets.
         limits: Where their bounds come from.
     """
 
@@ -27,16 +26,16 @@ class BoundsTable:
             self._lower += lower.tolist()
             self._upper += upper.tolist()
 
-    def judge(self, values: Sequence[float]) -> tuple[Fault, ...]:
-        """Returns the faults that values raise, in wire order; every value has to be strictly between its bounds.
+    def evaluate(self, values: Sequence[float]) -> list[LimitViolation]:
+        """Returns what values break; every value has to be strictly between its bounds, which NaN never is.
 
-        No NaN is. Every cycle asks this of some ninety numbers: one loop with both bounds is faster than two maps, and
-        a keyword of `zip` takes as long as five comparisons.
+        Every cycle evaluates some ninety numbers: one loop with both bounds is faster than two maps, and a keyword of
+        `zip` takes as long as five comparisons.
         """
         for lower, value, upper in zip(self._lower, values, self._upper):  # noqa: B905
             if not lower < value < upper:
-                return faults_of(self.broken(values))
-        return ()
+                return self.broken(values)
+        return []
 
     def broken(self, values: Sequence[float]) -> list[LimitViolation]:
         """Returns what values break; no values break nothing."""

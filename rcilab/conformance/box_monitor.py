@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from rcilab.conformance.condition import Condition
+from rcilab.conformance.common_conditions import BOX_TOLERANCE, CARTESIAN_POSITION
 from rcilab.conformance.limit_violation import LimitViolation
-from rcilab.conformance.tool_conditions import BOX_TOLERANCE, CARTESIAN_POSITION
-from rcilab.core.faults import Fault
+from rcilab.core.condition import Condition
 from rcilab.core.safety_box import EntryBox, SafetyBox, active_box
 
 
 class BoxMonitor:
-    """Judges where commanded joint angles bring the tool: the row "cartesian.position" alone.
+    """Checks where commanded joint angles bring the tool: the row "cartesian.position" alone.
 
     Owned by the thread that runs the cycle.
 
@@ -22,7 +21,7 @@ class BoxMonitor:
     Args:
         box: Where the tool shall stay; None, or one that is not active, bounds nothing; an `EntryBox` for a
             tool that starts outside.
-        row: What to judge by: that of the manual, or another maker's, see `JointMonitor`.
+        row: The condition; see `JointMonitor`.
     """
 
     def __init__(self, box: SafetyBox | EntryBox | None, row: Condition = CARTESIAN_POSITION) -> None:
@@ -32,19 +31,18 @@ class BoxMonitor:
 
     @property
     def is_active(self) -> bool:
-        """Whether there is a box at all: without one nobody needs the tool's position."""
+        """Whether there is a box at all: without one the tool's position is not needed."""
         return self._box is not None
 
-    def step(self, position: Sequence[float]) -> tuple[Fault, ...]:
-        """Takes the commanded tool of this cycle and returns the fault it raises, if any.
+    def step(self, position: Sequence[float]) -> list[LimitViolation]:
+        """Takes the commanded tool of this cycle and returns what it breaks.
 
         Args:
             position: Origin of the tool in the base, three numbers, [m].
         """
-        if self._box is None:
-            return ()
-        self.excess = self._box.excess(position)
-        return () if self.excess < BOX_TOLERANCE else (Fault.COMMAND_CARTESIAN_POSITION_LIMITS_VIOLATION,)
+        if self._box is not None:
+            self.excess = self._box.excess(position)
+        return self.broken()
 
     def broken(self) -> list[LimitViolation]:
         """Returns what the last step broke."""

@@ -7,11 +7,10 @@ from collections.abc import Sequence
 from typing import TypeAlias
 
 from rcilab.conformance.bounds_table import BoundsTable
-from rcilab.conformance.condition import Condition
+from rcilab.conformance.common_conditions import TOOL_CONDITIONS
 from rcilab.conformance.divided_differences import spans
 from rcilab.conformance.limit_violation import LimitViolation
-from rcilab.conformance.tool_conditions import TOOL_CONDITIONS
-from rcilab.core.faults import Fault
+from rcilab.core.condition import Condition
 from rcilab.core.limits import Limits
 from rcilab.core.safety_box import EntryBox, SafetyBox, active_box
 from rcilab.core.spatial import IDENTITY, Pose, turn_between
@@ -25,24 +24,24 @@ _NO_BOX = -1.0  # [m] Inside, when there is no box to be outside of.
 
 
 class CartesianMonitor:
-    """Judges one commanded tool pose a cycle, and the arm angle when one is commanded.
+    """Checks one commanded tool pose a cycle, and the arm angle when one is commanded.
 
     Owned by the thread that runs the cycle. Twist, acceleration and jerk are backward differences over one cycle in
-    base axes; translation and rotation are judged by their norms. An arm angle's differences are taken the short way
-    round, so that passing pi is no jump. Behind a gap they are divided differences, as those of `JointMonitor`.
+    base axes; translation and rotation are checked by their norms. An arm angle's differences are taken the short way
+    round, so that passing pi is not a jump. Behind a gap they are divided differences, as those of `JointMonitor`.
 
     Attributes:
         twist: Velocity of the tool, linear first, 6 floats, [m/s, rad/s].
         acceleration: Its backward difference, 6 floats, [m/s^2, rad/s^2].
         jerk: The acceleration's backward difference, 6 floats, [m/s^3, rad/s^3].
         arm_angle: The arm angle and its first, second and third difference, [rad, rad/s, rad/s^2, rad/s^3]; None while
-            none is commanded.
+            it is not commanded.
 
     Args:
         limits: Bounds of the tool and the arm angle.
         box: Where the tool shall stay; None, or one that is not active, bounds nothing; an `EntryBox` for a tool
-            that starts outside. The monitor starts at rest at the base; `reset` places it.
-        rows: What to judge by: those of the manual, or another maker's on the same signals, see `JointMonitor`.
+            that starts outside. The monitor starts at standstill at the base; `reset` moves it.
+        rows: The conditions, in the order of `TOOL_CONDITIONS`; see `JointMonitor`.
     """
 
     def __init__(
@@ -53,11 +52,11 @@ class CartesianMonitor:
         self.reset(IDENTITY)
 
     def reset(self, pose: Pose, psi: float | None = None) -> None:
-        """Forgets the past: the tool rests at `pose`, the elbow at `psi`.
+        """Restarts the history: the tool stands at `pose`, the elbow at `psi`.
 
         Args:
             pose: Pose of the tool in the base.
-            psi: Arm angle, [rad]; None while none is commanded.
+            psi: Arm angle, [rad]; None while it is not commanded.
         """
         self._pose = pose
         self._spacing = (1, 1)
@@ -67,15 +66,15 @@ class CartesianMonitor:
         self.arm_angle: Four | None = None if psi is None else (psi, 0.0, 0.0, 0.0)
         self._values: tuple[float, ...] = self._signals(_NO_BOX)
 
-    def step(self, pose: Pose, psi: float | None = None, cycles: int = 1) -> tuple[Fault, ...]:
-        """Takes the commanded pose of this cycle and returns the faults it raises, in wire order.
+    def step(self, pose: Pose, psi: float | None = None, cycles: int = 1) -> list[LimitViolation]:
+        """Takes the commanded pose of this cycle and returns what it breaks, in the order of the rows.
 
-        A value that is not a number breaks every condition on it. The history moves on in any case; after a fault it
-        is for the caller to `reset`.
+        A value that is not a number breaks every condition on it. The history advances in any case; after a violation
+        the caller has to `reset`.
 
         Args:
             pose: Pose of the tool in the base.
-            psi: Arm angle, [rad]; None is not judged, and the next one counts as at rest.
+            psi: Arm angle, [rad]; None is not checked, and the next one counts as at standstill.
             cycles: Cycles since the last step, 1 or more.
         """
         times = spans(cycles, self._spacing)
@@ -90,7 +89,7 @@ class CartesianMonitor:
         self._pose, self.twist, self.acceleration = pose, twist, acceleration
         self.arm_angle = _arm_angle_differences(self.arm_angle, psi, times)
         self._values = self._signals(_NO_BOX if self._box is None else self._box.excess(pose.parts[1]))
-        return self._rows.judge(self._values)
+        return self._rows.evaluate(self._values)
 
     def broken(self) -> list[LimitViolation]:
         """Returns what the last step broke."""

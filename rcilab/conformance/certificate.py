@@ -11,7 +11,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.conformance.conditions import START_POSITION_TOLERANCE
+from rcilab.conformance.common_conditions import START_POSITION_TOLERANCE
 from rcilab.conformance.start import StartState, as_start
 from rcilab.core.arrays import Unquoted
 from rcilab.core.clearance import ClearanceLimit

@@ -12,8 +12,7 @@ from rcilab.conformance.advice import advise
 from rcilab.conformance.catalogue import Phrase
 from rcilab.conformance.certificate import issue_certificate
 from rcilab.conformance.clearance_conditions import FAR, clearance_conditions
-from rcilab.conformance.condition import Condition
-from rcilab.conformance.condition_tables import condition_table
+from rcilab.conformance.common_conditions import condition_table
 from rcilab.conformance.limit_utilisation import Usage, near_bound, worst_of
 from rcilab.conformance.report import ConditionResult, Report, Violation
 from rcilab.conformance.signals import HOLD_SAMPLES as HOLD_SAMPLES
@@ -22,6 +21,7 @@ from rcilab.conformance.start import StartState, as_start
 from rcilab.core.arrays import Array, described
 from rcilab.core.clearance import STANDARD_DISTANCE, ClearanceLimit
 from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.condition import Condition
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.limits import Limits
 from rcilab.core.safety_box import SafetyBox, active_box

@@ -12,8 +12,8 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from rcilab.conformance.condition import AnyLimits, Bounds, Condition, Necessity
 from rcilab.core.clearance import STANDARD_DISTANCE, ClearanceLimit
+from rcilab.core.condition import AnyLimits, Bounds, Condition, Necessity
 
 OWN = "rcilab's own, not the controller's; capsules of the URDF"
 FAR = 0.1  # [m]

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 from rcilab.conformance.advice import amount, with_degrees
 from rcilab.conformance.catalogue import Language, Phrase, load_catalogue, say
-from rcilab.conformance.condition import Condition
 from rcilab.conformance.report import LISTED, ConditionResult, Report, Violation
+from rcilab.core.condition import Condition
 from rcilab.i18n.units import Units
 
 if TYPE_CHECKING:

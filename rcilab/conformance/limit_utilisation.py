@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rcilab.conformance.condition import Condition
 from rcilab.core.arrays import Array, readonly_copy
+from rcilab.core.condition import Condition
 
 FREE = 0.8
 """Part of a joint's range, or of the way to a face of the safety box, that uses nothing of it. A choice."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, NamedTuple
 
-from rcilab.conformance.condition import Condition
-from rcilab.core.faults import Fault
+from rcilab.core.condition import Condition
+from rcilab.core.fault import FaultCode
 from rcilab.i18n.translator import Remark
 
 if TYPE_CHECKING:
@@ -61,6 +61,6 @@ def describe_breaches(breaches: Iterable[LimitViolation]) -> Remark:
     return Remark.all(breach.remark for breach in breaches)
 
 
-def faults_of(breaches: Iterable[LimitViolation]) -> tuple[Fault, ...]:
-    """Returns the faults of the RCI that they raise, in wire order and once each."""
-    return tuple(sorted({fault for row, *_ in breaches if isinstance(fault := row.fault, Fault)}))
+def faults_of(breaches: Iterable[LimitViolation]) -> tuple[FaultCode, ...]:
+    """Returns the faults that they raise, by number and once each."""
+    return tuple(sorted({row.fault for row, *_ in breaches if row.fault is not None}))

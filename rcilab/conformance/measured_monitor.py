@@ -6,11 +6,11 @@ import math
 from collections.abc import Sequence
 
 from rcilab.conformance.bounds_table import BoundsTable
+from rcilab.conformance.common_conditions import ACCELERATION_CUTOFF, MEASURED_CONDITIONS
 from rcilab.conformance.limit_violation import LimitViolation
-from rcilab.conformance.measured_conditions import ACCELERATION_CUTOFF, MEASURED_CONDITIONS
 from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.condition import Condition
 from rcilab.core.errors import InvalidValueError
-from rcilab.core.faults import Fault
 from rcilab.core.limits import Limits
 from rcilab.core.safety_box import EntryBox, SafetyBox, active_box
 
@@ -19,10 +19,10 @@ _SHARE = CYCLE_TIME / (CYCLE_TIME + 1.0 / (2.0 * math.pi * ACCELERATION_CUTOFF))
 
 
 class MeasuredMonitor:
-    """Judges what the sensors say of an arm that moves, once a cycle.
+    """Checks what the sensors of a moving arm measure, once a cycle.
 
     Owned by the thread that runs the cycle. The bounds are the commanded ones with the allowances of
-    `measured_conditions`. Accelerations are low-passed differences of the measured velocities; the first step after a
+    `common_conditions`. Accelerations are low-passed differences of the measured velocities; the first step after a
     `reset` has none.
 
     Attributes:
@@ -33,21 +33,27 @@ class MeasuredMonitor:
         limits: Bounds of the arm.
         box: Where the tool shall stay; None, or one that is not active, bounds nothing; an `EntryBox` for a
             tool that starts outside.
+        rows: The conditions, in the order of `MEASURED_CONDITIONS`; see `JointMonitor`.
     """
 
-    def __init__(self, limits: Limits, box: SafetyBox | EntryBox | None = None) -> None:
+    def __init__(
+        self,
+        limits: Limits,
+        box: SafetyBox | EntryBox | None = None,
+        rows: Sequence[Condition] = MEASURED_CONDITIONS,
+    ) -> None:
         self._n = len(limits.joint.velocity)
         self._box = box if isinstance(box, EntryBox) else active_box(box)
-        self._rows = BoundsTable(MEASURED_CONDITIONS, limits)
+        self._rows = BoundsTable(rows, limits)
         self.reset([0.0] * self._n)
 
     @property
     def has_box(self) -> bool:
-        """Whether there is a box at all: without one nobody needs the tool's position."""
+        """Whether there is a box at all: without one the tool's position is not needed."""
         return self._box is not None
 
     def reset(self, q: Sequence[float]) -> None:
-        """Forgets the past: the arm is at `q`, and what it does there shows in the next step.
+        """Restarts the history: the arm is at `q`, and its motion shows in the next step.
 
         Args:
             q: Measured joint angles, n numbers, [rad].
@@ -71,8 +77,8 @@ class MeasuredMonitor:
         position: Sequence[float],
         twist: Sequence[float] | None,
         psi: float | None,
-    ) -> tuple[Fault, ...]:
-        """Takes the measurements of this cycle and returns the faults they raise, in wire order.
+    ) -> list[LimitViolation]:
+        """Takes the measurements of this cycle and returns what they break, in the order of the rows.
 
         Args:
             q: Joint angles, n numbers, [rad].
@@ -80,7 +86,7 @@ class MeasuredMonitor:
             position: The tool in the base, 3 numbers, [m].
             twist: Velocity of the tool in base axes, linear first, 6 numbers, [m/s, rad/s]; None in motions of the
                 joints, which may move the tool as fast as they like (manual 4.1).
-            psi: Arm angle, [rad]; None is not judged.
+            psi: Arm angle, [rad]; None is not checked.
         """
         self.acceleration = _low_passed(self.acceleration, dq, self._dq)
         self.tool_acceleration = _low_passed(self.tool_acceleration, twist, self._twist)
@@ -93,7 +99,7 @@ class MeasuredMonitor:
         velocity = (0.0, 0.0) if twist is None else _norms(twist)
         acceleration = _norms(self.tool_acceleration)
         self._values = [*q, outside, speed, *dq, *velocity, *self.acceleration, *acceleration]
-        return self._rows.judge(self._values)
+        return self._rows.evaluate(self._values)
 
     def broken(self) -> list[LimitViolation]:
         """Returns what the last step broke."""
@@ -101,7 +107,7 @@ class MeasuredMonitor:
 
 
 def _low_passed(state: list[float], new: Sequence[float] | None, old: Sequence[float] | None) -> list[float]:
-    """Returns the filtered difference one cycle later; from rest when there is nothing to take a difference of."""
+    """Returns the filtered difference one cycle later; zero when there is nothing to take a difference of."""
     if new is None or old is None:
         return [0.0] * len(state)
     triples = zip(state, new, old)  # noqa: B905  # As in `BoundsTable`.

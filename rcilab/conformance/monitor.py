@@ -6,17 +6,16 @@ from collections.abc import Sequence
 from operator import sub
 
 from rcilab.conformance.bounds_table import BoundsTable
-from rcilab.conformance.condition import Condition
-from rcilab.conformance.conditions import JOINT_CONDITIONS
+from rcilab.conformance.common_conditions import JOINT_CONDITIONS
 from rcilab.conformance.divided_differences import EVEN, spans
 from rcilab.conformance.limit_violation import LimitViolation
+from rcilab.core.condition import Condition
 from rcilab.core.errors import InvalidValueError
-from rcilab.core.faults import Fault
 from rcilab.core.limits import JointLimits
 
 
 class JointMonitor:
-    """Judges one commanded position a cycle by the same rows as `check`, with the same arithmetic.
+    """Checks one commanded position a cycle by the same rows as `check`, with the same arithmetic.
 
     Owned by the thread that runs the cycle. It allocates four short lists.
 
@@ -32,9 +31,9 @@ class JointMonitor:
         is_even: Whether the last differences are over single cycles, with no gap in their reach.
 
     Args:
-        limits: Bounds of the joints. The monitor starts at rest at zero; `reset` places it.
-        rows: What to judge by: those of the manual, or another maker's on the same four signals. Errors of other makers
-            are found in `broken`; `step` returns faults of the RCI.
+        limits: Bounds of the joints. The monitor starts at standstill at zero; `reset` moves it.
+        rows: The conditions on position, velocity, acceleration and jerk. The common ones raise no fault; those of a
+            maker's table do, see `faults_of`.
     """
 
     def __init__(self, limits: JointLimits, rows: Sequence[Condition] = JOINT_CONDITIONS) -> None:
@@ -43,11 +42,11 @@ class JointMonitor:
         self.reset([0.0] * self._n)
 
     def reset(self, q: Sequence[float], dq: Sequence[float] | None = None, ddq: Sequence[float] | None = None) -> None:
-        """Forgets the past: the arm stands at `q`, or comes along with given backward differences.
+        """Restarts the history: the arm stands at `q`, or moves with the given backward differences.
 
         Args:
             q: Joint angles, n numbers, [rad].
-            dq: First backward difference, n numbers, [rad/s]; None is rest.
+            dq: First backward difference, n numbers, [rad/s]; None is standstill.
             ddq: Second backward difference, n numbers, [rad/s^2]; None is zero.
 
         Raises:
@@ -60,11 +59,11 @@ class JointMonitor:
         self.is_even = True
         self._spacing = (1, 1)
 
-    def step(self, q_c: Sequence[float], cycles: int = 1) -> tuple[Fault, ...]:
-        """Takes the commanded angles of this cycle and returns the faults they raise, in wire order.
+    def step(self, q_c: Sequence[float], cycles: int = 1) -> list[LimitViolation]:
+        """Takes the commanded angles of this cycle and returns what they break, in the order of the rows.
 
-        A value that is not a number breaks every condition. The history moves on in any case; after a fault it is for
-        the caller to `reset`.
+        A value that is not a number breaks every condition. The history advances in any case; after a violation the
+        caller has to `reset`.
 
         Args:
             q_c: Commanded joint angles, at least n numbers (a 6-axis arm ignores the wire's seventh), [rad].
@@ -78,7 +77,7 @@ class JointMonitor:
         ddq = [change / second for change in map(sub, dq, self.dq)]
         jerk = [change / third for change in map(sub, ddq, self.ddq)]
         self.q, self.dq, self.ddq, self.jerk = q, dq, ddq, jerk
-        return self._rows.judge([*q, *dq, *ddq, *jerk])
+        return self._rows.evaluate([*q, *dq, *ddq, *jerk])
 
     def broken(self) -> list[LimitViolation]:
         """Returns what the last step broke."""

@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike
 from rcilab.conformance.box_monitor import BoxMonitor
 from rcilab.conformance.cartesian_monitor import CartesianMonitor
 from rcilab.conformance.clearance_monitor import ClearanceMonitor
-from rcilab.conformance.condition import Condition
-from rcilab.conformance.condition_tables import condition_table
+from rcilab.conformance.common_conditions import condition_table
 from rcilab.conformance.limit_violation import LimitViolation
 from rcilab.conformance.measured_monitor import MeasuredMonitor
 from rcilab.conformance.monitor import JointMonitor
@@ -25,6 +24,7 @@ from rcilab.conformance.torque_monitor import TorqueMonitor
 from rcilab.core.arrays import Array, JointVector, as_vector, described
 from rcilab.core.clearance import ClearanceLimit
 from rcilab.core.command import CartesianPosition, Command, JointPosition, JointTorque
+from rcilab.core.condition import Condition
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.safety_box import SafetyBox, active_box, box_from
 from rcilab.core.spatial import IDENTITY, Pose

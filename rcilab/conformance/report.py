@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING
 from rcilab.conformance.advice import amount, share, with_degrees
 from rcilab.conformance.catalogue import Language, Phrase
 from rcilab.conformance.certificate import Certificate
-from rcilab.conformance.condition import AnyFault, Condition, Necessity
 from rcilab.conformance.limit_utilisation import Usage
 from rcilab.conformance.start import StartState
+from rcilab.core.condition import Condition, Necessity
 from rcilab.core.errors import ConformanceError
+from rcilab.core.fault import FaultCode
 from rcilab.motion.motion import Motion
 
 if TYPE_CHECKING:
@@ -67,7 +68,7 @@ class ConditionResult:
         return self.condition.necessity
 
     @property
-    def fault(self) -> AnyFault | None:
+    def fault(self) -> FaultCode | None:
         """What the controller raises when it is broken; None for what it only recommends, or does not know of."""
         return self.condition.fault
 
@@ -156,7 +157,7 @@ class Violation:
     """Between whom the worst distance is; None for anything that is no distance."""
 
     @property
-    def fault(self) -> AnyFault | None:
+    def fault(self) -> FaultCode | None:
         """What the controller raises; None for what it only recommends, or does not know of."""
         return self.condition.fault
 

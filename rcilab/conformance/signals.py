@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rcilab.conformance.clearance_conditions import clearance_conditions
-from rcilab.conformance.condition import Condition
-from rcilab.conformance.conditions import START_POSITION_TOLERANCE
+from rcilab.conformance.common_conditions import START_POSITION_TOLERANCE
 from rcilab.conformance.standstill import beyond_a_cycle
 from rcilab.conformance.start import StartState
 from rcilab.conformance.tool_signals import ToolSignals
 from rcilab.core.arrays import Array
 from rcilab.core.clearance import ClearanceLimit
 from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.condition import Condition
 from rcilab.core.safety_box import EntryBox, SafetyBox, box_from
 from rcilab.core.state import Mode
 from rcilab.model.robot_model import RobotModel

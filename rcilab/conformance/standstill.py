@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from rcilab.conformance.condition import AnyLimits, Condition, all_limits, joint_limits
 from rcilab.core.arrays import Array
 from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.condition import AnyLimits, Condition, all_limits, joint_limits
 
 
 def unresolved(condition: Condition, limits: AnyLimits, cycles: int = 1) -> Array:

@@ -6,9 +6,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from rcilab.conformance.condition import Condition
 from rcilab.conformance.limit_violation import LimitViolation
 from rcilab.conformance.standstill import beyond_a_cycle
+from rcilab.core.condition import Condition
 from rcilab.core.limits import Limits
 
 

@@ -11,11 +11,11 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from rcilab.conformance.catalogue import Language
-from rcilab.conformance.condition import Condition
-from rcilab.conformance.conditions import START_POSITION_TOLERANCE
+from rcilab.conformance.common_conditions import START_POSITION_TOLERANCE
 from rcilab.conformance.report import ConditionResult, Report
 from rcilab.core.arrays import as_number
 from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.condition import Condition
 from rcilab.core.errors import InvalidValueError
 from rcilab.motion.motion import Motion
 

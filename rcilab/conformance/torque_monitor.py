@@ -5,17 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rcilab.conformance.bounds_table import BoundsTable
-from rcilab.conformance.condition import Condition
+from rcilab.conformance.common_conditions import TORQUE_CONDITIONS
 from rcilab.conformance.limit_violation import LimitViolation
-from rcilab.conformance.tool_conditions import TORQUE_CONDITIONS
 from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.condition import Condition
 from rcilab.core.errors import InvalidValueError
-from rcilab.core.faults import Fault
 from rcilab.core.limits import JointLimits
 
 
 class TorqueMonitor:
-    """Judges one commanded torque a cycle: its range, and its backward difference over one cycle.
+    """Checks one commanded torque a cycle: its range, and its backward difference over one cycle.
 
     Owned by the thread that runs the cycle. Commanded torques come on top of gravity and friction, which the
     controller compensates.
@@ -26,7 +25,7 @@ class TorqueMonitor:
 
     Args:
         limits: Bounds of the joints. The monitor starts from no torque.
-        rows: What to judge by, rate before range: those of the manual, or another maker's, see `JointMonitor`.
+        rows: The conditions, rate before range; see `JointMonitor`.
     """
 
     def __init__(self, limits: JointLimits, rows: Sequence[Condition] = TORQUE_CONDITIONS) -> None:
@@ -35,7 +34,7 @@ class TorqueMonitor:
         self.reset([0.0] * self._n)
 
     def reset(self, tau: Sequence[float]) -> None:
-        """Forgets the past: these torques have been commanded for a while.
+        """Restarts the history: these torques have been commanded before.
 
         Args:
             tau: Joint torques, n numbers, [N m].
@@ -48,10 +47,10 @@ class TorqueMonitor:
         self.tau = [float(value) for value in tau]
         self.dtau = [0.0] * self._n
 
-    def step(self, tau: Sequence[float], cycles: int = 1) -> tuple[Fault, ...]:
-        """Takes the commanded torques of this cycle and returns the faults they raise, in wire order.
+    def step(self, tau: Sequence[float], cycles: int = 1) -> list[LimitViolation]:
+        """Takes the commanded torques of this cycle and returns what they break, in the order of the rows.
 
-        A value that is not a number breaks both conditions. The history moves on in any case.
+        A value that is not a number breaks both conditions. The history advances in any case.
 
         Args:
             tau: Joint torques, at least n numbers (a 6-axis arm ignores the wire's seventh), [N m].
@@ -61,7 +60,7 @@ class TorqueMonitor:
         new = list(tau[: self._n])
         self.dtau = [(value - old) / h for value, old in zip(new, self.tau, strict=True)]
         self.tau = new
-        return self._rows.judge([*self.dtau, *new])
+        return self._rows.evaluate([*self.dtau, *new])
 
     def broken(self) -> list[LimitViolation]:
         """Returns what the last step broke."""

@@ -12,7 +12,7 @@ from rcilab.core.state import Mode, require_mode
 from rcilab.execution.start_pose_check import describe_start_mismatch, require_motion
 
 if TYPE_CHECKING:
-    from rcilab.conformance import Certificate
+    from rcilab.conformance.certificate import Certificate
     from rcilab.core.safety_box import SafetyBox
     from rcilab.model.robot_model import RobotModel
     from rcilab.motion import Motion

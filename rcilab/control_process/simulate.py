@@ -36,9 +36,10 @@ def simulate(
         ModelError: The arm does not speak the RCI.
         ConnectionLostError: The virtual controller did not start; the message carries what it said.
     """
-    from rcilab.model.robot_model import load_model, require_model, require_rci
+    from rcilab.makers.maker import require_simulator
+    from rcilab.model.robot_model import load_model, require_model
 
-    require_rci(require_model(model))
+    require_simulator(require_model(model))
     require_plant(plant)
     controller = start_controller(model.name, plant, lockstep)
     try:

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from rcilab.core.arrays import Array, JointVector
 from rcilab.core.cycle_log import cycle_dtype
-from rcilab.core.faults import Fault
 from rcilab.core.spatial import Pose
 from rcilab.core.state import ControllerMode, Mode, RobotMode
 from rcilab.makers.rokae.driver.configuration import RobotConfiguration
+from rcilab.makers.rokae.faults import Fault
 
 __all__ = ["MESSAGES", "PHASES", "Incident", "Lateness", "Phase", "SupervisorStatus", "cycle_dtype"]
 

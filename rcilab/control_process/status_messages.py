@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from rcilab.core.errors import CertificateError, ConnectionLostError, ControlError, InvalidValueError, RcilabError
-from rcilab.core.faults import name_faults
+from rcilab.core.fault import name_faults
 from rcilab.i18n.error_messages import tell
 from rcilab.i18n.translator import Finished, Message, message
 

@@ -13,10 +13,10 @@ from rcilab.control_process.ring import RingReader
 from rcilab.control_process.snapshot import Snapshot, read_snapshot
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError
-from rcilab.core.faults import faults_from_bits
 from rcilab.core.spatial import Pose
 from rcilab.core.state import ControllerMode, RobotMode
 from rcilab.makers.rokae.driver.commands import SIGNALS
+from rcilab.makers.rokae.faults import faults_from_bits
 
 
 class StatusReader:

@@ -55,7 +55,7 @@ from rcilab.makers.rokae.driver.identify import dh_lengths
 from rcilab.motion.speed_scaling import SpeedScaledMotion, require_pace
 
 if TYPE_CHECKING:
-    from rcilab.conformance import Certificate
+    from rcilab.conformance.certificate import Certificate
     from rcilab.model.robot_model import RobotModel
     from rcilab.motion import Motion
 
@@ -97,9 +97,10 @@ class Supervisor(Closeable):
         auto_restart: bool = True,
         setup: RobotConfiguration | None = None,
     ) -> None:
-        from rcilab.model.robot_model import require_model, require_rci
+        from rcilab.makers.maker import require_driver
+        from rcilab.model.robot_model import require_model
 
-        self.model = require_rci(require_model(model))
+        self.model = require_driver(require_model(model))
         require_plant(plant)
         self._target = VIRTUAL if target == VIRTUAL else str(parse_address(target))
         if setup is None:

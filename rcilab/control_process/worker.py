@@ -42,7 +42,7 @@ from rcilab.control_process.status_writer import StatusWriter
 from rcilab.control_process.stop_conditions import StopConditions
 from rcilab.core.arrays import JointVector
 from rcilab.core.errors import ConnectionLostError, ControlError, InvalidValueError, ModelError, RcilabError, UsageError
-from rcilab.core.faults import name_faults
+from rcilab.core.fault import name_faults
 from rcilab.core.spatial import Pose, as_pose
 from rcilab.core.state import RobotMode, RobotState
 from rcilab.execution.guiding import HandGuide

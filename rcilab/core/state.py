@@ -14,7 +14,7 @@ from typing import Any, Literal, TypeAlias, get_args
 
 from rcilab.core.arrays import Array, JointVector, described
 from rcilab.core.errors import InvalidValueError
-from rcilab.core.faults import Fault, name_faults
+from rcilab.core.fault import FaultCode, name_faults
 from rcilab.core.spatial import Pose
 
 Mode: TypeAlias = Literal["joint_position", "joint_impedance", "cartesian_position", "cartesian_impedance", "torque"]
@@ -108,7 +108,7 @@ class RobotState:
     """Motor torques, motor side of the gear, [N m]."""
     motor_tau_filtered: JointVector
     """Filtered motor torques, [N m]."""
-    faults: tuple[Fault, ...]
+    faults: tuple[FaultCode, ...]
     """The error bits that are set, in wire order."""
     success_rate: float
     """Share of the last commands that arrived in time, 0 to 1."""

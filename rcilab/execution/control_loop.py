@@ -22,7 +22,6 @@ from rcilab.core.errors import (
     PlanningError,
     RcilabError,
 )
-from rcilab.core.faults import Fault
 from rcilab.core.limits import Limits
 from rcilab.core.state import ControllerMode, RobotMode, RobotState
 from rcilab.execution.call_times import CallTimes
@@ -34,6 +33,7 @@ from rcilab.execution.stop_planner import CartesianStopPlanner, JointStopPlanner
 from rcilab.makers.rokae.driver.commands import RciCommands
 from rcilab.makers.rokae.driver.connection import RciConnection
 from rcilab.makers.rokae.driver.refusal import Refusal
+from rcilab.makers.rokae.faults import Fault
 from rcilab.makers.rokae.wire import SafetyStop, StartMotionMode, build_command
 
 if TYPE_CHECKING:
@@ -428,7 +428,7 @@ class ControlLoop:
         if Fault.INSTABILITY_DETECTION in state.faults:
             late = self._calls.describe()
         message = describe_faults(
-            state.faults,
+            (fault for fault in state.faults if isinstance(fault, Fault)),
             record,
             t,
             self._model,

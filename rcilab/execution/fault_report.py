@@ -9,16 +9,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rcilab.conformance import CartesianMonitor, JointMonitor, LimitViolation, TorqueMonitor
+from rcilab.conformance.cartesian_monitor import CartesianMonitor
+from rcilab.conformance.limit_violation import LimitViolation
+from rcilab.conformance.monitor import JointMonitor
+from rcilab.conformance.torque_monitor import TorqueMonitor
 from rcilab.core.arrays import Array, JointVector
 from rcilab.core.clock import CYCLE_TIME
-from rcilab.core.faults import BOX_FAULTS, RANGE_FAULTS, Fault, name_faults
+from rcilab.core.fault import name_faults
 from rcilab.core.limits import Limits
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.core.state import ControllerMode
 from rcilab.execution.measured_report import YIELDING_MODES, describe_measured, describe_passed_face
 from rcilab.execution.rotation import nine
+from rcilab.makers.rokae.conditions import RCI_JOINT_CONDITIONS, RCI_TOOL_CONDITIONS, RCI_TORQUE_CONDITIONS
+from rcilab.makers.rokae.faults import BOX_FAULTS, RANGE_FAULTS, Fault
 
 if TYPE_CHECKING:
     from rcilab.model.robot_model import RobotModel
@@ -151,7 +156,7 @@ def _judge_joints(q: Array, psi: Array, limits: Limits) -> Iterator[tuple[int, l
     if len(q) <= _HISTORY:
         return
     dq = np.diff(q[:_HISTORY], axis=0) / CYCLE_TIME
-    monitor = JointMonitor(limits.joint)
+    monitor = JointMonitor(limits.joint, RCI_JOINT_CONDITIONS)
     monitor.reset(q[2].tolist(), dq[1].tolist(), ((dq[1] - dq[0]) / CYCLE_TIME).tolist())
     for place in range(_HISTORY, len(q)):
         monitor.step(q[place].tolist())
@@ -159,7 +164,7 @@ def _judge_joints(q: Array, psi: Array, limits: Limits) -> Iterator[tuple[int, l
 
 
 def _judge_poses(T: Array, psi: Array, limits: Limits) -> Iterator[tuple[int, list[LimitViolation]]]:
-    monitor = CartesianMonitor(limits)
+    monitor = CartesianMonitor(limits, rows=RCI_TOOL_CONDITIONS)
     poses = [_pose(matrix) for matrix in T]
     angles = [angle if math.isfinite(angle) else None for angle in psi.tolist()]
     monitor.reset(poses[0], angles[0])
@@ -170,7 +175,7 @@ def _judge_poses(T: Array, psi: Array, limits: Limits) -> Iterator[tuple[int, li
 
 
 def _judge_torques(tau: Array, psi: Array, limits: Limits) -> Iterator[tuple[int, list[LimitViolation]]]:
-    monitor = TorqueMonitor(limits.joint)
+    monitor = TorqueMonitor(limits.joint, RCI_TORQUE_CONDITIONS)
     monitor.reset(tau[0].tolist())
     for place in range(1, len(tau)):
         monitor.step(tau[place].tolist())

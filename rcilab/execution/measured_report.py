@@ -9,14 +9,16 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rcilab.conformance import LimitViolation, MeasuredMonitor
-from rcilab.conformance.measured_conditions import yielding_limits
+from rcilab.conformance.common_conditions import yielding_limits
+from rcilab.conformance.limit_violation import LimitViolation
+from rcilab.conformance.measured_monitor import MeasuredMonitor
 from rcilab.core.arrays import Array, JointVector
 from rcilab.core.errors import KinematicsError
-from rcilab.core.faults import BOX_FAULTS, RANGE_FAULTS, Fault
 from rcilab.core.limits import Limits
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.state import ControllerMode
+from rcilab.makers.rokae.conditions import RCI_MEASURED_CONDITIONS
+from rcilab.makers.rokae.faults import BOX_FAULTS, RANGE_FAULTS, Fault
 
 if TYPE_CHECKING:
     from rcilab.model.robot_model import RobotModel
@@ -92,7 +94,9 @@ def describe_passed_face(faults: Iterable[Fault], record: NDArray[np.void], box:
 
 
 def _judge(record: NDArray[np.void], model: RobotModel, limits: Limits, mode: ControllerMode) -> _Measured:
-    monitor = MeasuredMonitor(yielding_limits(limits) if mode in YIELDING_MODES else limits)
+    monitor = MeasuredMonitor(
+        yielding_limits(limits) if mode in YIELDING_MODES else limits, rows=RCI_MEASURED_CONDITIONS
+    )
     monitor.reset(record["q"][0].tolist())
     ddq, breaches = np.zeros((len(record), model.n)), []
     for place, (q, dq) in enumerate(zip(record["q"], record["dq"], strict=True)):

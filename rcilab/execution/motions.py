@@ -26,7 +26,7 @@ from rcilab.motion.speed_scaling import require_pace
 from rcilab.recording.run import Run
 
 if TYPE_CHECKING:
-    from rcilab.conformance import Certificate
+    from rcilab.conformance.certificate import Certificate
     from rcilab.core.safety_box import SafetyBox
     from rcilab.model.robot_model import RobotModel
     from rcilab.motion import Motion
@@ -179,7 +179,7 @@ class Motions(RciCommands):
         require_mode(mode)
         filters: list[CommandFilter] = [] if cut_off is None else [LowPass(cut_off)]
         if rate_limit is not None:
-            from rcilab.conformance import cartesian_limits
+            from rcilab.makers.rokae.limit_tables import cartesian_limits
 
             filters.append(RateLimiter(cartesian_limits(self.model.limits, rate_limit)))
         if not callable(callback):
@@ -284,7 +284,7 @@ class Motions(RciCommands):
         """Returns a fresh state."""
 
     def _require_allowed(self, motion: Motion, state: RobotState, mode: Mode = "joint_position") -> None:
-        from rcilab.conformance import check
+        from rcilab.conformance.check import check
 
         check(motion, self.model, start=state.q_c, box=self.safety_box, mode=mode).require()
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.command import CartesianPosition, Command, JointPosition, JointTorque
 from rcilab.core.cycle_log import OTHER_STATE_FIELDS, STATE_FIELDS, cycle_dtype
-from rcilab.core.faults import Fault
+from rcilab.core.fault import FaultCode
 from rcilab.core.state import RobotState
 
 RECORD_TIME = 60.0  # [s] of cycles that a recorder keeps unless told otherwise; a choice.
@@ -261,7 +261,7 @@ def _is_alike(state: RobotState, other: RobotState) -> bool:
     )
 
 
-def _bits(faults: tuple[Fault, ...]) -> int:
+def _bits(faults: tuple[FaultCode, ...]) -> int:
     bits = 0
     for fault in faults:
         bits |= 1 << fault

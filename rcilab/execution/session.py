@@ -85,9 +85,10 @@ def open_session(
     place = parse_address(address)
     require_timeout(timeout)
     if model is not None:
-        from rcilab.model.robot_model import require_model, require_rci
+        from rcilab.makers.maker import require_driver
+        from rcilab.model.robot_model import require_model
 
-        require_rci(require_model(model))
+        require_driver(require_model(model))
     transport = SocketTransport(place, STATE_SIZE, timeout)
     try:
         link = RciConnection(transport, 7 if model is None else model.n, str(place), timeout)

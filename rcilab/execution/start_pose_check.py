@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from rcilab.conformance.conditions import START_POSITION_TOLERANCE
+from rcilab.conformance.common_conditions import START_POSITION_TOLERANCE
 from rcilab.core.arrays import JointVector
 from rcilab.core.errors import InvalidValueError
 
@@ -17,7 +17,8 @@ def require_motion(motion: object, certificate: object) -> None:
     Raises:
         InvalidValueError: It is something else, such as a report; the message says what to pass.
     """
-    from rcilab.conformance import Certificate, Report
+    from rcilab.conformance.certificate import Certificate
+    from rcilab.conformance.report import Report
     from rcilab.motion import Motion
 
     if not isinstance(motion, Motion):

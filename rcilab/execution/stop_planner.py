@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from rcilab.conformance import CartesianMonitor, JointMonitor, LimitViolation
+from rcilab.conformance.cartesian_monitor import CartesianMonitor
+from rcilab.conformance.limit_violation import LimitViolation
+from rcilab.conformance.monitor import JointMonitor
 from rcilab.core.arrays import Array, JointVector
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.command import CartesianPosition, Command, JointPosition, JointTorque
 from rcilab.core.errors import SingularError
-from rcilab.core.faults import Fault
 from rcilab.core.limits import JointLimits, Limits
 from rcilab.core.spatial import Pose
 from rcilab.core.state import RobotState
@@ -239,11 +240,11 @@ class TorqueStopPlanner:
 
 
 def _first_breach(
-    monitor: JointMonitor | CartesianMonitor, repeat: Callable[[], tuple[Fault, ...]]
+    monitor: JointMonitor | CartesianMonitor, repeat: Callable[[], list[LimitViolation]]
 ) -> LimitViolation | None:
     """Returns what the first broken cycle of as many repetitions breaks as a third difference looks back to."""
     for _ in range(_HISTORY):
-        breaches = [breach for breach in monitor.broken() if breach.condition.order > 0] if repeat() else []
+        breaches = [breach for breach in repeat() if breach.condition.order > 0]
         if breaches:  # Where a joint or the tool is, is no motion.
             return breaches[0]
     return None

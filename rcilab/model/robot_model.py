@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from rcilab.core.arrays import JointVector, as_path, as_rows, as_vector, described
 from rcilab.core.clearance import STANDARD_DISTANCE, ClearanceLimit
-from rcilab.core.errors import InvalidValueError, KinematicsError, ModelError
+from rcilab.core.errors import InvalidValueError, KinematicsError
 from rcilab.core.limits import Limits
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import IDENTITY, Pose
@@ -23,7 +23,7 @@ from rcilab.model.kinematics.frames import Frame
 from rcilab.model.kinematics.reaching_arm import ReachingArm
 from rcilab.model.kinematics.singularity import Manipulability, ManipulabilityPath, dexterity, dexterity_path
 from rcilab.model.kinematics.workspace import Workspace, sample_workspace
-from rcilab.robots import RCI_ROBOT_NAMES, RobotDescription, describe_robot
+from rcilab.robots import RobotDescription, describe_robot
 
 if TYPE_CHECKING:
     from rcilab.model.dynamics.friction import JointFriction
@@ -32,11 +32,11 @@ if TYPE_CHECKING:
 
 _SOFT_LIMIT = "soft limit that was set (SetJointLimit, RCI manual 3.1.15)"
 
-__all__ = ["RobotModel", "load_model", "require_model", "require_rci"]
+__all__ = ["RobotModel", "load_model", "require_model"]
 
 
 def load_model(name: str, *, tool: Pose | None = None, load: Payload | None = None) -> RobotModel:
-    """Returns the model of a robot by name, in any case: xMatePro3, xMatePro7, xMate3, xMate7 or Panda.
+    """Returns the model of a robot by name, in any case; `rcilab.robots.ROBOT_NAMES` lists the names.
 
     Args:
         name: Name of the robot.
@@ -61,20 +61,6 @@ def require_model(model: object) -> RobotModel:
     if isinstance(model, str):
         raise InvalidValueError("model", model, f"is a name; use load_model({model!r})")
     raise InvalidValueError("model", described(model), "is no robot model; load_model makes one")
-
-
-def require_rci(model: RobotModel) -> RobotModel:
-    """Returns `model` if the arm speaks the RCI: for borders behind which it is driven or simulated.
-
-    Raises:
-        ModelError: It speaks another interface; the message says what can be done with it.
-    """
-    if model.description.interface == "RCI":
-        return model
-    raise ModelError(
-        f"{model.name} is driven by Franka's own interface, not by the RCI: plan for it, check and draw its motions, "
-        f"but simulate and drive one of {', '.join(RCI_ROBOT_NAMES)}"
-    )
 
 
 class RobotModel(ReachingArm):

@@ -14,8 +14,9 @@ from rcilab.app.fault_lab.private_arm import PrivateArm
 from rcilab.app.fault_lab.table import FAULTS
 from rcilab.control_process.status_messages import tell_error
 from rcilab.core.errors import RcilabError
-from rcilab.core.faults import Fault, name_faults
+from rcilab.core.fault import name_faults
 from rcilab.i18n.translator import Text, message
+from rcilab.makers.rokae.faults import Fault
 from rcilab.notebook.exhibit_plot import draw_exhibit
 from rcilab.notebook.flight_recorder import record_html
 from rcilab.notebook.long_task import LongTask

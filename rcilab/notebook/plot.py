@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rcilab.conformance.check import HOLD_SAMPLES, check
-from rcilab.conformance.condition import Condition
-from rcilab.conformance.conditions import CYCLE_CONDITIONS
+from rcilab.conformance.common_conditions import JOINT_CONDITIONS
 from rcilab.core.arrays import Array, as_vector
 from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.condition import Condition
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.limits import JointLimits
 from rcilab.i18n.localized_text import chosen_language
@@ -140,7 +140,7 @@ def _panels(motion: Motion, limits: JointLimits, run: Run | None) -> list[_Panel
             *condition.bounds(limits),
             None if run is None else recorded_curves(run.t, run.q, run.q_c, run.dq, QUANTITIES[condition.order]).values,
         )
-        for condition in CYCLE_CONDITIONS
+        for condition in JOINT_CONDITIONS
     ]
 
 

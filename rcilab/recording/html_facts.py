@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rcilab.core.faults import name_faults
+from rcilab.core.fault import name_faults
 
 if TYPE_CHECKING:
     from rcilab.i18n.translator import Text

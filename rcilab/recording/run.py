@@ -14,16 +14,18 @@ from numpy.typing import NDArray
 from rcilab.core.arrays import Array, JointPath
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import UsageError, plain_text
-from rcilab.core.faults import FAULT_COUNT, Fault, name_faults
+from rcilab.core.fault import FaultCode, name_faults
 from rcilab.i18n.units import USUAL, Units
 from rcilab.recording.setup import Setup
 from rcilab.recording.tracking import Tracking, compute_tracking, find_stop, last_compared
+from rcilab.robots import describe_robot
 
 if TYPE_CHECKING:
-    from rcilab.conformance import Report
+    from rcilab.conformance.report import Report
     from rcilab.model.robot_model import RobotModel
     from rcilab.motion import Motion
 
+_FIRST_ARM = "xMatePro7"  # A recording without a model is of an arm whose controller has the same faults.
 _LONGEST_DELAY = 64  # [cycles] between a command and the state that shows it; more is no play-out buffer any more.
 
 
@@ -148,10 +150,11 @@ class Run:
         return self.cycles["success_rate"]
 
     @property
-    def faults(self) -> tuple[Fault, ...]:
+    def faults(self) -> tuple[FaultCode, ...]:
         """Every fault that was seen, in wire order."""
         bits = int(np.bitwise_or.reduce(self.cycles["faults"])) if len(self.cycles) else 0
-        return tuple(Fault(place) for place in range(FAULT_COUNT) if bits >> place & 1)
+        arm = describe_robot(_FIRST_ARM) if self.model is None else self.model.description
+        return tuple(fault for fault in arm.faults if bits >> fault & 1)
 
     @property
     def duration(self) -> float:
@@ -210,7 +213,7 @@ class Run:
         """The verdict on the plan; None without a plan or an arm. Judged anew each time, by the table of today."""
         if self.plan is None or self.model is None:
             return None
-        from rcilab.conformance import check
+        from rcilab.conformance.check import check
 
         return check(self.plan, self.model)
 

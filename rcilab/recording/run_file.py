@@ -46,7 +46,7 @@ from rcilab.recording.run import Run
 from rcilab.recording.setup import Setup
 
 if TYPE_CHECKING:
-    from rcilab.conformance import Report
+    from rcilab.conformance.report import Report
     from rcilab.model.robot_model import RobotModel
 
 ENDING = ".rcirun"

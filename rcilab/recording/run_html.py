@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from html import escape
 from typing import TYPE_CHECKING
 
-from rcilab.core.faults import name_faults
+from rcilab.core.fault import name_faults
 from rcilab.i18n.locale import load_words, require_language
 
 if TYPE_CHECKING:

@@ -1,22 +1,33 @@
-"""The arms this package knows, one data file each."""
+"""What an arm is, as data. The data files of the arms are with their makers: `rcilab/makers/*/robots`.
+
+This package finds them by folder and imports one when its arm is asked for. So code below `rcilab.makers` can load an
+arm by name without importing a maker. A maker lists its arms in `ROBOTS` of its folder `robots`: name to module.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from importlib import import_module
+from pathlib import Path
+from types import MappingProxyType
 
 from rcilab.core.errors import ModelError, plain_text
 from rcilab.robots.description import DhRow, Link, RobotDescription
 
-__all__ = ["RCI_ROBOT_NAMES", "ROBOT_NAMES", "DhRow", "Link", "RobotDescription", "describe_robot"]
+__all__ = ["ROBOTS_BY_MAKER", "ROBOT_NAMES", "DhRow", "Link", "RobotDescription", "describe_robot"]
 
-_XMATE_FILES = {"xMatePro3": "xmate_pro3", "xMatePro7": "xmate_pro7", "xMate3": "xmate3", "xMate7": "xmate7"}
-_XMATES = {name: f"rcilab.makers.rokae.robots.{module}" for name, module in _XMATE_FILES.items()}
-_MODULES = {**_XMATES, "Panda": "rcilab.makers.franka.robots.panda"}
+_MAKERS = Path(__file__).parents[1] / "makers"
 
-ROBOT_NAMES = tuple(_MODULES)
+
+def _find_robots() -> dict[str, Mapping[str, str]]:
+    found = sorted(file.parents[1].name for file in _MAKERS.glob("*/robots/__init__.py"))
+    return {maker: import_module(f"rcilab.makers.{maker}.robots").ROBOTS for maker in found}
+
+
+ROBOTS_BY_MAKER: Mapping[str, Mapping[str, str]] = MappingProxyType(_find_robots())
+"""The arms of every maker: by the maker's folder, the module of the data file by the name of the arm."""
+ROBOT_NAMES = tuple(name for robots in ROBOTS_BY_MAKER.values() for name in robots)
 """Every arm that can be computed with."""
-RCI_ROBOT_NAMES = tuple(_XMATES)
-"""Those that speak the RCI, and so can be simulated and driven as well."""
 
 
 def describe_robot(name: str) -> RobotDescription:
@@ -25,7 +36,8 @@ def describe_robot(name: str) -> RobotDescription:
     Raises:
         ModelError: No robot has this name; the message lists those that exist.
     """
-    for known, module in _MODULES.items():
-        if known.lower() == str(name).lower():
-            return import_module(module).DESCRIPTION
+    for maker, robots in ROBOTS_BY_MAKER.items():
+        for known, module in robots.items():
+            if known.lower() == str(name).lower():
+                return import_module(f"rcilab.makers.{maker}.robots.{module}").DESCRIPTION
     raise ModelError(f"unknown robot {plain_text(repr(name), 60)}; known robots: {', '.join(ROBOT_NAMES)}")

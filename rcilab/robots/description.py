@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Literal, TypeAlias
 
 from rcilab.core.arrays import JointVector, Matrix, Vector3, readonly_copy
+from rcilab.core.condition import ConditionTable
+from rcilab.core.fault import FaultCode
 from rcilab.core.limits import Limits
-
-Interface: TypeAlias = Literal["RCI", "FCI"]
-"""Which real-time interface an arm is driven by, and so whose conditions and error names its motions are judged by."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -124,8 +122,12 @@ class RobotDescription:
     rated_payload: float
     """Largest load, [kg]."""
     rated_payload_source: str
-    interface: Interface = "RCI"
-    """Which real-time interface the arm is driven by."""
+    maker: str = ""
+    """Name of its maker: the folder in `rcilab/makers`; empty for an arm that no maker's interface drives."""
+    faults: type[FaultCode] = FaultCode
+    """The faults of the maker's controller."""
+    conditions: Callable[[], ConditionTable] | None = None
+    """Returns the conditions of the maker's interface; None checks the common ones, which raise no fault."""
     elbow_flip: float | None = None
     """Angle of joint 4 on whose other side the elbow counts as flipped, [rad]; None where the maker knows no flip."""
     rods: tuple[tuple[Rod, ...], ...] | None = None

@@ -10,7 +10,8 @@ import resource
 import socket
 
 from rcilab.core.errors import UsageError
-from rcilab.model.robot_model import RobotModel, load_model, require_rci
+from rcilab.makers.maker import require_simulator
+from rcilab.model.robot_model import RobotModel, load_model
 from rcilab.workbench.access import is_local, require_token
 
 DEFAULT_PORT = 8080
@@ -47,7 +48,7 @@ def require_openable(host: str, token: str | None, target: str, model: str) -> R
         from rcilab.makers.rokae.driver.address import parse_address
 
         parse_address(target)
-    return require_rci(load_model(model))
+    return require_simulator(load_model(model))
 
 
 def _require_files() -> None:

@@ -13,8 +13,7 @@ import pytest
 
 from rcilab.app.status_text import tell_error
 from rcilab.app.text import Text, message
-from rcilab.conformance import check
-from rcilab.conformance.conditions import find_condition
+from rcilab.conformance.check import check
 from rcilab.conformance.explain import explain_limit
 from rcilab.conformance.limit_violation import LimitViolation, describe_breaches
 from rcilab.control_process import SupervisorStatus
@@ -27,6 +26,7 @@ from rcilab.i18n.error_messages import tell_note
 from rcilab.i18n.number_parsing import parse_number, parse_quaternion
 from rcilab.i18n.translator import Remark
 from rcilab.i18n.units import Units
+from rcilab.makers.rokae.conditions import RCI_CONDITIONS
 from rcilab.makers.rokae.controller.modes.generator import lost_motion
 from rcilab.makers.rokae.driver.address import RobotAddress
 from rcilab.makers.rokae.driver.identify import dh_lengths, require_same_arm
@@ -202,11 +202,11 @@ def test_what_goes_wrong_is_said_in_chinese(what):
 
 
 REASONS: dict[str, Remark] = {
-    "a joint too fast": LimitViolation(find_condition("joint.velocity"), 4, 2.3, 2.175).remark,
-    "a tool too fast": LimitViolation(find_condition("cartesian.velocity.translation"), 0, 2.3, 2.0).remark,
-    "a tool outside": LimitViolation(find_condition("cartesian.position"), 0, 0.02, 1e-3).remark,
-    "no pose": LimitViolation(find_condition("cartesian.frame"), 0, 2.0, 1.0).remark,
-    "two at once": describe_breaches([LimitViolation(find_condition("joint.jerk"), 1, 9e3, 8e3)] * 2),
+    "a joint too fast": LimitViolation(RCI_CONDITIONS.find("joint.velocity"), 4, 2.3, 2.175).remark,
+    "a tool too fast": LimitViolation(RCI_CONDITIONS.find("cartesian.velocity.translation"), 0, 2.3, 2.0).remark,
+    "a tool outside": LimitViolation(RCI_CONDITIONS.find("cartesian.position"), 0, 0.02, 1e-3).remark,
+    "no pose": LimitViolation(RCI_CONDITIONS.find("cartesian.frame"), 0, 2.0, 1.0).remark,
+    "two at once": describe_breaches([LimitViolation(RCI_CONDITIONS.find("joint.jerk"), 1, 9e3, 8e3)] * 2),
     "lost commands": lost_motion(Remark("x", "thrown", joint=2, value="9 rad/s^2", bound="8 rad/s^2")).reason,
 }
 

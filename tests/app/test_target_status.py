@@ -9,11 +9,11 @@ import pytest
 
 from rcilab.app.goal.target_status import NEAR_LIMIT, evaluate_joints, evaluate_pose, margin
 from rcilab.core.spatial import Pose
+from rcilab.makers.rokae.robots import ROBOTS
 from rcilab.model.robot_model import load_model
-from rcilab.robots import RCI_ROBOT_NAMES
 
 
-@pytest.mark.parametrize("name", RCI_ROBOT_NAMES)
+@pytest.mark.parametrize("name", ROBOTS)
 def test_a_reachable_pose_is_reached(name):
     model = load_model(name)
     rng = np.random.default_rng(3)
@@ -24,7 +24,7 @@ def test_a_reachable_pose_is_reached(name):
         assert model.forward(reach.q).is_close(model.forward(q), 1e-6)
 
 
-@pytest.mark.parametrize("name", RCI_ROBOT_NAMES)
+@pytest.mark.parametrize("name", ROBOTS)
 def test_a_target_out_of_reach_says_by_how_much_and_the_arm_stretches_towards_it(name):
     model = load_model(name)
     here = model.forward(model.home)
@@ -40,7 +40,7 @@ def test_a_target_out_of_reach_says_by_how_much_and_the_arm_stretches_towards_it
     assert (reach.q <= model.limits.joint.upper).all()
 
 
-@pytest.mark.parametrize("name", RCI_ROBOT_NAMES)
+@pytest.mark.parametrize("name", ROBOTS)
 def test_dragging_along_the_edge_of_reach_never_jumps_by_more_than_the_target_does(name):
     model = load_model(name)
     q, here = model.home, model.forward(model.home)
@@ -55,7 +55,7 @@ def test_dragging_along_the_edge_of_reach_never_jumps_by_more_than_the_target_do
         q, before = reach.q, position
 
 
-@pytest.mark.parametrize("name", RCI_ROBOT_NAMES)
+@pytest.mark.parametrize("name", ROBOTS)
 def test_a_joint_near_its_limit_is_named(name):
     model = load_model(name)
     q = np.array(model.home)

@@ -3,7 +3,9 @@ import pickle
 import numpy as np
 import pytest
 
-from rcilab.conformance import StartState, check, verify_certificate
+from rcilab.conformance.certificate import verify_certificate
+from rcilab.conformance.check import check
+from rcilab.conformance.start import StartState
 from rcilab.core.clearance import STANDARD_DISTANCE, ClearanceLimit
 from rcilab.core.errors import CertificateError, InvalidValueError
 from rcilab.core.safety_box import SafetyBox

@@ -5,10 +5,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rcilab.conformance import StartState, check
+from rcilab.conformance.check import check
+from rcilab.conformance.start import StartState
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import ConformanceError, InvalidValueError
-from rcilab.core.faults import Fault
+from rcilab.makers.rokae.faults import Fault
 from rcilab.model.robot_model import RobotModel, load_model
 from rcilab.motion import Motion, differences_from_derivatives, plan_joint
 

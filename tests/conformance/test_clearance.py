@@ -9,13 +9,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rcilab.conformance import ClearanceMonitor, JointMonitor, check, clearance_conditions
-from rcilab.conformance.check import HOLD_SAMPLES
+from rcilab.conformance.check import HOLD_SAMPLES, check
+from rcilab.conformance.clearance_conditions import clearance_conditions
+from rcilab.conformance.clearance_monitor import ClearanceMonitor
 from rcilab.conformance.clearance_path import LONGEST_STEP, MOST_TRAVEL, clearance_path, in_between
+from rcilab.conformance.monitor import JointMonitor
 from rcilab.core.clearance import ClearanceLimit
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.spatial import Pose
+from rcilab.makers.rokae.conditions import RCI_JOINT_CONDITIONS
 from rcilab.model.kinematics.collision import FLOOR, ClearanceQuery, LinkPair
 from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, plan_joint
@@ -137,14 +140,14 @@ def test_check_and_monitors_give_the_same_verdict_in_every_cycle(model, seed, sp
     q = low_motion(model, seed, part=0.1).q.copy()
     for _ in range(spoils):
         q[rng.integers(len(q)), rng.integers(model.n)] += rng.choice((-1.0, 1.0)) * 10.0 ** rng.uniform(-4.0, 0.0)
-    joints, monitor = JointMonitor(model.limits.joint), ClearanceMonitor(model, ASKED)
+    joints, monitor = JointMonitor(model.limits.joint, RCI_JOINT_CONDITIONS), ClearanceMonitor(model, ASKED)
     joints.reset(q[0].tolist())
     monitor.reset(q[0].tolist())
     report = check(Motion.from_cycles(q), model, distance=ASKED)
     played: dict[str, list[bool]] = {row.id: [] for row in clearance_conditions(ASKED)}
     kept = True
     for row in [*q, *[q[-1]] * HOLD_SAMPLES]:
-        kept = (joints.step(row.tolist()) == ()) & monitor.step(row.tolist()) & kept
+        kept = (joints.step(row.tolist()) == []) & monitor.step(row.tolist()) & kept
         broken = {breach.condition.id for breach in monitor.broken()}
         for id_, flags in played.items():
             flags.append(id_ in broken)

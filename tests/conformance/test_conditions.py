@@ -1,18 +1,17 @@
 import pytest
 
-from rcilab.conformance import CONDITIONS, CYCLE_CONDITIONS, explain_fault, find_condition
-from rcilab.conformance.conditions import MOTION_CONDITIONS
 from rcilab.core.errors import InvalidValueError
-from rcilab.core.faults import Fault
+from rcilab.makers.rokae.conditions import RCI_CONDITIONS, RCI_JOINT_CONDITIONS
+from rcilab.makers.rokae.faults import Fault
 from rcilab.model.robot_model import load_model
 
 ARM = load_model("xMatePro3").limits
 LIMITS = ARM.joint
-OWN_ROWS = [row for row in CONDITIONS if row.is_clearance]
+OWN_ROWS = [row for row in RCI_CONDITIONS.conditions if row.is_clearance]
 
 
 def test_the_necessary_conditions_on_joints_are_the_manuals_with_their_faults():
-    table = {row.id: (row.formula, row.fault, row.unit) for row in CYCLE_CONDITIONS}
+    table = {row.id: (row.formula, row.fault, row.unit) for row in RCI_JOINT_CONDITIONS}
     assert table == {
         "joint.position": ("q_min < q_c < q_max", Fault.COMMAND_JOINT_POSITION_LIMITS_VIOLATION, "rad"),
         "joint.velocity": ("-dq_max < dq_c < dq_max", Fault.COMMAND_JOINT_VELOCITY_LIMITS_VIOLATION, "rad/s"),
@@ -26,7 +25,7 @@ def test_the_necessary_conditions_on_joints_are_the_manuals_with_their_faults():
 
 
 def test_all_twenty_faults_are_explained_by_the_rows_that_the_manual_names_them_after():
-    rows = {int(fault): {row.id for row in explain_fault(fault)} for fault in Fault}
+    rows = {int(fault): {row.id for row in RCI_CONDITIONS.raising(fault)} for fault in Fault}
     kinds = ("translation", "rotation")
     assert rows == {
         0: {"measured.joint.position"},
@@ -53,12 +52,16 @@ def test_all_twenty_faults_are_explained_by_the_rows_that_the_manual_names_them_
 
 
 def test_a_condition_of_the_manual_is_necessary_exactly_when_it_raises_a_fault():
-    assert all((row.fault is not None) == (row.necessity == "necessary") for row in CONDITIONS if row not in OWN_ROWS)
-    assert len({row.id for row in CONDITIONS}) == len(CONDITIONS)
+    assert all(
+        (row.fault is not None) == (row.necessity == "necessary")
+        for row in RCI_CONDITIONS.conditions
+        if row not in OWN_ROWS
+    )
+    assert len({row.id for row in RCI_CONDITIONS.conditions}) == len(RCI_CONDITIONS.conditions)
 
 
 def test_the_recommended_conditions_ask_for_bearable_torques_and_rest_at_both_ends():
-    assert [row.id for row in MOTION_CONDITIONS if row.necessity == "recommended"] == [
+    assert [row.id for row in RCI_CONDITIONS.motion if row.necessity == "recommended"] == [
         "joint.torque",
         "joint.torque_rate",
         "start.position",
@@ -72,7 +75,7 @@ def test_the_recommended_conditions_ask_for_bearable_torques_and_rest_at_both_en
 @pytest.mark.parametrize("name", ["xMatePro3", "xMate7"])
 def test_every_row_has_one_pair_of_bounds_a_joint_or_one_for_the_tool(name):
     limits = load_model(name).limits
-    for row in CONDITIONS:
+    for row in RCI_CONDITIONS.conditions:
         lower, upper = row.bounds(limits)
         n = len(limits.joint.velocity) if row.is_per_joint else 1
         assert lower.shape == upper.shape == (n,), row.id
@@ -82,7 +85,7 @@ def test_every_row_has_one_pair_of_bounds_a_joint_or_one_for_the_tool(name):
 def test_the_tools_bounds_are_the_manuals_numbers():
     bounds = {
         row.id: float(row.bounds(ARM)[1][0])
-        for row in CONDITIONS
+        for row in RCI_CONDITIONS.conditions
         if row.signal in ("translation", "rotation") and row.stage == "throughout" and not row.is_measured
     }
     assert bounds == {
@@ -96,24 +99,24 @@ def test_the_tools_bounds_are_the_manuals_numbers():
 
 
 def test_measured_bounds_leave_a_servo_room_over_the_commanded_ones_and_say_so():
-    for row in (row for row in CONDITIONS if row.is_measured):
+    for row in (row for row in RCI_CONDITIONS.conditions if row.is_measured):
         assert "allowance" in row.source, row.id
         commanded = row.id.removeprefix("measured.")
         if row.order > 0:
-            factor = row.bounds(ARM)[1] / find_condition(commanded).bounds(ARM)[1]
+            factor = row.bounds(ARM)[1] / RCI_CONDITIONS.find(commanded).bounds(ARM)[1]
             assert factor.tolist() == pytest.approx([(1.1, 1.5)[row.order - 1]] * len(factor)), row.id
 
 
 def test_conditions_on_the_tool_need_all_limits():
     with pytest.raises(InvalidValueError, match=r"are of the joints only; pass model\.limits"):
-        find_condition("cartesian.velocity.rotation").bounds(LIMITS)
+        RCI_CONDITIONS.find("cartesian.velocity.rotation").bounds(LIMITS)
 
 
 def test_the_bounds_come_from_the_limits_of_the_arm():
-    lower, upper = find_condition("joint.position").bounds(LIMITS)
+    lower, upper = RCI_CONDITIONS.find("joint.position").bounds(LIMITS)
     assert (lower is LIMITS.lower, upper is LIMITS.upper) == (True, True)
     for name in ("velocity", "acceleration", "jerk"):
-        lower, upper = find_condition(f"joint.{name}").bounds(LIMITS)
+        lower, upper = RCI_CONDITIONS.find(f"joint.{name}").bounds(LIMITS)
         assert upper.tolist() == getattr(LIMITS, name).tolist()
         assert lower.tolist() == (-upper).tolist()
 
@@ -131,10 +134,10 @@ def test_what_no_controller_looks_at_raises_no_fault_and_says_that_it_is_ours():
 
 def test_every_condition_names_its_source_and_the_manuals_section():
     sections = {"throughout": "4.4", "start": "4.1", "end": "4.1"}
-    assert all("manual V1.3.1, " in row.source for row in CONDITIONS if row not in OWN_ROWS)
-    assert all(sections[row.stage] in row.source for row in MOTION_CONDITIONS)
+    assert all("manual V1.3.1, " in row.source for row in RCI_CONDITIONS.conditions if row not in OWN_ROWS)
+    assert all(sections[row.stage] in row.source for row in RCI_CONDITIONS.motion)
 
 
 def test_an_unknown_condition_lists_those_that_exist():
     with pytest.raises(InvalidValueError, match=r"joint\.speed.*joint\.velocity"):
-        find_condition("joint.speed")
+        RCI_CONDITIONS.find("joint.speed")

@@ -11,18 +11,21 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from rcilab.conformance import CONDITION_TABLES, CONDITIONS, Violation, check
 from rcilab.conformance.advice import advise
 from rcilab.conformance.catalogue import Language, Phrase, load_catalogue, say
-from rcilab.conformance.condition import Condition
+from rcilab.conformance.check import check
 from rcilab.conformance.explain import explain_formula, explain_source, explain_violation
 from rcilab.conformance.html import report_html
+from rcilab.conformance.report import Violation
+from rcilab.core.condition import Condition
 from rcilab.core.errors import InvalidValueError
-from rcilab.core.faults import Fault
-from rcilab.core.franka_errors import FrankaError
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.i18n.units import Units
+from rcilab.makers.franka.conditions import FCI_CONDITIONS
+from rcilab.makers.franka.errors import FrankaError
+from rcilab.makers.rokae.conditions import RCI_CONDITIONS
+from rcilab.makers.rokae.faults import Fault
 from rcilab.model.kinematics.collision import LinkPair
 from rcilab.model.robot_model import RobotModel, load_model
 from rcilab.motion import Motion, plan_joint
@@ -34,7 +37,7 @@ LANGUAGES: tuple[Language, ...] = get_args(Language)
 
 
 PANDA = load_model("Panda")
-FRANKA_CONDITIONS = CONDITION_TABLES["FCI"].conditions
+FRANKA_CONDITIONS = FCI_CONDITIONS.conditions
 
 
 def violation_of(row: Condition, count: int = 25, model: RobotModel = MODEL) -> Violation:
@@ -62,11 +65,11 @@ def test_every_language_has_the_same_keys_and_places_to_fill():
 
 def test_a_formula_with_words_in_it_has_them_in_every_language():
     symbols = {"T", "x", "q", "v", "dv", "dq", "ddq", "psi", "dpsi", "omega", "domega", "pi", "sign"}
-    for row in (*CONDITIONS, *FRANKA_CONDITIONS):
+    for row in (*RCI_CONDITIONS.conditions, *FRANKA_CONDITIONS):
         assert explain_formula(row) == row.formula
         said = re.findall(r"[A-Za-z][\w,]*", explain_formula(row, "zh"), re.ASCII)
         assert [word for word in said if "_" not in word and word not in symbols] == []
-    worded = {row.formula for row in (*CONDITIONS, *FRANKA_CONDITIONS)}
+    worded = {row.formula for row in (*RCI_CONDITIONS.conditions, *FRANKA_CONDITIONS)}
     assert {key.removeprefix("formula.") for key in load_catalogue("zh") if key.startswith("formula.")} <= worded
 
 
@@ -79,10 +82,10 @@ def test_no_key_stands_twice_in_a_catalogue():
 
 def test_english_words_are_those_of_the_table_and_of_the_faults():
     words = load_catalogue("en")
-    for table in CONDITION_TABLES.values():
+    for table in (RCI_CONDITIONS, FCI_CONDITIONS):
         for row in table.conditions:
             assert words[f"quantity.{row.id}"] == row.quantity
-    for row in CONDITIONS:
+    for row in RCI_CONDITIONS.conditions:
         assert explain_source(row) == row.source
         said = re.sub(r"RCI|SDK|URDF|rcilab|setCollisionBehavior|Hz|deg", "", explain_source(row, "zh"))
         assert not re.search(r"[A-Za-z]{2}", said), said
@@ -92,7 +95,7 @@ def test_english_words_are_those_of_the_table_and_of_the_faults():
 
 @pytest.mark.parametrize(
     ("row", "model"),
-    [*((row, MODEL) for row in CONDITIONS), *((row, PANDA) for row in FRANKA_CONDITIONS)],
+    [*((row, MODEL) for row in RCI_CONDITIONS.conditions), *((row, PANDA) for row in FRANKA_CONDITIONS)],
     ids=lambda value: getattr(value, "id", getattr(value, "name", "")),
 )
 @pytest.mark.parametrize("language", LANGUAGES)
@@ -150,12 +153,12 @@ def test_every_condition_is_explained_with_place_time_amount_fault_and_remedy(ro
     ],
 )
 def test_the_remedy_suits_the_condition(id_, advice):
-    row = next(row for row in CONDITIONS if row.id == id_)
+    row = next(row for row in RCI_CONDITIONS.conditions if row.id == id_)
     assert violation_of(row).advice.startswith(advice)
 
 
 def test_a_sentence_in_full_in_both_languages():
-    velocity = next(row for row in CONDITIONS if row.id == "joint.velocity")
+    velocity = next(row for row in RCI_CONDITIONS.conditions if row.id == "joint.velocity")
     violation = replace(violation_of(velocity, count=1), joint=4, value=-2.31, bound=-2.175, ratio=2.31 / 2.175)
     assert explain_violation(violation) == (
         "joint 4: commanded velocity -2.31 rad/s passes the bound of -2.175 rad/s by 0.135 rad/s, which is 106.2 % of "
@@ -169,10 +172,12 @@ def test_a_sentence_in_full_in_both_languages():
 
 
 def test_a_sentence_is_said_in_the_units_that_are_asked_for():
-    velocity = next(row for row in CONDITIONS if row.id == "joint.velocity")
+    velocity = next(row for row in RCI_CONDITIONS.conditions if row.id == "joint.velocity")
     violation = replace(violation_of(velocity, count=1), joint=4, value=-2.31, bound=-2.175, ratio=2.31 / 2.175)
     assert "commanded velocity -132.4°/s passes the bound of -124.6°/s by 7.735°/s" in violation.explain(units=Units())
-    box = replace(violation_of(next(row for row in CONDITIONS if row.id == "cartesian.position")), value=0.042)
+    box = replace(
+        violation_of(next(row for row in RCI_CONDITIONS.conditions if row.id == "cartesian.position")), value=0.042
+    )
     assert "is 42 mm outside" in box.explain("en", Units())
     assert "0.042 m" in box.explain("zh", Units(length="m"))
     report = check(MOTION, MODEL)
@@ -233,10 +238,10 @@ def test_a_language_that_nobody_speaks_here_is_refused():
 
 
 def test_every_source_is_told_in_both_languages():
-    for row in (*CONDITIONS, *FRANKA_CONDITIONS):
+    for row in (*RCI_CONDITIONS.conditions, *FRANKA_CONDITIONS):
         assert explain_source(row) == row.source
         assert explain_source(row, "zh") != row.source
-    own = replace(CONDITIONS[0], source="a page of somebody's own")
+    own = replace(RCI_CONDITIONS.conditions[0], source="a page of somebody's own")
     assert explain_source(own, "zh") == own.source
 
 

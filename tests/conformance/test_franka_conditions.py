@@ -10,17 +10,20 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rcilab.conformance import CONDITION_TABLES, check, condition_table
+from rcilab.conformance.check import check
+from rcilab.conformance.common_conditions import condition_table
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError
-from rcilab.core.faults import Fault
-from rcilab.core.franka_errors import FrankaError
 from rcilab.core.safety_box import SafetyBox
+from rcilab.makers.franka.conditions import FCI_CONDITIONS
+from rcilab.makers.franka.errors import FrankaError
+from rcilab.makers.rokae.conditions import RCI_CONDITIONS
+from rcilab.makers.rokae.faults import Fault
 from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, plan_joint
 
 PANDA = load_model("Panda")
-FCI, RCI = CONDITION_TABLES["FCI"], CONDITION_TABLES["RCI"]
+FCI, RCI = FCI_CONDITIONS, RCI_CONDITIONS
 MOTION = plan_joint(PANDA, PANDA.home, PANDA.home + [0.8, 0.4, -0.6, 0.5, 0.3, 0.6, -1.0], speed=0.5)
 
 JOINT_ERRORS = {

@@ -7,10 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rcilab.conformance import CartesianMonitor, JointMonitor, TorqueMonitor
+from rcilab.conformance.cartesian_monitor import CartesianMonitor
 from rcilab.conformance.divided_differences import spans
-from rcilab.core.faults import Fault
+from rcilab.conformance.limit_violation import faults_of
+from rcilab.conformance.monitor import JointMonitor
+from rcilab.conformance.torque_monitor import TorqueMonitor
 from rcilab.core.spatial import Pose
+from rcilab.makers.rokae.conditions import RCI_JOINT_CONDITIONS, RCI_TOOL_CONDITIONS, RCI_TORQUE_CONDITIONS
+from rcilab.makers.rokae.faults import Fault
 from rcilab.model.robot_model import load_model
 from rcilab.motion import plan_joint, plan_line
 
@@ -33,34 +37,34 @@ def kept(seed: int, share: float, count: int) -> list[tuple[int, int]]:
 @settings(max_examples=60, deadline=None)
 @given(seed=st.integers(0, 2**32), share=st.sampled_from([0.0, 0.01, 0.1, 0.5, 0.9]))
 def test_no_gap_makes_a_good_joint_motion_bad(seed: int, share: float) -> None:
-    monitor = JointMonitor(MODEL.limits.joint)
+    monitor = JointMonitor(MODEL.limits.joint, RCI_JOINT_CONDITIONS)
     monitor.reset(SWING[0].tolist())
     for row, cycles in kept(seed, share, len(SWING)):
-        assert monitor.step(SWING[row].tolist(), cycles) == (), monitor.broken()
+        assert faults_of(monitor.step(SWING[row].tolist(), cycles)) == (), monitor.broken()
 
 
 @settings(max_examples=10, deadline=None)
 @given(seed=st.integers(0, 2**32), share=st.sampled_from([0.01, 0.1, 0.5]))
 def test_no_gap_makes_a_good_line_bad(seed: int, share: float) -> None:
-    monitor = CartesianMonitor(MODEL.limits)
+    monitor = CartesianMonitor(MODEL.limits, rows=RCI_TOOL_CONDITIONS)
     poses = [MODEL.forward(q) for q in LINE.q]
     angles = [MODEL.arm_angle(q) for q in LINE.q]
     monitor.reset(poses[0], angles[0])
     for row, cycles in kept(seed, share, len(poses)):
-        assert monitor.step(poses[row], angles[row], cycles) == (), monitor.broken()
+        assert faults_of(monitor.step(poses[row], angles[row], cycles)) == (), monitor.broken()
 
 
 @pytest.mark.parametrize("cycles", [1, 2, 7])
 def test_a_jump_behind_a_gap_is_still_a_jump(cycles: int) -> None:
-    monitor = JointMonitor(MODEL.limits.joint)
+    monitor = JointMonitor(MODEL.limits.joint, RCI_JOINT_CONDITIONS)
     monitor.reset(HOME.tolist())
     row = HOME + [2.2e-3 * cycles, 0, 0, 0, 0, 0, 0]  # 2.2 rad/s on average, whatever happened in between.
-    assert Fault.COMMAND_JOINT_VELOCITY_LIMITS_VIOLATION in monitor.step(row.tolist(), cycles)
+    assert Fault.COMMAND_JOINT_VELOCITY_LIMITS_VIOLATION in faults_of(monitor.step(row.tolist(), cycles))
     assert monitor.dq[0] == pytest.approx(2.2)
 
 
 def test_the_differences_of_a_cubic_are_its_derivatives_at_any_spacing() -> None:
-    monitor = JointMonitor(MODEL.limits.joint)
+    monitor = JointMonitor(MODEL.limits.joint, RCI_JOINT_CONDITIONS)
     times = np.cumsum([0, 3, 1, 5, 2, 1, 1, 1]) * 1e-3
     monitor.reset([0.0] * 7)
     for t, cycles in zip(times[1:], (3, 1, 5, 2, 1, 1, 1), strict=True):
@@ -70,12 +74,14 @@ def test_the_differences_of_a_cubic_are_its_derivatives_at_any_spacing() -> None
 
 
 def test_torques_are_judged_by_their_rate_over_the_gap() -> None:
-    monitor = TorqueMonitor(MODEL.limits.joint)
+    monitor = TorqueMonitor(MODEL.limits.joint, RCI_TORQUE_CONDITIONS)
     rate = float(MODEL.limits.joint.torque_rate[0])
     first = 0.9 * rate * 5e-3
-    assert monitor.step([first, 0, 0, 0, 0, 0, 0], 5) == ()
+    assert faults_of(monitor.step([first, 0, 0, 0, 0, 0, 0], 5)) == ()
     assert monitor.dtau[0] == pytest.approx(0.9 * rate)
-    assert monitor.step([first + 1.1 * rate * 4e-3, 0, 0, 0, 0, 0, 0], 4) == (Fault.COMMAND_TORQUE_DISCONTINUITY,)
+    assert faults_of(monitor.step([first + 1.1 * rate * 4e-3, 0, 0, 0, 0, 0, 0], 4)) == (
+        Fault.COMMAND_TORQUE_DISCONTINUITY,
+    )
 
 
 def test_even_spacing_is_divided_by_the_cycle_time() -> None:

@@ -1,9 +1,12 @@
 import pytest
 
-from rcilab.conformance import CartesianMonitor, cartesian_limits
+from rcilab.conformance.cartesian_monitor import CartesianMonitor
+from rcilab.conformance.limit_violation import faults_of
 from rcilab.core.errors import InvalidValueError
-from rcilab.core.faults import Fault
 from rcilab.core.spatial import Pose
+from rcilab.makers.rokae.conditions import RCI_TOOL_CONDITIONS
+from rcilab.makers.rokae.faults import Fault
+from rcilab.makers.rokae.limit_tables import cartesian_limits
 from rcilab.model.robot_model import load_model
 
 LIMITS = load_model("xMatePro7").limits
@@ -27,9 +30,11 @@ def test_the_sdks_table_changes_the_three_numbers_of_its_rate_limiter_and_their_
 
 def test_a_tool_between_the_two_tables_is_too_fast_for_the_manual_only():
     for table, expected in (("manual", True), ("sdk", False)):
-        monitor = CartesianMonitor(cartesian_limits(LIMITS, table))
+        monitor = CartesianMonitor(cartesian_limits(LIMITS, table), rows=RCI_TOOL_CONDITIONS)
         x = [0.00125 * (cycle + 1) for cycle in range(5)]  # 1.25 m/s, coming along.
-        played = [monitor.step(Pose.from_parts((1, 0, 0, 0, 1, 0, 0, 0, 1), (value, 0.0, 0.0))) for value in x]
+        played = [
+            faults_of(monitor.step(Pose.from_parts((1, 0, 0, 0, 1, 0, 0, 0, 1), (value, 0.0, 0.0)))) for value in x
+        ]
         assert (Fault.COMMAND_CARTESIAN_VELOCITY_LIMITS_VIOLATION in played[-1]) is expected
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rcilab.conformance import check
+from rcilab.conformance.check import check
 from rcilab.conformance.limit_utilisation import near_bound
 from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, plan_joint

@@ -9,17 +9,21 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rcilab.conformance import Monitor, Report, StartState, check, condition_table
+from rcilab.conformance.check import check
+from rcilab.conformance.common_conditions import condition_table
+from rcilab.conformance.motion_monitor import Monitor
+from rcilab.conformance.report import Report
 from rcilab.conformance.signals import HOLD_SAMPLES, MotionSignals
+from rcilab.conformance.start import StartState
 from rcilab.core.arrays import Array
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.command import CartesianPosition, Command, JointPosition, JointTorque
 from rcilab.core.errors import CertificateError, InvalidValueError, PlanningError
-from rcilab.core.faults import Fault
-from rcilab.core.franka_errors import FrankaError
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.core.state import MODES, Mode
+from rcilab.makers.franka.errors import FrankaError
+from rcilab.makers.rokae.faults import Fault
 from rcilab.model.robot_model import RobotModel, load_model
 from rcilab.motion import Motion, plan_arc, plan_circle, plan_joint, plan_line
 from rcilab.robots import ROBOT_NAMES

@@ -3,10 +3,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rcilab.conformance import CYCLE_CONDITIONS, JointMonitor, StartState, check
-from rcilab.conformance.check import HOLD_SAMPLES
+from rcilab.conformance.check import HOLD_SAMPLES, check
+from rcilab.conformance.limit_violation import faults_of
+from rcilab.conformance.monitor import JointMonitor
+from rcilab.conformance.start import StartState
 from rcilab.core.errors import InvalidValueError
-from rcilab.core.faults import Fault
+from rcilab.makers.rokae.conditions import RCI_JOINT_CONDITIONS
+from rcilab.makers.rokae.faults import Fault
 from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, plan_joint
 
@@ -15,15 +18,15 @@ MODELS = [load_model("xMatePro7"), load_model("xMate3")]
 
 def faults_by_cycle(motion: Motion, model, start: StartState | None = None) -> list[tuple[Fault, ...]]:
     """Plays a motion into a monitor as the controller would, hold included; one entry a row of the check."""
-    monitor = JointMonitor(model.limits.joint)
+    monitor = JointMonitor(model.limits.joint, RCI_JOINT_CONDITIONS)
     rows = [*motion.q.tolist(), *[motion.q[-1].tolist()] * HOLD_SAMPLES]
     if start is None:
         monitor.reset(rows[0])
-        return [monitor.step(row) for row in rows]
+        return [faults_of(monitor.step(row)) for row in rows]
     monitor.reset(start.q.tolist(), start.dq.tolist(), start.ddq.tolist())
     if start.moving:
-        return [monitor.step(row) for row in rows[1:]]
-    return [monitor.step(row) for row in rows]
+        return [faults_of(monitor.step(row)) for row in rows[1:]]
+    return [faults_of(monitor.step(row)) for row in rows]
 
 
 @st.composite
@@ -52,7 +55,7 @@ def test_monitor_and_check_give_the_same_verdict_in_every_cycle(case):
     model, motion = case
     played = faults_by_cycle(motion, model)
     report = check(motion, model, distance=None)
-    for condition in CYCLE_CONDITIONS:
+    for condition in RCI_JOINT_CONDITIONS:
         expected = np.zeros(len(played), dtype=bool)
         for violation in report.violations:
             if violation.condition is condition:
@@ -74,8 +77,8 @@ def test_they_agree_also_from_a_moving_start(case, seed):
 
 
 def test_faults_come_in_wire_order_and_once_each():
-    monitor = JointMonitor(MODELS[0].limits.joint)
-    assert monitor.step([9.0] * 7) == (
+    monitor = JointMonitor(MODELS[0].limits.joint, RCI_JOINT_CONDITIONS)
+    assert faults_of(monitor.step([9.0] * 7)) == (
         Fault.COMMAND_JOINT_POSITION_LIMITS_VIOLATION,
         Fault.COMMAND_JOINT_VELOCITY_LIMITS_VIOLATION,
         Fault.COMMAND_JOINT_ACCELERATION_LIMITS_VIOLATION,
@@ -85,21 +88,23 @@ def test_faults_come_in_wire_order_and_once_each():
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), -float("inf")])
 def test_what_is_not_a_number_breaks_conditions(value):
-    monitor = JointMonitor(MODELS[0].limits.joint)
-    assert Fault.COMMAND_JOINT_POSITION_LIMITS_VIOLATION in monitor.step([0.0, value, 0.0, 0.0, 0.0, 0.0, 0.0])
+    monitor = JointMonitor(MODELS[0].limits.joint, RCI_JOINT_CONDITIONS)
+    assert Fault.COMMAND_JOINT_POSITION_LIMITS_VIOLATION in faults_of(
+        monitor.step([0.0, value, 0.0, 0.0, 0.0, 0.0, 0.0])
+    )
 
 
 def test_a_standing_arm_raises_nothing_and_a_six_axis_arm_ignores_the_seventh():
     model = MODELS[1]
-    monitor = JointMonitor(model.limits.joint)
+    monitor = JointMonitor(model.limits.joint, RCI_JOINT_CONDITIONS)
     monitor.reset(model.home.tolist())
-    assert monitor.step([*model.home.tolist(), float("nan")]) == ()
+    assert faults_of(monitor.step([*model.home.tolist(), float("nan")])) == ()
     assert monitor.q == model.home.tolist()
     assert monitor.dq == monitor.ddq == monitor.jerk == [0.0] * 6
 
 
 def test_its_signals_are_the_backward_differences():
-    monitor = JointMonitor(MODELS[0].limits.joint)
+    monitor = JointMonitor(MODELS[0].limits.joint, RCI_JOINT_CONDITIONS)
     for angle in (1e-6, 3e-6, 7e-6):
         monitor.step([angle] * 7)
     # Differences: 4e-6; second: 2e-6; third: 1e-6 (from 0, 1, 3, 7 micro-radians).
@@ -109,27 +114,27 @@ def test_its_signals_are_the_backward_differences():
 
 
 def test_what_was_broken_is_named_with_joint_value_and_bound():
-    monitor = JointMonitor(MODELS[0].limits.joint)
+    monitor = JointMonitor(MODELS[0].limits.joint, RCI_JOINT_CONDITIONS)
     monitor.step([0.0, 0.0, 0.0, -2e-5, 0.0, 0.0, 0.0])
     found = {breach.condition.id: (breach.axis, breach.bound) for breach in monitor.broken()}
     assert found == {"joint.acceleration": (4, -10.0), "joint.jerk": (4, -5000.0)}
 
 
 def test_reset_forgets_the_past():
-    monitor = JointMonitor(MODELS[0].limits.joint)
+    monitor = JointMonitor(MODELS[0].limits.joint, RCI_JOINT_CONDITIONS)
     monitor.step([9.0] * 7)
     monitor.reset([0.5] * 7)
-    assert monitor.step([0.5] * 7) == ()
+    assert faults_of(monitor.step([0.5] * 7)) == ()
     monitor.reset([0.5] * 7, dq=[0.1] * 7)
-    assert monitor.step([0.5 + 1e-4] * 7) == ()
+    assert faults_of(monitor.step([0.5 + 1e-4] * 7)) == ()
 
 
 def test_a_reset_to_the_wrong_number_of_joints_is_refused():
     with pytest.raises(InvalidValueError, match="needs 7 numbers"):
-        JointMonitor(MODELS[0].limits.joint).reset([0.0] * 6)
+        JointMonitor(MODELS[0].limits.joint, RCI_JOINT_CONDITIONS).reset([0.0] * 6)
 
 
 def test_a_command_of_too_few_joints_is_never_judged_by_those_that_are_there() -> None:
-    monitor = JointMonitor(load_model("xMatePro7").limits.joint)
+    monitor = JointMonitor(load_model("xMatePro7").limits.joint, RCI_JOINT_CONDITIONS)
     with pytest.raises(ValueError, match="longer"):
         monitor.step([0.0] * 6)

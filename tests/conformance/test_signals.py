@@ -5,13 +5,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rcilab.conformance import BoxMonitor, StartState, check, find_condition
+from rcilab.conformance.box_monitor import BoxMonitor
+from rcilab.conformance.check import check
 from rcilab.conformance.signals import HOLD_SAMPLES, MotionSignals
+from rcilab.conformance.start import StartState
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError
-from rcilab.core.faults import Fault
 from rcilab.core.safety_box import SafetyBox, box_from
 from rcilab.core.spatial import Pose
+from rcilab.makers.rokae.conditions import RCI_CONDITIONS
+from rcilab.makers.rokae.faults import Fault
 from rcilab.model.dynamics.payload import Payload
 from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, plan_joint
@@ -30,7 +33,7 @@ def random_motion(model, seed: int, **options) -> Motion:
 def torque_tables(motion: Motion, model) -> tuple[np.ndarray, np.ndarray]:
     start = StartState(motion.start, np.zeros(model.n), np.zeros(model.n))
     signals = MotionSignals(motion, model, start, None)
-    return tuple(signals.table(find_condition(name))[0] for name in ("joint.torque", "joint.torque_rate"))
+    return tuple(signals.table(RCI_CONDITIONS.find(name))[0] for name in ("joint.torque", "joint.torque_rate"))
 
 
 @settings(max_examples=6)
@@ -87,7 +90,7 @@ def test_monitor_and_check_give_one_verdict_on_the_safety_box(model, seed, edge)
     rng = np.random.default_rng(seed)
     centre = model.forward(motion.q[int(rng.integers(0, len(motion)))]).position
     box = SafetyBox(size=tuple(edge * rng.uniform(0.5, 1.5, 3)), T_base_box=Pose.from_rpy(centre, rng.normal(size=3)))
-    monitor = BoxMonitor(box_from(box, model.forward(motion.q[0]).position.tolist()))
+    monitor = BoxMonitor(box_from(box, model.forward(motion.q[0]).position.tolist()), RCI_CONDITIONS.box)
     played = [bool(monitor.step(model.forward(q).position.tolist())) for q in motion.q]
     played += played[-1:] * HOLD_SAMPLES
     report = check(motion, model, box=box, distance=None)

@@ -10,7 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rcilab.conformance import Report, StartState, check
+from rcilab.conformance.check import check
+from rcilab.conformance.report import Report
+from rcilab.conformance.start import StartState
 from rcilab.conformance.time_scaling import PRECISION, Obstacle
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.safety_box import SafetyBox

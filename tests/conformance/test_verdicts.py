@@ -9,13 +9,18 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rcilab.conformance import BoxMonitor, CartesianMonitor, Condition, TorqueMonitor, check
-from rcilab.conformance.check import HOLD_SAMPLES
-from rcilab.conformance.tool_conditions import CARTESIAN_POSITION, TOOL_CONDITIONS, TORQUE_CONDITIONS
+from rcilab.conformance.box_monitor import BoxMonitor
+from rcilab.conformance.cartesian_monitor import CartesianMonitor
+from rcilab.conformance.check import HOLD_SAMPLES, check
+from rcilab.conformance.common_conditions import TOOL_CONDITIONS, TORQUE_CONDITIONS
+from rcilab.conformance.limit_violation import faults_of
+from rcilab.conformance.torque_monitor import TorqueMonitor
 from rcilab.core.arrays import Array
 from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.condition import Condition
 from rcilab.core.safety_box import SafetyBox, box_from
 from rcilab.core.spatial import Pose
+from rcilab.makers.rokae.conditions import RCI_CONDITIONS, RCI_TOOL_CONDITIONS, RCI_TORQUE_CONDITIONS
 from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, plan_joint
 
@@ -49,12 +54,12 @@ def test_the_box_is_judged_alike_by_check_and_monitor(seed, spoils):
         q[rng.integers(len(q)), rng.integers(7)] += rng.choice((-1.0, 1.0)) * 10.0 ** rng.uniform(-4.0, 0.0)
     T_base_box = MODEL.forward(q[0]) @ Pose.from_rpy(rng.uniform(-0.1, 0.1, 3), rng.uniform(-3.0, 3.0, 3))
     box = SafetyBox(size=tuple(rng.uniform(0.05, 0.6, 3)), T_base_box=T_base_box)
-    monitor = BoxMonitor(box_from(box, MODEL.forward(q[0]).parts[1]))
+    monitor = BoxMonitor(box_from(box, MODEL.forward(q[0]).parts[1]), RCI_CONDITIONS.box)
     rows = [*q, *[q[-1]] * HOLD_SAMPLES]
     played = [bool(monitor.step(MODEL.forward(row).parts[1])) for row in rows]
     expected = np.zeros(len(rows), dtype=bool)
     for violation in check(Motion.from_cycles(q), MODEL, box=box, distance=None).violations:
-        if violation.condition is CARTESIAN_POSITION:
+        if violation.condition is RCI_CONDITIONS.box:
             first = round(violation.time / CYCLE_TIME)
             expected[first : first + violation.count] = True
     assert played == expected.tolist()
@@ -81,13 +86,13 @@ def tool_rows(draw):
 
 def played(rows: Array, direction: Array, axis: Array) -> dict[str, list[int]]:
     """Cycles that a monitor finds broken, by condition, when it comes from rest at the first row."""
-    monitor = CartesianMonitor(LIMITS)
+    monitor = CartesianMonitor(LIMITS, rows=RCI_TOOL_CONDITIONS)
     found: dict[str, list[int]] = {}
     for cycle, (way, angle, psi) in enumerate(rows.tolist()):
         pose = Pose(way * direction, [np.cos(angle / 2.0), *(np.sin(angle / 2.0) * axis)])
         if cycle == 0:
             monitor.reset(pose, psi)
-        faults = monitor.step(pose, psi)
+        faults = faults_of(monitor.step(pose, psi))
         breaches = monitor.broken()
         assert set(faults) == {breach.condition.fault for breach in breaches}
         for breach in breaches:
@@ -133,11 +138,11 @@ def test_a_spoiled_tool_sample_is_blamed_in_exactly_its_differences(seed, row, n
 
 def torque_breaches(tau: Array) -> dict[str, set[tuple[int, int]]]:
     """Cycles and joints that a monitor finds broken, by condition, when the first row has lasted for a while."""
-    monitor = TorqueMonitor(LIMITS.joint)
+    monitor = TorqueMonitor(LIMITS.joint, RCI_TORQUE_CONDITIONS)
     monitor.reset(tau[0].tolist())
     found: dict[str, set[tuple[int, int]]] = {row.id: set() for row in TORQUE_CONDITIONS}
     for cycle, row in enumerate(tau.tolist()):
-        faults = monitor.step(row)
+        faults = faults_of(monitor.step(row))
         breaches = monitor.broken()
         assert set(faults) == {breach.condition.fault for breach in breaches}
         for breach in breaches:

@@ -7,7 +7,7 @@ import time
 
 import numpy as np
 
-from rcilab.conformance import check
+from rcilab.conformance.check import check
 from rcilab.control_process import Supervisor
 from rcilab.model.robot_model import load_model
 from rcilab.motion import plan_joint

@@ -7,7 +7,7 @@ import time
 import numpy as np
 import pytest
 
-from rcilab.conformance import check
+from rcilab.conformance.check import check
 from rcilab.control_process import Supervisor
 from rcilab.core.errors import CommandRejectedError, ControlError, InvalidValueError, UsageError
 from rcilab.execution.simulation_control import SimulationControl

@@ -7,7 +7,7 @@ import time
 import numpy as np
 import pytest
 
-from rcilab.conformance import check
+from rcilab.conformance.check import check
 from rcilab.control_process import Supervisor
 from rcilab.core.errors import CertificateError, CommandRejectedError, InvalidValueError, UsageError
 from rcilab.core.state import ControllerMode

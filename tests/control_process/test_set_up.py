@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 import rcilab
-from rcilab.conformance import check
+from rcilab.conformance.check import check
 from rcilab.control_process import Supervisor
 from rcilab.core.command import JointPosition
 from rcilab.core.errors import CertificateError, ControlError, InvalidValueError, UsageError
-from rcilab.core.faults import Fault
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.makers.rokae.driver.configuration import ForceControlFrame, RobotConfiguration
+from rcilab.makers.rokae.faults import Fault
 from rcilab.makers.rokae.wire import ForceFrame
 from rcilab.model.dynamics.payload import Payload
 from rcilab.model.robot_model import load_model

@@ -36,10 +36,10 @@ from rcilab.core.errors import (
     UsageError,
     VersionMismatchError,
 )
-from rcilab.core.faults import Fault
 from rcilab.core.spatial import Pose
 from rcilab.execution.recorder import CycleLog, Recorder
 from rcilab.makers.rokae import wire as rci
+from rcilab.makers.rokae.faults import Fault
 from rcilab.model.robot_model import load_model
 
 

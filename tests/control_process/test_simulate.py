@@ -10,7 +10,7 @@ import time
 import numpy as np
 import pytest
 
-from rcilab.conformance import check
+from rcilab.conformance.check import check
 from rcilab.control_process.launch import start_controller
 from rcilab.control_process.simulate import simulate
 from rcilab.core.command import JointPosition
@@ -23,11 +23,11 @@ from rcilab.core.errors import (
     InvalidValueError,
     UsageError,
 )
-from rcilab.core.faults import Fault
 from rcilab.core.spatial import Pose
 from rcilab.execution import connect
 from rcilab.execution.session import open_session
 from rcilab.makers.rokae.driver.identify import identify_robot
+from rcilab.makers.rokae.faults import Fault
 from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, plan_joint
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rcilab.conformance import check
 from rcilab.conformance import speed_scaling_check as pacing
+from rcilab.conformance.check import check
 from rcilab.conformance.speed_scaling_check import plan_start
 from rcilab.control_process import Supervisor
 from rcilab.control_process.launch import start_controller

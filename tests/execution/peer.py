@@ -16,10 +16,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from rcilab.core.command import JointPosition
-from rcilab.core.faults import Fault
 from rcilab.core.spatial import IDENTITY
 from rcilab.core.state import ControllerMode, MotionGeneratorMode, RobotMode, RobotState
 from rcilab.makers.rokae import wire as rci
+from rcilab.makers.rokae.faults import Fault
 from rcilab.model.robot_model import load_model
 
 MODEL = load_model("xMatePro7")

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from rcilab.conformance import check
+from rcilab.conformance.check import check
 from rcilab.core.errors import CertificateError, CommandRejectedError, DeadlineError, InvalidValueError, UsageError
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose

@@ -9,8 +9,8 @@ import pytest
 
 from rcilab.core.command import CartesianPosition, JointPosition, JointTorque
 from rcilab.core.errors import CommandRejectedError, ConnectionLostError, ControlError, InvalidValueError
-from rcilab.core.faults import Fault
 from rcilab.makers.rokae import wire as rci
+from rcilab.makers.rokae.faults import Fault
 from tests.execution.peer import MODEL, Script, assert_controlled_stop, wave
 
 

@@ -9,11 +9,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rcilab.conformance import CartesianMonitor, JointMonitor, TorqueMonitor, cartesian_limits
+from rcilab.conformance.cartesian_monitor import CartesianMonitor
+from rcilab.conformance.monitor import JointMonitor
+from rcilab.conformance.torque_monitor import TorqueMonitor
 from rcilab.core.command import CartesianPosition, JointPosition, JointTorque
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.spatial import Pose
 from rcilab.execution.filters import LowPass, RateLimiter, is_near, low_pass, smoothing
+from rcilab.makers.rokae.conditions import rci_faults
+from rcilab.makers.rokae.limit_tables import cartesian_limits
 from rcilab.model.robot_model import load_model
 from rcilab.motion import plan_joint
 from rcilab.motion.cartesian import schedule
@@ -33,14 +37,14 @@ def limited(commands, limits=LIMITS):
 def joint_faults(commands):
     monitor = JointMonitor(LIMITS.joint)
     monitor.reset(commands[0].q.tolist())
-    return {fault for command in commands for fault in monitor.step(command.q.tolist())}
+    return {fault for command in commands for fault in rci_faults(monitor.step(command.q.tolist()))}
 
 
 def tool_faults(commands, limits):
     monitor = CartesianMonitor(limits)
     monitor.reset(Pose.from_matrix(commands[0].T_base_tool), commands[0].psi)
     return {
-        fault for c in commands for fault in monitor.step(Pose.from_matrix(c.T_base_tool), c.psi)
+        fault for c in commands for fault in rci_faults(monitor.step(Pose.from_matrix(c.T_base_tool), c.psi))
     }  # fmt: skip
 
 
@@ -151,5 +155,5 @@ def test_a_line_inside_the_limits_passes_unchanged():
 def test_torques_keep_their_rate_and_start_at_zero():
     sent = limited([JointTorque(np.full(7, 10.0))] * 20)
     monitor = TorqueMonitor(LIMITS.joint)
-    assert all(monitor.step(c.tau.tolist()) == () for c in sent)
+    assert all(monitor.step(c.tau.tolist()) == [] for c in sent)
     assert np.array_equal(sent[-1].tau, np.full(7, 10.0))

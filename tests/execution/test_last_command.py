@@ -8,8 +8,8 @@ import pytest
 import rcilab
 from rcilab.core.command import CartesianPosition, JointPosition
 from rcilab.core.errors import ControlError, InvalidValueError
-from rcilab.core.faults import Fault
 from rcilab.makers.rokae import wire as rci
+from rcilab.makers.rokae.faults import Fault
 from tests.execution.peer import Script, wave
 
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rcilab.conformance import check
+from rcilab.conformance.check import check
 from rcilab.control_process.simulate import simulate
 from rcilab.core.command import CartesianPosition, JointPosition, JointTorque
 from rcilab.core.errors import CertificateError, ConformanceError, ControlError, InvalidValueError, PlanningError
-from rcilab.core.faults import Fault
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
+from rcilab.makers.rokae.faults import Fault
 from rcilab.model.robot_model import load_model
 from rcilab.motion import plan_joint
 from rcilab.motion.cartesian import schedule

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rcilab.conformance import JointMonitor
+from rcilab.conformance.monitor import JointMonitor
 from rcilab.core.command import JointTorque
 from rcilab.execution.stop_planner import StreamStopPlanner, TorqueStopPlanner
 from rcilab.model.robot_model import load_model
@@ -31,7 +31,7 @@ def test_a_stop_from_anywhere_in_a_motion_breaks_no_condition(seed, share, speed
     monitor = JointMonitor(LIMITS)
     monitor.reset(start.tolist())
     for row in [*rows[:count], *way, way[-1], way[-1], way[-1]]:
-        assert monitor.step(row.tolist()) == ()
+        assert monitor.step(row.tolist()) == []
 
 
 def test_missing_samples_do_not_look_like_speed():

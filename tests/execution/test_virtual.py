@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rcilab.conformance import check
+from rcilab.conformance.check import check
 from rcilab.control_process.launch import start_controller
 from rcilab.control_process.simulate import simulate
 from rcilab.core.command import CartesianPosition, JointPosition, JointTorque
@@ -24,12 +24,12 @@ from rcilab.core.errors import (
     PlanningError,
     UsageError,
 )
-from rcilab.core.faults import Fault
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.core.state import RobotMode
 from rcilab.execution import connect
 from rcilab.makers.rokae.controller.state_machine import QUERIES, Phase, transition
+from rcilab.makers.rokae.faults import Fault
 from rcilab.makers.rokae.wire import CommandCode, RecoveryStatus, SafetyStop, SettingStatus
 from rcilab.makers.rokae.wire.statuses import WHILE_MOVING
 from rcilab.model.robot_model import load_model

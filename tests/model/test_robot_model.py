@@ -27,7 +27,7 @@ def test_every_limit_has_a_source(name):
         values = getattr(limits, group)
         for bound in values.__slots__ if values is not None else ():
             assert limits.source(f"{group}.{bound}")
-    place = {"RCI": "RCI user manual V1.3.1, 4.4", "FCI": "Franka's page"}[model.description.interface]
+    place = {"rokae": "RCI user manual V1.3.1, 4.4", "franka": "Franka's page"}[model.description.maker]
     assert place in limits.source("joint.velocity")
 
 

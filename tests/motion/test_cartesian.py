@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import rcilab
-from rcilab.conformance import check
+from rcilab.conformance.check import check
 from rcilab.core.errors import InvalidValueError, PlanningError
 from rcilab.core.spatial import Pose
 from rcilab.model.robot_model import load_model

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from rcilab.conformance import check
 from rcilab.conformance.cartesian_monitor import CartesianMonitor
+from rcilab.conformance.check import check
 from rcilab.core.errors import PlanningError
 from rcilab.core.spatial import Pose
 from rcilab.model.robot_model import load_model
@@ -53,7 +53,7 @@ def require_allowed(model, motion, speed):
     monitor = CartesianMonitor(model.limits)
     monitor.reset(model.forward(motion.q[0]), angles(model, motion.q[0]))
     for q in [*motion.q, *[motion.q[-1]] * 3]:
-        assert monitor.step(model.forward(q), angles(model, q)) == (), monitor.broken()
+        assert monitor.step(model.forward(q), angles(model, q)) == [], monitor.broken()
     times = np.linspace(0.0, motion.duration, 7 * len(motion))
     joint = model.limits.joint
     for order, bound in ((1, speed * joint.velocity), (2, speed * joint.acceleration), (3, joint.jerk)):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rcilab.conformance import check
+from rcilab.conformance.check import check
 from rcilab.conformance.speed_scaling_check import plan_pace, plan_start
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError, PlanningError

@@ -14,9 +14,9 @@ import pytest
 import rcilab
 from rcilab import notebook
 from rcilab.app.fault_lab import FaultDemo
-from rcilab.core.faults import Fault
 from rcilab.i18n.locale import LANGUAGES
 from rcilab.i18n.translator import load_face
+from rcilab.makers.rokae.faults import Fault
 from rcilab.notebook.kernel_reachability import KernelReachability
 from tests.processes import processes
 from tests.waiting import wait_for

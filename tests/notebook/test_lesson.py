@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rcilab.conformance import check
+from rcilab.conformance.check import check
 from rcilab.core.cycle_log import cycle_dtype
 from rcilab.model.robot_model import load_model
 from rcilab.motion import plan_joint

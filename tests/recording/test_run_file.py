@@ -13,7 +13,7 @@ import pytest
 import rcilab
 from rcilab.core.cycle_log import cycle_dtype
 from rcilab.core.errors import InvalidValueError, UsageError, VersionMismatchError
-from rcilab.core.faults import Fault
+from rcilab.makers.rokae.faults import Fault
 from rcilab.recording.chunks import MAGIC, encode_block, encode_header
 from rcilab.recording.export import export_run
 from rcilab.recording.live import LiveRecording, RunFacts

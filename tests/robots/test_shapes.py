@@ -7,13 +7,14 @@ import pytest
 
 from rcilab.core.arrays import Array
 from rcilab.core.spatial import Pose
-from rcilab.robots import RCI_ROBOT_NAMES, ROBOT_NAMES, describe_robot
+from rcilab.makers.rokae.robots import ROBOTS
+from rcilab.robots import ROBOT_NAMES, describe_robot
 from rcilab.robots.mesh import Mesh
 from rcilab.robots.shapes import LinkShape, build_shapes
 from rcilab.robots.upright import upright_joints
 
 arms = pytest.mark.parametrize("name", ROBOT_NAMES)
-xmates = pytest.mark.parametrize("name", RCI_ROBOT_NAMES)
+xmates = pytest.mark.parametrize("name", ROBOTS)
 
 
 def shell(shape: LinkShape) -> Mesh:

@@ -21,10 +21,10 @@ from rcilab.app.program.program_draft import Draft, number_at
 from rcilab.app.store import Store, UiState
 from rcilab.app.text import Text
 from rcilab.app.view_actions import PLOTS
-from rcilab.conformance import CONDITIONS
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.i18n.units import Units
+from rcilab.makers.rokae.conditions import RCI_CONDITIONS
 from rcilab.model.robot_model import load_model
 from rcilab.motion import Program, Waypoint
 from rcilab.workbench.panels.check import CheckPanel
@@ -241,7 +241,7 @@ def test_what_only_allows_for_rounding_is_0_and_the_verdict_counts_conditions_as
 
 
 def test_every_row_of_a_joint_or_the_tool_has_a_plot() -> None:
-    found = {plot_of(row) for row in CONDITIONS} - {None}
+    found = {plot_of(row) for row in RCI_CONDITIONS.conditions} - {None}
     assert found <= set(PLOTS)
     assert found >= {"q", "dq", "ddq", "jerk", "tau", "speed", "acceleration", "psi"}
 

@@ -19,8 +19,8 @@ from rcilab.app.learn.lessons import LESSONS
 from rcilab.app.run.recording import Recording
 from rcilab.app.store import Store, UiState
 from rcilab.app.text import LANGUAGES, Text, load_catalogue
-from rcilab.core.faults import Fault
 from rcilab.i18n.units import Units
+from rcilab.makers.rokae.faults import Fault
 from rcilab.model.robot_model import load_model
 from rcilab.views.plots import build_frame, mark_moment, plan_curves
 from rcilab.workbench.panels.learn_lesson import steps_html

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rcilab.conformance import check
-from rcilab.conformance.conditions import CYCLE_CONDITIONS
+from rcilab.conformance.check import check
+from rcilab.makers.rokae.conditions import RCI_JOINT_CONDITIONS
 from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, plan_joint, plan_recovery
 from rcilab.views.plots import (
@@ -113,7 +113,9 @@ def test_the_number_of_series_never_changes(joint):
 
 def test_a_plan_is_drawn_as_it_is_checked():
     motion = plan_joint(MODEL, MODEL.home, MODEL.home + 0.3)
-    used = {row.condition.order: row.ratio for row in check(motion, MODEL).rows if row.condition in CYCLE_CONDITIONS}
+    used = {
+        row.condition.order: row.ratio for row in check(motion, MODEL).rows if row.condition in RCI_JOINT_CONDITIONS
+    }
     drawn = np.abs(plan_curves(motion, "jerk").values / LIMITS.jerk).max()
     assert drawn == pytest.approx(used[3], rel=1e-6)
 
@@ -121,7 +123,9 @@ def test_a_plan_is_drawn_as_it_is_checked():
 def test_what_is_worst_behind_the_end_is_drawn_at_the_end():
     whole = plan_joint(MODEL, MODEL.home, MODEL.home + 0.3)
     motion = Motion.from_cycles(whole.q[: len(whole.q) // 2])  # It ends at full speed: the arm cannot stop within 1 ms.
-    used = {row.condition.order: row.ratio for row in check(motion, MODEL).rows if row.condition in CYCLE_CONDITIONS}
+    used = {
+        row.condition.order: row.ratio for row in check(motion, MODEL).rows if row.condition in RCI_JOINT_CONDITIONS
+    }
     for quantity, bound in (("ddq", LIMITS.acceleration), ("jerk", LIMITS.jerk)):
         curves = plan_curves(motion, quantity)
         assert np.abs(curves.values / bound).max() == pytest.approx(used[ORDERS[quantity]], rel=1e-6)

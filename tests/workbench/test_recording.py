@@ -24,7 +24,7 @@ from rcilab.app.store import UiState
 from rcilab.app.text import Text
 from rcilab.app.view_actions import Seek
 from rcilab.core.errors import UsageError
-from rcilab.core.faults import Fault
+from rcilab.makers.rokae.faults import Fault
 from rcilab.model.robot_model import load_model
 from rcilab.recording.export import export_run
 from rcilab.recording.run_file import decode_run

@@ -18,9 +18,9 @@ from rcilab.app.text import Text
 from rcilab.control_process import SupervisorStatus
 from rcilab.control_process.status import MESSAGES, Incident
 from rcilab.core.errors import CertificateError, ConnectionLostError, ControlError, InvalidValueError, RcilabError
-from rcilab.core.faults import Fault
 from rcilab.core.state import RobotMode
 from rcilab.makers.rokae.driver.address import parse_address
+from rcilab.makers.rokae.faults import Fault
 from rcilab.sim.api import WorldStatus
 from rcilab.workbench.panels.health import health_html
 from rcilab.workbench.panels.status import status_values

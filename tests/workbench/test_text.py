@@ -13,12 +13,12 @@ import rcilab
 from rcilab.app.planning import LAWS
 from rcilab.app.text import LANGUAGES, Text, load_catalogue, message
 from rcilab.app.view_actions import QUALITIES
-from rcilab.conformance import CONDITIONS
 from rcilab.control_process.status import PHASES
 from rcilab.core.errors import InvalidValueError
-from rcilab.core.faults import Fault
 from rcilab.core.state import ControllerMode, RobotMode
 from rcilab.i18n.locale import load_words
+from rcilab.makers.rokae.conditions import RCI_CONDITIONS
+from rcilab.makers.rokae.faults import Fault
 from tests.catalogues import require_equal
 
 _ROOT = Path(rcilab.__file__).parent
@@ -53,7 +53,7 @@ def test_every_key_written_in_the_code_exists():
 
 def test_every_name_that_becomes_a_key_has_one():
     known = set(load_catalogue("en"))
-    wanted = [f"condition.{row.id}" for row in CONDITIONS]
+    wanted = [f"condition.{row.id}" for row in RCI_CONDITIONS.conditions]
     wanted += [f"fault.{fault.name}" for fault in Fault]
     wanted += [f"phase.{phase}" for phase in PHASES]
     wanted += [f"robot_mode.{mode.name}" for mode in RobotMode]

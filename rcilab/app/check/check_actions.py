@@ -22,7 +22,8 @@ from rcilab.core.errors import RcilabError
 
 if TYPE_CHECKING:
     from rcilab.app.planning import Plan
-    from rcilab.conformance import Condition, Report
+    from rcilab.conformance.report import Report
+    from rcilab.core.condition import Condition
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -10,7 +10,8 @@ from rcilab.app.text import Message
 if TYPE_CHECKING:
     from rcilab.app.planning import Plan
     from rcilab.app.program.program_draft import Draft
-    from rcilab.conformance import Report, SlowDown
+    from rcilab.conformance.report import Report
+    from rcilab.conformance.time_scaling import SlowDown
 
 Explained: TypeAlias = "tuple[Report, SlowDown | None]"
 """A report that is told in words, and the slow-down that belongs to them; a report that is ok has none."""

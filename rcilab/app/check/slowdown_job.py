@@ -13,7 +13,7 @@ from rcilab.core.background_job import ProgressCallback
 
 if TYPE_CHECKING:
     from rcilab.app.planning import PlannableLaw
-    from rcilab.conformance import SlowDown
+    from rcilab.conformance.time_scaling import SlowDown
 
 _TRIES = 2
 _FURTHER = 0.9
@@ -49,7 +49,7 @@ def slow_to_goal(plan: Plan, speed: float, law: PlannableLaw, tell: ProgressCall
 
 def slow_program(plan: Plan, draft: Draft, rounds: int, tell: ProgressCallback) -> SlowdownJob:
     """Returns the plan of the same program with every speed scaled by the largest factor that passes."""
-    from rcilab.conformance import check
+    from rcilab.conformance.check import check
     from rcilab.motion import plan_program
 
     drafts: dict[float, Draft] = {}

@@ -16,7 +16,7 @@ from rcilab.app.fault_lab.fault_demo import FaultDemo
 from rcilab.app.fault_lab.lab import FaultLab
 from rcilab.app.fault_lab.scenario import GROUPS, FaultScenario, Group
 from rcilab.app.fault_lab.table import FAULTS, FaultTable
-from rcilab.core.faults import Fault
+from rcilab.makers.rokae.faults import Fault
 
 __all__ = ["FAULTS", "GROUPS", "FaultDemo", "FaultLab", "FaultScenario", "FaultTable", "Group", "provoke"]
 

@@ -15,11 +15,11 @@ from rcilab.app.fault_lab.scenario import FaultScenario, Scene
 from rcilab.core.arrays import Array, readonly_copy
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.command import CartesianPosition, Command, JointPosition, JointTorque
-from rcilab.core.faults import Fault
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.core.state import RobotState
 from rcilab.execution.control_loop import Callback
+from rcilab.makers.rokae.faults import Fault
 
 LIVELY_ELBOW = tuple(radians(angle) for angle in (0.0, -28.6, 58.8, 56.4, -5.8, 113.8, 0.0))  # [rad]
 """Where the elbow may turn fastest for what the joints may do, so that the arm angle passes its bound before them."""

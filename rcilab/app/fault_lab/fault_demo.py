@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from rcilab.app.fault_lab.catalogue import say
 from rcilab.app.fault_lab.scenario import FaultScenario
 from rcilab.app.fault_lab.signals import Signal
-from rcilab.conformance.condition import Condition
 from rcilab.conformance.explain import explain_formula, explain_source
 from rcilab.core.arrays import Array, JointVector, readonly_copy
-from rcilab.core.faults import Fault
+from rcilab.core.condition import Condition
 from rcilab.core.limits import Limits
 from rcilab.i18n.locale import Language
 from rcilab.makers.rokae.controller.fault_stop import FAULT_STOP, FaultSource
+from rcilab.makers.rokae.faults import Fault
 from rcilab.model.robot_model import RobotModel
 
 if TYPE_CHECKING:

@@ -18,7 +18,6 @@ from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.closeable import Closeable
 from rcilab.core.command import Command
 from rcilab.core.errors import CommandRejectedError, ControlError, RcilabError, UsageError
-from rcilab.core.faults import Fault, find_fault
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import IDENTITY
 from rcilab.core.state import RobotState
@@ -26,6 +25,7 @@ from rcilab.execution.control_loop import Callback
 from rcilab.execution.motion_callback import follow
 from rcilab.execution.recorder import CycleLog, Recorder
 from rcilab.execution.session import RobotSession
+from rcilab.makers.rokae.faults import Fault, find_fault
 from rcilab.model.robot_model import RobotModel, load_model
 from rcilab.motion import plan_joint
 

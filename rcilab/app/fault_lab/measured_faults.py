@@ -10,9 +10,9 @@ from rcilab.app.fault_lab.command_faults import LIVELY_ELBOW, box_around_tool, s
 from rcilab.app.fault_lab.scenario import FaultScenario, Scene
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.command import CartesianPosition, JointPosition
-from rcilab.core.faults import Fault
 from rcilab.core.state import RobotState
 from rcilab.execution.control_loop import Callback
+from rcilab.makers.rokae.faults import Fault
 from rcilab.sim.api import NetworkFaults
 
 _PAUSE = 20  # [cycles] of standing still before; a choice.

@@ -7,7 +7,7 @@ import threading
 from rcilab.app.fault_lab.fault_demo import FaultDemo
 from rcilab.app.fault_lab.lab import FaultLab
 from rcilab.core.background_job import ProgressCallback
-from rcilab.core.faults import Fault
+from rcilab.makers.rokae.faults import Fault
 
 IDLE_TIME = 60.0  # [s] A tuning value: starting a controller takes two seconds, keeping one 8 % of a core.
 

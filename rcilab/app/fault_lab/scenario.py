@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
 
-from rcilab.conformance.measured_conditions import yielding_limits
+from rcilab.conformance.common_conditions import yielding_limits
 from rcilab.core.arrays import JointVector, readonly_copy
-from rcilab.core.faults import Fault
 from rcilab.core.limits import Limits
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.state import Mode, RobotState
 from rcilab.execution.control_loop import Callback
+from rcilab.makers.rokae.faults import Fault
 
 if TYPE_CHECKING:
     from rcilab.execution.session import RobotSession

@@ -11,15 +11,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rcilab.conformance.condition import Condition
-from rcilab.conformance.conditions import explain_fault
-from rcilab.conformance.measured_conditions import ACCELERATION_CUTOFF
+from rcilab.conformance.common_conditions import ACCELERATION_CUTOFF
 from rcilab.conformance.tool_signals import turns
 from rcilab.core.arrays import Array
 from rcilab.core.clock import CYCLE_TIME
-from rcilab.core.faults import Fault
+from rcilab.core.condition import Condition
 from rcilab.core.limits import Limits
 from rcilab.core.safety_box import SafetyBox
+from rcilab.makers.rokae.conditions import RCI_CONDITIONS
+from rcilab.makers.rokae.faults import Fault
 from rcilab.model.kinematics.closed_form import build_closed_form
 from rcilab.model.robot_model import RobotModel
 from rcilab.sim.momentum_observer import MomentumObserver
@@ -86,7 +86,7 @@ class Signals:
 
     def find(self, fault: Fault) -> Signal | None:
         """Returns the signal that raised a fault: the one farthest past its bound in the last row."""
-        found = [signal for row in explain_fault(fault) for signal in self._signals(row) if signal.is_broken]
+        found = [signal for row in RCI_CONDITIONS.raising(fault) for signal in self._signals(row) if signal.is_broken]
         return max(found, key=lambda signal: signal.excess, default=None)
 
     def _signals(self, condition: Condition) -> list[Signal]:

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from rcilab.app.fault_lab.command_faults import COMMAND_RECIPES
 from rcilab.app.fault_lab.measured_faults import ARM_RECIPES
 from rcilab.app.fault_lab.scenario import GROUPS, FaultScenario, Group
-from rcilab.core.faults import Fault
+from rcilab.makers.rokae.faults import Fault
 
 
 class FaultTable(Mapping[Fault, FaultScenario]):

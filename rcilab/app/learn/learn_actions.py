@@ -22,7 +22,7 @@ from rcilab.app.store import Store
 from rcilab.app.text import message
 from rcilab.core.background_job import BackgroundJob
 from rcilab.core.errors import RcilabError
-from rcilab.core.faults import Fault
+from rcilab.makers.rokae.faults import Fault
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from rcilab.app.run.recording import Recording
 from rcilab.app.text import Message
 from rcilab.core.clock import CYCLE_TIME
-from rcilab.core.faults import Fault
+from rcilab.makers.rokae.faults import Fault
 
 if TYPE_CHECKING:
     from rcilab.app.fault_lab.demo_motion import DemoMotion

@@ -37,7 +37,7 @@ class Job:
 
 def plan_job(job: Job, tell: ProgressCallback) -> Plan:
     """Returns the plan of a program."""
-    from rcilab.conformance import check
+    from rcilab.conformance.check import check
     from rcilab.motion import plan_program
 
     motion = plan_program(

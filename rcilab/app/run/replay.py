@@ -10,7 +10,7 @@ import numpy as np
 from rcilab.app.goal.goal import goal_at
 from rcilab.app.planning import build_plan_view
 from rcilab.app.run.run_recorder import whole_recording
-from rcilab.conformance import check
+from rcilab.conformance.check import check
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import UsageError
 from rcilab.makers.rokae.driver.configuration import RobotConfiguration

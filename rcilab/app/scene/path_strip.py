@@ -11,7 +11,7 @@ from rcilab.app.planning import Plan, sampled_rows
 from rcilab.core.arrays import Array
 
 if TYPE_CHECKING:
-    from rcilab.conformance import Report, Violation
+    from rcilab.conformance.report import Report, Violation
 
 MOST_BEADS = 24
 """A choice: more hide the path; the worst are kept."""

@@ -11,13 +11,13 @@ import numpy as np
 
 from rcilab.conformance.check import check
 from rcilab.conformance.clearance_path import clearance_path
-from rcilab.conformance.conditions import MOTION_CONDITIONS
 from rcilab.core.arrays import Array
 from rcilab.core.clearance import ADVISED_DISTANCE
 from rcilab.core.errors import UnreachableError
 from rcilab.core.spatial import Pose
 from rcilab.diagnostics.bench.fastest import fastest_straight, slowest_alone
 from rcilab.diagnostics.bench.measure import Measurement, cost_by_length, summarise, time_calls
+from rcilab.makers.rokae.conditions import RCI_CONDITIONS
 from rcilab.model.kinematics.collision import ClearanceQuery
 from rcilab.model.robot_model import RobotModel, load_model
 from rcilab.motion.joint import plan_joint
@@ -172,7 +172,7 @@ def bench_check_joint_rows() -> Measurement:
     """The judgement of a 7-joint motion of 10 s by the conditions on joint angles alone."""
     model = load_model(_ROBOT)
     judge = check(motion_of(model, 1.0), model, distance=None).judge
-    rows = tuple(row for row in MOTION_CONDITIONS if row.signal == "joint")
+    rows = tuple(row for row in RCI_CONDITIONS.motion if row.signal == "joint")
     return _bench_check("check_joint_rows", lambda motion: judge(motion, rows), model, 5.0)
 
 

@@ -10,7 +10,7 @@ from rcilab.i18n.shown import value_against_bound
 from rcilab.workbench.widgets import esc
 
 if TYPE_CHECKING:
-    from rcilab.conformance import ConditionResult, Report
+    from rcilab.conformance.report import ConditionResult, Report
     from rcilab.model.robot_model import RobotModel
 
 TIGHT = 0.95  # A choice: from this share of a bound on, a row is amber.

@@ -8,7 +8,7 @@ from rcilab.app.run.drive_state import NETWORK_LAB, is_ours
 from rcilab.app.run.world_actions import PressSafety, SetNetwork
 from rcilab.app.text import Text
 from rcilab.control_process.status_messages import tell_success
-from rcilab.core.faults import name_faults
+from rcilab.core.fault import name_faults
 from rcilab.i18n.error_messages import tell_note
 from rcilab.sim.api import DIRECTIONS
 from rcilab.workbench.widgets import Ask, BoundControl, Html, esc, on_press

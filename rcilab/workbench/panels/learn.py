@@ -12,7 +12,7 @@ from rcilab.workbench.widgets import Ask, Html, esc, on_press
 if TYPE_CHECKING:
     from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
-    from rcilab.core.faults import Fault
+    from rcilab.makers.rokae.faults import Fault
 
 
 class LearnPanel:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from rcilab.app.run.drive_state import destination
 from rcilab.app.text import Text
-from rcilab.core.faults import name_faults
+from rcilab.core.fault import name_faults
 from rcilab.i18n.translator import Finished
 from rcilab.workbench.widgets import esc
 

@@ -19,7 +19,7 @@ from rcilab.app.run.readiness import (
 )
 from rcilab.app.run.run_actions import RobotCommand
 from rcilab.app.text import Text
-from rcilab.core.faults import name_faults
+from rcilab.core.fault import name_faults
 from rcilab.motion.speed_scaling import SLOWEST_PACE
 from rcilab.workbench.panels.outcome import outcome_html, way_html
 from rcilab.workbench.panels.target import planned_html

@@ -10,7 +10,7 @@ from rcilab.app.run.played_motion import played_at
 from rcilab.app.run.readiness import is_moving, time_shown
 from rcilab.app.status_text import phase_code, tell_status
 from rcilab.app.text import Text
-from rcilab.core.faults import name_faults
+from rcilab.core.fault import name_faults
 
 if TYPE_CHECKING:
     from rcilab.app.store import UiState

@@ -12,8 +12,8 @@ from rcilab.app import fault_lab
 from rcilab.app.fault_lab.catalogue import load_catalogue
 from rcilab.app.fault_lab.fault_demo import script
 from rcilab.core.errors import InvalidValueError, UsageError
-from rcilab.core.faults import Fault, find_fault
 from rcilab.i18n.locale import LANGUAGES
+from rcilab.makers.rokae.faults import Fault, find_fault
 from tests.catalogues import require_equal
 
 BY_POSE = sorted(Fault, key=lambda fault: (fault_lab.FAULTS[fault].pose or (), fault))

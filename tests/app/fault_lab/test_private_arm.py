@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rcilab.app.fault_lab.private_arm import PrivateArm
-from rcilab.core.faults import Fault
+from rcilab.makers.rokae.faults import Fault
 from tests.processes import processes
 from tests.waiting import wait_for
 

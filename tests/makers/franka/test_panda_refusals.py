@@ -7,18 +7,20 @@ import pytest
 import rcilab
 from rcilab.control_process.supervisor import Supervisor
 from rcilab.core.errors import ModelError
+from rcilab.makers.maker import require_driver
 from rcilab.makers.rokae.controller.config import ControllerConfig
 from rcilab.makers.rokae.controller.server import ControllerServer
-from rcilab.model.robot_model import load_model, require_rci
-from rcilab.robots import RCI_ROBOT_NAMES, ROBOT_NAMES
+from rcilab.makers.rokae.robots import ROBOTS
+from rcilab.model.robot_model import load_model
+from rcilab.robots import ROBOT_NAMES
 
 PANDA = load_model("panda")
 REFUSED = pytest.raises(ModelError, match=r"Panda is driven by Franka's own interface.*xMatePro3, xMatePro7, xMate3")
 
 
 def test_all_arms_but_the_panda_speak_the_rci():
-    assert set(ROBOT_NAMES) - set(RCI_ROBOT_NAMES) == {"Panda"}
-    assert all(require_rci(load_model(name)).name == name for name in RCI_ROBOT_NAMES)
+    assert set(ROBOT_NAMES) - set(ROBOTS) == {"Panda"}
+    assert all(require_driver(load_model(name)).name == name for name in ROBOTS)
 
 
 def test_a_panda_is_neither_simulated_nor_connected_nor_supervised():

@@ -12,9 +12,10 @@ from hypothesis import strategies as st
 from rcilab.core.clearance import ClearanceLimit
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.spatial import Pose
+from rcilab.makers.rokae.robots import ROBOTS
 from rcilab.model.kinematics.collision import FLOOR, TOOL, ClearanceQuery
 from rcilab.model.robot_model import RobotModel, load_model
-from rcilab.robots import RCI_ROBOT_NAMES, ROBOT_NAMES
+from rcilab.robots import ROBOT_NAMES
 from rcilab.robots.shapes import build_shapes
 from rcilab.robots.upright import upright_joints
 from rcilab.robots.urdf import build_urdf
@@ -142,7 +143,7 @@ def test_no_point_moves_farther_than_the_joints_turn_times_their_levers(name, to
         assert abs(ask(start + step)[0] - ask(start)[0]) <= bound + 1e-9
 
 
-@pytest.mark.parametrize("name", RCI_ROBOT_NAMES)
+@pytest.mark.parametrize("name", ROBOTS)
 def test_each_lever_is_reached_by_no_less_than_a_tenth_of_it_short(name: str) -> None:
     model = load_model(name)
     geometry = model.collision_geometry()

@@ -5,8 +5,9 @@ import pytest
 
 from rcilab.core.errors import InvalidValueError, KinematicsError, SingularError
 from rcilab.core.spatial import Pose
+from rcilab.makers.rokae.robots import ROBOTS
 from rcilab.model.robot_model import load_model
-from rcilab.robots import RCI_ROBOT_NAMES, ROBOT_NAMES
+from rcilab.robots import ROBOT_NAMES
 
 TOOL = Pose.from_rpy((0.03, -0.02, 0.12), (0.3, -0.4, 0.5))
 
@@ -16,7 +17,7 @@ def configurations(model, count=50, seed=7):
     return np.random.default_rng(seed).uniform(limits.lower, limits.upper, (count, model.n))
 
 
-@pytest.mark.parametrize("name", RCI_ROBOT_NAMES)
+@pytest.mark.parametrize("name", ROBOTS)
 def test_at_zero_the_arm_stands_upright(name):
     model = load_model(name)
     height = {"3": 1.3518, "7": 1.5295}[name[-1]]

@@ -9,9 +9,10 @@ from hypothesis import strategies as st
 
 from rcilab.core.errors import InvalidValueError, UnreachableError
 from rcilab.core.spatial import Pose
+from rcilab.makers.rokae.robots import ROBOTS
 from rcilab.model.kinematics.inverse import build_geometry, inverse_seven, inverse_six
 from rcilab.model.robot_model import load_model
-from rcilab.robots import RCI_ROBOT_NAMES, ROBOT_NAMES
+from rcilab.robots import ROBOT_NAMES
 
 POSES_PER_ARM = 2500  # 10 000 over the four arms.
 TOLERANCE = 1e-9  # [m] and rotation elements.
@@ -22,7 +23,7 @@ def random_configurations(model, count, seed):
     return np.random.default_rng(seed).uniform(limits.lower, limits.upper, (count, model.n))
 
 
-@pytest.mark.parametrize("name", RCI_ROBOT_NAMES)
+@pytest.mark.parametrize("name", ROBOTS)
 def test_every_one_of_eight_branches_gives_the_pose_back(name):
     model = load_model(name)
     for q in random_configurations(model, POSES_PER_ARM, seed=1):
@@ -69,7 +70,7 @@ SINGULAR = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", RCI_ROBOT_NAMES)
+@pytest.mark.parametrize("name", ROBOTS)
 def test_a_singular_pose_gives_the_solution_nearest_to_where_the_arm_is(name):
     model = load_model(name)
     for q in SINGULAR[model.n]:

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from rcilab.core.errors import InvalidValueError, UnreachableError
 from rcilab.core.spatial import Pose
+from rcilab.makers.rokae.robots import ROBOTS
 from rcilab.model.robot_model import RobotModel, load_model
-from rcilab.robots import RCI_ROBOT_NAMES
 
 TOOL = Pose.from_rpy((0.03, -0.02, 0.12), (0.3, -0.4, 0.5))
 CLEAR = 0.01  # Sine of the angles at which axes line up: from here on rounding costs at most two digits.
@@ -45,7 +45,7 @@ def scalar_branches(model, T, psi):
     return np.array(inverse_seven(geometry, pose, psi, None) if model.n == 7 else inverse_six(geometry, pose, None))
 
 
-@pytest.mark.parametrize("name", RCI_ROBOT_NAMES)
+@pytest.mark.parametrize("name", ROBOTS)
 @settings(max_examples=25)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_every_branch_is_that_of_the_scalar_inverse(name, seed):
@@ -64,7 +64,7 @@ def test_every_branch_is_that_of_the_scalar_inverse(name, seed):
     assert compared > 20
 
 
-@pytest.mark.parametrize("name", RCI_ROBOT_NAMES)
+@pytest.mark.parametrize("name", ROBOTS)
 def test_every_branch_puts_the_tool_at_its_pose(name):
     model = load_model(name, tool=TOOL)
     q = configurations(model, 3000, seed=1)  # More than one block.
@@ -84,7 +84,7 @@ def psi_of(model, q):
     return model.arm_angle(q) if model.n == 7 else None
 
 
-@pytest.mark.parametrize("name", RCI_ROBOT_NAMES)
+@pytest.mark.parametrize("name", ROBOTS)
 def test_singular_poses_are_answered_as_the_scalar_inverse_does(name):
     model = load_model(name)
     q = configurations(model, 60, seed=2)
@@ -96,7 +96,7 @@ def test_singular_poses_are_answered_as_the_scalar_inverse_does(name):
     np.testing.assert_allclose(around(found.q[45] - scalar_branches(model, T[45], 0.3)), 0.0, atol=1e-12)
 
 
-@pytest.mark.parametrize("name", RCI_ROBOT_NAMES)
+@pytest.mark.parametrize("name", ROBOTS)
 def test_a_pose_out_of_reach_is_no_number_and_the_others_do_not_care(name):
     model = load_model(name)
     T = np.tile(model.forward(model.home).matrix, (5, 1, 1))

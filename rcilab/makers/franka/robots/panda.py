@@ -15,6 +15,8 @@ import numpy as np
 
 from rcilab.core.arrays import readonly_copy
 from rcilab.core.limits import ArmAngleLimits, CartesianLimits, JointLimits, Limits
+from rcilab.makers.franka.conditions import fci_conditions
+from rcilab.makers.franka.errors import FrankaError
 from rcilab.robots.description import CraigRow, Link, RobotDescription, Rod, rows_from_craig
 
 SPECIFICATION = "Franka's page Robot and interface specifications (Panda)"
@@ -150,7 +152,9 @@ _RODS = (
 
 DESCRIPTION = RobotDescription(
     name="Panda",
-    interface="FCI",
+    maker="franka",
+    faults=FrankaError,
+    conditions=fci_conditions,
     elbow_flip=ELBOW_FLIP,
     dh=rows_from_craig(CRAIG),
     dh_source=f"{SPECIFICATION}, Denavit-Hartenberg parameters (Craig's convention), written as standard rows",

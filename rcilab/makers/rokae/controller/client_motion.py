@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rcilab.conformance import LimitTable
 from rcilab.core.clock import CYCLE_TIME
-from rcilab.core.faults import Fault
 from rcilab.i18n.translator import Remark
 from rcilab.makers.rokae.controller.actuator import ControlLaw
 from rcilab.makers.rokae.controller.arm import Arm
@@ -16,6 +14,8 @@ from rcilab.makers.rokae.controller.modes.generator import GeneratorOutput, Moti
 from rcilab.makers.rokae.controller.modes.motion_limits import build_terms
 from rcilab.makers.rokae.controller.modes.start import start_tolerance
 from rcilab.makers.rokae.controller.settings import Settings
+from rcilab.makers.rokae.faults import Fault
+from rcilab.makers.rokae.limit_tables import LimitTable
 
 PREFILL = 10  # [cycles] Pauses of client and network that a motion survives unharmed, and its delay. Both ends on one
 # busy machine, even under SCHED_FIFO, were measured to pause for 5 to 10 ms now and then.

@@ -13,10 +13,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from rcilab.conformance import LimitTable
 from rcilab.core.arrays import JointVector
 from rcilab.core.errors import InvalidValueError
-from rcilab.core.faults import Fault
 from rcilab.core.state import ControllerMode, MotionGeneratorMode, RobotState
 from rcilab.i18n.translator import Remark
 from rcilab.makers.rokae import wire as rci
@@ -35,6 +33,8 @@ from rcilab.makers.rokae.controller.request_handlers import (
 )
 from rcilab.makers.rokae.controller.settings import apply_request, default_settings
 from rcilab.makers.rokae.controller.state_machine import Action, Event, Phase, Transition, transition
+from rcilab.makers.rokae.faults import Fault
+from rcilab.makers.rokae.limit_tables import LimitTable
 from rcilab.model.robot_model import RobotModel
 from rcilab.sim.plant import Plant
 

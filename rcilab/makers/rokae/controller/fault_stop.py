@@ -17,7 +17,7 @@ from __future__ import annotations
 from enum import Enum
 from typing import Final, NamedTuple
 
-from rcilab.core.faults import Fault
+from rcilab.makers.rokae.faults import Fault
 
 
 class FaultSource(Enum):

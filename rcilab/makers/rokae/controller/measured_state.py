@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from operator import gt
 
+from rcilab.conformance.common_conditions import yielding_limits
 from rcilab.conformance.limit_violation import describe_breaches
-from rcilab.conformance.measured_conditions import yielding_limits
 from rcilab.conformance.measured_monitor import MeasuredMonitor
-from rcilab.core.faults import Fault
 from rcilab.core.limits import Limits
 from rcilab.core.safety_box import EntryBox, SafetyBox
 from rcilab.i18n.translator import Remark
+from rcilab.makers.rokae.conditions import rci_faults
+from rcilab.makers.rokae.faults import Fault
 from rcilab.model.robot_model import RobotModel
 from rcilab.sim.momentum_observer import MomentumObserver
 from rcilab.sim.plant import Measurement
@@ -99,8 +100,9 @@ class MeasuredStateMonitor:
         assert monitor is not None
         twist, psi = (tool.twist, tool.psi) if self._judges_tool and is_commanded else (None, None)
         position = tool.position if monitor.has_box else _ANYWHERE
-        faults = monitor.step(self._q, self._dq, position, twist, psi)
-        reasons = [describe_breaches(monitor.broken())] if faults else []
+        breaches = monitor.step(self._q, self._dq, position, twist, psi)
+        faults = rci_faults(breaches) if breaches else ()
+        reasons = [describe_breaches(breaches)] if breaches else []
         collision = self.find_collision(self._thresholds)
         if collision is not None:
             faults = (*faults, Fault.COLLISION)

@@ -28,12 +28,12 @@ import numpy as np
 
 from rcilab.core.arrays import Array, JointVector, make_readonly, readonly_copy, scalar
 from rcilab.core.clock import CYCLE_TIME
-from rcilab.core.faults import Fault
 from rcilab.core.reported_pose import ReportedPose
 from rcilab.core.spatial import Rotation9
 from rcilab.core.state import ControllerMode, MotionGeneratorMode, RobotMode, RobotState, build_state
 from rcilab.makers.rokae.controller.force_frame import ForceAxes
 from rcilab.makers.rokae.controller.settings import Settings
+from rcilab.makers.rokae.faults import Fault
 from rcilab.model.robot_model import RobotModel
 from rcilab.sim.drive_report import DriveReport
 from rcilab.sim.plant import Measurement

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from rcilab.conformance.measured_conditions import ANGLE_ALLOWANCE, BOX_ALLOWANCE
+from rcilab.conformance.common_conditions import ANGLE_ALLOWANCE, BOX_ALLOWANCE
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.safety_box import active_box
 from rcilab.core.state import ControllerMode

@@ -19,8 +19,9 @@ from collections.abc import Callable
 
 from rcilab.core.clock import CYCLE_TIME, SystemClock
 from rcilab.core.errors import UsageError
-from rcilab.core.faults import Fault, name_faults
+from rcilab.core.fault import FaultCode, name_faults
 from rcilab.i18n.translator import Remark
+from rcilab.makers.maker import require_simulator
 from rcilab.makers.rokae.controller.config import ControllerConfig
 from rcilab.makers.rokae.controller.cycle import ControlCycle
 from rcilab.makers.rokae.controller.endpoint import (
@@ -38,8 +39,9 @@ from rcilab.makers.rokae.controller.environment import Environment, ServerCounte
 from rcilab.makers.rokae.controller.faulty_network import FaultyNetwork
 from rcilab.makers.rokae.controller.request_queue import RequestQueue
 from rcilab.makers.rokae.controller.state_machine import Event, Phase
+from rcilab.makers.rokae.faults import Fault
 from rcilab.makers.rokae.wire import COMMAND_SIZE, decode_command
-from rcilab.model.robot_model import load_model, require_rci
+from rcilab.model.robot_model import load_model
 from rcilab.realtime.cpu_latency import CpuLatencyLock
 from rcilab.realtime.scheduling import enter_realtime, leave_realtime
 from rcilab.sim.clock_stalls import StallSchedule
@@ -88,7 +90,7 @@ class ControllerServer:
         log: Callable[[str], None] | None = None,
     ) -> None:
         self.config = config
-        model = require_rci(load_model(config.model))
+        model = require_simulator(load_model(config.model))
         self._plant = plant if plant is not None else build_plant(config.plant, model)
         self.cycle = ControlCycle(
             model,
@@ -350,7 +352,7 @@ class ControllerServer:
         if state.faults != self._told:
             self._tell_faults(state.faults)
 
-    def _tell_faults(self, faults: tuple[Fault, ...]) -> None:
+    def _tell_faults(self, faults: tuple[FaultCode, ...]) -> None:
         """Says why error bits were set, whoever set them: a condition, somebody at the world port, a request."""
         self._told = faults
         if faults:

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from typing import TypeAlias
 
 from rcilab.core.errors import ModelError
-from rcilab.robots import RCI_ROBOT_NAMES, DhRow, describe_robot
+from rcilab.makers.rokae.robots import ROBOTS
+from rcilab.robots import DhRow, describe_robot
 
 Lengths: TypeAlias = Sequence[Sequence[float]]
 """a and d of every joint, [m]."""
@@ -29,7 +30,7 @@ def identify_robot(dh: Sequence[float]) -> str:
     name = _find_name(served)
     if name is None:
         raise ModelError(
-            f"the robot is none of those known ({', '.join(RCI_ROBOT_NAMES)}): its DH lengths d are {_in_mm(served)} "
+            f"the robot is none of those known ({', '.join(ROBOTS)}): its DH lengths d are {_in_mm(served)} "
             "mm; say which model to use: connect(address, model=load_model(NAME))"
         )
     return name
@@ -78,7 +79,7 @@ def _served_lengths(dh: Sequence[float]) -> list[tuple[float, float]]:
 
 
 def _find_name(served: Lengths) -> str | None:
-    names = (name for name in RCI_ROBOT_NAMES if _agree(served, dh_lengths(describe_robot(name).dh), _LENGTH_TOLERANCE))
+    names = (name for name in ROBOTS if _agree(served, dh_lengths(describe_robot(name).dh), _LENGTH_TOLERANCE))
     return next(names, None)
 
 

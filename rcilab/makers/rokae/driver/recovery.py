@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 
 from rcilab.core.errors import DeadlineError
-from rcilab.core.faults import name_faults
+from rcilab.core.fault import name_faults
 from rcilab.makers.rokae.driver.commands import RciCommands
 from rcilab.makers.rokae.driver.connection import RciConnection
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from math import pi, radians
 
 from rcilab.core.arrays import readonly_copy
+from rcilab.makers.rokae.conditions import rci_conditions
+from rcilab.makers.rokae.faults import Fault
 from rcilab.makers.rokae.robots.xmate import MANUAL, ROS2, pro_heights, solid_link, tabled_link, xmate_limits
 from rcilab.robots.description import DhRow, RobotDescription
 
@@ -36,4 +38,7 @@ DESCRIPTION = RobotDescription(
     home=readonly_copy([radians(angle) for angle in (0, 30, 0, 60, 0, 90, 0)]),
     rated_payload=7.0,
     rated_payload_source="range the vendor's client accepts for setLoad",
+    maker="rokae",
+    faults=Fault,
+    conditions=rci_conditions,
 )

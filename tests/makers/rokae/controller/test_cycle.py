@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from rcilab.core.faults import Fault
 from rcilab.core.state import ControllerMode, MotionGeneratorMode, RobotMode
 from rcilab.makers.rokae import wire as rci
 from rcilab.makers.rokae.controller.state_machine import Event, Phase
+from rcilab.makers.rokae.faults import Fault
 from rcilab.model.robot_model import RobotModel
 from rcilab.motion.joint import plan_joint
 

@@ -7,12 +7,12 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from rcilab.core.faults import Fault
 from rcilab.core.spatial import Pose
 from rcilab.core.state import RobotMode, RobotState
 from rcilab.makers.rokae import wire as rci
 from rcilab.makers.rokae.controller import fault_stop
 from rcilab.makers.rokae.controller.state_machine import Phase
+from rcilab.makers.rokae.faults import Fault
 from rcilab.motion.joint import plan_joint
 from tests.makers.rokae.controller.conftest import Hand
 

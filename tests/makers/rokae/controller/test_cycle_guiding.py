@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from rcilab.core.errors import InvalidValueError
-from rcilab.core.faults import Fault
 from rcilab.core.spatial import turn_between
 from rcilab.core.state import RobotMode
 from rcilab.makers.rokae import wire as rci
 from rcilab.makers.rokae.controller.state_machine import Event, Phase
+from rcilab.makers.rokae.faults import Fault
 
 PLANTS = pytest.mark.parametrize("plant", ["ideal", "mujoco"])
 JOINT, CARTESIAN = rci.DragSpace

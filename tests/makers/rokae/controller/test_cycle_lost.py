@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rcilab.core.faults import Fault
 from rcilab.makers.rokae import wire as rci
 from rcilab.makers.rokae.controller.jitter_buffer import FIRST_COMMAND_TIMEOUT
+from rcilab.makers.rokae.faults import Fault
 from rcilab.motion.joint import plan_joint
 from tests.makers.rokae.controller.conftest import smooth
 

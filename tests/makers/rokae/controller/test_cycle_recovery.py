@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from rcilab.core.faults import Fault
 from rcilab.core.state import RobotMode
 from rcilab.makers.rokae import wire as rci
 from rcilab.makers.rokae.controller.state_machine import Phase
+from rcilab.makers.rokae.faults import Fault
 from rcilab.motion.joint import plan_joint
 
 F = Fault

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import pytest
 
 from rcilab.core.clock import CYCLE_TIME, ManualClock
-from rcilab.core.faults import Fault
+from rcilab.makers.rokae.faults import Fault
 from rcilab.sim.cycle_timer import LONGEST_PATIENCE, CycleTimer
 from tests.makers.rokae.controller.conftest import Hand
 

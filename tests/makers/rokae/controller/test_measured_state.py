@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from rcilab.core.arrays import readonly_copy
-from rcilab.core.faults import Fault
 from rcilab.makers.rokae import wire as rci
 from rcilab.makers.rokae.controller.cycle import ControlCycle
+from rcilab.makers.rokae.faults import Fault
 from rcilab.model.robot_model import RobotModel
 from rcilab.sim.ideal_plant import IdealPlant
 from rcilab.sim.plant import Measurement, Setpoint

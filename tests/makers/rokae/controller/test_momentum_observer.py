@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from rcilab.core.spatial import Pose
+from rcilab.makers.rokae.robots import ROBOTS
 from rcilab.model.dynamics.payload import Payload
 from rcilab.model.dynamics.rigid_body import RigidBody
 from rcilab.model.robot_model import RobotModel, load_model
 from rcilab.motion import plan_joint
-from rcilab.robots import RCI_ROBOT_NAMES
 from rcilab.sim.ideal_plant import IdealPlant
 from rcilab.sim.momentum_observer import MomentumObserver
 from rcilab.sim.mujoco_plant import MuJoCoPlant
@@ -21,7 +21,7 @@ from rcilab.sim.plant import Drive, Measurement, Plant, Setpoint
 CYCLE = 0.001  # [s]
 Maker = Callable[[RobotModel], Plant]
 both = pytest.mark.parametrize("make", [IdealPlant, MuJoCoPlant], ids=["ideal", "mujoco"])
-arms = pytest.mark.parametrize("name", RCI_ROBOT_NAMES)
+arms = pytest.mark.parametrize("name", ROBOTS)
 LOAD = Payload(mass=2.0, center_of_mass=np.array([0.0, 0.0, 0.05]))
 
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rcilab.core.faults import Fault
 from rcilab.makers.rokae import wire as rci
 from rcilab.makers.rokae.controller.actuator import ControlLaw
 from rcilab.makers.rokae.controller.modes.start import StartOffset, start_tolerance
 from rcilab.makers.rokae.controller.settings import default_settings
+from rcilab.makers.rokae.faults import Fault
 from rcilab.model.robot_model import load_model
 
 MODEL = load_model("xMatePro7")

@@ -9,16 +9,16 @@ from rcilab.core.arrays import Array
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
+from rcilab.makers.rokae.robots import ROBOTS
 from rcilab.model.dynamics.payload import Payload
 from rcilab.model.robot_model import RobotModel, load_model
 from rcilab.motion import plan_joint
-from rcilab.robots import RCI_ROBOT_NAMES
 from rcilab.sim.mujoco_obstacles import MOST_BOXES
 from rcilab.sim.mujoco_plant import MuJoCoPlant
 from rcilab.sim.plant import Drive, Measurement, Plant, Setpoint
 
 CYCLE = 0.001  # [s]
-arms = pytest.mark.parametrize("name", RCI_ROBOT_NAMES)
+arms = pytest.mark.parametrize("name", ROBOTS)
 
 
 def hold(drive: Drive, q: Array) -> Setpoint:

@@ -19,11 +19,11 @@ import numpy as np
 import pytest
 
 from rcilab.core.errors import InvalidValueError, ModelError, UsageError
-from rcilab.core.faults import Fault
 from rcilab.core.state import ControllerMode, MotionGeneratorMode, RobotMode, RobotState
 from rcilab.makers.rokae import wire as rci
 from rcilab.makers.rokae.controller.config import ControllerConfig
 from rcilab.makers.rokae.controller.server import ControllerServer
+from rcilab.makers.rokae.faults import Fault
 from rcilab.model.robot_model import load_model
 from rcilab.motion.joint import plan_joint
 from rcilab.sim.api import Stall

@@ -9,10 +9,10 @@ from random import Random
 import numpy as np
 import pytest
 
-from rcilab.core.faults import Fault
 from rcilab.makers.rokae import wire as rci
 from rcilab.makers.rokae.controller.cycle import ControlCycle
 from rcilab.makers.rokae.controller.state_machine import Event, Phase
+from rcilab.makers.rokae.faults import Fault
 from rcilab.model.dynamics.payload import Payload
 from rcilab.model.robot_model import load_model
 from rcilab.sim.plants import build_plant

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rcilab.core.faults import Fault
 from rcilab.core.state import ControllerMode, MotionGeneratorMode, RobotMode
 from rcilab.makers.rokae import wire as rci
+from rcilab.makers.rokae.faults import Fault
 from rcilab.makers.rokae.wire import CommandPacket
 
 GOLDEN = json.loads((Path(__file__).parent / "golden_wire.json").read_text())

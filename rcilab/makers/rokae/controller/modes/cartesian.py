@@ -10,17 +10,18 @@ as "not valid"); so on its way through zero an arm angle that is not valid is ze
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import dist, hypot, pi, remainder, tau
 
 from rcilab.conformance.cartesian_monitor import CartesianMonitor
-from rcilab.conformance.limit_violation import describe_breaches
+from rcilab.conformance.common_conditions import ARM_ANGLE_TOLERANCE
+from rcilab.conformance.limit_violation import LimitViolation, describe_breaches
 from rcilab.conformance.pose_validation import find_frame_error
-from rcilab.conformance.tool_conditions import ARM_ANGLE_TOLERANCE
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError, KinematicsError
-from rcilab.core.faults import Fault
 from rcilab.core.spatial import Pose, rotation_from_wxyz, turn_between, wxyz_from_rotation
 from rcilab.i18n.translator import Remark
+from rcilab.makers.rokae.conditions import rci_faults
 from rcilab.makers.rokae.controller.jitter_buffer import Playback
 from rcilab.makers.rokae.controller.modes.generator import (
     GeneratorOutput,
@@ -31,6 +32,7 @@ from rcilab.makers.rokae.controller.modes.generator import (
 )
 from rcilab.makers.rokae.controller.modes.ik_tracker import IkTracker
 from rcilab.makers.rokae.controller.modes.start import StartMonitor, find_tool_jump
+from rcilab.makers.rokae.faults import Fault
 from rcilab.makers.rokae.wire import CommandPacket
 from rcilab.sim.command_extrapolator import CommandExtrapolator
 from rcilab.sim.filters import PoseLowPass
@@ -105,10 +107,12 @@ class CartesianGenerator:
 
     def _judge(self, pose: Pose, psi: float, cycles: int) -> GeneratorOutput:
         if cycles > 0:
-            faults = self._step_monitor(pose, psi if self._has_psi else None, cycles)
-            if faults:
-                reason = describe_breaches(self._monitor.broken())
-                return GeneratorOutput(faults=faults, reason=Remark.all((self._jump, reason)) if self._jump else reason)
+            breaches = self._step_monitor(pose, psi if self._has_psi else None, cycles)
+            if breaches:
+                reason = describe_breaches(breaches)
+                return GeneratorOutput(
+                    faults=rci_faults(breaches), reason=Remark.all((self._jump, reason)) if self._jump else reason
+                )
             self._jump = None
         try:
             q = self._follower.solve(pose, psi, self._q)
@@ -156,15 +160,15 @@ class CartesianGenerator:
         monitor.reset(pose, psi if self._has_psi else None)
         return monitor
 
-    def _step_monitor(self, pose: Pose, psi: float | None, cycles: int) -> tuple[Fault, ...]:
+    def _step_monitor(self, pose: Pose, psi: float | None, cycles: int) -> Sequence[LimitViolation]:
         start = self._start
         if start is None:
             return self._monitor.step(pose, psi, cycles)
-        faults = start.step(pose, psi, cycles)
+        breaches = start.step(pose, psi, cycles)
         self._monitor = start.monitor
         if start.is_decided:
             self._start = None
-        return faults
+        return breaches
 
     def _read(self, packet: CommandPacket) -> list[float]:
         """Returns position, quaternion and arm angle of a command, with sign and turn that continue the last one."""

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 from rcilab.conformance.box_monitor import BoxMonitor
-from rcilab.conformance.limit_violation import describe_breaches
+from rcilab.conformance.limit_violation import LimitViolation, describe_breaches
 from rcilab.conformance.monitor import JointMonitor
 from rcilab.core.clock import CYCLE_TIME
-from rcilab.core.faults import Fault
 from rcilab.core.limits import Limits
 from rcilab.core.safety_box import EntryBox, SafetyBox, box_from
 from rcilab.core.spatial import Pose
 from rcilab.i18n.translator import Remark
+from rcilab.makers.rokae.conditions import rci_faults
 from rcilab.makers.rokae.controller.jitter_buffer import Playback
 from rcilab.makers.rokae.controller.modes.start import StartMonitor, StartOffset, StartTolerance, find_joint_jump
 from rcilab.makers.rokae.controller.settings import Settings
+from rcilab.makers.rokae.faults import Fault
 from rcilab.makers.rokae.wire import CommandPacket
 from rcilab.model.robot_model import RobotModel
 from rcilab.sim.reference_trajectory import JOIN_SHARE
@@ -197,15 +199,13 @@ class JointReference:
         return NOTHING
 
     def _judge(self, q: list[float], cycles: int) -> GeneratorOutput:
-        faults = self._step_monitor(q, cycles)
-        breaches = self._monitor.broken() if faults else []
+        breaches = self._step_monitor(q, cycles)
         if self._box.is_active:
-            faults += self._box.step(self._model.forward(q).parts[1])
-            breaches += self._box.broken()
-        if faults:
+            breaches = [*breaches, *self._box.step(self._model.forward(q).parts[1])]
+        if breaches:
             reason = describe_breaches(breaches)
             return GeneratorOutput(
-                faults=tuple(sorted(faults)), reason=Remark.all((self._jump, reason)) if self._jump else reason
+                faults=rci_faults(breaches), reason=Remark.all((self._jump, reason)) if self._jump else reason
             )
         self._jump = None
         monitor = self._monitor
@@ -213,12 +213,12 @@ class JointReference:
             q, differences=(monitor.dq, monitor.ddq) if monitor.is_even and self._start is None else None
         )
 
-    def _step_monitor(self, q: list[float], cycles: int) -> tuple[Fault, ...]:
+    def _step_monitor(self, q: list[float], cycles: int) -> Sequence[LimitViolation]:
         start = self._start
         if start is None:
             return self._monitor.step(q, cycles)
-        faults = start.step(q, cycles)
+        breaches = start.step(q, cycles)
         self._monitor = start.monitor
         if start.is_decided:
             self._start = None
-        return faults
+        return breaches

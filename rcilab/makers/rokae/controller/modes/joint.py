@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from math import isfinite
 
-from rcilab.core.faults import Fault
 from rcilab.i18n.translator import Remark
 from rcilab.makers.rokae.controller.jitter_buffer import Playback
 from rcilab.makers.rokae.controller.modes.generator import GeneratorOutput, JointReference, MissedCycles, MotionLimits
+from rcilab.makers.rokae.faults import Fault
 from rcilab.makers.rokae.wire import CommandPacket
 from rcilab.sim.command_extrapolator import CommandExtrapolator
 from rcilab.sim.filters import LowPass

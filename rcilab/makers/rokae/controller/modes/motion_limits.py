@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from rcilab.conformance import LimitTable, cartesian_limits
 from rcilab.core.arrays import JointVector
 from rcilab.core.safety_box import active_box
 from rcilab.core.spatial import Pose
@@ -13,6 +12,7 @@ from rcilab.makers.rokae.controller.modes.generator import MotionLimits
 from rcilab.makers.rokae.controller.modes.mode import Mode
 from rcilab.makers.rokae.controller.modes.start import StartTolerance
 from rcilab.makers.rokae.controller.settings import Settings
+from rcilab.makers.rokae.limit_tables import LimitTable, cartesian_limits
 from rcilab.model.robot_model import RobotModel
 from rcilab.motion.range import range_from
 

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from math import degrees, sqrt
 from typing import Any, Generic, Protocol, TypeVar
 
+from rcilab.conformance.limit_violation import LimitViolation
 from rcilab.core.clock import CYCLE_TIME
-from rcilab.core.faults import Fault
 from rcilab.core.limits import JointLimits
 from rcilab.i18n.translator import Remark
 from rcilab.makers.rokae.controller.actuator import ControlLaw
@@ -148,8 +148,8 @@ class Stepping(Protocol):
     """A per-cycle monitor."""
 
     @property
-    def step(self) -> Callable[..., tuple[Fault, ...]]:
-        """Takes the commands of this cycle and returns the faults they raise."""
+    def step(self) -> Callable[..., Sequence[LimitViolation]]:
+        """Takes the commands of this cycle and returns what they break."""
         ...
 
 
@@ -158,7 +158,7 @@ _AMBIGUOUS = 4  # Commands after which a third difference no longer reaches the 
 
 
 class StartMonitor(Generic[_M]):
-    """Evaluates commands, the first few of which may be read in two ways; a fault is what breaks both.
+    """Evaluates commands, the first few of which may be read in two ways; a violation is what breaks both.
 
     A first command that is off the reference by no more than one cycle's jerk is the first step of a motion from there,
     or the place where another motion begins. Owned by a motion generator.
@@ -181,17 +181,17 @@ class StartMonitor(Generic[_M]):
         """Whether only one reading is left: `monitor` alone goes on."""
         return self._alternative is None
 
-    def step(self, *signals: Any) -> tuple[Fault, ...]:
-        """Takes the commands of this cycle and returns the faults they raise, in wire order."""
-        faults = self.monitor.step(*signals)
+    def step(self, *signals: Any) -> Sequence[LimitViolation]:
+        """Takes the commands of this cycle and returns what they break."""
+        breaches = self.monitor.step(*signals)
         if self._alternative is not None:
             other = self._alternative.step(*signals)
-            if faults and not other:
-                self.monitor, faults = self._alternative, ()
+            if breaches and not other:
+                self.monitor, breaches = self._alternative, ()
             self._left -= 1
             if self._left == 0 or other or self.monitor is self._alternative:
                 self._alternative = None
-        return faults
+        return breaches
 
 
 class StartOffset:

@@ -12,10 +12,11 @@ from math import isfinite
 
 from rcilab.conformance.limit_violation import describe_breaches
 from rcilab.conformance.torque_monitor import TorqueMonitor
-from rcilab.core.faults import Fault
 from rcilab.i18n.translator import Remark
+from rcilab.makers.rokae.conditions import rci_faults
 from rcilab.makers.rokae.controller.jitter_buffer import Playback
 from rcilab.makers.rokae.controller.modes.generator import GeneratorOutput, MissedCycles, MotionLimits
+from rcilab.makers.rokae.faults import Fault
 from rcilab.makers.rokae.wire import CommandPacket
 from rcilab.sim.command_extrapolator import CommandExtrapolator
 from rcilab.sim.filters import LowPass
@@ -57,6 +58,6 @@ class TorqueGenerator:
         self._tau = tau
         self._stream.take(tau)
         tau = self._filter.step(tau)
-        if cycles > 0 and (faults := self._monitor.step(tau, cycles)):
-            return GeneratorOutput(faults=faults, reason=describe_breaches(self._monitor.broken()))
+        if cycles > 0 and (breaches := self._monitor.step(tau, cycles)):
+            return GeneratorOutput(faults=rci_faults(breaches), reason=describe_breaches(breaches))
         return GeneratorOutput(tau=tau)

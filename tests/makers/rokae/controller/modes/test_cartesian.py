@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from rcilab.conformance.pose_validation import find_frame_error
-from rcilab.core.faults import Fault
 from rcilab.core.spatial import Pose
 from rcilab.makers.rokae import wire as rci
+from rcilab.makers.rokae.faults import Fault
 
 GOOD = Pose.from_rpy((0.1, 0.2, 0.3), (0.4, 0.5, 0.6)).as_row_major()
 

@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from rcilab.core.faults import Fault
 from rcilab.core.spatial import Pose, turn_between
 from rcilab.core.state import ControllerMode, MotionGeneratorMode, RobotMode
 from rcilab.makers.rokae import wire as rci
+from rcilab.makers.rokae.faults import Fault
 from rcilab.motion.joint import plan_joint
 
 PLANTS = pytest.mark.parametrize("plant", ["ideal", "mujoco"])

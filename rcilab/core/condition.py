@@ -1,4 +1,4 @@
-"""What a condition is: a quantity, two bounds, the place it was taken from, and the fault it raises."""
+"""Conditions on a motion: a quantity between two bounds, its source and the fault it raises; a table for each maker."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ import numpy as np
 
 from rcilab.core.arrays import Array
 from rcilab.core.errors import InvalidValueError
-from rcilab.core.faults import Fault
-from rcilab.core.franka_errors import FrankaError
+from rcilab.core.fault import FaultCode
 from rcilab.core.limits import JointLimits, Limits
+from rcilab.core.state import Mode
 
 Necessity: TypeAlias = Literal["necessary", "recommended"]
 Stage: TypeAlias = Literal["throughout", "start", "end"]
@@ -36,16 +36,11 @@ Signal: TypeAlias = Literal[
 arm angle; the tool's pose as a whole; the smallest distance between links, or from the floor; the side of the elbow;
 external torques and force; commands that did not come."""
 
-AnyFault: TypeAlias = Fault | FrankaError
-"""What a controller raises: a fault of the RCI, or an error of Franka's interface."""
-
 Bounds: TypeAlias = tuple[Array, Array]
 """Lower and upper bound, each of shape (n,) for joints and (1,) for anything else."""
 
 AnyLimits: TypeAlias = Limits | JointLimits
 """All limits of an arm; a condition on joints makes do with those of the joints."""
-
-MANUAL = "RCI manual V1.3.1"
 
 _PLACES: dict[Signal, str] = {
     "arm_angle": "elbow",
@@ -70,10 +65,10 @@ class Condition:
     necessity: Necessity
     """The robot stops when a necessary condition is broken."""
     unit: str
-    source: str
+    source: str = ""
     """Where condition and bound come from."""
-    fault: AnyFault | None
-    """What the controller raises; None for a recommended condition, and for one that no controller knows of."""
+    fault: FaultCode | None = None
+    """What the maker's controller raises; None for a recommended condition, and for one that it does not check."""
     stage: Stage
     """When it is judged."""
     signal: Signal = "joint"
@@ -128,3 +123,68 @@ def same(value: float) -> Bounds:
     """Returns a single pair of bounds around zero."""
     bound = np.array([value])
     return -bound, bound
+
+
+def tolerance(value: float) -> Callable[[AnyLimits], Bounds]:
+    """Returns the function for bounds that are the same for every joint, around zero."""
+
+    def bounds(limits: AnyLimits) -> Bounds:
+        bound = np.full(len(joint_limits(limits).velocity), value)
+        return -bound, bound
+
+    return bounds
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class ConditionTable:
+    """The conditions of one maker's interface. Rows on the same quantity have the same id in every table."""
+
+    name: str
+    """Of the interface, such as "RCI"."""
+    motion: tuple[Condition, ...]
+    """For every joint motion."""
+    cartesian: tuple[Condition, ...]
+    """For a motion that is sent as poses of the tool."""
+    torque: tuple[Condition, ...]
+    """For a motion that is sent as torques."""
+    measured: tuple[Condition, ...]
+    """For what the sensors measure."""
+    box: Condition
+    """For a commanded tool where there is a safety box."""
+    conditions: tuple[Condition, ...]
+    """Every condition of the interface."""
+
+    def rows(self, mode: Mode, *, has_elbow: bool = True, has_box: bool = False) -> tuple[Condition, ...]:
+        """Returns the conditions on a motion in a mode, without those on distances.
+
+        Args:
+            mode: How it is commanded.
+            has_elbow: Whether the arm has an arm angle.
+            has_box: Whether there is a safety box. A motion in torques has no commanded position: the measured one
+                is checked.
+        """
+        if mode == "torque":
+            return self.torque + ((self.find("measured.cartesian.position"),) if has_box else ())
+        box = (self.box,) if has_box else ()
+        if not mode.startswith("cartesian"):
+            return self.motion + box
+        return tuple(row for row in self.cartesian if has_elbow or row.signal != "arm_angle") + box
+
+    def find(self, name: str) -> Condition:
+        """Returns a condition by id.
+
+        Raises:
+            InvalidValueError: There is no such condition; the message lists those that exist.
+        """
+        for row in self.conditions:
+            if row.id == name:
+                return row
+        known = ", ".join(row.id for row in self.conditions)
+        raise InvalidValueError("condition", name, f"is unknown to the {self.name}; known: {known}")
+
+    def raising(self, fault: FaultCode) -> tuple[Condition, ...]:
+        """Returns the conditions that raise a fault."""
+        return tuple(row for row in self.conditions if row.fault is fault)
+
+    def __repr__(self) -> str:
+        return f"<ConditionTable of the {self.name}: {len(self.conditions)} conditions, .motion, .find(id)>"

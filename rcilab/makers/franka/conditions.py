@@ -1,9 +1,9 @@
-"""Franka's conditions for the Panda, as rows of a table like the manual's: the same ids where they judge the same.
+"""The conditions of Franka's control interface (FCI) for the Panda: the common rows with its sources and errors.
 
 The page "Robot and interface specifications" prints three lists: for joint trajectories, for Cartesian ones with what
-follows from them for the joints, and for torques. What it recommends for the start and the end of a motion stands in
-the list of Cartesian ones; it is taken to hold for joints alike. Which error a broken condition raises is told on the
-page "Errors". Differences are taken backward over 1 ms there as well.
+follows from them for the joints, and for torques. Its recommendations for the start and the end of a motion stand in
+the list for Cartesian ones; they are taken to hold for joints too. The page "Errors" names the error of each broken
+condition. Differences are taken backward over 1 ms there as well.
 """
 
 from __future__ import annotations
@@ -13,32 +13,34 @@ from dataclasses import replace
 
 import numpy as np
 
-from rcilab.conformance.condition import AnyLimits, Bounds, Condition, joint_limits, same
-from rcilab.conformance.conditions import (
+from rcilab.conformance.common_conditions import (
+    CARTESIAN_FRAME,
+    CARTESIAN_POSITION,
+    EXTERNAL_TORQUE,
     JOINT_ACCELERATION,
     JOINT_CONDITIONS,
+    JOINT_END_CONDITIONS,
     JOINT_JERK,
     JOINT_POSITION,
     JOINT_VELOCITY,
-    MOTION_CONDITIONS,
-)
-from rcilab.conformance.measured_conditions import EXTERNAL_TORQUE, LOST_COMMANDS, MEASURED_CONDITIONS
-from rcilab.conformance.start_end_conditions import start_pose, tool_rest
-from rcilab.conformance.tool_conditions import (
-    CARTESIAN_FRAME,
-    CARTESIAN_POSITION,
+    LOST_COMMANDS,
+    MEASURED_CONDITIONS,
+    MOTION_TORQUE_CONDITIONS,
+    START_POSE,
     TOOL_CONDITIONS,
+    TOOL_STANDSTILL_CONDITIONS,
     TORQUE_RANGE,
     TORQUE_RATE,
 )
-from rcilab.core.franka_errors import FrankaError
+from rcilab.core.condition import AnyLimits, Bounds, Condition, ConditionTable, joint_limits, same, tolerance
+from rcilab.makers.franka.errors import FrankaError
 
 _PAGE = "Franka's page Robot and interface specifications"
 _ERRORS = "Franka's page Errors"
 _ELBOW_JOINT = 2  # From 0: Franka's elbow is the angle of joint 3.
 
 START_TOLERANCE = 1e-6  # [rad] or [m]
-"""How far from the arm a motion may start. A choice, the page gives no figure: less is a jerk inside every bound."""
+"""How far from the arm a motion may start. The page gives no figure: a step below this is a jerk inside every bound."""
 
 _JOINT_ERRORS = {
     JOINT_POSITION.id: FrankaError.JOINT_MOTION_GENERATOR_POSITION_LIMITS_VIOLATION,
@@ -67,7 +69,7 @@ _MEASURED_ERRORS = {
 
 
 def _motion_row(row: Condition) -> Condition:
-    """Returns a row of the manual's on joint motions as Franka has it."""
+    """Returns a common row on joint motions as Franka has it."""
     if row.id in _JOINT_ERRORS:
         return replace(row, fault=_JOINT_ERRORS[row.id], source=f"{_PAGE}, joint trajectory, necessary; {_ERRORS}")
     if row.id == "start.position":
@@ -76,15 +78,10 @@ def _motion_row(row: Condition) -> Condition:
             necessity="necessary",
             fault=FrankaError.JOINT_POSITION_MOTION_GENERATOR_START_POSE_INVALID,
             source=f"{_PAGE}, necessary by its example; {_ERRORS} (tolerance: ours)",
-            bounds=_start_bounds,
+            bounds=tolerance(START_TOLERANCE),
         )
     ours = "" if row.signal == "torque" else "; tolerance: ours"
     return replace(row, source=f"{_PAGE}, recommended (printed for Cartesian trajectories{ours})")
-
-
-def _start_bounds(limits: AnyLimits) -> Bounds:
-    bound = np.full(len(joint_limits(limits).velocity), START_TOLERANCE)
-    return -bound, bound
 
 
 def _inverse_row(row: Condition) -> Condition:
@@ -121,16 +118,15 @@ def _elbow_range(limits: AnyLimits) -> Bounds:
     return joint.lower[one], joint.upper[one]
 
 
-FRANKA_MOTION_CONDITIONS: tuple[Condition, ...] = tuple(_motion_row(row) for row in MOTION_CONDITIONS)
-"""What `check` judges of every joint motion of a Panda, in the order of the manual's."""
+_MOTION = tuple(_motion_row(row) for row in (*JOINT_CONDITIONS, *MOTION_TORQUE_CONDITIONS, *JOINT_END_CONDITIONS))
 
-FRANKA_BOX = replace(
+_BOX = replace(
     CARTESIAN_POSITION,
     fault=FrankaError.CARTESIAN_POSITION_LIMITS_VIOLATION,
     source=f"{_ERRORS}; the box is ours: no command of this interface sets one",
 )
 
-FRANKA_ELBOW_SIGN = Condition(
+_ELBOW_SIGN = Condition(
     id="elbow.sign",
     quantity="side of the elbow against that at the start",
     formula="sign(q_4 - q_flip) = sign(q_4,start - q_flip)",
@@ -145,7 +141,7 @@ FRANKA_ELBOW_SIGN = Condition(
 )
 """+1 on the side of the start, -1 beyond the angle of joint 4 at which the arm is stretched."""
 
-FRANKA_TOOL_CONDITIONS: tuple[Condition, ...] = (
+_TOOL = (
     replace(
         CARTESIAN_FRAME,
         formula="T_c proper, reachable, not singular at q_3",
@@ -153,10 +149,12 @@ FRANKA_TOOL_CONDITIONS: tuple[Condition, ...] = (
         source=f"{_PAGE}, Cartesian trajectory, necessary (singular: ours)",
     ),
     *(_tool_row(row) for row in TOOL_CONDITIONS if row is not CARTESIAN_POSITION),
-    FRANKA_ELBOW_SIGN,
+    _ELBOW_SIGN,
     *(_inverse_row(row) for row in JOINT_CONDITIONS),
     replace(
-        start_pose(START_TOLERANCE, f"{_ERRORS} ({_PAGE}: recommended; tolerance: ours)"),
+        START_POSE,
+        source=f"{_ERRORS} ({_PAGE}: recommended; tolerance: ours)",
+        bounds=lambda limits: same(START_TOLERANCE),
         necessity="necessary",
         fault=FrankaError.CARTESIAN_POSITION_MOTION_GENERATOR_START_POSE_INVALID,
     ),
@@ -173,11 +171,14 @@ FRANKA_TOOL_CONDITIONS: tuple[Condition, ...] = (
         order=0,
         bounds=lambda limits: same(START_TOLERANCE),
     ),
-    *tool_rest(f"{_PAGE}, Cartesian trajectory, recommended (tolerance: ours)"),
+    *(
+        replace(row, source=f"{_PAGE}, Cartesian trajectory, recommended (tolerance: ours)")
+        for row in TOOL_STANDSTILL_CONDITIONS
+    ),
 )
-"""What a commanded tool pose has to keep, and the joints that follow from it."""
+"""On commanded tool poses, and on the joint angles that follow from them."""
 
-FRANKA_TORQUE_CONDITIONS: tuple[Condition, ...] = (
+_TORQUES = (
     replace(
         TORQUE_RATE,
         fault=FrankaError.CONTROLLER_TORQUE_DISCONTINUITY,
@@ -198,9 +199,9 @@ FRANKA_TORQUE_CONDITIONS: tuple[Condition, ...] = (
         bounds=lambda limits: (-0.001 * joint_limits(limits).torque_rate, 0.001 * joint_limits(limits).torque_rate),
     ),
 )
-"""What a commanded torque has to keep."""
+"""On commanded torques."""
 
-FRANKA_BEHAVIOUR_CONDITIONS: tuple[Condition, ...] = (
+_BEHAVIOUR = (
     *(
         replace(
             row,
@@ -234,25 +235,21 @@ FRANKA_BEHAVIOUR_CONDITIONS: tuple[Condition, ...] = (
         source=f"{_ERRORS}, communication: 20 cycles without a packet",
     ),
 )
-"""What the arm itself has to keep, and the network."""
+"""On the arm itself and the network."""
 
-FRANKA_CARTESIAN_MOTION_CONDITIONS: tuple[Condition, ...] = (
-    *FRANKA_TOOL_CONDITIONS,
-    *(row for row in FRANKA_MOTION_CONDITIONS if row.signal == "torque"),
+FCI_CONDITIONS = ConditionTable(
+    name="FCI",
+    motion=_MOTION,
+    cartesian=(*_TOOL, *(row for row in _MOTION if row.signal == "torque")),
+    torque=(*_TORQUES, *(row for row in _BEHAVIOUR if row.is_measured and row.signal == "joint")),
+    measured=tuple(row for row in _BEHAVIOUR if row.is_measured),
+    box=_BOX,
+    conditions=(*_MOTION, _BOX, *_TOOL, *_TORQUES, *_BEHAVIOUR),
 )
-"""What `check` judges of a motion that is sent as tool poses."""
+"""What `check` and the monitors use for the Panda. Errors without a bound on the pages (power, sensor range,
+self-collision) have no row."""
 
-FRANKA_TORQUE_MOTION_CONDITIONS: tuple[Condition, ...] = (
-    *FRANKA_TORQUE_CONDITIONS,
-    *(row for row in FRANKA_BEHAVIOUR_CONDITIONS if row.is_measured and row.signal == "joint"),
-)
-"""What `check` judges of a motion that is sent as torques: these, and range and speed of the arm that follows them."""
 
-FRANKA_CONDITIONS: tuple[Condition, ...] = (
-    *FRANKA_MOTION_CONDITIONS,
-    FRANKA_BOX,
-    *FRANKA_TOOL_CONDITIONS,
-    *FRANKA_TORQUE_CONDITIONS,
-    *FRANKA_BEHAVIOUR_CONDITIONS,
-)
-"""Every condition of the Panda. Errors without a bound on the pages (power, sensor range, self-collision) have none."""
+def fci_conditions() -> ConditionTable:
+    """Returns the conditions of Franka's control interface."""
+    return FCI_CONDITIONS

@@ -7,10 +7,10 @@ velocity "discontinuity" is an acceleration beyond its limit, an acceleration "d
 
 from __future__ import annotations
 
-from enum import IntEnum
+from rcilab.core.fault import FaultCode
 
 
-class FrankaError(IntEnum):
+class FrankaError(FaultCode):
     """One error flag of the Panda's robot state; the value is its place."""
 
     JOINT_POSITION_LIMITS_VIOLATION = 0

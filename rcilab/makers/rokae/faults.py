@@ -7,12 +7,12 @@ causes and remedies: RCI manual V1.3.1, section 4.6.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from enum import IntEnum
 
 from rcilab.core.errors import InvalidValueError
+from rcilab.core.fault import FaultCode
 
 
-class Fault(IntEnum):
+class Fault(FaultCode):
     """One error bit of the robot state; the value is the bit's place on the wire."""
 
     ACTUAL_JOINT_POSITION_LIMITS_VIOLATION = 0
@@ -84,11 +84,6 @@ def find_fault(name: Fault | str) -> Fault:
             return fault
     known = ", ".join(fault.manual_name for fault in Fault)
     raise InvalidValueError("fault", name, f"is unknown; known: {known}")
-
-
-def name_faults(faults: Iterable[object]) -> str:
-    """Returns faults as the manual prints them: their one name everywhere."""
-    return ", ".join(fault.manual_name for fault in faults if isinstance(fault, Fault))
 
 
 def faults_from_bits(bits: Iterable[int]) -> tuple[Fault, ...]:

@@ -1,0 +1,437 @@
+"""Conditions that the interfaces of several makers have in common, without the fault and the source of any maker.
+
+A condition is a quantity strictly between two bounds: `lower < value < upper`. Necessary conditions are checked on
+backward differences at 1 ms, as a controller does it; recommended ones ask for a motion that starts and ends at
+standstill and for torques that the arm can give. A maker's table takes these rows and adds its own faults and sources.
+
+Velocity, acceleration and jerk of the tool are norms of backward differences, in base axes. Rotation velocity is the
+rotation vector of the turn within one cycle, divided by the cycle time.
+
+Makers give no bounds for measured quantities. They are the commanded bounds with an allowance, because a servo
+overshoots and a compliant arm is pushed. Measured accelerations are differences of measured velocities over one cycle
+after a first-order low pass, because a bare difference of measurements is mostly noise.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+
+from rcilab.core.arrays import JointVector, readonly_copy
+from rcilab.core.condition import (
+    AnyLimits,
+    Bounds,
+    Condition,
+    ConditionTable,
+    all_limits,
+    joint_limits,
+    same,
+    tolerance,
+)
+from rcilab.core.limits import Limits
+from rcilab.robots.description import RobotDescription
+
+START_POSITION_TOLERANCE = 1e-9  # [rad]
+"""How far from the arm a motion may start, in [m] too. A step of 1 nrad is a jerk of 2 rad/s^3: inside the planner's
+margin."""
+REST_VELOCITY_TOLERANCE = 1e-4  # [rad/s] or [m/s]
+"""What counts as zero velocity: it covers rounding and changes nothing that a joint can feel."""
+REST_ACCELERATION_TOLERANCE = 1e-2  # [rad/s^2] or [m/s^2]
+"""What counts as zero acceleration: a thousandth of the smallest acceleration limit."""
+BOX_TOLERANCE = 1e-9  # [m]
+"""How far outside the safety box a tool still counts as inside, so that a tool on the wall does not stop the arm."""
+ARM_ANGLE_TOLERANCE = 1e-9  # [rad]
+"""How far past pi an arm angle may be written: pi itself is an arm angle, and written digits are rounded."""
+
+ANGLE_ALLOWANCE = math.radians(1.0)  # [rad] What a servo may overshoot at the end of a joint's range.
+BOX_ALLOWANCE = 0.01  # [m] About what `ANGLE_ALLOWANCE` is at the tool, and what a soft spring gives.
+VELOCITY_ALLOWANCE = 1.1  # On the commanded bound: servo overshoot.
+ACCELERATION_ALLOWANCE = 1.5  # On the commanded bound: servo overshoot and noise that passes the filter.
+ACCELERATION_CUTOFF = 30.0  # [Hz] Below the first resonances of arms of this size, above any motion of theirs.
+YIELDING_ALLOWANCE = 8.0
+"""Factor on the acceleration bounds of a compliant arm. The light last joints of an arm that is pushed with 30 N, or
+commanded a torque of a few N m, accelerate harder than any position command could ask for."""
+LOST_IN_ROW = 20  # [cycles] ROKAE: usually 10 to 20 (RCI manual, 4.6); Franka: 20.
+
+_NAMES = ("position", "velocity", "acceleration", "jerk")
+_UNITS = {"translation": "m", "rotation": "rad", "arm_angle": "rad"}
+
+
+def yielding_limits(limits: Limits) -> Limits:
+    """Returns the bounds of an arm that forces move, as under impedance: more acceleration, the rest unchanged."""
+    joint, cartesian = limits.joint, limits.cartesian
+    return replace(
+        limits,
+        joint=replace(joint, acceleration=readonly_copy(YIELDING_ALLOWANCE * joint.acceleration)),
+        cartesian=replace(
+            cartesian,
+            translation_acceleration=YIELDING_ALLOWANCE * cartesian.translation_acceleration,
+            rotation_acceleration=YIELDING_ALLOWANCE * cartesian.rotation_acceleration,
+        ),
+    )
+
+
+def _symmetric(name: str, factor: float = 1.0) -> Callable[[AnyLimits], Bounds]:
+    """Returns the function for the bounds of a joint quantity, such as "velocity"."""
+
+    def bounds(limits: AnyLimits) -> Bounds:
+        bound: JointVector = getattr(joint_limits(limits), name)
+        if factor != 1.0:
+            bound = factor * bound
+        return -bound, bound
+
+    return bounds
+
+
+def _joint_range(limits: AnyLimits) -> Bounds:
+    joint = joint_limits(limits)
+    return joint.lower, joint.upper
+
+
+def _measured_range(limits: AnyLimits) -> Bounds:
+    joint = joint_limits(limits)
+    return joint.lower - ANGLE_ALLOWANCE, joint.upper + ANGLE_ALLOWANCE
+
+
+def _tool_bounds(name: str, factor: float = 1.0) -> Callable[[AnyLimits], Bounds]:
+    """Returns the function for the bounds of a norm of the tool, such as "translation_velocity"."""
+
+    def bounds(limits: AnyLimits) -> Bounds:
+        return same(factor * getattr(all_limits(limits).cartesian, name))
+
+    return bounds
+
+
+def _arm_angle_bounds(name: str, factor: float = 1.0) -> Callable[[AnyLimits], Bounds]:
+    """Returns the function for the bounds of a derivative of the arm angle; an arm without one has no bound."""
+
+    def bounds(limits: AnyLimits) -> Bounds:
+        arm_angle = all_limits(limits).arm_angle
+        return same(math.inf if arm_angle is None else factor * getattr(arm_angle, name))
+
+    return bounds
+
+
+def _joint(order: int) -> Condition:
+    dots, name = "d" * order, _NAMES[order]
+    return Condition(
+        id=f"joint.{name}",
+        quantity=f"commanded {name}",
+        formula=f"-{dots}q_max < {dots}q_c < {dots}q_max" if order else "q_min < q_c < q_max",
+        necessity="necessary",
+        unit=("rad", "rad/s", "rad/s^2", "rad/s^3")[order],
+        stage="throughout",
+        order=order,
+        bounds=_symmetric(name) if order else _joint_range,
+    )
+
+
+def _motion_torque(quantity: str, limit: str, order: int) -> Condition:
+    """Returns a recommended row on torques; gravity, which the arm compensates by itself, is not in them."""
+    dots = "d" * order
+    return Condition(
+        id=f"joint.{limit}",
+        quantity=f"{quantity} of the motion",
+        formula=f"-{dots}tau_max < {dots}tau_c < {dots}tau_max",
+        necessity="recommended",
+        unit="N m/s" if order else "N m",
+        stage="throughout",
+        signal="torque",
+        order=order,
+        bounds=_symmetric(limit),
+    )
+
+
+def _joint_end(stage: Literal["start", "end"], order: int) -> Condition:
+    name = _NAMES[order]
+    return Condition(
+        id=f"{stage}.{name}",
+        quantity=f"{name} at the {stage}" if order else "distance of the start from the arm",
+        formula=f"{'d' * order}q_c = 0" if order else "q_c = q",
+        necessity="recommended",
+        unit=("rad", "rad/s", "rad/s^2")[order],
+        stage=stage,
+        order=order,
+        bounds=tolerance((START_POSITION_TOLERANCE, REST_VELOCITY_TOLERANCE, REST_ACCELERATION_TOLERANCE)[order]),
+    )
+
+
+def _tool(signal: Literal["translation", "rotation"], order: int) -> Condition:
+    kind = {"translation": "translational", "rotation": "rotational"}[signal]
+    symbol = {"translation": "v", "rotation": "omega"}[signal]
+    dots = "d" * (order - 1)
+    return Condition(
+        id=f"cartesian.{_NAMES[order]}.{signal}",
+        quantity=f"commanded {kind} {_NAMES[order]}",
+        formula=f"|{dots}{symbol}_c| < {dots}{symbol}_max",
+        necessity="necessary",
+        unit=f"{_UNITS[signal]}/s" + (f"^{order}" if order > 1 else ""),
+        stage="throughout",
+        signal=signal,
+        order=order,
+        bounds=_tool_bounds(f"{signal}_{_NAMES[order]}"),
+    )
+
+
+def _arm_angle(order: int) -> Condition:
+    dots = "d" * order
+    return Condition(
+        id=f"arm_angle.{_NAMES[order]}",
+        quantity=f"commanded arm angle{' ' + _NAMES[order] if order else ''}",
+        formula=f"|{dots}psi_c| < {dots}psi_max" if order else "|psi_c| <= pi",
+        necessity="necessary",
+        unit="rad" if order == 0 else "rad/s" + (f"^{order}" if order > 1 else ""),
+        stage="throughout",
+        signal="arm_angle",
+        order=order,
+        bounds=(_arm_angle_bounds(_NAMES[order]) if order else lambda limits: same(math.pi + ARM_ANGLE_TOLERANCE)),
+    )
+
+
+def _tool_end(stage: Literal["start", "end"], signal: Literal["translation", "rotation"], order: int) -> Condition:
+    kind = {"translation": "translational", "rotation": "rotational"}[signal]
+    limit = REST_VELOCITY_TOLERANCE if order == 1 else REST_ACCELERATION_TOLERANCE
+    return Condition(
+        id=f"{stage}.cartesian.{_NAMES[order]}.{signal}",
+        quantity=f"{kind} {_NAMES[order]} at the {stage}",
+        formula="dp_c = 0" if order == 1 else "ddp_c = 0",
+        necessity="recommended",
+        unit=_UNITS[signal] + ("/s" if order == 1 else "/s^2"),
+        stage=stage,
+        signal=signal,
+        order=order,
+        bounds=lambda limits: same(limit),
+    )
+
+
+def _measured_joint(order: int) -> Condition:
+    name, bounds = _NAMES[order], _measured_range
+    if order:
+        bounds = _symmetric(name, VELOCITY_ALLOWANCE if order == 1 else ACCELERATION_ALLOWANCE)
+    dots = "d" * order
+    return Condition(
+        id=f"measured.joint.{name}",
+        quantity=f"measured {name}",
+        formula=f"-{dots}q_max < {dots}q < {dots}q_max" if order else "q_min < q < q_max",
+        necessity="necessary",
+        unit=("rad", "rad/s", "rad/s^2")[order],
+        stage="throughout",
+        order=order,
+        bounds=bounds,
+    )
+
+
+def _measured_tool(signal: Literal["translation", "rotation"], order: int) -> Condition:
+    symbol = "d" * (order - 1) + {"translation": "v", "rotation": "omega"}[signal]
+    factor = VELOCITY_ALLOWANCE if order == 1 else ACCELERATION_ALLOWANCE
+    return Condition(
+        id=f"measured.cartesian.{_NAMES[order]}.{signal}",
+        quantity=f"measured {signal}al {_NAMES[order]}",
+        formula=f"|{symbol}| < {symbol}_max",
+        necessity="necessary",
+        unit=_UNITS[signal] + ("/s" if order == 1 else "/s^2"),
+        stage="throughout",
+        signal=signal,
+        order=order,
+        bounds=_tool_bounds(f"{signal}_{_NAMES[order]}", factor),
+    )
+
+
+JOINT_CONDITIONS: tuple[Condition, ...] = tuple(_joint(order) for order in range(4))
+"""On commanded joint angles in every cycle: position, velocity, acceleration, jerk."""
+JOINT_POSITION, JOINT_VELOCITY, JOINT_ACCELERATION, JOINT_JERK = JOINT_CONDITIONS
+
+MOTION_TORQUE_CONDITIONS: tuple[Condition, ...] = (
+    _motion_torque("torque", "torque", 0),
+    _motion_torque("torque rate", "torque_rate", 1),
+)
+"""On the torques that a motion in angles or poses needs."""
+
+JOINT_END_CONDITIONS: tuple[Condition, ...] = (
+    *(_joint_end("start", order) for order in range(3)),
+    *(_joint_end("end", order) for order in (1, 2)),
+)
+"""On the start and the end of a joint motion."""
+
+CARTESIAN_POSITION = Condition(
+    id="cartesian.position",
+    quantity="commanded position",
+    formula="x_c in box",
+    necessity="necessary",
+    unit="m",
+    stage="throughout",
+    signal="position",
+    order=0,
+    bounds=lambda limits: (np.array([-math.inf]), np.array([BOX_TOLERANCE])),
+)
+"""How far the tool is outside its safety box, [m]; any depth inside is allowed."""
+
+TOOL_CONDITIONS: tuple[Condition, ...] = (
+    CARTESIAN_POSITION,
+    *(_arm_angle(order) for order in range(4)),
+    _tool("translation", 1),
+    _tool("rotation", 1),
+    _tool("translation", 2),
+    _tool("rotation", 2),
+    _tool("translation", 3),
+    _tool("rotation", 3),
+)
+"""On commanded tool poses in every cycle, in the order of the values of `CartesianMonitor`."""
+
+CARTESIAN_FRAME = Condition(
+    id="cartesian.frame",
+    quantity="commanded pose",
+    formula="T_c proper, reachable, not singular",
+    necessity="necessary",
+    unit="",
+    stage="throughout",
+    signal="frame",
+    order=0,
+    bounds=lambda limits: same(1.0),
+)
+"""How near the arm is to a singularity: 1 is what counts as on it. Infinite for what is no pose or out of reach."""
+
+START_POSE = Condition(
+    id="start.cartesian.position",
+    quantity="distance of the first pose from the arm's",
+    formula="T_c = T",
+    necessity="recommended",
+    unit="m",
+    stage="start",
+    signal="translation",
+    order=0,
+    bounds=lambda limits: same(START_POSITION_TOLERANCE),
+)
+
+TOOL_STANDSTILL_CONDITIONS: tuple[Condition, ...] = (
+    _tool_end("start", "translation", 1),
+    _tool_end("start", "rotation", 1),
+    _tool_end("start", "translation", 2),
+    _tool_end("start", "rotation", 2),
+    _tool_end("end", "translation", 1),
+    _tool_end("end", "rotation", 1),
+    _tool_end("end", "translation", 2),
+    _tool_end("end", "rotation", 2),
+)
+"""On the tool's velocity and acceleration at the start and the end."""
+
+TORQUE_RATE = Condition(
+    id="torque.rate",
+    quantity="commanded torque rate",
+    formula="-dtau_max < dtau_c < dtau_max",
+    necessity="necessary",
+    unit="N m/s",
+    stage="throughout",
+    signal="torque",
+    order=1,
+    bounds=_symmetric("torque_rate"),
+)
+TORQUE_RANGE = Condition(
+    id="torque.range",
+    quantity="commanded torque",
+    formula="-tau_max < tau_c < tau_max",
+    necessity="necessary",
+    unit="N m",
+    stage="throughout",
+    signal="torque",
+    order=0,
+    bounds=_symmetric("torque"),
+)
+TORQUE_CONDITIONS: tuple[Condition, ...] = (TORQUE_RATE, TORQUE_RANGE)
+"""On commanded torques in every cycle, in the order of the values of `TorqueMonitor`."""
+
+MEASURED_CONDITIONS: tuple[Condition, ...] = (
+    _measured_joint(0),
+    Condition(
+        id="measured.cartesian.position",
+        quantity="measured position",
+        formula="x in box",
+        necessity="necessary",
+        unit="m",
+        stage="throughout",
+        signal="position",
+        order=0,
+        bounds=lambda limits: (np.array([-math.inf]), np.array([BOX_ALLOWANCE])),
+    ),
+    Condition(
+        id="measured.arm_angle.velocity",
+        quantity="measured arm angle velocity",
+        formula="|dpsi| < dpsi_max",
+        necessity="necessary",
+        unit="rad/s",
+        stage="throughout",
+        signal="arm_angle",
+        order=1,
+        bounds=_arm_angle_bounds("velocity", VELOCITY_ALLOWANCE),
+    ),
+    _measured_joint(1),
+    _measured_tool("translation", 1),
+    _measured_tool("rotation", 1),
+    _measured_joint(2),
+    _measured_tool("translation", 2),
+    _measured_tool("rotation", 2),
+)
+"""On the moving arm in every cycle, in the order of the values of `MeasuredMonitor`."""
+
+EXTERNAL_TORQUE = Condition(
+    id="external.torque",
+    quantity="external torque",
+    formula="|tau_ext| < threshold",
+    necessity="necessary",
+    unit="N m",
+    stage="throughout",
+    signal="external_torque",
+    order=0,
+    bounds=_symmetric("collision_threshold"),
+)
+
+LOST_COMMANDS = Condition(
+    id="lost.commands",
+    quantity="lost commands in a row",
+    formula="lost < threshold",
+    necessity="necessary",
+    unit="cycles",
+    stage="throughout",
+    signal="lost_commands",
+    order=0,
+    bounds=lambda limits: same(LOST_IN_ROW),
+)
+
+COMMON_CONDITIONS = ConditionTable(
+    name="common table",
+    motion=(*JOINT_CONDITIONS, *MOTION_TORQUE_CONDITIONS, *JOINT_END_CONDITIONS),
+    cartesian=(
+        CARTESIAN_FRAME,
+        *TOOL_CONDITIONS[1:],
+        *JOINT_CONDITIONS,
+        *MOTION_TORQUE_CONDITIONS,
+        START_POSE,
+        *TOOL_STANDSTILL_CONDITIONS,
+    ),
+    torque=(*TORQUE_CONDITIONS, *(row for row in MEASURED_CONDITIONS if row.signal == "joint" and row.order < 2)),
+    measured=MEASURED_CONDITIONS,
+    box=CARTESIAN_POSITION,
+    conditions=(
+        *JOINT_CONDITIONS,
+        *MOTION_TORQUE_CONDITIONS,
+        *JOINT_END_CONDITIONS,
+        *TOOL_CONDITIONS,
+        CARTESIAN_FRAME,
+        START_POSE,
+        *TOOL_STANDSTILL_CONDITIONS,
+        *TORQUE_CONDITIONS,
+        *MEASURED_CONDITIONS,
+        EXTERNAL_TORQUE,
+        LOST_COMMANDS,
+    ),
+)
+"""What an arm without a maker is checked by."""
+
+
+def condition_table(description: RobotDescription) -> ConditionTable:
+    """Returns the conditions on the motions of an arm: those of its maker's interface."""
+    return COMMON_CONDITIONS if description.conditions is None else description.conditions()

@@ -1,0 +1,31 @@
+"""Franka: the Panda arm, its errors and conditions. It can be computed with, but not simulated or driven."""
+
+from __future__ import annotations
+
+from rcilab.core.condition import ConditionTable
+from rcilab.makers.franka.conditions import FCI_CONDITIONS
+from rcilab.makers.franka.errors import FrankaError
+from rcilab.makers.franka.robots import ROBOTS
+from rcilab.makers.maker import Capabilities
+
+
+class Franka:
+    """The maker of the Panda."""
+
+    name = "franka"
+    title = "Franka"
+    interface = "Franka's own interface"
+    scheme = "fci"
+    robots = ROBOTS
+    capabilities = Capabilities()
+
+    def conditions(self) -> ConditionTable:
+        """Returns the conditions of the FCI."""
+        return FCI_CONDITIONS
+
+    def faults(self) -> type[FrankaError]:
+        """Returns the 41 errors of the FCI."""
+        return FrankaError
+
+
+MAKER = Franka()
