@@ -69,11 +69,11 @@ threading.Thread(target=lambda: done.append(robot.execute(motion).stopped)).star
 until(lambda: robot.is_moving)
 """
 PAGE = """
-from rcilab.notebook import heart
+from rcilab.notebook import browser_heartbeat
 from rcilab.notebook.subshell_routing import hear_at_once
 from ipywidgets import Button
-heart.INTERVAL = 0.2  # A second of silence is enough.
-kernel_heart = heart.kernel_heart()
+browser_heartbeat.INTERVAL = 0.2  # A second of silence is enough.
+kernel_heart = browser_heartbeat.kernel_heart()
 kernel_heart.open()
 slow = Button()
 hear_at_once(slow)

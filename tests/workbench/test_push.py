@@ -78,7 +78,7 @@ def session():
 
 @pytest.fixture
 def actions(store, session, monkeypatch):
-    monkeypatch.setattr(push_actions, "HeldPush", FakePush)
+    monkeypatch.setattr(push_actions, "ExternalForceHold", FakePush)
     monkeypatch.setattr(push_actions, "HOLD_TIMEOUT", 0.05)
     actions = PushActions(store, session)
     tick(actions)
