@@ -162,7 +162,7 @@ def _go(
 
     if kind == "joint":
         return plan_joint(model, start, goal, speed=speed, law=law)
-    target, psi = model.forward(goal), model.arm_angle(goal) if model.n == 7 else None
+    target, psi = model.forward(goal), model.arm_angle(goal) if model.redundancy else None
     if kind == "line" or via is None:
         return plan_line(model, start, target, speed=speed, psi=psi, law=law)
     return plan_arc(model, start, via, target, speed=speed, psi=psi, law=law)

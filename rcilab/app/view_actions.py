@@ -169,5 +169,5 @@ class ViewActions:
 
 
 def has_plot(model: RobotModel, name: str) -> bool:
-    """Returns whether there is anything to plot for an arm: only 7-axis arms have an arm angle."""
-    return name != "psi" or model.n == 7
+    """Returns whether there is anything to plot for an arm: only an arm with redundancy has an arm angle."""
+    return name != "psi" or bool(model.redundancy)

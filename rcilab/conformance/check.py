@@ -82,7 +82,7 @@ def check(
         raise InvalidValueError("distance", described(distance), "is no ClearanceLimit; ClearanceLimit(links=...) is")
     state = as_start(motion.start if start is None else start, model.n)
     mode = require_mode(mode)
-    rows = condition_table(model.description).rows(mode, has_elbow=model.n == 7, has_box=box is not None)
+    rows = condition_table(model.description).rows(mode, has_elbow=bool(model.redundancy), has_box=box is not None)
     if distance is not None:
         rows = (*rows, *clearance_conditions(distance))
     return _report(motion, rows, model=model, start=state, box=box, distance=distance, mode=mode)

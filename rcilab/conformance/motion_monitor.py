@@ -29,7 +29,6 @@ from rcilab.core.errors import InvalidValueError
 from rcilab.core.safety_box import SafetyBox, active_box, box_from
 from rcilab.core.spatial import IDENTITY, Pose
 from rcilab.core.state import Mode, require_mode
-from rcilab.model.kinematics.closed_form import build_closed_form
 from rcilab.model.robot_model import RobotModel, require_model
 from rcilab.motion.range import RECOVERY_RANGE, range_from
 
@@ -59,10 +58,11 @@ class Monitor:
         distance: ClearanceLimit | None = None,
     ) -> None:
         self._model, self.mode = require_model(model), require_mode(mode)
+        self._has_elbow = bool(model.redundancy)
         table, self._safety_box = condition_table(model.description), active_box(box)
         limits = model.limits
         self._own_rows = {row.id: row for row in table.conditions}
-        rows = table.rows(self.mode, has_elbow=model.n == 7)
+        rows = table.rows(self.mode, has_elbow=self._has_elbow)
         self._start_rows = [row for row in rows if row.stage == "start" and row.order == 0]
         self._clearance = None if distance is None else ClearanceMonitor(model, distance)
         self._torques = None
@@ -77,7 +77,7 @@ class Monitor:
             self._tool_rows = (table.box, *_throughout(table.cartesian, "arm_angle", "translation", "rotation"))
         self._box_row = table.box
         self._pose_rows = {row.signal: row for row in rows if row.signal in ("frame", "elbow_sign")}
-        self._inverse = build_closed_form(model.description)
+        self._inverse = model.solver
         self._T_tool_flange = model.T_flange_tool.inverse()
         self._has_tool = not model.T_flange_tool.is_close(IDENTITY, 0.0)
         self.reset(model.home)
@@ -193,7 +193,7 @@ class Monitor:
         if len(numbers) != 16 or find_frame_error(numbers) is not None:
             return [self._improper(math.inf)]
         pose = Pose.from_row_major(numbers)
-        if self._model.n == 7 and command.psi is not None:
+        if self._has_elbow and command.psi is not None:
             self._psi = float(command.psi)
         monitor.step(pose, self._psi, cycles)
         way = math.dist(pose.parts[1], self._start_pose.parts[1])
@@ -277,7 +277,7 @@ class Monitor:
         return LimitViolation(self._pose_rows["frame"], 0, nearness, 1.0)
 
     def _arm_angle(self, q: Array) -> float | None:
-        return self._model.arm_angle(q) if self._model.n == 7 else None
+        return self._model.arm_angle(q) if self._has_elbow else None
 
     def _numbers(self, values: Array | None, name: str, command: Command) -> list[float]:
         if values is None:

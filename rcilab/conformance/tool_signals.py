@@ -12,7 +12,6 @@ from rcilab.conformance.start import StartState
 from rcilab.core.arrays import Array, JointPath
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.spatial import Rotation9, turn_between
-from rcilab.model.kinematics.closed_form import build_closed_form
 from rcilab.model.robot_model import RobotModel
 
 BEFORE = 3
@@ -39,7 +38,7 @@ class ToolSignals:
         self._is_moving = start.moving
         # A moving arm has had its first row already.
         self._rows = np.concatenate((commands_before(start), path[1:] if start.moving else path))
-        self._inverse = build_closed_form(model.description)
+        self._inverse = model.solver
 
     def differences(self, signal: str) -> Differences:
         """Returns the norms of "translation" or "rotation" with their differences, or the "arm_angle" and its own.

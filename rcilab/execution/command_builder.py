@@ -52,7 +52,7 @@ def _angles(rows: JointPath, k: int, state: RobotState) -> Command:
 
 
 def _poses(model: RobotModel) -> Commander:
-    has_psi = model.n == 7
+    has_psi = bool(model.redundancy)
 
     def command(rows: JointPath, k: int, state: RobotState) -> Command:
         q = rows[k]

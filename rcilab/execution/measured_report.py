@@ -110,7 +110,7 @@ def _judge(record: NDArray[np.void], model: RobotModel, limits: Limits, mode: Co
 
 
 def _arm_angle(model: RobotModel, q: Array) -> float | None:
-    if model.n != 7:
+    if not model.redundancy:
         return None
     try:
         return model.arm_angle(q)

@@ -258,7 +258,7 @@ def _joint_shares(model: RobotModel, q: JointVector) -> Array:
     """
     J = np.zeros((7, model.n))
     J[:6] = model.jacobian(q)
-    if model.n == 7:
+    if model.redundancy:
         try:
             for i, unit in enumerate(np.eye(7) * _STEP):
                 J[6, i] = math.remainder(model.arm_angle(q + unit) - model.arm_angle(q - unit), math.tau) / (

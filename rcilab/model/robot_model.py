@@ -20,8 +20,8 @@ from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import IDENTITY, Pose
 from rcilab.model.dynamics.payload import NO_LOAD, Payload
 from rcilab.model.kinematics.frames import Frame
+from rcilab.model.kinematics.manipulability import Manipulability, ManipulabilityPath, dexterity, dexterity_path
 from rcilab.model.kinematics.reaching_arm import ReachingArm
-from rcilab.model.kinematics.singularity import Manipulability, ManipulabilityPath, dexterity, dexterity_path
 from rcilab.model.kinematics.workspace import Workspace, sample_workspace
 from rcilab.robots import RobotDescription, describe_robot
 

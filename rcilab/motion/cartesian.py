@@ -243,7 +243,7 @@ def arm_angles(
         PlanningError: The arm angle has no meaning at the start.
         InvalidValueError: `psi` is no angle within +-pi, or the arm has none.
     """
-    if model.n != 7:
+    if not model.redundancy:
         if psi is not None:
             problem = f"has no meaning for {model.name}: a 6-axis arm has no arm angle"
             raise InvalidValueError("psi", psi, problem).coded("six_axes", model=model.name)

@@ -1,4 +1,4 @@
-"""The inverse along a path of the tool: `rcilab.model.kinematics.branch` for an arm with its tool."""
+"""The inverse along a path of the tool: `rcilab.model.kinematics.solvers.spherical.branch` for an arm with its tool."""
 
 from __future__ import annotations
 
@@ -6,8 +6,7 @@ import numpy as np
 
 from rcilab.core.arrays import Array, JointPath, JointVector
 from rcilab.core.spatial import IDENTITY
-from rcilab.model.kinematics.branch import BranchEnd
-from rcilab.model.kinematics.closed_form import build_closed_form
+from rcilab.model.kinematics.solvers.solver import BranchEnd
 from rcilab.model.robot_model import RobotModel
 
 
@@ -27,13 +26,10 @@ def inverse_path(
     Returns:
         Joint angles, shape (N, n), [rad], and the first row that is out of reach or singular, or None; from that row on
         the angles mean nothing.
-
-    Raises:
-        ModelError: The arm has no closed-form inverse.
     """
     (rotation, (x, y, z)), R, p = model.T_flange_tool.inverse().parts, T[:, :3, :3], T[:, :3, 3]
     if not model.T_flange_tool.is_close(IDENTITY, 0.0):
         a, b, c = (R[:, :, i] for i in range(3))
         p = p + x * a + y * b + z * c
         R = np.stack([a * rotation[i] + b * rotation[3 + i] + c * rotation[6 + i] for i in range(3)], axis=2)
-    return build_closed_form(model.description).follow(R, p, psi, start)
+    return model.solver.follow(R, p, psi, start)

@@ -53,7 +53,7 @@ def examine(
         return rows, Obstacle(loss.row, loss.reason, isinstance(loss.reason, SingularError))
     if first == len(rows):
         return rows, None
-    advice = ", or give another arm angle" if model.n == 7 else ""
+    advice = ", or give another arm angle" if model.redundancy else ""
     if outside[:1] == [first]:
         angles = rows[first]
         i = int(np.maximum(limits.lower - angles, angles - limits.upper).argmax())

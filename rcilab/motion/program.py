@@ -64,7 +64,7 @@ class Program:
             if not isinstance(waypoint, Waypoint):
                 raise InvalidValueError(f"waypoint {number}", described(waypoint), "is none; Waypoint.line makes one")
             try:
-                require_fit(waypoint, n, robot.name)
+                require_fit(waypoint, robot)
             except InvalidValueError as error:
                 raise named_value(number, waypoint.type, error) from error
         if self.tool is not None:

@@ -151,7 +151,7 @@ def _waypoint(node: Node, number: int, name: str, robot: RobotDescription) -> Wa
         values[key] = read(name, value, what)
     try:
         waypoint = Waypoint(**values)
-        require_fit(waypoint, len(robot.home), robot.name)
+        require_fit(waypoint, robot)
         return waypoint
     except InvalidValueError as error:
         raise _placed(

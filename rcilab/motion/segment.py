@@ -176,7 +176,7 @@ def _path(model: RobotModel, q: JointVector, waypoint: Waypoint) -> Path:
     goal, psi = waypoint.pose, waypoint.psi
     if waypoint.q is not None:
         goal = model.forward(waypoint.q)
-        psi = model.arm_angle(waypoint.q) if model.n == 7 else None
+        psi = model.arm_angle(waypoint.q) if model.redundancy else None
     psis = arm_angles(model, q, psi, waypoint.way or "shorter")
     if waypoint.type == "circle":
         assert waypoint.center is not None

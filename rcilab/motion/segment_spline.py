@@ -256,7 +256,7 @@ def _lead_tool(model: RobotModel, pieces: list[_Piece], states: tuple[Array, ...
     T, psi = np.concatenate(T_parts), np.asarray(np.unwrap(np.concatenate(psi_parts)), np.float64)
     first_share = pieces[0].local[0] if pieces[0].blend is None else pieces[0].blend.leave
     near = pieces[0].segment.near(float(first_share))
-    q, loss = inverse_path(model, T, psi if model.n == 7 else None, near)
+    q, loss = inverse_path(model, T, psi if model.redundancy else None, near)
     if loss is not None:
         raise _refusal(owners[loss.row // 3], T[loss.row], loss.reason)
     jumps = np.abs(np.diff(q[1::3], axis=0)).max(axis=1, initial=0.0)

@@ -12,9 +12,11 @@ from numpy.typing import ArrayLike
 from rcilab.core.arrays import as_number, as_vector, described
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.spatial import Pose, as_pose, is_transform
+from rcilab.model.kinematics.solvers.build import build_solver
 from rcilab.motion.joint import MIN_SPEED
 from rcilab.motion.path import CircleOrientation, Way
 from rcilab.motion.samples import MOST
+from rcilab.robots.description import RobotDescription
 
 WaypointType: TypeAlias = Literal["joint", "line", "arc", "circle", "nullspace"]
 
@@ -253,17 +255,17 @@ def named_value(number: int, kind: str, error: InvalidValueError) -> InvalidValu
     return named.coded("waypoint_value", number=number, kind=kind, name=error.name, reason=error)
 
 
-def require_fit(waypoint: Waypoint, n: int, robot: str) -> None:
-    """Refuses a waypoint that is none for this arm.
+def require_fit(waypoint: Waypoint, robot: RobotDescription) -> None:
+    """Refuses a waypoint that does not fit this arm.
 
     Raises:
         InvalidValueError: Its q has not n angles, or it has an arm angle and the arm has none.
     """
     if waypoint.q is not None:
-        angles_of(waypoint.q, "q", n, robot)
-    if n != 7 and (waypoint.psi is not None or waypoint.type == "nullspace"):
-        problem = f"has no meaning for {robot}: a 6-axis arm has no arm angle"
-        raise InvalidValueError("psi", waypoint.psi, problem).coded("six_axes", model=robot)
+        angles_of(waypoint.q, "q", robot.n, robot.name)
+    if (waypoint.psi is not None or waypoint.type == "nullspace") and not build_solver(robot).redundancy:
+        problem = f"has no meaning for {robot.name}: a 6-axis arm has no arm angle"
+        raise InvalidValueError("psi", waypoint.psi, problem).coded("six_axes", model=robot.name)
 
 
 def angles_of(value: ArrayLike, name: str, n: int | None = None, robot: str = "") -> Floats:

@@ -109,7 +109,7 @@ class FaultPanel(Part):
         said = self._failed
         if self._work.is_busy:
             said = verdict("warn", "…", text("learn.provoking", fault=fault.manual_name))
-        has_no_elbow = FAULTS[fault].needs_elbow and self.model.n != 7
+        has_no_elbow = FAULTS[fault].needs_elbow and not self.model.redundancy
         self.moment.layout.display = "none" if exhibit is None else None
         if exhibit is not None:
             told = _exhibit_html(exhibit, text)

@@ -105,7 +105,7 @@ class JogPanel(Part):
         psi = self.state.arm_angle
         if psi is not None:
             cells.append(f"{self.text('jog.arm_angle')} <b>{fixed(math.degrees(psi), 1)}</b>°")
-        elif self.model.n == 7:
+        elif self.model.redundancy:
             cells.append(self.text("jog.no_arm_angle"))
         return f'<p class="rl-soft rl-num">{self.text("jog.tool")}: {", ".join(cells)}</p>'
 

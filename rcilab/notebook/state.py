@@ -181,7 +181,7 @@ class LabState:
     @property
     def arm_angle(self) -> float | None:
         """Arm angle of the goal, [rad]; None where there is none."""
-        if self.model.n != 7:
+        if not self.model.redundancy:
             return None
         try:
             return self.model.arm_angle(self.goal)

@@ -57,7 +57,7 @@ class TargetPanel(Part):
         ]
         rows: list[Any] = [block(head(text("target.pose", in_mm="mm", in_deg="deg"))), *pairs, self._reach]
         self.psi: Any = None
-        if self.model.n == 7:
+        if self.model.redundancy:
             rows += self._arm_angle_rows()
         rows += [block(head(text("target.branches"))), self._table, self.branches]
         self._writing = False

@@ -113,7 +113,7 @@ class JointSliders:
             f"{name} {number:.1f}" for name, number in zip(names, np.round(numbers, 1) + 0.0, strict=True)
         ]  # No -0.0.
         parts = [f"{', '.join(told[:3])} mm", f"{', '.join(told[3:])}°"]
-        if self._model.n == 7:
+        if self._model.redundancy:
             try:
                 psi = math.degrees(self._model.arm_angle(self._q))
                 parts.append(f"{self._text('jog.arm_angle')} {fixed(psi, 1)}°")

@@ -131,13 +131,13 @@ def _reference(
 
         dq_c = M^-1 J^T L twist        ddq_c = M^-1 J^T L (acc - dJ/dt dq - J free) + free
 
-    On a 7-axis arm `free` is the acceleration of a damped spring at `null`, which moves along, and dq_c has the part of
-    its velocity of which the tool feels nothing, as it does of the spring.
+    With more than 6 joints `free` is the acceleration of a damped spring at `null`, which moves along, and dq_c has the
+    part of its velocity of which the tool feels nothing, as it does of the spring.
     """
     J = terms.jacobian
     wanted = np.array([*twist, *acc])
     along = free = np.zeros(model.n)
-    if model.n == 7:
+    if model.n > 6:
         q_null, along, ddq_null = null
         free = _PULL * (q_null - measured.q) + _DRAG * (along - measured.dq) + ddq_null
         wanted[:6] -= J.dot(along)

@@ -12,8 +12,6 @@ from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import SingularError
 from rcilab.core.spatial import Pose
 from rcilab.model.dynamics.rigid_body import ToolTerms, Twist
-from rcilab.model.kinematics.arm_angle import arm_angle
-from rcilab.model.kinematics.inverse import build_geometry
 from rcilab.model.robot_model import RobotModel
 
 _REST: Twist = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -23,7 +21,7 @@ class ToolKinematics:
     """Follows one motion of the joints, commanded or measured. Owned by the controller's cycle.
 
     The arm angle is undefined where shoulder and wrist are one above the other or the arm is stretched: there its last
-    value stays, and at first 0. On 6-axis arms it is 0.
+    value stays, and at first 0. Without redundancy it is 0.
 
     Attributes:
         matrix: Pose of the tool in base as a homogeneous transform, shape (4, 4), [m].
@@ -40,7 +38,7 @@ class ToolKinematics:
 
     def __init__(self, model: RobotModel, q: Sequence[float]) -> None:
         self._body = model.rigid_body
-        self._geometry = build_geometry(model.description)
+        self._solver, self._has_arm_angle = model.solver, bool(model.redundancy)
         self._terms: ToolTerms
         self.matrix: Matrix
         self.twist = self.acceleration = _REST
@@ -91,9 +89,9 @@ class ToolKinematics:
         self._terms, self.matrix, self.twist, self.psi = other._terms, other.matrix, other.twist, other.psi
 
     def _arm_angle(self, q: Sequence[float]) -> float:
-        if self._geometry.n != 7:
+        if not self._has_arm_angle:
             return 0.0
         try:
-            return arm_angle(self._geometry.upper, self._geometry.fore, q)
+            return self._solver.arm_angle(q)
         except SingularError:
             return self.psi

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from rcilab.core.arrays import Array, JointPath
-from rcilab.model.kinematics.closed_form import build_closed_form
 from rcilab.views.plots import Curves, backward_differences
 
 if TYPE_CHECKING:
@@ -30,7 +29,7 @@ def tool_curves(model: RobotModel, t: Array, q: JointPath, quantity: ToolQuantit
         quantity: Which; only 7-axis arms have an arm angle.
     """
     if quantity == "psi":
-        values = build_closed_form(model.description).arm_angle_path(q)
+        values = model.solver.arm_angle_path(q)
         return Curves(t=t, values=np.asarray(values)[:, np.newaxis])
     places = model.position_path(q)
     rates = backward_differences(t, places, 1 if quantity == "speed" else 2)

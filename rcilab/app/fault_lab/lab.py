@@ -68,7 +68,7 @@ class FaultLab(Closeable):
             RcilabError: The controller did not report it.
         """
         recipe = FAULTS[find_fault(fault)]
-        if recipe.needs_elbow and self.model.n != 7:
+        if recipe.needs_elbow and not self.model.redundancy:
             said = f"{recipe.fault.manual_name} takes an arm of 7 axes; {self.model.name} has no elbow angle"
             raise UsageError(said).coded("no_psi")
         try:

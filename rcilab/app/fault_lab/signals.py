@@ -20,7 +20,6 @@ from rcilab.core.limits import Limits
 from rcilab.core.safety_box import SafetyBox
 from rcilab.makers.rokae.conditions import RCI_CONDITIONS
 from rcilab.makers.rokae.faults import Fault
-from rcilab.model.kinematics.closed_form import build_closed_form
 from rcilab.model.robot_model import RobotModel
 from rcilab.sim.momentum_observer import MomentumObserver
 from rcilab.sim.plant import Measurement
@@ -82,7 +81,7 @@ class Signals:
         self, rows: NDArray[np.void], model: RobotModel, limits: Limits, box: SafetyBox | None, lost: int
     ) -> None:
         self._rows, self._model, self._limits, self._box, self._lost = rows, model, limits, box, lost
-        self._closed_form = build_closed_form(model.description)
+        self._closed_form = model.solver
 
     def find(self, fault: Fault) -> Signal | None:
         """Returns the signal that raised a fault: the one farthest past its bound in the last row."""

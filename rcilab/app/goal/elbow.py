@@ -69,7 +69,7 @@ def look_at_elbow(model: RobotModel, q: Array, box: SafetyBox | None) -> Elbow |
         q: Joint angles, shape (n,), [rad].
         box: What the tool shall stay in.
     """
-    if model.n != 7:
+    if not model.redundancy:
         return None
     try:
         circle, psi = model.elbow_circle(q), model.arm_angle(q)

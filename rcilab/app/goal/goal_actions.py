@@ -211,7 +211,7 @@ class GoalActions:
 
     def set_arm_angle(self, request: SetArmAngle, branch: int | None = None) -> None:
         """Turns the elbow about the shoulder-wrist line while the tool stays, as near as limits allow."""
-        if math.isfinite(request.psi) and self._store.state.model.n == 7:
+        if math.isfinite(request.psi) and self._store.state.model.redundancy:
             state = self._store.state
             psi, snapped = nearest_free(state.model, state.goal.target, math.remainder(request.psi, math.tau), branch)
             self._aim(state.goal.target, psi, snapped=snapped)
@@ -260,7 +260,7 @@ class GoalActions:
             parsed = parse_number(request.text, 100.0 * SLOWEST, 100.0, "%")
             value = parsed.value
             act = None if value is None else lambda: self.set_speed(SetSpeed(speed=value / 100.0))
-        elif kind == "psi" and state.model.n == 7:
+        elif kind == "psi" and state.model.redundancy:
             parsed = parse_number(request.text, -180.0, 180.0, "deg")
             value = parsed.value
             act = None if value is None else lambda: self.set_arm_angle(SetArmAngle(psi=math.radians(value)))

@@ -104,7 +104,7 @@ class LearnActions:
         if fault not in FAULTS:
             return
         recipe, model = FAULTS[Fault(fault)], self._store.state.model
-        if recipe.needs_elbow and model.n != 7:
+        if recipe.needs_elbow and not model.redundancy:
             self._set(problem=message("learn.no_elbow", model=model.name))
             return
         self._work.start(recipe.fault, partial(self._arm.provoke, recipe.fault, model.name))

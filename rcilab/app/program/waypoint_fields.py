@@ -46,7 +46,7 @@ def proposed(waypoint: Waypoint, field: str, typed: str, arm: RobotModel) -> Way
         low, high, unit, take = _PLAIN[field]
         parsed = parse_number(typed, low, high, unit)
         return parsed.problem if parsed.value is None else take(waypoint, parsed.value)
-    if field == "psi" and arm.n == 7:
+    if field == "psi" and arm.redundancy:
         if not typed.strip() and waypoint.type != "nullspace":
             return replace(as_pose(waypoint, arm), psi=None)
         parsed = parse_number(typed, -180.0, 180.0, "deg")
@@ -94,7 +94,7 @@ def as_pose(waypoint: Waypoint, arm: RobotModel) -> Waypoint:
 
 def arm_angle_of(waypoint: Waypoint, arm: RobotModel) -> float | None:
     """Returns the arm angle that a waypoint leads to, [rad]; None where it has none, or leaves it open."""
-    if waypoint.q is None or arm.n != 7:
+    if waypoint.q is None or not arm.redundancy:
         return waypoint.psi
     try:
         return arm.arm_angle(waypoint.q)

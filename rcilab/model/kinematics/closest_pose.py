@@ -9,8 +9,8 @@ from math import acos, sin
 from rcilab.core.arrays import JointVector
 from rcilab.core.errors import UnreachableError
 from rcilab.core.spatial import Pose, wxyz_from_rotation
-from rcilab.model.kinematics.inverse import ArmGeometry
 from rcilab.model.kinematics.solutions import Solutions
+from rcilab.model.kinematics.solvers.solver import Envelope
 
 _KEEP_BENT = 0.999  # Share of the full reach a projected target is put at: a stretched arm is singular.
 _HALVINGS = 12  # Steps of the search along the way to the target: 1/4096 of it, well below a pixel.
@@ -32,7 +32,7 @@ class ClosestPose:
 
 def closest_reachable(
     solve: Callable[[Pose, bool], Solutions],
-    arm: ArmGeometry,
+    arm: Envelope,
     T_flange_tool: Pose,
     here: Pose,
     q: JointVector,
@@ -104,7 +104,7 @@ def interpolate(a: Pose, b: Pose, share: float) -> Pose:
     )
 
 
-def _pull_in(arm: ArmGeometry, T_flange_tool: Pose, target: Pose) -> Pose:
+def _pull_in(arm: Envelope, T_flange_tool: Pose, target: Pose) -> Pose:
     """Returns the target moved so that its wrist centre is inside the reachable shell."""
     r, (x, y, z) = (target @ T_flange_tool.inverse()).parts
     wx, wy, wz = x - arm.hand * r[2], y - arm.hand * r[5], z - arm.hand * r[8] - arm.shoulder

@@ -10,9 +10,9 @@ from collections.abc import Iterator, Sequence
 
 from rcilab.core.errors import SingularError
 from rcilab.core.spatial import Pose
-from rcilab.model.kinematics.closed_form import build_closed_form
 from rcilab.model.kinematics.elbow_ranges import FeasibleArcs
 from rcilab.model.kinematics.solutions import Solutions
+from rcilab.model.kinematics.solvers.build import build_solver
 from rcilab.robots.description import RobotDescription
 
 _LOOKS = tuple(math.radians(sign * step) for step in range(10, 181, 10) for sign in (1, -1))
@@ -26,15 +26,14 @@ class InverseSearch:
         description: The arm.
 
     Raises:
-        ModelError: There is no closed form for its Denavit-Hartenberg table.
+        ModelError: No solver serves the arm.
     """
 
     def __init__(self, description: RobotDescription) -> None:
-        self.form = build_closed_form(description)
+        self.solver = build_solver(description)
         self._joint = description.limits.joint
         self._lower: list[float] = self._joint.lower.tolist()
         self._upper: list[float] = self._joint.upper.tolist()
-        self._has_arm_angle = len(description.dh) == 7
 
     def solve(self, T_base_flange: Pose, psi: float | None, near: Sequence[float] | None) -> Solutions:
         """Returns the solutions at an arm angle; at that of `near` when none is asked for, or else at the closest.
@@ -48,9 +47,9 @@ class InverseSearch:
             UnreachableError: There is none; the message says what is in the way.
         """
         start = psi
-        if start is None and self._has_arm_angle:
+        if start is None and self.solver.redundancy:
             start = self.natural_psi(near)
-        pose = self.form.at(T_base_flange, near)
+        pose = self.solver.at(T_base_flange, near)
         solutions = Solutions(pose.branches(start or 0.0), self._lower, self._upper, start)
         if len(solutions):
             return solutions
@@ -69,16 +68,16 @@ class InverseSearch:
 
         Raises:
             UnreachableError: The pose is out of reach at every arm angle.
-            KinematicsError: The arm has 6 axes.
+            KinematicsError: The arm has no redundancy.
         """
-        return self.form.arcs(T_base_flange, self._joint.lower, self._joint.upper, outside_box)
+        return self.solver.arcs(T_base_flange, self._joint.lower, self._joint.upper, outside_box)
 
     def natural_psi(self, near: Sequence[float] | None) -> float:
         """Returns the arm angle of joint angles, [rad]; 0 where it has no meaning, or where there are none."""
         if near is None:
             return 0.0
         try:
-            return self.form.arm_angle(near)
+            return self.solver.arm_angle(near)
         except SingularError:
             return 0.0
 

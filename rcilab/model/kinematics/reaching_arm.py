@@ -15,13 +15,12 @@ from rcilab.core.spatial import Pose
 from rcilab.model.kinematics.closest_pose import ClosestPose, closest_reachable
 from rcilab.model.kinematics.elbow_circle import ElbowCircle, elbow_circle
 from rcilab.model.kinematics.elbow_ranges import FeasibleArcs
-from rcilab.model.kinematics.inverse_batch import SolutionBatch, as_pose_batch
 from rcilab.model.kinematics.inverse_search import InverseSearch
 from rcilab.model.kinematics.moving_arm import MOST_ANGLE, MovingArm
+from rcilab.model.kinematics.solution_batch import SolutionBatch, as_pose_batch
 from rcilab.model.kinematics.solutions import Solutions
+from rcilab.model.kinematics.solvers.solver import KinematicsSolver, Redundancy
 from rcilab.robots.description import RobotDescription
-
-"""No arm angle is as large, [rad]: whoever gives more means degrees."""
 
 
 class ReachingArm(MovingArm):
@@ -41,12 +40,23 @@ class ReachingArm(MovingArm):
         self.description = description
         self._T_tool_flange = self.T_flange_tool.inverse()
 
+    @property
+    def redundancy(self) -> Redundancy:
+        """What a pose of the tool leaves open: nothing (then it is false), the arm angle, or the angle of a joint."""
+        return self.solver.redundancy
+
+    @property
+    def solver(self) -> KinematicsSolver:
+        """The inverse of the arm without its tool and joint limits."""
+        return self._search.solver
+
     def inverse(self, T: Pose | ArrayLike, psi: float | None = None, near: ArrayLike | None = None) -> Solutions:
-        """Returns every analytic solution inside the joint limits (GetJointPos); `.nearest(q)` is the vendor's answer.
+        """Returns every solution inside the joint limits (GetJointPos); `.nearest(q)` is the vendor's answer.
 
         The xMates have 8 solutions at an arm angle. The Panda has offsets, and up to 16 or none: the roots of a
         polynomial, which takes a millisecond or two. Where two of them are about to meet, one may be taken for both;
-        the one next to `near` is always found.
+        the one next to `near` is always found. An arm without closed form is solved by iteration: every solution given
+        is exact, but one may be missing.
 
         Args:
             T: Pose of the tool in base: a `Pose` or a homogeneous matrix, shape (4, 4).
@@ -69,7 +79,7 @@ class ReachingArm(MovingArm):
             raise InvalidValueError("psi", psi, "must be finite [rad]")
         if psi is not None and abs(psi) > MOST_ANGLE:
             raise InvalidValueError("psi", psi, "is more than two turns; it is wanted in rad")
-        if psi is not None and self.n != 7:
+        if psi is not None and not self.redundancy:
             name = self.description.name
             problem = f"has no meaning for {name}: a 6-axis arm has no arm angle"
             raise InvalidValueError("psi", psi, problem).coded("six_axes", model=name)
@@ -88,12 +98,12 @@ class ReachingArm(MovingArm):
         """
         q = as_vector(near, self.n, "near", "rad")
         target = T if isinstance(T, Pose) else Pose.from_matrix(T)
-        held = self._search.natural_psi(q.tolist()) if psi is None and self.n == 7 else psi
+        held = self._search.natural_psi(q.tolist()) if psi is None and self.redundancy else psi
 
         def solve(pose: Pose, may_search: bool) -> Solutions:
             return self.inverse(pose, psi if may_search else held, q)
 
-        return closest_reachable(solve, self._search.form.envelope, self.T_flange_tool, self.forward(q), q, target)
+        return closest_reachable(solve, self.solver.envelope, self.T_flange_tool, self.forward(q), q, target)
 
     def inverse_batch(self, T: ArrayLike, psi: ArrayLike = 0.0) -> SolutionBatch:
         """Returns every analytic solution of many poses at once (GetJointPos), at one arm angle each.
@@ -116,7 +126,7 @@ class ReachingArm(MovingArm):
             )
         flange = poses @ self._T_tool_flange.matrix if self._has_tool else poses
         joint = self.description.limits.joint
-        return SolutionBatch(self._search.form.batch(flange, angles), joint.lower, joint.upper)
+        return SolutionBatch(self.solver.batch(flange, angles), joint.lower, joint.upper)
 
     def feasible_arcs(self, T: Pose | ArrayLike, box: SafetyBox | None = None) -> FeasibleArcs:
         """Returns which arm angles a pose leaves to a 7-axis arm, and what forbids the others.
@@ -147,7 +157,7 @@ class ReachingArm(MovingArm):
             KinematicsError: The arm has 6 axes.
         """
         self._require_arm_angle()
-        return self._search.form.arm_angle(self._floats(q))
+        return self.solver.arm_angle(self._floats(q))
 
     def elbow_circle(self, q: ArrayLike) -> ElbowCircle:
         """Returns the circle on which the elbow can go round while the tool stays, for a 7-axis xMate.
@@ -160,7 +170,7 @@ class ReachingArm(MovingArm):
             KinematicsError: The arm has 6 axes, or offsets: then its elbow goes round on no circle.
         """
         self._require_arm_angle()
-        if any(row.a for row in self.description.dh):
+        if self.redundancy.kind != "arm_angle":
             raise KinematicsError(f"{self.description.name} has offsets: its elbow does not go round on a circle")
         frames = self.joint_frames(q)
         return elbow_circle(*(frames[joint].position for joint in (0, 2, 4)))
@@ -173,7 +183,7 @@ class ReachingArm(MovingArm):
         return T_base_tool @ self._T_tool_flange if self._has_tool else T_base_tool
 
     def _require_arm_angle(self) -> None:
-        if self.n != 7:
+        if not self.redundancy:
             raise KinematicsError(f"{self.description.name} has 6 axes: only a 7-axis arm has an arm angle").coded(
                 "no_psi"
             )

@@ -9,8 +9,8 @@ import numpy as np
 from rcilab.core.arrays import Array, JointPath, JointVector, described, readonly_copy
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.safety_box import SafetyBox, active_box
+from rcilab.model.kinematics.manipulability import ManipulabilityPath, dexterity_path
 from rcilab.model.kinematics.moving_arm import MovingArm
-from rcilab.model.kinematics.singularity import ManipulabilityPath, dexterity_path
 
 _MOST = 1_000_000  # Samples; a choice: some 200 MB while they are made.
 

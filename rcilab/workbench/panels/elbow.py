@@ -33,7 +33,7 @@ class ElbowPanel:
         """Adds the controls."""
         text, ask = self._text, self._ask
         self._psi: BoundControl | None = None
-        if state.model.n != 7:
+        if not state.model.redundancy:
             return
         with gui.add_folder(text("target.psi_title")):
             gui.add_html('<i class="rl-rows"></i>')

@@ -27,7 +27,7 @@ class ExtrasPanel:
         with gui.add_folder(self._text("extra.title")):
             gui.add_html('<i class="rl-ticks"></i>')
             for extra in EXTRAS:
-                if extra == "elbow" and state.model.n != 7:
+                if extra == "elbow" and state.model.redundancy.kind != "arm_angle":
                     continue
                 box = gui.add_checkbox(
                     self._text(f"extra.{extra}"), extra in state.scene.extras, hint=self._text(f"extra.{extra}_hint")

@@ -60,7 +60,7 @@ class LearnPanel:
         if busy:
             self._bar.value = round(100.0 * learn.progress, 1)
         for fault, button in self._buttons.items():
-            button.disabled = busy or (FAULTS[fault].needs_elbow and state.model.n != 7)
+            button.disabled = busy or (FAULTS[fault].needs_elbow and not state.model.redundancy)
 
 
 def _provoke(fault: Fault):  # type: ignore[no-untyped-def]

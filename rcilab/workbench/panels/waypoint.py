@@ -40,7 +40,7 @@ class WaypointPanel:
             self._kinds = {kind: label for label, kind in kinds.items()}
             choice = gui.add_dropdown(text("program.type"), tuple(kinds), hint=text("program.type_hint"))
             self._kind = BoundControl(choice, ask, lambda v, p: EditProgram(page=p, what="type", type=kinds.get(v, "")))
-            for name in (*_PLAIN, *(("psi",) if state.model.n == 7 else ())):
+            for name in (*_PLAIN, *(("psi",) if state.model.redundancy else ())):
                 self._field(gui, name)
         self._pose = gui.add_folder(text("program.pose"))
         with self._pose:

@@ -14,8 +14,8 @@ from rcilab.core.errors import KinematicsError, UnreachableError
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.model.kinematics.elbow_ranges import INSIDE
-from rcilab.model.kinematics.inverse import build_geometry, inverse_seven
-from rcilab.model.kinematics.singularity import find_singularity
+from rcilab.model.kinematics.solvers.spherical.inverse import build_geometry, inverse_seven
+from rcilab.model.kinematics.solvers.spherical.singularity import find_singularity
 from rcilab.model.robot_model import RobotModel, load_model
 
 NAMES = ["xMatePro3", "xMatePro7"]

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from rcilab.core.errors import InvalidValueError, UnreachableError
 from rcilab.core.spatial import Pose
 from rcilab.makers.rokae.robots import ROBOTS
-from rcilab.model.kinematics.inverse import build_geometry, inverse_seven, inverse_six
+from rcilab.model.kinematics.solvers.spherical.inverse import build_geometry, inverse_seven, inverse_six
 from rcilab.model.robot_model import load_model
 from rcilab.robots import ROBOT_NAMES
 

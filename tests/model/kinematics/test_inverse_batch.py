@@ -39,7 +39,7 @@ def clearance(model, q, T):
 
 def scalar_branches(model, T, psi):
     """The branches of the scalar inverse, whether or not a joint limit forbids all of them."""
-    from rcilab.model.kinematics.inverse import build_geometry, inverse_seven, inverse_six
+    from rcilab.model.kinematics.solvers.spherical.inverse import build_geometry, inverse_seven, inverse_six
 
     geometry, pose = build_geometry(model.description), Pose.from_matrix(T)
     return np.array(inverse_seven(geometry, pose, psi, None) if model.n == 7 else inverse_six(geometry, pose, None))

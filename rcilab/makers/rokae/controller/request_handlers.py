@@ -24,8 +24,6 @@ from rcilab.makers.rokae.controller.state_machine import (
     transition,
 )
 from rcilab.makers.rokae.wire.bounds import LOWEST_CLIENT_PORT
-from rcilab.model.kinematics.inverse import build_geometry
-from rcilab.model.kinematics.singularity import find_singularity
 from rcilab.model.robot_model import RobotModel
 from rcilab.sim.reference_trajectory import ReferenceTrajectory
 
@@ -97,7 +95,7 @@ def _judge_start(request: rci.StartMove, model: RobotModel, commanded: Reference
     mode = MODES.get((ControllerMode(controller_mode), rci.StartMotionMode(motion_mode)))
     if mode is None or not commanded.is_at_rest:
         return rci.StartStatus.NOT_POSSIBLE
-    if mode.is_cartesian and find_singularity(build_geometry(model.description), commanded.q) is not None:
+    if mode.is_cartesian and model.solver.singularity(commanded.q) is not None:
         return rci.StartStatus.SINGULAR_START_POSE
     return None
 
@@ -131,7 +129,7 @@ def describe_refusal(request: rci.Request, status: rci.Status, phase: Phase, set
         pair = f"controller mode {request.controller_mode} with motion mode {request.motion_mode}"
         why = f"there is no {pair}" if arm.commanded.is_at_rest else "the arm still moves"
     elif status is rci.StartStatus.SINGULAR_START_POSE:
-        why = find_singularity(build_geometry(arm.model.description), arm.commanded.q)
+        why = arm.model.solver.singularity(arm.commanded.q)
     elif status is rci.RecoveryStatus.REFLEX:
         why = arm.watch.find_collision(settings.collision_thresholds)
     elif status is rci.RecoveryStatus.MANUAL_RECOVERY_NEEDED:

@@ -54,7 +54,7 @@ class CartesianGenerator:
         self._terms = terms
         self._has_begun = False
         self._jump: Remark | None = None
-        self._has_psi = model.n == 7
+        self._has_psi = bool(model.redundancy)
         self._q = q
         self._psi = model.arm_angle(q) if self._has_psi else 0.0
         limits = terms.limits.arm_angle

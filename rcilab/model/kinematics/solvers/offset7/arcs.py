@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from rcilab.core.arrays import Array
 from rcilab.core.spatial import Pose
 from rcilab.model.kinematics.elbow_ranges import Arc, FeasibleArcs, Reason
+from rcilab.model.kinematics.solvers.newton import settle
 from rcilab.model.kinematics.solvers.offset7.arm import ELBOW, OffsetGeometry, SelfMotion, wrapped
-from rcilab.model.kinematics.solvers.offset7.settle import settle
 from rcilab.model.kinematics.solvers.offset7.singularity import held_singularity_path
 
 _CUTS = 8  # Into how many a piece is cut at once; a choice.
@@ -119,7 +119,8 @@ def _placed(
     whole[on] = motion.on_branches(guesses[on], branches[on])
     count = int((~on).sum())
     rotations = np.broadcast_to(T_base_flange.rotation, (count, 3, 3))
-    found, settled = settle(arm, rotations, np.broadcast_to(T_base_flange.position, (count, 3)), guesses[~on])
+    positions = np.broadcast_to(T_base_flange.position, (count, 3))
+    found, settled = settle(arm.chain, ELBOW, rotations, positions, guesses[~on])
     found[~settled] = np.nan
     whole[~on] = found
     return whole

@@ -6,13 +6,13 @@ and Automation Letters 6(4), 2021): W is known, the triangle of shoulder, elbow 
 the plane of that triangle through axis 5 two of joint 6, and the shoulder two groups of joints 1 to 3.
 
 But the arm angle of such an arm is its maker's: the elbow of the Panda is joint 3. So the self-motion of the arm at a
-pose is traced by joint 7; `held_elbow.py` finds where joint 3 is at a given angle.
+pose is traced by joint 7; `inverse.py` finds where joint 3 is at a given angle.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import atan2, degrees, hypot, pi, tau
+from math import atan2, hypot, pi, tau
 
 import numpy as np
 from numpy.typing import NDArray
@@ -265,8 +265,3 @@ def _unreachable(arm: OffsetGeometry, beyond: Array) -> UnreachableError:
         "shoulder, at whatever angle of joint 7; move the target",
         distance=excess,
     )
-
-
-def no_solution(psi: float) -> str:
-    """Returns in words that a pose has no solution at an arm angle, [rad]."""
-    return f"no joint angles put the tool there with the elbow (joint 3) at {degrees(psi):.1f} deg"

@@ -10,8 +10,8 @@ import pytest
 from rcilab.core.errors import SingularError, UnreachableError
 from rcilab.core.spatial import Pose
 from rcilab.makers.rokae.controller.modes.ik_tracker import IkTracker
-from rcilab.model.kinematics.inverse import build_geometry
-from rcilab.model.kinematics.singularity import find_singularity
+from rcilab.model.kinematics.solvers.spherical.inverse import build_geometry
+from rcilab.model.kinematics.solvers.spherical.singularity import find_singularity
 from rcilab.model.robot_model import load_model
 
 NAMES = ["xMatePro3", "xMatePro7", "xMate3", "xMate7"]

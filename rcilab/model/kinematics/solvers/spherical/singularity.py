@@ -1,59 +1,17 @@
-"""How close a configuration is to losing a direction of motion."""
+"""The singularities of the arms without offsets."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import cos, degrees, hypot, sin, sqrt
 
 import numpy as np
 
-from rcilab.core.arrays import Array, JointPath, Matrix
-from rcilab.model.kinematics.inverse import ArmGeometry
+from rcilab.core.arrays import Array, JointPath
+from rcilab.model.kinematics.solvers.spherical.inverse import ArmGeometry
 
-SINGULAR = (
-    0.02  # Sine of an angle, or share of the reach: about one degree from a singularity counts as on it; a choice.
-)
-
-
-@dataclass(frozen=True, slots=True)
-class Manipulability:
-    """What the singular values of the Jacobian say about a configuration."""
-
-    manipulability: float
-    """sqrt(det(J J^T)): product of the singular values (Yoshikawa 1985); 0 at a singularity."""
-    smallest: float
-    """Smallest singular value: the tool velocity that unit joint velocity gives in the worst direction."""
-    condition: float
-    """Largest over smallest singular value; infinite at a singularity."""
-
-
-def dexterity(J: Matrix) -> Manipulability:
-    """Returns the dexterity measures of a Jacobian, shape (6, n), metres and radians taken as they are."""
-    values = np.linalg.svd(J, compute_uv=False)
-    smallest, largest = float(values[-1]), float(values[0])
-    return Manipulability(float(np.prod(values)), smallest, largest / smallest if smallest > 0.0 else float("inf"))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class ManipulabilityPath:
-    """The measures of `Manipulability` for N configurations, each of shape (N,)."""
-
-    manipulability: Array
-    smallest: Array
-    condition: Array
-
-    def __repr__(self) -> str:
-        return f"<ManipulabilityPath of {len(self.smallest)} rows: .manipulability, .smallest, .condition>"
-
-
-def dexterity_path(J: Array) -> ManipulabilityPath:
-    """Returns the dexterity measures of many Jacobians, shape (N, 6, n)."""
-    values = np.asarray(np.linalg.svd(J, compute_uv=False), dtype=np.float64)
-    smallest, largest = values[:, -1], values[:, 0]
-    with np.errstate(divide="ignore"):
-        condition = np.where(smallest > 0.0, largest / smallest, np.inf)
-    return ManipulabilityPath(np.prod(values, axis=1), smallest, condition)
+SINGULAR = 0.02
+"""Sine of an angle, or share of the reach: what is nearer to a singularity counts as on it. Tuning value: a degree."""
 
 
 def find_singularity(arm: ArmGeometry, q: Sequence[float]) -> str | None:

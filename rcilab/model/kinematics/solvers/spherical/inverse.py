@@ -15,14 +15,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 from math import atan2, cos, hypot, pi, sin, sqrt, tau
-from typing import TypeAlias
 
 from rcilab.core.errors import ModelError, SingularError, UnreachableError
 from rcilab.core.spatial import Pose, Rotation9
 from rcilab.model.kinematics.arm_angle import reference_frame
+from rcilab.model.kinematics.solvers.solver import Angles
 from rcilab.robots.description import DhRow, RobotDescription
-
-Angles: TypeAlias = tuple[float, ...]
 
 _REACH_TOLERANCE = 1e-9  # [m] A pose that rounding put this far outside the reachable shell counts as on it.
 _AXIS_LOST = 1e-12  # sin of an angle below which the axes beside it are parallel within rounding.

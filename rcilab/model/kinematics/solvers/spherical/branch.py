@@ -9,7 +9,6 @@ told apart.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import pi, tau
 from typing import TypeAlias
 
@@ -17,7 +16,8 @@ import numpy as np
 
 from rcilab.core.arrays import Array, JointPath, JointVector
 from rcilab.core.errors import KinematicsError, SingularError
-from rcilab.model.kinematics.inverse import ArmGeometry, reach_error
+from rcilab.model.kinematics.solvers.solver import BranchEnd
+from rcilab.model.kinematics.solvers.spherical.inverse import ArmGeometry, reach_error
 
 Column: TypeAlias = Array
 """Shape (N,): one number for every row of the path."""
@@ -27,15 +27,6 @@ _REACH_TOLERANCE = 1e-9  # [m] As in `inverse.py`.
 _AXIS_LOST = 1e-12  # As in `inverse.py`: below it the azimuth is rounding, and the one before is kept.
 _VERTICAL = 1e-6  # sin of the angle to the vertical below which the arm angle's reference turns too fast to follow.
 _BESIDE = 1e-5  # sin of how far beside the axis a path still counts as through it: ten times the error of `_miss`.
-
-
-@dataclass(frozen=True, slots=True)
-class BranchEnd:
-    """The first row of a path at which its branch ends."""
-
-    row: int
-    reason: KinematicsError
-    """Out of reach, or singular."""
 
 
 def follow_branch(

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from rcilab.core.errors import KinematicsError, SingularError
 from rcilab.core.spatial import Pose
-from rcilab.model.kinematics.closed_form import build_closed_form
+from rcilab.model.kinematics.solvers.build import build_solver
 from rcilab.model.robot_model import load_model
 
 MODELS = {name: load_model(name) for name in ("xMatePro3", "xMatePro7", "xMate3", "xMate7", "Panda")}
@@ -28,7 +28,7 @@ def configurations(name: str, seed: int, count: int = 40):
 @settings(max_examples=40)
 @given(names, seeds)
 def test_arm_angles_of_a_path_are_those_of_its_rows(name, seed):
-    arm, q = build_closed_form(MODELS[name].description), configurations(name, seed)
+    arm, q = build_solver(MODELS[name].description), configurations(name, seed)
     if MODELS[name].n == 6:
         with pytest.raises(KinematicsError, match="no arm angle"):
             arm.arm_angle_path(q)
@@ -45,7 +45,7 @@ def test_arm_angles_of_a_path_are_those_of_its_rows(name, seed):
 @settings(max_examples=40)
 @given(names, seeds)
 def test_what_counts_as_singular_on_a_path_is_what_counts_for_one_configuration(name, seed):
-    arm, q = build_closed_form(MODELS[name].description), configurations(name, seed)
+    arm, q = build_solver(MODELS[name].description), configurations(name, seed)
     for row, nearness in zip(q, arm.singularity_path(q), strict=True):
         if abs(nearness - 1.0) > 1e-9:
             assert arm.is_singular(row.tolist()) == (nearness > 1.0)
@@ -56,7 +56,7 @@ def test_what_counts_as_singular_on_a_path_is_what_counts_for_one_configuration(
 @given(names, seeds)
 def test_the_solution_beside_the_last_angles_is_the_arm_itself(name, seed):
     model, rng = MODELS[name], np.random.default_rng(seed)
-    arm = build_closed_form(model.description)
+    arm = build_solver(model.description)
     q = model.home + rng.uniform(-0.15, 0.15, model.n)
     near = q + rng.uniform(-2e-3, 2e-3, model.n)
     psi = arm.arm_angle(q.tolist()) if model.n == 7 else 0.0

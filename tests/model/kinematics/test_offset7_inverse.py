@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from rcilab.model.kinematics.ik_fixed_elbow import DEGREE, polynomial, solve_held
 from rcilab.model.kinematics.solvers.offset7.arm import build_offset_geometry, trace, wrapped
+from rcilab.model.kinematics.solvers.offset7.inverse import DEGREE, polynomial, solve_held
 from rcilab.model.kinematics.solvers.offset7.singularity import held_singularity, held_singularity_path
 from rcilab.model.robot_model import load_model
 

@@ -1,49 +1,60 @@
-"""The inverse of an arm with offsets along a whole path: one branch, followed without a jump.
+"""The inverse along a whole path by Newton's method: one branch, followed without a jump.
 
-What `branch.py` does for the arms without offsets. A few rows are settled one after the other, each from the one
+What `spherical/branch.py` does in closed form. A few rows are settled one after the other, each from the one
 before; between them the joint angles are guessed by straight lines, and Newton's method settles all rows at once.
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from math import degrees
 
 import numpy as np
 
 from rcilab.core.arrays import Array, JointPath, JointVector
 from rcilab.core.errors import KinematicsError, SingularError, UnreachableError
 from rcilab.core.spatial import Pose
-from rcilab.model.kinematics.branch import BranchEnd
-from rcilab.model.kinematics.ik_fixed_elbow import inverse_held
-from rcilab.model.kinematics.solvers.offset7.arm import ELBOW, OffsetGeometry, no_solution
-from rcilab.model.kinematics.solvers.offset7.settle import settle, settle_beside
+from rcilab.model.kinematics.forward import Chain
+from rcilab.model.kinematics.solvers.newton import settle, settle_beside
+from rcilab.model.kinematics.solvers.solver import Angles, BranchEnd
 
-_KNOTS = 48  # Rows that are settled one by one; a choice: a few ms, and guesses good to a hundredth of a radian.
+_KNOTS = 48  # Rows that are settled one by one. Tuning value: a few ms, and guesses good to a hundredth of a radian.
 _TURN = 0.15  # [rad] Of a joint from knot to knot, beyond which rows between them are settled first.
 _JUMP = 0.6  # [rad] From row to row: beyond it the arm does not follow but changes branches.
 
 
-def follow_offset_branch(
-    arm: OffsetGeometry, rotations: Array, positions: Array, psi: Array, start: JointVector
+def follow_by_newton(
+    chain: Chain,
+    held: int | None,
+    solve: Callable[[Pose, float], list[Angles]],
+    rotations: Array,
+    positions: Array,
+    psi: Array,
+    start: JointVector,
 ) -> tuple[JointPath, BranchEnd | None]:
     """Returns the joint angles along a path of the flange, each row next to the one before; limits are not looked at.
 
     Args:
-        arm: From `build_offset_geometry`.
+        chain: From `build_chain`.
+        held: Which joint, from 0, is held at `psi`; None for none.
+        solve: Every solution at a pose of the flange and an angle of the held joint; asked where the branch ends.
         rotations: Flange in base, shape (N, 3, 3).
         positions: Flange in base, shape (N, 3), [m].
-        psi: Arm angles, shape (N,), [rad].
-        start: Joint angles at row 0, shape (7,), [rad]: they choose the branch.
+        psi: Angles of the held joint, shape (N,), [rad].
+        start: Joint angles at row 0, shape (n,), [rad]: they choose the branch.
 
     Returns:
-        Joint angles, shape (N, 7), [rad], and the first row that has none, or None. From that row on they mean nothing.
+        Joint angles, shape (N, n), [rad], and the first row that has none, or None. From that row on they mean nothing.
     """
-    march = _March(arm, rotations, positions, psi)
+    march = _March(chain, held, rotations, positions, psi)
     known = march.run(start)
     rows = np.arange(len(psi))
     places = sorted(known)
     table = np.array([known[place] for place in places])
     guess = np.stack([np.interp(rows, places, column) for column in table.T], axis=1)
-    guess[:, ELBOW] = psi
-    q, settled = settle(arm, rotations, positions, guess)
+    if held is not None:
+        guess[:, held] = psi
+    q, settled = settle(chain, held, rotations, positions, guess)
     q[places] = table
     settled[places] = True
     lost = ~settled
@@ -53,14 +64,15 @@ def follow_offset_branch(
     if not lost.any():
         return q, None
     row = int(lost.argmax())
-    return q, BranchEnd(row, _reason(arm, rotations[row], positions[row], float(psi[row])))
+    return q, BranchEnd(row, _reason(solve, rotations[row], positions[row], float(psi[row]), held))
 
 
 class _March:
     """Settles a few rows of a path one after the other."""
 
-    def __init__(self, arm: OffsetGeometry, rotations: Array, positions: Array, psi: Array) -> None:
-        self._arm, self._rotations, self._positions, self._psi = arm, rotations, positions, psi
+    def __init__(self, chain: Chain, held: int | None, rotations: Array, positions: Array, psi: Array) -> None:
+        self._chain, self._held = chain, held
+        self._rotations, self._positions, self._psi = rotations, positions, psi
         self.lost: int | None = None
 
     def run(self, start: JointVector) -> dict[int, list[float]]:
@@ -97,19 +109,31 @@ class _March:
     def _settled(self, row: int, guess: list[float]) -> list[float] | None:
         """Returns the solution at a row next to a guess, or None, in plain floats."""
         psi = float(self._psi[row])
-        return settle_beside(self._arm, self._rotations[row], self._positions[row], psi, guess)
+        return settle_beside(self._chain, self._held, self._rotations[row], self._positions[row], psi, guess)
 
 
-def _reason(arm: OffsetGeometry, rotation: Array, position: Array, psi: float) -> KinematicsError:
+def _reason(
+    solve: Callable[[Pose, float], list[Angles]], rotation: Array, position: Array, psi: float, held: int | None
+) -> KinematicsError:
     T = np.eye(4)
     T[:3, :3], T[:3, 3] = rotation, position
     try:
-        found = inverse_held(arm, Pose.from_matrix(T), psi, None)
+        found = solve(Pose.from_matrix(T), psi)
     except UnreachableError as error:
         return error
     if not found:
-        return UnreachableError(f"{no_solution(psi)}; give another arm angle").coded("no_angles")
+        return no_solution(psi, held)
     return SingularError(
         "the arm would have to jump, because a singularity is in the way; lead the tool around it, give another arm "
         "angle, or go there in joint space"
     ).coded("jump")
+
+
+def no_solution(psi: float, held: int | None) -> UnreachableError:
+    """Returns the error of a pose that has no solution with a joint, from 0, held at an angle, [rad]."""
+    if held is None:
+        return UnreachableError("no joint angles put the tool there; move the target").coded("no_angles")
+    elbow = "the elbow (joint 3)" if held == 2 else f"joint {held + 1}"
+    return UnreachableError(
+        f"no joint angles put the tool there with {elbow} at {degrees(psi):.1f} deg; give another arm angle"
+    ).coded("no_angles")

@@ -24,8 +24,8 @@ from numpy.typing import NDArray
 
 from rcilab.core.arrays import Array
 from rcilab.core.spatial import Pose
+from rcilab.model.kinematics.solvers.newton import settle, settle_beside
 from rcilab.model.kinematics.solvers.offset7.arm import ELBOW, OffsetGeometry, SelfMotion, trace, wrapped
-from rcilab.model.kinematics.solvers.offset7.settle import settle, settle_beside
 
 DEGREE = 8
 """Of the polynomial: 16 roots on the circle at most."""
@@ -88,7 +88,7 @@ def inverse_held(
     """
     rotation, position = T_base_flange.rotation, T_base_flange.position
     _, q = solve_held(arm, rotation[None], position[None], np.array((psi,)))
-    beside = None if near is None else settle_beside(arm, rotation, position, psi, near)
+    beside = None if near is None else settle_beside(arm.chain, ELBOW, rotation, position, psi, near)
     if beside is not None:
         middles = np.array(arm.middles)
         first = wrapped(np.array(beside) - middles) + middles
@@ -110,7 +110,7 @@ def _without_a_crossing(arm: OffsetGeometry, T_base_flange: Pose, psi: float) ->
     guesses[:, ELBOW] = psi
     count, middles = len(guesses), np.array(arm.middles)
     rotations = np.broadcast_to(T_base_flange.rotation, (count, 3, 3))
-    q, good = settle(arm, rotations, np.broadcast_to(T_base_flange.position, (count, 3)), guesses)
+    q, good = settle(arm.chain, ELBOW, rotations, np.broadcast_to(T_base_flange.position, (count, 3)), guesses)
     return wrapped(q[good] - middles) + middles
 
 
@@ -297,7 +297,7 @@ def _joint_angles(
     loose = np.flatnonzero(~small)
     good = np.ones(len(q), dtype=np.bool_)
     if len(loose):
-        q[loose], good[loose] = settle(arm, R[loose], p[loose], q[loose])
+        q[loose], good[loose] = settle(arm.chain, ELBOW, R[loose], p[loose], q[loose])
     return rows[root][good], q[good]
 
 

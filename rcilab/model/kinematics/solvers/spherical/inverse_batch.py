@@ -1,4 +1,4 @@
-"""The closed-form inverse for many poses at once: the branches of `rcilab.model.kinematics.inverse`, in numpy.
+"""The closed-form inverse for many poses at once: the branches of `spherical.inverse`, in numpy.
 
 The same mathematics with one array element a pose; sines and cosines come from normalised vectors instead of from the
 angles. The few poses at a singularity, where angles are left open, are handed to the scalar form, so that both agree
@@ -14,108 +14,22 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rcilab.core.arrays import Array
-from rcilab.core.errors import InvalidValueError
-from rcilab.core.spatial import PERPENDICULAR_TOLERANCE, UNIT_TOLERANCE, Pose
-from rcilab.model.kinematics.inverse import ArmGeometry, inverse_seven, inverse_six
+from rcilab.core.spatial import Pose
+from rcilab.model.kinematics.solvers.spherical.inverse import ArmGeometry, inverse_seven, inverse_six
 
 Columns: TypeAlias = tuple[Array, Array, Array]
 """Three components of one vector a pose, each of shape (N,)."""
 
-_BLOCK = 2048  # Poses worked on together, so that intermediate arrays stay in the cache; a choice.
+_BLOCK = 2048  # Poses worked on together, so that intermediate arrays stay in the cache.
 _OPEN = 1e-7  # Sine of an angle, or length in [m], below which the scalar form decides what a singularity leaves open.
 _REACH_TOLERANCE = 1e-9  # [m] As in the scalar form.
-
-
-class SolutionBatch:
-    """Every branch of the inverse at N poses. Read-only.
-
-    Args:
-        q: Branches, shape (N, 8, n), [rad]; not a number where a pose is out of reach.
-        lower: Smallest joint angles, shape (n,), [rad].
-        upper: Largest joint angles, shape (n,), [rad].
-    """
-
-    __slots__ = ("_lower", "_upper", "inside", "q")
-
-    def __init__(self, q: Array, lower: Array, upper: Array) -> None:
-        q.flags.writeable = False
-        self.q = q
-        """Shape (N, 8, n), [rad], inside the joint limits or not; branches in the order of `Solutions.all`."""
-        self._lower, self._upper = lower, upper
-        inside = np.ones(q.shape[:2], dtype=np.bool_)
-        for joint in range(q.shape[2]):
-            angle = q[:, :, joint]
-            inside &= (angle > lower[joint]) & (angle < upper[joint])
-        inside.flags.writeable = False
-        self.inside: NDArray[np.bool_] = inside
-        """Which branches keep every joint limit, shape (N, 8)."""
-
-    def __len__(self) -> int:
-        return len(self.q)
-
-    @property
-    def reachable(self) -> NDArray[np.bool_]:
-        """Which poses have a branch inside the joint limits, shape (N,)."""
-        return np.asarray(self.inside.any(axis=1), dtype=np.bool_)
-
-    def nearest(self, near: ArrayLike) -> Array:
-        """Returns the branch inside the limits that is closest to `near` at each pose.
-
-        A joint whose range is longer than a full turn may be moved by full turns to come closer.
-
-        Args:
-            near: Joint angles, shape (n,) or (N, n), [rad].
-
-        Returns:
-            Shape (N, n), [rad]; not a number where no branch is inside the limits.
-
-        Raises:
-            InvalidValueError: `near` has another shape or is not finite.
-        """
-        count, _, n = self.q.shape
-        here = np.asarray(near, dtype=np.float64)
-        if here.shape not in ((n,), (count, n)) or not np.isfinite(here).all():
-            raise InvalidValueError("near", near, f"needs shape ({n},) or ({count}, {n}), finite [rad]")
-        here = np.broadcast_to(here, (count, n))[:, None, :]
-        turned = self.q + np.round((here - self.q) / tau) * tau
-        turned = np.where((turned > self._lower) & (turned < self._upper), turned, self.q)
-        distance = np.where(self.inside, np.square(turned - here).sum(axis=2), np.inf)
-        chosen = turned[np.arange(count), distance.argmin(axis=1)]
-        return np.where(self.reachable[:, None], chosen, np.nan)
-
-    def __repr__(self) -> str:
-        return f"<SolutionBatch of {len(self)} poses, {int(self.reachable.sum())} inside the limits: .q, .inside>"
-
-
-def as_pose_batch(value: ArrayLike) -> Array:
-    """Returns checked homogeneous transforms, shape (N, 4, 4).
-
-    Raises:
-        InvalidValueError: They have another shape, or one of them is no proper rigid transform; the message says which.
-    """
-    T = np.asarray(value, dtype=np.float64)
-    if T.ndim != 3 or T.shape[1:] != (4, 4) or not len(T):
-        raise InvalidValueError("T", f"an array of shape {T.shape}", "needs shape (N, 4, 4)")
-    x, y, z = ((T[:, 0, i], T[:, 1, i], T[:, 2, i]) for i in range(3))
-    with np.errstate(invalid="ignore", over="ignore"):
-        good = _dot(_cross(x, y), z) > 0.0
-        for a, b in ((x, y), (y, z), (z, x)):
-            good &= (abs(_dot(a, b)) <= PERPENDICULAR_TOLERANCE) & (abs(_dot(a, a) - 1.0) <= 2.0 * UNIT_TOLERANCE)
-        good &= np.isfinite(T[:, 0, 3] + T[:, 1, 3] + T[:, 2, 3])
-    for column, value in enumerate((0.0, 0.0, 0.0, 1.0)):
-        good &= T[:, 3, column] == value
-    if not good.all():
-        row = int(np.argmin(good))
-        Pose.from_matrix(T[row])  # It names what is wrong with most of them.
-        raise InvalidValueError(f"T at row {row} (from 0)", T[row].tolist(), "is not a proper rigid transform")
-    return T
 
 
 def inverse_batch(arm: ArmGeometry, T_base_flange: Array, psi: ArrayLike = 0.0) -> Array:
     """Returns the 8 branches of the inverse at many poses, without regard to joint limits.
 
     Args:
-        arm: From `rcilab.model.kinematics.inverse.build_geometry`.
+        arm: From `build_geometry`.
         T_base_flange: Poses of the flange in base, shape (N, 4, 4).
         psi: Arm angle of a 7-axis arm, [rad], one number or shape (N,); of no meaning for 6 axes.
 

@@ -1,0 +1,33 @@
+"""Which solver an arm gets, by its Denavit-Hartenberg table."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+from rcilab.core.errors import ModelError
+from rcilab.model.kinematics.solvers.numeric.solver import NumericSolver
+from rcilab.model.kinematics.solvers.offset7.arm import build_offset_geometry
+from rcilab.model.kinematics.solvers.offset7.solver import OffsetSeven
+from rcilab.model.kinematics.solvers.solver import KinematicsSolver
+from rcilab.model.kinematics.solvers.spherical.inverse import build_geometry
+from rcilab.model.kinematics.solvers.spherical6 import SphericalSix
+from rcilab.model.kinematics.solvers.spherical7 import SphericalSeven
+from rcilab.robots.description import RobotDescription
+
+
+@lru_cache(maxsize=16)
+def build_solver(description: RobotDescription) -> KinematicsSolver:
+    """Returns the closed-form solver for the build of an arm, or the numeric one where there is no closed form.
+
+    Raises:
+        ModelError: The arm has more than 7 joints.
+    """
+    try:
+        geometry = build_geometry(description)
+        return SphericalSeven(geometry) if geometry.n == 7 else SphericalSix(geometry)
+    except ModelError:
+        pass
+    try:
+        return OffsetSeven(build_offset_geometry(description))
+    except ModelError:
+        return NumericSolver(description)
