@@ -13,6 +13,7 @@ from rcilab.model.kinematics.forward import Chain, forward
 from rcilab.model.kinematics.jacobian import tool_jacobian
 
 _ROUNDS = 12  # Of Newton's method; beside the stretched arm two solutions meet, and the first steps only halve.
+_SLOW_ROUNDS = 40
 _LONGEST = 0.5  # [rad] Of its steps.
 _ALMOST = 3e-7  # [m] and [rad] What is missing before a step that leaves rounding, as each squares it.
 _GOOD = 1e-10  # [m] and [rad] What counts as the pose at the end.
@@ -22,7 +23,7 @@ _SETTLED = 1e-12  # [m] and [rad] What counts as the pose for one alone.
 
 
 def settle(
-    chain: Chain, held: int | None, rotations: Array, positions: Array, q: Array
+    chain: Chain, held: int | None, rotations: Array, positions: Array, q: Array, *, slowly: bool = False
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Returns joint angles next to guesses that put the flange at poses, by Newton's method.
 
@@ -32,6 +33,7 @@ def settle(
         rotations: Flange in base, shape (M, 3, 3).
         positions: Flange in base, shape (M, 3), [m].
         q: Guesses, shape (M, n), [rad].
+        slowly: Whether to go on until rounding stops it, as it takes where two solutions are about to meet.
 
     Returns:
         Joint angles, shape (M, n), [rad], and which of them are solutions, shape (M,).
@@ -40,14 +42,14 @@ def settle(
     free = free_joints(chain, held)
     error = np.full(len(q), np.inf)
     active = np.arange(len(q))
-    for _ in range(_ROUNDS):
+    for _ in range(_SLOW_ROUNDS if slowly else _ROUNDS):
         J, miss = differential(chain, q[active], rotations[active], positions[active])
         error[active] = np.abs(miss).max(axis=1)
         step = solved(J[:, :, free], miss)
         step *= np.minimum(1.0, _LONGEST / np.maximum(np.abs(step).max(axis=1, keepdims=True), 1e-300))
         before = error[active]
         q[active[:, None], free] += step
-        active = active[before > _ALMOST]
+        active = active[before > (_GOOD / 10.0 if slowly else _ALMOST)]
         if not len(active):
             break
     _, miss = differential(chain, q, rotations, positions)

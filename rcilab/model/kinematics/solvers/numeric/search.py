@@ -13,7 +13,8 @@ from rcilab.model.kinematics.forward import Chain
 from rcilab.model.kinematics.solvers.newton import cross, free_joints, jacobians, settle
 from rcilab.model.kinematics.solvers.solver import Angles
 
-_STEPS = 40  # Of damped least squares; a start that has not converged by then seldom does.
+_STEPS = 18  # Of damped least squares; a start that has not converged by then seldom does.
+_GAIN = 0.02  # Damping by the square of what is missing: more is slower, less jumps further.
 _DAMPING = 1e-3  # Least damping, lengths as shares of the reach: bounds steps close to singularities.
 _LONGEST = 0.7  # [rad] Of a step: longer ones leave the region in which the Jacobian says anything.
 _ALMOST = 1e-3  # What is missing, lengths as shares of the reach, when Newton's method takes over.
@@ -100,13 +101,18 @@ def search(arm: NumericArm, rotations: Array, positions: Array, q: Array) -> tup
         if not len(active):
             break
         J = scale[:, None] * J[:, :, free]
-        damped = J @ J.transpose(0, 2, 1) + (0.1 * size + _DAMPING * _DAMPING)[:, None, None] * eye
+        damped = J @ J.transpose(0, 2, 1) + (_GAIN * size + _DAMPING * _DAMPING)[:, None, None] * eye
         step = (J.transpose(0, 2, 1) @ np.linalg.solve(damped, miss[..., None]))[..., 0]
         step *= np.minimum(1.0, _LONGEST / np.maximum(np.abs(step).max(axis=1, keepdims=True), 1e-300))
         q[active[:, None], free] += step
     good = np.zeros(len(q), dtype=np.bool_)
     if close.any():
         q[close], good[close] = settle(arm.chain, arm.held, rotations[close], positions[close], q[close])
+        missed = close & ~good
+        if missed.any() and not good.any():  # Where solutions are about to meet, Newton's method halves its steps.
+            q[missed], good[missed] = settle(
+                arm.chain, arm.held, rotations[missed], positions[missed], q[missed], slowly=True
+            )
     return q, good
 
 

@@ -157,7 +157,7 @@ class _NumericPose:
             rotations = np.broadcast_to(pose.rotation, (count, 3, 3))
             q, good = search(arm, rotations, np.broadcast_to(pose.position, (count, 3)), seeds)
             found = arm.distinct(np.concatenate((np.array(found).reshape(-1, arm.n), q[good])))
-            if not found or any(arm.is_inside(branch) for branch in found):
+            if any(arm.is_inside(branch) for branch in found):
                 break
         return found
 
