@@ -63,7 +63,7 @@ def feasible_arcs(
     Singular are the arm angles at which `find_singularity` names one.
 
     Args:
-        arm: Of 7 axes, from `rcilab.model.kinematics.inverse.build_geometry`.
+        arm: Of 7 axes, from `build_geometry`.
         T_base_flange: Pose of the flange in base.
         lower: Smallest joint angles, shape (7,), [rad].
         upper: Largest joint angles, shape (7,), [rad].

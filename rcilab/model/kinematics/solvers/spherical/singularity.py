@@ -22,7 +22,7 @@ def find_singularity(arm: ArmGeometry, q: Sequence[float]) -> str | None:
     6 axes: sin q3 = 0, sin q5 = 0, and the wrist on axis 1 (Siciliano et al., Robotics, 2009, section 3.3).
 
     Args:
-        arm: From `rcilab.model.kinematics.inverse.build_geometry`.
+        arm: From `build_geometry`.
         q: Joint angles, n plain floats, [rad].
     """
     upright = q
@@ -39,7 +39,7 @@ def singularity_path(arm: ArmGeometry, q: JointPath) -> Array:
     It is `SINGULAR` over the sine, or the share of the reach, that the nearest singularity is away.
 
     Args:
-        arm: From `rcilab.model.kinematics.inverse.build_geometry`.
+        arm: From `build_geometry`.
         q: Joint angles, shape (N, n), [rad].
     """
     upright = q - np.array(arm.offsets)
